@@ -1,0 +1,39 @@
+"""fecm: low-velocity impact on laminated composite plates, from the decks of NASA CR-168057.
+
+>>> import fecm
+>>> result = fecm.run("decks/appendix.inp")
+>>> result.force.shape
+(10,)
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from fecm.version import __version__
+
+if TYPE_CHECKING:
+    from fecm.api import run
+    from fecm.deck.findings import DeckError
+    from fecm.deck.reader import read_deck
+    from fecm.impact import DivergenceError
+    from fecm.results.result import Result, load
+
+__all__ = ["DeckError", "DivergenceError", "Result", "__version__", "load", "read_deck", "run"]
+
+_HOMES = {
+    "run": "fecm.api",
+    "DeckError": "fecm.deck.findings",
+    "read_deck": "fecm.deck.reader",
+    "DivergenceError": "fecm.impact",
+    "Result": "fecm.results.result",
+    "load": "fecm.results.result",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first asked for, so that `import fecm` costs nothing."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'fecm' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)

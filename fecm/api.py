@@ -1,0 +1,133 @@
+"""What Python users call: read a deck, run it, load a result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from fecm.check import Checked, check
+from fecm.deck.findings import DeckError, Finding
+from fecm.deck.model import Deck
+from fecm.deck.reader import Reader, load_text
+from fecm.results.result import Result
+from fecm.results.sinks import MemorySink
+from fecm.simulation import simulate
+from fecm.slips import LISTING, REPORT, active_slips
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A file that was read and checked.
+
+    Attributes
+    ----------
+    source : str
+        Its name.
+    problems : list of Checked
+        The problems that could be read.
+    findings : list of Finding
+        Everything that was found, in the deck's order.
+    """
+
+    source: str
+    problems: list[Checked]
+    findings: list[Finding]
+
+    @property
+    def has_errors(self) -> bool:
+        """Whether the deck is unusable."""
+        return any(finding.severity == "error" for finding in self.findings)
+
+
+def prepare(path_or_text: str | Path | Deck, mode: str = REPORT) -> Prepared:
+    """Read and check a deck without running it.
+
+    Parameters
+    ----------
+    path_or_text : str, Path or Deck
+        A file's path, a deck's text, or a model made in Python.
+    mode : str
+        In listing mode blanks inside numbers are zeros.
+
+    Raises
+    ------
+    OSError
+        If the file can't be read.
+    """
+    if isinstance(path_or_text, Deck):
+        text, source = path_or_text.to_text(), "<deck>"
+    else:
+        text, source = load_text(path_or_text)
+    reader = Reader(text, blanks_are_zeros=mode == LISTING)
+    checked = [check(problem, reader.findings) for problem in reader.problems()]
+    problems = [problem for problem in checked if problem is not None]
+    return Prepared(source, problems, list(reader.findings))
+
+
+def run(
+    deck: str | Path | Deck,
+    mode: str = REPORT,
+    slips: Iterable[str] = (),
+    output: str | Path | None = None,
+) -> Result | list[Result]:
+    """Run every problem of a deck.
+
+    Parameters
+    ----------
+    deck : str, Path or Deck
+        A file's path, a deck's text, or a model made in Python.
+    mode : str
+        ``"report"`` or ``"listing"``.
+    slips : iterable of str
+        Single slips to add to report mode.
+    output : str or Path, optional
+        Result file to write, in place of an earlier one; a second problem goes to ``-2.h5``, and so
+        on.  Without it nothing is written.
+
+    Returns
+    -------
+    Result or list of Result
+        A list where the deck holds several problems.
+
+    Raises
+    ------
+    DeckError
+        If the deck has errors.
+    DivergenceError
+        If the motion grows without bound.
+    ValueError
+        If the mode or a slip is unknown.
+    OSError
+        If a file can't be read or written.
+
+    Examples
+    --------
+    >>> result = run("decks/appendix.inp")
+    >>> print(f"{result.force.max():.2f} lb")
+    6.19 lb
+    """
+    active = active_slips(mode, slips)
+    prepared = prepare(deck, mode)
+    if prepared.has_errors:
+        raise DeckError(prepared.findings, prepared.source)
+    results: list[Result] = []
+    for number, problem in enumerate(prepared.problems, start=1):
+        if output is None:
+            memory = MemorySink()
+            simulate(problem, active, memory)
+            results.append(Result(memory.arrays, memory.texts, memory.groups))
+        else:
+            from fecm.results import hdf5
+            from fecm.results.result import load
+
+            path = numbered(Path(output), number)
+            with hdf5.writing(path) as sink:
+                simulate(problem, active, sink)
+            results.append(load(path))
+    return results[0] if len(results) == 1 else results
+
+
+def numbered(path: Path, number: int) -> Path:
+    """Output of problem `number`: the path itself, then with ``-2``, ``-3`` before its suffix."""
+    return path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")

@@ -1,0 +1,264 @@
+"""Indentation laws: the contact force for an indentation and for what came before it.
+
+Every curve of the report's laws (equations 3-1, 3-3 and 3-11) has one form,
+F = f ((a - b)/w)^p, zero for a <= b.  A law's memory is the curve that it is on and the peak where
+the first loading curve was left; memories are never changed but replaced.  Force and indentation
+are positive in compression.  All values are floats, or arrays with one entry a case.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+# A float or an array of floats; a bool or an array of bools.
+Number = Any
+Truth = Any
+
+LOADING_POWER = 1.5
+
+# Branches.
+VIRGIN, UNLOADING, RELOADING = 0, 1, 2
+
+
+def _select(condition: Truth, a: Number, b: Number) -> Number:
+    """`a` where the condition holds, otherwise `b`."""
+    if isinstance(condition, np.ndarray):
+        return np.where(condition, a, b)
+    return a if condition else b
+
+
+def _any(condition: Truth) -> bool:
+    """Whether the condition holds for any case."""
+    return bool(condition.any()) if isinstance(condition, np.ndarray) else bool(condition)
+
+
+@dataclass(frozen=True, slots=True)
+class Constants:
+    """What was measured: EXPE's card.
+
+    Attributes
+    ----------
+    k : float
+        Contact coefficient, force/length^1.5 (equation 3-1).
+    alpha_p, s_p : float
+        Critical indentation (length) and slope of equation 3-8.
+    q : float
+        Power of the unloading curve (equation 3-3).
+    """
+
+    k: Number
+    alpha_p: Number
+    s_p: Number
+    q: Number
+
+    def permanent(self, peak: Number) -> Number:
+        """Permanent indentation after a peak, equation 3-8, never negative (length)."""
+        value = self.s_p * (peak - self.alpha_p)
+        return _select(value > 0.0, value, 0.0)
+
+    def loading(self, indentation: Number) -> Number:
+        """Force on the first loading curve, equation 3-1."""
+        return _power(self.k, 0.0, 1.0, LOADING_POWER, indentation)
+
+
+def _power(f: Number, b: Number, w: Number, p: Number, a: Number) -> Number:
+    """F = f ((a - b)/w)^p, zero for a <= b."""
+    if isinstance(a, np.ndarray):
+        return np.where(a > b, f * (np.maximum(a - b, 0.0) / w) ** p, 0.0)
+    return f * ((a - b) / w) ** p if a > b else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """Where a law stands.
+
+    Attributes
+    ----------
+    branch : int
+        VIRGIN, UNLOADING or RELOADING.
+    f, b, w, p : float
+        The branch's curve F = f ((a - b)/w)^p.
+    peak, peak_force : float
+        Where the first loading curve was left last.
+    permanent : float
+        Permanent indentation after that peak.
+    """
+
+    branch: Number
+    f: Number
+    b: Number
+    w: Number
+    p: Number
+    peak: Number
+    peak_force: Number
+    permanent: Number
+
+    def force(self, indentation: Number) -> Number:
+        """Force on the branch's curve."""
+        return _power(self.f, self.b, self.w, self.p, indentation)
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """An accepted indentation and its force."""
+
+    indentation: Number
+    force: Number
+
+
+class Law(Protocol):
+    """An indentation law."""
+
+    @property
+    def constants(self) -> Constants:
+        """What was measured."""
+        ...
+
+    def start(self) -> Memory:
+        """Memory before the first contact."""
+        ...
+
+    def trial(self, memory: Memory, last: Point, indentation: Number) -> tuple[Number, Memory]:
+        """Contact force at a trial indentation, and the memory to go on with.
+
+        Parameters
+        ----------
+        memory : Memory
+            Where the law stands.
+        last : Point
+            The last accepted point.
+        indentation : float
+            The trial value.
+        """
+        ...
+
+    def accept(self, memory: Memory, last: Point, indentation: Number) -> Memory:
+        """Memory after a step that ended at an indentation."""
+        ...
+
+
+def _start(constants: Constants) -> Memory:
+    zero = 0.0 * constants.k
+    one = zero + 1.0
+    branch = VIRGIN + (zero == one)  # VIRGIN, once a case
+    return Memory(branch, constants.k, zero, one, LOADING_POWER * one, zero, zero, zero)
+
+
+@dataclass(frozen=True, slots=True)
+class MemoryLaw:
+    """The report's law with any number of unloadings and reloadings in any order.
+
+    A fall from the first loading curve (3-1) sets the peak.  Below it every fall follows (3-3) down
+    to the permanent indentation, every rise follows (3-11) back to the peak, and each begins where
+    the other ended, so that the force is continuous.  At the peak the first curve goes on.
+    """
+
+    constants: Constants
+
+    def start(self) -> Memory:
+        """Memory before the first contact."""
+        return _start(self.constants)
+
+    def trial(self, memory: Memory, last: Point, indentation: Number) -> tuple[Number, Memory]:
+        """Contact force at a trial indentation; a trial does not change the memory."""
+        return self._follow(memory, last, indentation).force(indentation), memory
+
+    def accept(self, memory: Memory, last: Point, indentation: Number) -> Memory:
+        """Memory after a step that ended at an indentation."""
+        return self._follow(memory, last, indentation)
+
+    def _follow(self, m: Memory, last: Point, a: Number) -> Memory:
+        """Memory on whose curve `a` lies, coming from the last accepted point."""
+        falls = a < last.indentation
+        virgin = m.branch == VIRGIN
+        leaves = virgin & falls
+        returns = (m.branch != VIRGIN) & (a >= m.peak)
+        turns_up = (m.branch == UNLOADING) & (a > last.indentation) & (a < m.peak)
+        turns_down = (m.branch == RELOADING) & falls
+        if not _any(leaves | returns | turns_up | turns_down):
+            return m
+        c = self.constants
+        peak = _select(leaves, last.indentation, m.peak)
+        peak_force = _select(leaves, c.loading(last.indentation), m.peak_force)
+        permanent = _select(leaves, c.permanent(last.indentation), m.permanent)
+        # Unloading, from the first curve's own point or from a reloading curve's last point.
+        begin = _select(leaves, peak_force, last.force)
+        width = last.indentation - permanent
+        down = Memory(
+            UNLOADING, _select(width > 0.0, begin, 0.0), permanent,
+            _select(width > 0.0, width, 1.0), c.q, peak, peak_force, permanent,
+        )  # fmt: skip
+        up = self._reloading(m, last)
+        first = Memory(VIRGIN, c.k, 0.0, 1.0, LOADING_POWER, m.peak, m.peak_force, m.permanent)
+        return _choose(leaves | turns_down, down, _choose(turns_up, up, _choose(returns, first, m)))
+
+    def _reloading(self, m: Memory, last: Point) -> Memory:
+        """Curve from the last point back to the peak."""
+        loaded = (last.force > 0.0) & (last.force < m.peak_force)
+        ratio = (_select(loaded, last.force, 0.0) / _select(loaded, m.peak_force, 1.0)) ** (
+            1.0 / LOADING_POWER
+        )
+        origin = _select(loaded, (last.indentation - ratio * m.peak) / (1.0 - ratio), m.permanent)
+        # A force that has not fallen below the peak's (the accepted force is one pass older than
+        # the indentation) leaves no room for a curve: it stays constant up to the peak.
+        level = (last.force > 0.0) & (last.force >= m.peak_force)
+        width = m.peak - origin
+        power = _select(level, 0.0, LOADING_POWER)
+        return Memory(
+            RELOADING, _select(width > 0.0, m.peak_force, 0.0), origin,
+            _select(width > 0.0, width, 1.0), power, m.peak, m.peak_force, m.permanent,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class StickyLaw:
+    """The printed program's law (the slip ``reload``), which never goes back a branch.
+
+    The first trial whose force is below the last accepted one ends loading for good; the first
+    trial on the unloading curve whose force is not, begins reloading for good.  Trials count, also
+    those that the contact iteration discards.
+    """
+
+    constants: Constants
+
+    def start(self) -> Memory:
+        """Memory before the first contact."""
+        return _start(self.constants)
+
+    def trial(self, memory: Memory, last: Point, indentation: Number) -> tuple[Number, Memory]:
+        """Contact force at a trial indentation, and the memory that the trial leaves behind."""
+        m, c = memory, self.constants
+        force = m.force(indentation)
+        leaves = (m.branch == VIRGIN) & (force < last.force)
+        if _any(leaves):
+            permanent = c.permanent(last.indentation)
+            width = last.indentation - permanent
+            down = Memory(
+                UNLOADING, _select(width > 0.0, last.force, 0.0), permanent,
+                _select(width > 0.0, width, 1.0), c.q, last.indentation, last.force, permanent,
+            )  # fmt: skip
+            m = _choose(leaves, down, m)
+            force = m.force(indentation)
+        turns = (m.branch == UNLOADING) & (indentation > m.permanent) & (force >= last.force)
+        if _any(turns):
+            up = Memory(
+                RELOADING, m.peak_force * (m.w > 0.0), m.permanent, m.w, LOADING_POWER,
+                m.peak, m.peak_force, m.permanent,
+            )  # fmt: skip
+            m = _choose(turns, up, m)
+            force = m.force(indentation)
+        return force, m
+
+    def accept(self, memory: Memory, last: Point, indentation: Number) -> Memory:
+        """Memory after a step: trials have done everything."""
+        return memory
+
+
+def _choose(condition: Truth, yes: Memory, no: Memory) -> Memory:
+    """One memory or the other, case by case."""
+    if not isinstance(condition, np.ndarray):
+        return yes if condition else no
+    return Memory(*(np.where(condition, getattr(yes, n), getattr(no, n)) for n in Memory.__slots__))

@@ -1,0 +1,172 @@
+"""Laminate stiffness: classical lamination with transverse shear, report section 2.1.
+
+Conventions: layer 1 is the struck face at z = -h/2, the last layer lies at z = +h/2; fibre angles
+are counter-clockwise from the x-axis.  In-plane components are in the order xx, yy, xy (engineering
+shear), transverse shear in the order xz, yz.  No shear correction factor is applied.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.deck.model import Material, Ply
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Laminate:
+    """Stiffness and inertia of a laminate, per area.
+
+    Attributes
+    ----------
+    A, B, D : ndarray (3, 3)
+        Extensional, coupling and bending stiffness (equation 2-18): force/length, force,
+        force*length.
+    shear : ndarray (2, 2)
+        Transverse shear stiffness (equation 2-19), force/length, order xz, yz: A*55, A*45; A*45,
+        A*44.
+    mass : float
+        P of equation 2-24: density times thickness.
+    rotary_inertia : float
+        I of equation 2-24: density times thickness cubed over 12.
+    thickness : float
+        Total thickness.
+    """
+
+    A: Floats
+    B: Floats
+    D: Floats
+    shear: Floats
+    mass: float
+    rotary_inertia: float
+    thickness: float
+
+    @property
+    def is_coupled(self) -> bool:
+        """Whether stretching and bending are coupled (B is not zero beyond rounding)."""
+        scale = np.abs(self.A).max() * self.thickness
+        return bool(np.abs(self.B).max() > 1e-12 * scale)
+
+
+def reduced_stiffness(ply: Ply) -> Floats:
+    """Plane-stress stiffness of a ply in its own axes, equation 2-3.
+
+    Parameters
+    ----------
+    ply : Ply
+        Elastic constants.
+
+    Returns
+    -------
+    ndarray (3, 3)
+        Q, force/area.
+    """
+    e1, e2, nu12 = ply.e1, ply.e2, ply.nu12
+    full = 1.0 - nu12**2 * e2 / e1
+    q12 = nu12 * e2 / full
+    return np.array([[e1 / full, q12, 0.0], [q12, e2 / full, 0.0], [0.0, 0.0, ply.g12]])
+
+
+def transformed_stiffness(q: Floats, angle: float) -> Floats:
+    """Turn a ply's plane-stress stiffness into the laminate's axes, equation 2-5.
+
+    Parameters
+    ----------
+    q : ndarray (3, 3)
+        Stiffness in the ply's axes.
+    angle : float
+        Fibre angle in degrees.
+
+    Returns
+    -------
+    ndarray (3, 3)
+    """
+    m, n = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
+    q11, q22, q12, q66 = q[0, 0], q[1, 1], q[0, 1], q[2, 2]
+    a, b = q11 - q12 - 2.0 * q66, q12 - q22 + 2.0 * q66
+    bar11 = q11 * m**4 + 2.0 * (q12 + 2.0 * q66) * m**2 * n**2 + q22 * n**4
+    bar22 = q11 * n**4 + 2.0 * (q12 + 2.0 * q66) * m**2 * n**2 + q22 * m**4
+    bar12 = (q11 + q22 - 4.0 * q66) * m**2 * n**2 + q12 * (m**4 + n**4)
+    bar16 = a * m**3 * n + b * m * n**3
+    bar26 = a * m * n**3 + b * m**3 * n
+    bar66 = (q11 + q22 - 2.0 * q12 - 2.0 * q66) * m**2 * n**2 + q66 * (m**4 + n**4)
+    return np.array([[bar11, bar12, bar16], [bar12, bar22, bar26], [bar16, bar26, bar66]])
+
+
+def transformed_shear(g13: float, g23: float, angle: float) -> Floats:
+    """Turn a ply's transverse shear stiffness into the laminate's axes, equation 2-5.
+
+    The sign of Q45 is that of the rotation itself; the report's (2-5) has it the wrong way round.
+
+    Returns
+    -------
+    ndarray (2, 2)
+        Force/area, order xz, yz.
+    """
+    m, n = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
+    coupling = (g13 - g23) * m * n
+    return np.array([[g13 * m**2 + g23 * n**2, coupling], [coupling, g13 * n**2 + g23 * m**2]])
+
+
+def laminate(
+    ply: Ply, angles: Sequence[float], thicknesses: Sequence[float], total: float | None = None
+) -> Laminate:
+    """Stack plies, equations 2-18, 2-19 and 2-24.
+
+    Parameters
+    ----------
+    ply : Ply
+        Constants of every layer.
+    angles : sequence of float
+        Fibre angles in degrees, from the struck face at z = -h/2 on.
+    thicknesses : sequence of float
+        Layer thicknesses.
+    total : float, optional
+        Thickness that the inertia is taken with; the sum of the layers without it.
+
+    Returns
+    -------
+    Laminate
+    """
+    faces = np.concatenate(([0.0], np.cumsum(thicknesses)))
+    faces -= faces[-1] / 2.0
+    lower, upper = faces[:-1, None, None], faces[1:, None, None]
+    q = reduced_stiffness(ply)
+    bars = np.array([transformed_stiffness(q, angle) for angle in angles])
+    shears = np.array([transformed_shear(ply.g13, ply.g23, angle) for angle in angles])
+    h = float(faces[-1] - faces[0]) if total is None else total
+    return Laminate(
+        A=(bars * (upper - lower)).sum(axis=0),
+        B=(bars * (upper**2 - lower**2)).sum(axis=0) / 2.0,
+        D=(bars * (upper**3 - lower**3)).sum(axis=0) / 3.0,
+        shear=(shears * (upper - lower)).sum(axis=0),
+        mass=ply.density * h,
+        rotary_inertia=ply.density * h**3 / 12.0,
+        thickness=h,
+    )
+
+
+def laminate_of(material: Material, *, isotropic_g12: bool = False) -> Laminate:
+    """Laminate of a deck's MATE segment; its inertia uses the card's total thickness.
+
+    Parameters
+    ----------
+    material : Material
+        The segment.
+    isotropic_g12 : bool
+        Replace G12 by E1/2(1+nu12) where E1 = E2 (the slip ``g12``).
+    """
+    ply = material.ply
+    if isotropic_g12 and ply.e1 == ply.e2:
+        ply = Ply(
+            ply.density, ply.nu12, ply.e1, ply.e2, ply.e1 / (2.0 * (1.0 + ply.nu12)),
+            ply.g13, ply.g23,
+        )  # fmt: skip
+    angles = [layer.angle for layer in material.layers]
+    thicknesses = [layer.thickness for layer in material.layers]
+    return laminate(ply, angles, thicknesses, material.integration.thickness)

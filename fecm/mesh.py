@@ -1,0 +1,231 @@
+"""The mesh that a deck's cards stand for: generation by increment, and equation numbers.
+
+Nodes, elements and equations are numbered from 1 as on the cards; row n - 1 of an array belongs to
+node or element n.  An absent node of an element, and the equation of a restrained unknown, is 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.deck.findings import Findings, Place
+from fecm.deck.model import (
+    Boundary,
+    Coordinates,
+    Deck,
+    ElementNodes,
+    Elements,
+    Forces,
+    NodeCodes,
+    NodeValues,
+)
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Nodes, elements, restraints and nodal forces of a problem.
+
+    Attributes
+    ----------
+    coordinates : ndarray (numnp, 2)
+        Length; NaN where no card gives the node.
+    elements : ndarray (numel, nen)
+        Node numbers, 0 where absent.
+    codes : ndarray (numnp, 5)
+        Restraint codes; an unknown with a code other than 0 is restrained.
+    forces : ndarray (numnp, 5)
+        Nodal force, or displacement of a restrained unknown.
+    equations : ndarray (numnp, 5)
+        Equation numbers in the order of nodes and their unknowns, 0 where restrained.
+    """
+
+    coordinates: Floats
+    elements: Ints
+    codes: Ints
+    forces: Floats
+    equations: Ints
+
+    @property
+    def number_of_equations(self) -> int:
+        """Number of unknowns that are not restrained."""
+        return int(np.count_nonzero(self.equations))
+
+    @property
+    def given(self) -> Bools:
+        """Which nodes have coordinates."""
+        return ~np.isnan(self.coordinates[:, 0])
+
+    @property
+    def used(self) -> Bools:
+        """Which nodes belong to an element."""
+        used = np.zeros(len(self.coordinates) + 1, dtype=bool)
+        inside = (self.elements >= 0) & (self.elements <= len(self.coordinates))
+        used[np.where(inside, self.elements, 0)] = True
+        return used[1:]
+
+
+def generate(deck: Deck, findings: Findings | None = None) -> Mesh:
+    """Generate nodes, elements, restraints and forces as the listing's GENVEC and PMESH do.
+
+    Parameters
+    ----------
+    deck : Deck
+        The model.
+    findings : Findings, optional
+        Receives what can't be generated.
+
+    Returns
+    -------
+    Mesh
+        What could be generated; complete if there were no findings.
+    """
+    noted = Findings() if findings is None else findings
+    control = deck.control
+    coordinates = np.full((control.numnp, control.ndm), np.nan)
+    elements = np.zeros((control.numel, control.nen), dtype=np.int32)
+    codes = np.zeros((control.numnp, control.ndf), dtype=np.int32)
+    forces = np.zeros((control.numnp, control.ndf))
+    for segment in deck.segments:
+        if isinstance(segment, Coordinates):
+            coordinates[:] = np.nan  # a second COOR starts anew, as in the listing
+            _interpolate(coordinates, segment.records, noted)
+        elif isinstance(segment, Forces):
+            _interpolate(forces, segment.records, noted)
+        elif isinstance(segment, Boundary):
+            _carry(codes, segment.records, noted)
+        elif isinstance(segment, Elements):
+            _step(elements, segment.records, noted)
+    free = codes.ravel() == 0
+    equations = np.where(free, np.cumsum(free), 0).astype(np.int32).reshape(codes.shape)
+    return Mesh(coordinates, elements, codes, forces, equations)
+
+
+def _known_nodes(
+    records: Sequence[NodeValues] | Sequence[NodeCodes], numnp: int, findings: Findings
+) -> Iterator[NodeValues | NodeCodes]:
+    """Yield the records whose node exists; report the others."""
+    for record in records:
+        if 1 <= record.node <= numnp:
+            yield record
+        else:
+            findings.add(
+                "E301",
+                f"Node {record.node} does not exist; the deck has nodes 1 to {numnp}.",
+                record.place("node"),
+            )
+
+
+def _run(start: int, end: int, increment: int) -> Ints:
+    """Node numbers from `start` towards `end`, `end` left out, at steps of `increment`."""
+    step = abs(increment) if end >= start else -abs(increment)
+    return np.arange(start, end, step, dtype=np.int32)
+
+
+def _interpolate(values: Floats, records: Sequence[NodeValues], findings: Findings) -> None:
+    """Fill rows between two cards linearly, adding one constant step at a time (GENVEC)."""
+    last: NodeValues | None = None
+    for record in _known_nodes(records, len(values), findings):
+        if not isinstance(record, NodeValues):
+            continue
+        values[record.node - 1] = record.values
+        if last is not None and last.increment != 0:
+            if record.node == last.node:
+                findings.add(
+                    "E302",
+                    f"Node {record.node} follows itself, so that nothing can be generated.",
+                    record.place("node"),
+                    "a generation increment stands on the card before",
+                )
+            else:
+                run = _run(last.node, record.node, last.increment) - 1
+                if len(run) > 1:
+                    ends = values[record.node - 1] - values[last.node - 1]
+                    steps = np.tile(ends / len(run), (len(run), 1))
+                    steps[0] = values[last.node - 1]
+                    # Summed one by one, so that each node has the listing's own rounding.
+                    values[run[1:]] = np.add.accumulate(steps, axis=0)[1:]
+        last = record
+
+
+def _carry(codes: Ints, records: Sequence[NodeCodes], findings: Findings) -> None:
+    """Set restraint codes; negative ones carry on through generated nodes (PMESH)."""
+    last: NodeCodes | None = None
+    for record in _known_nodes(records, len(codes), findings):
+        if not isinstance(record, NodeCodes):
+            continue
+        row = codes[record.node - 1]
+        row[:] = record.codes
+        if last is not None:
+            before = codes[last.node - 1]
+            row[(row == 0) & (before < 0)] = -1
+            if last.increment != 0 and record.node != last.node:
+                run = _run(last.node, record.node, last.increment) - 1
+                carried = np.logical_or.accumulate(codes[run] < 0, axis=0)[:-1]
+                codes[run[1:]] = np.where(carried, -1, codes[run[1:]])
+        last = record
+
+
+def _step(elements: Ints, records: Sequence[ElementNodes], findings: Findings) -> None:
+    """Set elements; those between two cards add the earlier card's increment (PMESH)."""
+    numel = len(elements)
+    last: ElementNodes | None = None
+    for record in records:
+        number = record.element
+        if not 1 <= number <= numel:
+            findings.add(
+                "E303",
+                f"Element {number} does not exist; the deck has elements 1 to {numel}.",
+                record.place("element"),
+            )
+            continue
+        previous = 0 if last is None else last.element
+        if number <= previous:
+            findings.add(
+                "E304",
+                f"Element {number} stands after element {previous}; elements must ascend.",
+                record.place("element"),
+            )
+            continue
+        if last is None and number > 1:
+            findings.add(
+                "E305",
+                f"Element {number} comes first, so that elements before it are not given.",
+                record.place("element"),
+            )
+        if last is not None:
+            _fill(elements, last, number)
+        elements[number - 1] = record.nodes
+        last = record
+    if last is not None:
+        _fill(elements, last, numel + 1)
+
+
+def _fill(elements: Ints, record: ElementNodes, end: int) -> None:
+    """Generate the elements between a card's own and number `end`."""
+    count = end - record.element - 1
+    if count > 0:
+        nodes = np.asarray(record.nodes, dtype=np.int64)
+        steps = np.arange(1, count + 1)[:, None] * (record.increment or 1)
+        generated = np.where(nodes == 0, 0, nodes + steps)
+        # A node that falls to 0 or beyond the integers is no node; the checks report it.
+        generated = np.where((nodes != 0) & (generated == 0), -1, generated)
+        limits = np.iinfo(np.int32)
+        elements[record.element : end - 1] = np.clip(generated, limits.min, limits.max)
+
+
+def place_of_element(deck: Deck, number: int) -> Place | None:
+    """Where the card stands that gives or generates an element."""
+    segment = deck.last(Elements)
+    best: ElementNodes | None = None
+    for record in segment.records if segment else ():
+        if record.element <= number:
+            best = record
+    return best.place("element") if best else None

@@ -1,0 +1,295 @@
+"""Plate elements: geometry, stiffness, lumped mass and strains of many elements at once.
+
+Conventions: the unknowns of a node are u, v, w, theta_x, theta_y; an element's unknowns run node by
+node.  Rotations have the listing's sign, opposite to the report's phi: transverse shear is
+gamma_xz = w,x - theta_x and gamma_yz = w,y - theta_y, curvature kappa_x = -theta_x,x and
+kappa_y = -theta_y,y.  Arrays over elements have the element first, then the quadrature point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.elements import quadrilateral
+from fecm.elements.quadrature import Rule
+from fecm.laminate import Laminate
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+
+UNKNOWNS = 5
+STRAINS = ("kappa_x", "kappa_y", "kappa_xy", "gamma_yz", "gamma_xz")
+
+
+@dataclass(frozen=True)
+class Family:
+    """Elements that have the same nodes present.
+
+    Attributes
+    ----------
+    rows : ndarray (ne,)
+        The elements' rows in the mesh.
+    nodes : ndarray (ne, nn)
+        Rows of their nodes, from 0.
+    coordinates : ndarray (ne, nn, 2)
+        Length.
+    present : ndarray (9,) of bool
+        Which of the nine nodes they have.
+    """
+
+    rows: NDArray[np.intp]
+    nodes: NDArray[np.intp]
+    coordinates: Floats
+    present: Bools
+
+    def blocks(self, size: int) -> Iterator[Family]:
+        """Cut the family into blocks of at most `size` elements."""
+        for start in range(0, len(self.rows), size):
+            yield self.take(np.arange(start, min(start + size, len(self.rows))))
+
+    def take(self, members: NDArray[np.intp]) -> Family:
+        """Pick some of the family's elements, by their position in it."""
+        return Family(
+            self.rows[members], self.nodes[members], self.coordinates[members], self.present
+        )
+
+
+def families(elements: Ints, coordinates: Floats) -> list[Family]:
+    """Sort elements by the nodes they have.
+
+    Parameters
+    ----------
+    elements : ndarray (numel, nen)
+        Node numbers from 1, 0 where absent.
+    coordinates : ndarray (numnp, 2)
+        Length.
+    """
+    nodes = np.zeros((len(elements), quadrilateral.NODES), dtype=np.intp)
+    nodes[:, : elements.shape[1]] = elements
+    found: list[Family] = []
+    patterns, which = np.unique(nodes > 0, axis=0, return_inverse=True)
+    for number, present in enumerate(patterns):
+        rows = np.flatnonzero(which.ravel() == number)
+        members = nodes[rows][:, present] - 1
+        found.append(Family(rows, members, coordinates[members], present))
+    return found
+
+
+@dataclass(frozen=True)
+class Interpolation:
+    """Shape functions of a family at the points of a rule.
+
+    Attributes
+    ----------
+    N : ndarray (npt, nn)
+        Values.
+    dN : ndarray (ne, npt, 2, nn)
+        Derivatives with respect to x and y, 1/length.
+    area : ndarray (ne, npt)
+        Area that belongs to each point: Jacobian determinant times weight.
+    """
+
+    N: Floats
+    dN: Floats
+    area: Floats
+
+
+def local_shape_functions(family: Family, rule: Rule) -> tuple[Floats, Floats]:
+    """Shape functions of a family's nodes: values (npt, nn), d/dxi and d/deta (npt, 2, nn)."""
+    values, local = quadrilateral.shape_functions(rule.xi, rule.eta, family.present)
+    return values[:, family.present], local[:, :, family.present]
+
+
+def inverse_jacobian(
+    family: Family, local: Floats, *, transposed: bool = False
+) -> tuple[Floats, Floats]:
+    """Inverse of the Jacobian, and its determinant.
+
+    Parameters
+    ----------
+    family : Family
+        The elements.
+    local : ndarray (npt, 2, nn)
+        Derivatives of the shape functions with respect to xi and eta.
+    transposed : bool
+        Give the inverse transposed (the slip ``jacobian``).
+
+    Returns
+    -------
+    inverse : ndarray (ne, npt, 2, 2)
+        dxi_a/dx_i in row i and column a, 1/length.
+    determinant : ndarray (ne, npt)
+        Length squared.
+    """
+    jacobian = np.einsum("pan,eni->epai", local, family.coordinates)  # dx_i/dxi_a
+    inverse = np.linalg.inv(jacobian)
+    if transposed:
+        inverse = inverse.swapaxes(-1, -2)
+    return inverse, np.linalg.det(jacobian)
+
+
+def jacobian_determinants(family: Family, rule: Rule) -> Floats:
+    """Determinant of the Jacobian at the points of a rule, (ne, npt), length squared."""
+    _, local = local_shape_functions(family, rule)
+    return np.asarray(np.linalg.det(np.einsum("pan,eni->epai", local, family.coordinates)))
+
+
+def interpolate(family: Family, rule: Rule, *, transposed: bool = False) -> Interpolation:
+    """Evaluate shape functions and their derivatives in x and y.
+
+    Parameters
+    ----------
+    family : Family
+        The elements.
+    rule : Rule
+        The points.
+    transposed : bool
+        Use the inverse Jacobian transposed (the slip ``jacobian``).
+    """
+    values, local = local_shape_functions(family, rule)
+    inverse, determinant = inverse_jacobian(family, local, transposed=transposed)
+    derivatives = np.einsum("epia,pan->epin", inverse, local)
+    return Interpolation(values, derivatives, determinant * rule.weights)
+
+
+def _membrane_and_bending(at: Interpolation) -> Floats:
+    """Matrix of midplane strains xx, yy, xy and curvatures xx, yy, xy: (ne, npt, 6, 5 nn)."""
+    ne, npt, _, nn = at.dN.shape
+    B = np.zeros((ne, npt, 6, nn, UNKNOWNS))
+    x, y = at.dN[:, :, 0], at.dN[:, :, 1]
+    B[:, :, 0, :, 0] = x
+    B[:, :, 1, :, 1] = y
+    B[:, :, 2, :, 0], B[:, :, 2, :, 1] = y, x
+    B[:, :, 3, :, 3] = -x
+    B[:, :, 4, :, 4] = -y
+    B[:, :, 5, :, 3], B[:, :, 5, :, 4] = -y, -x
+    return B.reshape(ne, npt, 6, nn * UNKNOWNS)
+
+
+def _transverse_shear(at: Interpolation) -> Floats:
+    """Matrix of transverse shear strains xz, yz: (ne, npt, 2, 5 nn)."""
+    ne, npt, _, nn = at.dN.shape
+    B = np.zeros((ne, npt, 2, nn, UNKNOWNS))
+    for row in (0, 1):
+        B[:, :, row, :, 2] = at.dN[:, :, row]
+        B[:, :, row, :, 3 + row] = -at.N
+    return B.reshape(ne, npt, 2, nn * UNKNOWNS)
+
+
+def _integrate(B: Floats, C: Floats, area: Floats) -> Floats:
+    """Sum of B' C B over the points, (ne, n, n); exactly symmetric."""
+    ne, npt, rows, n = B.shape
+    flat = B.reshape(ne, npt * rows, n)
+    weighted = (area[:, :, None, None] * (C @ B)).reshape(ne, npt * rows, n)
+    product = flat.swapaxes(1, 2) @ weighted
+    return np.asarray((product + product.swapaxes(1, 2)) / 2.0)
+
+
+def stiffness(
+    family: Family,
+    laminate: Laminate,
+    bending: Rule,
+    shear: Rule,
+    *,
+    transposed: bool = False,
+) -> Floats:
+    """Stiffness matrices of a family's elements.
+
+    Parameters
+    ----------
+    family : Family
+        The elements.
+    laminate : Laminate
+        Stiffness per area.
+    bending, shear : Rule
+        Quadrature of the membrane and bending energy, and of the transverse shear energy.
+    transposed : bool
+        See :func:`interpolate`.
+
+    Returns
+    -------
+    ndarray (ne, 5 nn, 5 nn)
+    """
+    ABD = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
+    at = interpolate(family, bending, transposed=transposed)
+    K = _integrate(_membrane_and_bending(at), ABD, at.area)
+    at = interpolate(family, shear, transposed=transposed)
+    return K + _integrate(_transverse_shear(at), laminate.shear, at.area)
+
+
+def lumped_mass(family: Family, laminate: Laminate, rule: Rule) -> Floats:
+    """Lumped masses of a family's elements: the consistent matrix' diagonal, scaled to the whole.
+
+    The listing's MASS01; the scaling keeps the element's mass and every entry positive.
+
+    Returns
+    -------
+    ndarray (ne, nn, 5)
+        Mass for u, v, w; mass times length squared for the rotations.
+    """
+    values, _ = local_shape_functions(family, rule)
+    area = jacobian_determinants(family, rule) * rule.weights
+    diagonal = np.einsum("ep,pn->en", area, values**2)
+    share = diagonal * (area.sum(axis=1) / diagonal.sum(axis=1))[:, None]
+    inertia = np.repeat([laminate.mass, laminate.rotary_inertia], (3, 2))
+    return np.asarray(share[:, :, None] * inertia)
+
+
+class StrainField:
+    """Curvatures and transverse shear strains at the same points of every element.
+
+    Parameters
+    ----------
+    elements : ndarray (numel, nen)
+        Node numbers from 1, 0 where absent.
+    coordinates : ndarray (numnp, 2)
+        Length.
+    rule : Rule
+        The points.
+    transposed : bool
+        See :func:`interpolate`.
+    """
+
+    def __init__(
+        self, elements: Ints, coordinates: Floats, rule: Rule, *, transposed: bool = False
+    ) -> None:
+        self.shape = (len(elements), len(rule.xi))
+        self._parts: list[tuple[Family, Floats, Floats]] = []
+        for family in families(elements, coordinates):
+            values, local = local_shape_functions(family, rule)
+            # Columns: d/dxi, d/deta and value at every point, so that one product gives them all.
+            table = np.concatenate([local[:, 0], local[:, 1], values]).T.copy()
+            inverse = inverse_jacobian(family, local, transposed=transposed)[0]
+            self._parts.append((family, table, inverse.transpose(2, 3, 1, 0).copy()))
+
+    def evaluate(self, displacement: Floats) -> Floats:
+        """Strains of a displacement field.
+
+        Parameters
+        ----------
+        displacement : ndarray (numnp, 5)
+            All unknowns of all nodes.
+
+        Returns
+        -------
+        ndarray (5, numel, npt)
+            kappa_x, kappa_y, kappa_xy (1/length), gamma_yz, gamma_xz.
+        """
+        strains = np.empty((len(STRAINS), *self.shape))
+        for family, table, inverse in self._parts:
+            ne, npt = len(family.rows), self.shape[1]
+            q = displacement[family.nodes, 2:].transpose(2, 0, 1).reshape(3 * ne, -1)
+            at = (q @ table).reshape(3, ne, 3, npt).transpose(0, 2, 3, 1)  # unknown, kind, point, e
+            xi, eta, (_, theta_x, theta_y) = at[:, 0], at[:, 1], at[:, 2]
+            w_x, tx_x, ty_x = inverse[0, 0] * xi + inverse[0, 1] * eta
+            w_y, tx_y, ty_y = inverse[1, 0] * xi + inverse[1, 1] * eta
+            # 0.0 - a, so that a plate at rest has no negative zeros.
+            parts = (0.0 - tx_x, 0.0 - ty_y, 0.0 - tx_y - ty_x, w_y - theta_y, w_x - theta_x)
+            for component, values in enumerate(parts):
+                strains[component, family.rows] = values.T
+        return strains

@@ -1,0 +1,196 @@
+"""The projectile: an elastic rod of two-unknown elements, report section 4.3.2.
+
+Conventions: unknowns of a node are u and du/dx, node by node; x runs from the impacted end (node 1)
+into the rod.  Displacement, velocity and acceleration are positive away from the plate, so that an
+approach is negative, and the contact force pushes u at node 1 in the positive direction.  The rod
+knows nothing of the plate or the law.  Every state array has the unknowns first; more axes, one
+column a case, may follow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+WILSON_THETA = 1.4
+
+# The report's steel rod, in lb, in and s: a spherical cap of five steps, then the cylinder.
+REPORT_CAP = (0.22, 0.36, 0.43, 0.48, 0.50)
+REPORT_DIAMETER = 0.625
+REPORT_ELEMENTS = 20
+REPORT_LENGTH = 1.0
+REPORT_MODULUS = 30.0e6
+REPORT_DENSITY = 0.0006875
+LISTING_DENSITY = 0.0003225
+
+
+@dataclass(frozen=True)
+class Rod:
+    """A straight elastic rod of equal elements.
+
+    Attributes
+    ----------
+    length : float
+        Whole length.
+    diameters : tuple of float
+        Diameter of each element, from the impacted end on.
+    modulus : float
+        Young's modulus, force/area.
+    density : float
+        Mass per volume.
+    """
+
+    length: float
+    diameters: tuple[float, ...]
+    modulus: float
+    density: float
+
+    @property
+    def elements(self) -> int:
+        """Number of elements."""
+        return len(self.diameters)
+
+    @property
+    def areas(self) -> Floats:
+        """Cross-section of each element, length squared."""
+        return np.pi * np.array(self.diameters) ** 2 / 4.0
+
+    @property
+    def total_mass(self) -> float:
+        """Mass of the whole rod."""
+        return float(self.density * self.areas.sum() * self.length / self.elements)
+
+    def stiffness(self) -> Floats:
+        """Stiffness matrix of the whole rod, equation 4-23: (n, n)."""
+        L = self.length / self.elements
+        shape = np.array(
+            [
+                [36.0, 3.0 * L, -36.0, 3.0 * L],
+                [3.0 * L, 4.0 * L**2, -3.0 * L, -(L**2)],
+                [-36.0, -3.0 * L, 36.0, -3.0 * L],
+                [3.0 * L, -(L**2), -3.0 * L, 4.0 * L**2],
+            ]
+        )
+        K = np.zeros((2 * self.elements + 2, 2 * self.elements + 2))
+        for element, area in enumerate(self.areas):
+            unknowns = slice(2 * element, 2 * element + 4)
+            K[unknowns, unknowns] += self.modulus * area / (30.0 * L) * shape
+        return K
+
+    def mass(self) -> Floats:
+        """Lumped mass of each unknown, (n,): rho A L/2 for u and rho A L^3/420 for du/dx."""
+        L = self.length / self.elements
+        m = np.zeros(2 * self.elements + 2)
+        for element, area in enumerate(self.areas):
+            share = self.density * area * L * np.array([0.5, L**2 / 420.0])
+            m[2 * element : 2 * element + 4] += np.tile(share, 2)
+        return m
+
+
+def report_rod(density: float = REPORT_DENSITY) -> Rod:
+    """Build the rod that stands in the report's program (lb, in, s)."""
+    rest = REPORT_ELEMENTS - len(REPORT_CAP)
+    diameters = REPORT_CAP + (REPORT_DIAMETER,) * rest
+    return Rod(REPORT_LENGTH, diameters, REPORT_MODULUS, density)
+
+
+@dataclass(slots=True)
+class RodState:
+    """State of a rod.
+
+    Attributes
+    ----------
+    motion : ndarray (3, n, ...)
+        Displacement, velocity and acceleration of every unknown.
+    """
+
+    motion: Floats
+
+    @property
+    def displacement(self) -> Floats:
+        """Displacement of every unknown, (n, ...)."""
+        return np.asarray(self.motion[0])
+
+    @property
+    def velocity(self) -> Floats:
+        """Velocity of every unknown, (n, ...)."""
+        return np.asarray(self.motion[1])
+
+    @property
+    def acceleration(self) -> Floats:
+        """Acceleration of every unknown, (n, ...)."""
+        return np.asarray(self.motion[2])
+
+
+def rigid_approach(rod: Rod, velocity: float, *, derivatives_too: bool = False) -> RodState:
+    """State of a rod that approaches the plate as a rigid body.
+
+    Parameters
+    ----------
+    rod : Rod
+    velocity : float
+        Approach velocity, positive towards the plate, length/time.
+    derivatives_too : bool
+        Start du/dx at the same velocity (the slip ``rod-start``).
+    """
+    motion = np.zeros((3, 2 * rod.elements + 2))
+    motion[1, :: 1 if derivatives_too else 2] = -velocity
+    return RodState(motion)
+
+
+class WilsonStep:
+    r"""One step of Wilson's theta method as a linear map, for a rod and a time step.
+
+    With :math:`y` the state (u, v, a of every unknown) and :math:`f` the force on the tip at
+    :math:`t + \theta \Delta t`, the new state is :math:`y' = T y + h f`.
+
+    Parameters
+    ----------
+    K : ndarray (n, n)
+        Stiffness.
+    m : ndarray (n,)
+        Lumped mass.
+    dt : float
+        Time step.
+    constants_dt : float, optional
+        Time step that the method's constants are made for, if not `dt` (the slip ``rod-dt``).
+
+    Attributes
+    ----------
+    T : ndarray (3 n, 3 n)
+    h : ndarray (3 n,)
+    n : int
+        Number of the rod's unknowns.
+    """
+
+    def __init__(self, K: Floats, m: Floats, dt: float, constants_dt: float | None = None) -> None:
+        theta, tau = WILSON_THETA, dt if constants_dt is None else constants_dt
+        self.dt = dt
+        self.n = n = len(m)
+        a0 = 6.0 / (theta * tau) ** 2
+        a2 = 6.0 / (theta * tau)
+        a4 = a0 / theta
+        one, none = np.eye(n), np.zeros((n, n))
+        effective = np.linalg.inv(K + a0 * np.diag(m))
+        # Written for the increment from u, so that the rigid motion does not cancel against it.
+        acceleration = np.hstack(
+            [
+                -a4 * effective @ K,
+                a4 * a2 * effective * m - a2 / theta * one,
+                2.0 * a4 * effective * m + (1.0 - 3.0 / theta) * one,
+            ]
+        )
+        # The acceleration is linear over the step.
+        velocity = np.hstack([none, one, tau / 2.0 * one]) + tau / 2.0 * acceleration
+        displacement = np.hstack([one, dt * one, tau**2 / 3.0 * one]) + tau**2 / 6.0 * acceleration
+        self.T = np.vstack([displacement, velocity, acceleration])
+        gain = a4 * effective[:, 0]
+        self.h = np.concatenate([tau**2 / 6.0 * gain, tau / 2.0 * gain, gain])
+
+    def free_motion(self, state: RodState) -> Floats:
+        """New state if no force acted on the tip, (3 n, ...)."""
+        return np.asarray(self.T @ state.motion.reshape(3 * self.n, *state.motion.shape[2:]))

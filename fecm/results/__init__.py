@@ -1,0 +1,1 @@
+"""Results: what a run gives, in memory, in HDF5 and as the program's own tapes."""

@@ -1,0 +1,163 @@
+"""Result files: HDF5, written beside their final name and renamed when complete."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.results.schema import (
+    FORMAT,
+    FORMAT_VERSION,
+    GROUP_DESCRIPTIONS,
+    Dataset,
+    ResultFileError,
+)
+
+Array = NDArray[Any]
+
+
+class FileSink:
+    """Writes a result into an open HDF5 file."""
+
+    def __init__(self, file: h5py.File) -> None:
+        self._file = file
+        self._datasets: dict[str, h5py.Dataset] = {}
+
+    def _group(self, name: str) -> h5py.Group:
+        if not name:
+            return self._file
+        new = name not in self._file
+        group = self._file.require_group(name)
+        if new and name in GROUP_DESCRIPTIONS:
+            group.attrs["description"] = GROUP_DESCRIPTIONS[name]
+        return group
+
+    def attributes(self, group: str, values: Mapping[str, Any]) -> None:
+        """Set attributes of a group; a list of strings becomes an array of strings."""
+        target = self._group(group)
+        for name, value in values.items():
+            if isinstance(value, list | tuple):
+                target.attrs.create(name, value, (len(value),), h5py.string_dtype())
+            else:
+                target.attrs[name] = value
+
+    def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
+        """Make a contiguous dataset of its full shape."""
+        made = self._group(dataset.group).create_dataset(dataset.name, shape, dataset.dtype)
+        made.attrs["description"] = dataset.description
+        if dataset.dimension:
+            made.attrs["dimension"] = dataset.dimension
+        self._datasets[dataset.path] = made
+
+    def write(self, path: str, start: int, rows: Array) -> None:
+        """Store rows of a dataset."""
+        self._datasets[path][start : start + len(rows)] = rows
+
+    def text(self, path: str, value: str, description: str) -> None:
+        """Store a text."""
+        made = self._file.create_dataset(path, data=value, dtype=h5py.string_dtype())
+        made.attrs["description"] = description
+
+
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[FileSink]:
+    """Open a result for writing; it gets its final name only when all went well.
+
+    Raises
+    ------
+    OSError
+        If the file can't be written; what stood under the final name is then untouched.
+    """
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        with h5py.File(partial, "w") as file:
+            yield FileSink(file)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+class FileArrays(Mapping[str, Array]):
+    """The datasets of a result file, each read when it is asked for."""
+
+    def __init__(self, path: Path, shapes: dict[str, tuple[int, ...]]) -> None:
+        self.path = path
+        self.shapes = shapes
+        self._read: dict[str, Array] = {}
+
+    def __getitem__(self, key: str) -> Array:
+        if key not in self.shapes:
+            raise KeyError(key)
+        if key not in self._read:
+            with h5py.File(self.path) as file:
+                self._read[key] = np.asarray(file[key][()])
+        return self._read[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.shapes)
+
+    def __len__(self) -> int:
+        return len(self.shapes)
+
+
+def read(path: Path) -> tuple[FileArrays, dict[str, str], dict[str, dict[str, Any]]]:
+    """Datasets, texts and attributes of a result file.
+
+    Raises
+    ------
+    ResultFileError
+        If the file is no HDF5 file, or no result of this format.
+    OSError
+        If it can't be opened.
+    """
+    with Path(path).open("rb"):
+        pass  # a missing or forbidden file says so itself
+    shapes: dict[str, tuple[int, ...]] = {}
+    texts: dict[str, str] = {}
+    groups: dict[str, dict[str, Any]] = {}
+    try:
+        with h5py.File(path) as file:
+            root = _attributes(file)
+            if root.get("format") != FORMAT:
+                raise ResultFileError(f"{path}: this HDF5 file is not a result of fecm")
+            if root.get("format_version") != FORMAT_VERSION:
+                raise ResultFileError(
+                    f"{path}: format version {root.get('format_version')} is not "
+                    f"{FORMAT_VERSION}, which this program reads"
+                )
+            groups[""] = root
+
+            def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
+                if isinstance(item, h5py.Group):
+                    groups[name] = _attributes(item)
+                elif h5py.check_string_dtype(item.dtype):
+                    texts[name] = item.asstr()[()]
+                else:
+                    shapes[name] = item.shape
+
+            file.visititems(visit)
+    except ResultFileError:
+        raise
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+        raise ResultFileError(f"{path}: this is no readable HDF5 file ({error})") from None
+    return FileArrays(Path(path), shapes), texts, groups
+
+
+def _attributes(item: h5py.Group) -> dict[str, Any]:
+    """Attributes as Python values."""
+    values: dict[str, Any] = {}
+    for name, value in item.attrs.items():
+        if isinstance(value, np.ndarray):
+            values[name] = [v.decode() if isinstance(v, bytes) else v for v in value.tolist()]
+        elif isinstance(value, np.generic):
+            values[name] = value.item()
+        else:
+            values[name] = value
+    return values

@@ -1,0 +1,142 @@
+"""A result in Python: arrays by name, from a run or from a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+HISTORY = "history"
+
+
+class Group:
+    """The datasets of one group as attributes: ``result.tape3.w``."""
+
+    def __init__(
+        self, name: str, arrays: Mapping[str, Array], attributes: Mapping[str, Any]
+    ) -> None:
+        self._name = name
+        self._arrays = arrays
+        self.attributes = dict(attributes)
+
+    def __getattr__(self, name: str) -> Array:
+        try:
+            return self._arrays[f"{self._name}/{name}"]
+        except KeyError:
+            raise AttributeError(f"there is no {self._name}/{name} in this result") from None
+
+    def __dir__(self) -> list[str]:
+        own = [p.rpartition("/")[2] for p in self._arrays if p.startswith(f"{self._name}/")]
+        return [*super().__dir__(), *own]
+
+
+class Result:
+    """What a run gave.
+
+    Every dataset is at hand as ``result["tape3/w"]`` and as ``result.tape3.w``; the columns of the
+    history (``time``, ``force``, ``indentation``, ``transducer``, ``displacement``, ``velocity``,
+    ``acceleration``, ``plate_w``, ``step``) also as ``result.force``.  Units are the deck's own.
+
+    Parameters
+    ----------
+    arrays : mapping of str to ndarray
+        Datasets by path.
+    texts : mapping of str to str
+        Texts by path.
+    groups : mapping of str to mapping
+        Attributes of the groups; those of the result itself stand under ``""``.
+    """
+
+    def __init__(
+        self,
+        arrays: Mapping[str, Array],
+        texts: Mapping[str, str],
+        groups: Mapping[str, Mapping[str, Any]],
+    ) -> None:
+        self._arrays = arrays
+        self._groups = groups
+        self.attributes = dict(groups.get("", {}))
+        self.deck = texts.get("deck", "")
+
+    @property
+    def title(self) -> str:
+        """The deck's title."""
+        return str(self.attributes.get("title", ""))
+
+    @property
+    def mode(self) -> str:
+        """``"report"`` or ``"listing"``."""
+        return str(self.attributes.get("mode", ""))
+
+    @property
+    def slips(self) -> tuple[str, ...]:
+        """The slips that were on, sorted."""
+        return tuple(self.attributes.get("slips", ()))
+
+    def __getitem__(self, path: str) -> Array:
+        return self._arrays[path.strip("/")]
+
+    def __contains__(self, path: str) -> bool:
+        return path.strip("/") in self._arrays
+
+    def keys(self) -> list[str]:
+        """Paths of all datasets."""
+        return list(self._arrays)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        if f"{HISTORY}/{name}" in self._arrays:
+            return self._arrays[f"{HISTORY}/{name}"]
+        if any(path.startswith(f"{name}/") for path in self._arrays):
+            return Group(name, self._arrays, self._groups.get(name, {}))
+        raise AttributeError(f"there is no {name} in this result")
+
+    def __dir__(self) -> list[str]:
+        heads = {path.partition("/")[0] for path in self._arrays}
+        columns = [p.partition("/")[2] for p in self._arrays if p.startswith(f"{HISTORY}/")]
+        return [*super().__dir__(), *heads, *columns]
+
+    def __repr__(self) -> str:
+        steps = len(self["history/time"]) if "history/time" in self else 0
+        return f"<fecm result {self.title!r}, {self.mode} mode, {steps} steps>"
+
+
+def load(path: str | Path) -> Result:
+    """Read a result file; datasets are read when they are asked for.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file that ``fecm run`` wrote.
+
+    Raises
+    ------
+    ResultFileError
+        If the file is no result.
+    OSError
+        If it can't be opened.
+
+    Examples
+    --------
+    >>> result = load("appendix.h5")
+    >>> float(result.force.max())  # doctest: +SKIP
+    6.19
+    """
+    from fecm.results import hdf5
+
+    return Result(*hdf5.read(Path(path)))
+
+
+def contact_intervals(force: Array, time: Array) -> list[tuple[float, float]]:
+    """First and last time of every stretch of steps with a contact force."""
+    touching = np.concatenate(([0], np.asarray(force) > 0.0, [0])).astype(int)
+    edges = np.flatnonzero(np.diff(touching))
+    return [
+        (float(time[begin]), float(time[end - 1]))
+        for begin, end in zip(edges[::2], edges[1::2], strict=True)
+    ]

@@ -1,0 +1,144 @@
+"""What a result file holds: every dataset, its shape, its dimension and what it is.
+
+Shapes are given in the sizes of a run: ``steps``, ``n3``, ``n8``, ``n9`` (rows of a group),
+``numnp``, ``ndm``, ``ndf``, ``numel``, ``nen``, ``npt`` (points an element).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+FORMAT = "fecm"
+FORMAT_VERSION = 1
+
+
+class ResultFileError(ValueError):
+    """A file is not a result that this program can read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Dataset:
+    """One dataset of a result.
+
+    Attributes
+    ----------
+    path : str
+        Group and name.
+    shape : tuple
+        Sizes by name, or numbers.
+    description : str
+        What it is.
+    dimension : str
+        Its physical dimension; empty where it has none.
+    dtype : str
+        NumPy's name of its type.
+    """
+
+    path: str
+    shape: tuple[str | int, ...]
+    description: str
+    dimension: str = ""
+    dtype: str = "f8"
+
+    @property
+    def group(self) -> str:
+        """Name of its group."""
+        return self.path.rpartition("/")[0]
+
+    @property
+    def name(self) -> str:
+        """Name in its group."""
+        return self.path.rpartition("/")[2]
+
+
+def _group(
+    group: str, rows: tuple[str | int, ...], *columns: tuple[str, str, str]
+) -> tuple[Dataset, ...]:
+    """Datasets of equal shape: (name, description, dimension)."""
+    return tuple(Dataset(f"{group}/{name}", rows, text, dim) for name, text, dim in columns)
+
+
+def _clock(group: str, rows: str) -> tuple[Dataset, ...]:
+    return (
+        Dataset(f"{group}/step", (rows,), "number of the impact step, from 1", dtype="i8"),
+        Dataset(f"{group}/time", (rows,), "time integrated up to the row's state", "time"),
+    )
+
+
+_CONTACT = (
+    ("force", "contact force, positive in compression", "force"),
+    ("indentation", "indentation of the plate by the projectile", "length"),
+    ("transducer", "force in the projectile at its transducer", "force"),
+    ("displacement", "displacement of the impacted end, positive away from the plate", "length"),
+    ("velocity", "velocity of the impacted end, positive away from the plate", "length/time"),
+    ("acceleration", "acceleration of the impacted end", "length/time^2"),
+)
+
+DATASETS = {
+    dataset.path: dataset
+    for dataset in (
+        Dataset("mesh/coordinates", ("numnp", "ndm"), "nodal coordinates", "length"),
+        Dataset(
+            "mesh/elements", ("numel", "nen"),
+            "node numbers from 1 of every element, 0 where absent", dtype="i4",
+        ),
+        Dataset(
+            "mesh/equations", ("numnp", "ndf"),
+            "equation numbers from 1 of every unknown, 0 where restrained", dtype="i4",
+        ),
+        Dataset("laminate/A", (3, 3), "extensional stiffness, order xx, yy, xy", "force/length"),
+        Dataset("laminate/B", (3, 3), "coupling stiffness, order xx, yy, xy", "force"),
+        Dataset("laminate/D", (3, 3), "bending stiffness, order xx, yy, xy", "force*length"),
+        Dataset(
+            "laminate/shear", (2, 2), "transverse shear stiffness, order xz, yz", "force/length"
+        ),
+        *_clock("tape3", "n3"),
+        Dataset("tape3/w", ("n3", "numnp"), "transverse displacement of every node", "length"),
+        Dataset(
+            "tape3/displacement", ("n3", "numnp", "ndf"),
+            "u, v, w and the rotations theta_x, theta_y of every node",
+            "length (u, v, w), 1 (theta_x, theta_y)",
+        ),
+        *_clock("tape8", "n8"),
+        *_group(
+            "tape8", ("n8", "numel", "npt"),
+            ("kappa_x", "curvature -theta_x,x at every point of every element", "1/length"),
+            ("kappa_y", "curvature -theta_y,y", "1/length"),
+            ("kappa_xy", "twist -theta_x,y - theta_y,x", "1/length"),
+            ("gamma_yz", "transverse shear strain w,y - theta_y", ""),
+            ("gamma_xz", "transverse shear strain w,x - theta_x", ""),
+        ),
+        *_clock("tape9", "n9"),
+        *_group("tape9", ("n9",), *_CONTACT),
+        *_clock("history", "steps"),
+        *_group(
+            "history", ("steps",), *_CONTACT,
+            ("plate_w", "displacement of the impact node that the contact law sees", "length"),
+        ),
+        *_clock("energy", "steps"),
+        *_group(
+            "energy", ("steps",),
+            ("plate_kinetic", "kinetic energy of the plate", "force*length"),
+            ("plate_strain", "strain energy of the plate", "force*length"),
+            ("projectile_kinetic", "kinetic energy of the projectile", "force*length"),
+            ("projectile_strain", "strain energy of the projectile", "force*length"),
+            ("contact_work", "work of the contact force on the indentation", "force*length"),
+            ("external_work", "work of the nodal forces on the plate", "force*length"),
+            (
+                "balance_error",
+                "all energies and the contact work, less the initial energy and external work",
+                "force*length",
+            ),
+        ),
+    )
+}  # fmt: skip
+
+GROUP_DESCRIPTIONS = {
+    "mesh": "the finite element mesh",
+    "laminate": "stiffness of the laminate per area",
+    "tape3": "nodal displacements, stored by DISP",
+    "tape8": "element strains, stored by RODP",
+    "tape9": "contact and the projectile, stored by RODP",
+    "history": "contact and the projectile at every step; row n is the state after step n",
+    "energy": "energies at every step",
+}

@@ -1,0 +1,111 @@
+"""Sinks: where a run's rows go, behind one small interface.
+
+A sink is given every dataset once with its full shape, then its rows in order.  The memory sink
+keeps arrays, the file sink (:mod:`fecm.results.hdf5`) writes them as they come.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.results.schema import Dataset
+
+Array = NDArray[Any]
+
+
+class Sink(Protocol):
+    """Receives a result."""
+
+    def attributes(self, group: str, values: Mapping[str, Any]) -> None:
+        """Set attributes of a group; ``""`` is the file itself."""
+        ...
+
+    def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
+        """Make room for a dataset."""
+        ...
+
+    def write(self, path: str, start: int, rows: Array) -> None:
+        """Store rows of a dataset from row `start` on."""
+        ...
+
+    def text(self, path: str, value: str, description: str) -> None:
+        """Store a text."""
+        ...
+
+
+class MemorySink:
+    """Keeps a result in arrays."""
+
+    def __init__(self) -> None:
+        self.arrays: dict[str, Array] = {}
+        self.texts: dict[str, str] = {}
+        self.groups: dict[str, dict[str, Any]] = {}
+
+    def attributes(self, group: str, values: Mapping[str, Any]) -> None:
+        """Set attributes of a group."""
+        self.groups.setdefault(group, {}).update(values)
+
+    def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
+        """Make room for a dataset."""
+        self.arrays[dataset.path] = np.zeros(shape, dtype=dataset.dtype)
+
+    def write(self, path: str, start: int, rows: Array) -> None:
+        """Store rows of a dataset."""
+        self.arrays[path][start : start + len(rows)] = rows
+
+    def text(self, path: str, value: str, description: str) -> None:
+        """Store a text."""
+        self.texts[path] = value
+
+
+class RowBuffer:
+    """Gathers the rows of one group and hands them to a sink in blocks.
+
+    Parameters
+    ----------
+    sink : Sink
+        Receives the rows.
+    datasets : sequence of Dataset
+        The group's datasets.
+    shapes : sequence of tuple of int
+        Their full shapes, rows first.
+    """
+
+    # Bytes that a block may hold: enough for few writes, little enough to stay unnoticed.
+    BYTES = 4_000_000
+
+    def __init__(
+        self, sink: Sink, datasets: Sequence[Dataset], shapes: Sequence[tuple[int, ...]]
+    ) -> None:
+        self._sink = sink
+        row_bytes = 8 * max(1, sum(math.prod(shape[1:]) for shape in shapes))
+        rows = min(shapes[0][0], max(1, self.BYTES // row_bytes))
+        self._blocks = {
+            d.name: np.empty((rows, *shape[1:]), dtype=d.dtype)
+            for d, shape in zip(datasets, shapes, strict=True)
+        }
+        self._paths = {d.name: d.path for d in datasets}
+        self._room = rows
+        self._filled = 0
+        self._stored = 0
+
+    def put(self, columns: Mapping[str, Any]) -> None:
+        """Add one row; `columns` has a value or an array for every dataset."""
+        for name, block in self._blocks.items():
+            block[self._filled] = columns[name]
+        self._filled += 1
+        if self._filled == self._room:
+            self.flush()
+
+    def flush(self) -> None:
+        """Hand over what was gathered."""
+        if self._filled:
+            for name, block in self._blocks.items():
+                self._sink.write(self._paths[name], self._stored, block[: self._filled])
+        self._stored += self._filled
+        self._filled = 0

@@ -1,0 +1,101 @@
+"""The program's three tapes as text, in the formats of its own WRITE statements.
+
+tape3 holds w of every node, (6E12.4).  In the report's order tape8 holds strains, (2I6,5E12.4), and
+tape9 contact, (6E12.4); under the slip ``tapes`` they change places and the shear strains change
+columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.results.result import Result
+
+Floats = NDArray[np.float64]
+
+CURVATURES = ("kappa_x", "kappa_y", "kappa_xy")
+CONTACT = ("force", "indentation", "transducer", "displacement", "velocity", "acceleration")
+
+
+def fortran_e(value: float) -> str:
+    """Write a number in the format E12.4: ``  0.2322E+01``."""
+    if not np.isfinite(value):
+        text = "NaN" if np.isnan(value) else ("-Infinity" if value < 0 else "Infinity")
+        return text.rjust(12)
+    mantissa, _, power = f"{value:.3e}".partition("e")
+    sign = "-" if mantissa.startswith("-") else ""
+    digits = mantissa.lstrip("-").replace(".", "")
+    exponent = int(power) + (digits != "0000")
+    # A third digit of the exponent takes the place of its letter.
+    mark = f"E{exponent:+03d}" if abs(exponent) < 100 else f"{exponent:+04d}"
+    return f"{sign}0.{digits}{mark}".rjust(12)
+
+
+def _lines(numbers: Floats) -> Iterator[str]:
+    """Lines of six numbers; the last line may be shorter."""
+    for start in range(0, len(numbers), 6):
+        yield "".join(map(fortran_e, numbers[start : start + 6].tolist()))
+
+
+def _displacements(result: Result) -> Iterator[str]:
+    for row in result["tape3/w"]:
+        yield from _lines(row)
+
+
+def _strains(result: Result, shears: tuple[str, str]) -> Iterator[str]:
+    columns = [result[f"tape8/{name}"] for name in (*CURVATURES, *shears)]
+    rows, numel, npt = columns[0].shape
+    for row in range(rows):
+        values = np.stack([column[row] for column in columns], axis=-1).tolist()
+        for element in range(numel):
+            for point in range(npt):
+                text = "".join(map(fortran_e, values[element][point]))
+                yield f"{element + 1:6d}{point + 1:6d}{text}"
+
+
+def _contact(result: Result) -> Iterator[str]:
+    columns = [result[f"tape9/{name}"] for name in CONTACT]
+    for row in np.stack(columns, axis=-1):
+        yield from _lines(row)
+
+
+def tape_texts(result: Result) -> dict[str, Iterator[str]]:
+    """Lines of every tape that the run wrote, by the tape's name."""
+    listing = "tapes" in result.slips
+    strains, contact = ("tape9", "tape8") if listing else ("tape8", "tape9")
+    shears = ("gamma_xz", "gamma_yz") if listing else ("gamma_yz", "gamma_xz")
+    texts: dict[str, Iterator[str]] = {}
+    if "tape3/w" in result:
+        texts["tape3"] = _displacements(result)
+    if "tape8/kappa_x" in result:
+        texts[strains] = _strains(result, shears)
+    if "tape9/force" in result:
+        texts[contact] = _contact(result)
+    return dict(sorted(texts.items()))
+
+
+def write_tapes(result: Result, folder: Path) -> list[Path]:
+    """Write the tapes into a folder, which is made if it is not there.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+
+    Raises
+    ------
+    OSError
+        If a file can't be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    written: list[Path] = []
+    for name, lines in tape_texts(result).items():
+        path = folder / name
+        with path.open("w", encoding="ascii", newline="\n") as file:
+            file.writelines(f"{line}\n" for line in lines)
+        written.append(path)
+    return written

@@ -1,0 +1,159 @@
+"""Slips: where the report's printed program leaves the report's text, or its own sense.
+
+This table is the only place that knows them: the two modes, the single slips of a run, the
+parameters that they change and the errata page are all made from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+REPORT = "report"
+LISTING = "listing"
+MODES = (REPORT, LISTING)
+
+
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """One difference between the printed program and the report.
+
+    Attributes
+    ----------
+    name : str
+        What a user calls it by.
+    listing : str
+        What the printed program does.
+    report : str
+        What the report says, or means.
+    """
+
+    name: str
+    listing: str
+    report: str
+
+
+SLIPS = (
+    Slip(
+        "target",
+        "The impact node's equation number is looked up before equations are numbered, so the "
+        "contact law sees a plate that stands still, though the plate does feel the force.",
+        "The indentation is the projectile's approach less the plate's own displacement.",
+    ),
+    Slip(
+        "density",
+        "The rod's mass density is 0.0003225, its mass 8.49e-5 lb s²/in.",
+        "The rod's mass density is 0.0006875, its mass 1.8096e-4, the .000181 of page 81.",
+    ),
+    Slip(
+        "rod-start",
+        "The rod's strain unknowns start at the impact velocity too, which makes a force of "
+        "109 lb in the transducer out of nothing.",
+        "The rod starts as a rigid body: its strain unknowns start at zero.",
+    ),
+    Slip(
+        "reload",
+        "The first fall of the force, however small, ends loading for good, and the first rise "
+        "after it begins reloading for good.",
+        "Loading, unloading and reloading may follow each other any number of times; the force "
+        "is continuous at every turn.",
+    ),
+    Slip(
+        "jacobian",
+        "The inverse Jacobian is used transposed: harmless where element sides are parallel to "
+        "the axes, wrong on any other element.",
+        "Derivatives are taken with the inverse Jacobian.",
+    ),
+    Slip(
+        "station",
+        "The transducer is E A du/dx at the rod's node 12 (x = 0.55 in), negative in compression.",
+        "The transducer is the force at the rod's midpoint, positive in compression.",
+    ),
+    Slip(
+        "tapes",
+        "Contact goes to tape8 at every step; strains go to tape9, at Gauss points of order L1, "
+        "one step old, and with γxz before γyz.",
+        "Strains go to tape8 at the points that K names, γyz before γxz; contact goes to tape9; "
+        "both every N steps and of the same instant.",
+    ),
+    Slip(
+        "g12",
+        "Where E1 = E2 the card's G12 is replaced by E1/2(1+ν12), as if the ply were isotropic.",
+        "The card's G12 holds, as a woven ply needs it.",
+    ),
+    Slip(
+        "shear-order",
+        "L2 is read and not used; transverse shear is integrated with order L1.",
+        "Bending is integrated with order L1, transverse shear with L2.",
+    ),
+    Slip(
+        "time",
+        "The macro TIME is skipped, so that the clock of PROP and STRE stands at 0.",
+        "TIME advances the clock by DT.",
+    ),
+    Slip(
+        "prop",
+        "The proportional load is only ever taken at t = 0, and reading its table returns none.",
+        "The proportional load is taken at the clock's time.",
+    ),
+    Slip(
+        "force-scale",
+        "Every FORC value is scaled by the contact force, prescribed displacements too.",
+        "FORC has its proportional load; the contact force acts on the impact unknown alone.",
+    ),
+    Slip(
+        "rod-dt",
+        "The rod's integration keeps the constants of the first DT for good.",
+        "The rod's integration follows DT.",
+    ),
+    Slip(
+        "check-end",
+        "The macro CHEC ends the macro program.",
+        "CHEC reports and the program goes on.",
+    ),
+)
+NAMES = tuple(slip.name for slip in SLIPS)
+
+
+def active_slips(mode: str = REPORT, single: Iterable[str] = ()) -> frozenset[str]:
+    """Names of the slips that are on.
+
+    Parameters
+    ----------
+    mode : str
+        ``"report"`` has none, ``"listing"`` all of them.
+    single : iterable of str
+        Single slips to add to report mode.
+
+    Raises
+    ------
+    ValueError
+        If the mode or a slip is unknown, or single slips are given in listing mode.
+    """
+    names = frozenset(single)
+    if mode not in MODES:
+        raise ValueError(f"unknown mode {mode!r}; known are {', '.join(MODES)}")
+    if unknown := sorted(names - set(NAMES)):
+        raise ValueError(f"unknown slip {unknown[0]!r}; known are {', '.join(NAMES)}")
+    if mode == LISTING:
+        if names:
+            raise ValueError("listing mode has every slip; single slips go with report mode")
+        return frozenset(NAMES)
+    return names
+
+
+def errata() -> str:
+    """Write the errata page, in Markdown."""
+    lines = [
+        "# Errata: the report's program against the report",
+        "",
+        "`fecm run` follows the report's text (`--mode report`) or its printed program",
+        "(`--mode listing`). They differ in the slips below. `--slip NAME`, which may be repeated,",
+        "adds single ones to report mode, so that you can see what each of them does.",
+        "",
+        "| slip | the printed program | the report |",
+        "|---|---|---|",
+        *(f"| `{slip.name}` | {slip.listing} | {slip.report} |" for slip in SLIPS),
+        "",
+    ]
+    return "\n".join(lines)
