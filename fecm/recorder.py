@@ -67,7 +67,8 @@ class Recorder:
     contact_at_every_step : bool
         Store contact at every step instead of at every N-th (the slip ``tapes``).
     watches : bool
-        Stop the run when its energy grows without bound.
+        Stop the run when its energy grows without bound; it is stopped in any case when the energy
+        is no longer finite.
     """
 
     def __init__(
@@ -221,6 +222,10 @@ class Recorder:
         self._contact_rows.clear()
 
     def _watch(self, table: Mapping[str, Floats], held: Floats) -> None:
+        lost = ~np.isfinite(held)
+        if lost.any():
+            row = int(np.flatnonzero(lost)[0])
+            raise DivergenceError(int(table["step"][row]), "the motion is no longer finite")
         given = self._initial + np.maximum.accumulate(np.abs(table["external_work"]))
         lost = ~(np.abs(held) <= GROWTH * given) & (given > 0.0)
         if self._watches and lost.any():

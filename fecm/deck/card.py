@@ -6,8 +6,8 @@ values separated by commas, in the same order; everything from ``!`` on is a com
 
 from __future__ import annotations
 
-import math
 import re
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -17,6 +17,8 @@ from fecm.deck.findings import Findings, Place
 from fecm.deck.numbers import format_real, parse_integer, parse_real
 
 Value = int | float | str
+
+LARGEST_INTEGER = 2**31 - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +149,7 @@ def read_values(
         One value a field; None after an error.
     """
     source = Source(card, fields)
+    fixed = "," not in card.data
     if "\t" in card.data:
         column = card.data.index("\t") + 1
         findings.add(
@@ -156,9 +159,7 @@ def read_values(
             "write blanks instead of tabs",
         )
         return None
-    pieces = card.cut(fields)
-    fixed = "," not in card.data
-    if fixed and (straddle := _straddling(card, fields)) and not blanks_are_zeros:
+    if fixed and not blanks_are_zeros and (straddle := _straddling(card, fields)):
         first, last = straddle
         findings.add(
             "E105",
@@ -167,36 +168,45 @@ def read_values(
             "right-justify each number in its own columns",
         )
         return None
-    extra = (
-        card.data[fields[-1].last :].strip()
-        if fixed
-        else ",".join(text for _, text in pieces[len(fields) :])
-    )
-    if extra:
-        first = card.data.rindex(extra) + 1 if extra in card.data else 1
+    pieces = card.cut(fields)
+    _warn_of_rest(card, fields, pieces, findings)
+    texts = [text for _, text in pieces[: len(fields)]]
+    texts += [""] * (len(fields) - len(texts))
+    values: list[Value | None] = []
+    for field, text in zip(fields, texts, strict=True):
+        if field.kind == "A":
+            values.append(text.rstrip())
+        else:
+            values.append(_number(field, text, source, findings, fixed and blanks_are_zeros))
+    sound = [value for value in values if value is not None]
+    return sound if len(sound) == len(values) else None
+
+
+def _warn_of_rest(
+    card: Card, fields: Fields, pieces: Sequence[tuple[int, str]], findings: Findings
+) -> None:
+    """Warn of what stands behind the last field."""
+    if "," in card.data:
+        rest = [piece for piece in pieces[len(fields) :] if piece[1]]
+        first = rest[0][0] if rest else 0
+    else:
+        tail = card.data[fields[-1].last :]
+        first = len(card.data) - len(tail.lstrip()) + 1 if tail.strip() else 0
+    if first:
+        extra = card.data[first - 1 :]
         findings.add(
             "W106",
             f"`{extra}` stands beyond the last field of the card and is not read.",
-            Place(card.line, first, first + len(extra) - 1, card.text),
+            Place(card.line, first, len(card.data), card.text),
         )
-    pieces += [(len(card.data) + 1, "")] * (len(fields) - len(pieces))
-    values: list[Value] = []
-    sound = True
-    for field, (_, text) in zip(fields, pieces, strict=False):
-        value = _value(field, text, source, findings, fixed and blanks_are_zeros, fixed)
-        sound = sound and value is not None
-        values.append(0 if value is None else value)
-    return values if sound else None
 
 
-def _value(
-    field: Field, text: str, source: Source, findings: Findings, zeros: bool, fixed: bool
-) -> Value | None:
-    """One value, or None after noting what is wrong with it."""
-    if field.kind == "A":
-        return text.rstrip()
-    squeezed = text.replace(" ", "")
+def _number(
+    field: Field, text: str, source: Source, findings: Findings, zeros: bool
+) -> int | float | None:
+    """A field's number, or None after noting what is wrong with it."""
     parse = parse_integer if field.kind == "I" else parse_real
+    squeezed = text.replace(" ", "")
     if not squeezed:
         return 0 if field.kind == "I" else 0.0
     plain = parse(squeezed)
@@ -204,38 +214,47 @@ def _value(
     place = source.place(field.name)
     if plain is None and padded is None:
         kind = "whole number" if field.kind == "I" else "number"
-        hint = ""
-        if field.kind == "I" and parse_real(squeezed) is not None:
-            hint = "this field takes no decimal point"
-        elif re.search("[A-Za-z]", squeezed):
-            hint = "a letter stands where a digit belongs"
-        findings.add("E101", f"`{text.strip()}` is not a {kind}.", place, hint)
+        findings.add("E101", f"`{text.strip()}` is not a {kind}.", place, _why(field, squeezed))
         return None
+    value = padded if zeros else plain
     if plain != padded:
-        was = "no number" if padded is None else f"{padded:g}"
-        if zeros and padded is not None:
-            findings.add(
-                "W104",
-                f"A blank inside `{text}` was read as a zero: the value is {was}.",
-                place,
-            )
-            return padded
-        justified = squeezed.rjust(field.width)
-        text_then = source.card.data.ljust(field.last)
-        card = text_then[: field.first - 1] + justified + text_then[field.last :]
-        where = "inside" if " " in text.strip() else "behind"
+        if not zeros or value is None:
+            _refuse_blank(field, text, padded, source, findings)
+            return None
         findings.add(
-            "E104",
-            f"A blank stands {where} the number `{text.strip()}`; on the report's machine it was "
-            f"a zero and the value {was}.",
-            place,
-            f"right-justified, the card is `{card.rstrip()}`" if fixed else "take the blank out",
+            "W104", f"A blank inside `{text}` was read as a zero: the value is {value:g}.", place
         )
-        return None
-    if isinstance(plain, float) and not math.isfinite(plain):
+    if value is None or abs(value) > (LARGEST_INTEGER if field.kind == "I" else sys.float_info.max):
         findings.add("E107", f"`{text.strip()}` is too large a number.", place)
         return None
-    return plain
+    return value
+
+
+def _why(field: Field, text: str) -> str:
+    """What keeps a text from being a number."""
+    if field.kind == "I" and parse_real(text) is not None:
+        return "this field takes no decimal point"
+    if re.search("[A-Za-z]", text):
+        return "a letter stands where a digit belongs"
+    return ""
+
+
+def _refuse_blank(
+    field: Field, text: str, padded: float | None, source: Source, findings: Findings
+) -> None:
+    """Report a blank that would change a value, with the card as it was meant."""
+    was = "no number" if padded is None else f"{padded:g}"
+    where = "inside" if " " in text.strip() else "behind"
+    line = source.card.data.ljust(field.last)
+    justified = text.replace(" ", "").rjust(field.width)
+    meant = (line[: field.first - 1] + justified + line[field.last :]).rstrip()
+    findings.add(
+        "E104",
+        f"A blank stands {where} the number `{text.strip()}`; on the report's machine it was a "
+        f"zero and the value {was}.",
+        source.place(field.name),
+        "take the blank out" if "," in line else f"right-justified, the card is `{meant}`",
+    )
 
 
 def _straddling(card: Card, fields: Fields) -> tuple[int, int] | None:
@@ -264,14 +283,13 @@ def write_card(fields: Fields, values: Sequence[Value]) -> str:
     ValueError
         If a number is not finite.
     """
-    texts = [_written(field, value) for field, value in zip(fields, values, strict=True)]
-    if any(text is None for text in texts):
-        free = [str(v) if isinstance(v, str) else repr(v) for v in values]
-        return ", ".join(free)
     line = ""
-    for field, text in zip(fields, texts, strict=True):
+    for field, value in zip(fields, values, strict=True):
+        text = _written(field, value)
+        if text is None:
+            return ", ".join(str(v) if isinstance(v, str) else repr(v) for v in values)
         line = line.ljust(field.first - 1)
-        line += text.ljust(field.width) if field.kind == "A" else (text or "").rjust(field.width)  # type: ignore[union-attr]
+        line += text.ljust(field.width) if field.kind == "A" else text.rjust(field.width)
     return line.rstrip()
 
 

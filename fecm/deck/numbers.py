@@ -10,6 +10,8 @@ import re
 from collections.abc import Iterator
 from decimal import Decimal
 
+# Digits of the longest integer that is looked at.
+_LONGEST = 40
 _INTEGER = re.compile(r"[+-]?[0-9]+")
 _REAL = re.compile(
     r"(?P<mantissa>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))"
@@ -18,8 +20,11 @@ _REAL = re.compile(
 
 
 def parse_integer(text: str) -> int | None:
-    """Read an I field without blanks in it; None when it is no whole number."""
-    return int(text) if _INTEGER.fullmatch(text) else None
+    """Read an I field without blanks in it; None when it is no whole number.
+
+    Digits beyond what any count can have are cut off, so that their number takes no time.
+    """
+    return int(text[:_LONGEST]) if _INTEGER.fullmatch(text) else None
 
 
 def parse_real(text: str) -> float | None:

@@ -34,7 +34,6 @@ from fecm.deck.model import (
     Page,
     Ply,
     PrintOption,
-    Record,
     Segment,
     code_fields,
     element_fields,
@@ -159,7 +158,7 @@ class Reader:
             self._control = Control(*map(int, values), source=Source(card, Control.fields))
             self._check_control(self._control)
         segments = self._mesh_and_data(title)
-        macros = self._program(title)
+        macros = self._program(title) if self._next < len(self._cards) else []
         text = "\n".join(c.text.rstrip() for c in self._cards[first : self._next])
         deck = None
         if self._control is not None:
@@ -182,6 +181,18 @@ class Reader:
             sound = False
             self.findings.add("E201", message, control.place(name), hint)
 
+        values = control.values()
+        if values[-1] == 0:
+            missing = [f.name for f, value in zip(Control.fields, values, strict=True) if not value]
+            first = missing[0]
+            are = "is" if len(missing) == 1 else "are"
+            refuse(
+                first,
+                f"{', '.join(missing)} {are} missing on the control card.",
+                "(6I5): NUMNP, NUMEL, LAYER, NDM, NDF, NEN",
+            )
+            self._control = None
+            return
         for name, count in (
             ("NUMNP", control.numnp), ("NUMEL", control.numel), ("LAYER", control.layers)
         ):  # fmt: skip
@@ -232,7 +243,7 @@ class Reader:
     def _stray(self, card: Card, known: list[str]) -> None:
         """Report a card where a keyword should stand, once for all that follow it."""
         if card.is_keyword:
-            near = difflib.get_close_matches(card.keyword, known, 1, 0.5)
+            near = _close(card.keyword, known)
             self._unsound.update(near)
             self.findings.add(
                 "E005",
@@ -240,6 +251,8 @@ class Reader:
                 Place(card.line, 1, min(4, len(card.data)), card.text),
                 f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}",
             )
+            if near == [MACROS]:
+                return
         elif card.keyword.lstrip()[:1].isalpha():
             self.findings.add(
                 "E005",
@@ -416,7 +429,15 @@ class Reader:
             if card.keyword in (TITLE, STOP):
                 self._give_back()
                 break
+            if card.is_keyword and not _close(card.keyword, [MACROS]):
+                self._give_back()
+                self.findings.add(
+                    "E009", "No MACR card stands before the macro program.", card.place
+                )
+                return self._macros(card)
             self._stray(card, [MACROS])
+            if card.is_keyword:  # MACR misspelt: what follows is the program all the same
+                return self._macros(card)
         self.findings.add(
             "E009", "The problem has no macro program.", title.place, "it begins with a MACR card"
         )
@@ -445,6 +466,11 @@ class Reader:
         self.findings.add("E004", "The macro program is not ended by END.", (card or head).place)
         self._unsound.add(MACROS)
         return macros
+
+
+def _close(word: str, known: list[str]) -> list[str]:
+    """The known word that a misspelt one most likely means, or nothing."""
+    return difflib.get_close_matches(word, known, 1, 0.6)
 
 
 def _node_values(rows: list[tuple[list[Value], Source]]) -> list[NodeValues]:
@@ -503,12 +529,3 @@ def load_text(path_or_text: str | Path) -> tuple[str, str]:
     if isinstance(path_or_text, str) and ("\n" in path_or_text or not path_or_text.strip()):
         return path_or_text, "<text>"
     return decode(Path(path_or_text).read_bytes()), str(path_or_text)
-
-
-def records(deck: Deck) -> list[Record]:
-    """Every record of a deck that numbers nodes, in its order."""
-    found: list[Record] = []
-    for segment in deck.segments:
-        if isinstance(segment, Coordinates | Forces | Boundary | Elements):
-            found.extend(segment.records)
-    return found

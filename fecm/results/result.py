@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -83,9 +83,9 @@ class Result:
     def __contains__(self, path: str) -> bool:
         return path.strip("/") in self._arrays
 
-    def keys(self) -> list[str]:
-        """Paths of all datasets."""
-        return list(self._arrays)
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the paths of all datasets."""
+        return iter(self._arrays)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):

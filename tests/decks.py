@@ -1,0 +1,63 @@
+"""Decks for the tests: small plates that run in milliseconds, and the report's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+DATA = Path(__file__).parent / "data"
+APPENDIX = ROOT / "decks" / "appendix.inp"
+LONG = ROOT / "decks" / "impact-115.inp"
+
+# A 2 x 2 in plate of four 9-node elements, hit in the middle.
+MESH = """\
+COOR
+    1    1       0.0       0.0
+    5    0       2.0       0.0
+    6    1       0.0       0.5
+   10    0       2.0       0.5
+   11    1       0.0       1.0
+   15    0       2.0       1.0
+   16    1       0.0       1.5
+   20    0       2.0       1.5
+   21    1       0.0       2.0
+   25    0       2.0       2.0
+
+ELEM
+    1    1    3   13   11    2    8   12    6    7    2
+    3   11   13   23   21   12   18   22   16   17    2
+
+BOUN
+    1    1   -1   -1    0    0    0
+   25    0    1    1    0    0    0
+
+"""
+DATA_CARDS = """\
+ROD
+   13    3     115.0
+EXPE
+  1912000. 0.0006564     0.094       2.0
+MATE
+    3    3   -3      .106
+  0.000148       0.3 17500000.  1150000.   800000.   800000.   800000.
+    1   0.     0.053
+    2  90.     0.053
+"""
+PROGRAM = """\
+LMAS
+DT        .5E-6
+LOOP         10
+TIME
+RODP          5
+DISP          5
+NEXT
+"""
+
+
+def small(
+    program: str = PROGRAM, *, mesh: str = MESH, data: str = DATA_CARDS, stop: bool = True
+) -> str:
+    """A deck of one small problem."""
+    end = "STOP\n" if stop else ""
+    control = "   25    4    2    2    5    9\n"
+    return f"FECM small plate\n{control}{mesh}{data}END\nMACR\n{program}END\n{end}"

@@ -1,0 +1,213 @@
+"""The command line as its user sees it: output, files and exit status."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from fecm import slips
+from tests.decks import APPENDIX, DATA_CARDS, ROOT, small
+
+
+def fecm(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """Run ``python -m fecm`` in a folder."""
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-m", "fecm", *map(str, arguments)],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.fixture
+def deck(tmp_path: Path) -> Path:
+    """A small deck in a folder of its own."""
+    path = tmp_path / "small.inp"
+    path.write_text(small())
+    return path
+
+
+def test_a_run_writes_its_result_beside_the_user_and_says_what_came_out(tmp_path: Path) -> None:
+    done = fecm("run", APPENDIX, cwd=tmp_path)
+    assert done.returncode == 0
+    assert done.stderr == ""
+    assert [p.name for p in tmp_path.iterdir()] == ["appendix.h5"]
+    for words in (
+        "peak force",
+        "6.18964",
+        "contact",
+        "largest indent",
+        "energy balance",
+        "appendix.h5",
+    ):
+        assert words in done.stdout
+
+
+def test_the_file_has_the_promised_layout(tmp_path: Path) -> None:
+    fecm("run", APPENDIX, cwd=tmp_path)
+    with h5py.File(tmp_path / "appendix.h5") as file:
+        attributes = dict(file.attrs)
+        assert attributes["format"] == "fecm"
+        assert attributes["format_version"] == 1
+        assert attributes["mode"] == "report"
+        assert list(attributes["slips"]) == []
+        assert file["deck"].asstr()[()].startswith("FECM **LOW")
+        assert file["deck"].asstr()[()].endswith("\nSTOP\n")
+        shapes = {
+            "mesh/coordinates": (609, 2), "mesh/elements": (140, 9), "mesh/equations": (609, 5),
+            "laminate/A": (3, 3), "laminate/shear": (2, 2), "tape3/w": (2, 609),
+            "tape3/displacement": (2, 609, 5), "tape8/kappa_xy": (2, 140, 9), "tape9/force": (2,),
+            "history/plate_w": (10,), "energy/balance_error": (10,),
+        }  # fmt: skip
+        for path, shape in shapes.items():
+            assert file[path].shape == shape
+        assert file["mesh/elements"].dtype == np.int32
+        assert file["history/step"].dtype == np.int64
+        assert file["tape8"].attrs["location"] == "nodes"
+        assert file["energy"].attrs["initial"] == pytest.approx(1.19659, rel=1e-5)
+        descriptions: list[str] = []
+        file.visititems(
+            lambda name, item: (
+                descriptions.append(item.attrs.get("description", ""))
+                if isinstance(item, h5py.Dataset)
+                else None
+            )
+        )
+        assert all(descriptions)
+        assert file["history/acceleration"].attrs["dimension"] == "length/time^2"
+
+
+def test_the_deck_in_a_result_runs_again_to_the_same_numbers(deck: Path) -> None:
+    fecm("run", deck, cwd=deck.parent)
+    with h5py.File(deck.parent / "small.h5") as file:
+        (deck.parent / "again.inp").write_text(file["deck"].asstr()[()])
+        force = file["history/force"][()]
+    assert fecm("run", "again.inp", cwd=deck.parent).returncode == 0
+    with h5py.File(deck.parent / "again.h5") as file:
+        np.testing.assert_array_equal(file["history/force"][()], force)
+
+
+def test_an_existing_result_is_kept_unless_told_otherwise(deck: Path) -> None:
+    target = deck.parent / "small.h5"
+    target.write_text("precious")
+    refused = fecm("run", deck, cwd=deck.parent)
+    assert refused.returncode == 2
+    assert "--overwrite" in refused.stderr
+    assert target.read_text() == "precious"
+    assert fecm("run", deck, "--overwrite", cwd=deck.parent).returncode == 0
+    assert h5py.is_hdf5(target)
+
+
+def test_every_output_is_checked_before_the_first_run(deck: Path) -> None:
+    deck.write_text(small(stop=False) + small())
+    (deck.parent / "small-2.h5").write_text("precious")
+    refused = fecm("run", deck, cwd=deck.parent)
+    assert refused.returncode == 2
+    assert not (deck.parent / "small.h5").exists()
+    (deck.parent / "small-2.h5").unlink()
+    assert fecm("run", deck, cwd=deck.parent).returncode == 0
+    assert h5py.is_hdf5(deck.parent / "small-2.h5")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run", "nothing.inp"),
+        ("run",),
+        ("run", "small.inp", "--mode", "other"),
+        ("run", "small.inp", "--slip", "other"),
+        ("run", "small.inp", "--mode", "listing", "--slip", "density"),
+        ("run", "small.inp", "-o", "no/such/folder.h5"),
+        ("run", "small.inp", "-o", "."),
+        ("tapes", "small.inp"),
+        ("tapes", "nothing.h5"),
+        ("nonsense",),
+        ("--nonsense",),
+    ],
+)
+def test_an_unusable_call_exits_2_with_a_message_and_no_traceback(
+    deck: Path, arguments: tuple[str, ...]
+) -> None:
+    done = fecm(*arguments, cwd=deck.parent)
+    assert done.returncode == 2
+    assert "rror" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert [p.name for p in deck.parent.iterdir()] == ["small.inp"]
+
+
+def test_a_deck_with_errors_is_not_run(deck: Path) -> None:
+    deck.write_text(small(data=DATA_CARDS.replace("     115.0", "     1l5.0")))
+    done = fecm("run", deck, cwd=deck.parent)
+    assert done.returncode == 2
+    assert re.search(r"small\.inp:\d+:11: error\[E101\]: `1l5.0` is not a number\.", done.stderr)
+    assert not (deck.parent / "small.h5").exists()
+
+
+@pytest.mark.parametrize("mode", ["report", "listing"])
+def test_a_run_that_diverges_exits_1_names_step_and_cause_and_leaves_no_file(
+    deck: Path, mode: str
+) -> None:
+    program = "LMAS\nDT        .5E-5\nLOOP       2000\nTIME\nRODP\nNEXT\n"
+    deck.write_text(small(program))
+    done = fecm("run", deck, "--mode", mode, cwd=deck.parent)
+    assert done.returncode == 1
+    assert re.search(r"diverged at step \d+", done.stderr)
+    assert "DT = 5e-06 is above the plate's critical time step" in done.stderr
+    assert [p.name for p in deck.parent.iterdir()] == ["small.inp"]
+
+
+def test_tapes_go_to_the_folder_that_is_asked_for(deck: Path) -> None:
+    fecm("run", deck, cwd=deck.parent)
+    done = fecm("tapes", "small.h5", "-d", "new/tapes", cwd=deck.parent)
+    assert done.returncode == 0
+    names = sorted(p.name for p in (deck.parent / "new" / "tapes").iterdir())
+    assert names == ["tape3", "tape8", "tape9"]
+    assert len((deck.parent / "new/tapes/tape3").read_text().splitlines()) == 2 * 5
+
+
+def test_a_terminated_run_exits_143_and_leaves_nothing_behind(deck: Path) -> None:
+    deck.write_text(small("LMAS\nDT        .1E-6\nLOOP      99999\nTIME\nRODP\nNEXT\n"))
+    for number, status in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "fecm", "run", str(deck)],
+            cwd=deck.parent,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        )
+        for _ in range(200):
+            time.sleep(0.02)
+            if len(list(deck.parent.iterdir())) > 1:
+                break
+        process.send_signal(number)
+        errors = process.communicate(timeout=20)[1]
+        assert process.returncode == status
+        assert b"Traceback" not in errors
+        assert [p.name for p in deck.parent.iterdir()] == ["small.inp"]
+
+
+def test_help_names_every_slip(tmp_path: Path) -> None:
+    text = re.sub(r"\s+", "", fecm("run", "--help", cwd=tmp_path).stdout)
+    for name in slips.NAMES:
+        assert name in text
+
+
+def test_the_errata_page_is_made_from_the_table_of_slips() -> None:
+    assert (ROOT / "docs" / "errata.md").read_text() == slips.errata()
+
+
+def test_listing_mode_is_all_slips_and_report_mode_none() -> None:
+    assert slips.active_slips("report") == frozenset()
+    assert slips.active_slips("listing") == frozenset(slips.NAMES)
+    assert slips.active_slips("report", ["target"]) == {"target"}
+    assert len(slips.NAMES) == len(set(slips.NAMES)) == 14
