@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from fecm.plate import Family
 
-# Two elements are congruent if their nodes' relative places agree to this part of their size.
+# Two elements are congruent if their nodes' relative places agree to this part of the largest
+# element's size.
 TOLERANCE = 1.0e-9
 
 

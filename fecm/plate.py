@@ -225,7 +225,8 @@ def stiffness(
 def lumped_mass(family: Family, laminate: Laminate, rule: Rule) -> Floats:
     """Lumped masses of a family's elements: the consistent matrix' diagonal, scaled to the whole.
 
-    The listing's MASS01; the scaling keeps the element's mass and every entry positive.
+    The listing's MASS01.  The scaling keeps the element's mass; every entry is positive unless the
+    rule has all its points on a node's zero line, as order 1 has for mid-sides and corners.
 
     Returns
     -------

@@ -61,7 +61,7 @@ SLIPS = (
     Slip(
         "jacobian",
         "The inverse Jacobian is used transposed: harmless where element sides are parallel to "
-        "the axes, wrong on any other element.",
+        "the axes, wrong on nearly every other element.",
         "Derivatives are taken with the inverse Jacobian.",
     ),
     Slip(

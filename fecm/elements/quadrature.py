@@ -1,7 +1,7 @@
 """Points and weights on the square -1 <= xi, eta <= 1.
 
 Points are in the report's order: corners counter-clockwise from (-1, -1), mid-sides from eta = -1
-on, centre.  Order 4 takes the corners of the large square, of the wide, the tall and the small one.
+on, centre.  Order 4 takes the corners of the large square, of the tall, the wide and the small rectangle.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def nodal(order: int) -> Rule:
     ValueError
         If the order is outside 1 to 4.
     """
-    points = np.linspace(-1.0, 1.0, _known(order)) if order > 1 else np.zeros(1)
+    points = np.linspace(-1.0, 1.0, order) if _known(order) > 1 else np.zeros(1)
     return _rule(order, points, np.polynomial.legendre.leggauss(order)[1])
 
 
