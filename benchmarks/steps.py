@@ -17,15 +17,16 @@ from pathlib import Path
 
 from fecm.api import prepare
 from fecm.check import Checked
+from fecm.parts import set_up
 from fecm.results import hdf5
-from fecm.simulation import Simulation, set_up
+from fecm.simulation import Simulation
 
 ROUNDS = 7
 
 
 def plain(checked: Checked, steps: int, dt: float) -> float:
     """Seconds of the plain loop."""
-    setup = set_up(checked, frozenset())
+    setup = set_up(checked.deck, checked.mesh, frozenset())
     impact, K, m = setup.impact, setup.plate.stiffness, setup.plate.mass
     state = impact.start()
     row = impact.contact.equation

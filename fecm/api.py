@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fecm.check import Checked, check
+from fecm.check.run import UNSTABLE
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, load_text
@@ -34,10 +35,13 @@ class Prepared:
     problems: list[Checked]
     findings: list[Finding]
 
-    @property
-    def has_errors(self) -> bool:
-        """Whether the deck is unusable."""
-        return any(finding.severity == "error" for finding in self.findings)
+    def errors(self, force: bool = False) -> list[Finding]:
+        """Findings that make the deck unusable; with `force`, without an unstable time step."""
+        return [
+            finding
+            for finding in self.findings
+            if finding.severity == "error" and not (force and finding.code == UNSTABLE)
+        ]
 
 
 def prepare(path_or_text: str | Path | Deck, mode: str = REPORT) -> Prepared:
@@ -70,6 +74,7 @@ def run(
     mode: str = REPORT,
     slips: Iterable[str] = (),
     output: str | Path | None = None,
+    force: bool = False,
 ) -> Result | list[Result]:
     """Run every problem of a deck.
 
@@ -84,6 +89,8 @@ def run(
     output : str or Path, optional
         Result file to write, in place of an earlier one; a second problem goes to ``-2.h5``, and so
         on.  Without it nothing is written.
+    force : bool
+        Run with a time step above the critical one all the same.
 
     Returns
     -------
@@ -109,7 +116,7 @@ def run(
     """
     active = active_slips(mode, slips)
     prepared = prepare(deck, mode)
-    if prepared.has_errors:
+    if prepared.errors(force):
         raise DeckError(prepared.findings, prepared.source)
     results: list[Result] = []
     for number, problem in enumerate(prepared.problems, start=1):

@@ -6,6 +6,7 @@ node or element n.  An absent node of an element, and the equation of a restrain
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -112,15 +113,18 @@ def _known_nodes(
     records: Sequence[NodeValues] | Sequence[NodeCodes], numnp: int, findings: Findings
 ) -> Iterator[NodeValues | NodeCodes]:
     """Yield the records whose node exists; report the others."""
+    outside = [record for record in records if not 1 <= record.node <= numnp]
+    if outside:
+        more = f" (and {len(outside) - 1} more)" if len(outside) > 1 else ""
+        findings.add(
+            "E301",
+            f"Node {outside[0].node}{more} does not exist; the control card gives the deck nodes "
+            f"1 to {numnp}.",
+            outside[0].place("node"),
+        )
     for record in records:
         if 1 <= record.node <= numnp:
             yield record
-        else:
-            findings.add(
-                "E301",
-                f"Node {record.node} does not exist; the deck has nodes 1 to {numnp}.",
-                record.place("node"),
-            )
 
 
 def _run(start: int, end: int, increment: int) -> Ints:
@@ -177,14 +181,18 @@ def _step(elements: Ints, records: Sequence[ElementNodes], findings: Findings) -
     """Set elements; those between two cards add the earlier card's increment (PMESH)."""
     numel = len(elements)
     last: ElementNodes | None = None
+    outside = [r for r in records if not 1 <= r.element <= numel]
+    if outside:
+        more = f" (and {len(outside) - 1} more)" if len(outside) > 1 else ""
+        findings.add(
+            "E303",
+            f"Element {outside[0].element}{more} does not exist; the control card gives the deck "
+            f"elements 1 to {numel}.",
+            outside[0].place("element"),
+        )
     for record in records:
         number = record.element
         if not 1 <= number <= numel:
-            findings.add(
-                "E303",
-                f"Element {number} does not exist; the deck has elements 1 to {numel}.",
-                record.place("element"),
-            )
             continue
         previous = 0 if last is None else last.element
         if number <= previous:
@@ -224,8 +232,7 @@ def _fill(elements: Ints, record: ElementNodes, end: int) -> None:
 def place_of_element(deck: Deck, number: int) -> Place | None:
     """Where the card stands that gives or generates an element."""
     segment = deck.last(Elements)
-    best: ElementNodes | None = None
-    for record in segment.records if segment else ():
-        if record.element <= number:
-            best = record
-    return best.place("element") if best else None
+    if segment is None:
+        return None
+    cards = bisect.bisect_right(segment.records, number, key=lambda record: record.element)
+    return segment.records[cards - 1].place("element") if cards else None

@@ -89,25 +89,11 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
     body: list[Macro | Loop] = []
     done: set[str] = set()
     for macro in macros:
-        word = WORDS.get(macro.word)
+        word = WORDS.get(macro.word) or _unknown(macro, findings)
         if word is None:
-            near = difflib.get_close_matches(macro.word, WORDS, 1, 0.5)
-            findings.add(
-                "E501",
-                f"`{macro.word}` is no macro.",
-                macro.place("macro"),
-                f"did you mean {near[0]}?" if near else f"known are {', '.join(WORDS)}, END",
-            )
             continue
         _check_value(word, macro, findings)
-        for need in word.needs:
-            if need not in done:
-                findings.add(
-                    "E504", f"{word.name} stands before {need}.", macro.place("macro"),
-                    f"put {need} before it",
-                )  # fmt: skip
-                done.add(need)  # said once
-        done.add(word.name)
+        _check_order(word, macro, done, findings)
         if word.name == "LOOP":
             open_loops.append((macro, body))
             body = []
@@ -138,6 +124,32 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
     return program
 
 
+def _unknown(macro: Macro, findings: Findings) -> Word | None:
+    """Report an unknown word; the word that it most likely means, so that loops stay whole."""
+    near = difflib.get_close_matches(macro.word, WORDS, 1, 0.5)
+    findings.add(
+        "E501",
+        f"`{macro.word}` is no macro.",
+        macro.place("macro"),
+        f"did you mean {near[0]}?" if near else f"known are {', '.join(WORDS)}, END",
+    )
+    return WORDS[near[0]] if near else None
+
+
+def _check_order(word: Word, macro: Macro, done: set[str], findings: Findings) -> None:
+    """Report the words that must have been carried out before this one, each once."""
+    for need in word.needs:
+        if need not in done:
+            findings.add(
+                "E504",
+                f"{word.name} needs {need}, which does not stand before it.",
+                macro.place("macro"),
+                f"put {need} before it",
+            )
+            done.add(need)
+    done.add(word.name)
+
+
 def _check_value(word: Word, macro: Macro, findings: Findings) -> None:
     value = macro.value
     if word.value == "count" and (value < 0 or not value.is_integer()):
@@ -156,7 +168,7 @@ def _warn_of_standing_clock(body: Body, findings: Findings) -> None:
     """Warn of the loops that step without TIME."""
     for item in body:
         if isinstance(item, Loop):
-            words = {m.word for m in _flat(item.body)}
+            words = {m.word for m in flat(item.body)}
             if "RODP" in words and "TIME" not in words:
                 findings.add(
                     "W507",
@@ -169,11 +181,11 @@ def _warn_of_standing_clock(body: Body, findings: Findings) -> None:
                 _warn_of_standing_clock(item.body, findings)
 
 
-def _flat(body: Body) -> Iterator[Macro]:
+def flat(body: Body) -> Iterator[Macro]:
     """Every macro once, in the order of the cards, without LOOP and NEXT."""
     for item in body:
         if isinstance(item, Loop):
-            yield from _flat(item.body)
+            yield from flat(item.body)
         else:
             yield item
 
@@ -188,12 +200,14 @@ def walk(body: Body, current: int = 1) -> Iterator[tuple[Macro, int]]:
             yield item, current
 
 
-@dataclass
+@dataclass(frozen=True, slots=True)
 class Tally:
-    """How much a program stores.
+    """How much a program does and stores.
 
     Attributes
     ----------
+    macros : int
+        Macros carried out.
     steps : int
         Impact steps.
     contact_rows : int
@@ -202,26 +216,54 @@ class Tally:
         Rows that DISP stores.
     """
 
-    steps: int = 0
-    contact_rows: int = 0
-    displacement_rows: int = 0
+    macros: int
+    steps: int
+    contact_rows: int
+    displacement_rows: int
+
+
+def estimate(body: Body) -> Tally:
+    """Count what a program does without carrying out its loops.
+
+    Exact, but for `contact_rows` where RODP cards differ in their number: then an upper bound.
+    """
+    macros, displacements, steps = _entry(body, 1)
+    total = sum(steps.values())
+    if len(steps) == 1:
+        contact = total // next(iter(steps))
+    else:
+        contact = sum(min(count, total // n) for n, count in steps.items())
+    return Tally(macros, total, contact, displacements)
+
+
+def _entry(body: Body, passes: int) -> tuple[int, int, dict[int, int]]:
+    """Macros, DISP's rows, and steps by RODP's number, of a body run `passes` times on end."""
+    macros, displacements = 0, 0
+    steps: dict[int, int] = {}
+    for item in body:
+        if isinstance(item, Loop):
+            inner, rows, taken = _entry(item.body, item.count)
+            macros += passes * inner
+            displacements += passes * rows
+            for n, count in taken.items():
+                steps[n] = steps.get(n, 0) + passes * count
+        else:
+            macros += passes
+            if item.word == "DISP":
+                displacements += passes // every(item)
+            elif item.word == "RODP":
+                steps[every(item)] = steps.get(every(item), 0) + passes
+    return macros, displacements, steps
 
 
 def tally(body: Body) -> Tally:
-    """Count a program's steps and rows by carrying out its loops."""
-    result = Tally()
-    for macro, current in walk(body):
+    """Count exactly what a program does and stores; carries out its loops where it must."""
+    counted = estimate(body)
+    if len({every(macro) for macro in flat(body) if macro.word == "RODP"}) <= 1:
+        return counted
+    step = rows = 0
+    for macro, _ in walk(body):
         if macro.word == "RODP":
-            result.steps += 1
-            result.contact_rows += result.steps % every(macro) == 0
-        elif macro.word == "DISP":
-            result.displacement_rows += current % every(macro) == 0
-    return result
-
-
-def executions(body: Body) -> int:
-    """How many macros a program carries out, without carrying them out."""
-    total = 0
-    for item in body:
-        total += item.count * executions(item.body) if isinstance(item, Loop) else 1
-    return total
+            step += 1
+            rows += step % every(macro) == 0
+    return Tally(counted.macros, counted.steps, rows, counted.displacement_rows)

@@ -91,6 +91,22 @@ class Rod:
         return m
 
 
+@dataclass(frozen=True)
+class Station:
+    """Where and how the transducer measures.
+
+    Attributes
+    ----------
+    node : int
+        Node of the rod, from 1.
+    sign : float
+        -1 for a force that is positive in compression, +1 in tension.
+    """
+
+    node: int
+    sign: float = -1.0
+
+
 def report_rod(density: float = REPORT_DENSITY) -> Rod:
     """Build the rod that stands in the report's program (lb, in, s)."""
     rest = REPORT_ELEMENTS - len(REPORT_CAP)

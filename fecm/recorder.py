@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from fecm.assembly import PlateModel
 from fecm.impact import DivergenceError, Impact, ImpactState, inner
 from fecm.plate import STRAINS, StrainField
 from fecm.program import Tally
+from fecm.projectile import Station
 from fecm.results.schema import DATASETS
 from fecm.results.sinks import RowBuffer, Sink
 
@@ -31,22 +31,6 @@ SCALARS = (
     "plate_kinetic", "plate_strain", "contact_work", "external_work",
 )  # fmt: skip
 HISTORY = ("force", "indentation", "transducer", "displacement", "velocity", "acceleration")
-
-
-@dataclass(frozen=True)
-class Station:
-    """Where and how the transducer measures.
-
-    Attributes
-    ----------
-    node : int
-        Node of the rod, from 1.
-    sign : float
-        -1 for a force that is positive in compression, +1 in tension.
-    """
-
-    node: int
-    sign: float = -1.0
 
 
 class Recorder:

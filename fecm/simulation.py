@@ -1,8 +1,4 @@
-"""A run: one problem from its model to its result.
-
-Here, and only here, the slips that are on become parameters of the plate, the projectile, the law
-and the recorder.
-"""
+"""A run: one problem's macro program, carried out from its model to its result."""
 
 from __future__ import annotations
 
@@ -11,65 +7,20 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fecm.assembly import PlateModel, Rules, assemble
-from fecm.check import Checked, rules
-from fecm.deck.model import Impact as ImpactCard
-from fecm.deck.model import Indentation, Macro, Material
-from fecm.impact import Contact, DivergenceError, Impact, ImpactState
-from fecm.indentation import VIRGIN, Constants, Law, MemoryLaw, StickyLaw
-from fecm.laminate import laminate_of
-from fecm.plate import StrainField
+from fecm.check import Checked
+from fecm.deck.model import Macro, Material
+from fecm.impact import DivergenceError, ImpactState
+from fecm.indentation import VIRGIN
+from fecm.parts import Setup, set_up
 from fecm.program import every, tally, walk
-from fecm.projectile import LISTING_DENSITY, REPORT_DENSITY, report_rod
-from fecm.recorder import Recorder, Station
+from fecm.recorder import Recorder
 from fecm.results.schema import FORMAT, FORMAT_VERSION
 from fecm.results.sinks import Sink
 from fecm.slips import LISTING, NAMES, REPORT
+from fecm.units import unit_names
 from fecm.version import __version__
 
 Progress = Callable[[int, int], None]
-
-
-@dataclass(frozen=True)
-class Setup:
-    """A problem's parts, ready to run."""
-
-    plate: PlateModel
-    impact: Impact
-    station: Station
-    strains: StrainField
-
-
-def set_up(checked: Checked, slips: frozenset[str]) -> Setup:
-    """Make plate, projectile and law of a checked problem, with the slips that are on."""
-    deck, mesh = checked.deck, checked.mesh
-    material = deck.need(Material)
-    bending, shear, points = rules(material)
-    plate = assemble(
-        mesh,
-        laminate_of(material, isotropic_g12="g12" in slips),
-        Rules(
-            bending=bending,
-            shear=bending if "shear-order" in slips else shear,
-            strains=bending if "tapes" in slips else points,
-            transposed="jacobian" in slips,
-        ),
-    )
-    card, measured = deck.need(ImpactCard), deck.need(Indentation)
-    constants = Constants(measured.k, measured.alpha_p, measured.s_p, measured.q)
-    law: Law = StickyLaw(constants) if "reload" in slips else MemoryLaw(constants)
-    rod = report_rod(LISTING_DENSITY if "density" in slips else REPORT_DENSITY)
-    contact = Contact(
-        equation=int(mesh.equations[card.node - 1, card.dof - 1]) - 1,
-        velocity=card.velocity,
-        plate_moves="target" not in slips,
-        strains_start_moving="rod-start" in slips,
-        scales_forces="force-scale" in slips,
-        keeps_first_step="rod-dt" in slips,
-    )
-    middle = rod.elements // 2 + 1
-    station = Station(middle + 1, 1.0) if "station" in slips else Station(middle)
-    return Setup(plate, Impact(plate, rod, law, contact), station, plate.strain_field())
 
 
 @dataclass
@@ -99,9 +50,10 @@ class Simulation:
     proportional: float = field(default=1.0, init=False)
 
     def __post_init__(self) -> None:
-        self.setup = set_up(self.checked, self.slips)
+        self.setup = set_up(self.checked.deck, self.checked.mesh, self.slips)
         self.state = self.setup.impact.start()
         self._sizes = tally(self.checked.program)
+        self._tick = max(1, min(64, 100_000 // self.setup.plate.neq))
         self._header()
         self._recorder = Recorder(
             self.sink,
@@ -131,6 +83,7 @@ class Simulation:
                 "title": deck.title,
                 "mode": LISTING if listing else REPORT,
                 "slips": sorted(self.slips),
+                **{f"unit_{name}": unit for name, unit in unit_names(deck).items()},
             },
         )
         self.sink.text("deck", deck.text or deck.to_text(), "the cards of the problem")
@@ -200,7 +153,7 @@ class Simulation:
         self._recorder.step(state, self.proportional, stores)
         if stores and "tapes" not in self.slips:
             self._store_strains(state.step)
-        if not state.step % 64:
+        if not state.step % self._tick:
             self.progress(state.step, self._sizes.steps)
 
     def _load_factor(self) -> float:

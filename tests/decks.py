@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from fecm.api import prepare
+from fecm.parts import Setup, set_up
+
 ROOT = Path(__file__).parent.parent
 DATA = Path(__file__).parent / "data"
 APPENDIX = ROOT / "decks" / "appendix.inp"
@@ -52,6 +55,12 @@ RODP          5
 DISP          5
 NEXT
 """
+
+
+def ready(deck: str | Path) -> Setup:
+    """Parts of a deck's first problem."""
+    problem = prepare(deck).problems[0]
+    return set_up(problem.deck, problem.mesh, frozenset())
 
 
 def small(

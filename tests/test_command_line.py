@@ -40,7 +40,7 @@ def deck(tmp_path: Path) -> Path:
 def test_a_run_writes_its_result_beside_the_user_and_says_what_came_out(tmp_path: Path) -> None:
     done = fecm("run", APPENDIX, cwd=tmp_path)
     assert done.returncode == 0
-    assert done.stderr == ""
+    assert re.findall(r"(error|warning)\[(\w+)\]", done.stderr) == [("warning", "W414")]
     assert [p.name for p in tmp_path.iterdir()] == ["appendix.h5"]
     for words in (
         "peak force",
@@ -159,7 +159,10 @@ def test_a_run_that_diverges_exits_1_names_step_and_cause_and_leaves_no_file(
 ) -> None:
     program = "LMAS\nDT        .5E-5\nLOOP       2000\nTIME\nRODP\nNEXT\n"
     deck.write_text(small(program))
-    done = fecm("run", deck, "--mode", mode, cwd=deck.parent)
+    refused = fecm("run", deck, "--mode", mode, cwd=deck.parent)
+    assert refused.returncode == 2
+    assert "error[E508]" in refused.stderr
+    done = fecm("run", deck, "--mode", mode, "--force", cwd=deck.parent)
     assert done.returncode == 1
     assert re.search(r"diverged at step \d+", done.stderr)
     assert "DT = 5e-06 is above the plate's critical time step" in done.stderr

@@ -9,10 +9,9 @@ import fecm
 from fecm.api import prepare
 from fecm.deck import Findings
 from fecm.deck.model import Macro
-from fecm.program import compile_program, executions, tally, walk
+from fecm.program import compile_program, tally, walk
 from fecm.results.result import Result
-from fecm.simulation import set_up
-from tests.decks import DATA_CARDS, small
+from tests.decks import DATA_CARDS, ready, small
 
 
 def run(program: str, mode: str = "report", slips: tuple[str, ...] = ()) -> Result:
@@ -89,7 +88,7 @@ def test_the_tally_counts_what_the_run_stores() -> None:
     assert counted.steps == len(result.force) == 14
     assert counted.contact_rows == len(result.tape9.force) == 4
     assert counted.displacement_rows == len(result.tape3.w) == 6
-    assert executions(prepare(small(text)).problems[0].program) == 2 + 7 * 3
+    assert counted.macros == 2 * (2 + 7 * 3)
 
 
 def test_rodp_counts_steps_across_loops_and_disp_the_passes_of_its_own_loop() -> None:
@@ -199,7 +198,7 @@ def test_forces_on_a_free_plate_give_its_centre_of_mass_newtons_motion() -> None
     )
     result = fecm.run(text)
     assert isinstance(result, Result)
-    plate = set_up(prepare(text).problems[0], frozenset()).plate
+    plate = ready(text).plate
     moment = plate.mass @ result.tape3.displacement[-1][plate.mesh.equations > 0]
     # Leapfrog from rest under 25 unit forces: sum of m w = F dt^2 n (n + 1)/2 after n steps.  The
     # rotations have no resultant by symmetry.

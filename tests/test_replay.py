@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import fecm
 from fecm.results.result import Result
 from fecm.results.tapes import tape_texts
-from tests.decks import APPENDIX, DATA, LONG
+from tests.decks import APPENDIX, DATA, LONG, ready
 
 Floats = NDArray[np.float64]
 
@@ -161,11 +161,9 @@ def test_the_listing_stores_contact_at_every_step_and_strains_one_step_old(
 
 @pytest.mark.parametrize("solver", ["csr", ""])
 def test_both_products_give_the_same_history(solver: str) -> None:
-    from fecm.api import prepare
     from fecm.impact import Impact
-    from fecm.simulation import set_up
 
-    setup = set_up(prepare(APPENDIX).problems[0], frozenset())
+    setup = ready(APPENDIX)
     made = setup.impact
     impact = Impact(made.plate, made.rod, made.law, made.contact, solver)
     state = impact.start()
@@ -175,18 +173,16 @@ def test_both_products_give_the_same_history(solver: str) -> None:
 
 
 def test_a_stored_state_goes_on_as_if_nothing_had_happened() -> None:
-    from fecm.api import prepare
     from fecm.impact import ImpactState
-    from fecm.simulation import set_up
 
-    setup = set_up(prepare(LONG).problems[0], frozenset())
+    setup = ready(LONG)
     state = setup.impact.start()
     for _ in range(300):  # past the first peak, so that the law has a memory
         setup.impact.advance(state, 2e-7)
     stored = state.to_arrays()
     for _ in range(50):
         setup.impact.advance(state, 2e-7)
-    fresh = set_up(prepare(LONG).problems[0], frozenset()).impact
+    fresh = ready(LONG).impact
     again = ImpactState.from_arrays(stored)
     for _ in range(50):
         fresh.advance(again, 2e-7)

@@ -23,12 +23,13 @@ LARGEST_INTEGER = 2**31 - 1
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A field of a card: its name, its Fortran letter (I, F or A) and its columns."""
+    """A field of a card: name, Fortran letter (I, F or A), columns, and a label for rulers."""
 
     name: str
     kind: str
     first: int
     last: int
+    label: str
 
     @property
     def width(self) -> int:
@@ -46,16 +47,17 @@ def layout(*descriptors: str) -> Fields:
     Parameters
     ----------
     *descriptors : str
-        ``"I5 node"``, ``"F10 x-coordinate"``, ``"A4 word"``, or ``"X1"`` for a column that is
-        skipped.
+        ``"I5 node"``, ``"A4 word"``, ``"X1"`` for a column that is skipped, or with a label for
+        rulers ``"F10 x-coordinate|x"``.
     """
     fields: list[Field] = []
     column = 1
     for descriptor in descriptors:
-        code, _, name = descriptor.partition(" ")
+        code, _, text = descriptor.partition(" ")
+        name, _, label = text.partition("|")
         width = int(code[1:])
         if code[0] != "X":
-            fields.append(Field(name, code[0], column, column + width - 1))
+            fields.append(Field(name, code[0], column, column + width - 1, label or name))
         column += width
     return tuple(fields)
 

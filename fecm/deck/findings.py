@@ -47,6 +47,29 @@ class Finding:
         """``"error"`` or ``"warning"``."""
         return "error" if self.code.startswith("E") else "warning"
 
+    def to_dict(self, source: str) -> dict[str, object]:
+        """The finding as plain values, for JSON.
+
+        Parameters
+        ----------
+        source : str
+            Name of the deck's file.
+        """
+        place = self.place
+        return {
+            "kind": "finding",
+            "severity": self.severity,
+            "code": self.code,
+            "message": self.message,
+            "file": source,
+            "line": place.line if place else None,
+            "column": place.first if place else None,
+            "end_column": place.last if place else None,
+            "field": place.field if place else "",
+            "card": place.text if place else "",
+            "hint": self.hint,
+        }
+
     def render(self, source: str) -> str:
         """Write the finding as a person reads it, with the card and a caret under the field.
 

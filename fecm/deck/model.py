@@ -18,6 +18,8 @@ from fecm.deck.findings import Place
 TITLE = "FECM"
 STOP = "STOP"
 
+# Least and greatest number of nodes an element.
+NODES_AN_ELEMENT = (4, 9)
 AXES = ("x", "y", "z")
 UNKNOWNS = ("u", "v", "w", "theta_x", "theta_y")
 
@@ -90,22 +92,28 @@ class ElementNodes(Record):
 
 def node_fields(ndm: int) -> Fields:
     """Fields of a COOR card: (2I5,7F10.0), of which `ndm` coordinates are used."""
-    return layout("I5 node", "I5 increment", *(f"F10 {axis}-coordinate" for axis in AXES[:ndm]))
+    return layout(
+        "I5 node", "I5 increment|incr", *(f"F10 {axis}-coordinate|{axis}" for axis in AXES[:ndm])
+    )
 
 
 def force_fields(ndf: int) -> Fields:
     """Fields of a FORC card: (2I5,7F10.0), of which `ndf` values are used."""
-    return layout("I5 node", "I5 increment", *(f"F10 value {i + 1}" for i in range(ndf)))
+    return layout("I5 node", "I5 increment|incr", *(f"F10 value {i + 1}" for i in range(ndf)))
 
 
 def code_fields(ndf: int) -> Fields:
     """Fields of a BOUN card: (16I5), of which `ndf` codes are used."""
-    return layout("I5 node", "I5 increment", *(f"I5 code {i + 1}" for i in range(ndf)))
+    return layout(
+        "I5 node", "I5 increment|incr", *(f"I5 code {i + 1}|c{i + 1}" for i in range(ndf))
+    )
 
 
 def element_fields(nen: int) -> Fields:
     """Fields of an ELEM card: (16I5); the increment follows the last of the `nen` nodes."""
-    return layout("I5 element", *(f"I5 node {i + 1}" for i in range(nen)), "I5 increment")
+    return layout(
+        "I5 element|elm", *(f"I5 node {i + 1}|n{i + 1}" for i in range(nen)), "I5 increment|incr"
+    )
 
 
 @dataclass(frozen=True)
@@ -125,7 +133,9 @@ class Layer(Record):
     angle: float
     thickness: float
 
-    fields: ClassVar[Fields] = layout("I5 layer", "F5 fibre angle", "F10 layer thickness")
+    fields: ClassVar[Fields] = layout(
+        "I5 layer|lay", "F5 fibre angle|ang", "F10 layer thickness|thickness"
+    )
 
 
 @dataclass(frozen=True)
@@ -149,8 +159,8 @@ class Integration(Record):
     width: float = 0.0
 
     fields: ClassVar[Fields] = layout(
-        "I5 bending order L1", "I5 shear order L2", "I5 stress-point order K",
-        "F10 total thickness", "F10 width",
+        "I5 bending order L1|L1", "I5 shear order L2|L2", "I5 stress-point order K|K",
+        "F10 total thickness|thickness", "F10 width",
     )  # fmt: skip
 
 
@@ -177,9 +187,9 @@ class Ply(Record):
     g23: float
 
     fields: ClassVar[Fields] = layout(
-        "F10 mass density", "F10 Poisson's ratio NU12", "F10 Young's modulus E1",
-        "F10 Young's modulus E2", "F10 shear modulus G12", "F10 shear modulus G13",
-        "F10 shear modulus G23",
+        "F10 mass density|density", "F10 Poisson's ratio NU12|NU12", "F10 Young's modulus E1|E1",
+        "F10 Young's modulus E2|E2", "F10 shear modulus G12|G12", "F10 shear modulus G13|G13",
+        "F10 shear modulus G23|G23",
     )  # fmt: skip
 
 
@@ -303,7 +313,9 @@ class Impact(Segment):
     velocity: float
     keyword: ClassVar[str] = "ROD"
 
-    fields: ClassVar[Fields] = layout("I5 impact node", "I5 impact unknown", "F10 impact velocity")
+    fields: ClassVar[Fields] = layout(
+        "I5 impact node|node", "I5 impact unknown|dof", "F10 impact velocity|velocity"
+    )
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
@@ -334,14 +346,36 @@ class Indentation(Segment):
     keyword: ClassVar[str] = "EXPE"
 
     fields: ClassVar[Fields] = layout(
-        "F10 contact coefficient k", "F10 critical indentation alpha_p", "F10 constant s_p",
-        "F10 unloading power q",
+        "F10 contact coefficient k|k", "F10 critical indentation alpha_p|alpha_p",
+        "F10 constant s_p|s_p", "F10 unloading power q|q",
     )  # fmt: skip
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
         yield "EXPE"
         yield write_card(self.fields, [self.k, self.alpha_p, self.s_p, self.q])
+
+
+@dataclass(frozen=True)
+class Units(Segment):
+    """UNIT: names of the deck's units, for output; nothing is converted.
+
+    Attributes
+    ----------
+    length, force, time : str
+    """
+
+    length: str
+    force: str
+    time: str
+    keyword: ClassVar[str] = "UNIT"
+
+    NAMES: ClassVar[tuple[str, ...]] = ("length", "force", "time")
+
+    def cards(self, control: Control) -> Iterator[str]:
+        """Text of the segment's cards."""
+        yield "UNIT"
+        yield f"{self.length} {self.force} {self.time}"
 
 
 @dataclass(frozen=True)

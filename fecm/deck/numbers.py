@@ -88,4 +88,5 @@ def _forms(value: float, letter: str) -> Iterator[str]:
         power = exponent + len(digits) - whole
         if power or letter:
             yield f"{minus}{digits[:whole]}.{digits[whole:]}{letter}{power:{marked}d}"
-    yield f"{minus}{digits}{exponent:+d}" if exponent else f"{minus}{digits}"
+    if not letter:
+        yield f"{minus}{digits}{exponent:+d}" if exponent else f"{minus}{digits}"

@@ -1,7 +1,8 @@
 """Points and weights on the square -1 <= xi, eta <= 1.
 
 Points are in the report's order: corners counter-clockwise from (-1, -1), mid-sides from eta = -1
-on, centre.  Order 4 takes the corners of the large square, of the tall, the wide and the small rectangle.
+on, centre.  Order 4 takes the corners of the large square, of the tall and the wide rectangle, and
+of the small square.
 """
 
 from __future__ import annotations

@@ -18,7 +18,9 @@ from fecm.results.schema import (
     GROUP_DESCRIPTIONS,
     Dataset,
     ResultFileError,
+    declared_units,
 )
+from fecm.units import unit_of
 
 Array = NDArray[Any]
 
@@ -28,6 +30,7 @@ class FileSink:
 
     def __init__(self, file: h5py.File) -> None:
         self._file = file
+        self._units: dict[str, str] = {}
         self._datasets: dict[str, h5py.Dataset] = {}
 
     def _group(self, name: str) -> h5py.Group:
@@ -42,6 +45,8 @@ class FileSink:
     def attributes(self, group: str, values: Mapping[str, Any]) -> None:
         """Set attributes of a group; a list of strings becomes an array of strings."""
         target = self._group(group)
+        if not group:
+            self._units = declared_units(values)
         for name, value in values.items():
             if isinstance(value, list | tuple):
                 target.attrs.create(name, value, (len(value),), h5py.string_dtype())
@@ -54,6 +59,8 @@ class FileSink:
         made.attrs["description"] = dataset.description
         if dataset.dimension:
             made.attrs["dimension"] = dataset.dimension
+            if unit := unit_of(dataset.dimension, self._units):
+                made.attrs["unit"] = unit
         self._datasets[dataset.path] = made
 
     def write(self, path: str, start: int, rows: Array) -> None:

@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm.results.schema import declared_units
+from fecm.units import unit_of
+
 Array = NDArray[Any]
 HISTORY = "history"
 
@@ -76,6 +79,10 @@ class Result:
     def slips(self) -> tuple[str, ...]:
         """The slips that were on, sorted."""
         return tuple(self.attributes.get("slips", ()))
+
+    def unit(self, dimension: str) -> str:
+        """Unit of a dimension such as ``"force/length"``; empty where the deck names no units."""
+        return unit_of(dimension, declared_units(self.attributes))
 
     def __getitem__(self, path: str) -> Array:
         return self._arrays[path.strip("/")]

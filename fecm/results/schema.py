@@ -6,7 +6,9 @@ Shapes are given in the sizes of a run: ``steps``, ``n3``, ``n8``, ``n9`` (rows 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 FORMAT = "fecm"
 FORMAT_VERSION = 1
@@ -132,6 +134,13 @@ DATASETS = {
         ),
     )
 }  # fmt: skip
+
+
+def declared_units(attributes: Mapping[str, Any]) -> dict[str, str]:
+    """Names of a result's units of length, force and time; empty where the deck gave none."""
+    names = {n: str(attributes.get(f"unit_{n}", "")) for n in ("length", "force", "time")}
+    return names if all(names.values()) else {}
+
 
 GROUP_DESCRIPTIONS = {
     "mesh": "the finite element mesh",

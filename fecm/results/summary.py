@@ -14,29 +14,35 @@ def summary(result: Result) -> list[str]:
     """Summarise a result: forces, contacts, indentation and energy, in the deck's own units."""
     if "history/force" not in result:
         return ["no impact step was taken"]
+
+    def quantity(value: float, dimension: str) -> str:
+        return f"{value:.6g} {result.unit(dimension)}".rstrip()
+
     force, time = result["history/force"], result["history/time"]
     peak = int(np.argmax(force))
-    lines = [f"steps             {len(time)}, up to time {time[-1]:.6g}"]
+    lines = [f"steps             {len(time)}, up to time {quantity(time[-1], 'time')}"]
     if force[peak] > 0.0:
         lines.append(
-            f"peak force        {force[peak]:.6g} at time {time[peak]:.6g} (step {peak + 1})"
+            f"peak force        {quantity(force[peak], 'force')} at time "
+            f"{quantity(time[peak], 'time')} (step {peak + 1})"
         )
     else:
         lines.append("peak force        0: there was no contact")
     intervals = contact_intervals(force, time)
-    texts = [f"{begin:.6g} to {end:.6g}" for begin, end in intervals[:LISTED]]
+    texts = [f"{begin:.6g} to {quantity(end, 'time')}" for begin, end in intervals[:LISTED]]
     if len(intervals) > LISTED:
         texts.append(f"and {len(intervals) - LISTED} more")
     if texts:
         lines.append(f"contact           {', '.join(texts)}")
     indentation = result["history/indentation"]
     deepest = int(np.argmax(indentation))
+    permanent = float(result.history.attributes["permanent_indentation"])
     lines.append(
-        f"largest indent    {indentation[deepest]:.6g} at time {time[deepest]:.6g}, "
-        f"permanent {result.history.attributes['permanent_indentation']:.6g}"
+        f"largest indent    {quantity(indentation[deepest], 'length')} at time "
+        f"{quantity(time[deepest], 'time')}, permanent {quantity(permanent, 'length')}"
     )
     initial = float(result.energy.attributes["initial"])
     worst = float(np.abs(result["energy/balance_error"]).max())
     share = f"{worst / initial:.2g} of the initial" if initial else f"{worst:.3g}, initially"
-    lines.append(f"energy balance    worst error {share} {initial:.6g}")
+    lines.append(f"energy balance    worst error {share} {quantity(initial, 'force*length')}")
     return lines

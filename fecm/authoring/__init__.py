@@ -1,0 +1,1 @@
+"""Decks made from what an engineer knows."""

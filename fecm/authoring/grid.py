@@ -1,0 +1,218 @@
+"""Grids of 9-node elements over a rectangle, as lines of nodes and the cards that generate them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from fecm.deck.model import Boundary, Coordinates, ElementNodes, Elements, NodeCodes, NodeValues
+
+# Coordinates are rounded to this part of the plate's size, so that they fit their columns.
+DIGITS = 6
+
+
+@dataclass(frozen=True)
+class Section:
+    """A run of equally long elements in one direction.
+
+    Attributes
+    ----------
+    start, end : float
+        Where it begins and ends (length).
+    elements : int
+        How many elements it has.
+    """
+
+    start: float
+    end: float
+    elements: int
+
+
+def uniform(length: float, elements: int) -> list[Section]:
+    """One section of equal elements."""
+    return [Section(0.0, length, elements)]
+
+
+def listed(text: str) -> list[Section]:
+    """Sections from a list of counts and sizes: ``3*0.5,8*0.375,3*0.5``.
+
+    Raises
+    ------
+    ValueError
+        If the text is no such list.
+    """
+    sections: list[Section] = []
+    start = 0.0
+    for part in text.split(","):
+        match = re.fullmatch(r"\s*(\d{1,6})\s*[*x]\s*([0-9.eE+-]+)\s*", part)
+        size = float(match[2]) if match else 0.0
+        if match is None or int(match[1]) < 1 or not 0.0 < size < math.inf:
+            raise ValueError(f"`{part.strip()}` is not COUNT*SIZE, as in 3*0.5,8*0.375,3*0.5")
+        end = start + int(match[1]) * size
+        sections.append(Section(start, _round(end, end), int(match[1])))
+        start = sections[-1].end
+    return sections
+
+
+def graded(length: float, elements: int, centre: float, ratio: float) -> list[Section]:
+    """Elements that shrink towards `centre`, each side in a geometric series.
+
+    Parameters
+    ----------
+    length : float
+        Whole length.
+    elements : int
+        Number of elements.
+    centre : float
+        Where they are smallest; becomes a corner of elements.
+    ratio : float
+        Largest over smallest element of a side.
+    """
+    if not 0.0 < centre < length or elements < 2:
+        side = _series(length, elements, ratio)
+        steps = side if centre <= 0.0 else side[::-1]
+    else:
+        left = min(
+            range(1, elements),
+            key=lambda n: abs(
+                math.log(
+                    _series(centre, n, ratio)[0] / _series(length - centre, elements - n, ratio)[0]
+                )
+            ),
+        )
+        steps = _series(centre, left, ratio)[::-1]
+        steps += _series(length - centre, elements - left, ratio)
+    sections: list[Section] = []
+    start = total = 0.0
+    for number, step in enumerate(steps, start=1):
+        total += step
+        end = length if number == len(steps) else _round(total, length)
+        sections.append(Section(start, end, 1))
+        start = end
+    return sections
+
+
+def _series(length: float, count: int, ratio: float) -> list[float]:
+    """Sizes that grow geometrically by `ratio` over all, and add up to `length`."""
+    growth = ratio ** (1.0 / (count - 1)) if count > 1 else 1.0
+    sizes = [growth**n for n in range(count)]
+    return [length * size / sum(sizes) for size in sizes]
+
+
+def _round(value: float, scale: float) -> float:
+    return round(value, DIGITS - math.floor(math.log10(scale)))
+
+
+def lines(sections: Sequence[Section]) -> list[float]:
+    """Coordinates of the lines of nodes: two a element, and the last."""
+    found: list[float] = []
+    for section in sections:
+        count = 2 * section.elements
+        step = (section.end - section.start) / count
+        found += [section.start + i * step for i in range(count)]
+    return [*found, sections[-1].end]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A grid of 9-node elements; node numbers run along x first.
+
+    Attributes
+    ----------
+    columns, rows : list of Section
+        Sections along x and along y.
+    """
+
+    columns: list[Section]
+    rows: list[Section]
+
+    @property
+    def across(self) -> int:
+        """Nodes along x."""
+        return 2 * sum(section.elements for section in self.columns) + 1
+
+    @property
+    def up(self) -> int:
+        """Nodes along y."""
+        return 2 * sum(section.elements for section in self.rows) + 1
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes."""
+        return self.across * self.up
+
+    @property
+    def elements(self) -> int:
+        """Number of elements."""
+        return (self.across // 2) * (self.up // 2)
+
+    def nearest(self, x: float, y: float) -> tuple[int, float, float]:
+        """Number and place of the node nearest to a point."""
+        xs, ys = lines(self.columns), lines(self.rows)
+        i = min(range(len(xs)), key=lambda k: abs(xs[k] - x))
+        j = min(range(len(ys)), key=lambda k: abs(ys[k] - y))
+        return 1 + i + j * self.across, xs[i], ys[j]
+
+    def coordinates(self) -> Coordinates:
+        """COOR cards: one for the beginning of every section in every line of nodes."""
+        records: list[NodeValues] = []
+        for line, y in enumerate(lines(self.rows)):
+            node = 1 + line * self.across
+            y = _round(y, self.rows[-1].end)
+            for section in self.columns:
+                records.append(NodeValues(node, 1, (section.start, y)))
+                node += 2 * section.elements
+            records.append(NodeValues(node, 0, (self.columns[-1].end, y)))
+        return Coordinates(tuple(records))
+
+    def element_cards(self) -> Elements:
+        """ELEM cards: the first element of every row."""
+        a = self.across
+        records: list[ElementNodes] = []
+        for row in range(self.up // 2):
+            n = 1 + 2 * row * a
+            corners = (n, n + 2, n + 2 + 2 * a, n + 2 * a)
+            sides = (n + 1, n + 2 + a, n + 1 + 2 * a, n + a)
+            number = 1 + row * (a // 2)
+            records.append(ElementNodes(number, (*corners, *sides, n + 1 + a), 2))
+        return Elements(tuple(records))
+
+    def boundary(
+        self, everywhere: Sequence[int], edges: Mapping[str, Sequence[int]]
+    ) -> Boundary | None:
+        """BOUN cards; None where nothing is restrained.
+
+        Parameters
+        ----------
+        everywhere : sequence of int
+            Codes of every node.
+        edges : dict
+            Codes of the nodes of the edges ``left``, ``right``, ``bottom`` and ``top``.
+        """
+        a, u = self.across, self.up
+        members = {
+            "left": lambda i, j: i == 0,
+            "right": lambda i, j: i == a - 1,
+            "bottom": lambda i, j: j == 0,
+            "top": lambda i, j: j == u - 1,
+        }
+        runs: list[tuple[int, int, tuple[int, ...]]] = []
+        for j in range(u):
+            for i in range(a):
+                held = [codes for name, codes in edges.items() if members[name](i, j)]
+                code = tuple(max(c) for c in zip(everywhere, *held, strict=True))
+                node = 1 + i + j * a
+                if runs and runs[-1][2] == code:
+                    runs[-1] = (runs[-1][0], node, code)
+                else:
+                    runs.append((node, node, code))
+        records: list[NodeCodes] = []
+        for first, last, code in runs:
+            if not any(code):
+                continue
+            if first < last:  # a negative code carries on up to the next card
+                records.append(NodeCodes(first, 1, tuple(-c for c in code)))
+            records.append(NodeCodes(last, 0, code))
+        return Boundary(tuple(records)) if records else None

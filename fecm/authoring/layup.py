@@ -1,0 +1,99 @@
+"""Layups in the usual notation: ``[0/45/0/-45/0]2s``.
+
+Angles in degrees, from the struck face on, separated by ``/``.  ``_2`` or ``_{2}`` repeats a ply,
+``±45`` (or ``+-45``) is 45/-45, a number behind a group repeats it, ``s`` mirrors it, ``T`` says
+that it is the total.  Groups may stand inside groups.
+"""
+
+from __future__ import annotations
+
+import re
+
+# A layup of more plies than this is a slip of the pen.
+MOST_PLIES = 10_000
+
+_ANGLE = re.compile(r"(±|\+-|\+/-)?([+-]?(?:\d+\.?\d*|\.\d+))(?:_\{?(\d+)\}?)?")
+_SUFFIX = re.compile(r"_?\{?(\d*)([sST]?)\}?")
+
+
+class LayupError(ValueError):
+    """A layup can't be read."""
+
+
+def parse_layup(text: str) -> list[float]:
+    """Angles of a layup's plies, from the struck face on.
+
+    Parameters
+    ----------
+    text : str
+        For example ``"[0/45/0/-45/0]2s"`` or ``"[0_2/(±45)2/90]s"``.
+
+    Raises
+    ------
+    LayupError
+        If the text is no layup; the message shows where.
+    """
+    compact = re.sub(r"\s", "", text)
+    if not compact.startswith("["):
+        compact = f"[{compact}]" if compact[-1:] not in "])" or "[" not in compact else compact
+    angles, end = _group(compact, 0)
+    if end != len(compact):
+        raise _error(compact, end)
+    return angles
+
+
+def _error(text: str, position: int) -> LayupError:
+    rest = text[position : position + 10]
+    what = f"at `{rest}`" if rest else "at its end"
+    return LayupError(f"the layup `{text}` can't be read {what}; write for example [0/45/-45/90]2s")
+
+
+def _group(text: str, start: int) -> tuple[list[float], int]:
+    """Angles of the group that begins at `start`, and where it ends."""
+    if text[start : start + 1] not in ("[", "("):
+        raise _error(text, start)
+    close = "]" if text[start] == "[" else ")"
+    angles: list[float] = []
+    position = start + 1
+    while True:
+        if text[position : position + 1] in ("[", "("):
+            inner, position = _group(text, position)
+            angles += inner
+        else:
+            match = _ANGLE.match(text, position)
+            if match is None:
+                raise _error(text, position)
+            angle = float(match[2])
+            plies = [angle, -angle] if match[1] else [angle]
+            angles += plies * _times(match[3] or "1", len(plies), text, position)
+            position = match.end()
+        _bound(angles, text, position)
+        following = text[position : position + 1]
+        position += 1
+        if following == close:
+            break
+        if following not in ("/", ","):
+            raise _error(text, position - 1)
+    suffix = _SUFFIX.match(text, position)
+    if suffix is not None:
+        angles = angles * _times(suffix[1] or "1", len(angles), text, position)
+        if suffix[2] in ("s", "S") and suffix[2]:
+            angles = angles + angles[::-1]
+        position = suffix.end()
+    _bound(angles, text, position)
+    return angles, position
+
+
+def _times(digits: str, plies: int, text: str, position: int) -> int:
+    """A number of repeats that does not exhaust the memory."""
+    if len(digits) > 5 or int(digits) * plies > MOST_PLIES or int(digits) < 1:
+        raise LayupError(
+            f"the layup `{text}` repeats {digits} times at `{text[position : position + 10]}`; "
+            f"1 to {MOST_PLIES} plies can be made"
+        )
+    return int(digits)
+
+
+def _bound(angles: list[float], text: str, position: int) -> None:
+    if len(angles) > MOST_PLIES:
+        raise _error(text, position)

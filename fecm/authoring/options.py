@@ -1,0 +1,177 @@
+"""From the options of ``fecm new`` to a deck."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+from fecm.authoring.grid import Grid, Section, graded, listed, uniform
+from fecm.authoring.layup import LayupError, parse_layup
+from fecm.authoring.materials import MATERIALS, SYSTEMS
+from fecm.authoring.new import EDGES, SUPPORTS, Specification, new_deck
+from fecm.deck.model import Deck, Indentation, Ply, Units
+
+# Elements in one direction, at the most.
+MOST = 2000
+
+
+class OptionError(ValueError):
+    """An option can't be meant."""
+
+
+def deck_of_options(
+    *,
+    title: str,
+    size: str | None,
+    mesh: str | None,
+    grading: float,
+    columns: str | None,
+    rows: str | None,
+    layup: str,
+    ply_thickness: float,
+    ply: str | None,
+    material: str | None,
+    units: str | None,
+    support: str,
+    edges: Sequence[str],
+    at: str | None,
+    velocity: float,
+    law: str,
+    duration: float,
+    dt: float | None,
+    every: int | None,
+) -> tuple[Deck, list[str]]:
+    """Make a deck, and notes for the user, of the command's options.
+
+    Raises
+    ------
+    OptionError
+        If an option can't be meant; the message names it.
+    """
+    try:
+        angles = parse_layup(layup)
+    except LayupError as error:
+        raise OptionError(str(error)) from None
+    for name, value in (
+        ("--ply-thickness", ply_thickness),
+        ("--duration", duration),
+        ("--dt", 1.0 if dt is None else dt),
+    ):
+        if not 0.0 < value < math.inf:
+            raise OptionError(f"{name} must be positive, not {value:g}")
+    point = None if at is None else _numbers("--at", at, 2)
+    grid = _grid(size, mesh, grading, columns, rows, point)
+    x, y = point or (grid.columns[-1].end / 2.0, grid.rows[-1].end / 2.0)
+    constants, system = _ply(ply, material, units)
+    spec = Specification(
+        title=title,
+        grid=grid,
+        angles=angles,
+        ply_thickness=ply_thickness,
+        ply=constants,
+        supports=_supports(support, edges),
+        at=(x, y),
+        velocity=velocity,
+        law=Indentation(*_numbers("--law", law, 4)),
+        duration=duration,
+        dt=dt,
+        every=every,
+        units=None if system is None else Units(*SYSTEMS[system][0]),
+    )
+    notes: list[str] = []
+    node, node_x, node_y = grid.nearest(x, y)
+    if math.hypot(node_x - x, node_y - y) > 1e-9 * grid.columns[-1].end:
+        notes.append(f"the nearest node to the impact point is {node} at {node_x:g}, {node_y:g}")
+    return new_deck(spec), notes
+
+
+def _numbers(option: str, text: str, count: int) -> list[float]:
+    """Numbers separated by commas."""
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != count or not all(map(math.isfinite, values)):
+        raise OptionError(f"{option} takes {count} numbers with commas between them, not `{text}`")
+    return values
+
+
+def _pair(option: str, text: str | None) -> tuple[float, float]:
+    """Two positive numbers with an x between them."""
+    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*[xX×]\s*([0-9.eE+-]+)\s*", text or "")
+    try:
+        a, b = (float(match[1]), float(match[2])) if match else (0.0, 0.0)
+    except ValueError:
+        a = b = 0.0
+    if not (0.0 < a < math.inf and 0.0 < b < math.inf):
+        raise OptionError(f"{option} takes two numbers as in 6x4, not `{text or ''}`")
+    return a, b
+
+
+def _grid(
+    size: str | None,
+    mesh: str | None,
+    grading: float,
+    columns: str | None,
+    rows: str | None,
+    point: Sequence[float] | None,
+) -> Grid:
+    """The grid of elements, from sizes or from lists."""
+    if (columns is None) != (rows is None):
+        raise OptionError("--columns and --rows belong together")
+    if columns is not None and rows is not None:
+        if size or mesh or grading != 1.0:
+            raise OptionError("--columns and --rows stand for --size, --mesh and --grading")
+        try:
+            grid = Grid(listed(columns), listed(rows))
+        except ValueError as error:
+            raise OptionError(str(error)) from None
+    else:
+        lengths = _pair("--size", size)
+        counts = _pair("--mesh", mesh)
+        if not all(n.is_integer() and n <= MOST for n in counts):
+            raise OptionError(f"--mesh takes whole numbers up to {MOST}, not `{mesh}`")
+        directions: list[list[Section]] = []
+        for axis in (0, 1):
+            length, count = lengths[axis], int(counts[axis])
+            centre = length / 2.0 if point is None else point[axis]
+            directions.append(
+                graded(length, count, centre, grading) if grading > 1.0 else uniform(length, count)
+            )
+        grid = Grid(*directions)
+    if grid.across // 2 > MOST or grid.up // 2 > MOST or grid.elements > 500_000:
+        raise OptionError(f"the mesh would have {grid.elements} elements; 500000 is the most")
+    if point is not None and not (
+        0.0 <= point[0] <= grid.columns[-1].end and 0.0 <= point[1] <= grid.rows[-1].end
+    ):
+        raise OptionError("--at lies outside the plate")
+    return grid
+
+
+def _ply(text: str | None, name: str | None, system: str | None) -> tuple[Ply, str | None]:
+    """Constants of the ply, and the system of units that the deck declares."""
+    if system is not None and system not in SYSTEMS:
+        raise OptionError(f"--units takes {', '.join(SYSTEMS)}, not `{system}`")
+    if (text is None) == (name is None):
+        raise OptionError("give either --ply or --material")
+    if text is not None:
+        return Ply(*_numbers("--ply", text, 7)), system
+    material = MATERIALS.get(name or "")
+    if material is None:
+        raise OptionError(f"--material takes {', '.join(MATERIALS)}, not `{name}`")
+    return material.converted(system or material.system), system
+
+
+def _supports(support: str, edges: Sequence[str]) -> dict[str, str]:
+    """Support of every edge."""
+    supports = dict.fromkeys(EDGES, support)
+    for text in edges:
+        edge, _, kind = text.partition("=")
+        if edge not in EDGES or kind not in SUPPORTS:
+            raise OptionError(
+                f"--edge takes one of {', '.join(EDGES)}, =, and one of {', '.join(SUPPORTS)}, "
+                f"not `{text}`"
+            )
+        supports[edge] = kind
+    return supports

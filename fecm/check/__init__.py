@@ -1,0 +1,121 @@
+"""Checks of a deck that was read: a plate that can be hit, a program that can run.
+
+Findings about what a segment lacks are held back where a card of that segment could not be read,
+so that one slip makes one finding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fecm.check.impact import check_impact, check_law, check_projectile, check_resolution
+from fecm.check.material import check_material
+from fecm.check.mesh import check_mesh
+from fecm.check.run import check_output, check_program, check_time_step
+from fecm.deck.findings import Findings
+from fecm.deck.model import (
+    Boundary,
+    Coordinates,
+    Deck,
+    Elements,
+    Impact,
+    Indentation,
+    Material,
+    Segment,
+    Units,
+)
+from fecm.deck.reader import Problem
+from fecm.mesh import Mesh, generate
+from fecm.program import Body, compile_program
+
+NEEDED: tuple[type[Segment], ...] = (Coordinates, Elements, Material, Impact, Indentation)
+# Segments of which only the last counts.
+SINGLE: tuple[type[Segment], ...] = (Coordinates, Elements, Material, Impact, Indentation, Units)
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A problem that was checked.
+
+    Attributes
+    ----------
+    deck : Deck
+    mesh : Mesh
+    program : tuple
+        The macro program with its loops nested.
+    """
+
+    deck: Deck
+    mesh: Mesh
+    program: Body
+
+
+def check(problem: Problem, findings: Findings) -> Checked | None:
+    """Check a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        As the reader left it.
+    findings : Findings
+        Receives what is wrong.
+
+    Returns
+    -------
+    Checked or None
+        None where the problem has no control card to check anything by.
+    """
+    deck, unsound = problem.deck, problem.unsound
+    if deck is None:
+        return None
+    before = len(findings.errors)
+    _check_segments(deck, unsound, findings)
+    program = compile_program(deck.macros, findings)
+    generated = len(findings.errors)
+    mesh = generate(deck, findings)
+    complete = len(findings.errors) == generated and not unsound & {"COOR", "ELEM"}
+    if complete and deck.has(Coordinates) and deck.has(Elements):
+        check_mesh(deck, mesh, findings)
+    if (material := deck.last(Material)) is not None:
+        check_material(material, findings)
+    if (impact := deck.last(Impact)) is not None:
+        check_impact(impact, deck, mesh, findings)
+    if (law := deck.last(Indentation)) is not None:
+        check_law(law, findings)
+    checked = Checked(deck, mesh, program)
+    if len(findings.errors) == before and not unsound:
+        with np.errstate(all="ignore"):  # numbers beyond all range end in a finding
+            check_time_step(deck, mesh, findings)
+            check_program(deck, program, findings)
+            check_projectile(deck.need(Impact), findings)
+            check_resolution(deck, mesh, findings)
+            check_output(deck, program, findings)
+    return checked
+
+
+def _check_segments(deck: Deck, unsound: set[str], findings: Findings) -> None:
+    """Segments that are missing, and those that another one of the same keyword replaces."""
+    for kind in NEEDED:
+        if not deck.has(kind) and kind.keyword not in unsound:
+            findings.add(
+                "E203",
+                f"The deck has no {kind.keyword} segment.",
+                deck.place(),
+                "it belongs before END",
+            )
+    for kind in SINGLE:
+        for segment in deck.all(kind)[1:]:
+            findings.add(
+                "W204",
+                f"A second {kind.keyword} segment replaces the first.",
+                segment.place(),
+                "take one of them out",
+            )
+    if len(deck.all(Boundary)) > 1:
+        findings.add(
+            "W204",
+            "A second BOUN segment adds to the first and replaces the codes of its nodes.",
+            deck.all(Boundary)[1].place(),
+        )

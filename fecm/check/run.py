@@ -1,0 +1,107 @@
+"""Checks of what a run would do: its time step, its length, what it stores."""
+
+from __future__ import annotations
+
+from fecm.assembly import UnsoundPlateError
+from fecm.deck.findings import Findings
+from fecm.deck.model import Deck, Material
+from fecm.elements.quadrature import HIGHEST_ORDER
+from fecm.mesh import Mesh
+from fecm.parts import build_plate, rules
+from fecm.program import Body, Tally, estimate, every, flat
+
+# A program of more macros than this would run for days.
+MOST_MACROS = 10**9
+LARGE_OUTPUT = 10**9
+
+UNSTABLE = "E508"
+
+
+def check_program(deck: Deck, program: Body, findings: Findings) -> None:
+    """Check the length of a program, and that what it is asked to store ever comes up."""
+    sizes = estimate(program)
+    if sizes.macros > MOST_MACROS:
+        findings.add(
+            "E509",
+            f"The program carries out {sizes.macros:.3g} macros, more than {MOST_MACROS:g}.",
+            deck.macros[0].place("macro"),
+            "nested LOOPs multiply",
+        )
+    for macro in flat(program):
+        if macro.word == "RODP" and every(macro) > max(1, sizes.steps):
+            findings.add(
+                "W510",
+                f"RODP stores every {every(macro)} steps, but the program takes only "
+                f"{sizes.steps}: no strains are stored.",
+                macro.place("value"),
+            )
+        if macro.word == "DISP" and not sizes.displacement_rows:
+            findings.add(
+                "W510",
+                f"DISP stores every {every(macro)} passes, but no loop has as many: no "
+                "displacements are stored.",
+                macro.place("value"),
+            )
+    if program and not sizes.steps:
+        findings.add("W511", "The program takes no impact step.", deck.macros[0].place("macro"))
+
+
+def check_time_step(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+    """Compare every DT with the plate's critical time step."""
+    steps = [macro for macro in deck.macros if macro.word == "DT"]
+    if not steps:
+        return
+    plate = build_plate(deck, mesh)
+    try:
+        if max(macro.value for macro in steps) < plate.safe_time_step():
+            return
+        critical = plate.critical_time_step()
+    except UnsoundPlateError as error:
+        findings.add(
+            "E417",
+            f"The plate has no critical time step: {error}.",
+            deck.need(Material).place(),
+            "look at the units of the ply's constants, the thickness and the coordinates",
+        )
+        return
+    for macro in steps:
+        if macro.value >= critical:
+            findings.add(
+                UNSTABLE,
+                f"DT = {macro.value:.4g} is not below the plate's critical time step "
+                f"{critical:.4g}: the motion would grow without bound.",
+                macro.place("value"),
+                f"take {_below(critical)} or less; --force runs the deck all the same",
+            )
+
+
+def _below(critical: float) -> str:
+    """A round number a little below the critical time step."""
+    return f"{0.95 * critical:.2g}"
+
+
+def output_bytes(deck: Deck, sizes: Tally) -> int:
+    """Size of a result's large datasets, in bytes."""
+    control = deck.control
+    card = deck.need(Material).integration
+    points = len(rules(deck.need(Material))[2].xi) if 1 <= abs(card.points) <= HIGHEST_ORDER else 0
+    displacement_row = control.numnp * (control.ndf + 1)
+    strain_row = control.numel * points * 5
+    return 8 * (
+        sizes.displacement_rows * displacement_row
+        + sizes.contact_rows * (strain_row + 8)
+        + sizes.steps * 18
+    )
+
+
+def check_output(deck: Deck, program: Body, findings: Findings) -> None:
+    """Warn of a large result."""
+    size = output_bytes(deck, estimate(program))
+    if size > LARGE_OUTPUT:
+        macro = next((m for m in flat(program) if m.word in ("RODP", "DISP")), None)
+        findings.add(
+            "W512",
+            f"The result will take {size / 1e9:.3g} GB.",
+            macro.place("value") if macro else None,
+            "RODP and DISP store every N steps: take a larger N",
+        )

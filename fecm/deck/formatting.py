@@ -1,0 +1,87 @@
+"""A deck rewritten with aligned columns and a ruler above each kind of card.
+
+Comments and blank cards stay where they are; the model does not change.  Rulers begin with ``!:``
+and are made anew each time.
+"""
+
+from __future__ import annotations
+
+from fecm.deck.card import Card, Fields, Value, write_card
+from fecm.deck.findings import DeckError
+from fecm.deck.model import STOP, Macro
+from fecm.deck.reader import Reader
+from fecm.deck.segments import READERS
+
+RULER = "!:"
+
+
+def format_deck(text: str, source: str = "<text>") -> str:
+    """Align a deck's columns.
+
+    Parameters
+    ----------
+    text : str
+        The deck.
+    source : str
+        Its name in messages.
+
+    Raises
+    ------
+    DeckError
+        If the deck can't be read.
+    """
+    reader = Reader(text)
+    reader.problems()
+    if reader.findings.errors:
+        raise DeckError(list(reader.findings), source)
+    read = reader.stream.read
+    written: list[str] = []
+    above: Fields | None = None
+    lines = reader.stream.lines
+    for number, line in enumerate(lines, start=1):
+        if line.startswith(RULER):
+            continue
+        card = Card(number, line)
+        if number in read:
+            fields, values = read[number]
+            aligned = _aligned(card, fields, values)
+            if fields != above and "," not in aligned and fields != Macro.fields:
+                written.append(ruler(fields))
+            above = fields
+            written.append(_with_comment(aligned, line))
+        else:
+            if not line.startswith("!"):
+                above = None
+            keyword = card.is_keyword and (card.keyword in READERS or card.keyword == STOP)
+            known = card.keyword if keyword and len(card.data.split()) == 1 else card.data
+            written.append(line.rstrip() if line.startswith("!") else _with_comment(known, line))
+        if card.keyword == STOP and not line.startswith("!"):
+            written += [rest.rstrip() for rest in lines[number:]]
+            break
+    return "\n".join(written) + "\n"
+
+
+def ruler(fields: Fields) -> str:
+    """A comment with the fields' names over their columns."""
+    line = RULER
+    for field in fields:
+        room = field.last - len(line)
+        line += field.label[: room if line == RULER else room - 1].rjust(room)
+    return line.rstrip()
+
+
+def _aligned(card: Card, fields: Fields, values: list[Value]) -> str:
+    """A card's values in their columns, without the zeros that it left blank at its end."""
+    texts = [text for _, text in card.cut(fields)][: len(fields)]
+    count = max([n for n, text in enumerate(texts, start=1) if text.strip()], default=0)
+    kept: list[Value] = list(values[:count])
+    if fields == Macro.fields:  # whole numbers of macros are counts
+        kept = [int(v) if isinstance(v, float) and v.is_integer() else v for v in kept]
+        kept[:1] = [str(v).strip().upper() for v in kept[:1]]
+    return write_card(fields[:count], kept) if count else ""
+
+
+def _with_comment(text: str, line: str) -> str:
+    """Text with the comment that stood behind it."""
+    _, mark, comment = line.partition("!")
+    return f"{text}  !{comment.rstrip()}" if mark else text.rstrip()

@@ -1,0 +1,233 @@
+"""Readers of the segments between the control card and END, each of one keyword."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from fecm.deck.card import Card, Fields, Source, Value
+from fecm.deck.model import (
+    Boundary,
+    Control,
+    Coordinates,
+    ElementNodes,
+    Elements,
+    Forces,
+    Impact,
+    Indentation,
+    Integration,
+    Layer,
+    Material,
+    NodeCodes,
+    NodeValues,
+    Page,
+    Ply,
+    PrintOption,
+    Segment,
+    Units,
+    code_fields,
+    element_fields,
+    force_fields,
+    node_fields,
+)
+from fecm.deck.stream import Stream
+
+Row = tuple[list[Value], Source]
+
+
+class SegmentReader:
+    """Reads segments of one problem.
+
+    Parameters
+    ----------
+    stream : Stream
+        The deck's cards.
+    control : Control
+        Counts of the problem.
+
+    Attributes
+    ----------
+    unsound : set of str
+        Keywords of segments of which a card could not be read.
+    """
+
+    def __init__(self, stream: Stream, control: Control) -> None:
+        self._stream = stream
+        self._control = control
+        self.unsound: set[str] = set()
+
+    def read(self, head: Card) -> Segment | None:
+        """Read the segment that a keyword card begins; None if it can't be made."""
+        segment = READERS[head.keyword](self, head)
+        if segment is None:
+            self.unsound.add(head.keyword)
+        return segment
+
+    # Numbered cards up to a blank one ------------------------------------------------------------
+
+    def _rows(self, head: Card, fields: Fields) -> list[Row]:
+        """Rows of numbered cards up to the blank card that ends them."""
+        rows: list[Row] = []
+        while (card := self._stream.take()) is not None:
+            if card.is_blank:
+                return rows
+            if card.is_keyword:
+                self._stream.give_back()
+                self._not_ended(head, card)
+                return rows
+            row = self._stream.row(card, fields)
+            if row is None:
+                self.unsound.add(head.keyword)
+            else:
+                rows.append(row)
+        self._not_ended(head, head)
+        return rows
+
+    def _not_ended(self, head: Card, at: Card) -> None:
+        self._stream.findings.add(
+            "E007",
+            f"The {head.keyword} cards are not ended by a blank card.",
+            at.place,
+            "put a blank card before this one" if at is not head else "put a blank card at the end",
+        )
+
+    def _coordinates(self, head: Card) -> Segment:
+        rows = self._rows(head, node_fields(self._control.ndm))
+        return Coordinates(_node_values(rows), source=Source(head, ()))
+
+    def _forces(self, head: Card) -> Segment:
+        rows = self._rows(head, force_fields(self._control.ndf))
+        return Forces(_node_values(rows), source=Source(head, ()))
+
+    def _boundary(self, head: Card) -> Segment:
+        rows = self._rows(head, code_fields(self._control.ndf))
+        records = [
+            NodeCodes(int(v[0]), int(v[1]), tuple(map(int, v[2:])), source=source)
+            for v, source in rows
+        ]
+        return Boundary(tuple(records), source=Source(head, ()))
+
+    def _elements(self, head: Card) -> Segment:
+        """Read ELEM cards up to a blank card, or to the last element's card without one."""
+        fields = element_fields(self._control.nen)
+        records: list[ElementNodes] = []
+        while (card := self._stream.take()) is not None and not card.is_blank:
+            if card.is_keyword:
+                self._stream.give_back()
+                if not records or records[-1].element < self._control.numel:
+                    self._not_ended(head, card)
+                break
+            row = self._stream.row(card, fields)
+            if row is None:
+                self.unsound.add("ELEM")
+            else:
+                number, *nodes, increment = map(int, row[0])
+                records.append(ElementNodes(number, tuple(nodes), increment, source=row[1]))
+        return Elements(tuple(records), source=Source(head, ()))
+
+    # Cards of a fixed number ---------------------------------------------------------------------
+
+    def _single(self, head: Card, fields: Fields, what: str) -> Row | None:
+        """A card that must be there; None if it is missing or can't be read."""
+        card = self._stream.take()
+        if card is None or card.is_keyword:
+            if card is not None:
+                self._stream.give_back()
+            if head.keyword not in self.unsound:
+                self._stream.findings.add("E008", f"{what} is missing.", (card or head).place)
+            self.unsound.add(head.keyword)
+            return None
+        row = self._stream.row(card, fields)
+        if row is None:
+            self.unsound.add(head.keyword)
+        return row
+
+    def _impact(self, head: Card) -> Segment | None:
+        row = self._single(head, Impact.fields, "The card of the impact")
+        if row is None:
+            return None
+        (node, dof, velocity), source = row
+        return Impact(int(node), int(dof), float(velocity), source=source)
+
+    def _indentation(self, head: Card) -> Segment | None:
+        row = self._single(head, Indentation.fields, "The card of the indentation law")
+        return None if row is None else Indentation(*map(float, row[0]), source=row[1])
+
+    def _units(self, head: Card) -> Segment | None:
+        card = self._stream.take()
+        names = [] if card is None else card.data.replace(",", " ").split()
+        if card is not None and len(names) == len(Units.NAMES):
+            return Units(*names, source=Source(card, ()))
+        if card is not None and card.keyword in (*READERS, "END"):
+            self._stream.give_back()
+        self._stream.findings.add(
+            "E010",
+            "UNIT takes one card with three names: the units of length, force and time.",
+            (card or head).place,
+            "for example: in lbf s",
+        )
+        return None
+
+    def _print_option(self, head: Card) -> Segment:
+        return PrintOption(head.keyword == "PRIN", source=Source(head, ()))
+
+    def _page(self, head: Card) -> Segment:
+        card = self._stream.take()
+        return Page("" if card is None else card.data[:4].rstrip(), source=Source(head, ()))
+
+    def _material(self, head: Card) -> Segment | None:
+        rule = self._single(head, Integration.fields, "The first card of MATE")
+        ply = self._single(head, Ply.fields, "The card of the ply's constants")
+        layers = self._layers(head) if rule or ply else None
+        if rule is None or ply is None or layers is None:
+            return None
+        bending, shear, points, thickness, width = rule[0]
+        integration = Integration(
+            int(bending), int(shear), int(points), float(thickness), float(width), source=rule[1]
+        )
+        constants = Ply(*map(float, ply[0]), source=ply[1])
+        return Material(integration, constants, layers, source=Source(head, ()))
+
+    def _layers(self, head: Card) -> tuple[Layer, ...] | None:
+        """Layer cards, as many as the control card says; None if one is missing or unreadable."""
+        count = self._control.layers
+        layers: list[Layer] = []
+        for number in range(count):
+            card = self._stream.take()
+            if card is None or card.is_keyword or card.is_blank:
+                if card is not None:
+                    self._stream.give_back()
+                self._stream.findings.add(
+                    "E202",
+                    f"MATE has {number} layer cards where the control card says {count}.",
+                    (card or head).place,
+                )
+                return None
+            row = self._stream.row(card, Layer.fields)
+            if row is not None:
+                (layer, angle, thickness), source = row
+                layers.append(Layer(int(layer), float(angle), float(thickness), source=source))
+        return tuple(layers) if len(layers) == count else None
+
+
+# What reads the data of each keyword; None where a segment can't be made.
+READERS: dict[str, Callable[[SegmentReader, Card], Segment | None]] = {
+    "COOR": SegmentReader._coordinates,
+    "ELEM": SegmentReader._elements,
+    "BOUN": SegmentReader._boundary,
+    "MATE": SegmentReader._material,
+    "ROD": SegmentReader._impact,
+    "EXPE": SegmentReader._indentation,
+    "FORC": SegmentReader._forces,
+    "UNIT": SegmentReader._units,
+    "PRIN": SegmentReader._print_option,
+    "NOPR": SegmentReader._print_option,
+    "PAGE": SegmentReader._page,
+}
+
+
+def _node_values(rows: list[Row]) -> tuple[NodeValues, ...]:
+    """COOR or FORC records of their rows."""
+    return tuple(
+        NodeValues(int(v[0]), int(v[1]), tuple(map(float, v[2:])), source=source)
+        for v, source in rows
+    )

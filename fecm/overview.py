@@ -1,0 +1,136 @@
+"""What a deck would run: the summary of ``fecm check``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.check import Checked
+from fecm.check.run import output_bytes
+from fecm.parts import build_plate, build_rod
+from fecm.program import estimate, flat
+from fecm.units import unit_names, unit_of
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Overview:
+    """A problem in numbers.
+
+    Attributes
+    ----------
+    title : str
+    nodes, elements, layers, equations, steps : int
+    A, B, D, shear : ndarray
+        Laminate stiffnesses.
+    plate_mass, projectile_mass : float
+    critical_time_step : float
+    time_steps : list of float
+        Every DT of the program.
+    output_bytes : int
+        About what the result will take.
+    units : dict
+        Names of the units; empty where the deck gives none.
+    """
+
+    title: str
+    nodes: int
+    elements: int
+    layers: int
+    equations: int
+    steps: int
+    A: Floats
+    B: Floats
+    D: Floats
+    shear: Floats
+    plate_mass: float
+    projectile_mass: float
+    critical_time_step: float
+    time_steps: list[float]
+    output_bytes: int
+    units: dict[str, str]
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values, for JSON."""
+        return {
+            name: value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in self.__dict__.items()
+        }
+
+    def lines(self) -> list[str]:
+        """Lines that a person reads."""
+
+        def quantity(value: float, dimension: str) -> str:
+            return f"{value:.4g} {unit_of(dimension, self.units)}".rstrip()
+
+        lines = [
+            self.title or "(no title)",
+            f"  nodes               {self.nodes}",
+            f"  elements            {self.elements}",
+            f"  equations           {self.equations}",
+            f"  layers              {self.layers}",
+        ]
+        for name, dimension in (("A", "force/length"), ("B", "force"), ("D", "force*length")):
+            lines += _matrix(name, getattr(self, name), unit_of(dimension, self.units))
+        lines += _matrix("shear xz, yz", self.shear, unit_of("force/length", self.units))
+        mass = "force*time^2/length"
+        lines += [
+            f"  plate mass          {quantity(self.plate_mass, mass)}",
+            f"  projectile mass     {quantity(self.projectile_mass, mass)}",
+            f"  critical time step  {quantity(self.critical_time_step, 'time')}",
+        ]
+        for dt in dict.fromkeys(self.time_steps):
+            share = dt / self.critical_time_step
+            lines.append(f"  DT                  {quantity(dt, 'time')} ({share:.0%} of it)")
+        lines += [
+            f"  impact steps        {self.steps}",
+            f"  output              {_size(self.output_bytes)}",
+        ]
+        return lines
+
+
+def _matrix(name: str, values: Floats, unit: str) -> list[str]:
+    """A matrix, its rounding errors shown as zeros."""
+    shown = np.where(np.abs(values) < 1e-12 * max(1.0, np.abs(values).max()), 0.0, values)
+    rows = [" ".join(f"{value:12.5g}" for value in row) for row in shown]
+    heads = [f"  {name:18}"] + [" " * 20] * (len(rows) - 1)
+    lines = [f"{head}{row}" for head, row in zip(heads, rows, strict=True)]
+    lines[0] = f"{lines[0]}  {unit}".rstrip()
+    return lines
+
+
+def _size(count: int) -> str:
+    """A number of bytes as a person says it."""
+    for unit, scale in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= scale:
+            return f"{count / scale:.3g} {unit}"
+    return f"{count} bytes"
+
+
+def overview(checked: Checked) -> Overview:
+    """Summarise a problem without errors."""
+    deck, mesh = checked.deck, checked.mesh
+    plate = build_plate(deck, mesh)
+    sizes = estimate(checked.program)
+    laminate = plate.laminate
+    return Overview(
+        title=deck.title,
+        nodes=deck.control.numnp,
+        elements=deck.control.numel,
+        layers=deck.control.layers,
+        equations=plate.neq,
+        steps=sizes.steps,
+        A=laminate.A,
+        B=laminate.B,
+        D=laminate.D,
+        shear=laminate.shear,
+        plate_mass=plate.area() * laminate.mass,
+        projectile_mass=build_rod().total_mass,
+        critical_time_step=plate.critical_time_step(),
+        time_steps=[m.value for m in flat(checked.program) if m.word == "DT"],
+        output_bytes=output_bytes(deck, sizes),
+        units=unit_names(deck),
+    )

@@ -1,0 +1,86 @@
+"""From a deck to the parts of a run.
+
+Here, and only here, the slips that are on become parameters of the plate, the projectile, the law
+and the transducer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fecm.assembly import PlateModel, Rules, assemble
+from fecm.deck.model import Deck, Indentation, Material
+from fecm.deck.model import Impact as ImpactCard
+from fecm.elements.quadrature import HIGHEST_ORDER, Rule, gauss, nodal
+from fecm.impact import Contact, Impact
+from fecm.indentation import Constants, Law, MemoryLaw, StickyLaw
+from fecm.laminate import laminate_of
+from fecm.mesh import Mesh
+from fecm.plate import StrainField
+from fecm.projectile import LISTING_DENSITY, REPORT_DENSITY, Rod, Station, report_rod
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A problem's parts, ready to run."""
+
+    plate: PlateModel
+    impact: Impact
+    station: Station
+    strains: StrainField
+
+
+def rules(material: Material) -> tuple[Rule, Rule, Rule]:
+    """Quadrature of a MATE card: bending (L1), transverse shear (L2), stored strains (K).
+
+    L1 and L2 outside 1 to 4 count as the nearest of these, as in the listing.
+
+    Raises
+    ------
+    ValueError
+        If K is 0 or beyond 4.
+    """
+    card = material.integration
+    bending, shear = (min(HIGHEST_ORDER, max(1, n)) for n in (card.bending, card.shear))
+    points = gauss(card.points) if card.points > 0 else nodal(-card.points)
+    return gauss(bending), gauss(shear), points
+
+
+def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> PlateModel:
+    """Make the plate of a deck, with the slips that are on."""
+    material = deck.need(Material)
+    bending, shear, points = rules(material)
+    return assemble(
+        mesh,
+        laminate_of(material, isotropic_g12="g12" in slips),
+        Rules(
+            bending=bending,
+            shear=bending if "shear-order" in slips else shear,
+            strains=bending if "tapes" in slips else points,
+            transposed="jacobian" in slips,
+        ),
+    )
+
+
+def build_rod(slips: frozenset[str] = frozenset()) -> Rod:
+    """Make the projectile, with the slips that are on."""
+    return report_rod(LISTING_DENSITY if "density" in slips else REPORT_DENSITY)
+
+
+def set_up(deck: Deck, mesh: Mesh, slips: frozenset[str]) -> Setup:
+    """Make plate, projectile and law of a checked problem, with the slips that are on."""
+    plate, rod = build_plate(deck, mesh, slips), build_rod(slips)
+    card, measured = deck.need(ImpactCard), deck.need(Indentation)
+    constants = Constants(measured.k, measured.alpha_p, measured.s_p, measured.q)
+    law: Law = StickyLaw(constants) if "reload" in slips else MemoryLaw(constants)
+    contact = Contact(
+        equation=int(mesh.equations[card.node - 1, card.dof - 1]) - 1,
+        velocity=card.velocity,
+        plate_moves="target" not in slips,
+        strains_start_moving="rod-start" in slips,
+        scales_forces="force-scale" in slips,
+        keeps_first_step="rod-dt" in slips,
+    )
+    middle = rod.elements // 2 + 1
+    station = Station(middle + 1, 1.0) if "station" in slips else Station(middle)
+    return Setup(plate, Impact(plate, rod, law, contact), station, plate.strain_field())

@@ -1,0 +1,185 @@
+"""Checks of decks, and what a user of a wrong deck sees."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from fecm.api import prepare
+from fecm.cli import cli
+from tests.decks import APPENDIX, DATA_CARDS, LONG, MESH, PROGRAM, small
+
+WRONG = sorted((Path(__file__).parent / "wrong").glob("*.inp"))
+
+
+ENDLESS = PROGRAM.replace("         10", "      99999").replace("          5", "")
+
+
+def codes(text: str) -> list[str]:
+    """Codes of a deck's findings, without the projectile that small decks never give."""
+    return [f.code for f in prepare(text).findings if f.code not in ("W414", "W415")]
+
+
+def with_data(old: str, new: str) -> str:
+    """The small deck with a change in its data."""
+    assert old in DATA_CARDS
+    return small(data=DATA_CARDS.replace(old, new))
+
+
+@pytest.mark.parametrize("deck", WRONG, ids=lambda path: path.stem)
+def test_a_wrong_deck_shows_its_user_exactly_this(
+    deck: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / deck.name).write_text(deck.read_text())
+    monkeypatch.chdir(tmp_path)
+    checked = CliRunner().invoke(cli, ["check", deck.name])
+    assert checked.exit_code == 1
+    assert checked.stdout == deck.with_suffix(".txt").read_text()
+    ran = CliRunner().invoke(cli, ["run", deck.name])
+    assert ran.exit_code == 2
+    assert ran.stdout == ""
+    assert ran.stderr.startswith(checked.stdout)
+    assert [path.name for path in tmp_path.iterdir()] == [deck.name]
+
+
+def test_there_are_twenty_wrong_decks_and_more() -> None:
+    assert len(WRONG) >= 20
+
+
+def test_five_independent_errors_are_five_findings_in_one_run() -> None:
+    deck = next(path for path in WRONG if path.stem == "five-errors")
+    assert [f.code for f in prepare(deck).findings] == ["E005", "E408", "E101", "E403", "E501"]
+
+
+def test_the_summary_has_the_reports_critical_time_step_to_1_per_cent() -> None:
+    checked = CliRunner().invoke(cli, ["check", str(LONG)])
+    assert checked.exit_code == 0
+    match = re.search(r"critical time step +([0-9.e+-]+)", checked.stdout)
+    assert match is not None
+    assert float(match[1]) == pytest.approx(0.4748e-6, rel=1e-2)
+    for words in (
+        "nodes               609",
+        "equations           1827",
+        "projectile mass",
+        "16.5 MB",
+    ):
+        assert words in checked.stdout
+
+
+def test_findings_and_summary_are_json_lines_for_programs() -> None:
+    sound = CliRunner().invoke(cli, ["check", str(LONG), "--format", "json"])
+    *findings, last = (json.loads(line) for line in sound.stdout.splitlines())
+    assert [f["code"] for f in findings] == ["W414"]
+    assert last["kind"] == "summary"
+    assert last["equations"] == 1827
+    assert last["D"][0][0] == pytest.approx(1287.414844365, rel=1e-10)
+    wrong = CliRunner().invoke(cli, ["check", str(WRONG[0]), "--format", "json"])
+    (finding,) = (json.loads(line) for line in wrong.stdout.splitlines())
+    assert wrong.exit_code == 1
+    assert finding["severity"] == "error"
+    card = WRONG[0].read_text().splitlines()[finding["line"] - 1]
+    assert card == finding["card"]
+    assert card[finding["column"] - 1 : finding["end_column"]].strip() in finding["message"]
+
+
+def test_check_runs_nothing_and_writes_nothing(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "fecm", "check", str(APPENDIX)], cwd=tmp_path, check=False
+    )
+    assert done.returncode == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_sound_deck_has_no_findings_but_the_projectile() -> None:
+    assert [f.code for f in prepare(APPENDIX).findings] == ["W414"]
+    assert codes(small()) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code"),
+    [
+        ("    3    3   -3", "    3    3    0", "E402"),
+        ("    3    3   -3", "    3    3    5", "E402"),
+        ("    3    3   -3", "    5    3   -3", "W401"),
+        ("    3    3   -3", "    1    3   -3", "E315"),
+        ("    3    3   -3", "    3    2   -3", "W316"),
+        ("  0.000148", "       0.0", "E403"),
+        ("  1150000.", "       0.0", "E403"),
+        ("       0.3 ", "      3.95 ", "E404"),
+        ("    1   0.     0.053", "    1   0.     -.053", "E405"),
+        ("    1   0.     0.053", "    7   0.     0.053", "W408"),
+        ("      .106", "       0.0", "E406"),
+        ("   13    3", "   26    3", "E408"),
+        ("   13    3", "   13    6", "E409"),
+        ("   13    3", "   13    1", "E410"),
+        ("   13    3", "   13    4", "W413"),
+        ("     115.0", "    -115.0", "W411"),
+        ("     115.0", "       0.0", "W411"),
+        ("  1912000.", "       -1.", "E412"),
+        ("     0.094", "     1.094", "E412"),
+        (" 17500000.", "   1.E+308", "E417"),
+        ("EXPE", "EXPE\n  1912000. 0.0006564     0.094       2.0\nEXPE", "W204"),
+    ],
+)
+def test_data_that_cannot_be_meant_are_found(old: str, new: str, code: str) -> None:
+    assert codes(with_data(old, new)) == [code]
+
+
+@pytest.mark.parametrize(
+    ("program", "code"),
+    [
+        (PROGRAM.replace("RODP          5", "RODP         50"), "W510"),
+        (PROGRAM.replace("DISP          5", "DISP         50"), "W510"),
+        ("LMAS\nDISP\n", "W511"),
+        (PROGRAM.replace(".5E-6", ".8E-6"), "E508"),
+        ("LOOP          9\n" + ENDLESS + "NEXT\n", "W512"),
+        (PROGRAM.replace("TIME\n", ""), "W507"),
+    ],
+)
+def test_a_program_that_makes_a_wrong_result_look_right_is_found(program: str, code: str) -> None:
+    assert codes(small(program)) == [code]
+
+
+def test_two_nodes_in_one_place_are_a_cut_in_the_plate() -> None:
+    mesh = MESH.replace("    5    0       2.0       0.0", "    5    0       2.0       0.5")
+    assert "W314" in codes(small(mesh=mesh)) or "E313" in codes(small(mesh=mesh))
+    doubled = MESH.replace("   10    0       2.0", "   10    0       2.0")
+    assert codes(small(mesh=doubled)) == []
+
+
+def test_a_mesh_too_coarse_for_the_impacts_waves_is_found() -> None:
+    assert "W415" in [f.code for f in prepare(small()).findings]
+    assert "W415" not in [f.code for f in prepare(APPENDIX).findings]
+
+
+def test_loops_that_would_run_for_years_are_found_at_once() -> None:
+    years = "LMAS\nDT        .5E-6\n" + "LOOP      99999\n" * 9 + "TIME\nRODP\n" + "NEXT\n" * 9
+    (finding,) = [f for f in prepare(small(years)).findings if f.code.startswith("E")]
+    assert finding.code == "E509"
+
+
+def test_units_are_named_in_summary_and_result(tmp_path: Path) -> None:
+    deck = tmp_path / "units.inp"
+    deck.write_text(small(data="UNIT\nin lbf s\n" + DATA_CARDS))
+    checked = CliRunner().invoke(cli, ["check", str(deck)])
+    assert re.search(r"critical time step  \S+ s\n", checked.stdout)
+    assert "lbf*in" in checked.stdout
+    ran = CliRunner().invoke(cli, ["run", str(deck), "-o", str(tmp_path / "u.h5")])
+    assert re.search(r"peak force +\S+ lbf at time \S+ s", ran.stdout)
+    import h5py
+
+    with h5py.File(tmp_path / "u.h5") as file:
+        assert file.attrs["unit_force"] == "lbf"
+        assert file["history/acceleration"].attrs["unit"] == "in/s^2"
+        assert "unit" not in file["tape8/gamma_xz"].attrs
+
+
+@pytest.mark.parametrize("card", ["in lbf", "in lbf s lb", ""])
+def test_units_need_three_names(card: str) -> None:
+    assert codes(small(data=f"UNIT\n{card}\n" + DATA_CARDS)) == ["E010"]
