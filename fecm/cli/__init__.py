@@ -1,0 +1,63 @@
+"""The command line: ``fecm COMMAND``.
+
+Results go to standard output, everything else to standard error.  Exit status: 0 done, 1 the answer
+is no, 2 unusable input or call, 130 and 143 after SIGINT and SIGTERM.  Heavy modules are imported
+by the command that needs them.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+import click
+
+from fecm.cli.common import INTERRUPTED, UNUSABLE, signals
+from fecm.cli.decks import check, fmt, materials, new
+from fecm.cli.results import tapes
+from fecm.cli.run import run
+from fecm.results.schema import ResultFileError
+from fecm.version import __version__
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, prog_name="fecm")
+def cli() -> None:
+    """Impact on laminated composite plates, from the punched-card decks of NASA CR-168057."""
+
+
+for _command in (run, check, new, fmt, materials, tapes):
+    cli.add_command(_command)
+
+
+def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoReturn:
+    """Run the command line and leave with its exit status."""
+    signals.install()
+    try:
+        cli.main(arguments, prog_name=prog_name, standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        raise SystemExit(error.exit_code) from None
+    except (KeyboardInterrupt, click.Abort):
+        click.echo("fecm: interrupted", err=True)
+        raise SystemExit(INTERRUPTED) from None
+    except BrokenPipeError:
+        sys.stderr.close()
+        raise SystemExit(UNUSABLE) from None
+    except (OSError, MemoryError) as error:
+        click.echo(f"fecm: error: {_told(error)}", err=True)
+        raise SystemExit(UNUSABLE) from None
+    except ResultFileError as error:
+        click.echo(f"fecm: error: {error}", err=True)
+        raise SystemExit(UNUSABLE) from None
+    raise SystemExit(0)
+
+
+def _told(error: Exception) -> str:
+    """One line about an error of the operating system."""
+    if isinstance(error, MemoryError):
+        return "there is not enough memory"
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return str(error)

@@ -1,0 +1,154 @@
+"""Commands about decks: ``fecm check``, ``fmt``, ``new`` and ``materials``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fecm.cli.common import (
+    DECK_PATH,
+    FORMAT_OPTION,
+    MODE_OPTION,
+    AnswerIsNo,
+    Refused,
+    check_outputs,
+    count_errors,
+    write_text,
+)
+
+
+@click.command()
+@click.argument("deck", type=DECK_PATH)
+@MODE_OPTION
+@FORMAT_OPTION
+def check(deck: Path, mode: str, form: str) -> None:
+    """Read and check DECK without running it: findings, then a summary.
+
+    With --format json, one JSON object a finding and one a problem, a line each.  Exit status 1 if
+    the deck has errors.
+    """
+    from fecm.api import prepare
+    from fecm.overview import overview
+
+    prepared = prepare(deck, mode)
+    errors = prepared.errors()
+    views = [] if errors else [overview(problem) for problem in prepared.problems]
+    if form == "json":
+        for finding in prepared.findings:
+            click.echo(json.dumps(finding.to_dict(str(deck))))
+        for view in views:
+            click.echo(json.dumps({"kind": "summary", **view.to_dict()}))
+    else:
+        for finding in prepared.findings:
+            click.echo(finding.render(str(deck)))
+        for view in views:
+            click.echo("\n".join(view.lines()))
+    if errors:
+        raise AnswerIsNo(count_errors(errors))
+
+
+@click.command()
+@click.argument("deck", type=DECK_PATH)
+@click.option("-o", "--output", type=click.Path(path_type=Path, allow_dash=True), metavar="FILE",
+              help="Where to write; - is standard output.  [default: DECK itself]")  # fmt: skip
+@click.option("--check", "only_check", is_flag=True,
+              help="Write nothing; exit with 1 if the deck would change.")  # fmt: skip
+def fmt(deck: Path, output: Path | None, only_check: bool) -> None:
+    """Align the columns of DECK and put a ruler above each kind of card.
+
+    The model, comments and blank cards stay as they are.
+    """
+    from fecm.deck.findings import DeckError
+    from fecm.deck.formatting import format_deck
+    from fecm.deck.reader import decode
+
+    before = decode(deck.read_bytes())
+    try:
+        after = format_deck(before, str(deck))
+    except DeckError as error:
+        click.echo(str(error), err=True)
+        raise Refused("the deck can't be read; nothing was written") from None
+    if only_check:
+        if after != before:
+            raise AnswerIsNo(f"{deck} would change")
+    elif str(output) == "-":
+        click.echo(after, nl=False)
+    else:
+        write_text(output or deck, after)
+
+
+@click.command()
+@click.argument("output", type=click.Path(path_type=Path, allow_dash=True), metavar="DECK")
+@click.option("--title", default="", help="Title of the deck.")
+@click.option("--size", metavar="LXxLY", help="Size of the plate, as in 6x4.")
+@click.option("--mesh", metavar="NXxNY", help="Elements along x and y, as in 14x10.")
+@click.option("--grading", type=click.FloatRange(min=1.0), default=1.0, metavar="RATIO",
+              help="Largest over smallest element; the smallest at the impact point.")  # fmt: skip
+@click.option("--columns", metavar="LIST",
+              help="Elements along x one by one, as in 3*0.5,8*0.375,3*0.5, instead of --size and "
+                   "--mesh.")  # fmt: skip
+@click.option("--rows", metavar="LIST", help="The same along y.")
+@click.option("--layup", required=True, metavar="LAYUP",
+              help='Layup from the struck face on, as in "[0/45/0/-45/0]2s".')  # fmt: skip
+@click.option("--ply-thickness", type=float, required=True, help="Thickness of a ply.")
+@click.option("--ply", metavar="RHO,NU12,E1,E2,G12,G13,G23", help="Constants of a ply.")
+@click.option("--material", metavar="NAME",
+              help="A named ply instead; `fecm materials` lists them.")  # fmt: skip
+@click.option("--units", metavar="SYSTEM",
+              help="in-lbf-s, m-N-s or mm-N-s: names the deck's units, and gives a named ply in "
+                   "them.  [default for a named ply: its source's]")  # fmt: skip
+@click.option("--support", type=click.Choice(["free", "simple", "clamped"]), default="free",
+              show_default=True, help="Support of all edges.")  # fmt: skip
+@click.option("--edge", "edges", multiple=True, metavar="EDGE=SUPPORT",
+              help="Support of one edge: left, right, bottom or top; may be repeated.")  # fmt: skip
+@click.option("--at", metavar="X,Y", help="Impact point.  [default: the plate's middle]")
+@click.option("--velocity", type=float, required=True, help="Approach velocity.")
+@click.option("--law", required=True, metavar="K,ALPHA_P,S_P,Q", help="The indentation law.")
+@click.option("--duration", type=float, required=True, help="Time to run.")
+@click.option("--dt", type=float, help="Time step.  [default: 0.9 of the critical one]")
+@click.option("--every", type=click.IntRange(min=1),
+              help="Steps between stored rows.  [default: for about 200 rows]")  # fmt: skip
+@click.option("--overwrite", is_flag=True, help="Replace a deck that exists.")
+def new(output: Path, overwrite: bool, **options: Any) -> None:
+    """Write a ready deck from plate, layup, supports and impact; - is standard output."""
+    from fecm.authoring.options import OptionError, deck_of_options
+    from fecm.deck.formatting import format_deck
+
+    if str(output) != "-":
+        check_outputs([output], overwrite)
+    try:
+        deck, notes = deck_of_options(**options)
+    except OptionError as error:
+        raise click.UsageError(str(error)) from None
+    from fecm.api import prepare
+
+    text = format_deck(deck.to_text())
+    if errors := prepare(text).errors():
+        for finding in errors:
+            click.echo(finding.render("the new deck"), err=True)
+        raise Refused("these options make no sound deck; nothing was written")
+    for note in notes:
+        click.echo(f"fecm: note: {note}", err=True)
+    if str(output) == "-":
+        click.echo(text, nl=False)
+    else:
+        write_text(output, text)
+        click.echo(output)
+
+
+@click.command()
+def materials() -> None:
+    """List the named plies of `fecm new`, with their sources."""
+    from fecm.authoring.materials import MATERIALS
+
+    for material in MATERIALS.values():
+        ply = material.ply
+        click.echo(f"{material.name} ({material.system})")
+        click.echo(
+            f"  E1 {ply.e1:g}, E2 {ply.e2:g}, NU12 {ply.nu12:g}, G12 {ply.g12:g}, G13 {ply.g13:g}, "
+            f"G23 {ply.g23:g}, density {ply.density:g}"
+        )
+        click.echo(f"  {material.source}{'; ' + material.assumed if material.assumed else ''}")

@@ -1,0 +1,124 @@
+"""``fecm run``."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from fecm.cli.common import (
+    DECK_PATH,
+    FILE_PATH,
+    MODE_OPTION,
+    AnswerIsNo,
+    Refused,
+    check_outputs,
+    count_errors,
+    report,
+    signals,
+)
+from fecm.slips import NAMES, active_slips
+
+if TYPE_CHECKING:
+    from click._termui_impl import ProgressBar
+
+    from fecm.api import Prepared
+
+
+@click.command()
+@click.argument("deck", type=DECK_PATH)
+@click.option("-o", "--output", type=FILE_PATH, metavar="OUT.h5",
+              help="Result file.  [default: the deck's name with .h5, in this folder]")  # fmt: skip
+@MODE_OPTION
+@click.option("--slip", "slips", type=click.Choice(NAMES), multiple=True, metavar="NAME",
+              help=f"Add a single slip of the program to report mode; may be repeated.  Names: "
+                   f"{', '.join(NAMES)}.")  # fmt: skip
+@click.option("--overwrite", is_flag=True, help="Replace result files that exist.")
+@click.option("--force", is_flag=True, help="Run with a time step above the critical one.")
+def run(
+    deck: Path,
+    output: Path | None,
+    mode: str,
+    slips: tuple[str, ...],
+    overwrite: bool,
+    force: bool,
+) -> None:
+    """Run every problem in DECK and write its result.
+
+    A second problem in the deck goes to OUT-2.h5, and so on.
+    """
+    try:
+        active = active_slips(mode, slips)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+    from fecm.api import numbered, prepare
+
+    prepared = prepare(deck, mode)
+    report(prepared)
+    if errors := prepared.errors(force):
+        raise Refused(f"{count_errors(errors)}; nothing was run")
+    first = output or Path(f"{deck.stem}.h5")
+    paths = [numbered(first, n) for n in range(1, len(prepared.problems) + 1)]
+    check_outputs(paths, overwrite)
+    for number, path in enumerate(paths):
+        if number:
+            click.echo()
+        _run_one(prepared, number, active, path)
+
+
+def _run_one(prepared: Prepared, number: int, active: frozenset[str], path: Path) -> None:
+    """Run one problem of a deck into a file and say what came out."""
+    from fecm.impact import DivergenceError
+    from fecm.program import tally
+    from fecm.results import hdf5
+    from fecm.results.result import load
+    from fecm.results.summary import summary
+    from fecm.simulation import simulate
+
+    problem = prepared.problems[number]
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(signals.deferred())
+        sink = stack.enter_context(hdf5.writing(path))
+        advance = stack.enter_context(_progress(tally(problem.program).steps))
+        try:
+            simulate(problem, active, sink, advance)
+        except DivergenceError as diverged:
+            raise AnswerIsNo(
+                f"the run diverged at step {diverged.step}: {diverged.reason}; "
+                f"{path} was not written"
+            ) from None
+    click.echo(problem.deck.title or prepared.source)
+    for line in summary(load(path)):
+        click.echo(f"  {line}")
+    click.echo(f"  result            {path}")
+
+
+@contextlib.contextmanager
+def _progress(steps: int) -> Iterator[_Advance]:
+    """Show a progress bar where standard error is a terminal."""
+    advance = _Advance()
+    if not sys.stderr.isatty():
+        yield advance
+        return
+    with click.progressbar(length=steps, label="fecm", file=sys.stderr) as bar:
+        advance.bar = bar
+        yield advance
+        bar.update(steps - advance.done)
+
+
+class _Advance:
+    """Moves a progress bar to the step that a run has reached."""
+
+    def __init__(self) -> None:
+        self.bar: ProgressBar[int] | None = None
+        self.done = 0
+
+    def __call__(self, done: int, steps: int) -> None:
+        signals.heed()
+        if self.bar is not None:
+            self.bar.update(done - self.done)
+        self.done = done

@@ -1,0 +1,234 @@
+"""Decks made from what an engineer knows, and decks rewritten."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from hypothesis import given
+from hypothesis import strategies as st
+
+import fecm
+from fecm.api import prepare
+from fecm.authoring.grid import Grid, graded, lines, listed, uniform
+from fecm.authoring.layup import LayupError, parse_layup
+from fecm.authoring.materials import MATERIALS
+from fecm.cli import cli
+from fecm.deck import Deck
+from fecm.deck.formatting import format_deck
+from fecm.deck.model import Control, Impact, Material
+from fecm.mesh import generate
+from tests.decks import APPENDIX, LONG, small
+
+REPORT = [
+    "--title", "**LOW VELOCITY IMPACT OF LAMINATED PLATE**",
+    "--columns", "3*.5,8*.375,3*.5", "--rows", "1*.5,8*.375,1*.5",
+    "--layup", "[0/45/0/-45/0]2s", "--ply-thickness", ".0053", "--material", "report",
+    "--velocity", "115", "--law", "1912000,.0006564,.094,2.0",
+    "--duration", "800e-6", "--dt", "2e-7", "--every", "20",
+]  # fmt: skip
+PLATE = [
+    "--size", "0.3x0.2", "--mesh", "6x4", "--layup", "[0/90]s", "--ply-thickness", "0.25e-3",
+    "--material", "T300/5208", "--units", "m-N-s", "--velocity", "3", "--law", "1e9,1e-5,.1,2.5",
+    "--duration", "1e-4",
+]  # fmt: skip
+
+
+def new(*options: str) -> Result:
+    """Run ``fecm new`` to standard output."""
+    return CliRunner().invoke(cli, ["new", "-", *options])
+
+
+@pytest.mark.parametrize(
+    ("text", "angles"),
+    [
+        ("[0/45/0/-45/0]2s", [0, 45, 0, -45, 0] * 2 + [0, -45, 0, 45, 0] * 2),
+        ("[0_2/90]s", [0, 0, 90, 90, 0, 0]),
+        ("[0_{2}/90]_{s}", [0, 0, 90, 90, 0, 0]),
+        ("[0/90]T", [0, 90]),
+        ("[±45]2s", [45, -45] * 2 + [-45, 45] * 2),
+        ("[+-30/0]", [30, -30, 0]),
+        ("[0/(45/-45)2/90]s", [0, 45, -45, 45, -45, 90, 90, -45, 45, -45, 45, 0]),
+        ("0/90", [0, 90]),
+        ("[ 22.5 / -67.5 ]", [22.5, -67.5]),
+    ],
+)
+def test_layups_read_as_the_literature_writes_them(text: str, angles: list[float]) -> None:
+    assert parse_layup(text) == angles
+
+
+@pytest.mark.parametrize("text", ["", "[", "[]", "[0/]", "[0/x]", "[0/90]q", "[0]99999", "[0_0]"])
+def test_what_is_no_layup_is_refused(text: str) -> None:
+    with pytest.raises(LayupError):
+        parse_layup(text)
+
+
+def test_the_reports_numbers_give_the_reports_deck() -> None:
+    made = new(*REPORT)
+    assert made.exit_code == 0
+    assert fecm.read_deck(made.stdout) == fecm.read_deck(LONG)
+
+
+def test_a_new_deck_is_sound_and_declares_its_units() -> None:
+    made = new(*PLATE)
+    assert made.exit_code == 0
+    prepared = prepare(made.stdout)
+    assert prepared.errors() == []
+    deck = prepared.problems[0].deck
+    assert deck.control == Control(117, 24, 4, 2, 5, 9)
+    material = deck.need(Material)
+    assert material.ply.e1 == 181e9
+    assert material.integration.thickness == 1e-3
+    assert deck.need(Impact).node == 59  # the middle of 13 x 9 nodes
+    dt = next(m.value for m in deck.macros if m.word == "DT")
+    critical = prepare(made.stdout).problems[0]
+    from fecm.parts import build_plate
+
+    ratio = dt / build_plate(critical.deck, critical.mesh).critical_time_step()
+    assert 0.8 < ratio <= 0.9
+
+
+def test_a_named_ply_is_converted_between_systems_of_units() -> None:
+    ply = MATERIALS["T300/5208"].converted("in-lbf-s")
+    assert ply.e1 == pytest.approx(181e9 / 6894.757, rel=1e-5)  # Pa in a psi
+    assert ply.density == pytest.approx(1600 * 9.357e-8, rel=1e-3)  # kg/m^3 in lbf s^2/in^4
+    assert MATERIALS["T300/5208"].converted("mm-N-s").density == pytest.approx(1.6e-9, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("support", "w", "theta_x", "theta_y"),
+    [("free", 0, 0, 0), ("simple", 1, 0, 1), ("clamped", 1, 1, 1)],
+)
+def test_supports_hold_what_their_names_say(
+    support: str, w: int, theta_x: int, theta_y: int
+) -> None:
+    deck = fecm.read_deck(new(*PLATE, "--edge", f"left={support}").stdout)
+    assert isinstance(deck, Deck)
+    mesh = generate(deck)
+    left = np.flatnonzero(mesh.coordinates[:, 0] == 0.0)
+    inside = np.setdiff1d(np.arange(117), left)
+    held = (mesh.equations == 0).astype(int)
+    assert (held[left] == [1, 1, w, theta_x, theta_y]).all()
+    assert (held[inside] == [1, 1, 0, 0, 0]).all()
+
+
+def test_a_coupled_laminate_keeps_its_in_plane_unknowns() -> None:
+    options = [o if o != "[0/90]s" else "[0/90]" for o in PLATE]
+    deck = fecm.read_deck(new(*options, "--edge", "left=clamped").stdout)
+    assert isinstance(deck, Deck)
+    mesh = generate(deck)
+    assert (mesh.equations[mesh.coordinates[:, 0] > 0] > 0).all()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--layup", "[0/"], ["--size", "6"], ["--mesh", "2.5x3"], ["--law", "1,2,3"],
+        ["--at", "9,9"], ["--units", "cubits"], ["--material", "cheese"], ["--edge", "left=glued"],
+        ["--columns", "3*1"], ["--duration", "-1"], ["--mesh", "2000x2000"], ["--velocity", "x"],
+        ["--ply", "1,2,3,4,5,6,7"], ["--grading", "0.5"],
+    ],
+)  # fmt: skip
+def test_options_that_cannot_be_meant_exit_2(options: list[str]) -> None:
+    made = new(*PLATE, *options)
+    assert made.exit_code == 2
+    assert "Error" in made.stderr
+    assert made.stdout == ""
+
+
+def test_a_new_deck_never_replaces_an_old_one_unasked(tmp_path: Path) -> None:
+    target = tmp_path / "plate.inp"
+    target.write_text("precious")
+    refused = CliRunner().invoke(cli, ["new", str(target), *PLATE])
+    assert refused.exit_code == 2
+    assert target.read_text() == "precious"
+    assert CliRunner().invoke(cli, ["new", str(target), *PLATE, "--overwrite"]).exit_code == 0
+    assert prepare(target).errors() == []
+
+
+@given(st.floats(0.1, 100.0), st.integers(2, 30), st.floats(0.1, 0.9), st.floats(1.0, 20.0))
+def test_a_graded_side_fills_its_length_and_is_finest_at_its_centre(
+    length: float, count: int, part: float, ratio: float
+) -> None:
+    sections = graded(length, count, part * length, ratio)
+    sizes = np.diff([0.0, *(section.end for section in sections)])
+    assert len(sections) == count
+    assert sections[-1].end == length
+    assert (sizes > 0.0).all()
+    at = int(np.argmin(sizes))
+    assert (np.diff(sizes[: at + 1]) < 1e-5 * length).all()
+    assert (np.diff(sizes[at:]) > -1e-5 * length).all()
+
+
+def test_the_cards_of_a_grid_generate_its_nodes() -> None:
+    grid = Grid(listed("2*0.5,1*0.25"), uniform(1.0, 2))
+    deck = Deck("", Control(35, 6, 1, 2, 5, 9), (grid.coordinates(), grid.element_cards()), ())
+    mesh = generate(deck)
+    x, y = np.meshgrid(lines(grid.columns), lines(grid.rows))
+    np.testing.assert_allclose(
+        mesh.coordinates, np.column_stack([x.ravel(), y.ravel()]), atol=1e-12
+    )
+    centres = mesh.coordinates[mesh.elements[:, 8] - 1]
+    corners = mesh.coordinates[mesh.elements[:, :4] - 1].mean(axis=1)
+    np.testing.assert_allclose(centres, corners, atol=1e-12)
+
+
+@pytest.mark.parametrize("path", [APPENDIX, LONG])
+def test_formatting_changes_neither_model_nor_itself(path: Path) -> None:
+    text = path.read_text()
+    formatted = format_deck(text)
+    assert formatted != text
+    assert fecm.read_deck(formatted) == fecm.read_deck(text)
+    assert format_deck(formatted) == formatted
+
+
+def test_a_formatted_deck_runs_to_the_same_tapes(tmp_path: Path) -> None:
+    formatted = tmp_path / "formatted.inp"
+    made = CliRunner().invoke(cli, ["fmt", str(APPENDIX), "-o", str(formatted)])
+    assert made.exit_code == 0
+    for path in (APPENDIX, formatted):
+        out = tmp_path / f"{path.stem}.h5"
+        assert CliRunner().invoke(cli, ["run", str(path), "-o", str(out)]).exit_code == 0
+        assert (
+            CliRunner().invoke(cli, ["tapes", str(out), "-d", str(tmp_path / path.stem)]).exit_code
+            == 0
+        )
+    for name in ("tape3", "tape8", "tape9"):
+        one, other = (tmp_path / stem / name for stem in ("appendix", "formatted"))
+        assert one.read_bytes() == other.read_bytes()
+
+
+def test_comments_stay_where_they_are() -> None:
+    text = (
+        small()
+        .replace("COOR\n", "! corners first\nCOOR\n")
+        .replace("   2.0\nMATE", "   2.0 ! q\nMATE")
+    )
+    formatted = format_deck(text)
+    assert "! corners first\nCOOR\n" in formatted
+    assert "       2.0  ! q\nMATE" in formatted
+
+
+def test_rulers_name_the_columns_above_which_they_stand() -> None:
+    lines_ = format_deck(small()).splitlines()
+    row = lines_.index("ROD")
+    assert lines_[row + 1 : row + 3] == ["!:nod  dof  velocity", "   13    3     115.0"]
+
+
+def test_a_deck_that_cannot_be_read_is_left_alone(tmp_path: Path) -> None:
+    deck = tmp_path / "wrong.inp"
+    deck.write_text(small().replace("115.0", "1l5.0"))
+    done = CliRunner().invoke(cli, ["fmt", str(deck)])
+    assert done.exit_code == 2
+    assert "E101" in done.stderr
+    assert deck.read_text() == small().replace("115.0", "1l5.0")
+
+
+def test_fmt_check_answers_whether_a_deck_would_change(tmp_path: Path) -> None:
+    deck = tmp_path / "small.inp"
+    deck.write_text(small())
+    assert CliRunner().invoke(cli, ["fmt", "--check", str(deck)]).exit_code == 1
+    assert CliRunner().invoke(cli, ["fmt", str(deck)]).exit_code == 0
+    assert CliRunner().invoke(cli, ["fmt", "--check", str(deck)]).exit_code == 0

@@ -1,0 +1,110 @@
+"""Any text at all gives a model or findings, never another exception."""
+
+from __future__ import annotations
+
+import random
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fecm.api import prepare
+from fecm.deck import Deck
+from fecm.deck.model import (
+    Boundary,
+    Control,
+    Coordinates,
+    ElementNodes,
+    Elements,
+    Forces,
+    Impact,
+    Indentation,
+    Integration,
+    Layer,
+    Macro,
+    Material,
+    NodeCodes,
+    NodeValues,
+    Page,
+    Ply,
+    PrintOption,
+    Units,
+)
+from fecm.deck.reader import Reader
+from tests.decks import small
+from tests.fuzz_decks import examine, mutate
+
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+counts = st.integers(-99999, 999999)
+words = st.text("ABCXYZ", min_size=1, max_size=4).filter(lambda word: word not in ("END", "STOP"))
+
+
+@st.composite
+def decks(draw: st.DrawFn) -> Deck:
+    """Models that make no sense but can stand on cards."""
+
+    def some(strategy: st.SearchStrategy[object]) -> tuple[object, ...]:
+        return tuple(draw(st.lists(strategy, max_size=4)))
+
+    nodes = st.integers(1, 99999)
+    layers = draw(st.integers(1, 3))
+    five = st.tuples(*[numbers] * 5)
+    layer = st.builds(Layer, counts, numbers, numbers)
+    segments = draw(
+        st.lists(
+            st.one_of(
+                st.lists(st.builds(NodeValues, nodes, counts, st.tuples(numbers, numbers))).map(
+                    lambda records: Coordinates(tuple(records))
+                ),
+                st.lists(st.builds(NodeValues, nodes, counts, five), max_size=4).map(
+                    lambda records: Forces(tuple(records))
+                ),
+                st.lists(
+                    st.builds(NodeCodes, nodes, counts, st.tuples(*[counts] * 5)), max_size=4
+                ).map(lambda records: Boundary(tuple(records))),
+                st.lists(
+                    st.builds(ElementNodes, nodes, st.tuples(*[counts] * 4), counts), max_size=4
+                ).map(lambda records: Elements(tuple(records))),
+                st.builds(
+                    Material,
+                    st.builds(Integration, counts, counts, counts, numbers, numbers),
+                    st.builds(Ply, *[numbers] * 7),
+                    st.tuples(*[layer] * layers),
+                ),
+                st.builds(Impact, counts, counts, numbers),
+                st.builds(Indentation, *[numbers] * 4),
+                st.builds(Units, words, words, words),
+                st.builds(PrintOption, st.booleans()),
+                st.builds(Page, st.sampled_from(["", "0", "1"])),
+            ),
+            max_size=6,
+        )
+    )
+    macros = draw(
+        st.lists(st.builds(Macro, words, st.sampled_from(["", "AB"]), numbers, numbers), max_size=5)
+    )
+    control = Control(draw(st.integers(1, 999)), 1, layers, 2, 5, 4)
+    return Deck("title", control, tuple(segments), tuple(macros))
+
+
+@given(decks())
+def test_printing_and_reading_a_model_gives_it_back(deck: Deck) -> None:
+    reader = Reader(deck.to_text())
+    (problem,) = reader.problems()
+    assert reader.findings.errors == []
+    assert problem.deck == deck
+
+
+@given(st.text(max_size=400))
+def test_any_text_gives_findings(text: str) -> None:
+    assert prepare(text + "\n").findings
+
+
+@given(st.text("FECM COOR\n0123456789.-+ED,! \t", max_size=600))
+def test_any_text_of_a_decks_own_letters_gives_findings(text: str) -> None:
+    assert prepare("FECM x\n" + text + "\n").findings
+
+
+@settings(max_examples=150)
+@given(st.integers(0, 2**32))
+def test_any_mutation_of_a_deck_gives_a_model_or_findings(seed: int) -> None:
+    examine(mutate(small(), random.Random(seed)))
