@@ -1,4 +1,4 @@
-"""The plate as a whole: stiffness, lumped mass, and what restraints and loads make of them.
+"""The plate as a whole: stiffness, mass, and what restraints and loads make of them.
 
 Vectors over equations hold the unknowns that are not restrained, in the order of their equation
 numbers; a field holds every unknown of every node, (numnp, 5).
@@ -6,7 +6,7 @@ numbers; a field holds every unknown of every node, (numnp, 5).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -99,31 +99,40 @@ class PlateModel:
     def _unknowns(self, family: plate.Family) -> Indices:
         return self._numbers[family.nodes].reshape(len(family.rows), -1)
 
-    def _element_matrices(self) -> Iterator[tuple[Indices, Floats]]:
-        """Unknowns (ne, n) and stiffness (ne, n, n) of all elements, block by block."""
+    def _mass_of(self, family: plate.Family) -> Floats:
+        return plate.consistent_mass(family, self.laminate, self.rules.bending)
+
+    def _element_matrices(
+        self, matrices_of: Callable[[plate.Family], Floats]
+    ) -> Iterator[tuple[Indices, Floats]]:
+        """Unknowns (ne, n) and matrices (ne, n, n) of all elements, block by block."""
         for family in self._families:
             same = congruence(family)
             for start in range(0, len(family.rows), BLOCK):
                 block = np.arange(start, min(start + BLOCK, len(family.rows)))
                 wanted, which = np.unique(same.group[block], return_inverse=True)
-                K = self._stiffness_of(family.take(same.representatives[wanted]))
-                yield self._unknowns(family.take(block)), K[which.ravel()]
+                matrices = matrices_of(family.take(same.representatives[wanted]))
+                yield self._unknowns(family.take(block)), matrices[which.ravel()]
 
-    @cached_property
-    def _with_supports(self) -> sparse.csr_array:
-        """K with the columns of the restrained unknowns behind those of the equations."""
+    def _assembled(self, matrices_of: Callable[[plate.Family], Floats]) -> sparse.csr_array:
+        """Sum of matrices, the restrained unknowns' columns behind those of the equations."""
         neq, whole = self.neq, self._numbers.size
         total = sparse.csr_array((neq, whole))
-        for unknowns, K in self._element_matrices():
-            rows = np.broadcast_to(unknowns[:, :, None], K.shape)
-            columns = np.broadcast_to(unknowns[:, None, :], K.shape)
-            wanted = (rows < neq) & (K != 0.0)
+        for unknowns, matrices in self._element_matrices(matrices_of):
+            rows = np.broadcast_to(unknowns[:, :, None], matrices.shape)
+            columns = np.broadcast_to(unknowns[:, None, :], matrices.shape)
+            wanted = (rows < neq) & (matrices != 0.0)
             total = total + sparse.coo_array(
-                (K[wanted], (rows[wanted], columns[wanted])), shape=(neq, whole)
+                (matrices[wanted], (rows[wanted], columns[wanted])), shape=(neq, whole)
             )
         total = total.tocsr()
         total.sort_indices()
         return total
+
+    @cached_property
+    def _with_supports(self) -> sparse.csr_array:
+        """K with the columns of the restrained unknowns behind those of the equations."""
+        return self._assembled(self._stiffness_of)
 
     @cached_property
     def stiffness(self) -> sparse.csr_array:
@@ -144,6 +153,11 @@ class PlateModel:
                 lumped = plate.lumped_mass(block, self.laminate, self.rules.bending)
                 np.add.at(mass, self._numbers[block.nodes].ravel(), lumped.ravel())
         return mass[: self.neq]
+
+    @cached_property
+    def consistent_mass(self) -> sparse.csr_array:
+        """Consistent M, sparse (neq, neq), under the bending rule; made when first asked for."""
+        return self._assembled(self._mass_of)[:, : self.neq].tocsr()
 
     def product(self, solver: str = "") -> Product:
         """K u, by the way that suits the mesh.

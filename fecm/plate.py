@@ -9,13 +9,14 @@ kappa_y = -theta_y,y.  Arrays over elements have the element first, then the qua
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.elements import quadrilateral
+from fecm.elements.catalogue import MOST_NODES, shape_of
 from fecm.elements.quadrature import Rule
+from fecm.elements.shape import ElementShape
 from fecm.laminate import Laminate
 
 Floats = NDArray[np.float64]
@@ -38,14 +39,17 @@ class Family:
         Rows of their nodes, from 0.
     coordinates : ndarray (ne, nn, 2)
         Length.
-    present : ndarray (9,) of bool
-        Which of the nine nodes they have.
+    present : ndarray (shape.nodes,) of bool
+        Which of their shape's nodes they have.
+    shape : ElementShape
+        Triangle, quadrilateral or cubic quadrilateral.
     """
 
     rows: NDArray[np.intp]
     nodes: NDArray[np.intp]
     coordinates: Floats
     present: Bools
+    shape: ElementShape
 
     def blocks(self, size: int) -> Iterator[Family]:
         """Cut the family into blocks of at most `size` elements."""
@@ -54,29 +58,42 @@ class Family:
 
     def take(self, members: NDArray[np.intp]) -> Family:
         """Pick some of the family's elements, by their position in it."""
-        return Family(
-            self.rows[members], self.nodes[members], self.coordinates[members], self.present
+        return replace(
+            self,
+            rows=self.rows[members],
+            nodes=self.nodes[members],
+            coordinates=self.coordinates[members],
         )
 
 
 def families(elements: Ints, coordinates: Floats) -> list[Family]:
-    """Sort elements by the nodes they have.
+    """Sort elements by the nodes they have; a family's shape follows from the last of them.
 
     Parameters
     ----------
     elements : ndarray (numel, nen)
-        Node numbers from 1, 0 where absent.
+        Node numbers from 1, 0 where absent; nen is at most 12.
     coordinates : ndarray (numnp, 2)
         Length.
+
+    Raises
+    ------
+    ValueError
+        If an element lacks one of its corners: three up to a third node, four beyond.
     """
-    nodes = np.zeros((len(elements), quadrilateral.NODES), dtype=np.intp)
+    nodes = np.zeros((len(elements), max(MOST_NODES, elements.shape[1])), dtype=np.intp)
     nodes[:, : elements.shape[1]] = elements
     found: list[Family] = []
     patterns, which = np.unique(nodes > 0, axis=0, return_inverse=True)
     for number, present in enumerate(patterns):
         rows = np.flatnonzero(which.ravel() == number)
+        shape = shape_of(present)
+        if not present[: shape.corners].all():
+            raise ValueError(
+                f"element {rows[0] + 1} lacks one of the {shape.corners} corners of a {shape.name}"
+            )
         members = nodes[rows][:, present] - 1
-        found.append(Family(rows, members, coordinates[members], present))
+        found.append(Family(rows, members, coordinates[members], present[: shape.nodes], shape))
     return found
 
 
@@ -101,7 +118,7 @@ class Interpolation:
 
 def local_shape_functions(family: Family, rule: Rule) -> tuple[Floats, Floats]:
     """Shape functions of a family's nodes: values (npt, nn), d/dxi and d/deta (npt, 2, nn)."""
-    values, local = quadrilateral.shape_functions(rule.xi, rule.eta, family.present)
+    values, local = family.shape.shape_functions(rule.xi, rule.eta, family.present)
     return values[:, family.present], local[:, :, family.present]
 
 
@@ -239,6 +256,39 @@ def lumped_mass(family: Family, laminate: Laminate, rule: Rule) -> Floats:
     share = diagonal * (area.sum(axis=1) / diagonal.sum(axis=1))[:, None]
     inertia = np.repeat([laminate.mass, laminate.rotary_inertia], (3, 2))
     return np.asarray(share[:, :, None] * inertia)
+
+
+def consistent_mass(family: Family, laminate: Laminate, rule: Rule) -> Floats:
+    """Consistent mass matrices of a family's elements (the listing's MASS01).
+
+    Two nodes share the integral of N_i N_j, with the mass per area rho h for u, v and w, and with
+    the rotary inertia rho h^3 / 12 for the rotations; different unknowns share nothing.
+
+    Parameters
+    ----------
+    family : Family
+        The elements.
+    laminate : Laminate
+        Mass and rotary inertia per area.
+    rule : Rule
+        Quadrature; the 4-node element takes order 2, those with mid-sides order 3, the cubic one
+        order 4 to be exact on parallelograms.
+
+    Returns
+    -------
+    ndarray (ne, 5 nn, 5 nn)
+        Mass for u, v, w; mass times length squared for the rotations.  Exactly symmetric.
+    """
+    values, _ = local_shape_functions(family, rule)
+    area = jacobian_determinants(family, rule) * rule.weights
+    product = np.einsum("ep,pi,pj->eij", area, values, values, optimize=True)
+    shared = (product + product.swapaxes(1, 2)) / 2.0
+    inertia = np.repeat([laminate.mass, laminate.rotary_inertia], (3, 2))
+    ne, nn = family.nodes.shape
+    M = np.zeros((ne, nn, UNKNOWNS, nn, UNKNOWNS))
+    for unknown in range(UNKNOWNS):
+        M[:, :, unknown, :, unknown] = inertia[unknown] * shared
+    return M.reshape(ne, nn * UNKNOWNS, nn * UNKNOWNS)
 
 
 class StrainField:

@@ -30,6 +30,12 @@ def nodes(rows: NDArray[np.intp]) -> str:
     return f"Node {rows[0] + 1} is" if len(rows) == 1 else f"Nodes {ranges(rows + 1)} are"
 
 
+def listed(rows: NDArray[np.intp]) -> str:
+    """Name elements by their rows, how many and which: ``3 elements (1, 4-5)``."""
+    count = len(rows)
+    return f"{count} element{'' if count == 1 else 's'} ({ranges(rows + 1)})"
+
+
 def elements(
     findings: Findings, code: str, rows: NDArray[np.intp], deck: Deck, what: str, hint: str = ""
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,12 +10,13 @@ import numpy as np
 from fecm import plate
 from fecm.check import gather
 from fecm.deck.findings import Findings
-from fecm.deck.model import Coordinates, Deck, Elements, Material
-from fecm.elements.quadrature import HIGHEST_ORDER
+from fecm.deck.model import Coordinates, Deck, Elements, Integration, Material
+from fecm.elements import cubic, triangle
+from fecm.elements.quadrature import HIGHEST_ORDER, Rule
 from fecm.mesh import Mesh
 from fecm.parts import rules
 
-CORNERS = 4
+TRIANGLE = triangle.SHAPE.corners
 W = 2
 
 
@@ -47,7 +49,10 @@ def _check_elements(deck: Deck, mesh: Mesh, findings: Findings) -> None:
 
     empty = ~(elements != 0).any(axis=1)
     unknown = (elements < 0) | (elements > numnp)
-    absent = (elements[:, :CORNERS] == 0).any(axis=1) & ~empty
+    # Nodes behind the third make a quadrilateral, which has a fourth corner.
+    pointed = ~(elements[:, TRIANGLE:] != 0).any(axis=1)
+    three_missing = (elements[:, :TRIANGLE] == 0).any(axis=1)
+    four_missing = (elements[:, : TRIANGLE + 1] == 0).any(axis=1)
     ordered = np.sort(elements, axis=1)
     repeated = ((ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] != 0)).any(axis=1)
     report("E308", empty, "has no nodes")
@@ -55,7 +60,11 @@ def _check_elements(deck: Deck, mesh: Mesh, findings: Findings) -> None:
         "E309", unknown.any(axis=1), f"has a node outside 1 to {numnp}",
         "its own card or the increment of the card before it is wrong",
     )  # fmt: skip
-    report("E310", absent, "lacks one of its four corners")
+    report(
+        "E310", three_missing & pointed & ~empty, "lacks one of its three corners",
+        "an element that ends with its third node is a triangle, any other has four corners",
+    )  # fmt: skip
+    report("E310", four_missing & ~pointed, "lacks one of its four corners")
     report("E312", repeated, "has a node twice")
 
 
@@ -74,43 +83,102 @@ def _check_coincidence(deck: Deck, mesh: Mesh, findings: Findings) -> None:
 
 
 def _check_shapes(deck: Deck, mesh: Mesh, findings: Findings) -> None:
-    """Jacobians at every point that is used, and the lumped masses."""
+    """Jacobians at every point that is used, the lumped masses, motions without energy."""
     material = deck.last(Material)
     if material is None or not 1 <= abs(material.integration.points) <= HIGHEST_ORDER:
         return
-    bending, shear, points = rules(material)
-    folded = np.zeros(len(mesh.elements), dtype=bool)
-    massless = np.zeros(len(mesh.elements), dtype=bool)
-    quadratic = False
+    families = plate.families(mesh.elements, mesh.coordinates)
+    _check_triangles(material.integration, families, findings)
     with np.errstate(all="ignore"):
-        for family in plate.families(mesh.elements, mesh.coordinates):
-            quadratic |= bool(family.present[-1])
-            for block in family.blocks(4096):
-                for rule in (bending, shear, points):
-                    found = plate.jacobian_determinants(block, rule)
-                    folded[block.rows] |= ~(found > 0.0).all(axis=1)
-                values = plate.local_shape_functions(block, bending)[0]
-                massless[block.rows] |= bool((np.square(values).sum(axis=0) < 1e-12).any())
-    gather.elements(
-        findings, "E313", np.flatnonzero(folded), deck, "has a Jacobian that is zero or negative",
-        "corners run counter-clockwise, mid-side 5 lies between corners 1 and 2",
-    )  # fmt: skip
-    card = material.integration
-    if massless.any():
-        rows = np.flatnonzero(massless)
+        _check_jacobians(deck, families, rules(material), findings)
+        _check_masses(material, families, findings)
+    supported = bool((mesh.equations[:, W] == 0).any())
+    _check_shear(material, families, supported, findings)
+
+
+def _at_third_node(card: Integration, family: plate.Family) -> bool:
+    """Whether strains are stored where a triangle's Jacobian is zero: on the side eta = 1."""
+    return family.shape is triangle.SHAPE and card.points < -1
+
+
+def _check_triangles(card: Integration, families: list[plate.Family], findings: Findings) -> None:
+    for family in families:
+        if _at_third_node(card, family):
+            findings.add(
+                "E317",
+                f"Strains at nodal points (K = {card.points}) do not exist in triangles, whose "
+                f"Jacobian is zero at the third node: {gather.listed(family.rows)}.",
+                card.place("stress-point order K"),
+                f"take Gauss points: K = {-card.points}",
+            )
+
+
+def _check_jacobians(
+    deck: Deck, families: list[plate.Family], used: tuple[Rule, ...], findings: Findings
+) -> None:
+    card = deck.need(Material).integration
+    folded: dict[str, list[int]] = {}
+    for family in families:
+        for block in family.blocks(4096):
+            for rule in used[:2] if _at_third_node(card, family) else used:
+                found = plate.jacobian_determinants(block, rule)
+                rows = block.rows[~(found > 0.0).all(axis=1)]
+                folded.setdefault(family.shape.numbering, []).extend(rows.tolist())
+    for numbering, wrong in folded.items():
+        what = "has a Jacobian that is zero or negative"
+        gather.elements(findings, "E313", np.unique(wrong).astype(np.intp), deck, what, numbering)
+
+
+def _check_masses(material: Material, families: list[plate.Family], findings: Findings) -> None:
+    card, bending = material.integration, rules(material)[0]
+    massless = [
+        family.rows
+        for family in families
+        if (np.square(plate.local_shape_functions(family, bending)[0]).sum(axis=0) < 1e-12).any()
+    ]
+    if massless:
         findings.add(
             "E315",
-            f"Under the bending order L1 = {card.bending} nodes of {len(rows)} elements "
-            f"({gather.ranges(rows + 1)}) have no mass.",
+            f"Under the bending order L1 = {card.bending} nodes of "
+            f"{gather.listed(np.sort(np.concatenate(massless)))} have no mass.",
             card.place("bending order L1"),
             "elements with mid-side nodes take L1 = 2 or more",
         )
-    supported = bool((mesh.equations[:, W] == 0).any())
-    if quadratic and len(shear.xi) < len(points.xi) and len(shear.xi) < 9 and not supported:
+
+
+def _check_shear(
+    material: Material, families: list[plate.Family], supported: bool, findings: Findings
+) -> None:
+    """Warn of motions that the transverse shear's points do not see."""
+    card, order = material.integration, math.isqrt(len(rules(material)[1].xi))
+    weak: dict[int, list[str]] = {}
+    for family in families:
+        name, free, held = _orders_without_motions(family)
+        if order < (held if supported else free):
+            weak.setdefault(free, []).append(name)
+    if weak:
+        names = dict.fromkeys(name for kind in weak.values() for name in kind)
         findings.add(
             "W316",
-            f"The shear order L2 = {card.shear} leaves 9-node elements a motion without energy, "
-            "and nothing supports the plate's w.",
+            f"The shear order L2 = {card.shear} leaves {' and '.join(names)} motions without "
+            "energy" + ("." if supported else ", and nothing supports the plate's w."),
             card.place("shear order L2"),
-            "take L2 = 3",
+            f"take L2 = {max(weak)}",
         )
+
+
+def _orders_without_motions(family: plate.Family) -> tuple[str, int, int]:
+    """What a family is called, and the shear order that leaves it no motion without energy.
+
+    The first order is that of a plate whose w is free, the second that of one with a support, which
+    a lower order may do for: the motion of a whole mesh then meets the support.
+    """
+    if family.shape is triangle.SHAPE:
+        return "triangles", 1, 1
+    if family.shape is cubic.SHAPE:
+        return "cubic elements", 3, 3
+    if family.present[8]:
+        return "9-node elements", 3, 2
+    if family.present[4:].any():
+        return "elements with mid-sides", 2, 2
+    return "4-node elements", 2, 1

@@ -19,7 +19,7 @@ TITLE = "FECM"
 STOP = "STOP"
 
 # Least and greatest number of nodes an element.
-NODES_AN_ELEMENT = (4, 9)
+NODES_AN_ELEMENT = (3, 12)
 AXES = ("x", "y", "z")
 UNKNOWNS = ("u", "v", "w", "theta_x", "theta_y")
 

@@ -8,10 +8,8 @@ neighbours and reproduces every linear field.  Shape functions of an absent node
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from fecm.elements.shape import Bools, ElementShape, Floats
 
 NODES = 9
 # Local coordinates of the nodes.
@@ -61,3 +59,13 @@ def shape_functions(xi: Floats, eta: Floats, present: Bools) -> tuple[Floats, Fl
         before, after = _SIDES_OF_CORNER[i]
         S[:, i] -= centre / 4.0 + (S[:, before] + S[:, after]) / 2.0
     return S[0].T.copy(), S[1:].transpose(2, 0, 1).copy()
+
+
+SHAPE = ElementShape(
+    name="quadrilateral",
+    xi=XI,
+    eta=ETA,
+    corners=4,
+    numbering="corners run counter-clockwise, mid-side 5 lies between corners 1 and 2",
+    shape_functions=shape_functions,
+)
