@@ -7,7 +7,7 @@ any loop it is 1.  LOOP 0 runs once.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 
 from fecm.deck.findings import Findings
@@ -27,33 +27,52 @@ class Word:
     meaning : str
         What it does, in one sentence.
     value : str
-        What its number is: ``"count"`` (whole, not negative), ``"time step"`` (positive), or empty
-        where it takes none.
+        What its number is: ``"count"`` (whole, not negative), ``"time step"`` or ``"tolerance"``
+        (positive), or empty where it takes none.
     needs : tuple of str
-        Words that must have been carried out before.
+        Words that must have been carried out before; ``"LMAS|CMAS"`` is one or the other.
+    inside : bool
+        Whether it belongs inside a loop.
     """
 
     name: str
     meaning: str
     value: str = ""
     needs: tuple[str, ...] = ()
+    inside: bool = False
 
 
 WORDS = {
     word.name: word
     for word in (
-        Word("LMAS", "Forms the lumped mass."),
-        Word("DT", "Sets the time step.", "time step"),
         Word("LOOP", "Carries out N times what stands before its NEXT.", "count"),
         Word("NEXT", "Ends a loop."),
+        Word("DT", "Sets the time step.", "time step"),
         Word("TIME", "Advances the clock by DT."),
+        Word(
+            "PROP", "Reads a proportional load from a card behind END, or takes it anew.", "count"
+        ),
+        Word("LMAS", "Forms the lumped mass."),
+        Word("CMAS", "Forms the consistent mass."),
+        Word("TANG", "Forms and factorises the stiffness."),
+        Word("FORM", "Forms what is out of balance: the loads less the internal forces."),
+        Word("SOLV", "Solves for the displacement that balances it.", "", ("TANG", "FORM")),
+        Word("TOL", "Sets the tolerance of CONV.", "tolerance"),
+        Word("CONV", "Leaves the loop once the solution stands still.", "", ("SOLV",), True),
+        Word("REAC", "Stores and prints the reactions.", "", ("SOLV|EXCD|RODP",)),
+        Word("EIGE", "Finds the N lowest natural modes.", "count", ("LMAS|CMAS",)),
+        Word("EXCD", "Takes one step of central differences.", "", ("LMAS", "DT")),
         Word(
             "RODP",
             "Takes one impact step; stores contact and strains at every N-th.",
             "count",
             ("LMAS", "DT"),
         ),
-        Word("DISP", "Stores displacements at every N-th pass of the loop.", "count", ("LMAS",)),
+        Word("DISP", "Stores displacements at every N-th pass of the loop.", "count"),
+        Word(
+            "STRE", "Stores and prints strains and stress resultants at every N-th pass.", "count"
+        ),
+        Word("CHEC", "Reports mesh and storage."),
     )
 }
 
@@ -94,6 +113,11 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
             continue
         _check_value(word, macro, findings)
         _check_order(word, macro, done, findings)
+        if word.inside and not open_loops:
+            findings.add(
+                "E513", f"{word.name} stands outside any loop.", macro.place("macro"),
+                "put it between LOOP and NEXT",
+            )  # fmt: skip
         if word.name == "LOOP":
             open_loops.append((macro, body))
             body = []
@@ -139,14 +163,16 @@ def _unknown(macro: Macro, findings: Findings) -> Word | None:
 def _check_order(word: Word, macro: Macro, done: set[str], findings: Findings) -> None:
     """Report the words that must have been carried out before this one, each once."""
     for need in word.needs:
-        if need not in done:
+        choices = need.split("|")
+        if not done.intersection(choices):
+            names = " or ".join(choices)
             findings.add(
                 "E504",
-                f"{word.name} needs {need}, which does not stand before it.",
+                f"{word.name} needs {names}, which does not stand before it.",
                 macro.place("macro"),
-                f"put {need} before it",
+                f"put {names} before it",
             )
-            done.add(need)
+            done.add(choices[0])
     done.add(word.name)
 
 
@@ -158,10 +184,11 @@ def _check_value(word: Word, macro: Macro, findings: Findings) -> None:
             f"{word.name} takes a whole number that is not negative, not {value:g}.",
             macro.place("value"),
         )
-    elif word.value == "time step" and value <= 0:
+    elif word.value in ("time step", "tolerance") and value <= 0:
         findings.add(
-            "E505", f"{word.name} takes a positive time step, not {value:g}.", macro.place("value")
-        )
+            "E505", f"{word.name} takes a positive {word.value}, not {value:g}.",
+            macro.place("value"),
+        )  # fmt: skip
 
 
 def _warn_of_standing_clock(body: Body, findings: Findings) -> None:
@@ -169,13 +196,13 @@ def _warn_of_standing_clock(body: Body, findings: Findings) -> None:
     for item in body:
         if isinstance(item, Loop):
             words = {m.word for m in flat(item.body)}
-            if "RODP" in words and "TIME" not in words:
+            if words & STEPS and "TIME" not in words:
                 findings.add(
                     "W507",
                     "The loop steps without TIME, so that the clock of time-dependent loads "
                     "stands still.",
                     item.macro.place("macro"),
-                    "put TIME before RODP",
+                    "put TIME before the step",
                 )
             else:
                 _warn_of_standing_clock(item.body, findings)
@@ -190,80 +217,117 @@ def flat(body: Body) -> Iterator[Macro]:
             yield item
 
 
-def walk(body: Body, current: int = 1) -> Iterator[tuple[Macro, int]]:
-    """Carry out a program: every macro as often as it runs, with the pass it runs in."""
+def hits(body: Body) -> bool:
+    """Whether a program takes impact steps."""
+    return any(macro.word == "RODP" for macro in flat(body))
+
+
+# Words that take a time step.
+STEPS = {"RODP", "EXCD"}
+
+Walk = Generator[tuple[Macro, int], "bool | None", bool]
+
+
+def walk(body: Body, current: int = 1) -> Walk:
+    """Carry out a program: every macro as often as it runs, with the pass it runs in.
+
+    Sending True in answer to a macro leaves the innermost loop.
+    """
     for item in body:
         if isinstance(item, Loop):
             for number in range(1, item.count + 1):
-                yield from walk(item.body, number)
-        else:
-            yield item, current
+                if (yield from walk(item.body, number)):
+                    break
+        elif (yield item, current):
+            return True
+    return False
 
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """How much a program does and stores.
+    """How much a program does and stores; the most of it where CONV may leave loops early.
 
     Attributes
     ----------
     macros : int
         Macros carried out.
     steps : int
-        Impact steps.
+        Time steps, impact steps and central differences.
     contact_rows : int
         Steps at which contact and strains are stored.
-    displacement_rows : int
-        Rows that DISP stores.
+    passes : dict of str to int
+        Times that DISP, STRE, REAC and EIGE store something, by word.
     """
 
     macros: int
     steps: int
     contact_rows: int
-    displacement_rows: int
+    passes: dict[str, int]
+
+
+# Words that store a row at every N-th pass, and at every one.
+_EVERY = ("DISP", "STRE")
+_ALWAYS = ("REAC", "EIGE")
 
 
 def estimate(body: Body) -> Tally:
     """Count what a program does without carrying out its loops.
 
-    Exact, but for `contact_rows` where RODP cards differ in their number: then an upper bound.
+    Exact, but for `contact_rows` where RODP cards differ in their number, or EXCD stands among
+    them: then an upper bound.
     """
-    macros, displacements, steps = _entry(body, 1)
+    macros, passes, steps = _entry(body, 1)
     total = sum(steps.values())
-    if len(steps) == 1:
+    impact = {n: count for n, count in steps.items() if n}
+    if len(steps) == 1 and impact:
         contact = total // next(iter(steps))
     else:
-        contact = sum(min(count, total // n) for n, count in steps.items())
-    return Tally(macros, total, contact, displacements)
+        contact = sum(min(count, total // n) for n, count in impact.items())
+    return Tally(macros, total, contact, passes)
 
 
-def _entry(body: Body, passes: int) -> tuple[int, int, dict[int, int]]:
-    """Macros, DISP's rows, and steps by RODP's number, of a body run `passes` times on end."""
-    macros, displacements = 0, 0
+def _entry(body: Body, count: int) -> tuple[int, dict[str, int], dict[int, int]]:
+    """Macros, stored rows by word, and steps by RODP's number, of a body run `count` times on end.
+
+    Steps of EXCD stand under 0.
+    """
+    macros = 0
+    passes = dict.fromkeys((*_EVERY, *_ALWAYS), 0)
     steps: dict[int, int] = {}
+
+    def step(n: int, more: int) -> None:
+        steps[n] = steps.get(n, 0) + more
+
     for item in body:
         if isinstance(item, Loop):
             inner, rows, taken = _entry(item.body, item.count)
-            macros += passes * inner
-            displacements += passes * rows
-            for n, count in taken.items():
-                steps[n] = steps.get(n, 0) + passes * count
-        else:
-            macros += passes
-            if item.word == "DISP":
-                displacements += passes // every(item)
-            elif item.word == "RODP":
-                steps[every(item)] = steps.get(every(item), 0) + passes
-    return macros, displacements, steps
+            macros += count * inner
+            for word, more in rows.items():
+                passes[word] += count * more
+            for n, more in taken.items():
+                step(n, count * more)
+            continue
+        macros += count
+        if item.word in _EVERY:
+            passes[item.word] += count // every(item)
+        elif item.word == "REAC":
+            passes["REAC"] += count
+        elif item.word == "EIGE":
+            passes["EIGE"] += count * every(item)
+        elif item.word == "RODP":
+            step(every(item), count)
+        elif item.word == "EXCD":
+            step(0, count)
+    return macros, passes, steps
 
 
 def tally(body: Body) -> Tally:
     """Count exactly what a program does and stores; carries out its loops where it must."""
     counted = estimate(body)
-    if len({every(macro) for macro in flat(body) if macro.word == "RODP"}) <= 1:
+    if len({every(m) if m.word == "RODP" else 0 for m in flat(body) if m.word in STEPS}) <= 1:
         return counted
     step = rows = 0
     for macro, _ in walk(body):
-        if macro.word == "RODP":
-            step += 1
-            rows += step % every(macro) == 0
-    return Tally(counted.macros, counted.steps, rows, counted.displacement_rows)
+        step += macro.word in STEPS
+        rows += macro.word == "RODP" and step % every(macro) == 0
+    return Tally(counted.macros, counted.steps, rows, counted.passes)

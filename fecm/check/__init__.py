@@ -28,9 +28,10 @@ from fecm.deck.model import (
 )
 from fecm.deck.reader import Problem
 from fecm.mesh import Mesh, generate
-from fecm.program import Body, compile_program
+from fecm.program import Body, compile_program, hits
 
-NEEDED: tuple[type[Segment], ...] = (Coordinates, Elements, Material, Impact, Indentation)
+ALWAYS: tuple[type[Segment], ...] = (Coordinates, Elements, Material)
+IN_AN_IMPACT: tuple[type[Segment], ...] = (Impact, Indentation)
 # Segments of which only the last counts.
 SINGLE: tuple[type[Segment], ...] = (Coordinates, Elements, Material, Impact, Indentation, Units)
 
@@ -71,8 +72,8 @@ def check(problem: Problem, findings: Findings) -> Checked | None:
     if deck is None:
         return None
     before = len(findings.errors)
-    _check_segments(deck, unsound, findings)
     program = compile_program(deck.macros, findings)
+    _check_segments(deck, unsound, findings)
     generated = len(findings.errors)
     mesh = generate(deck, findings)
     complete = len(findings.errors) == generated and not unsound & {"COOR", "ELEM"}
@@ -89,15 +90,17 @@ def check(problem: Problem, findings: Findings) -> Checked | None:
         with np.errstate(all="ignore"):  # numbers beyond all range end in a finding
             check_time_step(deck, mesh, findings)
             check_program(deck, program, findings)
-            check_projectile(deck.need(Impact), findings)
-            check_resolution(deck, mesh, findings)
+            if hits(program):
+                check_projectile(deck.need(Impact), findings)
+                check_resolution(deck, mesh, findings)
             check_output(deck, program, findings)
     return checked
 
 
 def _check_segments(deck: Deck, unsound: set[str], findings: Findings) -> None:
     """Segments that are missing, and those that another one of the same keyword replaces."""
-    for kind in NEEDED:
+    words = {macro.word for macro in deck.macros}
+    for kind in (*ALWAYS, *(IN_AN_IMPACT if "RODP" in words else ())):
         if not deck.has(kind) and kind.keyword not in unsound:
             findings.add(
                 "E203",

@@ -91,7 +91,8 @@ def check_resolution(deck: Deck, mesh: Mesh, findings: Findings) -> None:
     impact, law = deck.need(Impact), deck.need(Indentation)
     if impact.velocity <= 0.0:
         return
-    plate, mass, v = laminate_of(deck.need(Material)), build_rod().total_mass, impact.velocity
+    plate, mass = laminate_of(deck.need(Material)), build_rod().total_mass
+    v = np.float64(impact.velocity)  # a division by zero is then infinite, not an error
     contact = 2.94 * (5.0 * mass * v**2 / (4.0 * law.k)) ** 0.4 / v
     rigidity = float(min(plate.D[0, 0], plate.D[1, 1]))
     wave = 2.0 * np.pi * (rigidity / (plate.mass * (np.pi / contact) ** 2)) ** 0.25

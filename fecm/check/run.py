@@ -35,15 +35,16 @@ def check_program(deck: Deck, program: Body, findings: Findings) -> None:
                 f"{sizes.steps}: no strains are stored.",
                 macro.place("value"),
             )
-        if macro.word == "DISP" and not sizes.displacement_rows:
+        if macro.word in ("DISP", "STRE") and not sizes.passes[macro.word]:
             findings.add(
                 "W510",
-                f"DISP stores every {every(macro)} passes, but no loop has as many: no "
-                "displacements are stored.",
+                f"{macro.word} stores every {every(macro)} passes, but no loop has as many: "
+                "nothing is stored.",
                 macro.place("value"),
             )
-    if program and not sizes.steps:
-        findings.add("W511", "The program takes no impact step.", deck.macros[0].place("macro"))
+    if not sizes.steps and not any(sizes.passes.values()):
+        place = deck.macros[0].place("macro") if deck.macros else None
+        findings.add("W511", "The program takes no step and stores nothing.", place)
 
 
 def check_time_step(deck: Deck, mesh: Mesh, findings: Findings) -> None:
@@ -85,11 +86,12 @@ def output_bytes(deck: Deck, sizes: Tally) -> int:
     control = deck.control
     card = deck.need(Material).integration
     points = len(rules(deck.need(Material))[2].xi) if 1 <= abs(card.points) <= HIGHEST_ORDER else 0
-    displacement_row = control.numnp * (control.ndf + 1)
-    strain_row = control.numel * points * 5
+    field, point = control.numnp * control.ndf, control.numel * points
     return 8 * (
-        sizes.displacement_rows * displacement_row
-        + sizes.contact_rows * (strain_row + 8)
+        sizes.passes["DISP"] * (field + control.numnp)
+        + sizes.passes["STRE"] * point * 16
+        + (sizes.passes["REAC"] + sizes.passes["EIGE"]) * field
+        + sizes.contact_rows * (point * 5 + 8)
         + sizes.steps * 18
     )
 

@@ -438,6 +438,38 @@ class Macro(Record):
         return write_card(self.fields[: len(values)], values)
 
 
+@dataclass(frozen=True)
+class LoadTable(Record):
+    """Card of PROP: (2I5,7F10.0), behind the macro program's END.
+
+    Attributes
+    ----------
+    kind, exponent : int
+        Type of the table, 1 (or blank), and the power L of the sine.
+    begin, end : float
+        Times between which the load acts.
+    constants : tuple of float
+        A1 to A5 of A1 + A2 t + A3 sin(A4 t + A5)^L.
+    """
+
+    kind: int
+    exponent: int
+    begin: float
+    end: float
+    constants: tuple[float, ...]
+
+    fields: ClassVar[Fields] = layout(
+        "I5 type", "I5 exponent|exp", "F10 begin|t_min", "F10 end|t_max",
+        *(f"F10 constant A{i}|A{i}" for i in range(1, 6)),
+    )  # fmt: skip
+
+    def text(self) -> str:
+        """Text of the card."""
+        return write_card(
+            self.fields, [self.kind, self.exponent, self.begin, self.end, *self.constants]
+        )
+
+
 _S = TypeVar("_S", bound=Segment)
 
 
@@ -454,6 +486,8 @@ class Deck(Record):
         In the order of the deck.
     macros : tuple of Macro
         The macro program without its END.
+    tables : tuple of LoadTable
+        Proportional loads, one for each PROP that reads one.
     text : str
         The problem's cards as they were read, ended by STOP; empty for a deck made in Python.
     """
@@ -462,6 +496,7 @@ class Deck(Record):
     control: Control
     segments: tuple[Segment, ...]
     macros: tuple[Macro, ...]
+    tables: tuple[LoadTable, ...] = ()
     text: str = field(default="", compare=False, repr=False)
 
     def has(self, kind: type[Segment]) -> bool:
@@ -504,5 +539,6 @@ class Deck(Record):
         ]
         for segment in self.segments:
             lines.extend(segment.cards(self.control))
-        lines += ["END", "MACR", *(macro.text() for macro in self.macros), "END", STOP]
+        lines += ["END", "MACR", *(macro.text() for macro in self.macros), "END"]
+        lines += [*(table.text() for table in self.tables), STOP]
         return "\n".join(lines) + "\n"

@@ -19,6 +19,7 @@ from fecm.deck.model import (
     UNKNOWNS,
     Control,
     Deck,
+    LoadTable,
     Macro,
     Segment,
 )
@@ -107,6 +108,7 @@ class Reader:
             control,
             tuple(segments),
             tuple(macros),
+            tuple(self._tables(macros)),
             f"{self.stream.text_since(first)}\n{STOP}\n",
             source=Source(title, ()),
         )
@@ -278,6 +280,36 @@ class Reader:
         self.findings.add("E004", "The macro program is not ended by END.", (card or head).place)
         self._unsound.add(MACROS)
         return macros
+
+    def _tables(self, macros: list[Macro]) -> list[LoadTable]:
+        """Read the cards of proportional loads, one for each PROP with a number."""
+        tables: list[LoadTable] = []
+        for macro in macros:
+            if macro.word != "PROP" or macro.value <= 0:
+                continue
+            card = self.stream.take()
+            if card is None or card.is_keyword or card.is_blank:
+                if card is not None:
+                    self.stream.give_back()
+                self.findings.add(
+                    "E011",
+                    "The card of PROP's load table is missing behind the macro program's END.",
+                    macro.place("macro"),
+                    "(2I5,7F10.0): type, exponent, t_min, t_max, A1 to A5",
+                )
+                break
+            row = self.stream.row(card, LoadTable.fields)
+            if row is None:
+                self._unsound.add(MACROS)
+                continue
+            (kind, exponent, begin, end, *constants), source = row
+            tables.append(
+                LoadTable(
+                    int(kind), int(exponent), float(begin), float(end),
+                    tuple(map(float, constants)), source=source,
+                )
+            )  # fmt: skip
+        return tables
 
 
 def _close(word: str, known: list[str]) -> list[str]:
