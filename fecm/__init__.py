@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from fecm.api import run
     from fecm.deck.findings import DeckError
     from fecm.deck.reader import read_deck
-    from fecm.impact import DivergenceError
+    from fecm.dynamics import DivergenceError
     from fecm.results.result import Result, load
 
 __all__ = ["DeckError", "DivergenceError", "Result", "__version__", "load", "read_deck", "run"]
@@ -26,7 +26,7 @@ _HOMES = {
     "run": "fecm.api",
     "DeckError": "fecm.deck.findings",
     "read_deck": "fecm.deck.reader",
-    "DivergenceError": "fecm.impact",
+    "DivergenceError": "fecm.dynamics",
     "Result": "fecm.results.result",
     "load": "fecm.results.result",
 }

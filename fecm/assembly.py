@@ -188,6 +188,30 @@ class PlateModel:
             for family in self._families
         )
 
+    def profile(self) -> int:
+        """Entries of K in the listing's profile storage: columns from their first to the diagonal.
+
+        The listing's JDIAG(NEQ).
+        """
+        first = np.arange(self.neq)
+        for family in self._families:
+            unknowns = self._unknowns(family)
+            lowest = np.where(unknowns < self.neq, unknowns, self.neq).min(axis=1)
+            for column in unknowns.T:
+                held = column < self.neq
+                np.minimum.at(first, column[held], lowest[held])
+        return int((np.arange(self.neq) - first + 1).sum())
+
+    def internal_forces(self, field: Floats) -> Floats:
+        """Internal force of every unknown of every node under a field, (numnp, 5)."""
+        order = np.empty(self._numbers.size)
+        order[self._numbers.ravel()] = field.ravel()
+        forces = np.zeros(self._numbers.size)
+        for unknowns, K in self._element_matrices(self._stiffness_of):
+            local = np.einsum("eij,ej->ei", K, order[unknowns])
+            forces += np.bincount(unknowns.ravel(), local.ravel(), len(forces))
+        return np.asarray(forces[self._numbers])
+
     @property
     def nodal_loads(self) -> Floats:
         """FORC's forces on the equations, less what its prescribed displacements cause: (neq,)."""
@@ -215,14 +239,10 @@ class PlateModel:
         full[self._free] = displacement
         return full
 
-    def strain_field(self) -> plate.StrainField:
-        """Strains at the points where they are stored."""
-        return plate.StrainField(
-            self.mesh.elements,
-            self.mesh.coordinates,
-            self.rules.strains,
-            transposed=self.rules.transposed,
-        )
+    def strain_field(self, points: Rule) -> plate.StrainField:
+        """Strains at the given points of every element."""
+        mesh, transposed = self.mesh, self.rules.transposed
+        return plate.StrainField(mesh.elements, mesh.coordinates, points, transposed=transposed)
 
     def safe_time_step(self) -> float:
         """A lower bound of the critical time step, from the elements alone.

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from fecm.assembly import PlateModel, Rules, assemble
 from fecm.deck.model import Deck, Indentation, Material
 from fecm.deck.model import Impact as ImpactCard
+from fecm.dynamics import PlateMotion
 from fecm.elements.quadrature import HIGHEST_ORDER, Rule, gauss, nodal
 from fecm.impact import Contact, Impact
 from fecm.indentation import Constants, Law, MemoryLaw, StickyLaw
@@ -22,12 +23,27 @@ from fecm.projectile import LISTING_DENSITY, REPORT_DENSITY, Rod, Station, repor
 
 @dataclass(frozen=True)
 class Setup:
-    """A problem's parts, ready to run."""
+    """A problem's parts, ready to run.
+
+    Attributes
+    ----------
+    plate : PlateModel
+    motion : PlateMotion
+        The plate in time.
+    impact : Impact or None
+        Plate and projectile; None where nothing hits.
+    station : Station
+        The transducer.
+    strains, stress_points : StrainField
+        Points of tape8, and of the stresses.
+    """
 
     plate: PlateModel
-    impact: Impact
+    motion: PlateMotion
+    impact: Impact | None
     station: Station
     strains: StrainField
+    stress_points: StrainField
 
 
 def rules(material: Material) -> tuple[Rule, Rule, Rule]:
@@ -67,20 +83,40 @@ def build_rod(slips: frozenset[str] = frozenset()) -> Rod:
     return report_rod(LISTING_DENSITY if "density" in slips else REPORT_DENSITY)
 
 
-def set_up(deck: Deck, mesh: Mesh, slips: frozenset[str]) -> Setup:
-    """Make plate, projectile and law of a checked problem, with the slips that are on."""
-    plate, rod = build_plate(deck, mesh, slips), build_rod(slips)
+def build_impact(deck: Deck, motion: PlateMotion, rod: Rod, slips: frozenset[str]) -> Impact:
+    """Make projectile, law and contact, with the slips that are on."""
     card, measured = deck.need(ImpactCard), deck.need(Indentation)
     constants = Constants(measured.k, measured.alpha_p, measured.s_p, measured.q)
     law: Law = StickyLaw(constants) if "reload" in slips else MemoryLaw(constants)
     contact = Contact(
-        equation=int(mesh.equations[card.node - 1, card.dof - 1]) - 1,
+        equation=int(motion.plate.mesh.equations[card.node - 1, card.dof - 1]) - 1,
         velocity=card.velocity,
         plate_moves="target" not in slips,
         strains_start_moving="rod-start" in slips,
-        scales_forces="force-scale" in slips,
         keeps_first_step="rod-dt" in slips,
     )
+    return Impact(motion, rod, law, contact)
+
+
+def set_up(deck: Deck, mesh: Mesh, slips: frozenset[str], *, hits: bool = True) -> Setup:
+    """Make the parts of a checked problem, with the slips that are on.
+
+    Parameters
+    ----------
+    deck : Deck
+    mesh : Mesh
+    slips : frozenset of str
+    hits : bool
+        Whether there is a projectile.
+    """
+    plate, rod = build_plate(deck, mesh, slips), build_rod(slips)
+    motion = PlateMotion(plate)
     middle = rod.elements // 2 + 1
-    station = Station(middle + 1, 1.0) if "station" in slips else Station(middle)
-    return Setup(plate, Impact(plate, rod, law, contact), station, plate.strain_field())
+    return Setup(
+        plate=plate,
+        motion=motion,
+        impact=build_impact(deck, motion, rod, slips) if hits else None,
+        station=Station(middle + 1, 1.0) if "station" in slips else Station(middle),
+        strains=plate.strain_field(plate.rules.strains),
+        stress_points=plate.strain_field(rules(deck.need(Material))[2]),
+    )

@@ -318,6 +318,15 @@ class StrainField:
             inverse = inverse_jacobian(family, local, transposed=transposed)[0]
             self._parts.append((family, table, inverse.transpose(2, 3, 1, 0).copy()))
 
+    def places(self, coordinates: Floats) -> tuple[Floats, Floats]:
+        """Where the points are: x and y, (numel, npt)."""
+        x, y = np.empty((2, *self.shape))
+        for family, table, _ in self._parts:
+            values = table[:, 2 * self.shape[1] :]
+            place = np.einsum("eni,np->iep", coordinates[family.nodes], values)
+            x[family.rows], y[family.rows] = place
+        return x, y
+
     def evaluate(self, displacement: Floats) -> Floats:
         """Strains of a displacement field.
 

@@ -7,20 +7,31 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fecm.assembly import UnsoundPlateError
 from fecm.check import Checked
-from fecm.deck.model import Macro, Material
-from fecm.impact import DivergenceError, ImpactState
+from fecm.deck.model import LoadTable, Macro, Material
+from fecm.dynamics import DivergenceError, PlateState
+from fecm.impact import ImpactState
 from fecm.indentation import VIRGIN
+from fecm.modes import modes
 from fecm.parts import Setup, set_up
-from fecm.program import every, tally, walk
-from fecm.recorder import Recorder
+from fecm.plate import Floats
+from fecm.printout import Printer
+from fecm.program import every, hits, tally, walk
+from fecm.proportional import load_factor
+from fecm.recording.recorder import Recorder
 from fecm.results.schema import FORMAT, FORMAT_VERSION
 from fecm.results.sinks import Sink
 from fecm.slips import LISTING, NAMES, REPORT
+from fecm.statics import Tangent, reactions
+from fecm.stresses import strains_and_resultants
 from fecm.units import unit_names
 from fecm.version import __version__
 
 Progress = Callable[[int, int], None]
+
+# Change of the displacement, relative to it, below which CONV leaves its loop.
+TOLERANCE = 1.0e-9
 
 
 @dataclass
@@ -37,35 +48,54 @@ class Simulation:
         Receives the result.
     progress : callable
         Told of steps taken and steps to take, now and then.
+    printer : Printer
+        Writes the printed output.
     """
 
     checked: Checked
     slips: frozenset[str]
     sink: Sink
     progress: Progress = lambda done, steps: None
+    printer: Printer = field(default_factory=Printer)
     setup: Setup = field(init=False)
-    state: ImpactState = field(init=False)
+    plate: PlateState = field(init=False)
+    impact: ImpactState | None = field(default=None, init=False)
     dt: float = field(default=0.0, init=False)
     clock: float = field(default=0.0, init=False)
-    proportional: float = field(default=1.0, init=False)
+    constant_factor: float = field(default=1.0, init=False)
+    table: LoadTable | None = field(default=None, init=False)
+    tolerance: float = field(default=TOLERANCE, init=False)
+    consistent: bool = field(default=False, init=False)
+    ended: bool = field(default=False, init=False)
+    _tangent: Tangent | None = field(default=None, init=False)
+    _residual: Floats | None = field(default=None, init=False)
+    _settled: bool = field(default=False, init=False)
+    _state_clock: float = field(default=0.0, init=False)
 
     def __post_init__(self) -> None:
-        self.setup = set_up(self.checked.deck, self.checked.mesh, self.slips)
-        self.state = self.setup.impact.start()
-        self._sizes = tally(self.checked.program)
+        deck, mesh, program = self.checked.deck, self.checked.mesh, self.checked.program
+        with np.errstate(all="ignore"):
+            self.setup = set_up(deck, mesh, self.slips, hits=hits(program))
+        self.plate = self.setup.motion.start()
+        if self.setup.impact is not None:
+            self.impact = self.setup.impact.start(self.plate)
+        self._sizes = tally(program)
+        self._tables = list(deck.tables)
         self._tick = max(1, min(64, 100_000 // self.setup.plate.neq))
         self._header()
         self._recorder = Recorder(
             self.sink,
-            self.setup.impact,
-            self.setup.station,
-            self.setup.strains,
+            self.setup,
             self._sizes,
             contact_at_every_step="tapes" in self.slips,
             watches=not self.slips,
         )
-        if self._sizes.contact_rows:
+        if self._sizes.contact_rows and self.impact is not None:
             self.sink.attributes("tape8", {"location": self._location()})
+        if self._sizes.passes["STRE"]:
+            x, y = self.setup.stress_points.places(mesh.coordinates)
+            self._recorder.constant("stresses/x", x)
+            self._recorder.constant("stresses/y", y)
 
     def _location(self) -> str:
         at_nodes = self.checked.deck.need(Material).integration.points < 0
@@ -74,32 +104,26 @@ class Simulation:
     def _header(self) -> None:
         deck = self.checked.deck
         listing = self.slips == frozenset(NAMES)
-        self.sink.attributes(
-            "",
-            {
-                "format": FORMAT,
-                "format_version": FORMAT_VERSION,
-                "fecm_version": __version__,
-                "title": deck.title,
-                "mode": LISTING if listing else REPORT,
-                "slips": sorted(self.slips),
-                **{f"unit_{name}": unit for name, unit in unit_names(deck).items()},
-            },
-        )
+        attributes = {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "fecm_version": __version__,
+            "title": deck.title,
+            "mode": LISTING if listing else REPORT,
+            "slips": sorted(self.slips),
+            **{f"unit_{name}": unit for name, unit in unit_names(deck).items()},
+        }
+        self.sink.attributes("", attributes)
         self.sink.text("deck", deck.text or deck.to_text(), "the cards of the problem")
 
     def _footer(self) -> None:
-        if self.state.step:
-            memory, point = self.state.memory, self.state.contact
-            peak = point.indentation if memory.branch == VIRGIN else memory.peak
-            permanent = self.setup.impact.law.constants.permanent(max(peak, memory.peak))
-            self.sink.attributes(
-                "history",
-                {
-                    "permanent_indentation": float(permanent),
-                    "unsettled_steps": self.state.unsettled,
-                },
-            )
+        if self.impact is None or self.setup.impact is None or not self.plate.step:
+            return
+        memory, point = self.impact.memory, self.impact.contact
+        peak = point.indentation if memory.branch == VIRGIN else memory.peak
+        permanent = self.setup.impact.law.constants.permanent(max(peak, memory.peak))
+        values = {"permanent_indentation": permanent, "unsettled_steps": self.impact.unsettled}
+        self.sink.attributes("history", values)
 
     def run(self) -> None:
         """Carry out the program.
@@ -108,18 +132,20 @@ class Simulation:
         ------
         DivergenceError
             If the motion grows without bound; the message names the likely cause.
+        SingularStiffnessError
+            If a static solution is asked for and the plate is not held.
         """
-        actions = {
-            "LMAS": self._form_mass,
-            "DT": self._set_time_step,
-            "TIME": self._advance_clock,
-            "RODP": self._impact_step,
-            "DISP": self._store_displacements,
-        }
+        self.printer.problem(self.checked.deck, self.checked.mesh, self.setup.plate)
+        program = walk(self.checked.program)
         try:
             with np.errstate(all="ignore"):  # an overflow is found, and said better, below
-                for macro, current in walk(self.checked.program):
-                    actions[macro.word](macro, current)
+                answer: bool | None = None
+                while not self.ended:
+                    try:
+                        macro, current = program.send(answer)
+                    except StopIteration:
+                        break
+                    answer = ACTIONS[macro.word](self, macro, current)
                 self._recorder.finish()
             self._footer()
         except DivergenceError as diverged:
@@ -127,45 +153,181 @@ class Simulation:
 
     def _cause(self) -> str:
         """Why a run diverged, as far as the time step tells."""
-        critical = self.setup.plate.critical_time_step()
-        if self.dt > critical:
-            return f"DT = {self.dt:.4g} is above the plate's critical time step {critical:.4g}"
-        return f"DT = {self.dt:.4g} is below the plate's critical time step {critical:.4g}"
+        try:
+            critical = self.setup.plate.critical_time_step()
+        except UnsoundPlateError as error:
+            return str(error)
+        where = "above" if self.dt > critical else "below"
+        return f"DT = {self.dt:.4g} is {where} the plate's critical time step {critical:.4g}"
 
-    # Macros --------------------------------------------------------------------------------------
+    # Loads ---------------------------------------------------------------------------------------
 
-    def _form_mass(self, macro: Macro, current: int) -> None:
-        """LMAS: the lumped mass is assembled with the plate."""
+    def factor(self, clock: float | None = None) -> float:
+        """Load factor of FORC's values at a time of the clock, now without one."""
+        if "force-scale" in self.slips and self.impact is not None:
+            return float(self.impact.contact.force)
+        if self.table is None or "prop" in self.slips:
+            return self.constant_factor
+        return load_factor(self.table, self.clock if clock is None else clock)
 
-    def _set_time_step(self, macro: Macro, current: int) -> None:
+    def field(self) -> Floats:
+        """Every unknown of every node now, (numnp, 5)."""
+        return self.setup.plate.field(self.plate.displacement, self.factor())
+
+    def proportional_load(self, macro: Macro, current: int) -> None:
+        """PROP: read a table, or (under the slip ``prop``) take its value at t = 0."""
+        if macro.value > 0:
+            self.table = self._tables.pop(0) if self._tables else self.table
+            self.constant_factor = 0.0
+        elif self.table is not None:
+            self.constant_factor = load_factor(self.table, 0.0)
+
+    def set_time_step(self, macro: Macro, current: int) -> None:
+        """DT."""
         self.dt = macro.value
 
-    def _advance_clock(self, macro: Macro, current: int) -> None:
+    def advance_clock(self, macro: Macro, current: int) -> None:
+        """TIME."""
         if "time" not in self.slips:
             self.clock += self.dt
 
-    def _impact_step(self, macro: Macro, current: int) -> None:
-        setup, state = self.setup, self.state
-        stores = (state.step + 1) % every(macro) == 0
+    # Time steps ----------------------------------------------------------------------------------
+
+    def _before_step(self) -> None:
+        if not self.plate.step:
+            self._recorder.steps.begin(self.plate, self.impact)
+
+    def _after_step(self) -> None:
+        if not self.plate.step % self._tick:
+            self.progress(self.plate.step, self._sizes.steps)
+
+    def impact_step(self, macro: Macro, current: int) -> None:
+        """RODP: one impact step; contact and strains at every N-th."""
+        if self.setup.impact is None or self.impact is None:
+            return
+        self._before_step()
+        stores = (self.plate.step + 1) % every(macro) == 0
         if stores and "tapes" in self.slips:
-            self._store_strains(state.step + 1)
-        setup.impact.advance(state, self.dt, self.proportional)
-        self._recorder.step(state, self.proportional, stores)
+            self._recorder.strains(self.plate.step + 1, self.plate.time, self.field())
+        self.setup.impact.advance(self.impact, self.dt, self.factor())
+        self._recorder.steps.step(self.plate, self.impact, self.factor(), contact_row=stores)
         if stores and "tapes" not in self.slips:
-            self._store_strains(state.step)
-        if not state.step % self._tick:
-            self.progress(state.step, self._sizes.steps)
+            self._recorder.strains(self.plate.step, self.plate.time, self.field())
+        self._after_step()
 
-    def _load_factor(self) -> float:
-        return self.setup.impact.load_factor(self.state, self.proportional)
+    def central_difference(self, macro: Macro, current: int) -> None:
+        """EXCD: one step of the plate alone, under the given loads."""
+        self._before_step()
+        # Central differences take the loads of the state's own instant, which TIME has left.
+        factor = self.factor(self._state_clock)
+        self.setup.motion.central_difference(self.plate, self.dt, factor)
+        self._state_clock = self.clock
+        self._recorder.steps.step(self.plate, self.impact, self.factor())
+        self._after_step()
 
-    def _store_strains(self, step: int) -> None:
-        displacement = self.setup.plate.field(self.state.displacement, self._load_factor())
-        self._recorder.strain_row(step, self.state.time, displacement)
+    # Statics and modes ---------------------------------------------------------------------------
 
-    def _store_displacements(self, macro: Macro, current: int) -> None:
+    def form_tangent(self, macro: Macro, current: int) -> None:
+        """TANG."""
+        if self._tangent is None:
+            self._tangent = Tangent(self.setup.plate)
+
+    def form_residual(self, macro: Macro, current: int) -> None:
+        """FORM."""
+        self._residual = self.setup.motion.unbalanced(self.plate, self.factor())
+
+    def solve(self, macro: Macro, current: int) -> None:
+        """SOLV."""
+        if self._tangent is None or self._residual is None:
+            return
+        change = self._tangent.solve(self._residual)
+        self.plate.displacement += change
+        self.setup.motion.refresh(self.plate)
+        size = float(np.linalg.norm(self.plate.displacement))
+        self._settled = float(np.linalg.norm(change)) <= self.tolerance * size
+
+    def set_tolerance(self, macro: Macro, current: int) -> None:
+        """TOL."""
+        self.tolerance = macro.value
+
+    def leave_if_settled(self, macro: Macro, current: int) -> bool:
+        """CONV: leave the loop once the last solution changed nothing."""
+        return self._settled
+
+    def lump_mass(self, macro: Macro, current: int) -> None:
+        """LMAS."""
+        self.consistent = False
+
+    def form_consistent_mass(self, macro: Macro, current: int) -> None:
+        """CMAS."""
+        self.consistent = True
+
+    def find_modes(self, macro: Macro, current: int) -> None:
+        """EIGE."""
+        found = modes(self.setup.plate, every(macro), consistent=self.consistent)
+        for number, (omega, shape) in enumerate(
+            zip(found.angular_frequency, found.shapes, strict=True), start=1
+        ):
+            field = self.setup.plate.field(shape, 0.0)
+            columns = {"number": number, "angular_frequency": omega, "shape": field}
+            self._recorder.row("modes", self.plate.step, self.plate.time, columns)
+        self.printer.modes(found.angular_frequency)
+
+    # Output --------------------------------------------------------------------------------------
+
+    def store_displacements(self, macro: Macro, current: int) -> None:
+        """DISP."""
         if current % every(macro) == 0:
-            self._recorder.displacements(self.setup.plate, self.state, self._load_factor())
+            field = self.field()
+            self._recorder.displacements(self.plate.step, self.plate.time, field)
+            if self.impact is None:
+                self.printer.displacements(field, self.plate.time)
+
+    def store_reactions(self, macro: Macro, current: int) -> None:
+        """REAC."""
+        force = reactions(self.setup.plate, self.plate.displacement, self.factor())
+        self._recorder.row("reactions", self.plate.step, self.plate.time, {"force": force})
+        self.printer.reactions(force, self.checked.mesh, self.plate.time)
+
+    def store_stresses(self, macro: Macro, current: int) -> None:
+        """STRE."""
+        if current % every(macro):
+            return
+        points = self.setup.stress_points
+        values = strains_and_resultants(points, self.setup.plate.laminate, self.field())
+        self._recorder.row("stresses", self.plate.step, self.plate.time, values)
+        places = points.places(self.checked.mesh.coordinates)
+        self.printer.stresses(values, places, self.clock)
+
+    def check(self, macro: Macro, current: int) -> None:
+        """CHEC; ends the program under its slip."""
+        profile = self.setup.plate.profile()
+        self.sink.attributes("mesh", {"equations": self.setup.plate.neq, "profile": profile})
+        self.printer.check(self.setup.plate, profile)
+        self.ended = "check-end" in self.slips
+
+
+Action = Callable[[Simulation, Macro, int], "bool | None"]
+
+ACTIONS: dict[str, Action] = {
+    "DT": Simulation.set_time_step,
+    "TIME": Simulation.advance_clock,
+    "PROP": Simulation.proportional_load,
+    "LMAS": Simulation.lump_mass,
+    "CMAS": Simulation.form_consistent_mass,
+    "TANG": Simulation.form_tangent,
+    "FORM": Simulation.form_residual,
+    "SOLV": Simulation.solve,
+    "TOL": Simulation.set_tolerance,
+    "CONV": Simulation.leave_if_settled,
+    "REAC": Simulation.store_reactions,
+    "EIGE": Simulation.find_modes,
+    "EXCD": Simulation.central_difference,
+    "RODP": Simulation.impact_step,
+    "DISP": Simulation.store_displacements,
+    "STRE": Simulation.store_stresses,
+    "CHEC": Simulation.check,
+}
 
 
 def simulate(
@@ -173,6 +335,7 @@ def simulate(
     slips: Iterable[str],
     sink: Sink,
     progress: Progress = lambda done, steps: None,
+    printer: Printer | None = None,
 ) -> Simulation:
     """Run a problem into a sink and return the finished simulation.
 
@@ -180,7 +343,9 @@ def simulate(
     ------
     DivergenceError
         If the motion grows without bound.
+    SingularStiffnessError
+        If a static solution is asked for and the plate is not held.
     """
-    simulation = Simulation(checked, frozenset(slips), sink, progress)
+    simulation = Simulation(checked, frozenset(slips), sink, progress, printer or Printer())
     simulation.run()
     return simulation

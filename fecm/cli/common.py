@@ -8,7 +8,7 @@ import signal
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 import click
 
@@ -79,14 +79,22 @@ def check_outputs(paths: Sequence[Path], overwrite: bool) -> None:
             raise Refused(f"{path} exists already; --overwrite replaces it")
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a text file whole, or leave what is there."""
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[TextIO]:
+    """Open a text file that gets its final name only when all went well."""
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
-        partial.write_text(text, encoding="utf-8", newline="\n")
+        with partial.open("w", encoding="utf-8", newline="\n") as file:
+            yield file
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file whole, or leave what is there."""
+    with writing(path) as file:
+        file.write(text)
 
 
 class Signals:

@@ -20,6 +20,7 @@ from fecm.cli.common import (
     count_errors,
     report,
     signals,
+    writing,
 )
 from fecm.slips import NAMES, active_slips
 
@@ -39,6 +40,13 @@ if TYPE_CHECKING:
                    f"{', '.join(NAMES)}.")  # fmt: skip
 @click.option("--overwrite", is_flag=True, help="Replace result files that exist.")
 @click.option("--force", is_flag=True, help="Run with a time step above the critical one.")
+@click.option(
+    "--print",
+    "printed",
+    type=FILE_PATH,
+    metavar="OUT.txt",
+    help="Also write what the original program sent to its printer.",
+)
 def run(
     deck: Path,
     output: Path | None,
@@ -46,6 +54,7 @@ def run(
     slips: tuple[str, ...],
     overwrite: bool,
     force: bool,
+    printed: Path | None,
 ) -> None:
     """Run every problem in DECK and write its result.
 
@@ -63,29 +72,40 @@ def run(
         raise Refused(f"{count_errors(errors)}; nothing was run")
     first = output or Path(f"{deck.stem}.h5")
     paths = [numbered(first, n) for n in range(1, len(prepared.problems) + 1)]
-    check_outputs(paths, overwrite)
+    prints = [None if printed is None else numbered(printed, n + 1) for n in range(len(paths))]
+    check_outputs([*paths, *(path for path in prints if path is not None)], overwrite)
     for number, path in enumerate(paths):
         if number:
             click.echo()
-        _run_one(prepared, number, active, path)
+        _run_one(prepared, number, active, path, prints[number])
 
 
-def _run_one(prepared: Prepared, number: int, active: frozenset[str], path: Path) -> None:
+def _run_one(
+    prepared: Prepared, number: int, active: frozenset[str], path: Path, printed: Path | None
+) -> None:
     """Run one problem of a deck into a file and say what came out."""
-    from fecm.impact import DivergenceError
+    from fecm.dynamics import DivergenceError
+    from fecm.printout import Printer
     from fecm.program import tally
     from fecm.results import hdf5
     from fecm.results.result import load
     from fecm.results.summary import summary
     from fecm.simulation import simulate
+    from fecm.statics import SingularStiffnessError
 
     problem = prepared.problems[number]
     with contextlib.ExitStack() as stack:
         stack.enter_context(signals.deferred())
         sink = stack.enter_context(hdf5.writing(path))
+        printer = Printer() if printed is None else Printer(stack.enter_context(writing(printed)))
         advance = stack.enter_context(_progress(tally(problem.program).steps))
         try:
-            simulate(problem, active, sink, advance)
+            simulate(problem, active, sink, advance, printer)
+        except SingularStiffnessError as error:
+            raise Refused(
+                f"{error}: the plate is not held, so that it has no static displacement; restrain "
+                f"it with BOUN; {path} was not written"
+            ) from None
         except DivergenceError as diverged:
             raise AnswerIsNo(
                 f"the run diverged at step {diverged.step}: {diverged.reason}; "
@@ -95,6 +115,8 @@ def _run_one(prepared: Prepared, number: int, active: frozenset[str], path: Path
     for line in summary(load(path)):
         click.echo(f"  {line}")
     click.echo(f"  result            {path}")
+    if printed is not None:
+        click.echo(f"  printed           {printed}")
 
 
 @contextlib.contextmanager

@@ -67,6 +67,20 @@ class FileSink:
         """Store rows of a dataset."""
         self._datasets[path][start : start + len(rows)] = rows
 
+    def trim(self, path: str, rows: int) -> None:
+        """Cut a dataset down to its first rows; without any it goes, and an empty group with it."""
+        old = self._datasets.pop(path)
+        group, name = old.parent, path.rpartition("/")[2]
+        attributes = dict(old.attrs)
+        kept = old[:rows]
+        del group[name]
+        if rows:
+            made = group.create_dataset(name, data=kept)
+            made.attrs.update(attributes)
+            self._datasets[path] = made
+        elif not len(group):
+            del self._file[path.rpartition("/")[0]]
+
     def text(self, path: str, value: str, description: str) -> None:
         """Store a text."""
         made = self._file.create_dataset(path, data=value, dtype=h5py.string_dtype())

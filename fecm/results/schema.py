@@ -1,7 +1,7 @@
 """What a result file holds: every dataset, its shape, its dimension and what it is.
 
-Shapes are given in the sizes of a run: ``steps``, ``n3``, ``n8``, ``n9`` (rows of a group),
-``numnp``, ``ndm``, ``ndf``, ``numel``, ``nen``, ``npt`` (points an element).
+Shapes are given in the sizes of a run: ``rows`` of the group, ``numnp``, ``ndm``, ``ndf``,
+``numel``, ``nen``, ``npt`` and ``nps`` (points an element of tape8 and of the stresses).
 """
 
 from __future__ import annotations
@@ -60,10 +60,10 @@ def _group(
     return tuple(Dataset(f"{group}/{name}", rows, text, dim) for name, text, dim in columns)
 
 
-def _clock(group: str, rows: str) -> tuple[Dataset, ...]:
+def _clock(group: str) -> tuple[Dataset, ...]:
     return (
-        Dataset(f"{group}/step", (rows,), "number of the impact step, from 1", dtype="i8"),
-        Dataset(f"{group}/time", (rows,), "time integrated up to the row's state", "time"),
+        Dataset(f"{group}/step", ("rows",), "number of time steps taken", dtype="i8"),
+        Dataset(f"{group}/time", ("rows",), "time integrated up to the row's state", "time"),
     )
 
 
@@ -94,32 +94,32 @@ DATASETS = {
         Dataset(
             "laminate/shear", (2, 2), "transverse shear stiffness, order xz, yz", "force/length"
         ),
-        *_clock("tape3", "n3"),
-        Dataset("tape3/w", ("n3", "numnp"), "transverse displacement of every node", "length"),
+        *_clock("tape3"),
+        Dataset("tape3/w", ("rows", "numnp"), "transverse displacement of every node", "length"),
         Dataset(
-            "tape3/displacement", ("n3", "numnp", "ndf"),
+            "tape3/displacement", ("rows", "numnp", "ndf"),
             "u, v, w and the rotations theta_x, theta_y of every node",
             "length (u, v, w), 1 (theta_x, theta_y)",
         ),
-        *_clock("tape8", "n8"),
+        *_clock("tape8"),
         *_group(
-            "tape8", ("n8", "numel", "npt"),
+            "tape8", ("rows", "numel", "npt"),
             ("kappa_x", "curvature -theta_x,x at every point of every element", "1/length"),
             ("kappa_y", "curvature -theta_y,y", "1/length"),
             ("kappa_xy", "twist -theta_x,y - theta_y,x", "1/length"),
             ("gamma_yz", "transverse shear strain w,y - theta_y", ""),
             ("gamma_xz", "transverse shear strain w,x - theta_x", ""),
         ),
-        *_clock("tape9", "n9"),
-        *_group("tape9", ("n9",), *_CONTACT),
-        *_clock("history", "steps"),
+        *_clock("tape9"),
+        *_group("tape9", ("rows",), *_CONTACT),
+        *_clock("history"),
         *_group(
-            "history", ("steps",), *_CONTACT,
+            "history", ("rows",), *_CONTACT,
             ("plate_w", "displacement of the impact node that the contact law sees", "length"),
         ),
-        *_clock("energy", "steps"),
+        *_clock("energy"),
         *_group(
-            "energy", ("steps",),
+            "energy", ("rows",),
             ("plate_kinetic", "kinetic energy of the plate", "force*length"),
             ("plate_strain", "strain energy of the plate", "force*length"),
             ("projectile_kinetic", "kinetic energy of the projectile", "force*length"),
@@ -131,6 +131,40 @@ DATASETS = {
                 "all energies and the contact work, less the initial energy and external work",
                 "force*length",
             ),
+        ),
+        *_clock("stresses"),
+        Dataset("stresses/x", ("numel", "nps"), "x of every point of every element", "length"),
+        Dataset("stresses/y", ("numel", "nps"), "y of every point of every element", "length"),
+        *_group(
+            "stresses", ("rows", "numel", "nps"),
+            ("eps_xx", "midplane strain u,x", ""),
+            ("eps_yy", "midplane strain v,y", ""),
+            ("gamma_xy", "midplane shear strain u,y + v,x", ""),
+            ("kappa_x", "curvature -theta_x,x", "1/length"),
+            ("kappa_y", "curvature -theta_y,y", "1/length"),
+            ("kappa_xy", "twist -theta_x,y - theta_y,x", "1/length"),
+            ("gamma_xz", "transverse shear strain w,x - theta_x", ""),
+            ("gamma_yz", "transverse shear strain w,y - theta_y", ""),
+            ("N_x", "stress resultant", "force/length"),
+            ("N_y", "stress resultant", "force/length"),
+            ("N_xy", "shear resultant", "force/length"),
+            ("M_x", "stress couple", "force"),
+            ("M_y", "stress couple", "force"),
+            ("M_xy", "twisting couple", "force"),
+            ("Q_x", "transverse shear force", "force/length"),
+            ("Q_y", "transverse shear force", "force/length"),
+        ),
+        *_clock("reactions"),
+        Dataset(
+            "reactions/force", ("rows", "numnp", "ndf"),
+            "internal less applied force of every unknown: forces of the supports",
+            "force (u, v, w), force*length (theta_x, theta_y)",
+        ),
+        *_clock("modes"),
+        Dataset("modes/number", ("rows",), "number of the mode, from 1", dtype="i8"),
+        Dataset("modes/angular_frequency", ("rows",), "natural angular frequency", "1/time"),
+        Dataset(
+            "modes/shape", ("rows", "numnp", "ndf"), "mode of unit modal mass: every unknown"
         ),
     )
 }  # fmt: skip
@@ -150,4 +184,7 @@ GROUP_DESCRIPTIONS = {
     "tape9": "contact and the projectile, stored by RODP",
     "history": "contact and the projectile at every step; row n is the state after step n",
     "energy": "energies at every step",
+    "stresses": "strains and stress resultants, stored by STRE",
+    "reactions": "forces of the supports, stored by REAC",
+    "modes": "natural modes, found by EIGE",
 }

@@ -33,6 +33,10 @@ class Sink(Protocol):
         """Store rows of a dataset from row `start` on."""
         ...
 
+    def trim(self, path: str, rows: int) -> None:
+        """Cut a dataset down to its first rows; without any it goes."""
+        ...
+
     def text(self, path: str, value: str, description: str) -> None:
         """Store a text."""
         ...
@@ -58,6 +62,12 @@ class MemorySink:
         """Store rows of a dataset."""
         self.arrays[path][start : start + len(rows)] = rows
 
+    def trim(self, path: str, rows: int) -> None:
+        """Cut a dataset down to its first rows."""
+        kept = self.arrays.pop(path)[:rows].copy()
+        if rows:
+            self.arrays[path] = kept
+
     def text(self, path: str, value: str, description: str) -> None:
         """Store a text."""
         self.texts[path] = value
@@ -74,6 +84,11 @@ class RowBuffer:
         The group's datasets.
     shapes : sequence of tuple of int
         Their full shapes, rows first.
+
+    Attributes
+    ----------
+    stored : int
+        Rows handed over.
     """
 
     # Bytes that a block may hold: enough for few writes, little enough to stay unnoticed.
@@ -92,7 +107,7 @@ class RowBuffer:
         self._paths = {d.name: d.path for d in datasets}
         self._room = rows
         self._filled = 0
-        self._stored = 0
+        self.stored = 0
 
     def put(self, columns: Mapping[str, Any]) -> None:
         """Add one row; `columns` has a value or an array for every dataset."""
@@ -106,6 +121,6 @@ class RowBuffer:
         """Hand over what was gathered."""
         if self._filled:
             for name, block in self._blocks.items():
-                self._sink.write(self._paths[name], self._stored, block[: self._filled])
-        self._stored += self._filled
+                self._sink.write(self._paths[name], self.stored, block[: self._filled])
+        self.stored += self._filled
         self._filled = 0

@@ -11,12 +11,38 @@ LISTED = 6
 
 
 def summary(result: Result) -> list[str]:
-    """Summarise a result: forces, contacts, indentation and energy, in the deck's own units."""
-    if "history/force" not in result:
-        return ["no impact step was taken"]
+    """Summarise a result: what it found, in the deck's own units."""
+    lines: list[str] = []
+    if "history/force" in result:
+        lines += _impact(result)
+    elif "energy/time" in result:
+        time = result["energy/time"]
+        lines.append(
+            f"steps             {len(time)}, up to time {_quantity(result, time[-1], 'time')}"
+        )
+    if "history/force" not in result and "tape3/w" in result:
+        w = result["tape3/w"]
+        row, node = np.unravel_index(int(np.abs(w).argmax()), w.shape)
+        lines.append(
+            f"largest w         {_quantity(result, w[row, node], 'length')} at node {node + 1}"
+        )
+    if "modes/angular_frequency" in result:
+        found = result["modes/angular_frequency"]
+        texts = ", ".join(f"{omega:.6g}" for omega in found[:LISTED])
+        more = f" and {len(found) - LISTED} more" if len(found) > LISTED else ""
+        lines.append(f"frequencies       {texts}{more} {result.unit('1/time')}".rstrip())
+    return lines or ["nothing was stored"]
+
+
+def _quantity(result: Result, value: float, dimension: str) -> str:
+    return f"{value:.6g} {result.unit(dimension)}".rstrip()
+
+
+def _impact(result: Result) -> list[str]:
+    """Forces, contacts, indentation and energy of an impact."""
 
     def quantity(value: float, dimension: str) -> str:
-        return f"{value:.6g} {result.unit(dimension)}".rstrip()
+        return _quantity(result, value, dimension)
 
     force, time = result["history/force"], result["history/time"]
     peak = int(np.argmax(force))

@@ -1,0 +1,175 @@
+"""Explicit motion of the plate: M a = P - K u.
+
+The stored velocity belongs to the middle of the last step.  Vectors are over equations.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.assembly import PlateModel
+
+Floats = NDArray[np.float64]
+
+# Longest sum that BLAS adds up in one thread.
+_CHUNK = 8192
+
+
+class DivergenceError(ArithmeticError):
+    """The motion has lost all sense.
+
+    Attributes
+    ----------
+    step : int
+        The step at which it did.
+    reason : str
+        How that shows.
+    """
+
+    def __init__(self, step: int, reason: str) -> None:
+        self.step = step
+        self.reason = reason
+        super().__init__(f"step {step}: {reason}")
+
+
+@dataclass(slots=True)
+class PlateState:
+    """The plate's part of what one step hands to the next.
+
+    Attributes
+    ----------
+    step : int
+        Steps taken.
+    time : float
+        Sum of their time steps.
+    dt : float
+        The last time step.
+    displacement, velocity : ndarray (neq,)
+        The unknowns, and their velocities half a step earlier.
+    internal : ndarray (neq,)
+        K u.
+    external_work : float
+        Work done by nodal forces.
+    """
+
+    step: int
+    time: float
+    dt: float
+    displacement: Floats
+    velocity: Floats
+    internal: Floats
+    external_work: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class PointForce:
+    """A force on one equation, on top of the nodal forces."""
+
+    row: int
+    force: float
+
+
+class PlateMotion:
+    """Moves a plate through time.
+
+    Parameters
+    ----------
+    plate : PlateModel
+    solver : str
+        How K u is had: see :meth:`PlateModel.product`.
+    """
+
+    def __init__(self, plate: PlateModel, solver: str = "") -> None:
+        self.plate = plate
+        self.product = plate.product(solver)
+        loads = plate.nodal_loads
+        self._loads = loads if loads.any() else None
+        self._flexibility = np.empty(0)
+        self._kick = math.nan
+
+    def start(self) -> PlateState:
+        """State of the plate at rest."""
+        neq = self.plate.neq
+        return PlateState(0, 0.0, 0.0, np.zeros(neq), np.zeros(neq), np.zeros(neq))
+
+    def refresh(self, state: PlateState) -> None:
+        """Make K u agree with a displacement that was set from outside."""
+        state.internal = self.product(state.displacement)
+
+    def unbalanced(
+        self, state: PlateState, factor: float, point: PointForce | None = None
+    ) -> Floats:
+        """Load less internal force of every equation, at the state's instant.
+
+        Parameters
+        ----------
+        state : PlateState
+        factor : float
+            Load factor of the nodal forces.
+        point : PointForce, optional
+        """
+        force = -state.internal
+        if point is not None:
+            force[point.row] += point.force
+        if self._loads is not None:
+            force += factor * self._loads
+        return force
+
+    def advance(
+        self,
+        state: PlateState,
+        dt: float,
+        factor: float,
+        point: PointForce | None = None,
+        *,
+        kick: float | None = None,
+    ) -> None:
+        """Take one step: v += kick M^-1 (P - K u), u += dt v.
+
+        Parameters
+        ----------
+        state : PlateState
+            Changed in place.
+        dt : float
+            Time step.
+        factor : float
+            Load factor of the nodal forces.
+        point : PointForce, optional
+        kick : float, optional
+            Time between the middles of the last step and of this one; `dt` without it.
+        """
+        over = dt if kick is None else kick
+        if over != self._kick:
+            self._flexibility, self._kick = over / self.plate.mass, over
+        force = self.unbalanced(state, factor, point)
+        force *= self._flexibility
+        state.velocity += force
+        moved = np.multiply(state.velocity, dt, out=force)
+        state.displacement += moved
+        if self._loads is not None:
+            state.external_work += factor * inner(self._loads, moved)
+        self.refresh(state)
+        state.step += 1
+        state.time += dt
+        state.dt = dt
+
+    def central_difference(self, state: PlateState, dt: float, factor: float) -> None:
+        """Take one step of the central differences, from rest or from the last step.
+
+        The first step from rest has half a kick, so that the velocity belongs to its middle; a
+        change of the time step is met in the same way.
+        """
+        self.advance(state, dt, factor, kick=0.5 * (state.dt + dt))
+
+
+def inner(a: Floats, b: Floats) -> float:
+    """Inner product, the same to the last bit whatever the number of threads."""
+    if len(a) <= _CHUNK:
+        return float(np.dot(a, b))
+    return sum(
+        float(np.dot(a[i : i + _CHUNK], b[i : i + _CHUNK])) for i in range(0, len(a), _CHUNK)
+    )

@@ -1,0 +1,161 @@
+"""The recorder of a run: makes room for every dataset, and stores rows in a sink."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.assembly import PlateModel
+from fecm.parts import Setup
+from fecm.plate import STRAINS
+from fecm.program import Tally
+from fecm.recording.steps import StepRecorder
+from fecm.results.schema import DATASETS
+from fecm.results.sinks import RowBuffer, Sink
+
+Floats = NDArray[np.float64]
+
+BUFFERED = ("tape3", "tape8", "stresses", "reactions", "modes")
+
+
+class Recorder:
+    """Stores what a run gives.
+
+    Parameters
+    ----------
+    sink : Sink
+        Receives the rows.
+    setup : Setup
+        The run's parts.
+    sizes : Tally
+        How many rows there will be at the most.
+    contact_at_every_step, watches : bool
+        See :class:`~fecm.recording.steps.StepRecorder`.
+    """
+
+    def __init__(
+        self,
+        sink: Sink,
+        setup: Setup,
+        sizes: Tally,
+        *,
+        contact_at_every_step: bool = False,
+        watches: bool = True,
+    ) -> None:
+        self._sink = sink
+        self._setup = setup
+        self.steps = StepRecorder(
+            sink,
+            setup.motion,
+            setup.impact,
+            setup.station,
+            contact_at_every_step=contact_at_every_step,
+            watches=watches,
+        )
+        self._room = self._rows_to_come(sizes, contact_at_every_step)
+        self._buffers: dict[str, RowBuffer] = {}
+        self._create()
+        self._store_plate(setup.plate)
+
+    def _rows_to_come(self, sizes: Tally, contact_at_every_step: bool) -> dict[str, int]:
+        """Rows of each group at the most."""
+        hits = self._setup.impact is not None
+        return {
+            "tape3": sizes.passes["DISP"],
+            "tape8": sizes.contact_rows if hits else 0,
+            "tape9": (sizes.steps if contact_at_every_step else sizes.contact_rows) if hits else 0,
+            "history": sizes.steps if hits else 0,
+            "energy": sizes.steps,
+            "stresses": sizes.passes["STRE"],
+            "reactions": sizes.passes["REAC"],
+            "modes": sizes.passes["EIGE"],
+        }
+
+    def _create(self) -> None:
+        """Make room for every dataset of which there will be a row."""
+        mesh = self._setup.plate.mesh
+        numbers = {
+            "numnp": mesh.coordinates.shape[0], "ndm": mesh.coordinates.shape[1],
+            "numel": mesh.elements.shape[0], "nen": mesh.elements.shape[1],
+            "ndf": mesh.equations.shape[1], "npt": self._setup.strains.shape[1],
+            "nps": self._setup.stress_points.shape[1],
+        }  # fmt: skip
+        for dataset in DATASETS.values():
+            rows = self._room.get(dataset.group)
+            if rows == 0:
+                continue
+            known = numbers | {"rows": rows or 0}
+            shape = tuple(known[n] if isinstance(n, str) else n for n in dataset.shape)
+            self._sink.create(dataset, shape)
+        for group in BUFFERED:
+            if rows := self._room[group]:
+                known = numbers | {"rows": rows}
+                members = [
+                    d for d in DATASETS.values() if d.group == group and d.shape[0] == "rows"
+                ]
+                shapes = [
+                    tuple(known[n] if isinstance(n, str) else n for n in d.shape) for d in members
+                ]
+                self._buffers[group] = RowBuffer(self._sink, members, shapes)
+
+    def _store_plate(self, plate: PlateModel) -> None:
+        """Store mesh and laminate."""
+        mesh, laminate = plate.mesh, plate.laminate
+        for path, array in (
+            ("mesh/coordinates", mesh.coordinates),
+            ("mesh/elements", mesh.elements),
+            ("mesh/equations", mesh.equations),
+            ("laminate/A", laminate.A),
+            ("laminate/B", laminate.B),
+            ("laminate/D", laminate.D),
+            ("laminate/shear", laminate.shear),
+        ):
+            self._sink.write(path, 0, array)
+
+    def constant(self, path: str, array: Floats) -> None:
+        """Store a dataset that has no rows."""
+        self._sink.write(path, 0, array)
+
+    def row(self, group: str, step: int, time: float, columns: Mapping[str, Any]) -> None:
+        """Store a row of a group.
+
+        Parameters
+        ----------
+        group : str
+            One of :data:`BUFFERED`.
+        step, time : int, float
+            When.
+        columns : mapping
+            A value or an array for each of the group's other datasets.
+        """
+        self._buffers[group].put({"step": step, "time": time, **columns})
+
+    def displacements(self, step: int, time: float, field: Floats) -> None:
+        """Store a row of tape3: every unknown of every node, (numnp, 5)."""
+        self.row("tape3", step, time, {"w": field[:, 2], "displacement": field})
+
+    def strains(self, step: int, time: float, field: Floats) -> None:
+        """Store a row of tape8: strains of a field that belongs to `time`."""
+        values = self._setup.strains.evaluate(field)
+        self.row("tape8", step, time, dict(zip(STRAINS, values, strict=True)))
+
+    def finish(self) -> None:
+        """Store all that is held back, and cut off the rows that never came.
+
+        Raises
+        ------
+        DivergenceError
+            If the energy has grown without bound.
+        """
+        self.steps.flush()
+        stored = dict(self.steps.rows)
+        for group, buffer in self._buffers.items():
+            buffer.flush()
+            stored[group] = buffer.stored
+        for dataset in DATASETS.values():
+            room, came = self._room.get(dataset.group, 0), stored.get(dataset.group, 0)
+            if room > came and dataset.shape[0] == "rows":
+                self._sink.trim(dataset.path, came)

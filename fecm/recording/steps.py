@@ -1,0 +1,209 @@
+"""What is noted at every time step: history, energies, and the rows of tape9 among them.
+
+Scalars of every step are gathered in blocks; what can be computed from a block (the transducer, the
+projectile's energies, the balance) is computed when it is full.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.dynamics import DivergenceError, PlateMotion, PlateState, inner
+from fecm.impact import Impact, ImpactState
+from fecm.projectile import Station
+from fecm.results.schema import DATASETS
+from fecm.results.sinks import Sink
+
+Floats = NDArray[np.float64]
+
+BLOCK = 512
+# A run whose energy has grown by this factor has diverged.
+GROWTH = 10.0
+
+SCALARS = (
+    "step", "time", "plate_kinetic", "plate_strain", "external_work",
+    "force", "indentation", "plate_w", "contact_work",
+)  # fmt: skip
+CONTACT = ("force", "indentation", "transducer", "displacement", "velocity", "acceleration")
+
+
+class StepRecorder:
+    """Notes every step in a sink.
+
+    Parameters
+    ----------
+    sink : Sink
+        Receives the rows; the datasets of history, energy and tape9 stand there already.
+    motion : PlateMotion
+        The plate.
+    impact : Impact or None
+        Plate and projectile; None for a plate alone, which has energies only.
+    station : Station
+        The transducer.
+    contact_at_every_step : bool
+        Store contact on tape9 at every step instead of every N-th (the slip ``tapes``).
+    watches : bool
+        Stop the run when its energy grows without bound; it is stopped in any case when the energy
+        is no longer finite.
+    """
+
+    def __init__(
+        self,
+        sink: Sink,
+        motion: PlateMotion,
+        impact: Impact | None,
+        station: Station,
+        *,
+        contact_at_every_step: bool = False,
+        watches: bool = True,
+    ) -> None:
+        self._sink = sink
+        self._motion = motion
+        self._impact = impact
+        self._watches = watches
+        self._all_contact = contact_at_every_step
+        self._mass = motion.plate.mass
+        self._momentum = np.empty_like(self._mass)
+        self._flexibility, self._flexibility_dt = self._mass, math.nan
+        self._rows: list[tuple[float, ...]] = []
+        self._contact_rows: list[int] = []
+        self._stored = self._tape9_rows = 0
+        self._station = 2 * station.node - 1
+        self._gauge = 0.0
+        self._rod = np.empty((0, 3, 0))
+        if impact is not None:
+            rod = impact.rod
+            element = min(station.node, rod.elements) - 1
+            self._gauge = station.sign * rod.modulus * float(rod.areas[element])
+            self._rod = np.empty((BLOCK, 3, 2 * rod.elements + 2))
+        self.initial = 0.0
+
+    def begin(self, plate: PlateState, impact: ImpactState | None) -> None:
+        """Note the energy before the first step (force*length)."""
+        energy = 0.5 * inner(plate.displacement, plate.internal)
+        if self._impact is not None and impact is not None:
+            velocity = impact.rod.velocity
+            energy += 0.5 * float(np.einsum("i,i,i", self._impact.rod_mass, velocity, velocity))
+        self.initial = float(energy)
+        self._sink.attributes("energy", {"initial": self.initial})
+
+    def step(
+        self,
+        plate: PlateState,
+        impact: ImpactState | None,
+        factor: float,
+        *,
+        contact_row: bool = False,
+    ) -> None:
+        """Note the state after a step.
+
+        Parameters
+        ----------
+        plate : PlateState
+        impact : ImpactState or None
+        factor : float
+            Load factor of nodal forces.
+        contact_row : bool
+            Whether the step's contact goes to tape9.
+        """
+        point = None
+        if self._impact is not None and impact is not None:
+            point = self._impact.point_force(impact)
+        # The stored velocity is half a step old; energy needs it at the displacement's instant.
+        velocity = self._motion.unbalanced(plate, factor, point)
+        velocity *= self._half_flexibility(plate.dt)
+        velocity += plate.velocity
+        strain = 0.5 * inner(plate.displacement, plate.internal)
+        momentum = np.multiply(self._mass, velocity, out=self._momentum)
+        kinetic = 0.5 * inner(momentum, velocity)
+        own = (plate.step, plate.time, kinetic, strain, plate.external_work)
+        if impact is None:
+            self._rows.append((*own, 0.0, 0.0, 0.0, 0.0))
+        else:
+            self._rod[len(self._rows)] = impact.rod.motion
+            if contact_row or self._all_contact:
+                self._contact_rows.append(len(self._rows))
+            contact = impact.contact
+            self._rows.append(
+                (*own, contact.force, contact.indentation, impact.plate_w, impact.contact_work)
+            )
+        if len(self._rows) == BLOCK:
+            self.flush()
+
+    def _half_flexibility(self, dt: float) -> Floats:
+        """Half a time step over the plate's mass, (neq,)."""
+        if dt != self._flexibility_dt:
+            self._flexibility, self._flexibility_dt = 0.5 * dt / self._mass, dt
+        return self._flexibility
+
+    def flush(self) -> None:
+        """Store what was gathered.
+
+        Raises
+        ------
+        DivergenceError
+            If the energy has grown without bound.
+        """
+        count = len(self._rows)
+        if not count:
+            return
+        table = dict(zip(SCALARS, np.array(self._rows).T, strict=True))
+        self._add_projectile(table, count)
+        held = (
+            table["plate_kinetic"] + table["plate_strain"]
+            + table["projectile_kinetic"] + table["projectile_strain"] + table["contact_work"]
+        )  # fmt: skip
+        table["balance_error"] = held - self.initial - table["external_work"]
+        self._watch(table, held)
+        groups = ("energy",) if self._impact is None else ("history", "energy")
+        for dataset in DATASETS.values():
+            if dataset.group in groups:
+                self._sink.write(dataset.path, self._stored, table[dataset.name])
+        rows = np.array(self._contact_rows, dtype=int)
+        if len(rows):
+            for name in ("step", "time", *CONTACT):
+                self._sink.write(f"tape9/{name}", self._tape9_rows, table[name][rows])
+            self._tape9_rows += len(rows)
+        self._stored += count
+        self._rows.clear()
+        self._contact_rows.clear()
+
+    def _add_projectile(self, table: dict[str, Floats], count: int) -> None:
+        """Add what follows from the rod's motion over a block of steps."""
+        if self._impact is None:
+            table["projectile_kinetic"] = table["projectile_strain"] = np.zeros(count)
+            return
+        motion = self._rod[:count]
+        u, v = motion[:, 0], motion[:, 1]
+        table["transducer"] = self._gauge * u[:, self._station]
+        table["displacement"], table["velocity"], table["acceleration"] = motion[:, :, 0].T
+        table["projectile_kinetic"] = 0.5 * np.einsum("ri,i->r", v**2, self._impact.rod_mass)
+        table["projectile_strain"] = 0.5 * np.einsum(
+            "ri,ij,rj->r", u, self._impact.rod_stiffness, u, optimize=False
+        )
+
+    def _watch(self, table: Mapping[str, Floats], held: Floats) -> None:
+        """Stop a run that has lost all sense."""
+        lost = ~np.isfinite(held)
+        if lost.any():
+            step = int(table["step"][np.flatnonzero(lost)[0]])
+            raise DivergenceError(step, "the motion is no longer finite")
+        given = self.initial + np.maximum.accumulate(np.abs(table["external_work"]))
+        lost = ~(np.abs(held) <= GROWTH * given) & (given > 0.0)
+        if self._watches and lost.any():
+            row = int(np.flatnonzero(lost)[0])
+            factor = held[row] / given[row]
+            raise DivergenceError(
+                int(table["step"][row]),
+                f"the energy has grown to {factor:.3g} times what was given",
+            )
+
+    @property
+    def rows(self) -> dict[str, int]:
+        """Rows stored in each group."""
+        history = {} if self._impact is None else {"history": self._stored}
+        return {"energy": self._stored, "tape9": self._tape9_rows, **history}
