@@ -66,6 +66,12 @@ def test_loop_0_runs_once() -> None:
         (("LOOP 2.5", "TIME", "NEXT"), "E505"),
         (("DT -1",), "E505"),
         (("LMAS", "DT 1", "LOOP 5", "RODP", "NEXT"), "W507"),
+        (("TANG", "SOLV"), "E504"),
+        (("FORM", "SOLV"), "E504"),
+        (("TANG", "FORM", "SOLV", "CONV"), "E513"),
+        (("EIGE 3",), "E504"),
+        (("TOL 0",), "E505"),
+        (("REAC",), "E504"),
     ],
 )
 def test_a_program_that_cannot_be_meant_is_found(cards: tuple[str, ...], code: str) -> None:
@@ -87,7 +93,7 @@ def test_the_tally_counts_what_the_run_stores() -> None:
     counted = tally(prepare(small(text + text)).problems[0].program)
     assert counted.steps == len(result.force) == 14
     assert counted.contact_rows == len(result.tape9.force) == 4
-    assert counted.displacement_rows == len(result.tape3.w) == 6
+    assert counted.passes["DISP"] == len(result.tape3.w) == 6
     assert counted.macros == 2 * (2 + 7 * 3)
 
 

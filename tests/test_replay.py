@@ -10,6 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
+from fecm.dynamics import PlateMotion
+from fecm.impact import Impact, ImpactState
 from fecm.results.result import Result
 from fecm.results.tapes import tape_texts
 from tests.decks import APPENDIX, DATA, LONG, ready
@@ -161,11 +163,9 @@ def test_the_listing_stores_contact_at_every_step_and_strains_one_step_old(
 
 @pytest.mark.parametrize("solver", ["csr", ""])
 def test_both_products_give_the_same_history(solver: str) -> None:
-    from fecm.impact import Impact
-
-    setup = ready(APPENDIX)
-    made = setup.impact
-    impact = Impact(made.plate, made.rod, made.law, made.contact, solver)
+    made = impact_of(APPENDIX)
+    motion = PlateMotion(made.plate, solver)
+    impact = Impact(motion, made.rod, made.law, made.contact)
     state = impact.start()
     for _ in range(10):
         impact.advance(state, 2e-7)
@@ -173,18 +173,23 @@ def test_both_products_give_the_same_history(solver: str) -> None:
 
 
 def test_a_stored_state_goes_on_as_if_nothing_had_happened() -> None:
-    from fecm.impact import ImpactState
-
-    setup = ready(LONG)
-    state = setup.impact.start()
+    impact = impact_of(LONG)
+    state = impact.start()
     for _ in range(300):  # past the first peak, so that the law has a memory
-        setup.impact.advance(state, 2e-7)
+        impact.advance(state, 2e-7)
     stored = state.to_arrays()
     for _ in range(50):
-        setup.impact.advance(state, 2e-7)
-    fresh = ready(LONG).impact
+        impact.advance(state, 2e-7)
     again = ImpactState.from_arrays(stored)
+    fresh = impact_of(LONG)
     for _ in range(50):
         fresh.advance(again, 2e-7)
     for name, array in state.to_arrays().items():
         np.testing.assert_array_equal(again.to_arrays()[name], array)
+
+
+def impact_of(deck: Path) -> Impact:
+    """Plate and projectile of a deck."""
+    impact = ready(deck).impact
+    assert impact is not None
+    return impact
