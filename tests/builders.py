@@ -269,3 +269,10 @@ def simple_support(coordinates: Floats) -> Bools:
 def rules(bending: int = 3, shear: int = 3, *, transposed: bool = False) -> Rules:
     """Gauss rules of the given orders; strains are stored at those of the bending rule."""
     return Rules(gauss(bending), gauss(shear), gauss(bending), transposed=transposed)
+
+
+def mixed(nx: int, ny: int, kind: int) -> tuple[Floats, Ints]:
+    """Mesh the unit square with distorted elements of which some nodes are absent."""
+    coordinates, elements = without_some_nodes(*distorted_square(nx, ny, kind))
+    assert len(np.unique(elements > 0, axis=0)) > 5
+    return coordinates, elements
