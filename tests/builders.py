@@ -96,6 +96,13 @@ SKEWED: Corners = ((0.0, 0.0), (2.1, 0.3), (1.7, 1.9), (-0.4, 1.2))
 PARALLELOGRAM: Corners = ((0.0, 0.0), (1.3, 0.4), (0.8, 1.3), (-0.5, 0.9))
 
 
+# Places of an element's nodes on the grid of its mid-sides, and of its third points.
+_HALVES = ((0, 2, 2, 0, 1, 2, 1, 0, 1), (0, 0, 2, 2, 0, 1, 2, 1, 1))
+_THIRDS = ((0, 3, 3, 0, 1, 3, 2, 0, 0, 2, 3, 1), (0, 0, 3, 3, 0, 1, 3, 2, 1, 0, 2, 3))
+# Third points that are absent from every element of a mesh, so that neighbours fit each other.
+_ABSENT = {10: [4, 11, 7, 10], 11: [4, 11], 12: []}
+
+
 def mesh_on(corners: Floats, kind: int) -> tuple[Floats, Ints]:
     """Lay straight-sided elements on a grid of corners.
 
@@ -104,28 +111,50 @@ def mesh_on(corners: Floats, kind: int) -> tuple[Floats, Ints]:
     corners : ndarray (rows, columns, 2)
         Columns follow each other in the sense of xi, rows in that of eta.
     kind : int
-        Nodes an element: 4, 8 or 9.
+        Nodes an element: 4, 8 or 9; 3 for two triangles in the place of each quadrilateral; 10, 11
+        or 12 for the last node of cubic elements, those with 10 or 11 having one third point on all
+        sides or on every other side.
 
     Returns
     -------
     coordinates : ndarray (numnp, 2)
     elements : ndarray (numel, kind)
     """
+    if kind == 3:
+        coordinates, elements = mesh_on(corners, 4)
+        return coordinates, _halved(elements, corners.shape[1] - 1)
+    pitch, places = (2, _HALVES) if kind <= 9 else (3, _THIRDS)
     rows, columns = corners.shape[0] - 1, corners.shape[1] - 1
-    fine = np.zeros((2 * rows + 1, 2 * columns + 1, 2))
-    fine[::2, ::2] = corners
-    fine[1::2, ::2] = (corners[:-1] + corners[1:]) / 2.0
-    fine[:, 1::2] = (fine[:, :-2:2] + fine[:, 2::2]) / 2.0
+    fine = _refined(_refined(corners, pitch).swapaxes(0, 1), pitch).swapaxes(0, 1)
     number = np.arange(fine[..., 0].size).reshape(fine.shape[:2])
-    j, i = np.mgrid[0 : 2 * rows : 2, 0 : 2 * columns : 2]
-    right = np.array([0, 2, 2, 0, 1, 2, 1, 0, 1])[:kind]
-    up = np.array([0, 0, 2, 2, 0, 1, 2, 1, 1])[:kind]
-    elements = number[j.ravel()[:, None] + up, i.ravel()[:, None] + right]
-    used, renumbered = np.unique(elements, return_inverse=True)
-    return (
-        fine.reshape(-1, 2)[used],
-        (renumbered.reshape(elements.shape) + 1).astype(np.int32),
-    )
+    j, i = np.mgrid[0 : pitch * rows : pitch, 0 : pitch * columns : pitch]
+    right, up = np.array(places)[:, :kind]
+    elements = number[j.ravel()[:, None] + up, i.ravel()[:, None] + right] + 1
+    elements[:, [node for node in _ABSENT.get(kind, []) if node < kind]] = 0
+    used = np.unique(elements[elements > 0])
+    renumbered = np.where(elements > 0, np.searchsorted(used, elements) + 1, 0)
+    return fine.reshape(-1, 2)[used - 1], renumbered.astype(np.int32)
+
+
+def _refined(corners: Floats, pitch: int) -> Floats:
+    """Put points at equal distances between those of the first axis."""
+    fine = np.zeros((pitch * (len(corners) - 1) + 1, *corners.shape[1:]))
+    fine[-1] = corners[-1]
+    for part in range(pitch):
+        fine[part:-1:pitch] = ((pitch - part) * corners[:-1] + part * corners[1:]) / pitch
+    return fine
+
+
+def _halved(elements: Ints, columns: int) -> Ints:
+    """Cut quadrilaterals into triangles, along either diagonal and beginning with any corner."""
+    halves: list[tuple[int, ...]] = []
+    for number, (a, b, c, d) in enumerate(elements.tolist()):
+        straight = (number // columns + number % columns) % 2 == 0
+        pair = ((a, b, c), (c, d, a)) if straight else ((b, c, d), (d, a, b))
+        for triangle in pair:
+            first = len(halves) % 3
+            halves.append(triangle[first:] + triangle[:first])
+    return np.array(halves, dtype=np.int32)
 
 
 def _grid(nx: int, ny: int) -> Floats:
@@ -159,9 +188,11 @@ def parallelograms(nx: int, ny: int, kind: int = 9) -> tuple[Floats, Ints]:
 
 def one_element(corners: Corners, kind: int = 9) -> tuple[Floats, Ints]:
     """Make a single straight-sided element whose n-th node has the number n."""
+    if kind == 3:
+        return np.array(corners[:3]), np.array([[1, 2, 3]], dtype=np.int32)
     a, b, c, d = corners
-    coordinates, elements = mesh_on(np.array([[a, b], [d, c]]), kind)
-    return coordinates[elements[0] - 1], np.arange(1, kind + 1, dtype=np.int32)[None]
+    coordinates, elements = mesh_on(np.array([[a, b], [d, c]]), 12 if kind > 9 else kind)
+    return coordinates[elements[0, :kind] - 1], np.arange(1, kind + 1, dtype=np.int32)[None]
 
 
 def without_some_nodes(coordinates: Floats, elements: Ints) -> tuple[Floats, Ints]:
@@ -201,9 +232,9 @@ def nothing(coordinates: Floats) -> Bools:
 
 def boundary(coordinates: Floats, elements: Ints) -> Bools:
     """Restrain every unknown on the sides that belong to one element only, and unused nodes."""
-    padded = np.zeros((len(elements), 9), dtype=np.int64)
+    padded = np.zeros((len(elements), 13), dtype=np.int32)
     padded[:, : elements.shape[1]] = elements
-    sides = padded[:, [[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]]].reshape(-1, 3)
+    sides = np.concatenate([_sides(element) for element in padded])
     _, which, count = np.unique(
         np.sort(sides[:, :2], axis=1), axis=0, return_inverse=True, return_counts=True
     )
@@ -211,6 +242,17 @@ def boundary(coordinates: Floats, elements: Ints) -> Bools:
     numbers = np.arange(1, len(coordinates) + 1)
     held = np.isin(numbers, outer) | ~np.isin(numbers, elements)
     return np.repeat(held[:, None], 5, axis=1)
+
+
+def _sides(element: Ints) -> Ints:
+    """Nodes of an element's sides, the ends first; 0 where there is no node."""
+    last = int(np.flatnonzero(element)[-1]) + 1
+    none = 12  # a place that never holds a node
+    if last == 3:
+        return element[[[0, 1, none, none], [1, 2, none, none], [2, 0, none, none]]]
+    if last <= 9:
+        return element[[[0, 1, 4, none], [1, 2, 5, none], [2, 3, 6, none], [3, 0, 7, none]]]
+    return element[[[0, 1, 4, 9], [1, 2, 5, 10], [2, 3, 6, 11], [3, 0, 7, 8]]]
 
 
 def simple_support(coordinates: Floats) -> Bools:
