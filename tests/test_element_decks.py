@@ -164,6 +164,15 @@ def test_a_shear_order_that_leaves_motions_without_energy_is_warned_of(
     assert [code for code, _, _ in findings(text) if code.startswith("W")] == codes
 
 
+def test_a_triangle_s_missing_corner_is_no_side_of_it() -> None:
+    coordinates, elements = square(8, 8, 4)
+    a, b, c, d = elements[36]  # its first corner is struck
+    elements[36] = a, b, c, 0
+    elements = np.vstack([elements, [[c, d, a, 0]]]).astype(np.int32)
+    found = prepare(deck((coordinates, elements), (2, 2, 2))).findings
+    assert [finding.code for finding in found] == ["W414"]
+
+
 @pytest.mark.parametrize(("nodes", "right"), [(2, False), (3, True), (12, True), (13, False)])
 def test_elements_have_3_to_12_nodes(nodes: int, right: bool) -> None:
     lines = deck(square(1, 1, 4), (2, 2, 2)).splitlines()
