@@ -97,7 +97,9 @@ def check_resolution(deck: Deck, mesh: Mesh, findings: Findings) -> None:
     rigidity = float(min(plate.D[0, 0], plate.D[1, 1]))
     wave = 2.0 * np.pi * (rigidity / (plate.mass * (np.pi / contact) ** 2)) ** 0.25
     touching = (mesh.elements == impact.node).any(axis=1)
-    corners = mesh.coordinates[mesh.elements[touching, :4] - 1]
+    nodes = mesh.elements[touching, :4]
+    nodes = np.where(nodes == 0, nodes[:, :1], nodes)  # a triangle returns to its first corner
+    corners = mesh.coordinates[nodes - 1]
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     if np.isfinite(wave) and sides.max() > wave / ELEMENTS_A_WAVE:
         findings.add(
