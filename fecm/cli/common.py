@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import signal
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from fecm.files import beside
 from fecm.slips import MODES, REPORT
 
 if TYPE_CHECKING:
@@ -81,12 +81,8 @@ def check_outputs(paths: Sequence[Path], overwrite: bool) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file whole, or leave what is there."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
+    with beside(path) as partial:
         partial.write_text(text, encoding="utf-8", newline="\n")
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 class Signals:
