@@ -160,3 +160,6 @@ GROUP_DESCRIPTIONS = {
     "history": "contact and the projectile at every step; row n is the state after step n",
     "energy": "energies at every step",
 }
+
+# The macro that makes a group.
+STORED_BY = {"tape3": "DISP", "tape8": "RODP", "tape9": "RODP", "history": "RODP", "energy": "RODP"}
