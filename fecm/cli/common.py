@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import signal
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import click
 
+from fecm.files import beside
 from fecm.slips import MODES, REPORT
 
 if TYPE_CHECKING:
@@ -82,13 +82,8 @@ def check_outputs(paths: Sequence[Path], overwrite: bool) -> None:
 @contextlib.contextmanager
 def writing(path: Path) -> Iterator[TextIO]:
     """Open a text file that gets its final name only when all went well."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        with partial.open("w", encoding="utf-8", newline="\n") as file:
-            yield file
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with beside(path) as partial, partial.open("w", encoding="utf-8", newline="\n") as file:
+        yield file
 
 
 def write_text(path: Path, text: str) -> None:

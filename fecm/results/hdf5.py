@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,10 +11,13 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm.deck.model import UNKNOWNS
+from fecm.files import beside
 from fecm.results.schema import (
     FORMAT,
     FORMAT_VERSION,
     GROUP_DESCRIPTIONS,
+    SCALES,
     Dataset,
     ResultFileError,
     declared_units,
@@ -23,6 +25,7 @@ from fecm.results.schema import (
 from fecm.units import unit_of
 
 Array = NDArray[Any]
+TIME = "time"
 
 
 class FileSink:
@@ -32,6 +35,7 @@ class FileSink:
         self._file = file
         self._units: dict[str, str] = {}
         self._datasets: dict[str, h5py.Dataset] = {}
+        self._made: list[Dataset] = []
 
     def _group(self, name: str) -> h5py.Group:
         if not name:
@@ -57,11 +61,45 @@ class FileSink:
         """Make a contiguous dataset of its full shape."""
         made = self._group(dataset.group).create_dataset(dataset.name, shape, dataset.dtype)
         made.attrs["description"] = dataset.description
+        made.attrs["long_name"] = dataset.description
         if dataset.dimension:
             made.attrs["dimension"] = dataset.dimension
             if unit := unit_of(dataset.dimension, self._units):
                 made.attrs["unit"] = unit
         self._datasets[dataset.path] = made
+        self._made.append(dataset)
+
+    def label_axes(self) -> None:
+        """Attach scales to every axis of what is stored in rows, by which xarray knows them.
+
+        HDF5's Dimension Scales Specification.  Rows have their group's times; nodes, elements,
+        points and unknowns have the file's own scales, as a netCDF reader finds dimensions in a
+        group and in those above it, and takes a dataset with all of its axes labelled or none.
+        """
+        made_of = [(d, self._datasets[d.path]) for d in self._made if d.path in self._datasets]
+        clocks = {d.group: made for d, made in made_of if d.name == TIME}
+        for clock in clocks.values():
+            clock.make_scale(TIME)
+        for dataset, made in made_of:
+            clock = clocks.get(dataset.group)
+            if clock is None or made == clock:
+                continue
+            for axis, size in enumerate(dataset.shape):
+                rows = size == "rows"
+                scale = clock if rows else self._scale(str(size), made.shape[axis])
+                made.dims[axis].attach_scale(scale)
+
+    def _scale(self, size: str, length: int) -> h5py.Dataset:
+        """The scale of an axis, made when it is first asked for."""
+        name, description = SCALES.get(size, (size, ""))
+        if name not in self._file:
+            if size == "ndf":
+                made = self._file.create_dataset(name, data=UNKNOWNS, dtype=h5py.string_dtype())
+            else:
+                made = self._file.create_dataset(name, data=np.arange(1, length + 1, dtype="i4"))
+            made.make_scale(name)
+            made.attrs["description"] = made.attrs["long_name"] = description
+        return self._file[name]
 
     def write(self, path: str, start: int, rows: Array) -> None:
         """Store rows of a dataset."""
@@ -96,13 +134,10 @@ def writing(path: Path) -> Iterator[FileSink]:
     OSError
         If the file can't be written; what stood under the final name is then untouched.
     """
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        with h5py.File(partial, "w") as file:
-            yield FileSink(file)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with beside(path) as partial, h5py.File(partial, "w") as file:
+        sink = FileSink(file)
+        yield sink
+        sink.label_axes()
 
 
 class FileArrays(Mapping[str, Array]):
@@ -158,6 +193,8 @@ def read(path: Path) -> tuple[FileArrays, dict[str, str], dict[str, dict[str, An
             def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
                 if isinstance(item, h5py.Group):
                     groups[name] = _attributes(item)
+                elif item.parent.name == "/" and item.is_scale:
+                    pass  # it numbers an axis
                 elif h5py.check_string_dtype(item.dtype):
                     texts[name] = item.asstr()[()]
                 else:

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.results.schema import declared_units
+from fecm.results.schema import DATASETS, declared_units
 from fecm.units import unit_of
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
 
 Array = NDArray[Any]
 HISTORY = "history"
@@ -83,6 +87,60 @@ class Result:
     def unit(self, dimension: str) -> str:
         """Unit of a dimension such as ``"force/length"``; empty where the deck names no units."""
         return unit_of(dimension, declared_units(self.attributes))
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """The history as a pandas DataFrame: a row a step, by time; step is its first column.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        KeyError
+            If no impact step was taken.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError("a DataFrame needs pandas: pip install pandas") from None
+        members = [path for path in self if path.startswith(f"{HISTORY}/")]
+        if not members:
+            raise KeyError("the result has no history: no impact step was taken")
+        known = [path for path in DATASETS if path in members]
+        columns = {path.partition("/")[2]: self[path] for path in dict.fromkeys(known + members)}
+        index = pandas.Index(columns.pop("time"), name="time")
+        return pandas.DataFrame(columns, index=index)
+
+    def plot(self, kind: str = "force", path: str | Path | None = None, **options: Any) -> Figure:
+        """Draw a picture, and write it if there is a path.
+
+        Parameters
+        ----------
+        kind : str
+            One of :data:`fecm.plot.KINDS`.
+        path : str or Path, optional
+            Where to write it, in place of what is there; its suffix is the format.
+        **options
+            Fields of :class:`fecm.plot.Options`.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        PlotError
+            If the result lacks what the kind shows, or the options don't fit.
+        ImportError
+            If matplotlib is not installed.
+        """
+        from fecm.plot import Options, check_suffix, draw, save
+
+        if path is not None:
+            check_suffix(kind, Path(path))
+        picture = draw(kind, {self.title or "the result": self}, Options(**options))
+        if path is not None:
+            save(picture, Path(path))
+        return picture.figure
 
     def __getitem__(self, path: str) -> Array:
         return self._arrays[path.strip("/")]

@@ -170,6 +170,16 @@ DATASETS = {
 }  # fmt: skip
 
 
+# Scales of the axes of what is stored in rows: name and description by size.
+SCALES = {
+    "numnp": ("node", "number of the node"),
+    "numel": ("element", "number of the element"),
+    "npt": ("point", "number of the point in its element"),
+    "nps": ("stress_point", "number of the stress point in its element"),
+    "ndf": ("unknown", "name of the unknown"),
+}
+
+
 def declared_units(attributes: Mapping[str, Any]) -> dict[str, str]:
     """Names of a result's units of length, force and time; empty where the deck gave none."""
     names = {n: str(attributes.get(f"unit_{n}", "")) for n in ("length", "force", "time")}
@@ -188,3 +198,6 @@ GROUP_DESCRIPTIONS = {
     "reactions": "forces of the supports, stored by REAC",
     "modes": "natural modes, found by EIGE",
 }
+
+# The macro that makes a group.
+STORED_BY = {"tape3": "DISP", "tape8": "RODP", "tape9": "RODP", "history": "RODP", "energy": "RODP"}

@@ -1,0 +1,131 @@
+"""``fecm plot``."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, check_outputs
+from fecm.plot import KINDS, Options, Picture, PlotError, check_suffix, draw, save
+
+if TYPE_CHECKING:
+    from fecm.results.result import Result
+
+_KIND_HELP = "; ".join(f"{name}: {kind.summary}" for name, kind in KINDS.items())
+
+
+class Numbers(click.ParamType):
+    """Finite numbers with commas between them.
+
+    Parameters
+    ----------
+    form : str
+        What help and messages call them.
+    count : int
+        How many there must be; 0 for any number.
+    """
+
+    def __init__(self, form: str, count: int = 0) -> None:
+        self.name = form
+        self._count = count
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, ...]:
+        """Numbers of a text."""
+        try:
+            numbers = tuple(float(part) for part in str(value).split(","))
+        except ValueError:
+            numbers = ()
+        finite = all(abs(number) < float("inf") for number in numbers)
+        if not numbers or not finite or (self._count and len(numbers) != self._count):
+            self.fail(f"{value} is not of the form {self.name}", param, ctx)
+        return numbers
+
+
+@click.command()
+@click.argument("results", type=DECK_PATH, nargs=-1, required=True, metavar="RESULT...")
+@click.option("--kind", "kinds", type=click.Choice(list(KINDS)), multiple=True,
+              default=("force",), show_default=True, metavar="KIND",
+              help=f"What to draw; may be repeated.  {_KIND_HELP}.")  # fmt: skip
+@click.option("-o", "--output", type=FILE_PATH, metavar="PATH",
+              help="Picture (.png, .svg, .pdf; .gif for animation), or folder for several.  "
+                   "[default: RESULT-KIND.png in this folder]")  # fmt: skip
+@click.option("--at", type=Numbers("X,Y", 2), multiple=True, metavar="X,Y",
+              help="Point of strain; may be repeated.  [default: the impact point]",
+              )  # fmt: skip
+@click.option("--gage", "gages", type=Numbers("DEGREES,..."), metavar="DEGREES,...",
+              default="0,90", show_default=True,
+              help="Directions of strain, from the x-axis.")  # fmt: skip
+@click.option("--face", type=click.Choice(["far", "struck", "curvature"]), default="far",
+              show_default=True, help="Face of the strain, or curvature instead.")  # fmt: skip
+@click.option("--times", type=Numbers("T,T,..."), metavar="T,T,...",
+              help="Times, in the deck's unit; the nearest stored rows are drawn.")  # fmt: skip
+@click.option("--along", type=click.Choice(["x", "y"]), default="x", show_default=True,
+              help="Direction of line.")  # fmt: skip
+@click.option("--width", type=click.Choice(["column", "full"]), default="column",
+              show_default=True, help="3.5 in, or 7.2 in.")  # fmt: skip
+@click.option("--overwrite", is_flag=True, help="Replace pictures that exist.")
+def plot(
+    results: tuple[Path, ...],
+    kinds: tuple[str, ...],
+    output: Path | None,
+    at: tuple[tuple[float, float], ...],
+    gages: tuple[float, ...],
+    face: str,
+    times: tuple[float, ...] | None,
+    along: str,
+    width: str,
+    overwrite: bool,
+) -> None:
+    """Draw the report's figures from one RESULT or several."""
+    options = Options(at, gages, face, times or (), along, width)
+    try:
+        paths = _paths(results[0], list(dict.fromkeys(kinds)), output)
+        check_outputs(list(paths.values()), overwrite)
+        pictures = _draw(_named(results), list(paths), options)
+        for kind, path in paths.items():
+            save(pictures[kind], path)
+            click.echo(path)
+    except PlotError as error:
+        raise Refused(str(error)) from None
+    except ImportError as error:
+        if error.name and not error.name.startswith("matplotlib"):
+            raise
+        raise Refused(str(error)) from None
+
+
+def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path]:
+    """Where each picture goes."""
+    folder = output if output and output.is_dir() else Path()
+    if output and not output.is_dir():
+        if len(kinds) > 1:
+            raise Refused(f"{output} is no folder, and {len(kinds)} pictures were asked for")
+        check_suffix(kinds[0], output)
+        return {kinds[0]: output}
+    return {kind: folder / f"{first.stem}-{kind}{KINDS[kind].suffixes[0]}" for kind in kinds}
+
+
+def _named(paths: tuple[Path, ...]) -> dict[str, Result]:
+    """Results by the shortest names that tell them apart."""
+    from fecm.results.result import load
+
+    names = [path.stem for path in paths]
+    if len(set(names)) < len(names):
+        names = [str(path) for path in paths]
+    if len(set(names)) < len(names):
+        raise Refused("a result is given twice")
+    return {name: load(path) for name, path in zip(names, paths, strict=True)}
+
+
+def _draw(results: dict[str, Result], kinds: list[str], options: Options) -> dict[str, Picture]:
+    """Draw all pictures, before any is written."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        pictures = {kind: draw(kind, results, options) for kind in kinds}
+    for text in dict.fromkeys(str(one.message) for one in caught):
+        click.echo(f"fecm: note: {text}", err=True)
+    return pictures

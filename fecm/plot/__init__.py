@@ -1,0 +1,172 @@
+"""Pictures: the report's figures, drawn from one or more results.
+
+Nothing here is imported by a run, and matplotlib only when something is drawn.  A kind of picture
+is a row of `KINDS`; its function takes named results and options and gives a :class:`Picture`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from fecm.results.result import Result
+
+SUFFIXES = (".png", ".svg", ".pdf")
+MISSING = "pictures need matplotlib: pip install 'fecm[plot]'"
+
+
+class PlotError(ValueError):
+    """A result lacks what a picture needs, or the options don't fit it."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of picture.
+
+    Attributes
+    ----------
+    function : str
+        Module of this package, and the function in it.
+    summary : str
+        What it shows.
+    several : bool
+        Whether several results go into one picture.
+    suffixes : tuple of str
+        Formats it can be written in, the usual one first.
+    """
+
+    function: str
+    summary: str
+    several: bool = False
+    suffixes: tuple[str, ...] = SUFFIXES
+
+
+KINDS = {
+    "force": Kind("histories:force", "contact force and transducer against time", True),
+    "loop": Kind("histories:loop", "contact force against indentation", True),
+    "energy": Kind("histories:energy", "where the energy is, against time", True),
+    "strain": Kind("histories:strain", "surface strain at points, against time", True),
+    "line": Kind("deflection:line", "deflection along a line through the impact point", True),
+    "contour": Kind("deflection:contour", "deflection of the plate, seen from above"),
+    "surface": Kind("deflection:surface", "the deflected plate"),
+    "mesh": Kind("meshes:mesh", "mesh, supports and impact point"),
+    "animation": Kind("deflection:animation", "the moving plate", suffixes=(".gif",)),
+}
+
+
+@dataclass(frozen=True)
+class Options:
+    """What can be chosen about a picture.
+
+    Attributes
+    ----------
+    at : tuple of (float, float)
+        Points of the plate (length); the impact point if empty.
+    gages : tuple of float
+        Directions of strain in degrees from the x-axis.
+    face : str
+        ``"far"`` (z = h/2), ``"struck"`` (z = -h/2), or ``"curvature"`` for curvature instead.
+    times : tuple of float
+        Times (the deck's unit) whose nearest stored rows are drawn; some of them all if empty.
+    along : str
+        Direction of the line, ``"x"`` or ``"y"``.
+    width : str
+        ``"column"`` (3.5 in) or ``"full"`` (7.2 in).
+    """
+
+    at: tuple[tuple[float, float], ...] = ()
+    gages: tuple[float, ...] = (0.0, 90.0)
+    face: str = "far"
+    times: tuple[float, ...] = ()
+    along: str = "x"
+    width: str = "column"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure, and what changes it from frame to frame if it moves."""
+
+    figure: Figure
+    frames: Sequence[Callable[[], Any]] = ()
+
+
+def draw(kind: str, results: Mapping[str, Result], options: Options | None = None) -> Picture:
+    """Draw a picture.
+
+    Parameters
+    ----------
+    kind : str
+        One of `KINDS`.
+    results : mapping of str to Result
+        Results by the name they have in the legend.
+    options : Options, optional
+
+    Raises
+    ------
+    PlotError
+        If the kind is unknown, a result lacks what it shows, or the options don't fit.
+    ImportError
+        If matplotlib is not installed.
+    """
+    if kind not in KINDS:
+        raise PlotError(f"there is no kind {kind!r} of picture; there is {', '.join(KINDS)}")
+    if len(results) > 1 and not KINDS[kind].several:
+        raise PlotError(f"the kind {kind} shows one result; {len(results)} were given")
+    try:
+        import matplotlib
+    except ImportError:
+        raise ImportError(MISSING) from None
+    from fecm.plot.style import RC
+
+    module, _, function = KINDS[kind].function.partition(":")
+    drawn = getattr(import_module(f"fecm.plot.{module}"), function)
+    with matplotlib.rc_context(RC):
+        picture: Picture = drawn(results, options or Options())
+    return picture
+
+
+def check_suffix(kind: str, path: Path) -> None:
+    """Refuse a name whose suffix is no format of the kind.
+
+    Raises
+    ------
+    PlotError
+    """
+    suffixes = KINDS[kind].suffixes
+    if path.suffix.lower() not in suffixes:
+        raise PlotError(f"{path}: the kind {kind} is written as {' or '.join(suffixes)}")
+
+
+def save(picture: Picture, path: Path) -> None:
+    """Write a picture in the format that its name's suffix says; the same picture, the same bytes.
+
+    Raises
+    ------
+    OSError
+        If the file can't be written; what stood there is then untouched.
+    """
+    import matplotlib
+
+    from fecm.files import beside
+    from fecm.plot.style import RC, RESOLUTION, SCREEN, UNDATED
+
+    suffix = path.suffix.lower()
+    with matplotlib.rc_context(RC), beside(path) as partial:
+        if suffix != ".gif":
+            picture.figure.savefig(
+                partial, format=suffix[1:], dpi=RESOLUTION, metadata=UNDATED[suffix]
+            )
+            return
+        from matplotlib.animation import PillowWriter
+
+        writer = PillowWriter(fps=15)
+        with writer.saving(picture.figure, str(partial), dpi=SCREEN):
+            for frame in picture.frames:
+                frame()
+                writer.grab_frame()

@@ -1,0 +1,173 @@
+"""What pictures take from a result: rows by time, points of the plate, the deck's own data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.deck.model import Deck, Impact, Material
+from fecm.deck.reader import Reader
+from fecm.elements.quadrilateral import shape_functions
+from fecm.parts import rules
+from fecm.plate import Family, families
+from fecm.plot import PlotError
+from fecm.results.result import Result
+from fecm.results.schema import STORED_BY
+from fecm.slips import LISTING
+
+Array = NDArray[Any]
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+Bools = NDArray[np.bool_]
+
+# Elements beyond which an element's inside is drawn by its nodes alone.
+MANY = 2000
+
+
+def need(result: Result, name: str, *paths: str) -> list[Array]:
+    """Datasets of a result.
+
+    Raises
+    ------
+    PlotError
+        If one is not there; the message names the macro that stores it.
+    """
+    for path in paths:
+        if path not in result:
+            macro = STORED_BY.get(path.partition("/")[0], "")
+            remedy = f"; add {macro} to the deck's program and run it again" if macro else ""
+            raise PlotError(f"{name} has no {path}{remedy}")
+    return [result[path] for path in paths]
+
+
+def deck_of(result: Result, name: str) -> Deck:
+    """The model of a result's deck.
+
+    Raises
+    ------
+    PlotError
+        If the result holds no deck.
+    """
+    reader = Reader(result.deck, blanks_are_zeros=result.mode == LISTING)
+    decks = [problem.deck for problem in reader.problems() if problem.deck is not None]
+    if not decks:
+        raise PlotError(f"{name} holds no deck that can be read")
+    return decks[0]
+
+
+def impact_point(result: Result, name: str) -> Floats:
+    """Coordinates of the impact node, (2,), length."""
+    node = deck_of(result, name).need(Impact).node
+    return np.asarray(result["mesh/coordinates"][node - 1])
+
+
+def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -> Ints:
+    """Rows of tape3 nearest to given times; without any, `count` at equal distances.
+
+    Raises
+    ------
+    PlotError
+        If there are no rows, or a time is outside them.
+    """
+    (stored,) = need(result, name, "tape3/time")
+    if not times:
+        first = 0 if count < len(stored) else -1
+        return np.unique(np.linspace(first, len(stored) - 1, count + 1).round()[1:].astype(np.intp))
+    spacing = float(np.diff(stored).max()) if len(stored) > 1 else float(stored[0])
+    for time in times:
+        if not stored[0] - spacing <= time <= stored[-1] + spacing:
+            raise PlotError(
+                f"{name} has no displacements at time {time:g}: its rows reach from "
+                f"{stored[0]:g} to {stored[-1]:g}"
+            )
+    return np.array([np.abs(stored - time).argmin() for time in times])
+
+
+@dataclass(frozen=True)
+class Patches:
+    """The plate cut into small quadrilaterals, each element into the same number.
+
+    Attributes
+    ----------
+    points : ndarray (n, 2)
+        Their corners (length).
+    quads : ndarray (m, 4)
+        Rows of their corners.
+    outlines : list of ndarray (k, 2)
+        Rows of the points around each element are `edges`.
+    """
+
+    points: Floats
+    quads: Ints
+    edges: list[Ints]
+    parts: list[tuple[Family, Floats]]
+
+    def values(self, nodal: Array) -> Floats:
+        """Values at the points from values at the nodes, by the elements' own shape functions."""
+        return np.concatenate([(nodal[family.nodes] @ N.T).ravel() for family, N in self.parts])
+
+    @property
+    def triangles(self) -> Ints:
+        """Two triangles a quadrilateral."""
+        return np.concatenate([self.quads[:, [0, 1, 2]], self.quads[:, [0, 2, 3]]])
+
+
+def patches(result: Result, cuts: int) -> Patches:
+    """Cut every element into cuts × cuts quadrilaterals."""
+    elements, coordinates = result["mesh/elements"], result["mesh/coordinates"][:, :2]
+    cuts = min(cuts, 2) if len(elements) > MANY else cuts
+    ticks = np.linspace(-1.0, 1.0, cuts + 1)
+    eta, xi = (grid.ravel() for grid in np.meshgrid(ticks, ticks, indexing="ij"))
+    number = np.arange(len(xi)).reshape(cuts + 1, cuts + 1)
+    quad = np.stack(
+        [a.ravel() for a in (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1])],
+        axis=1,
+    )
+    around = np.concatenate(
+        [number[0, :-1], number[:-1, -1], number[-1, :0:-1], number[:0:-1, 0], number[0, :1]]
+    )
+    points, quads, edges, parts, start = [], [], [], [], 0
+    for family in families(elements, coordinates):
+        N = shape_functions(xi, eta, family.present)[0][:, family.present]
+        parts.append((family, N))
+        points.append(np.einsum("pn,eni->epi", N, family.coordinates).reshape(-1, 2))
+        starts = start + len(xi) * np.arange(len(family.rows))
+        quads.append((starts[:, None, None] + quad).reshape(-1, 4))
+        edges += list(starts[:, None] + around)
+        start += len(points[-1])
+    return Patches(np.concatenate(points), np.concatenate(quads), edges, parts)
+
+
+def strain_points(result: Result, name: str) -> Floats:
+    """Coordinates of the points at which tape8 holds strains, (numel, npt, 2), length."""
+    bending, _, points = rules(deck_of(result, name).need(Material))
+    rule = bending if "tapes" in result.slips else points
+    elements, coordinates = result["mesh/elements"], result["mesh/coordinates"][:, :2]
+    found = np.empty((len(elements), len(rule.xi), 2))
+    for family in families(elements, coordinates):
+        N = shape_functions(rule.xi, rule.eta, family.present)[0][:, family.present]
+        found[family.rows] = np.einsum("pn,eni->epi", N, family.coordinates)
+    return found
+
+
+def nearest(points: Floats, at: Floats, name: str) -> Bools:
+    """Which points are nearest to a place; several if elements meet there.
+
+    Raises
+    ------
+    PlotError
+        If the place is outside the plate's extent.
+    """
+    low, high = points.min(axis=(0, 1)), points.max(axis=(0, 1))
+    room = 0.02 * float((high - low).max())
+    if not ((at >= low - room) & (at <= high + room)).all():
+        raise PlotError(
+            f"the point {at[0]:g},{at[1]:g} is not on the plate of {name}, which reaches from "
+            f"{low[0]:g},{low[1]:g} to {high[0]:g},{high[1]:g}"
+        )
+    distance = np.hypot(*np.moveaxis(points - at, -1, 0))
+    return np.asarray(distance <= distance.min() + 1e-6 * float((high - low).max()))

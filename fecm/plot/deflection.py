@@ -1,0 +1,303 @@
+"""Pictures of the deflected plate at stored instants (the report's figure 4.20)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.tri import LinearTriInterpolator, Triangulation
+
+from fecm.plot import Options, Picture, PlotError
+from fecm.plot.data import (
+    Array,
+    Floats,
+    Patches,
+    impact_point,
+    need,
+    patches,
+    stored_rows,
+)
+from fecm.plot.style import (
+    COLOURS,
+    IN_ORDER,
+    RATIO,
+    SIGNED,
+    WIDTHS,
+    Scale,
+    lines_legend,
+    panels,
+    scale_of,
+)
+from fecm.results.result import Result
+
+Results = Mapping[str, Result]
+
+AXES = {"x": 0, "y": 1}
+FRAMES = 60
+SAMPLES = 401
+LEVELS = 21
+# Height of a deflected plate over its longer side.
+EXAGGERATION = 0.3
+
+
+# Along a line -----------------------------------------------------------------------------------
+
+
+def profile(result: Result, name: str, along: str, rows: Array) -> tuple[Floats, Floats]:
+    """Deflection on a line through the impact point.
+
+    Parameters
+    ----------
+    result : Result
+    name : str
+        What messages call it.
+    along : str
+        ``"x"`` or ``"y"``.
+    rows : ndarray of int
+        Rows of tape3.
+
+    Returns
+    -------
+    position : ndarray (n,)
+        Of the nodes on the line if a row of nodes lies on it from edge to edge, else of equidistant
+        points on it.
+    w : ndarray (rows, n)
+    """
+    coordinates, w = result["mesh/coordinates"], result["tape3/w"][rows]
+    axis, across = AXES[along], 1 - AXES[along]
+    level = impact_point(result, name)[across]
+    extent = float(np.ptp(coordinates[:, axis]))
+    on = np.flatnonzero(np.abs(coordinates[:, across] - level) <= 1e-6 * extent)
+    on = on[np.argsort(coordinates[on, axis])]
+    cut = patches(result, 4)
+    position = np.linspace(*_chord(cut, axis, level), SAMPLES)
+    inside = coordinates[on, axis]
+    sides = np.diff(inside).max() if len(on) > 2 else math.inf
+    if sides <= 2.0 * _longest_side(result) and np.isclose(np.ptp(inside), np.ptp(position)):
+        return inside, w[:, on]
+    points = [position, np.full(SAMPLES, level)]
+    triangles = Triangulation(cut.points[:, 0], cut.points[:, 1], cut.triangles)
+    values = [
+        LinearTriInterpolator(triangles, cut.values(row))(points[axis], points[across]) for row in w
+    ]
+    return position, np.ma.filled(np.ma.stack(values), np.nan)
+
+
+def _chord(cut: Patches, axis: int, level: float) -> tuple[float, float]:
+    """Ends of the plate on a line: where it crosses the small quadrilaterals' sides."""
+    corners = cut.points[cut.quads]
+    ends = np.roll(corners, -1, axis=1)
+    a, b = corners[..., 1 - axis] - level, ends[..., 1 - axis] - level
+    crossed = (a * b <= 0.0) & (a != b)
+    share = a[crossed] / (a[crossed] - b[crossed])
+    at = corners[crossed][:, axis] + share * (ends[crossed] - corners[crossed])[:, axis]
+    return float(at.min()), float(at.max())
+
+
+def _longest_side(result: Result) -> float:
+    corners = result["mesh/coordinates"][result["mesh/elements"][:, :4] - 1]
+    return float(np.hypot(*np.moveaxis(np.roll(corners, -1, axis=1) - corners, -1, 0)).max())
+
+
+def line(results: Results, options: Options) -> Picture:
+    """Deflection along a line at several times; of several results, an axes a time."""
+    data = {}
+    for name, result in results.items():
+        need(result, name, "tape3/w")
+        rows = stored_rows(result, name, options.times, 6 if len(results) == 1 else 3)
+        data[name] = (result["tape3/time"][rows], *profile(result, name, options.along, rows))
+    if len({len(times) for times, _, _ in data.values()}) > 1 or len(data) > len(COLOURS):
+        raise PlotError("the results have not the same number of rows to draw; give --times")
+    clock = scale_of(results, "time", [times for times, _, _ in data.values()])
+    place = scale_of(results, "length", [position for _, position, _ in data.values()])
+    length = scale_of(results, "length", [np.nan_to_num(w) for _, _, w in data.values()])
+    if len(data) == 1:
+        ((times, position, w),) = data.values()
+        figure, axes = panels(options.width, ratio=RATIO[options.width])
+        shades = matplotlib.colormaps[IN_ORDER](np.linspace(0.0, 0.85, len(times)))
+        for time, values, shade in zip(times, w, shades, strict=True):
+            axes[0].plot(
+                place.factor * position, length.factor * values, color=shade,
+                label=f"{clock.factor * time:.4g}",
+            )  # fmt: skip
+        lines_legend(figure, axes[0], clock.label("Time"))
+    else:
+        figure, axes = _lines_by_time(data, options, clock, place, length)
+    for ax in axes:
+        ax.set_ylabel(length.label("Deflection"))
+        ax.margins(x=0.0)
+    axes[-1].set_xlabel(place.label(f"${options.along}$"))
+    return Picture(figure)
+
+
+def _lines_by_time(
+    data: Mapping[str, tuple[Array, Array, Array]],
+    options: Options,
+    clock: Scale,
+    place: Scale,
+    length: Scale,
+) -> tuple[Figure, list[Axes]]:
+    """An axes a time, a colour a result."""
+    count, ratio = len(next(iter(data.values()))[0]), 0.6 * RATIO[options.width]
+    figure, axes = panels(options.width, count, sharex=True, sharey=True, ratio=ratio)
+    for (name, (times, position, w)), colour in zip(data.items(), COLOURS, strict=False):
+        for ax, time, values in zip(axes, times, w, strict=True):
+            ax.plot(
+                place.factor * position, length.factor * values, color=colour, label=name
+            )  # fmt: skip
+            ax.set_title(f"time {clock.show(time)}", loc="left")
+    lines_legend(figure, axes[0])
+    return figure, axes
+
+
+# The whole plate --------------------------------------------------------------------------------
+
+
+def contour(results: Results, options: Options) -> Picture:
+    """Deflection of the plate at given times, seen from above, in one scale of colours."""
+    ((name, result),) = results.items()
+    need(result, name, "tape3/w")
+    rows = stored_rows(result, name, options.times, 4)
+    cut, w = patches(result, 4), result["tape3/w"][rows]
+    clock = scale_of(results, "time", [result["tape3/time"][rows]])
+    length = scale_of(results, "length", [w])
+    place = scale_of(results, "length", [cut.points])
+    columns = min(len(rows), 2 if options.width == "column" else 4)
+    height, wide = np.ptp(cut.points[:, 1]), np.ptp(cut.points[:, 0])
+    lines = math.ceil(len(rows) / columns)
+    figure, axes = panels(
+        options.width, lines, columns, sharex=True, sharey=True,
+        ratio=float(np.clip(height / wide, 0.3, 2.0))
+        + 0.65 * columns / lines / WIDTHS[options.width],
+    )  # fmt: skip
+    fields = [length.factor * cut.values(row) for row in w]
+    peak = float(np.abs(fields).max()) or 1.0  # inside an element there may be more than at nodes
+    levels = np.linspace(-peak, peak, LEVELS)
+    at = place.factor * cut.points
+    triangles = Triangulation(at[:, 0], at[:, 1], cut.triangles)
+    where = place.factor * impact_point(result, name)
+    fills = []
+    for ax, row, values in zip(axes, rows, fields, strict=False):
+        fills.append(ax.tricontourf(triangles, values, levels, cmap=SIGNED))
+        fills[-1].set(edgecolor="face", linewidth=0.2)  # no white seams between the colours
+        ax.plot(*where[:2], "+", color="black", ms=4, mew=0.6)
+        ax.set_title(f"time {clock.show(float(result['tape3/time'][row]))}", loc="left")
+        ax.set_aspect("equal")
+    for ax in axes[len(rows) :]:
+        ax.set_axis_off()
+    figure.supxlabel(place.label("$x$"), fontsize=8.0)
+    figure.supylabel(place.label("$y$"), fontsize=8.0)
+    bar = figure.colorbar(
+        fills[0], ax=axes, location="top", aspect=40, shrink=0.8, pad=0.03
+    )  # fmt: skip
+    bar.set_label(length.label("Deflection"))
+    bar.outline.set_linewidth(0.6)
+    bar.locator = matplotlib.ticker.MaxNLocator(6, symmetric=True)
+    bar.update_ticks()
+    return Picture(figure)
+
+
+class _Plate:
+    """The deflected plate in an axes of three dimensions."""
+
+    def __init__(
+        self, axes: Any, cut: Patches, place: Scale, length: Scale, span: tuple[float, float]
+    ) -> None:
+        from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+        self._cut, self._length = cut, length
+        peak = max(map(abs, span)) or 1.0
+        self._flat = place.factor * cut.points[cut.quads]
+        self.axes = axes
+        self._norm = Normalize(-length.factor * peak, length.factor * peak)
+        self._title = axes.text2D(0.03, 0.94, "", transform=axes.transAxes)
+        self.collection = Poly3DCollection(
+            self._at(np.zeros(len(cut.points))), cmap=SIGNED, norm=self._norm,
+            edgecolors="0.25", linewidths=0.12,
+        )  # fmt: skip
+        axes.add_collection3d(self.collection)
+        low, high = self._flat.min(axis=(0, 1)), self._flat.max(axis=(0, 1))
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        axes.set_zlim(length.factor * min(span[0], 0.0), length.factor * max(span[1], 0.0))
+        side = float((high - low).max())
+        axes.set_box_aspect((*(high - low) / side, EXAGGERATION), zoom=1.12)
+        axes.view_init(elev=28.0, azim=-62.0)
+        axes.set(xlabel=place.label("$x$"), ylabel=place.label("$y$"))
+        axes.set_zlabel(length.label("Deflection"))
+        for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+            axis.pane.set_visible(False)
+            axis._axinfo["grid"]["linewidth"] = 0.3
+        axes.tick_params(pad=-1)
+        axes.locator_params(axis="z", nbins=4)
+        axes.locator_params(axis="x", nbins=5)
+        axes.locator_params(axis="y", nbins=5)
+
+    def _at(self, values: Floats) -> Floats:
+        heights = (self._length.factor * values)[self._cut.quads]
+        return np.concatenate([self._flat, heights[:, :, None]], axis=2)
+
+    def show(self, w: Array, text: str) -> None:
+        """Deflect the plate by w at the nodes."""
+        corners = self._at(self._cut.values(w))
+        self.collection.set_verts(corners)
+        self.collection.set_array(corners[:, :, 2].mean(axis=1))
+        self._title.set_text(text)
+
+
+def surface(results: Results, options: Options) -> Picture:
+    """The deflected plate; without times at the instant when it is bent most."""
+    ((name, result),) = results.items()
+    (w,) = need(result, name, "tape3/w")
+    if options.times:
+        rows = stored_rows(result, name, options.times, 1)
+    else:
+        rows = np.array([int(np.ptp(w, axis=1).argmax())])
+    columns = 1 if options.width == "column" else min(len(rows), 2)
+    figure, plates = _plates(results, options, rows, columns, len(rows))
+    clock = scale_of(results, "time", [result["tape3/time"]])
+    for plate, row in zip(plates, rows, strict=True):
+        plate.show(w[row], f"time {clock.show(float(result['tape3/time'][row]))}")
+    return Picture(figure)
+
+
+def _plates(
+    results: Results, options: Options, rows: Array, columns: int, count: int
+) -> tuple[Figure, list[_Plate]]:
+    """Axes for `count` plates, in the scale of all rows."""
+    (result,) = results.values()
+    cut, w = patches(result, 2), result["tape3/w"][rows]
+    place = scale_of(results, "length", [cut.points])
+    length = scale_of(results, "length", [w])
+    span = (float(w.min()), float(w.max()))
+    lines = math.ceil(count / columns)
+    figure, axes = panels(
+        options.width, lines, columns, ratio=0.62, layout=None, subplot_kw={"projection": "3d"}
+    )
+    # Layout engines do not know how much room an axes of three dimensions takes.
+    figure.subplots_adjust(left=0.0, right=0.92, bottom=0.06, top=1.0, wspace=0.1, hspace=0.0)
+    for ax in axes[count:]:
+        ax.set_axis_off()
+    return figure, [_Plate(ax, cut, place, length, span) for ax in axes[:count]]
+
+
+def animation(results: Results, options: Options) -> Picture:
+    """The deflected plate, frame by frame; the figure shows the last frame."""
+    ((name, result),) = results.items()
+    (w,) = need(result, name, "tape3/w")
+    rows = stored_rows(result, name, options.times, FRAMES)
+    figure, (plate, *_) = _plates(results, options, rows, 1, 1)
+    clock = scale_of(results, "time", [result["tape3/time"][rows]])
+    texts = [f"time {clock.show(float(result['tape3/time'][row]))}" for row in rows]
+
+    def frame(row: int, text: str) -> Any:
+        return lambda: plate.show(w[row], text)
+
+    frames = [frame(int(row), text) for row, text in zip(rows, texts, strict=True)]
+    frames[-1]()
+    return Picture(figure, frames)

@@ -1,0 +1,68 @@
+"""The mesh with its supports and the impact point (the report's figure 4.11 a)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.collections import LineCollection
+
+from fecm.plot import Options, Picture
+from fecm.plot.data import Bools, impact_point, need, patches
+from fecm.plot.style import COLOURS, WIDTHS, legend, panels, scale_of
+from fecm.results.result import Result
+
+# Marks of the supports: how they are called, and how they look.
+MARKS: dict[str, dict[str, Any]] = {
+    "clamped": {"marker": "s", "color": COLOURS[0], "ms": 3.0},
+    "w held": {"marker": "^", "color": COLOURS[0], "ms": 3.5, "mfc": "white", "mew": 0.7},
+    "rotation held": {"marker": "o", "color": COLOURS[2], "ms": 3.0, "mfc": "white", "mew": 0.7},
+}
+
+
+def supports(result: Result) -> dict[str, Bools]:
+    """Which nodes are held against bending, by the kind of support; each (numnp,)."""
+    held = result["mesh/equations"][:, 2:5] == 0
+    w, rotations = held[:, 0], held[:, 1:]
+    clamped = w & rotations.all(axis=1)
+    return {
+        "clamped": clamped,
+        "w held": w & ~clamped,
+        "rotation held": ~w & rotations.any(axis=1),
+    }
+
+
+def mesh(results: Mapping[str, Result], options: Options) -> Picture:
+    """Elements, nodes that are held, the impact point, and the points asked for."""
+    ((name, result),) = results.items()
+    coordinates, _ = need(result, name, "mesh/coordinates", "mesh/elements")
+    cut = patches(result, 4)
+    place = scale_of(results, "length", [coordinates])
+    low, high = place.factor * cut.points.min(axis=0), place.factor * cut.points.max(axis=0)
+    height = float(np.clip((high - low)[1] / (high - low)[0], 0.3, 2.0))
+    figure, (axes,) = panels(
+        options.width, ratio=height + (0.55 - 0.5 * height) / WIDTHS[options.width]
+    )
+    axes.add_collection(
+        LineCollection(
+            [place.factor * cut.points[edge] for edge in cut.edges], colors="0.4", linewidths=0.4
+        )
+    )
+    handles, labels = [], []
+    for label, nodes in supports(result).items():
+        if nodes.any():
+            at = place.factor * coordinates[nodes]
+            handles += axes.plot(at[:, 0], at[:, 1], ls="none", clip_on=False, **MARKS[label])
+            labels.append(label)
+    where = place.factor * impact_point(result, name)
+    handles += axes.plot(*where[:2], "X", color=COLOURS[1], ms=6.0, mec="white", mew=0.5, ls="none")
+    labels.append("impact")
+    if options.at:
+        at = place.factor * np.array(options.at)
+        handles += axes.plot(at[:, 0], at[:, 1], "D", color=COLOURS[3], ms=3.5, ls="none")
+        labels.append("points")
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    axes.set(xlabel=place.label("$x$"), ylabel=place.label("$y$"))
+    legend(figure, handles, labels)
+    return Picture(figure)
