@@ -15,6 +15,8 @@ import click
 
 from fecm.cli.common import INTERRUPTED, UNUSABLE, signals
 from fecm.cli.decks import check, fmt, materials, new
+from fecm.cli.diff import diff
+from fecm.cli.info import info
 from fecm.cli.results import tapes
 from fecm.cli.run import run
 from fecm.results.schema import ResultFileError
@@ -27,7 +29,7 @@ def cli() -> None:
     """Impact on laminated composite plates, from the punched-card decks of NASA CR-168057."""
 
 
-for _command in (run, check, new, fmt, materials, tapes):
+for _command in (run, check, new, fmt, materials, tapes, info, diff):
     cli.add_command(_command)
 
 
