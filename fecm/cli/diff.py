@@ -68,10 +68,10 @@ def diff(
         raise Refused(printable(str(error))) from None
     if form == "json":
         head = {"a": printable(str(a)), "b": printable(str(b)), "rtol": rtol, "atol": atol}
-        click.echo(json.dumps(jsonable(_json(found, head, brief)), indent=2))
+        click.echo(json.dumps(jsonable(_json(found, head, brief))))
     else:
-        click.echo("\n".join(_brief(found) if brief else _lines(found)))
-        click.echo(_verdict(found, rtol, atol))
+        lines = _brief(found) if brief else _lines(found)
+        click.echo("\n".join([*lines, _verdict(found, rtol, atol)]))
     if not found.same:
         raise SystemExit(NO)
 
@@ -127,7 +127,9 @@ def _told(found: Comparison) -> str:
                 f"largest {found.largest:.3g} ({share}), {left} against {right}{_where(found.at)}"
             )
     if found.differing:
-        parts.append(f"{found.differing} number{'s' * (found.differing != 1)} differ")
+        parts.append(
+            f"{found.differing} {'number differs' if found.differing == 1 else 'numbers differ'}"
+        )
     if found.first:
         parts.append(f"first{_where(found.first)}")
     return "; ".join(parts)

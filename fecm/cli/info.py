@@ -28,7 +28,7 @@ def info(result: Path, form: str) -> None:
 
     told = information(result)
     if form == "json":
-        click.echo(json.dumps(jsonable(_json(told)), indent=2))
+        click.echo(json.dumps(jsonable(_json(told))))
     else:
         click.echo("\n".join(_lines(told)))
 

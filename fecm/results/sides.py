@@ -33,7 +33,7 @@ ON_TAPE = frozenset(
 
 
 class UnknownNameError(ValueError):
-    """A dataset or group was asked for that neither side has."""
+    """A dataset or group was asked for that neither side has, or tapes have no place for."""
 
 
 class FileSide:
@@ -155,7 +155,7 @@ def difference(
     Raises
     ------
     UnknownNameError
-        If `only` names what neither side has.
+        If `only` names what can't be compared.
     ResultFileError
         If a file can't be read.
     """
@@ -187,7 +187,7 @@ def _chosen(names: set[str], only: Sequence[str]) -> set[str]:
         plain = asked.strip("/")
         found = {name for name in names if name == plain or name.startswith(f"{plain}/")}
         if not found:
-            raise UnknownNameError(f"neither side has `{asked}`{_hint(plain, names)}")
+            raise UnknownNameError(f"there is no `{asked}` to compare{_hint(plain, names)}")
         chosen |= found
     return chosen
 
@@ -195,7 +195,9 @@ def _chosen(names: set[str], only: Sequence[str]) -> set[str]:
 def _hint(asked: str, names: set[str]) -> str:
     """Names that may have been meant."""
     known = sorted(names | {name.rpartition("/")[0] for name in names} - {""})
-    alike = [name for name in known if name.rpartition("/")[2] == asked]
+    own = [name.rpartition("/")[2] for name in known]
+    close = difflib.get_close_matches(asked, own, n=1) if "/" not in asked else []
+    alike = [name for name, last in zip(known, own, strict=True) if last in (asked, *close)]
     alike = alike or difflib.get_close_matches(asked, known, n=3)
     if alike:
         return f"; did you mean {' or '.join(alike)}?"

@@ -185,7 +185,7 @@ def fortran_number(field: bytes) -> float | None:
 
 
 def _displacements(text: _Lines) -> tuple[Array, bool]:
-    """Displacement w of every node, (rows, nodes); or (lines, 6) and True if nodes can't be counted."""
+    """Displacements w, (rows, nodes); or (lines, 6) and True where nodes can't be counted."""
     counts = text.counts(0)
     values = text.numbers(0)
     ends = np.flatnonzero(counts < PER_LINE)
