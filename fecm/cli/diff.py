@@ -127,9 +127,7 @@ def _told(found: Comparison) -> str:
                 f"largest {found.largest:.3g} ({share}), {left} against {right}{_where(found.at)}"
             )
     if found.differing:
-        parts.append(
-            f"{found.differing} {'number differs' if found.differing == 1 else 'numbers differ'}"
-        )
+        parts.append(f"{found.differing} number{'s differ' if found.differing > 1 else ' differs'}")
     if found.first:
         parts.append(f"first{_where(found.first)}")
     return "; ".join(parts)

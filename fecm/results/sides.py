@@ -196,7 +196,7 @@ def _hint(asked: str, names: set[str]) -> str:
     """Names that may have been meant."""
     known = sorted(names | {name.rpartition("/")[0] for name in names} - {""})
     own = [name.rpartition("/")[2] for name in known]
-    close = difflib.get_close_matches(asked, own, n=1) if "/" not in asked else []
+    close = difflib.get_close_matches(asked, own, n=3) if "/" not in asked else []
     alike = [name for name, last in zip(known, own, strict=True) if last in (asked, *close)]
     alike = alike or difflib.get_close_matches(asked, known, n=3)
     if alike:
