@@ -230,6 +230,30 @@ def test_a_dataset_that_is_none_of_a_results_is_named(
         assert "no impact step was taken" in done.stdout
 
 
+def test_a_shape_beyond_the_files_size_is_refused_before_anything_is_read(
+    changed: Callable[[Edit], Path],
+) -> None:
+    path = changed(
+        lambda file: file.create_dataset("extra", (10**6, 10**6), "f8", chunks=(1, 10**6))
+    )
+    for done in (call("info", path), call("diff", path, path)):
+        assert_unusable(done)
+        assert "extra has the shape (1000000, 1000000)" in done.stderr
+
+
+def test_packed_datasets_are_read_like_any_other(
+    result: Path, changed: Callable[[Edit], Path]
+) -> None:
+    def edit(file: h5py.File) -> None:
+        values = file["tape3/displacement"][()]
+        attributes = dict(file["tape3/displacement"].attrs)
+        del file["tape3/displacement"]
+        packed = file.create_dataset("tape3/displacement", data=values, compression="gzip")
+        packed.attrs.update(attributes)
+
+    assert call("diff", result, changed(edit)).exit_code == 0
+
+
 def format_of(value: Any) -> Edit:
     """An edit of the attribute that says what the file is."""
     return lambda file: file.attrs.__setitem__("format", value)
