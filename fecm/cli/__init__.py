@@ -15,7 +15,9 @@ import click
 
 from fecm.cli.common import INTERRUPTED, UNUSABLE, signals
 from fecm.cli.decks import check, fmt, materials, new
+from fecm.cli.diff import diff
 from fecm.cli.export import export
+from fecm.cli.info import info
 from fecm.cli.plot import plot
 from fecm.cli.results import tapes
 from fecm.cli.run import run
@@ -29,7 +31,7 @@ def cli() -> None:
     """Impact on laminated composite plates, from the punched-card decks of NASA CR-168057."""
 
 
-for _command in (run, check, new, fmt, materials, tapes, export, plot):
+for _command in (run, check, new, fmt, materials, info, tapes, diff, export, plot):
     cli.add_command(_command)
 
 

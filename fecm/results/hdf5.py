@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -141,18 +142,34 @@ def writing(path: Path) -> Iterator[FileSink]:
 
 
 class FileArrays(Mapping[str, Array]):
-    """The datasets of a result file, each read when it is asked for."""
+    """The datasets of a result file, each read when it is asked for.
 
-    def __init__(self, path: Path, shapes: dict[str, tuple[int, ...]]) -> None:
+    Attributes
+    ----------
+    path : Path
+        The file.
+    shapes : dict
+        Shape of every dataset of numbers.
+    dtypes : dict
+        Its type, in this machine's byte order.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        shapes: dict[str, tuple[int, ...]],
+        dtypes: dict[str, np.dtype[Any]] | None = None,
+    ) -> None:
         self.path = path
         self.shapes = shapes
+        self.dtypes = dtypes or {}
         self._read: dict[str, Array] = {}
 
     def __getitem__(self, key: str) -> Array:
         if key not in self.shapes:
             raise KeyError(key)
         if key not in self._read:
-            with h5py.File(self.path) as file:
+            with _troubles(self.path), h5py.File(self.path) as file:
                 self._read[key] = np.asarray(file[key][()])
         return self._read[key]
 
@@ -163,8 +180,61 @@ class FileArrays(Mapping[str, Array]):
         return len(self.shapes)
 
 
+class OpenArrays:
+    """The datasets of a result file that stays open: rows are read as they are asked for.
+
+    Used in a ``with`` statement; memory holds no more than the rows of one call.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __enter__(self) -> OpenArrays:
+        with _troubles(self.path):
+            self._file = h5py.File(self.path)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with contextlib.suppress(Exception):  # nothing was written that closing could lose
+            self._file.close()
+
+    def rows(self, path: str, start: int, stop: int) -> Array:
+        """Rows `start` to `stop` of a dataset; a single number is one row.
+
+        Raises
+        ------
+        ResultFileError
+            If the file can't be read there.
+        """
+        with _troubles(self.path):
+            dataset = self._file[path]
+            if not dataset.shape:
+                return np.asarray(dataset[()]).reshape(1)[start:stop]
+            return np.asarray(dataset[start:stop])
+
+    def attributes(self, path: str) -> dict[str, Any]:
+        """Attributes of a dataset or group."""
+        with _troubles(self.path):
+            return _attributes(self._file[path])
+
+
+@contextlib.contextmanager
+def _troubles(path: Path) -> Iterator[None]:
+    """Turn whatever a damaged file raises into one :class:`ResultFileError`."""
+    try:
+        yield
+    except (ResultFileError, MemoryError):
+        raise
+    except Exception as error:  # a damaged file may raise anything inside of HDF5
+        told = " ".join(str(error).split())
+        raise ResultFileError(f"{path}: this is no readable HDF5 file ({told})") from None
+
+
 def read(path: Path) -> tuple[FileArrays, dict[str, str], dict[str, dict[str, Any]]]:
     """Datasets, texts and attributes of a result file.
+
+    Links are not followed, and attributes of a type that Python has no plain value for are given
+    by the name of that type.
 
     Raises
     ------
@@ -173,49 +243,89 @@ def read(path: Path) -> tuple[FileArrays, dict[str, str], dict[str, dict[str, An
     OSError
         If it can't be opened.
     """
-    with Path(path).open("rb"):
+    path = Path(path)
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise ResultFileError(f"{path}: this is no file but a device or a pipe")
+    with path.open("rb"):
         pass  # a missing or forbidden file says so itself
-    shapes: dict[str, tuple[int, ...]] = {}
-    texts: dict[str, str] = {}
-    groups: dict[str, dict[str, Any]] = {}
-    try:
-        with h5py.File(path) as file:
-            root = _attributes(file)
-            if root.get("format") != FORMAT:
-                raise ResultFileError(f"{path}: this HDF5 file is not a result of fecm")
-            if root.get("format_version") != FORMAT_VERSION:
+    with _troubles(path), h5py.File(path) as file:
+        root = _attributes(file)
+        if root.get("format") != FORMAT:
+            raise ResultFileError(f"{path}: this HDF5 file is not a result of fecm")
+        if root.get("format_version") != FORMAT_VERSION:
+            raise ResultFileError(
+                f"{path}: format version {root.get('format_version')} is not "
+                f"{FORMAT_VERSION}, which this program reads"
+            )
+        visitor = _Visitor(path)
+        file.visititems(visitor)
+    arrays = FileArrays(path, visitor.shapes, visitor.dtypes)
+    return arrays, visitor.texts, {"": root, **visitor.groups}
+
+
+# No filter of HDF5 packs numbers more tightly than this; deflate reaches 1032.
+PACKED = 2000
+
+
+class _Visitor:
+    """Notes what stands in a file: shapes, texts, attributes of groups."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.size = path.stat().st_size
+        self.shapes: dict[str, tuple[int, ...]] = {}
+        self.dtypes: dict[str, np.dtype[Any]] = {}
+        self.texts: dict[str, str] = {}
+        self.groups: dict[str, dict[str, Any]] = {}
+
+    def __call__(self, name: str, item: h5py.HLObject) -> None:
+        if isinstance(item, h5py.Group):
+            self.groups[name] = _attributes(item)
+        elif isinstance(item, h5py.Dataset):  # a named type is nothing to read
+            self._dataset(name, item)
+
+    def _dataset(self, name: str, item: h5py.Dataset) -> None:
+        if "/" not in name and item.is_scale:
+            return  # it numbers an axis
+        if h5py.check_string_dtype(item.dtype) and item.shape == ():
+            self.texts[name] = str(_plain(item[()]))
+        elif item.dtype.kind in "biuf" and item.shape is not None and not item.dtype.shape:
+            shape = tuple(map(int, item.shape))
+            room = self.size * (PACKED if item.chunks else 1)
+            # A damaged shape would have a reader go through more rows than any disk holds.
+            if math.prod(shape) * item.dtype.itemsize > room:
                 raise ResultFileError(
-                    f"{path}: format version {root.get('format_version')} is not "
-                    f"{FORMAT_VERSION}, which this program reads"
+                    f"{self.path}: {name} has the shape {shape}, which is more than the file holds"
                 )
-            groups[""] = root
-
-            def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
-                if isinstance(item, h5py.Group):
-                    groups[name] = _attributes(item)
-                elif item.parent.name == "/" and item.is_scale:
-                    pass  # it numbers an axis
-                elif h5py.check_string_dtype(item.dtype):
-                    texts[name] = item.asstr()[()]
-                else:
-                    shapes[name] = item.shape
-
-            file.visititems(visit)
-    except ResultFileError:
-        raise
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
-        raise ResultFileError(f"{path}: this is no readable HDF5 file ({error})") from None
-    return FileArrays(Path(path), shapes), texts, groups
+            self.shapes[name] = shape
+            self.dtypes[name] = item.dtype.newbyteorder("=")
+        else:
+            raise ResultFileError(f"{self.path}: {name} holds neither numbers nor one text")
 
 
-def _attributes(item: h5py.Group) -> dict[str, Any]:
+def _attributes(item: h5py.HLObject) -> dict[str, Any]:
     """Attributes as Python values."""
     values: dict[str, Any] = {}
-    for name, value in item.attrs.items():
-        if isinstance(value, np.ndarray):
-            values[name] = [v.decode() if isinstance(v, bytes) else v for v in value.tolist()]
-        elif isinstance(value, np.generic):
-            values[name] = value.item()
-        else:
-            values[name] = value
+    for name in item.attrs:
+        try:
+            values[_text(name)] = _plain(item.attrs[name])
+        except (TypeError, OSError, ValueError):  # a type that NumPy has no counterpart of
+            values[_text(name)] = "<unreadable>"
     return values
+
+
+def _plain(value: Any) -> Any:
+    """Numbers, texts and lists of them; anything else by the name of its type."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, str | bytes):
+        return _text(value)
+    return value if isinstance(value, bool | int | float) else f"<{type(value).__name__}>"
+
+
+def _text(value: str | bytes) -> str:
+    """A text whose undecodable bytes are replaced, so that it can be printed."""
+    raw = value.encode("utf-8", "surrogateescape") if isinstance(value, str) else value
+    return raw.decode("utf-8", "replace")

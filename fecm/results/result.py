@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.results.schema import DATASETS, declared_units
+from fecm.results.schema import DATASETS, ResultFileError, declared_units, misfit
 from fecm.units import unit_of
 
 if TYPE_CHECKING:
@@ -182,7 +182,7 @@ def load(path: str | Path) -> Result:
     Raises
     ------
     ResultFileError
-        If the file is no result.
+        If the file is no result, or a dataset's shape or type is none of a result's.
     OSError
         If it can't be opened.
 
@@ -194,7 +194,11 @@ def load(path: str | Path) -> Result:
     """
     from fecm.results import hdf5
 
-    return Result(*hdf5.read(Path(path)))
+    arrays, texts, groups = hdf5.read(Path(path))
+    kinds = {name: dtype.kind for name, dtype in arrays.dtypes.items()}
+    if found := misfit(arrays.shapes, kinds):
+        raise ResultFileError(f"{path}: {found}")
+    return Result(arrays, texts, groups)
 
 
 def contact_intervals(force: Array, time: Array) -> list[tuple[float, float]]:

@@ -180,6 +180,37 @@ SCALES = {
 }
 
 
+def misfit(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str]) -> str:
+    """Say which dataset has not the shape or type that a result's has; empty where all have.
+
+    Parameters
+    ----------
+    shapes : mapping
+        Shape of every dataset, by path.
+    kinds : mapping
+        NumPy's letter for the kind of its numbers: ``"f"``, ``"i"``, ``"u"`` or ``"b"``.
+    """
+    sizes: dict[str, tuple[int, str]] = {}
+    for path, shape in shapes.items():
+        if (dataset := DATASETS.get(path)) is None:
+            continue
+        if kinds[path] not in ("f" if dataset.dtype.startswith("f") else "iu"):
+            return f"{path} holds numbers of another type than {dataset.dtype}"
+        if len(shape) != len(dataset.shape):
+            return (
+                f"{path} has the shape {shape}, which is not ({', '.join(map(str, dataset.shape))})"
+            )
+        for name, size in zip(dataset.shape, shape, strict=True):
+            if isinstance(name, int):
+                expected, source = name, "every result"
+            else:
+                key = f"{dataset.group} {name}" if name == "rows" else name
+                expected, source = sizes.setdefault(key, (size, path))
+            if size != expected:
+                return f"{path} has the shape {shape}, but {name} is {expected} in {source}"
+    return ""
+
+
 def declared_units(attributes: Mapping[str, Any]) -> dict[str, str]:
     """Names of a result's units of length, force and time; empty where the deck gave none."""
     names = {n: str(attributes.get(f"unit_{n}", "")) for n in ("length", "force", "time")}

@@ -1,0 +1,289 @@
+"""Compares the datasets of two results.
+
+Two numbers are the same where |a - b| <= atol + rtol*max, max being the largest finite absolute
+value of the whole dataset in both results together: a history's zero crossing is judged by the
+history's size, not by its own.  Whole numbers (steps, node and equation numbers) are names rather
+than quantities; they have to be equal.  NaN is the same as NaN, an infinity as the same infinity;
+either of them against anything else is a difference at any tolerance.
+
+Datasets are read in blocks of rows, so memory does not grow with the results.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.results.schema import DATASETS
+
+Array = NDArray[Any]
+
+# Bytes of a block of rows.
+BLOCK = 4_000_000
+
+# What an index is called along each size of a dataset (see the schema); rows are told by the clock.
+AXES = {"numnp": "node", "numel": "element", "npt": "point", "nen": "position", "ndm": "axis"}
+UNKNOWNS = ("u", "v", "w", "theta_x", "theta_y")
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far apart two numbers may be.
+
+    Attributes
+    ----------
+    relative : float
+        Share of the dataset's largest absolute value.
+    absolute : float
+        In the dataset's own unit.
+    """
+
+    relative: float = 0.0
+    absolute: float = 0.0
+
+    def of(self, maximum: float) -> float:
+        """Largest difference that is none, for a dataset of this largest absolute value."""
+        return self.absolute + self.relative * maximum
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Shape and type of a dataset, and what its indices are where the schema does not say."""
+
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    axes: tuple[str, ...] = ()
+
+    @property
+    def rows(self) -> int:
+        """Number of its rows; a single number is one."""
+        return self.shape[0] if self.shape else 1
+
+
+class Side(Protocol):
+    """One of the two results."""
+
+    @property
+    def layouts(self) -> Mapping[str, Layout]:
+        """Every dataset of numbers, by path."""
+        ...
+
+    def rows(self, path: str, start: int, stop: int) -> Array:
+        """Rows of a dataset."""
+        ...
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place in a dataset.
+
+    Attributes
+    ----------
+    index : tuple of int
+        Index in the array, from 0.
+    step, time
+        Those of its row; None where its group has no clock.
+    names : dict
+        What the other indices are: node, element, point, unknown and so on, from 1.
+    """
+
+    index: tuple[int, ...]
+    step: int | None = None
+    time: float | None = None
+    names: dict[str, int | str] = field(default_factory=dict)
+
+
+@dataclass
+class Comparison:
+    """What came out for one dataset.
+
+    Attributes
+    ----------
+    path : str
+    layouts : tuple of Layout
+        In A and in B.
+    comparable : bool
+        Whether the shapes are equal, so that numbers could be compared.
+    maximum, tolerance : float
+        Largest finite absolute value in both, and the largest difference that is none.
+    largest : float
+        Largest difference; infinite where it is between a number and what is none.
+    at : Place or None
+        Where that is, and `values` what stands there in A and in B; None where nothing differs.
+    differing : int
+        How many numbers differ by more than the tolerance.
+    first : Place or None
+        First row where one does; only where the group has a clock.
+    """
+
+    path: str
+    layouts: tuple[Layout, Layout]
+    comparable: bool = True
+    maximum: float = 0.0
+    tolerance: float = 0.0
+    largest: float = 0.0
+    at: Place | None = None
+    values: tuple[float, float] | None = None
+    differing: int = 0
+    first: Place | None = None
+
+    @property
+    def same_type(self) -> bool:
+        """Whether both have one type of number."""
+        return self.layouts[0].dtype == self.layouts[1].dtype
+
+    @property
+    def same(self) -> bool:
+        """Whether shape, type and all numbers are the same."""
+        return self.comparable and self.same_type and not self.differing
+
+    @property
+    def relative(self) -> float:
+        """Largest difference over the largest absolute value."""
+        return self.largest / self.maximum if self.maximum else self.largest and np.inf
+
+
+def compare(a: Side, b: Side, path: str, tolerance: Tolerance) -> Comparison:
+    """Compare a dataset that both sides have.
+
+    Parameters
+    ----------
+    a, b : Side
+    path : str
+        The dataset's name.
+    tolerance : Tolerance
+
+    Raises
+    ------
+    ResultFileError
+        If a file can't be read there.
+    """
+    layouts = a.layouts[path], b.layouts[path]
+    found = Comparison(path, layouts, layouts[0].shape == layouts[1].shape)
+    if not found.comparable:
+        return found
+    index, lost = _measure(found, a, b)
+    whole = all(layout.dtype.kind in "biu" for layout in layouts)
+    found.tolerance = 0.0 if whole else tolerance.of(found.maximum)
+    if index is not None:
+        found.at = _place(a, b, path, index)
+    if lost or found.largest > found.tolerance:
+        _count(found, a, b)
+    return found
+
+
+def _measure(found: Comparison, a: Side, b: Side) -> tuple[tuple[int, ...] | None, bool]:
+    """Find maximum, largest difference and its index; also whether a number stands against none."""
+    place: tuple[int, ...] | None = None
+    lost = False
+    for start, left, right in _blocks(a, b, found):
+        for values in (left, right):
+            size = np.abs(values, where=np.isfinite(values), out=np.zeros(values.shape))
+            found.maximum = max(found.maximum, float(size.max(initial=0.0)))
+        apart, strange = _differences(left, right)
+        if lost or not apart.size:
+            continue  # the first strange number has been found; nothing is further apart
+        here = int((strange if strange.any() else apart).argmax())
+        index = np.unravel_index(here, apart.shape)
+        if strange.any() or apart[index] > found.largest:
+            lost = bool(strange.any())
+            found.largest = float("inf") if lost else float(apart[index])
+            found.values = float(left[index]), float(right[index])
+            place = (start + int(index[0]), *map(int, index[1:]))
+    return place, lost
+
+
+def _count(found: Comparison, a: Side, b: Side) -> None:
+    """Count what differs by more than the tolerance, and find the first row of it."""
+    for start, left, right in _blocks(a, b, found):
+        apart, strange = _differences(left, right)
+        wrong = strange | (apart > found.tolerance)
+        found.differing += int(np.count_nonzero(wrong))
+        if found.first is None and wrong.any() and _clocked(a, b, found):
+            row = int(wrong.reshape(len(wrong), -1).any(axis=1).argmax())
+            found.first = _place(a, b, found.path, (start + row,))
+
+
+def _blocks(a: Side, b: Side, found: Comparison) -> Iterator[tuple[int, Array, Array]]:
+    """Yield the first row, and the rows of A and B as at least one-dimensional arrays."""
+    layout = found.layouts[0]
+    row_bytes = 8 * max(1, int(np.prod(layout.shape[1:], dtype=float)))
+    step = max(1, BLOCK // row_bytes)
+    for start in range(0, layout.rows, step):
+        stop = min(start + step, layout.rows)
+        yield start, a.rows(found.path, start, stop), b.rows(found.path, start, stop)
+
+
+def _differences(left: Array, right: Array) -> tuple[Array, Array]:
+    """|a - b| where both are finite, else 0; and where one is not and the other differs from it."""
+    if left.dtype.kind in "biu" and right.dtype.kind in "biu":
+        apart = np.abs(left.astype(float) - right.astype(float))
+        unequal = left != right
+        # Two large whole numbers may be one and the same as floats.
+        return np.where(unequal, np.maximum(apart, 1.0), 0.0), np.zeros(left.shape, bool)
+    left, right = left.astype(float), right.astype(float)
+    finite = np.isfinite(left) & np.isfinite(right)
+    with np.errstate(over="ignore", invalid="ignore"):
+        apart = np.where(finite, np.abs(left - right), 0.0)
+    equal = (left == right) | (np.isnan(left) & np.isnan(right))
+    return apart, ~finite & ~equal
+
+
+def _clock(a: Side, b: Side, path: str) -> tuple[Side, str] | None:
+    """Side and group whose step and time tell the rows of a dataset."""
+    group = path.rpartition("/")[0]
+    for side in (a, b):
+        layouts = side.layouts
+        names = (path, f"{group}/step", f"{group}/time")
+        if all(name in layouts for name in names):
+            rows, *clock = (layouts[name].shape for name in names)
+            kinds = [layouts[name].dtype.kind for name in names[1:]]
+            if rows and kinds == ["i", "f"] and all(shape == rows[:1] for shape in clock):
+                return side, group
+    return None
+
+
+def _clocked(a: Side, b: Side, found: Comparison) -> bool:
+    """Whether the rows of a dataset are instants, or at least rows of a tape."""
+    return bool(found.layouts[0].shape) and (
+        _clock(a, b, found.path) is not None or found.path.startswith("tape")
+    )
+
+
+def _place(a: Side, b: Side, path: str, index: tuple[int, ...]) -> Place:
+    """Name a place by step, time, node and whatever the schema calls its indices."""
+    step: int | None = None
+    time: float | None = None
+    clock = _clock(a, b, path)
+    if clock:
+        side, group = clock
+        row = index[0]
+        step = int(side.rows(f"{group}/step", row, row + 1)[0])
+        time = float(side.rows(f"{group}/time", row, row + 1)[0])
+    return Place(index, step, time, _named(a.layouts[path], path, index, bool(clock)))
+
+
+def _named(
+    layout: Layout, path: str, index: tuple[int, ...], clocked: bool
+) -> dict[str, int | str]:
+    """Names of a place's indices, from 1; a row that the clock tells needs none."""
+    if layout.axes:
+        return {name: i + 1 for name, i in zip(layout.axes, index, strict=False)}
+    dataset = DATASETS.get(path)
+    names: dict[str, int | str] = {}
+    if not clocked and path.startswith("tape"):
+        names["row"] = index[0] + 1
+    if dataset is None or len(dataset.shape) != len(layout.shape):
+        return names
+    for axis, (size, i) in enumerate(zip(dataset.shape, index, strict=False)):
+        if size == "ndf" and i < len(UNKNOWNS):
+            names["unknown"] = UNKNOWNS[i]
+        elif isinstance(size, int):
+            names["column" if axis else "row"] = i + 1
+        elif size in AXES:
+            names[AXES[size]] = i + 1
+    return names

@@ -1,0 +1,45 @@
+"""Calls of the command line inside the tests' own process: quick, and with all that `main` does."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from dataclasses import dataclass
+from unittest import mock
+
+import pytest
+
+from fecm.cli import main
+from fecm.cli.common import signals
+
+
+@dataclass(frozen=True)
+class Done:
+    """A call that has ended."""
+
+    exit_code: int
+    stdout: str
+    stderr: str
+
+
+def call(*arguments: object) -> Done:
+    """Call ``fecm`` with these arguments."""
+    out, err = io.StringIO(), io.StringIO()
+    with (
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+        mock.patch.object(signals, "install"),
+        pytest.raises(SystemExit) as left,
+    ):
+        main(list(map(str, arguments)))
+    assert isinstance(left.value.code, int)
+    return Done(left.value.code, out.getvalue(), err.getvalue())
+
+
+def assert_unusable(done: Done) -> None:
+    """Status 2, nothing on standard output, one line on standard error."""
+    assert done.exit_code == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("fecm: error: ")
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.endswith("\n")
