@@ -54,7 +54,6 @@ class GroupedProduct:
 
     def __init__(self, groups: Sequence[tuple[Floats, Indices]], neq: int) -> None:
         self._neq = neq
-        self._padded = np.zeros(neq + 1)  # the last one stands for every restrained unknown
         self._parts: list[tuple[Floats, Floats, Floats]] = []
         lists: list[Indices] = []
         reduced: list[Floats] = []
@@ -63,6 +62,10 @@ class GroupedProduct:
             lists.append(np.minimum(unknowns[:, kept], neq))
             reduced.append(np.ascontiguousarray(K[np.ix_(kept, kept)]))
         self._unknowns = np.concatenate([part.ravel() for part in lists])
+        # Where some elements have a restrained unknown that others have not, a last entry that is
+        # always zero stands for it.
+        held = bool((self._unknowns == neq).any())
+        self._padded = np.zeros(neq + 1) if held else None
         gathered = np.empty(len(self._unknowns))
         forces = np.empty(len(self._unknowns))
         self._gathered, self._forces = gathered, forces
@@ -76,9 +79,12 @@ class GroupedProduct:
 
     def __call__(self, displacement: Floats) -> Floats:
         """K u, (neq,)."""
-        self._padded[:-1] = displacement
-        np.take(self._padded, self._unknowns, out=self._gathered, mode="clip")
+        source = displacement
+        if self._padded is not None:
+            self._padded[:-1] = displacement
+            source = self._padded
+        source.take(self._unknowns, out=self._gathered, mode="clip")
         for q, K, forces in self._parts:
-            np.matmul(q, K, out=forces)
-        total = np.bincount(self._unknowns, self._forces, self._neq + 1)
-        return np.asarray(total, dtype=np.float64)[:-1]
+            np.dot(q, K, out=forces)
+        total = np.bincount(self._unknowns, self._forces, len(source))
+        return np.asarray(total, dtype=np.float64)[: self._neq]
