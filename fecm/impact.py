@@ -71,6 +71,7 @@ class ImpactState:
             "displacement": plate.displacement.copy(),
             "velocity": plate.velocity.copy(),
             "internal": plate.internal.copy(),
+            "restoring": plate.restoring.copy(),
             "rod": self.rod.motion.copy(),
         }
 
@@ -86,6 +87,7 @@ class ImpactState:
             arrays["displacement"].copy(),
             arrays["velocity"].copy(),
             arrays["internal"].copy(),
+            arrays["restoring"].copy(),
             external,
         )
         return cls(

@@ -6,7 +6,6 @@ projectile's energies, the balance) is computed when it is full.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -66,9 +65,6 @@ class StepRecorder:
         self._impact = impact
         self._watches = watches
         self._all_contact = contact_at_every_step
-        self._mass = motion.plate.mass
-        self._momentum = np.empty_like(self._mass)
-        self._flexibility, self._flexibility_dt = self._mass, math.nan
         self._rows: list[tuple[float, ...]] = []
         self._contact_rows: list[int] = []
         self._stored = self._tape9_rows = 0
@@ -113,13 +109,8 @@ class StepRecorder:
         point = None
         if self._impact is not None and impact is not None:
             point = self._impact.point_force(impact)
-        # The stored velocity is half a step old; energy needs it at the displacement's instant.
-        velocity = self._motion.unbalanced(plate, factor, point)
-        velocity *= self._half_flexibility(plate.dt)
-        velocity += plate.velocity
+        kinetic = self._motion.kinetic_energy(plate, factor, point)
         strain = 0.5 * inner(plate.displacement, plate.internal)
-        momentum = np.multiply(self._mass, velocity, out=self._momentum)
-        kinetic = 0.5 * inner(momentum, velocity)
         own = (plate.step, plate.time, kinetic, strain, plate.external_work)
         if impact is None:
             self._rows.append((*own, 0.0, 0.0, 0.0, 0.0))
@@ -133,12 +124,6 @@ class StepRecorder:
             )
         if len(self._rows) == BLOCK:
             self.flush()
-
-    def _half_flexibility(self, dt: float) -> Floats:
-        """Half a time step over the plate's mass, (neq,)."""
-        if dt != self._flexibility_dt:
-            self._flexibility, self._flexibility_dt = 0.5 * dt / self._mass, dt
-        return self._flexibility
 
     def flush(self) -> None:
         """Store what was gathered.
