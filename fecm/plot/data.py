@@ -59,10 +59,25 @@ def deck_of(result: Result, name: str) -> Deck:
     return decks[0]
 
 
+def struck(result: Result, name: str) -> Floats:
+    """Coordinates of the impact node, (1, 2), length; (0, 2) where nothing strikes the plate."""
+    impact = deck_of(result, name).last(Impact)
+    nodes = [] if impact is None else [impact.node - 1]
+    return np.asarray(result["mesh/coordinates"][nodes, :2])
+
+
 def impact_point(result: Result, name: str) -> Floats:
-    """Coordinates of the impact node, (2,), length."""
-    node = deck_of(result, name).need(Impact).node
-    return np.asarray(result["mesh/coordinates"][node - 1])
+    """Coordinates of the impact node, (2,), length.
+
+    Raises
+    ------
+    PlotError
+        If the deck has none.
+    """
+    points = struck(result, name)
+    if not len(points):
+        raise PlotError(f"nothing strikes the plate of {name}: its deck has no ROD segment")
+    return np.asarray(points[0])
 
 
 def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -> Ints:

@@ -68,10 +68,13 @@ def force(results: Results, options: Options) -> Picture:
 
 
 def loop(results: Results, options: Options) -> Picture:
-    """Contact force against indentation, where there is contact or was a moment before."""
+    """Contact force against indentation, from the start at rest on."""
     _within(results, len(COLOURS), "loops")
     paths = ("history/indentation", "history/force")
-    data = {name: need(result, name, *paths) for name, result in results.items()}
+    data = {
+        name: [np.concatenate(([0.0], column)) for column in need(result, name, *paths)]
+        for name, result in results.items()
+    }
     length = scale_of(results, "length", [a.clip(min=0.0) for a, _ in data.values()])
     pound = scale_of(results, "force", [f for _, f in data.values()])
     figure, (axes,) = panels(options.width, ratio=1.2 * RATIO[options.width])
