@@ -90,8 +90,8 @@ def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -
     """
     (stored,) = need(result, name, "tape3/time")
     if not times:
-        first = 0 if count < len(stored) else -1
-        return np.unique(np.linspace(first, len(stored) - 1, count + 1).round()[1:].astype(np.intp))
+        ends = np.arange(1, min(count, len(stored)) + 1) / min(count, len(stored))
+        return (ends * len(stored)).round().astype(np.intp) - 1
     spacing = float(np.diff(stored).max()) if len(stored) > 1 else float(stored[0])
     for time in times:
         if not stored[0] - spacing <= time <= stored[-1] + spacing:
@@ -112,8 +112,10 @@ class Patches:
         Their corners (length).
     quads : ndarray (m, 4)
         Rows of their corners.
-    outlines : list of ndarray (k, 2)
-        Rows of the points around each element are `edges`.
+    edges : list of ndarray (k,)
+        Rows of the points around each element, the first again at the end.
+    parts : list of (Family, ndarray)
+        Elements, and their shape functions at their points.
     """
 
     points: Floats

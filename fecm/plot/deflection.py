@@ -149,9 +149,7 @@ def _lines_by_time(
     figure, axes = panels(options.width, count, sharex=True, sharey=True, ratio=ratio)
     for (name, (times, position, w)), colour in zip(data.items(), COLOURS, strict=False):
         for ax, time, values in zip(axes, times, w, strict=True):
-            ax.plot(
-                place.factor * position, length.factor * values, color=colour, label=name
-            )  # fmt: skip
+            ax.plot(place.factor * position, length.factor * values, color=colour, label=name)
             ax.set_title(f"time {clock.show(time)}", loc="left")
     lines_legend(figure, axes[0])
     return figure, axes
@@ -173,10 +171,14 @@ def contour(results: Results, options: Options) -> Picture:
     height, wide = np.ptp(cut.points[:, 1]), np.ptp(cut.points[:, 0])
     lines = math.ceil(len(rows) / columns)
     figure, axes = panels(
-        options.width, lines, columns, sharex=True, sharey=True,
+        options.width,
+        lines,
+        columns,
+        sharex=True,
+        sharey=True,
         ratio=float(np.clip(height / wide, 0.3, 2.0))
         + 0.65 * columns / lines / WIDTHS[options.width],
-    )  # fmt: skip
+    )
     fields = [length.factor * cut.values(row) for row in w]
     peak = float(np.abs(fields).max()) or 1.0  # inside an element there may be more than at nodes
     levels = np.linspace(-peak, peak, LEVELS)
@@ -194,9 +196,7 @@ def contour(results: Results, options: Options) -> Picture:
         ax.set_axis_off()
     figure.supxlabel(place.label("$x$"), fontsize=8.0)
     figure.supylabel(place.label("$y$"), fontsize=8.0)
-    bar = figure.colorbar(
-        fills[0], ax=axes, location="top", aspect=40, shrink=0.8, pad=0.03
-    )  # fmt: skip
+    bar = figure.colorbar(fills[0], ax=axes, location="top", aspect=40, shrink=0.8, pad=0.03)
     bar.set_label(length.label("Deflection"))
     bar.outline.set_linewidth(0.6)
     bar.locator = matplotlib.ticker.MaxNLocator(6, symmetric=True)

@@ -98,7 +98,8 @@ def scale(peak: float, unit: str) -> Scale:
         power = 3 * math.floor(math.log10(peak) / 3.0)
     if base and power + own in _PREFIXES:
         return Scale(10.0**-power, _PREFIXES[power + own] + base)
-    text = unit.replace("*", "·").replace("^2", "²")
+    text = f"{unit[2:]}⁻¹" if unit.startswith("1/") else unit
+    text = text.replace("*", "·").replace("^2", "²")
     return Scale(10.0**-power, f"{_power(power)} {text}".strip())
 
 
