@@ -73,6 +73,8 @@ def check_outputs(paths: Sequence[Path], overwrite: bool) -> None:
     for path in paths:
         if path.is_dir():
             raise Refused(f"{path} is a folder")
+        if path.exists() and not path.is_file():
+            raise Refused(f"{path} is no ordinary file")  # a device would be replaced
         if not path.parent.is_dir():
             raise Refused(f"{path}: there is no folder {path.parent}")
         if path.exists() and not overwrite:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import warnings
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -17,33 +19,24 @@ if TYPE_CHECKING:
 _KIND_HELP = "; ".join(f"{name}: {kind.summary}" for name, kind in KINDS.items())
 
 
-class Numbers(click.ParamType):
-    """Finite numbers with commas between them.
+def _numbers(form: str, count: int = 0) -> Callable[[click.Context, click.Parameter, Any], Any]:
+    """A callback that reads finite numbers with commas between them, `count` of them if not 0."""
 
-    Parameters
-    ----------
-    form : str
-        What help and messages call them.
-    count : int
-        How many there must be; 0 for any number.
-    """
-
-    def __init__(self, form: str, count: int = 0) -> None:
-        self.name = form
-        self._count = count
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, ...]:
-        """Numbers of a text."""
+    def read(value: str) -> tuple[float, ...]:
         try:
-            numbers = tuple(float(part) for part in str(value).split(","))
+            numbers = tuple(float(part) for part in value.split(","))
         except ValueError:
             numbers = ()
-        finite = all(abs(number) < float("inf") for number in numbers)
-        if not numbers or not finite or (self._count and len(numbers) != self._count):
-            self.fail(f"{value} is not of the form {self.name}", param, ctx)
+        if not numbers or not all(map(math.isfinite, numbers)) or count not in (0, len(numbers)):
+            raise click.BadParameter(f"{value} is not of the form {form}")
         return numbers
+
+    def callback(context: click.Context, parameter: click.Parameter, value: Any) -> Any:
+        if isinstance(value, tuple):
+            return tuple(map(read, value))
+        return () if value is None else read(value)
+
+    return callback
 
 
 @click.command()
@@ -54,15 +47,15 @@ class Numbers(click.ParamType):
 @click.option("-o", "--output", type=FILE_PATH, metavar="PATH",
               help="Picture (.png, .svg, .pdf; .gif for animation), or folder for several.  "
                    "[default: RESULT-KIND.png in this folder]")  # fmt: skip
-@click.option("--at", type=Numbers("X,Y", 2), multiple=True, metavar="X,Y",
+@click.option("--at", callback=_numbers("X,Y", 2), multiple=True, metavar="X,Y",
               help="Point of strain; may be repeated.  [default: the impact point]",
               )  # fmt: skip
-@click.option("--gage", "gages", type=Numbers("DEGREES,..."), metavar="DEGREES,...",
+@click.option("--gage", "gages", callback=_numbers("DEGREES,..."), metavar="DEGREES,...",
               default="0,90", show_default=True,
               help="Directions of strain, from the x-axis.")  # fmt: skip
 @click.option("--face", type=click.Choice(["far", "struck", "curvature"]), default="far",
               show_default=True, help="Face of the strain, or curvature instead.")  # fmt: skip
-@click.option("--times", type=Numbers("T,T,..."), metavar="T,T,...",
+@click.option("--times", callback=_numbers("T,T,..."), metavar="T,T,...",
               help="Times, in the deck's unit; the nearest stored rows are drawn.")  # fmt: skip
 @click.option("--along", type=click.Choice(["x", "y"]), default="x", show_default=True,
               help="Direction of line.")  # fmt: skip
@@ -76,13 +69,13 @@ def plot(
     at: tuple[tuple[float, float], ...],
     gages: tuple[float, ...],
     face: str,
-    times: tuple[float, ...] | None,
+    times: tuple[float, ...],
     along: str,
     width: str,
     overwrite: bool,
 ) -> None:
     """Draw the report's figures from one RESULT or several."""
-    options = Options(at, gages, face, times or (), along, width)
+    options = Options(at, gages, face, times, along, width)
     try:
         paths = _paths(results[0], list(dict.fromkeys(kinds)), output)
         check_outputs(list(paths.values()), overwrite)

@@ -103,12 +103,11 @@ def _members(result: Result, name: str) -> list[str]:
         known = list(DATASETS)
         return sorted(members, key=lambda path: known.index(path) if path in known else len(known))
     group = name.partition("/")[0]
-    groups = list(dict.fromkeys(path.partition("/")[0] for path in result))
+    groups = sorted({path.partition("/")[0] for path in result})
     if group in STORED_BY and group not in groups:
         macro = STORED_BY[group]
         raise ExportError(
-            f"the result has no {name}: the macro {macro} stores it, and the deck's program has "
-            f"none that stored anything"
+            f"the result has no {name}; add {macro} to the deck's program and run it again"
         )
     names = sorted({*result, *groups})
     near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)

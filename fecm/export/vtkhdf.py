@@ -56,7 +56,7 @@ def write_vtkhdf(result: Result, path: Path, note: Note = lambda text: None) -> 
     if "tape3/displacement" not in result:
         raise ExportError(
             "the result holds no displacements (tape3), so that there is no time step to export; "
-            "add DISP to the deck's loop and run it again"
+            "add DISP to the deck's program and run it again"
         )
     # A state that was stored twice is one time step.
     steps, rows = np.unique(result["tape3/step"], return_index=True)

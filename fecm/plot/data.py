@@ -59,10 +59,25 @@ def deck_of(result: Result, name: str) -> Deck:
     return decks[0]
 
 
+def struck(result: Result, name: str) -> Floats:
+    """Coordinates of the impact node, (1, 2), length; (0, 2) where nothing strikes the plate."""
+    impact = deck_of(result, name).last(Impact)
+    nodes = [] if impact is None else [impact.node - 1]
+    return np.asarray(result["mesh/coordinates"][nodes, :2])
+
+
 def impact_point(result: Result, name: str) -> Floats:
-    """Coordinates of the impact node, (2,), length."""
-    node = deck_of(result, name).need(Impact).node
-    return np.asarray(result["mesh/coordinates"][node - 1])
+    """Coordinates of the impact node, (2,), length.
+
+    Raises
+    ------
+    PlotError
+        If the deck has none.
+    """
+    points = struck(result, name)
+    if not len(points):
+        raise PlotError(f"nothing strikes the plate of {name}: its deck has no ROD segment")
+    return np.asarray(points[0])
 
 
 def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -> Ints:
@@ -75,8 +90,8 @@ def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -
     """
     (stored,) = need(result, name, "tape3/time")
     if not times:
-        first = 0 if count < len(stored) else -1
-        return np.unique(np.linspace(first, len(stored) - 1, count + 1).round()[1:].astype(np.intp))
+        ends = np.arange(1, min(count, len(stored)) + 1) / min(count, len(stored))
+        return (ends * len(stored)).round().astype(np.intp) - 1
     spacing = float(np.diff(stored).max()) if len(stored) > 1 else float(stored[0])
     for time in times:
         if not stored[0] - spacing <= time <= stored[-1] + spacing:
@@ -97,8 +112,10 @@ class Patches:
         Their corners (length).
     quads : ndarray (m, 4)
         Rows of their corners.
-    outlines : list of ndarray (k, 2)
-        Rows of the points around each element are `edges`.
+    edges : list of ndarray (k,)
+        Rows of the points around each element, the first again at the end.
+    parts : list of (Family, ndarray)
+        Elements, and their shape functions at their points.
     """
 
     points: Floats

@@ -22,6 +22,7 @@ from fecm.plot.data import (
     need,
     patches,
     stored_rows,
+    struck,
 )
 from fecm.plot.style import (
     COLOURS,
@@ -148,9 +149,7 @@ def _lines_by_time(
     figure, axes = panels(options.width, count, sharex=True, sharey=True, ratio=ratio)
     for (name, (times, position, w)), colour in zip(data.items(), COLOURS, strict=False):
         for ax, time, values in zip(axes, times, w, strict=True):
-            ax.plot(
-                place.factor * position, length.factor * values, color=colour, label=name
-            )  # fmt: skip
+            ax.plot(place.factor * position, length.factor * values, color=colour, label=name)
             ax.set_title(f"time {clock.show(time)}", loc="left")
     lines_legend(figure, axes[0])
     return figure, axes
@@ -172,30 +171,32 @@ def contour(results: Results, options: Options) -> Picture:
     height, wide = np.ptp(cut.points[:, 1]), np.ptp(cut.points[:, 0])
     lines = math.ceil(len(rows) / columns)
     figure, axes = panels(
-        options.width, lines, columns, sharex=True, sharey=True,
+        options.width,
+        lines,
+        columns,
+        sharex=True,
+        sharey=True,
         ratio=float(np.clip(height / wide, 0.3, 2.0))
         + 0.65 * columns / lines / WIDTHS[options.width],
-    )  # fmt: skip
+    )
     fields = [length.factor * cut.values(row) for row in w]
     peak = float(np.abs(fields).max()) or 1.0  # inside an element there may be more than at nodes
     levels = np.linspace(-peak, peak, LEVELS)
     at = place.factor * cut.points
     triangles = Triangulation(at[:, 0], at[:, 1], cut.triangles)
-    where = place.factor * impact_point(result, name)
+    where = place.factor * struck(result, name)
     fills = []
     for ax, row, values in zip(axes, rows, fields, strict=False):
         fills.append(ax.tricontourf(triangles, values, levels, cmap=SIGNED))
         fills[-1].set(edgecolor="face", linewidth=0.2)  # no white seams between the colours
-        ax.plot(*where[:2], "+", color="black", ms=4, mew=0.6)
+        ax.plot(*where.T, "+", color="black", ms=4, mew=0.6)
         ax.set_title(f"time {clock.show(float(result['tape3/time'][row]))}", loc="left")
         ax.set_aspect("equal")
     for ax in axes[len(rows) :]:
         ax.set_axis_off()
     figure.supxlabel(place.label("$x$"), fontsize=8.0)
     figure.supylabel(place.label("$y$"), fontsize=8.0)
-    bar = figure.colorbar(
-        fills[0], ax=axes, location="top", aspect=40, shrink=0.8, pad=0.03
-    )  # fmt: skip
+    bar = figure.colorbar(fills[0], ax=axes, location="top", aspect=40, shrink=0.8, pad=0.03)
     bar.set_label(length.label("Deflection"))
     bar.outline.set_linewidth(0.6)
     bar.locator = matplotlib.ticker.MaxNLocator(6, symmetric=True)
@@ -219,21 +220,22 @@ class _Plate:
         self._title = axes.text2D(0.03, 0.94, "", transform=axes.transAxes)
         self.collection = Poly3DCollection(
             self._at(np.zeros(len(cut.points))), cmap=SIGNED, norm=self._norm,
-            edgecolors="0.25", linewidths=0.12,
+            edgecolors="0.25", linewidths=0.12, clip_on=False,
         )  # fmt: skip
         axes.add_collection3d(self.collection)
         low, high = self._flat.min(axis=(0, 1)), self._flat.max(axis=(0, 1))
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         axes.set_zlim(length.factor * min(span[0], 0.0), length.factor * max(span[1], 0.0))
         side = float((high - low).max())
-        axes.set_box_aspect((*(high - low) / side, EXAGGERATION), zoom=1.12)
+        axes.set_box_aspect((*(high - low) / side, EXAGGERATION), zoom=1.3)
         axes.view_init(elev=28.0, azim=-62.0)
-        axes.set(xlabel=place.label("$x$"), ylabel=place.label("$y$"))
-        axes.set_zlabel(length.label("Deflection"))
+        axes.set_xlabel(place.label("$x$"), labelpad=-4.0)
+        axes.set_ylabel(place.label("$y$"), labelpad=-4.0)
+        axes.set_zlabel(length.label("Deflection"), labelpad=-7.0)
         for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
             axis.pane.set_visible(False)
             axis._axinfo["grid"]["linewidth"] = 0.3
-        axes.tick_params(pad=-1)
+        axes.tick_params(pad=-3.0)
         axes.locator_params(axis="z", nbins=4)
         axes.locator_params(axis="x", nbins=5)
         axes.locator_params(axis="y", nbins=5)
@@ -277,10 +279,9 @@ def _plates(
     span = (float(w.min()), float(w.max()))
     lines = math.ceil(count / columns)
     figure, axes = panels(
-        options.width, lines, columns, ratio=0.62, layout=None, subplot_kw={"projection": "3d"}
+        options.width, lines, columns, ratio=0.62, subplot_kw={"projection": "3d"}
     )
-    # Layout engines do not know how much room an axes of three dimensions takes.
-    figure.subplots_adjust(left=0.0, right=0.92, bottom=0.06, top=1.0, wspace=0.1, hspace=0.0)
+    figure.subplots_adjust(left=0.0, right=0.91, bottom=0.07, top=1.0, wspace=0.1, hspace=0.05)
     for ax in axes[count:]:
         ax.set_axis_off()
     return figure, [_Plate(ax, cut, place, length, span) for ax in axes[:count]]

@@ -68,17 +68,18 @@ def force(results: Results, options: Options) -> Picture:
 
 
 def loop(results: Results, options: Options) -> Picture:
-    """Contact force against indentation, where there is contact or was a moment before."""
+    """Contact force against indentation, from the start at rest on."""
     _within(results, len(COLOURS), "loops")
     paths = ("history/indentation", "history/force")
-    data = {name: need(result, name, *paths) for name, result in results.items()}
+    data = {
+        name: [np.concatenate(([0.0], column)) for column in need(result, name, *paths)]
+        for name, result in results.items()
+    }
     length = scale_of(results, "length", [a.clip(min=0.0) for a, _ in data.values()])
     pound = scale_of(results, "force", [f for _, f in data.values()])
     figure, (axes,) = panels(options.width, ratio=1.2 * RATIO[options.width])
     for (name, (indentation, values)), colour in zip(data.items(), COLOURS, strict=False):
-        axes.plot(
-            length.factor * indentation, pound.factor * values, color=colour, label=name
-        )  # fmt: skip
+        axes.plot(length.factor * indentation, pound.factor * values, color=colour, label=name)
     deepest = max(float(indentation.max()) for indentation, _ in data.values())
     if deepest > 0.0:
         # Where the bodies are apart there is no force, and nothing to see.
@@ -103,9 +104,7 @@ def energy(results: Results, options: Options) -> Picture:
     for (time, *columns), style in zip(data.values(), STYLES, strict=False):
         for values, colour in zip(columns, COLOURS, strict=False):
             axes.plot(clock.factor * time, work.factor * values, color=colour, ls=style)
-        axes.plot(
-            clock.factor * time, work.factor * np.sum(columns, axis=0), color="0.5", ls=style
-        )  # fmt: skip
+        axes.plot(clock.factor * time, work.factor * np.sum(columns, axis=0), color="0.5", ls=style)
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel(work.label("Energy"))
     _time_axis(axes, clock.label("Time"), times, clock.factor)

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 
 from fecm.plot import Options, Picture
-from fecm.plot.data import Bools, impact_point, need, patches
+from fecm.plot.data import Bools, need, patches, struck
 from fecm.plot.style import COLOURS, WIDTHS, legend, panels, scale_of
 from fecm.results.result import Result
 
@@ -55,9 +55,10 @@ def mesh(results: Mapping[str, Result], options: Options) -> Picture:
             at = place.factor * coordinates[nodes]
             handles += axes.plot(at[:, 0], at[:, 1], ls="none", clip_on=False, **MARKS[label])
             labels.append(label)
-    where = place.factor * impact_point(result, name)
-    handles += axes.plot(*where[:2], "X", color=COLOURS[1], ms=6.0, mec="white", mew=0.5, ls="none")
-    labels.append("impact")
+    where = place.factor * struck(result, name)
+    if len(where):
+        handles += axes.plot(*where.T, "X", color=COLOURS[1], ms=6.0, mec="white", mew=0.5, ls="")
+        labels.append("impact")
     if options.at:
         at = place.factor * np.array(options.at)
         handles += axes.plot(at[:, 0], at[:, 1], "D", color=COLOURS[3], ms=3.5, ls="none")

@@ -17,7 +17,7 @@ from fecm.results.result import Result
 # Width of a column and of a page (in); points an inch of pictures in print and on a screen.
 WIDTHS = {"column": 3.5, "full": 7.2}
 RATIO = {"column": 0.68, "full": 0.45}  # height over width of a graph
-RESOLUTION, SCREEN = 300, 120
+RESOLUTION, SCREEN = 300, 150
 
 # Okabe and Ito's colours, without the yellow that is lost on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -98,7 +98,8 @@ def scale(peak: float, unit: str) -> Scale:
         power = 3 * math.floor(math.log10(peak) / 3.0)
     if base and power + own in _PREFIXES:
         return Scale(10.0**-power, _PREFIXES[power + own] + base)
-    text = unit.replace("*", "·").replace("^2", "²")
+    text = f"{unit[2:]}⁻¹" if unit.startswith("1/") else unit
+    text = text.replace("*", "·").replace("^2", "²")
     return Scale(10.0**-power, f"{_power(power)} {text}".strip())
 
 
@@ -129,16 +130,12 @@ def scale_of(results: Mapping[str, Result], dimension: str, values: Iterable[Any
 
 
 def panels(
-    width: str,
-    rows: int = 1,
-    columns: int = 1,
-    *,
-    ratio: float,
-    layout: str | None = "constrained",
-    **options: Any,
+    width: str, rows: int = 1, columns: int = 1, *, ratio: float, **options: Any
 ) -> tuple[Figure, list[Axes]]:
     """A figure of equal axes, each `ratio` as high as wide; row by row."""
     inches = WIDTHS[width]
+    # Layout engines do not know how much room an axes of three dimensions takes.
+    layout: Any = None if "subplot_kw" in options else "constrained"
     figure = Figure(figsize=(inches, inches * ratio * rows / columns), layout=layout)
     FigureCanvasAgg(figure)
     axes = figure.subplots(rows, columns, squeeze=False, **options)

@@ -1,0 +1,356 @@
+"""Pictures: their lines are the result's numbers, their axes have units, and a run draws none."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import fecm
+from fecm.plot import KINDS, MISSING, Options, PlotError, draw, save
+from fecm.plot.data import strain_points
+from fecm.plot.deflection import profile
+from fecm.plot.meshes import supports
+from fecm.plot.style import COLOURS, scale
+from fecm.results.result import Result
+from tests.builders import distorted_square
+from tests.decks import DATA_CARDS, MESH, PROGRAM, small
+from tests.test_command_line import fecm as command
+
+Array = NDArray[Any]
+
+pytest.importorskip("matplotlib")
+
+NAMED = small(data=DATA_CARDS + "UNIT\nin lbf s\n")
+
+
+def run(deck: str) -> Result:
+    """Result of a deck of one problem."""
+    result = fecm.run(deck)
+    assert isinstance(result, Result)
+    return result
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    """The small plate in in, lbf and s."""
+    return run(NAMED)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """The small plate's result file."""
+    fecm.run(NAMED, output=tmp_path / "small.h5")
+    return tmp_path / "small.h5"
+
+
+def lines(axes: Any) -> dict[str, tuple[Array, Array]]:
+    """Data of an axes' lines by their labels."""
+    return {line.get_label(): line.get_data() for line in axes.get_lines()}
+
+
+def legend_of(figure: Any) -> list[str]:
+    """Texts of a figure's legend."""
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+# What is drawn ----------------------------------------------------------------------------------
+
+
+def test_force_shows_both_forces_in_microseconds_and_pounds(result: Result) -> None:
+    figure = result.plot("force")
+    (axes,) = figure.axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("Time (µs)", "Force (lbf)")
+    drawn = lines(axes)
+    assert list(drawn) == legend_of(figure) == ["contact force", "transducer"]
+    time, force = drawn["contact force"]
+    np.testing.assert_allclose(time, 1e6 * result.time, rtol=1e-12)
+    np.testing.assert_array_equal(force, result.force)
+    np.testing.assert_array_equal(drawn["transducer"][1], result.transducer)
+
+
+def test_a_deck_without_units_has_none_on_its_axes() -> None:
+    (axes,) = run(small()).plot("force").axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("Time (10⁻⁶)", "Force")
+
+
+def test_several_results_share_the_axes_each_in_its_colour(result: Result) -> None:
+    listing = fecm.run(NAMED, mode="listing")
+    assert isinstance(listing, Result)
+    both = {"report": result, "listing": listing}
+    figure = draw("force", both).figure
+    assert [axes.get_ylabel() for axes in figure.axes] == [
+        "Contact force (lbf)", "Transducer (lbf)",
+    ]  # fmt: skip
+    assert legend_of(figure) == ["report", "listing"]
+    np.testing.assert_array_equal(lines(figure.axes[0])["listing"][1], listing.force)
+    np.testing.assert_array_equal(lines(figure.axes[1])["report"][1], result.transducer)
+    assert [line.get_color() for line in figure.axes[0].get_lines()] == list(COLOURS[:2])
+    figure = draw("loop", both).figure
+    indentation, force = lines(figure.axes[0])["listing"]
+    np.testing.assert_allclose(indentation, 1e6 * np.append(0.0, listing.indentation), rtol=1e-12)
+    np.testing.assert_array_equal(force, np.append(0.0, listing.force))
+    assert figure.axes[0].get_xlabel() == "Indentation (10⁻⁶ in)"
+    figure = draw("energy", both).figure
+    assert legend_of(figure)[-2:] == ["report", "listing"]
+    assert len(figure.axes[0].get_lines()) == 2 * 6
+    assert len({line.get_linestyle() for line in figure.axes[0].get_lines()}) == 2
+
+
+def test_the_sum_of_the_energies_is_what_there_was_at_first(result: Result) -> None:
+    (axes,) = result.plot("energy").axes
+    total = np.asarray(axes.get_lines()[-1].get_ydata())
+    initial = 0.5 * 1.8096e-4 * 115.0**2
+    np.testing.assert_allclose(total, initial, rtol=1e-3)
+    assert axes.get_ylabel() == "Energy (lbf·in)"
+
+
+def test_results_in_different_units_share_no_axes(result: Result) -> None:
+    metric = run(small(data=DATA_CARDS + "UNIT\nm N s\n"))
+    with pytest.raises(PlotError, match="lbf in first and N in second"):
+        draw("force", {"first": result, "second": metric})
+
+
+def test_line_follows_the_nodes_through_the_impact_point(result: Result) -> None:
+    figure = result.plot("line", times=(2.5e-6, 5e-6), along="y")
+    (axes,) = figure.axes
+    assert figure.legends[0].get_title().get_text() == "Time (µs)"
+    for row, label in enumerate(("2.5", "5")):
+        place, w = lines(axes)[label]
+        np.testing.assert_array_equal(place, [0.0, 0.5, 1.0, 1.5, 2.0])
+        shown = w / result["tape3/w"][row, [2, 7, 12, 17, 22]]
+        np.testing.assert_allclose(shown, shown[0], rtol=1e-9)
+    assert axes.get_xlabel() == "$y$ (in)"
+
+
+def test_on_a_distorted_mesh_the_line_is_interpolated_in_its_elements(result: Result) -> None:
+    coordinates, elements = distorted_square(4, 4)
+    node = int(np.hypot(*(coordinates - 0.5).T).argmin()) + 1
+    deck = result.deck.replace("   13    3", f"{node:5d}    3")
+    w = 3.0 * coordinates[:, 0] + 2.0 * coordinates[:, 1] - 1.0
+    arrays: dict[str, Array] = {
+        "mesh/coordinates": coordinates,
+        "mesh/elements": elements,
+        "tape3/w": w[None],
+    }
+    skewed = Result(arrays, {"deck": deck}, {})
+    place, shown = profile(skewed, "skewed", "x", np.array([0]))
+    assert (place[0], place[-1]) == (0.0, 1.0)
+    inner = slice(1, -1)  # rounding may put the ends beside the plate
+    np.testing.assert_allclose(shown[0, inner], 3.0 * place[inner], rtol=1e-9)
+
+
+def test_strain_is_curvature_times_the_distance_of_the_face(result: Result) -> None:
+    far = result.plot("strain", gages=(0.0, 90.0, 45.0), at=((1.1, 0.9),))
+    assert legend_of(far) == ["x at 1, 1", "y at 1, 1", "45° at 1, 1"]
+    corners = np.array([2, 3, 1, 0])
+    means = {
+        name: result[f"tape8/{name}"][:, [0, 1, 2, 3], corners].mean(axis=1)
+        for name in ("kappa_x", "kappa_y", "kappa_xy")
+    }
+    expected = 0.053 * (means["kappa_x"] + means["kappa_y"] + means["kappa_xy"]) / 2.0
+    assert far.axes[0].get_ylabel() == "Strain, far face (10⁻⁶)"
+    shown = lines(far.axes[0])
+    np.testing.assert_allclose(shown["x at 1, 1"][1], 53e3 * means["kappa_x"], rtol=1e-12)
+    np.testing.assert_allclose(shown["45° at 1, 1"][1], 1e6 * expected, rtol=1e-12)
+    struck = lines(result.plot("strain", face="struck", gages=(0.0,)).axes[0])
+    np.testing.assert_allclose(struck["x at 1, 1"][1], -shown["x at 1, 1"][1], rtol=1e-12)
+    curvature = result.plot("strain", face="curvature", gages=(90.0,)).axes[0]
+    np.testing.assert_allclose(lines(curvature)["y at 1, 1"][1], 1e6 * means["kappa_y"], rtol=1e-12)
+    assert curvature.get_ylabel() == "Curvature (10⁻⁶ in⁻¹)"
+
+
+def test_strain_points_are_nodes_or_gauss_points(result: Result) -> None:
+    points = strain_points(result, "small")
+    nodes = result["mesh/coordinates"][result["mesh/elements"] - 1]
+    np.testing.assert_allclose(points, nodes, atol=1e-15)
+    gauss = strain_points(run(small().replace("    3    3   -3", "    3    3    2")), "small")
+    np.testing.assert_allclose(gauss[0, 0], 0.5 - 0.5 / np.sqrt(3.0), rtol=1e-12)
+
+
+def test_a_plate_that_stretches_is_said_to_show_bending_alone() -> None:
+    free = MESH[: MESH.index("BOUN")] + "BOUN\n    1    0    1    1    1    1    1\n\n"
+    with pytest.warns(UserWarning, match="bending alone"):
+        run(small(mesh=free)).plot("strain")
+
+
+def test_contours_share_one_scale_about_zero(result: Result) -> None:
+    figure = result.plot("contour", times=(2.5e-6, 5e-6))
+    first, second, bar = figure.axes
+    assert [a.get_title(loc="left") for a in (first, second)] == ["time 2.5 µs", "time 5 µs"]
+    assert bar.get_xlabel().startswith("Deflection (10⁻⁶ in)")
+    low, high = bar.get_xlim()
+    assert low == -high
+    assert high >= 1e6 * np.abs(result["tape3/w"]).max()
+
+
+def test_the_surface_has_the_heights_of_the_nodes(result: Result) -> None:
+    figure = result.plot("surface")
+    axes: Any = figure.axes[0]
+    assert axes.get_zlabel() == "Deflection (10⁻⁶ in)"
+    assert [text.get_text() for text in axes.texts] == ["time 5 µs"]
+    heights = axes.collections[0].get_array()
+    assert len(heights) == 4 * 4
+    # The first element's last quarter has its centre, two mid-sides and the plate's middle.
+    quarter = result["tape3/w"][-1, [6, 7, 12, 11]]
+    assert heights[3] == pytest.approx(1e6 * quarter.mean(), rel=1e-12)
+
+
+def test_mesh_marks_supports_and_the_impact_point() -> None:
+    held = "    1    1   -1   -1   -1   -1   -1\n    5    0    1    1    1    1    1\n"
+    simple = "   21    1   -1   -1   -1    0    0\n   25    0    1    1    1    0    0\n"
+    inner = "    6    1   -1   -1    0    0    0\n   20    0    1    1    0    0    0\n"
+    mesh = MESH[: MESH.index("BOUN")] + f"BOUN\n{held}{inner}{simple}\n"
+    result = run(small(mesh=mesh))
+    kinds = {name: np.flatnonzero(nodes) + 1 for name, nodes in supports(result).items()}
+    assert kinds["clamped"].tolist() == [1, 2, 3, 4, 5]
+    assert kinds["w held"].tolist() == [21, 22, 23, 24, 25]
+    assert not len(kinds["rotation held"])
+    figure = result.plot("mesh", at=((0.3, 0.4),))
+    axes: Any = figure.axes[0]
+    assert legend_of(figure) == ["clamped", "w held", "impact", "points"]
+    assert len(axes.collections[0].get_segments()) == 4
+    impact = axes.get_lines()[2].get_data()
+    assert [float(value[0]) for value in impact] == [1.0, 1.0]
+    assert axes.get_aspect() == 1.0
+
+
+def test_the_animation_has_a_frame_for_each_stored_row(result: Result, tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    result.plot("animation", tmp_path / "plate.gif")
+    with image.open(tmp_path / "plate.gif") as opened:
+        assert opened.format == "GIF"
+        assert opened.n_frames == 2
+
+
+@pytest.mark.parametrize(
+    ("peak", "unit", "factor", "label"),
+    [
+        (8e-4, "s", 1e6, "µs"), (0.8, "s", 1e3, "ms"), (3.0, "s", 1.0, "s"), (0.8, "ms", 1e3, "µs"),
+        (8e-4, "", 1e6, "10⁻⁶"), (86.2, "", 1.0, ""), (0.0013, "in", 1e3, "10⁻³ in"),
+        (0.15, "m", 1e3, "mm"), (2e-5, "m", 1e6, "µm"), (0.02, "mm", 1e3, "µm"),
+        (25000.0, "N", 1e-3, "kN"), (25000.0, "lbf", 1e-3, "10³ lbf"),
+        (0.7, "N*m", 1e3, "mJ"), (7.0, "N*mm", 1.0, "mJ"), (1.2, "lbf*in", 1.0, "lbf·in"),
+        (0.0, "s", 1.0, "s"),
+    ],
+)  # fmt: skip
+def test_axes_are_scaled_by_thousands(peak: float, unit: str, factor: float, label: str) -> None:
+    got = scale(peak, unit)
+    assert got.factor == pytest.approx(factor, rel=1e-12)
+    assert got.unit == label
+
+
+def test_widths_are_those_of_a_column_and_of_a_page(result: Result) -> None:
+    assert result.plot("force").get_figwidth() == 3.5
+    assert result.plot("force", width="full").get_figwidth() == 7.2
+
+
+# What is missing --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", sorted(set(KINDS) - {"mesh"}))
+def test_a_picture_names_the_macro_that_stores_what_it_lacks(kind: str) -> None:
+    result = run(small("LMAS\nDT        .5E-6\n"))
+    macro = "DISP" if kind in {"line", "contour", "surface", "animation"} else "RODP"
+    with pytest.raises(PlotError, match=f"bare has no .*; add {macro} to"):
+        draw(kind, {"bare": result})
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "words"),
+    [
+        ("line", Options(times=(1.0,)), "no displacements at time 1"),
+        ("strain", Options(at=((9.0, 9.0),)), "9,9 is not on the plate"),
+        ("strain", Options(gages=tuple(range(8))), "fewer points"),
+        ("picture", Options(), "no kind 'picture'"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(
+    result: Result, kind: str, options: Options, words: str
+) -> None:
+    with pytest.raises(PlotError, match=words):
+        draw(kind, {"small": result}, options)
+
+
+def test_without_matplotlib_one_line_says_what_to_install(
+    result: Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(ImportError) as refused:
+        result.plot()
+    assert str(refused.value) == MISSING == "pictures need matplotlib: pip install 'fecm[plot]'"
+
+
+# The command ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_the_same_picture_has_the_same_bytes(result: Result, tmp_path: Path, suffix: str) -> None:
+    written = []
+    for name in ("a", "b"):
+        path = tmp_path / f"{name}.{suffix}"
+        save(draw("force", {"small": result}), path)
+        written.append(path.read_bytes())
+    assert written[0] == written[1]
+    heads = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
+    assert written[0].startswith(heads[suffix])
+    assert b"CreationDate" not in written[0]
+    assert b"dc:date" not in written[0]
+
+
+def test_the_command_writes_every_kind_and_keeps_what_is_there(file: Path) -> None:
+    asked = [part for kind in KINDS for part in ("--kind", kind)]
+    done = command("plot", file, *asked, cwd=file.parent)
+    expected = [f"small-{k}.{'gif' if k == 'animation' else 'png'}" for k in KINDS]
+    assert (done.returncode, done.stdout.split(), done.stderr) == (0, expected, "")
+    assert sorted(p.name for p in file.parent.iterdir()) == sorted([*expected, "small.h5"])
+    (file.parent / "small-loop.png").write_text("precious")
+    (file.parent / "small-force.png").unlink()
+    refused = command("plot", file, "--kind", "force", "--kind", "loop", cwd=file.parent)
+    assert refused.returncode == 2
+    assert "small-loop.png exists already" in refused.stderr
+    assert (file.parent / "small-loop.png").read_text() == "precious"
+    assert not (file.parent / "small-force.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("-o", "picture.jpg"), ".png or .svg or .pdf"),
+        (("--kind", "animation", "-o", "plate.png"), ".gif"),
+        (("--kind", "force", "--kind", "loop", "-o", "both.png"), "no folder"),
+        (("--kind", "contour", "--times", "1"), "at time 1"),
+        (("--times", "soon"), "T,T"),
+        (("--at", "1"), "X,Y"),
+        (("small.h5",), "given twice"),
+    ],
+)
+def test_a_call_that_makes_no_picture_is_refused_in_words(
+    file: Path, arguments: tuple[str, ...], words: str
+) -> None:
+    refused = command("plot", "small.h5", *arguments, cwd=file.parent)
+    assert refused.returncode == 2
+    assert words in refused.stderr
+    assert "Traceback" not in refused.stderr
+    assert [p.name for p in file.parent.iterdir()] == ["small.h5"]
+
+
+def test_nothing_but_a_picture_imports_matplotlib(file: Path) -> None:
+    program = (
+        "import sys, fecm, fecm.cli, fecm.plot, fecm.cli.plot\n"
+        "try: fecm.cli.main(sys.argv[1:])\n"
+        "except SystemExit as end: assert not end.code\n"
+        "print([n for n in ('matplotlib', 'pandas', 'vtk') if n in sys.modules])\n"
+    )
+    for arguments in (("tapes", "small.h5"), ("export", "small.h5", "--to", "csv"), ("--help",)):
+        done = subprocess.run(
+            [sys.executable, "-c", program, *arguments],
+            cwd=file.parent, capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        assert done.stdout.splitlines()[-1] == "[]"
+    assert PROGRAM in fecm.load(file).deck
