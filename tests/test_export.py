@@ -21,7 +21,7 @@ from fecm.export.csv import table
 from fecm.export.vtkhdf import write_vtkhdf
 from fecm.results.result import Result
 from tests.builders import SQUARE, one_element
-from tests.decks import PROGRAM, small
+from tests.decks import PROGRAM, ROOT, small
 from tests.test_command_line import fecm as command
 
 Array = NDArray[Any]
@@ -244,6 +244,27 @@ def test_any_dataset_has_its_columns_named(
     lines = "".join(table(result, name).lines()).splitlines()
     assert lines[0] == header
     assert last is None or lines[-1] == last
+
+
+def test_what_is_the_same_at_every_row_is_written_once() -> None:
+    result = fecm.run(ROOT / "decks" / "static-bending.inp")
+    assert isinstance(result, Result)
+    got = exported(result, "stresses/x")
+    assert list(got[0]) == ["element", "stress_point", "x"]
+    assert len(got) == result["stresses/x"].size
+    got = exported(result, "stresses")
+    assert list(got[0])[:5] == ["step", "time", "element", "stress_point", "eps_xx"]
+    assert "x" not in got[0]
+    assert float(got[-1]["M_x"]) == result["stresses/M_x"][0, -1, -1]
+
+
+def test_modes_are_numbered() -> None:
+    result = fecm.run(ROOT / "decks" / "natural-frequencies.inp")
+    assert isinstance(result, Result)
+    got = exported(result, "modes/angular_frequency")
+    assert [row["number"] for row in got[:3]] == ["1", "2", "3"]
+    assert float(got[2]["angular_frequency"]) == result["modes/angular_frequency"][2]
+    assert list(exported(result, "modes/shape")[0])[:5] == ["step", "time", "number", "node", "u"]
 
 
 @pytest.mark.parametrize(

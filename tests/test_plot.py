@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm.plot import KINDS, MISSING, Options, PlotError, draw, save
-from fecm.plot.data import strain_points
+from fecm.plot.data import patches, strain_points
 from fecm.plot.deflection import profile
 from fecm.plot.meshes import supports
 from fecm.plot.style import COLOURS, scale
@@ -143,6 +143,21 @@ def test_on_a_distorted_mesh_the_line_is_interpolated_in_its_elements(result: Re
     assert (place[0], place[-1]) == (0.0, 1.0)
     inner = slice(1, -1)  # rounding may put the ends beside the plate
     np.testing.assert_allclose(shown[0, inner], 3.0 * place[inner], rtol=1e-9)
+
+
+@pytest.mark.parametrize("kind", [3, 4, 8, 9, 10, 12])
+def test_elements_of_every_family_cover_the_plate_and_carry_linear_fields(kind: int) -> None:
+    coordinates, elements = distorted_square(3, 3, kind)
+    made = Result({"mesh/coordinates": coordinates, "mesh/elements": elements}, {}, {})
+    cut = patches(made, 3)
+    first, second = (
+        cut.points[cut.triangles[:, n]] - cut.points[cut.triangles[:, 0]] for n in (1, 2)
+    )
+    areas = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2.0
+    assert (areas > 0.0).all()
+    assert areas.sum() == pytest.approx(1.0, rel=1e-12)
+    shown = cut.values(coordinates @ [3.0, -2.0])
+    np.testing.assert_allclose(shown, cut.points @ [3.0, -2.0], atol=1e-12)
 
 
 def test_strain_is_curvature_times_the_distance_of_the_face(result: Result) -> None:

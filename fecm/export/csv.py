@@ -23,7 +23,8 @@ from fecm.results.schema import DATASETS, SCALES, STORED_BY
 
 Array = NDArray[Any]
 
-CLOCK = ("step", "time")
+# What numbers a row: its instant, and of modes their own number.
+CLOCK = ("step", "time", "number")
 # An axis whose places have names becomes columns.
 NAMED: dict[str | int, tuple[str, ...]] = {
     "ndf": UNKNOWNS,
@@ -75,14 +76,18 @@ def table(result: Result, name: str = "history") -> Table:
     members = _members(result, name.strip("/"))
     clock = [path for column in CLOCK if (path := _beside(members[0], column)) in result]
     values = [path for path in members if path not in clock]
+    if clock and values and not any(map(_in_rows, values)):
+        clock = []
+    elif clock:
+        values = list(filter(_in_rows, values))  # the others are the same at every row
     if name.strip("/") == "tape3":
         values = ["tape3/displacement"]  # w is one of its columns
     if not values:  # step or time by itself
-        return Table(CLOCK, zip(*(result[path].tolist() for path in clock), strict=True))
+        return Table(_names(clock), zip(*(result[path].tolist() for path in clock), strict=True))
     if len({result[path].shape for path in values}) > 1:
         raise ExportError(f"the datasets of {name} are no one table; name {_either(values)}")
     sizes = _sizes(values[0], result[values[0]].shape)[bool(clock) :]
-    columns = tuple(path.rpartition("/")[2] for path in values)
+    columns = _names(values)
     if len(values) == 1 and sizes and len(names := NAMED.get(sizes[-1][0], ())) >= sizes[-1][1]:
         columns = names[: sizes.pop()[1]]
     keys = tuple(SCALES[str(size)][0] if str(size) in SCALES else "row" for size, _ in sizes)
@@ -91,7 +96,7 @@ def table(result: Result, name: str = "history") -> Table:
         [result[path] for path in clock],
         [length for _, length in sizes],
     )
-    return Table((*(CLOCK if clock else ()), *keys, *columns), rows)
+    return Table((*_names(clock), *keys, *columns), rows)
 
 
 def _members(result: Result, name: str) -> list[str]:
@@ -120,6 +125,16 @@ def _either(names: Sequence[str], word: str = "or") -> str:
     """A list in words."""
     *others, last = names
     return f"{', '.join(others)} {word} {last}" if others else last
+
+
+def _names(paths: Sequence[str]) -> tuple[str, ...]:
+    """Names of datasets in their groups."""
+    return tuple(path.rpartition("/")[2] for path in paths)
+
+
+def _in_rows(path: str) -> bool:
+    """Whether a dataset of a group with a clock has an instant a row."""
+    return path not in DATASETS or DATASETS[path].shape[0] == "rows"
 
 
 def _beside(path: str, name: str) -> str:

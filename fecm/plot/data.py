@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from fecm.deck.model import Deck, Impact, Material
 from fecm.deck.reader import Reader
-from fecm.elements.quadrilateral import shape_functions
+from fecm.elements.quadrature import Rule
 from fecm.parts import rules
-from fecm.plate import Family, families
+from fecm.plate import Family, families, local_shape_functions
 from fecm.plot import PlotError
 from fecm.results.result import Result
 from fecm.results.schema import STORED_BY
@@ -129,8 +129,12 @@ class Patches:
 
     @property
     def triangles(self) -> Ints:
-        """Two triangles a quadrilateral."""
-        return np.concatenate([self.quads[:, [0, 1, 2]], self.quads[:, [0, 2, 3]]])
+        """Two triangles a quadrilateral, one where a triangle's side is a point."""
+        found = np.concatenate([self.quads[:, [0, 1, 2]], self.quads[:, [0, 2, 3]]])
+        first, second = (self.points[found[:, n]] - self.points[found[:, 0]] for n in (1, 2))
+        area = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+        kept = area > 1e-9 * float(area.max())
+        return np.asarray(found[kept])
 
 
 def patches(result: Result, cuts: int) -> Patches:
@@ -138,7 +142,8 @@ def patches(result: Result, cuts: int) -> Patches:
     elements, coordinates = result["mesh/elements"], result["mesh/coordinates"][:, :2]
     cuts = min(cuts, 2) if len(elements) > MANY else cuts
     ticks = np.linspace(-1.0, 1.0, cuts + 1)
-    eta, xi = (grid.ravel() for grid in np.meshgrid(ticks, ticks, indexing="ij"))
+    eta, xi = (places.ravel() for places in np.meshgrid(ticks, ticks, indexing="ij"))
+    grid = Rule(xi, eta, np.zeros(len(xi)))  # points alone; nothing is integrated
     number = np.arange(len(xi)).reshape(cuts + 1, cuts + 1)
     quad = np.stack(
         [a.ravel() for a in (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1])],
@@ -149,7 +154,7 @@ def patches(result: Result, cuts: int) -> Patches:
     )
     points, quads, edges, parts, start = [], [], [], [], 0
     for family in families(elements, coordinates):
-        N = shape_functions(xi, eta, family.present)[0][:, family.present]
+        N = local_shape_functions(family, grid)[0]
         parts.append((family, N))
         points.append(np.einsum("pn,eni->epi", N, family.coordinates).reshape(-1, 2))
         starts = start + len(xi) * np.arange(len(family.rows))
@@ -166,7 +171,7 @@ def strain_points(result: Result, name: str) -> Floats:
     elements, coordinates = result["mesh/elements"], result["mesh/coordinates"][:, :2]
     found = np.empty((len(elements), len(rule.xi), 2))
     for family in families(elements, coordinates):
-        N = shape_functions(rule.xi, rule.eta, family.present)[0][:, family.present]
+        N = local_shape_functions(family, rule)[0]
         found[family.rows] = np.einsum("pn,eni->epi", N, family.coordinates)
     return found
 

@@ -231,4 +231,7 @@ GROUP_DESCRIPTIONS = {
 }
 
 # The macro that makes a group.
-STORED_BY = {"tape3": "DISP", "tape8": "RODP", "tape9": "RODP", "history": "RODP", "energy": "RODP"}
+STORED_BY = {
+    "tape3": "DISP", "tape8": "RODP", "tape9": "RODP", "history": "RODP", "energy": "RODP",
+    "stresses": "STRE", "reactions": "REAC", "modes": "EIGE",
+}  # fmt: skip
