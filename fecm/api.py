@@ -15,6 +15,7 @@ from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.simulation import simulate
 from fecm.slips import LISTING, REPORT, active_slips
+from fecm.solvers import AUTO
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,7 @@ def run(
     slips: Iterable[str] = (),
     output: str | Path | None = None,
     force: bool = False,
+    solver: str = AUTO,
 ) -> Result | list[Result]:
     """Run every problem of a deck.
 
@@ -91,6 +93,8 @@ def run(
         on.  Without it nothing is written.
     force : bool
         Run with a time step above the critical one all the same.
+    solver : str
+        How K u is had: ``"auto"`` by what suits the mesh, ``"csr"`` by a sparse matrix.
 
     Returns
     -------
@@ -122,7 +126,7 @@ def run(
     for number, problem in enumerate(prepared.problems, start=1):
         if output is None:
             memory = MemorySink()
-            simulate(problem, active, memory)
+            simulate(problem, active, memory, solver=solver)
             results.append(Result(memory.arrays, memory.texts, memory.groups))
         else:
             from fecm.results import hdf5
@@ -130,7 +134,7 @@ def run(
 
             path = numbered(Path(output), number)
             with hdf5.writing(path) as sink:
-                simulate(problem, active, sink)
+                simulate(problem, active, sink, solver=solver)
             results.append(load(path))
     return results[0] if len(results) == 1 else results
 

@@ -20,6 +20,7 @@ from fecm.elements.quadrature import Rule
 from fecm.laminate import Laminate
 from fecm.mesh import Mesh
 from fecm.products import CsrProduct, GroupedProduct, Product
+from fecm.solvers import AUTO, CSR
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -159,7 +160,7 @@ class PlateModel:
         """Consistent M, sparse (neq, neq), under the bending rule; made when first asked for."""
         return self._assembled(self._mass_of)[:, : self.neq].tocsr()
 
-    def product(self, solver: str = "") -> Product:
+    def product(self, solver: str = AUTO) -> Product:
         """K u, by the way that suits the mesh.
 
         Parameters
@@ -168,7 +169,7 @@ class PlateModel:
             ``"csr"`` for the sparse matrix; otherwise elements are grouped where enough of them
             are congruent.
         """
-        if solver == "csr":
+        if solver == CSR:
             return CsrProduct(self.stiffness)
         groups: list[tuple[Floats, Indices]] = []
         for family in self._families:

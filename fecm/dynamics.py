@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.assembly import PlateModel
+from fecm.solvers import AUTO
 
 Floats = NDArray[np.float64]
 
@@ -83,7 +84,7 @@ class PlateMotion:
         How K u is had: see :meth:`PlateModel.product`.
     """
 
-    def __init__(self, plate: PlateModel, solver: str = "") -> None:
+    def __init__(self, plate: PlateModel, solver: str = AUTO) -> None:
         self.plate = plate
         self.product = plate.product(solver)
         self._inverse_mass = 1.0 / plate.mass

@@ -11,6 +11,7 @@ from fecm.check import Checked
 from fecm.check.run import output_bytes
 from fecm.parts import build_plate, build_rod
 from fecm.program import estimate, flat
+from fecm.solvers import SAFE
 from fecm.units import unit_names, unit_of
 
 Floats = NDArray[np.float64]
@@ -83,6 +84,7 @@ class Overview:
             f"  critical time step  {quantity(self.critical_time_step, 'time')}",
         ]
         for dt in dict.fromkeys(self.time_steps):
+            dt = dt or SAFE * self.critical_time_step
             share = dt / self.critical_time_step
             lines.append(f"  DT                  {quantity(dt, 'time')} ({share:.0%} of it)")
         lines += [

@@ -19,6 +19,7 @@ from fecm.laminate import laminate_of
 from fecm.mesh import Mesh
 from fecm.plate import StrainField
 from fecm.projectile import LISTING_DENSITY, REPORT_DENSITY, Rod, Station, report_rod
+from fecm.solvers import AUTO
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,9 @@ def build_impact(deck: Deck, motion: PlateMotion, rod: Rod, slips: frozenset[str
     return Impact(motion, rod, law, contact)
 
 
-def set_up(deck: Deck, mesh: Mesh, slips: frozenset[str], *, hits: bool = True) -> Setup:
+def set_up(
+    deck: Deck, mesh: Mesh, slips: frozenset[str], *, hits: bool = True, solver: str = AUTO
+) -> Setup:
     """Make the parts of a checked problem, with the slips that are on.
 
     Parameters
@@ -108,9 +111,11 @@ def set_up(deck: Deck, mesh: Mesh, slips: frozenset[str], *, hits: bool = True) 
     slips : frozenset of str
     hits : bool
         Whether there is a projectile.
+    solver : str
+        How K u is had: see :meth:`PlateModel.product`.
     """
     plate, rod = build_plate(deck, mesh, slips), build_rod(slips)
-    motion = PlateMotion(plate)
+    motion = PlateMotion(plate, solver)
     middle = rod.elements // 2 + 1
     return Setup(
         plate=plate,

@@ -28,7 +28,7 @@ class Word:
         What it does, in one sentence.
     value : str
         What its number is: ``"count"`` (whole, not negative), ``"time step"`` or ``"tolerance"``
-        (positive), or empty where it takes none.
+        (positive; 0 is a time step by itself), or empty where it takes none.
     needs : tuple of str
         Words that must have been carried out before; ``"LMAS|CMAS"`` is one or the other.
     inside : bool
@@ -47,7 +47,7 @@ WORDS = {
     for word in (
         Word("LOOP", "Carries out N times what stands before its NEXT.", "count"),
         Word("NEXT", "Ends a loop."),
-        Word("DT", "Sets the time step.", "time step"),
+        Word("DT", "Sets the time step; 0 takes 0.9 of the critical one.", "time step"),
         Word("TIME", "Advances the clock by DT."),
         Word(
             "PROP", "Reads a proportional load from a card behind END, or takes it anew.", "count"
@@ -184,7 +184,7 @@ def _check_value(word: Word, macro: Macro, findings: Findings) -> None:
             f"{word.name} takes a whole number that is not negative, not {value:g}.",
             macro.place("value"),
         )
-    elif word.value in ("time step", "tolerance") and value <= 0:
+    elif (word.value == "time step" and value < 0) or (word.value == "tolerance" and value <= 0):
         findings.add(
             "E505", f"{word.name} takes a positive {word.value}, not {value:g}.",
             macro.place("value"),

@@ -23,6 +23,7 @@ from fecm.recording.recorder import Recorder
 from fecm.results.schema import FORMAT, FORMAT_VERSION
 from fecm.results.sinks import Sink
 from fecm.slips import LISTING, NAMES, REPORT
+from fecm.solvers import AUTO, SAFE
 from fecm.statics import Tangent, reactions
 from fecm.stresses import strains_and_resultants
 from fecm.units import unit_names
@@ -50,6 +51,10 @@ class Simulation:
         Told of steps taken and steps to take, now and then.
     printer : Printer
         Writes the printed output.
+    solver : str
+        How K u is had: see :meth:`PlateModel.product`.
+    notes : list of str
+        What the user should know of the run.
     """
 
     checked: Checked
@@ -57,6 +62,8 @@ class Simulation:
     sink: Sink
     progress: Progress = lambda done, steps: None
     printer: Printer = field(default_factory=Printer)
+    solver: str = AUTO
+    notes: list[str] = field(default_factory=list, init=False)
     setup: Setup = field(init=False)
     plate: PlateState = field(init=False)
     impact: ImpactState | None = field(default=None, init=False)
@@ -75,7 +82,7 @@ class Simulation:
     def __post_init__(self) -> None:
         deck, mesh, program = self.checked.deck, self.checked.mesh, self.checked.program
         with np.errstate(all="ignore"):
-            self.setup = set_up(deck, mesh, self.slips, hits=hits(program))
+            self.setup = set_up(deck, mesh, self.slips, hits=hits(program), solver=self.solver)
         self.plate = self.setup.motion.start()
         if self.setup.impact is not None:
             self.impact = self.setup.impact.start(self.plate)
@@ -183,8 +190,12 @@ class Simulation:
             self.constant_factor = load_factor(self.table, 0.0)
 
     def set_time_step(self, macro: Macro, current: int) -> None:
-        """DT."""
+        """DT; 0 takes a part of the critical time step."""
         self.dt = macro.value
+        if not self.dt:
+            critical = self.setup.plate.critical_time_step()
+            self.dt = float(f"{SAFE * critical:.3g}")
+            self.notes.append(f"DT 0: took {self.dt:g}, {SAFE:g} of the critical {critical:.4g}")
 
     def advance_clock(self, macro: Macro, current: int) -> None:
         """TIME."""
@@ -336,6 +347,7 @@ def simulate(
     sink: Sink,
     progress: Progress = lambda done, steps: None,
     printer: Printer | None = None,
+    solver: str = AUTO,
 ) -> Simulation:
     """Run a problem into a sink and return the finished simulation.
 
@@ -346,6 +358,6 @@ def simulate(
     SingularStiffnessError
         If a static solution is asked for and the plate is not held.
     """
-    simulation = Simulation(checked, frozenset(slips), sink, progress, printer or Printer())
+    simulation = Simulation(checked, frozenset(slips), sink, progress, printer or Printer(), solver)
     simulation.run()
     return simulation

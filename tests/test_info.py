@@ -82,6 +82,18 @@ def test_units_are_told_where_the_deck_names_them(tmp_path: Path) -> None:
     assert "force/length (lbf/in)" in text
 
 
+def test_a_result_that_lacks_what_a_tape_needs_is_refused(
+    changed: Callable[[Edit], Path], tmp_path: Path
+) -> None:
+    def edit(file: h5py.File) -> None:
+        del file["tape8/gamma_yz"]
+
+    done = call("tapes", changed(edit), "-d", tmp_path / "tapes")
+    assert done.exit_code == 2
+    assert "tape8/gamma_yz" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
 def test_json_holds_the_files_own_numbers(result: Path) -> None:
     done = call("info", result, "--format", "json")
     said = json.loads(done.stdout)

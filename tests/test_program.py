@@ -11,6 +11,8 @@ from fecm.deck import Findings
 from fecm.deck.model import Macro
 from fecm.program import compile_program, tally, walk
 from fecm.results.result import Result
+from fecm.results.sinks import MemorySink
+from fecm.simulation import simulate
 from tests.decks import DATA_CARDS, ready, small
 
 
@@ -229,3 +231,23 @@ def test_a_prescribed_displacement_is_followed_and_loads_the_free_unknowns() -> 
     assert isinstance(result, Result)
     np.testing.assert_array_equal(result.tape3.w[:, [0, 5, 10, 15, 20]], 1e-3)
     assert (result.tape3.w[-1, [1, 6, 11, 16, 21]] > 0.0).all()
+
+
+def test_dt_0_takes_nine_tenths_of_the_critical_time_step_and_says_so() -> None:
+    text = small(PROGRAM.replace("DT        .5E-6", "DT"))
+    assert prepare(text).errors() == []
+    problem = prepare(text).problems[0]
+    sink = MemorySink()
+    simulation = simulate(problem, frozenset(), sink)
+    critical = simulation.setup.plate.critical_time_step()
+    assert simulation.dt == pytest.approx(0.9 * critical, rel=5e-3)
+    assert sink.arrays["history/time"][0] == simulation.dt
+    (note,) = simulation.notes
+    assert f"{simulation.dt:g}" in note
+
+
+def test_the_sparse_solver_gives_the_same_history_to_rounding() -> None:
+    auto, csr = (fecm.run(small(), solver=solver) for solver in ("auto", "csr"))
+    assert isinstance(auto, Result)
+    assert isinstance(csr, Result)
+    np.testing.assert_allclose(csr.force, auto.force, rtol=1e-11)

@@ -23,6 +23,7 @@ from fecm.deck.model import (
 from fecm.laminate import laminate
 from fecm.mesh import generate
 from fecm.parts import build_plate
+from fecm.solvers import SAFE
 
 EDGES = ("left", "right", "bottom", "top")
 # Restraints of an edge: nothing; w and the rotation along the edge; everything out of the plane.
@@ -30,8 +31,6 @@ SUPPORTS = ("free", "simple", "clamped")
 
 ORDER = 3
 NODAL_POINTS = -3
-# Part of the critical time step that is taken where none is given.
-SAFE = 0.9
 # Rows of strains and displacements that are stored where nothing else is asked for.
 ROWS = 200
 

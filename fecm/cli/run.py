@@ -23,6 +23,7 @@ from fecm.cli.common import (
     writing,
 )
 from fecm.slips import NAMES, active_slips
+from fecm.solvers import AUTO, SOLVERS
 
 if TYPE_CHECKING:
     from click._termui_impl import ProgressBar
@@ -39,6 +40,13 @@ if TYPE_CHECKING:
               help=f"Add a single slip of the program to report mode; may be repeated.  Names: "
                    f"{', '.join(NAMES)}.")  # fmt: skip
 @click.option("--overwrite", is_flag=True, help="Replace result files that exist.")
+@click.option(
+    "--solver",
+    type=click.Choice(SOLVERS),
+    default=AUTO,
+    show_default=True,
+    help="How K u is had: by what suits the mesh, or by a sparse matrix in any case.",
+)
 @click.option("--force", is_flag=True, help="Run with a time step above the critical one.")
 @click.option(
     "--print",
@@ -53,6 +61,7 @@ def run(
     mode: str,
     slips: tuple[str, ...],
     overwrite: bool,
+    solver: str,
     force: bool,
     printed: Path | None,
 ) -> None:
@@ -77,11 +86,16 @@ def run(
     for number, path in enumerate(paths):
         if number:
             click.echo()
-        _run_one(prepared, number, active, path, prints[number])
+        _run_one(prepared, number, active, solver, path, prints[number])
 
 
 def _run_one(
-    prepared: Prepared, number: int, active: frozenset[str], path: Path, printed: Path | None
+    prepared: Prepared,
+    number: int,
+    active: frozenset[str],
+    solver: str,
+    path: Path,
+    printed: Path | None,
 ) -> None:
     """Run one problem of a deck into a file and say what came out."""
     from fecm.dynamics import DivergenceError
@@ -100,7 +114,7 @@ def _run_one(
         printer = Printer() if printed is None else Printer(stack.enter_context(writing(printed)))
         advance = stack.enter_context(_progress(tally(problem.program).steps))
         try:
-            simulate(problem, active, sink, advance, printer)
+            simulation = simulate(problem, active, sink, advance, printer, solver)
         except SingularStiffnessError as error:
             raise Refused(
                 f"{error}: the plate is not held, so that it has no static displacement; restrain "
@@ -111,6 +125,8 @@ def _run_one(
                 f"the run diverged at step {diverged.step}: {diverged.reason}; "
                 f"{path} was not written"
             ) from None
+    for note in simulation.notes:
+        click.echo(f"fecm: note: {note}", err=True)
     click.echo(problem.deck.title or prepared.source)
     for line in summary(load(path)):
         click.echo(f"  {line}")

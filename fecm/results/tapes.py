@@ -7,13 +7,14 @@ columns.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecm.results.result import Result
+from fecm.results.schema import ResultFileError
 
 Floats = NDArray[np.float64]
 
@@ -72,10 +73,19 @@ def tape_texts(result: Result) -> dict[str, Iterator[str]]:
     if "tape3/w" in result:
         texts["tape3"] = _displacements(result)
     if "tape8/kappa_x" in result:
+        _need(result, [f"tape8/{name}" for name in (*CURVATURES, *shears)])
         texts[strains] = _strains(result, shears)
     if "tape9/force" in result:
+        _need(result, [f"tape9/{name}" for name in CONTACT])
         texts[contact] = _contact(result)
     return dict(sorted(texts.items()))
+
+
+def _need(result: Result, paths: Iterable[str]) -> None:
+    """Make sure that a result has the datasets that a tape is made of."""
+    for path in paths:
+        if path not in result:
+            raise ResultFileError(f"the result lacks {path}, which a tape needs")
 
 
 def write_tapes(result: Result, folder: Path) -> list[Path]:
