@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -17,10 +16,8 @@ import pytest
 import fecm
 from fecm.results import compare
 from fecm.results.result import load
-from fecm.results.tape_reader import fortran_number, read_tapes
-from fecm.results.tapes import write_tapes
 from tests.calls import Done, assert_unusable, call
-from tests.decks import APPENDIX, DATA, small
+from tests.decks import APPENDIX, small
 
 Edit = Callable[[h5py.File], object]
 
@@ -62,14 +59,6 @@ def pair(runs: Path, tmp_path: Path) -> tuple[Path, Callable[[Edit], Path]]:
         return copy
 
     return runs / "small.h5", changed
-
-
-def originals(mode: str, folder: Path) -> Path:
-    """The original program's tapes in a folder of their own."""
-    folder.mkdir()
-    for name in ("tape3", "tape8", "tape9"):
-        shutil.copy(DATA / f"appendix-{mode}-{name}.txt", folder / name)
-    return folder
 
 
 def replaced(path: str, values: Any) -> Edit:
@@ -114,126 +103,6 @@ def test_the_modes_differ_and_the_first_step_of_the_force_is_named(runs: Path) -
     assert "shape 2 against 10" in told(done, "tape9/force")
     assert told(done, "mode:") == "listed     mode: `report` against `listing`"
     assert told(done, "mesh/coordinates").startswith("same")
-
-
-@pytest.mark.parametrize("mode", ["report", "listing"])
-def test_a_result_is_the_original_programs_tapes_to_four_digits(
-    runs: Path, tmp_path: Path, mode: str
-) -> None:
-    tapes = originals(mode, tmp_path / "tapes")
-    for sides in ((runs / f"{mode}.h5", tapes), (tapes, runs / f"{mode}.h5")):
-        done = diff(*sides, "--rtol", "1e-3")
-        assert done.exit_code == 0, done.stdout
-        assert done.stdout.count("same ") == 12
-        assert diff(*sides, "--rtol", "1e-6").exit_code == 1
-
-
-def test_a_results_own_tapes_are_the_originals_text_in_report_order(
-    runs: Path, tmp_path: Path
-) -> None:
-    write_tapes(load(runs / "report.h5"), tmp_path / "own")
-    done = diff(tmp_path / "own", originals("report", tmp_path / "tapes"), "--rtol", "1e-6")
-    assert done.exit_code == 0, done.stdout
-
-
-def test_the_tapes_of_both_modes_differ_most_at_the_impact_node(tmp_path: Path) -> None:
-    done = diff(originals("report", tmp_path / "a"), originals("listing", tmp_path / "b"))
-    assert done.exit_code == 1
-    assert "at row 2, node 305" in told(done, "tape3/w")
-
-
-@pytest.mark.parametrize("mode", ["report", "listing"])
-def test_the_original_shear_columns_are_told_by_where_the_strains_stand(
-    tmp_path: Path, mode: str
-) -> None:
-    strains, columns = ("tape8", (5, 6)) if mode == "report" else ("tape9", (6, 5))
-    folder = originals(mode, tmp_path / "tapes")
-    table = np.array([line.split() for line in (folder / strains).read_text().splitlines()])
-    arrays = read_tapes(folder).arrays
-    for name, column in zip(("gamma_yz", "gamma_xz"), columns, strict=True):
-        np.testing.assert_array_equal(
-            arrays[f"tape8/{name}"].ravel(), table[:, column].astype(float)
-        )
-
-
-def test_tapes_with_the_suffix_txt_are_found(runs: Path, tmp_path: Path) -> None:
-    folder = originals("report", tmp_path / "tapes")
-    for path in list(folder.iterdir()):
-        path.rename(path.with_suffix(".txt"))
-    assert diff(runs / "report.h5", folder, "--rtol", "1e-3").exit_code == 0
-
-
-def test_a_tape_that_is_missing_or_empty_is_a_difference(runs: Path, tmp_path: Path) -> None:
-    folder = originals("report", tmp_path / "tapes")
-    (folder / "tape9").write_text("")
-    for _ in range(2):
-        done = diff(runs / "report.h5", folder, "--rtol", "1e-3")
-        assert done.exit_code == 1
-        assert told(done, "tape9/force").startswith("only in A")
-        (folder / "tape9").unlink(missing_ok=True)
-    assert (
-        diff(
-            runs / "report.h5", folder, "--rtol", "1e-3", "--only", "tape3", "--only", "tape8"
-        ).exit_code
-        == 0
-    )
-
-
-def test_a_tape_short_of_a_whole_row_differs_in_shape(runs: Path, tmp_path: Path) -> None:
-    folder = originals("report", tmp_path / "tapes")
-    lines = (folder / "tape3").read_text().splitlines(keepends=True)
-    (folder / "tape3").write_text("".join(lines[:102]))
-    done = diff(runs / "report.h5", folder, "--rtol", "1e-3")
-    assert done.exit_code == 1
-    assert "shape 2x609 against 1x609" in told(done, "tape3/w")
-
-
-@pytest.mark.parametrize("nodes", [3, 12, 25])
-def test_rows_of_tape3_are_found_for_any_number_of_nodes(tmp_path: Path, nodes: int) -> None:
-    w = np.arange(1.0, 4 * nodes + 1).reshape(4, nodes)
-    lines = [
-        "".join(f"{value:12.4E}" for value in row[start : start + 6])
-        for row in w
-        for start in range(0, nodes, 6)
-    ]
-    (tmp_path / "tape3").write_text("\n".join(lines))
-    text = read_tapes(tmp_path)
-    assert text.lines == (nodes == 12)
-    np.testing.assert_array_equal(text.fitted(nodes).arrays["tape3/w"], w)
-
-
-def test_lines_of_six_are_compared_by_lines_where_nothing_tells_the_nodes(tmp_path: Path) -> None:
-    line = "  0.1000E+01" * 6 + "\n"
-    for name, text in (("a", line * 4), ("b", line * 3 + "  0.2000E+01" + line[12:])):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "tape3").write_text(text)
-    done = diff(tmp_path / "a", tmp_path / "b")
-    assert "1 against 2 at line 4, column 1" in told(done, "tape3/w")
-
-
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        (b"  0.2322E+01", 2.322), (b" -0.1149E-03", -1.149e-4), (b"  0.1234+100", 1.234e99),
-        (b" -0.1234-100", -1.234e-101), (b"  0.5000D+01", 5.0), (b"    Infinity", math.inf),
-        (b"   -Infinity", -math.inf), (b"   0.1234000", 0.1234),
-    ],
-)  # fmt: skip
-def test_every_form_of_fortrans_numbers_is_read(field: bytes, value: float) -> None:
-    assert fortran_number(field) == value
-
-
-def test_what_is_no_number_of_fortran_is_none() -> None:
-    assert math.isnan(fortran_number(b"         NaN") or 0.0)
-    for field in (
-        b"************",
-        b"            ",
-        b" 1_0",
-        b"0x10",
-        b"  0.1000+999",
-        b" 0.1 0E+01",
-    ):
-        assert fortran_number(field) is None
 
 
 def test_a_zero_crossing_is_judged_by_the_size_of_the_whole_history(
@@ -411,66 +280,6 @@ def test_small_blocks_of_rows_find_the_same(runs: Path, monkeypatch: pytest.Monk
     assert diff(runs / "report.h5", runs / "listing.h5").stdout == whole
 
 
-def spoiled(name: str, folder: Path, source: Path) -> Path:
-    """Something that can't be compared."""
-    path = folder / name
-    if name in TAPES:
-        originals("report", path)
-        tape, old, new = TAPES[name]
-        text = (path / tape).read_bytes()
-        assert old in text
-        (path / tape).write_bytes(text.replace(old, new, 1))
-    elif name == "truncated":
-        path.write_bytes(source.read_bytes()[:-1000])
-    elif name == "binary":
-        path.write_bytes(bytes(range(256)) * 8)
-    elif name == "empty":
-        path.write_bytes(b"")
-    elif name == "foreign":
-        with h5py.File(path, "w") as file:
-            file["x"] = 1.0
-    elif name == "later":
-        shutil.copy(source, path)
-        with h5py.File(path, "r+") as file:
-            file.attrs["format_version"] = 2
-    elif name in ("folder", "both", "twice"):
-        path.mkdir()
-        if name != "folder":
-            line = "  0.1000E+01" * 6
-            for tape in ("tape8", "tape8.txt") if name == "both" else ("tape8", "tape9"):
-                (path / tape).write_text(line)
-    elif name == "pipe":
-        os.mkfifo(path)
-    return path
-
-
-FIRST = b"     1     1  0.0000E+00"
-TAPES = {
-    "ragged line": ("tape9", b"  0.1478E+06", b"  0.1478E+"),
-    "ragged row": ("tape9", b"  0.1478E+06", b""),
-    "overflowed": ("tape9", b"  0.1478E+06", b"************"),
-    "blank number": ("tape9", b"  0.6190E+01", b"            "),
-    "word": ("tape9", b"  0.1478E+06", b"  0.nan8E+06"),
-    "too large": ("tape9", b"  0.1478E+06", b"  0.1478+999"),
-    "zero byte": ("tape9", b"  0.1478E+06", b"  0.1478E+\0\0"),
-    "lost element": ("tape8", FIRST, b"     1     2  0.0000E+00"),
-    "vast element": ("tape8", FIRST, b"999999999999  0.0000E+00"),
-    "no element": ("tape8", FIRST, b"     0     0  0.0000E+00"),
-    "row of w": ("tape3", b"  0.0000E+00\n", b"\n"),
-}
-
-
-@pytest.mark.parametrize(
-    "name",
-    [*TAPES, "truncated", "binary", "empty", "foreign", "later", "folder", "both", "twice", "pipe",
-     "missing"],
-)  # fmt: skip
-def test_what_cant_be_compared_exits_2_with_one_line(runs: Path, tmp_path: Path, name: str) -> None:
-    wrong = spoiled(name, tmp_path, runs / "report.h5")
-    for sides in ((runs / "report.h5", wrong), (wrong, runs / "report.h5")):
-        assert_unusable(diff(*sides))
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -491,12 +300,6 @@ def test_a_wrong_tolerance_or_name_exits_2_and_says_what_would_do(
     done = diff(runs / "small.h5", runs / "small.h5", *arguments)
     assert_unusable(done)
     assert words in done.stderr
-
-
-def test_an_unreadable_number_of_a_tape_is_shown_with_its_line(runs: Path, tmp_path: Path) -> None:
-    wrong = spoiled("overflowed", tmp_path, runs / "report.h5")
-    done = diff(runs / "report.h5", wrong)
-    assert f"{wrong}/tape9:2: `************` is not a number" in done.stderr
 
 
 def test_help_says_how_numbers_are_judged() -> None:
