@@ -13,7 +13,7 @@ from fecm.program import compile_program, tally, walk
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.simulation import simulate
-from tests.decks import DATA_CARDS, ready, small
+from tests.decks import DATA_CARDS, PROGRAM, ready, small
 
 
 def run(program: str, mode: str = "report", slips: tuple[str, ...] = ()) -> Result:
