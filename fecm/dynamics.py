@@ -94,7 +94,7 @@ class PlateMotion:
 
     def start(self) -> PlateState:
         """State of the plate at rest."""
-        u, v, internal, restoring = np.zeros((4, self.plate.neq))
+        u, v, internal, restoring = (np.zeros(self.plate.neq) for _ in range(4))
         return PlateState(0, 0.0, 0.0, u, v, internal, restoring)
 
     def refresh(self, state: PlateState) -> None:

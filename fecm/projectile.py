@@ -209,4 +209,5 @@ class WilsonStep:
 
     def free_motion(self, state: RodState) -> Floats:
         """New state if no force acted on the tip, (3 n, ...)."""
-        return np.asarray(self.T @ state.motion.reshape(3 * self.n, *state.motion.shape[2:]))
+        y = state.motion.reshape(3 * self.n, *state.motion.shape[2:])
+        return np.asarray(np.dot(self.T, y))
