@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import resource
 import signal
 import subprocess
 import sys
@@ -197,6 +198,27 @@ def test_a_terminated_run_exits_143_and_leaves_nothing_behind(deck: Path) -> Non
         assert process.returncode == status
         assert b"Traceback" not in errors
         assert [p.name for p in deck.parent.iterdir()] == ["small.inp"]
+
+
+def test_a_result_that_cannot_be_written_ends_in_one_line_and_leaves_what_was_there(
+    deck: Path,
+) -> None:
+    target = deck.parent / "small.h5"
+    target.write_text("precious")
+
+    def limit() -> None:
+        # As a full disk does: every byte beyond these is refused.
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+
+    done = subprocess.run(
+        [sys.executable, "-m", "fecm", "run", str(deck), "--overwrite"],
+        cwd=deck.parent, capture_output=True, text=True, check=False, preexec_fn=limit,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "small.h5 can't be written: File too large" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert target.read_text() == "precious"
+    assert sorted(path.name for path in deck.parent.iterdir()) == ["small.h5", "small.inp"]
 
 
 def test_help_names_every_slip(tmp_path: Path) -> None:

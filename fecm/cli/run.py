@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -98,6 +99,7 @@ def _run_one(
     printed: Path | None,
 ) -> None:
     """Run one problem of a deck into a file and say what came out."""
+    from fecm.check.run import output_bytes
     from fecm.dynamics import DivergenceError
     from fecm.printout import Printer
     from fecm.program import tally
@@ -108,6 +110,7 @@ def _run_one(
     from fecm.statics import SingularStiffnessError
 
     problem = prepared.problems[number]
+    _check_room(path, output_bytes(problem.deck, tally(problem.program)))
     with contextlib.ExitStack() as stack:
         stack.enter_context(signals.deferred())
         sink = stack.enter_context(hdf5.writing(path))
@@ -133,6 +136,16 @@ def _run_one(
     click.echo(f"  result            {path}")
     if printed is not None:
         click.echo(f"  printed           {printed}")
+
+
+def _check_room(path: Path, size: int) -> None:
+    """Refuse a result that the disk has no room for."""
+    free = shutil.disk_usage(path.parent).free
+    if size > free:
+        raise Refused(
+            f"{path}: the result takes about {size / 1e6:.3g} MB, and the disk has "
+            f"{free / 1e6:.3g} MB left"
+        )
 
 
 @contextlib.contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -21,6 +22,7 @@ from fecm.results.schema import (
     SCALES,
     Dataset,
     ResultFileError,
+    ResultWriteError,
     declared_units,
 )
 from fecm.units import unit_of
@@ -32,8 +34,9 @@ TIME = "time"
 class FileSink:
     """Writes a result into an open HDF5 file."""
 
-    def __init__(self, file: h5py.File) -> None:
+    def __init__(self, file: h5py.File, guarded: _Guarded) -> None:
         self._file = file
+        self._guarded = guarded
         self._units: dict[str, str] = {}
         self._datasets: dict[str, h5py.Dataset] = {}
         self._made: list[Dataset] = []
@@ -103,7 +106,15 @@ class FileSink:
         return self._file[name]
 
     def write(self, path: str, start: int, rows: Array) -> None:
-        """Store rows of a dataset."""
+        """Store rows of a dataset.
+
+        Raises
+        ------
+        OSError
+            If this or an earlier write failed.
+        """
+        if self._guarded.error is not None:
+            raise self._guarded.error
         self._datasets[path][start : start + len(rows)] = rows
 
     def trim(self, path: str, rows: int) -> None:
@@ -132,13 +143,72 @@ def writing(path: Path) -> Iterator[FileSink]:
 
     Raises
     ------
-    OSError
+    ResultWriteError
         If the file can't be written; what stood under the final name is then untouched.
     """
-    with beside(path) as partial, h5py.File(partial, "w") as file:
-        sink = FileSink(file)
-        yield sink
-        sink.label_axes()
+    with beside(path) as partial, partial.open("w+b", buffering=0) as raw:
+        guarded = _Guarded(raw)
+        with h5py.File(guarded, "w") as file:
+            sink = FileSink(file, guarded)
+            try:
+                yield sink
+            except OSError as error:
+                if error is guarded.error:
+                    raise _unwritten(path, error) from None
+                raise
+            sink.label_axes()
+        if guarded.error is not None:
+            raise _unwritten(path, guarded.error)
+
+
+def _unwritten(path: Path, error: OSError) -> ResultWriteError:
+    return ResultWriteError(f"{path} can't be written: {error.strerror or error}")
+
+
+class _Guarded:
+    """A file that remembers the first error of writing instead of raising it.
+
+    HDF5 can neither go on nor let go of a file once a write has failed in it: it complains at every
+    turn, and falls over at the end of the program.  So it is left in the belief that all is well,
+    until the sink asks.
+    """
+
+    def __init__(self, raw: io.FileIO) -> None:
+        self._raw = raw
+        self.error: OSError | None = None
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        return self._raw.seek(offset, whence)
+
+    def tell(self) -> int:
+        return self._raw.tell()
+
+    def read(self, size: int = -1) -> bytes:
+        return self._raw.read(size) or b""
+
+    def readinto(self, buffer: memoryview) -> int:
+        return self._raw.readinto(buffer) or 0
+
+    def write(self, data: memoryview) -> int:
+        view = memoryview(data).cast("B")
+        done = 0
+        while self.error is None and done < len(view):
+            try:
+                done += self._raw.write(view[done:]) or 0
+            except OSError as error:
+                self.error = error
+        return len(view)
+
+    def truncate(self, size: int | None = None) -> int:
+        if self.error is None:
+            try:
+                self._raw.truncate(size)
+            except OSError as error:
+                self.error = error
+        return size or 0
+
+    def flush(self) -> None:
+        """Nothing is buffered."""
 
 
 class FileArrays(Mapping[str, Array]):

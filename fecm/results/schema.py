@@ -18,6 +18,10 @@ class ResultFileError(ValueError):
     """A file is not a result that this program can read."""
 
 
+class ResultWriteError(OSError):
+    """A result can't be written."""
+
+
 @dataclass(frozen=True, slots=True)
 class Dataset:
     """One dataset of a result.
