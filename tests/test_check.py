@@ -165,6 +165,15 @@ def test_numbers_at_the_edge_of_their_range_end_in_findings_not_in_exceptions() 
         assert prepare(text).errors() == []
 
 
+def test_control_characters_of_a_deck_never_reach_the_terminal() -> None:
+    prepared = prepare(small(data=DATA_CARDS.replace("     115.0", "  \x1b[31m\t5")))
+    shown = "\n".join(finding.render("deck\x07.inp") for finding in prepared.findings)
+    assert "E103" in shown
+    assert shown.replace("\n", "").isprintable()
+    card, caret = (line for line in shown.splitlines() if " | " in line)
+    assert card[caret.index("^")] == "·"
+
+
 def test_loops_that_would_run_for_years_are_found_at_once() -> None:
     years = "LMAS\nDT        .5E-6\n" + "LOOP      99999\n" * 9 + "TIME\nRODP\n" + "NEXT\n" * 9
     (finding,) = [f for f in prepare(small(years)).findings if f.code.startswith("E")]

@@ -96,7 +96,12 @@ class Finding:
             ]
         if self.hint:
             lines.append(f"   hint: {self.hint}")
-        return "\n".join(lines)
+        return "\n".join(map(_printable, lines))
+
+
+def _printable(text: str) -> str:
+    """A text that a terminal shows as it stands: control characters become dots."""
+    return "".join(char if char.isprintable() else "·" for char in text)
 
 
 class Findings:
