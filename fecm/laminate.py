@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.deck.model import Material, Ply
+from fecm.deck.model import Material
+from fecm.deck.records import Ply
 
 Floats = NDArray[np.float64]
 

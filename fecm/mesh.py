@@ -14,16 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.deck.findings import Findings, Place
-from fecm.deck.model import (
-    Boundary,
-    Coordinates,
-    Deck,
-    ElementNodes,
-    Elements,
-    Forces,
-    NodeCodes,
-    NodeValues,
-)
+from fecm.deck.model import Boundary, Coordinates, Deck, Elements, Forces
+from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from fecm.assembly import PlateModel
 from fecm.deck.model import (
-    UNKNOWNS,
     Boundary,
     Coordinates,
     Deck,
@@ -27,6 +26,7 @@ from fecm.deck.model import (
     PrintOption,
     Segment,
 )
+from fecm.deck.records import UNKNOWNS
 from fecm.mesh import Mesh
 from fecm.program import WORDS
 from fecm.stresses import RESULTANTS, STRAINS

@@ -11,7 +11,7 @@ from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 
 from fecm.deck.findings import Findings
-from fecm.deck.model import Macro
+from fecm.deck.records import Macro
 
 NESTING = 64
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from fecm.deck.model import LoadTable
+from fecm.deck.records import LoadTable
 
 
 def load_factor(table: LoadTable, clock: float) -> float:

@@ -9,7 +9,8 @@ import numpy as np
 
 from fecm.assembly import UnsoundPlateError
 from fecm.check import Checked
-from fecm.deck.model import LoadTable, Macro, Material
+from fecm.deck.model import Material
+from fecm.deck.records import LoadTable, Macro
 from fecm.dynamics import DivergenceError, PlateState
 from fecm.impact import ImpactState
 from fecm.indentation import VIRGIN

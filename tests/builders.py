@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.assembly import Rules
-from fecm.deck.model import Ply
+from fecm.deck.records import Ply
 from fecm.elements.quadrature import gauss
 from fecm.laminate import Laminate, laminate
 from fecm.mesh import Mesh

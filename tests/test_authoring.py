@@ -18,7 +18,8 @@ from fecm.authoring.materials import MATERIALS
 from fecm.cli import cli
 from fecm.deck import Deck
 from fecm.deck.formatting import format_deck
-from fecm.deck.model import Control, Impact, Material
+from fecm.deck.model import Impact, Material
+from fecm.deck.records import Control
 from fecm.mesh import generate
 from tests.decks import APPENDIX, LONG, small
 

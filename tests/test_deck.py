@@ -12,18 +12,17 @@ import fecm
 from fecm.deck import Deck, DeckError, Reader
 from fecm.deck.model import (
     Boundary,
-    Control,
     Coordinates,
     Elements,
     Forces,
     Impact,
     Indentation,
-    Macro,
     Material,
     Page,
     PrintOption,
 )
 from fecm.deck.numbers import format_real, parse_real
+from fecm.deck.records import Control, Macro
 from tests.decks import APPENDIX, DATA_CARDS, LONG, MESH, small
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fecm.deck.model import Integration, Layer, Material, Ply
+from fecm.deck.model import Material
+from fecm.deck.records import Integration, Layer, Ply
 from fecm.laminate import (
     laminate,
     laminate_of,

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 import fecm
 from fecm.api import prepare
 from fecm.cli import cli
-from fecm.deck.model import LoadTable
+from fecm.deck.records import LoadTable
 from fecm.modes import modes
 from fecm.parts import build_plate
 from fecm.proportional import load_factor

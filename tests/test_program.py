@@ -8,7 +8,7 @@ import pytest
 import fecm
 from fecm.api import prepare
 from fecm.deck import Findings
-from fecm.deck.model import Macro
+from fecm.deck.records import Macro
 from fecm.program import compile_program, tally, walk
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink

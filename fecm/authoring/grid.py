@@ -7,7 +7,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from fecm.deck.model import Boundary, Coordinates, ElementNodes, Elements, NodeCodes, NodeValues
+from fecm.deck.model import Boundary, Coordinates, Elements
+from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
 
 # Coordinates are rounded to this part of the plate's size, so that they fit their columns.
 DIGITS = 6

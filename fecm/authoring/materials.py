@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fecm.deck.model import Ply
+from fecm.deck.records import Ply
 
 # Systems of units: names of length, force and time, and one of each in m, N and s.
 SYSTEMS = {

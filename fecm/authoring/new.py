@@ -7,19 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from fecm.authoring.grid import Grid
-from fecm.deck.model import (
-    Control,
-    Deck,
-    Impact,
-    Indentation,
-    Integration,
-    Layer,
-    Macro,
-    Material,
-    Ply,
-    Segment,
-    Units,
-)
+from fecm.deck.model import Deck, Impact, Indentation, Material, Segment, Units
+from fecm.deck.records import Control, Integration, Layer, Macro, Ply
 from fecm.laminate import laminate
 from fecm.mesh import generate
 from fecm.parts import build_plate

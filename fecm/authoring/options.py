@@ -10,7 +10,8 @@ from fecm.authoring.grid import Grid, Section, graded, listed, uniform
 from fecm.authoring.layup import LayupError, parse_layup
 from fecm.authoring.materials import MATERIALS, SYSTEMS
 from fecm.authoring.new import EDGES, SUPPORTS, Specification, new_deck
-from fecm.deck.model import Deck, Indentation, Ply, Units
+from fecm.deck.model import Deck, Indentation, Units
+from fecm.deck.records import Ply
 
 # Elements in one direction, at the most.
 MOST = 2000

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from fecm.deck.findings import Findings
-from fecm.deck.model import Integration, Material, Ply
+from fecm.deck.model import Material
+from fecm.deck.records import Integration, Ply
 from fecm.elements.quadrature import HIGHEST_ORDER
 
 THICKNESS_TOLERANCE = 1.0e-6

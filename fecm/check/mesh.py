@@ -10,7 +10,8 @@ import numpy as np
 from fecm import plate
 from fecm.check import gather
 from fecm.deck.findings import Findings
-from fecm.deck.model import Coordinates, Deck, Elements, Integration, Material
+from fecm.deck.model import Coordinates, Deck, Elements, Material
+from fecm.deck.records import Integration
 from fecm.elements import cubic, triangle
 from fecm.elements.quadrature import HIGHEST_ORDER, Rule
 from fecm.mesh import Mesh

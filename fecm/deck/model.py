@@ -1,8 +1,8 @@
 """The model: what a deck says, as plain typed objects that know nothing of mechanics.
 
-A :class:`Deck` is one problem of a file.  It keeps the cards' values as they were given; nodes and
-elements that the cards only imply are generated from it by :mod:`fecm.mesh`.  Every record knows
-the card that it was read from (`source`), which does not count when models are compared.
+A :class:`Deck` is one problem of a file: its control card, its segments in the deck's order, its
+macro program.  It keeps the cards' values as they were given; nodes and elements that the cards
+only imply are generated from it by :mod:`fecm.mesh`.
 """
 
 from __future__ import annotations
@@ -12,188 +12,28 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, TypeVar
 
-from fecm.deck.card import Fields, Source, Value, layout, write_card
-from fecm.deck.findings import Place
+from fecm.deck.card import Fields, Value, layout, write_card
+from fecm.deck.records import (
+    Control,
+    ElementNodes,
+    Integration,
+    Layer,
+    LoadTable,
+    Macro,
+    NodeCodes,
+    NodeValues,
+    Ply,
+    Record,
+    code_fields,
+    element_fields,
+    force_fields,
+    node_fields,
+)
 
 TITLE = "FECM"
 STOP = "STOP"
 
-# Least and greatest number of nodes an element.
-NODES_AN_ELEMENT = (3, 12)
-AXES = ("x", "y", "z")
-UNKNOWNS = ("u", "v", "w", "theta_x", "theta_y")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Record:
-    """Whatever was read from one card."""
-
-    source: Source | None = field(default=None, compare=False, repr=False)
-
-    def place(self, name: str = "") -> Place | None:
-        """Where the field called `name` stands in the deck; the whole card without a name."""
-        return self.source.place(name) if self.source else None
-
-
-@dataclass(frozen=True)
-class Control(Record):
-    """Control card: 6I5.
-
-    Attributes
-    ----------
-    numnp, numel, layers : int
-        Numbers of nodes, elements and layers.
-    ndm, ndf, nen : int
-        Spatial dimensions, unknowns a node, nodes an element at the most.
-    """
-
-    numnp: int
-    numel: int
-    layers: int
-    ndm: int
-    ndf: int
-    nen: int
-
-    fields: ClassVar[Fields] = layout(
-        "I5 NUMNP", "I5 NUMEL", "I5 LAYER", "I5 NDM", "I5 NDF", "I5 NEN"
-    )
-
-    def values(self) -> list[Value]:
-        """Values in the card's order."""
-        return [self.numnp, self.numel, self.layers, self.ndm, self.ndf, self.nen]
-
-
-@dataclass(frozen=True)
-class NodeValues(Record):
-    """COOR or FORC card: values at a node, and the step to the next node generated from it."""
-
-    node: int
-    increment: int
-    values: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class NodeCodes(Record):
-    """BOUN card: restraint codes of a node; a negative code carries on to generated nodes."""
-
-    node: int
-    increment: int
-    codes: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class ElementNodes(Record):
-    """ELEM card: the nodes of an element (0 where absent) and the step for generated ones."""
-
-    element: int
-    nodes: tuple[int, ...]
-    increment: int
-
-
-def node_fields(ndm: int) -> Fields:
-    """Fields of a COOR card: (2I5,7F10.0), of which `ndm` coordinates are used."""
-    return layout(
-        "I5 node", "I5 increment|incr", *(f"F10 {axis}-coordinate|{axis}" for axis in AXES[:ndm])
-    )
-
-
-def force_fields(ndf: int) -> Fields:
-    """Fields of a FORC card: (2I5,7F10.0), of which `ndf` values are used."""
-    return layout("I5 node", "I5 increment|incr", *(f"F10 value {i + 1}" for i in range(ndf)))
-
-
-def code_fields(ndf: int) -> Fields:
-    """Fields of a BOUN card: (16I5), of which `ndf` codes are used."""
-    return layout(
-        "I5 node", "I5 increment|incr", *(f"I5 code {i + 1}|c{i + 1}" for i in range(ndf))
-    )
-
-
-def element_fields(nen: int) -> Fields:
-    """Fields of an ELEM card: (16I5); the increment follows the last of the `nen` nodes."""
-    return layout(
-        "I5 element|elm", *(f"I5 node {i + 1}|n{i + 1}" for i in range(nen)), "I5 increment|incr"
-    )
-
-
-@dataclass(frozen=True)
-class Layer(Record):
-    """Layer card of MATE: (I5,F5.0,F10.0); the number is not used for placing.
-
-    Attributes
-    ----------
-    number : int
-    angle : float
-        Fibre direction in degrees, counter-clockwise from the x-axis.
-    thickness : float
-        Length.
-    """
-
-    number: int
-    angle: float
-    thickness: float
-
-    fields: ClassVar[Fields] = layout(
-        "I5 layer|lay", "F5 fibre angle|ang", "F10 layer thickness|thickness"
-    )
-
-
-@dataclass(frozen=True)
-class Integration(Record):
-    """First card of MATE: (3I5,2F10.0).
-
-    Attributes
-    ----------
-    bending, shear : int
-        Gauss orders of the bending and of the transverse shear stiffness (L1, L2).
-    points : int
-        Stress points: Gauss points of this order if positive, nodal points if negative (K).
-    thickness, width : float
-        Total thickness (length); the width is read and never used.
-    """
-
-    bending: int
-    shear: int
-    points: int
-    thickness: float
-    width: float = 0.0
-
-    fields: ClassVar[Fields] = layout(
-        "I5 bending order L1|L1", "I5 shear order L2|L2", "I5 stress-point order K|K",
-        "F10 total thickness|thickness", "F10 width",
-    )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Ply(Record):
-    """Second card of MATE: (7F10.0); mass density and elastic constants of every layer.
-
-    Attributes
-    ----------
-    density : float
-        Mass per volume.
-    nu12 : float
-        Major Poisson's ratio.
-    e1, e2, g12, g13, g23 : float
-        Moduli, force per area.
-    """
-
-    density: float
-    nu12: float
-    e1: float
-    e2: float
-    g12: float
-    g13: float
-    g23: float
-
-    fields: ClassVar[Fields] = layout(
-        "F10 mass density|density", "F10 Poisson's ratio NU12|NU12", "F10 Young's modulus E1|E1",
-        "F10 Young's modulus E2|E2", "F10 shear modulus G12|G12", "F10 shear modulus G13|G13",
-        "F10 shear modulus G23|G23",
-    )  # fmt: skip
-
-
-# Segments, each of one keyword ------------------------------------------------------------------
+_S = TypeVar("_S", bound="Segment")
 
 
 @dataclass(frozen=True)
@@ -403,74 +243,6 @@ class Page(Segment):
         """Text of the segment's cards."""
         yield "PAGE"
         yield self.carriage_control
-
-
-@dataclass(frozen=True)
-class Macro(Record):
-    """A macro card: (A4,1X,A4,1X,2F5.0).
-
-    Attributes
-    ----------
-    word : str
-        Name, in capitals.
-    option : str
-        Second word, in capitals; often blank.
-    value, second : float
-        The two numbers; 0 where blank.
-    """
-
-    word: str
-    option: str = ""
-    value: float = 0.0
-    second: float = 0.0
-
-    fields: ClassVar[Fields] = layout(
-        "A4 macro", "X1", "A4 second word", "X1", "F5 value", "F5 second value"
-    )
-
-    def text(self) -> str:
-        """Text of the card; whole numbers stand without a point, zeros at its end not at all."""
-        values: list[Value] = [self.word, self.option]
-        for number in (self.value, self.second):
-            values.append(int(number) if number.is_integer() else number)
-        while values and not values[-1]:
-            values.pop()
-        return write_card(self.fields[: len(values)], values)
-
-
-@dataclass(frozen=True)
-class LoadTable(Record):
-    """Card of PROP: (2I5,7F10.0), behind the macro program's END.
-
-    Attributes
-    ----------
-    kind, exponent : int
-        Type of the table, 1 (or blank), and the power L of the sine.
-    begin, end : float
-        Times between which the load acts.
-    constants : tuple of float
-        A1 to A5 of A1 + A2 t + A3 sin(A4 t + A5)^L.
-    """
-
-    kind: int
-    exponent: int
-    begin: float
-    end: float
-    constants: tuple[float, ...]
-
-    fields: ClassVar[Fields] = layout(
-        "I5 type", "I5 exponent|exp", "F10 begin|t_min", "F10 end|t_max",
-        *(f"F10 constant A{i}|A{i}" for i in range(1, 6)),
-    )  # fmt: skip
-
-    def text(self) -> str:
-        """Text of the card."""
-        return write_card(
-            self.fields, [self.kind, self.exponent, self.begin, self.end, *self.constants]
-        )
-
-
-_S = TypeVar("_S", bound=Segment)
 
 
 @dataclass(frozen=True)

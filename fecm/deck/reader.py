@@ -12,17 +12,8 @@ from pathlib import Path
 
 from fecm.deck.card import Card, Source
 from fecm.deck.findings import DeckError, Findings, Place
-from fecm.deck.model import (
-    NODES_AN_ELEMENT,
-    STOP,
-    TITLE,
-    UNKNOWNS,
-    Control,
-    Deck,
-    LoadTable,
-    Macro,
-    Segment,
-)
+from fecm.deck.model import STOP, TITLE, Deck, Segment
+from fecm.deck.records import NODES_AN_ELEMENT, UNKNOWNS, Control, LoadTable, Macro
 from fecm.deck.segments import READERS, SegmentReader
 from fecm.deck.stream import Stream
 

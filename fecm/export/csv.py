@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.deck.model import AXES, UNKNOWNS
+from fecm.deck.records import AXES, UNKNOWNS
 from fecm.export import ExportError
 from fecm.results.result import Result
 from fecm.results.schema import DATASETS, SCALES, STORED_BY

@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.deck.model import UNKNOWNS
+from fecm.deck.records import UNKNOWNS
 from fecm.files import beside
 from fecm.results.schema import (
     FORMAT,
