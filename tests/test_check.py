@@ -165,6 +165,12 @@ def test_numbers_at_the_edge_of_their_range_end_in_findings_not_in_exceptions() 
         assert prepare(text).errors() == []
 
 
+def test_a_clock_of_static_loads_has_no_critical_time_step() -> None:
+    static = "DT         1.0\nTANG\nLOOP          3\nTIME\nFORM\nSOLV\nDISP\nNEXT\n"
+    assert codes(small(static)) == []
+    assert codes(small(static + "LMAS\nEXCD\n")) == ["E508"]
+
+
 def test_control_characters_of_a_deck_never_reach_the_terminal() -> None:
     prepared = prepare(small(data=DATA_CARDS.replace("     115.0", "  \x1b[31m\t5")))
     shown = "\n".join(finding.render("deck\x07.inp") for finding in prepared.findings)
