@@ -35,6 +35,10 @@ class DivergenceError(ArithmeticError):
         self.reason = reason
         super().__init__(f"step {step}: {reason}")
 
+    def __reduce__(self) -> tuple[type[DivergenceError], tuple[int, str]]:
+        """Make the error again in another process."""
+        return DivergenceError, (self.step, self.reason)
+
 
 @dataclass(slots=True)
 class PlateState:
