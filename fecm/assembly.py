@@ -80,6 +80,11 @@ class PlateModel:
         return np.asarray(self.mesh.equations > 0)
 
     @cached_property
+    def _free_places(self) -> Indices:
+        """Places of the equations' unknowns in a field laid out flat."""
+        return np.flatnonzero(self._free)
+
+    @cached_property
     def _numbers(self) -> Indices:
         """Number of every unknown from 0: equations first, restrained unknowns behind them."""
         numbers = self.mesh.equations.astype(np.intp) - 1
@@ -237,7 +242,7 @@ class PlateModel:
         ndarray (numnp, 5)
         """
         full = scale * self.mesh.forces
-        full[self._free] = displacement
+        full.reshape(-1)[self._free_places] = displacement
         return full
 
     def strain_field(self, points: Rule) -> plate.StrainField:

@@ -6,6 +6,7 @@ The stored velocity belongs to the middle of the last step.  Vectors are over eq
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,8 +71,7 @@ class PlateState:
     external_work: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class PointForce:
+class PointForce(NamedTuple):
     """A force on one equation, on top of the nodal forces."""
 
     row: int
@@ -175,9 +175,10 @@ class PlateMotion:
         if self._loads is not None:
             whole = v + half * self._inverse_mass * self.unbalanced(state, factor, point)
             return 0.5 * inner(self.plate.mass * whole, whole)
-        square = inner(np.multiply(self.plate.mass, v, out=self._work), v)
-        power = -inner(v, state.internal)
-        force = inner(state.internal, state.restoring)
+        dot = inner if len(v) > _CHUNK else np.dot
+        square = float(dot(np.multiply(self.plate.mass, v, out=self._work), v))
+        power = -float(dot(v, state.internal))
+        force = float(dot(state.internal, state.restoring))
         if point is not None:
             row, F = point.row, point.force
             power += F * float(v[row])

@@ -9,7 +9,7 @@ are positive in compression.  All values are floats, or arrays with one entry a 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -101,8 +101,7 @@ class Memory:
         return _power(self.f, self.b, self.w, self.p, indentation)
 
 
-@dataclass(frozen=True, slots=True)
-class Point:
+class Point(NamedTuple):
     """An accepted indentation and its force."""
 
     indentation: Number

@@ -19,7 +19,7 @@ from fecm.results.sinks import Sink
 
 Floats = NDArray[np.float64]
 
-BLOCK = 512
+BLOCK = 1024
 # A run whose energy has grown by this factor has diverged.
 GROWTH = 10.0
 
