@@ -7,8 +7,9 @@ node or element n.  An absent node of an element, and the equation of a restrain
 from __future__ import annotations
 
 import bisect
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,22 +102,27 @@ def generate(deck: Deck, findings: Findings | None = None) -> Mesh:
     return Mesh(coordinates, elements, codes, forces, equations)
 
 
-def _known_nodes(
-    records: Sequence[NodeValues] | Sequence[NodeCodes], numnp: int, findings: Findings
-) -> Iterator[NodeValues | NodeCodes]:
-    """Yield the records whose node exists; report the others."""
-    outside = [record for record in records if not 1 <= record.node <= numnp]
+_R = TypeVar("_R", NodeValues, NodeCodes, ElementNodes)
+
+
+def _existing(
+    records: Sequence[_R], what: str, count: int, code: str, findings: Findings
+) -> list[_R]:
+    """Records whose node or element exists; the others are reported together."""
+
+    def number(record: _R) -> int:
+        return record.element if isinstance(record, ElementNodes) else record.node
+
+    outside = [record for record in records if not 1 <= number(record) <= count]
     if outside:
         more = f" (and {len(outside) - 1} more)" if len(outside) > 1 else ""
         findings.add(
-            "E301",
-            f"Node {outside[0].node}{more} does not exist; the control card gives the deck nodes "
-            f"1 to {numnp}.",
-            outside[0].place("node"),
+            code,
+            f"{what.capitalize()} {number(outside[0])}{more} does not exist; the control card "
+            f"gives the deck {what}s 1 to {count}.",
+            outside[0].place(what),
         )
-    for record in records:
-        if 1 <= record.node <= numnp:
-            yield record
+    return [record for record in records if 1 <= number(record) <= count]
 
 
 def _run(start: int, end: int, increment: int) -> Ints:
@@ -128,9 +134,7 @@ def _run(start: int, end: int, increment: int) -> Ints:
 def _interpolate(values: Floats, records: Sequence[NodeValues], findings: Findings) -> None:
     """Fill rows between two cards linearly, adding one constant step at a time (GENVEC)."""
     last: NodeValues | None = None
-    for record in _known_nodes(records, len(values), findings):
-        if not isinstance(record, NodeValues):
-            continue
+    for record in _existing(records, "node", len(values), "E301", findings):
         values[record.node - 1] = record.values
         if last is not None and last.increment != 0:
             if record.node == last.node:
@@ -154,9 +158,7 @@ def _interpolate(values: Floats, records: Sequence[NodeValues], findings: Findin
 def _carry(codes: Ints, records: Sequence[NodeCodes], findings: Findings) -> None:
     """Set restraint codes; negative ones carry on through generated nodes (PMESH)."""
     last: NodeCodes | None = None
-    for record in _known_nodes(records, len(codes), findings):
-        if not isinstance(record, NodeCodes):
-            continue
+    for record in _existing(records, "node", len(codes), "E301", findings):
         row = codes[record.node - 1]
         row[:] = record.codes
         if last is not None:
@@ -173,19 +175,8 @@ def _step(elements: Ints, records: Sequence[ElementNodes], findings: Findings) -
     """Set elements; those between two cards add the earlier card's increment (PMESH)."""
     numel = len(elements)
     last: ElementNodes | None = None
-    outside = [r for r in records if not 1 <= r.element <= numel]
-    if outside:
-        more = f" (and {len(outside) - 1} more)" if len(outside) > 1 else ""
-        findings.add(
-            "E303",
-            f"Element {outside[0].element}{more} does not exist; the control card gives the deck "
-            f"elements 1 to {numel}.",
-            outside[0].place("element"),
-        )
-    for record in records:
+    for record in _existing(records, "element", numel, "E303", findings):
         number = record.element
-        if not 1 <= number <= numel:
-            continue
         previous = 0 if last is None else last.element
         if number <= previous:
             findings.add(
