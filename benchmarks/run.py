@@ -123,15 +123,15 @@ def plain(problem: Checked, steps: int) -> float:
     impact, K, m = setup.impact, setup.plate.stiffness, setup.plate.mass
     if impact is None:
         raise ValueError("nothing hits in this deck")
-    state, row = impact.start(), impact.contact.equation
-    plate = state.plate
+    state, row = impact.start(), impact.contact.row
+    displacement, velocity = state.plate.displacement, np.zeros(setup.plate.neq)
     dt = time_step(problem.deck)
     begin = time.perf_counter()
     for _ in range(steps):
-        force = -(K @ plate.displacement)
+        force = -(K @ displacement)
         force[row] += state.contact.force
-        plate.velocity += dt * (force / m)
-        plate.displacement += dt * plate.velocity
+        velocity += dt * (force / m)
+        displacement += dt * velocity
         impact.move_projectile(state, dt)
     return time.perf_counter() - begin
 

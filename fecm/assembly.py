@@ -19,16 +19,12 @@ from fecm.congruence import congruence
 from fecm.elements.quadrature import Rule
 from fecm.laminate import Laminate
 from fecm.mesh import Mesh
-from fecm.products import CsrProduct, GroupedProduct, Product
-from fecm.solvers import AUTO, CSR
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 # Elements whose matrices are in memory at the same time.
 BLOCK = 1024
-# Fewer congruent elements than this a group, and the sparse matrix is the faster product.
-WORTH_GROUPING = 8
 
 
 class UnsoundPlateError(ArithmeticError):
@@ -93,10 +89,12 @@ class PlateModel:
         return numbers
 
     @cached_property
-    def _families(self) -> list[plate.Family]:
+    def families(self) -> list[plate.Family]:
+        """The elements, sorted by the nodes they have."""
         return plate.families(self.mesh.elements, self.mesh.coordinates)
 
-    def _stiffness_of(self, family: plate.Family) -> Floats:
+    def stiffness_of(self, family: plate.Family) -> Floats:
+        """Stiffness of each of some elements, (ne, 5 nn, 5 nn)."""
         rules = self.rules
         return plate.stiffness(
             family, self.laminate, rules.bending, rules.shear, transposed=rules.transposed
@@ -112,7 +110,7 @@ class PlateModel:
         self, matrices_of: Callable[[plate.Family], Floats]
     ) -> Iterator[tuple[Indices, Floats]]:
         """Unknowns (ne, n) and matrices (ne, n, n) of all elements, block by block."""
-        for family in self._families:
+        for family in self.families:
             same = congruence(family)
             for start in range(0, len(family.rows), BLOCK):
                 block = np.arange(start, min(start + BLOCK, len(family.rows)))
@@ -138,7 +136,7 @@ class PlateModel:
     @cached_property
     def _with_supports(self) -> sparse.csr_array:
         """K with the columns of the restrained unknowns behind those of the equations."""
-        return self._assembled(self._stiffness_of)
+        return self._assembled(self.stiffness_of)
 
     @cached_property
     def stiffness(self) -> sparse.csr_array:
@@ -154,7 +152,7 @@ class PlateModel:
     def mass(self) -> Floats:
         """Lumped M, (neq,)."""
         mass = np.zeros(self._numbers.size)
-        for family in self._families:
+        for family in self.families:
             for block in family.blocks(BLOCK):
                 lumped = plate.lumped_mass(block, self.laminate, self.rules.bending)
                 np.add.at(mass, self._numbers[block.nodes].ravel(), lumped.ravel())
@@ -165,33 +163,12 @@ class PlateModel:
         """Consistent M, sparse (neq, neq), under the bending rule; made when first asked for."""
         return self._assembled(self._mass_of)[:, : self.neq].tocsr()
 
-    def product(self, solver: str = AUTO) -> Product:
-        """K u, by the way that suits the mesh.
-
-        Parameters
-        ----------
-        solver : str
-            ``"csr"`` for the sparse matrix; otherwise elements are grouped where enough of them
-            are congruent.
-        """
-        if solver == CSR:
-            return CsrProduct(self.stiffness)
-        groups: list[tuple[Floats, Indices]] = []
-        for family in self._families:
-            same = congruence(family)
-            if len(family.rows) < WORTH_GROUPING * len(same.representatives):
-                return CsrProduct(self.stiffness)
-            matrices = self._stiffness_of(family.take(same.representatives))
-            unknowns = self._unknowns(family)
-            groups += [(K, unknowns[same.group == number]) for number, K in enumerate(matrices)]
-        return GroupedProduct(groups, self.neq)
-
     def area(self) -> float:
         """Area of the plate, length squared."""
         rule = self.rules.bending
         return sum(
             float((plate.jacobian_determinants(family, rule) @ rule.weights).sum())
-            for family in self._families
+            for family in self.families
         )
 
     def profile(self) -> int:
@@ -200,7 +177,7 @@ class PlateModel:
         The listing's JDIAG(NEQ).
         """
         first = np.arange(self.neq)
-        for family in self._families:
+        for family in self.families:
             unknowns = self._unknowns(family)
             lowest = np.where(unknowns < self.neq, unknowns, self.neq).min(axis=1)
             for column in unknowns.T:
@@ -213,7 +190,7 @@ class PlateModel:
         order = np.empty(self._numbers.size)
         order[self._numbers.ravel()] = field.ravel()
         forces = np.zeros(self._numbers.size)
-        for unknowns, K in self._element_matrices(self._stiffness_of):
+        for unknowns, K in self._element_matrices(self.stiffness_of):
             local = np.einsum("eij,ej->ei", K, order[unknowns])
             forces += np.bincount(unknowns.ravel(), local.ravel(), len(forces))
         return np.asarray(forces[self._numbers])
@@ -262,13 +239,13 @@ class PlateModel:
             If an element's numbers are beyond all range.
         """
         fastest = 0.0
-        for family in self._families:
+        for family in self.families:
             same = congruence(family)
             for block in family.take(same.representatives).blocks(BLOCK):
                 mass = plate.lumped_mass(block, self.laminate, self.rules.bending)
                 scale = 1.0 / np.sqrt(mass.reshape(len(block.rows), -1))
                 with np.errstate(all="ignore"):
-                    scaled = self._stiffness_of(block) * scale[:, :, None] * scale[:, None, :]
+                    scaled = self.stiffness_of(block) * scale[:, :, None] * scale[:, None, :]
                 if not np.isfinite(scaled).all():
                     raise UnsoundPlateError("the stiffness is beyond the range of numbers")
                 fastest = max(fastest, float(np.linalg.eigvalsh(scaled)[:, -1].max()))

@@ -1,23 +1,25 @@
 """Explicit motion of the plate: M a = P - K u.
 
-The stored velocity belongs to the middle of the last step.  Vectors are over equations.
+The central differences in increments: d = u - u_last, which is dt times the velocity in the middle
+of the last step, and d + dt^2 M^-1 (P - K u) is the next one.  Vectors are over equations, and
+are gone through piece by piece.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecm.assembly import PlateModel
-from fecm.solvers import AUTO
+from fecm.products import pieces, product_of
+from fecm.reduction import Reduction, whole
+from fecm.solvers import AUTO, CSR
+from fecm.workers import Workers
 
 Floats = NDArray[np.float64]
-
-# Longest sum that BLAS adds up in one thread.
-_CHUNK = 8192
 
 
 class DivergenceError(ArithmeticError):
@@ -47,28 +49,61 @@ class PlateState:
 
     Attributes
     ----------
+    extended : ndarray (size,)
+        The displacement, extended as the product needs it.
+    increment : ndarray (n,)
+        What the last step added to the displacement.
+    pull : ndarray (n,)
+        M^-1 K u times `area`.
     step : int
         Steps taken.
     time : float
         Sum of their time steps.
     dt : float
         The last time step.
-    displacement, velocity : ndarray (neq,)
-        The unknowns, and their velocities half a step earlier.
-    internal, restoring : ndarray (neq,)
-        K u, and M^-1 K u.
+    area : float
+        Square of the time step that `pull` is made for.
     external_work : float
         Work done by nodal forces.
+    sums : Sums
+        Inner products of the vectors.
     """
 
-    step: int
-    time: float
-    dt: float
-    displacement: Floats
-    velocity: Floats
-    internal: Floats
-    restoring: Floats
+    extended: Floats
+    increment: Floats
+    pull: Floats
+    step: int = 0
+    time: float = 0.0
+    dt: float = 0.0
+    area: float = 0.0
     external_work: float = 0.0
+    sums: Sums = field(default_factory=lambda: Sums(*[0.0] * 6))
+
+    @property
+    def displacement(self) -> Floats:
+        """The unknowns that move on their own, (n,); a view."""
+        return self.extended[: len(self.increment)]
+
+    @property
+    def velocity(self) -> Floats:
+        """Velocity in the middle of the last step, (n,)."""
+        return self.increment / self.dt if self.dt else np.zeros_like(self.increment)
+
+    @property
+    def strain_energy(self) -> float:
+        """U K u / 2 (force*length)."""
+        return 0.5 * self.sums.strain
+
+
+class Sums(NamedTuple):
+    """Inner products that the energies are made of: d increment, u displacement, P nodal loads."""
+
+    inertia: float  # d M d
+    power: float  # d K u
+    strain: float  # u K u
+    pull: float  # (K u) pull
+    load: float  # P d
+    load_pull: float  # P pull
 
 
 class PointForce(NamedTuple):
@@ -85,42 +120,115 @@ class PlateMotion:
     ----------
     plate : PlateModel
     solver : str
-        How K u is had: see :meth:`PlateModel.product`.
+        How K u is had: see :func:`~fecm.products.product_of`.
+    reduced : Reduction, optional
+        What moves; every unknown without it, and with the sparse matrix.
+    workers : Workers, optional
+        Threads to share the work of a step.
     """
 
-    def __init__(self, plate: PlateModel, solver: str = AUTO) -> None:
+    def __init__(
+        self,
+        plate: PlateModel,
+        solver: str = AUTO,
+        reduced: Reduction | None = None,
+        workers: Workers | None = None,
+    ) -> None:
+        kept = whole(plate) if reduced is None or solver == CSR else reduced
         self.plate = plate
-        self.product = plate.product(solver)
-        self._inverse_mass = 1.0 / plate.mass
-        self._work = np.empty(plate.neq)
-        loads = plate.nodal_loads
+        self.product = product_of(plate, solver, kept, workers)
+        self.mass = kept.gather(kept.sign * plate.field(plate.mass, 0.0))
+        self._slots = kept.slots
+        self._inverse_mass = 1.0 / self.mass
+        self._scale = np.zeros(kept.count)  # M^-1 times the state's area
+        self._scaled_for = 0.0
+        self._work = np.empty(kept.count)
+        loads = kept.gather(plate.field(plate.nodal_loads, 0.0))
         self._loads = loads if loads.any() else None
+        self._loads_square = float(loads @ (loads * self._inverse_mass))
+        self._prescribed = np.where(kept.sign == 0.0, plate.mesh.forces, 0.0)
+        self._prescribes = bool(self._prescribed.any())
+        self._pieces = pieces(kept.count)
+        self._viewed: PlateState | None = None
+        self._views: list[tuple[Any, ...]] = []
 
     def start(self) -> PlateState:
         """State of the plate at rest."""
-        u, v, internal, restoring = (np.zeros(self.plate.neq) for _ in range(4))
-        return PlateState(0, 0.0, 0.0, u, v, internal, restoring)
+        count = len(self.mass)
+        return PlateState(np.zeros(self.product.size), np.zeros(count), np.zeros(count))
+
+    def row(self, node: int, unknown: int) -> int:
+        """Place among the moving unknowns of an unknown of a node, both from 0.
+
+        Raises
+        ------
+        ValueError
+            If it does not move.
+        """
+        slot = int(self._slots[node, unknown])
+        if slot >= len(self.mass):
+            raise ValueError(f"unknown {unknown + 1} of node {node + 1} does not move on its own")
+        return slot
+
+    def field(self, state: PlateState, factor: float) -> Floats:
+        """Every unknown of every node, (numnp, 5).
+
+        Parameters
+        ----------
+        state : PlateState
+        factor : float
+            Load factor of the prescribed displacements.
+        """
+        full = state.extended.take(self._slots)
+        full += factor * self._prescribed if self._prescribes else 0.0  # no negative zeros
+        return full
 
     def refresh(self, state: PlateState) -> None:
-        """Make K u and its acceleration agree with the displacement."""
-        state.internal = self.product(state.displacement)
-        np.multiply(state.internal, self._inverse_mass, out=state.restoring)
+        """Make all that follows from the displacement agree with it."""
+        self._prepare(state)
+        sums = self.product.each(state.extended, self._account)
+        state.sums = sums[0] if len(sums) == 1 else Sums(*map(sum, zip(*sums, strict=True)))
 
-    def unbalanced(
-        self, state: PlateState, factor: float, point: PointForce | None = None
-    ) -> Floats:
-        """Load less internal force of every equation, at the state's instant.
+    def _prepare(self, state: PlateState) -> None:
+        """Scale the masses for the state's time step, and cut all vectors into pieces."""
+        if self._scaled_for != state.area:
+            np.multiply(self._inverse_mass, state.area, out=self._scale)
+            self._scaled_for = state.area
+        if self._viewed is state:
+            return
+        own = (state.displacement, state.increment, state.pull)
+        vectors = (*own, self._scale, self.mass, self._work)
+        loads = self._loads
+        self._views = [
+            (*(v[piece] for v in vectors), None if loads is None else loads[piece])
+            for piece in self._pieces
+        ]
+        self._viewed = state
+
+    def _account(self, number: int, internal: Floats) -> Sums:
+        """Pull and sums of one piece, from K u."""
+        u, d, pull, scale, mass, work, loads = self._views[number]
+        np.multiply(internal, scale, out=pull)
+        np.multiply(mass, d, out=work)
+        return Sums(
+            float(np.dot(work, d)),
+            float(np.dot(d, internal)),
+            float(np.dot(u, internal)),
+            float(np.dot(internal, pull)),
+            0.0 if loads is None else float(np.dot(loads, d)),
+            0.0 if loads is None else float(np.dot(loads, pull)),
+        )
+
+    def unbalanced(self, state: PlateState, factor: float) -> Floats:
+        """Load less internal force of every equation.
 
         Parameters
         ----------
         state : PlateState
         factor : float
             Load factor of the nodal forces.
-        point : PointForce, optional
         """
-        force = -state.internal
-        if point is not None:
-            force[point.row] += point.force
+        force = -self.product(state.displacement)
         if self._loads is not None:
             force += factor * self._loads
         return force
@@ -148,42 +256,58 @@ class PlateMotion:
         kick : float, optional
             Time between the middles of the last step and of this one; `dt` without it.
         """
-        over, v = dt if kick is None else kick, state.velocity
-        v -= np.multiply(state.restoring, over, out=self._work)
+        area = dt * (dt if kick is None else kick)
+        if state.area != area:
+            state.area = area
+            self.refresh(state)
+        if state.dt != dt:
+            state.increment *= dt / state.dt if state.dt else 1.0
+            state.dt = dt
+        self._prepare(state)
         if point is not None:
-            v[point.row] += over * point.force * self._inverse_mass[point.row]
-        if self._loads is not None:
-            v += (over * factor) * (self._loads * self._inverse_mass)
-        moved = np.multiply(v, dt, out=self._work)
-        state.displacement += moved
-        if self._loads is not None:
-            state.external_work += factor * inner(self._loads, moved)
+            row, force = point
+            state.pull[row] -= force * self._scale[row]
+        for u, d, pull, scale, _, _, loads in self._views:
+            d -= pull
+            if loads is not None:
+                d += factor * scale * loads
+            u += d
         self.refresh(state)
+        state.external_work += factor * state.sums.load
         state.step += 1
         state.time += dt
-        state.dt = dt
 
     def kinetic_energy(
         self, state: PlateState, factor: float, point: PointForce | None = None
     ) -> float:
         """Kinetic energy at the displacement's instant (force*length).
 
-        The stored velocity is half a step old, so that the energy is that of v + dt/2 a; without
-        nodal forces its square is taken apart, which needs no more vectors than the step has.
+        The stored velocity is half a step old, so that the energy is that of v + dt/2 a, with
+        a = M^-1 (P - K u).  Its square is taken apart, which needs no vector that the step has not.
+
+        Parameters
+        ----------
+        state : PlateState
+        factor : float
+            Load factor of the nodal forces.
+        point : PointForce, optional
         """
-        v, half = state.velocity, 0.5 * state.dt
-        if self._loads is not None:
-            whole = v + half * self._inverse_mass * self.unbalanced(state, factor, point)
-            return 0.5 * inner(self.plate.mass * whole, whole)
-        dot = inner if len(v) > _CHUNK else np.dot
-        square = float(dot(np.multiply(self.plate.mass, v, out=self._work), v))
-        power = -float(dot(v, state.internal))
-        force = float(dot(state.internal, state.restoring))
+        dt2 = state.dt**2
+        if not dt2:
+            return 0.0
+        inertia, power, _, pull, load, load_pull = state.sums
+        to_step = dt2 / state.area
+        work = factor * load - power  # d (P - K u)
+        force = factor * (factor * self._loads_square * dt2 - 2.0 * load_pull * to_step)
+        force += pull * to_step  # dt^2 (P - K u) M^-1 (P - K u)
         if point is not None:
-            row, F = point.row, point.force
-            power += F * float(v[row])
-            force += F * (F * float(self._inverse_mass[row]) - 2.0 * float(state.restoring[row]))
-        return 0.5 * square + half * (power + 0.5 * half * force)
+            row, F = point
+            inverse, p = float(self._inverse_mass[row]) * dt2, float(state.pull[row]) * to_step
+            work += F * float(state.increment[row])
+            force += F * (F * inverse - 2.0 * p)
+            if self._loads is not None:
+                force += 2.0 * factor * F * float(self._loads[row]) * inverse
+        return 0.5 * (inertia / dt2 + work + 0.25 * force)
 
     def central_difference(self, state: PlateState, dt: float, factor: float) -> None:
         """Take one step of the central differences, from rest or from the last step.
@@ -192,12 +316,3 @@ class PlateMotion:
         change of the time step is met in the same way.
         """
         self.advance(state, dt, factor, kick=0.5 * (state.dt + dt))
-
-
-def inner(a: Floats, b: Floats) -> float:
-    """Inner product, the same to the last bit whatever the number of threads."""
-    if len(a) <= _CHUNK:
-        return float(np.dot(a, b))
-    return sum(
-        float(np.dot(a[i : i + _CHUNK], b[i : i + _CHUNK])) for i in range(0, len(a), _CHUNK)
-    )

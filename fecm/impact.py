@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.assembly import PlateModel
-from fecm.dynamics import DivergenceError, PlateMotion, PlateState, PointForce
+from fecm.dynamics import DivergenceError, PlateMotion, PlateState, PointForce, Sums
 from fecm.indentation import Law, Memory, Point
 from fecm.projectile import WILSON_THETA, Rod, RodState, WilsonStep, rigid_approach
 
@@ -61,34 +61,36 @@ class ImpactState:
         """Store the state as plain arrays, from which :meth:`from_arrays` makes it again."""
         plate = self.plate
         scalars = [
-            plate.step, plate.time, plate.dt, plate.external_work, self.contact.indentation,
-            self.contact.force, self.plate_w, self.contact_work, self.unsettled,
+            plate.step, plate.time, plate.dt, plate.area, plate.external_work,
+            self.contact.indentation, self.contact.force, self.plate_w, self.contact_work,
+            self.unsettled,
         ]  # fmt: skip
         memory = [getattr(self.memory, f.name) for f in dataclasses.fields(Memory)]
         return {
             "scalars": np.array(scalars, dtype=float),
+            "sums": np.array(plate.sums),
             "memory": np.array(memory, dtype=float),
-            "displacement": plate.displacement.copy(),
-            "velocity": plate.velocity.copy(),
-            "internal": plate.internal.copy(),
-            "restoring": plate.restoring.copy(),
+            "extended": plate.extended.copy(),
+            "increment": plate.increment.copy(),
+            "pull": plate.pull.copy(),
             "rod": self.rod.motion.copy(),
         }
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, Floats]) -> ImpactState:
         """Make the state again that :meth:`to_arrays` stored."""
-        step, time, dt, external, a, force, w, work, unsettled = arrays["scalars"].tolist()
+        step, time, dt, area, external, a, force, w, work, unsettled = arrays["scalars"].tolist()
         branch, *curve = arrays["memory"].tolist()
         plate = PlateState(
+            arrays["extended"].copy(),
+            arrays["increment"].copy(),
+            arrays["pull"].copy(),
             int(step),
             time,
             dt,
-            arrays["displacement"].copy(),
-            arrays["velocity"].copy(),
-            arrays["internal"].copy(),
-            arrays["restoring"].copy(),
+            area,
             external,
+            Sums(*arrays["sums"].tolist()),
         )
         return cls(
             plate,
@@ -107,8 +109,8 @@ class Contact:
 
     Attributes
     ----------
-    equation : int
-        Row of the impact unknown among the equations.
+    row : int
+        Place of the impact unknown among those that move.
     velocity : float
         Approach velocity, length/time.
     plate_moves : bool
@@ -119,7 +121,7 @@ class Contact:
         Whether the rod keeps the constants of the first time step (the slip ``rod-dt``).
     """
 
-    equation: int
+    row: int
     velocity: float
     plate_moves: bool = True
     strains_start_moving: bool = False
@@ -168,7 +170,7 @@ class Impact:
 
     def point_force(self, state: ImpactState) -> PointForce:
         """The contact force on the plate."""
-        return PointForce(self.contact.equation, state.contact.force)
+        return PointForce(self.contact.row, state.contact.force)
 
     def advance(self, state: ImpactState, dt: float, factor: float = 1.0) -> None:
         """Take one step.
@@ -208,13 +210,9 @@ class Impact:
         """Iterate force and tip acceleration, then move the whole rod with what came out."""
         law, last, memory = self.law, state.contact, state.memory
         step = self._rod_step(dt)
-        w = (
-            float(state.plate.displacement[self.contact.equation])
-            if self.contact.plate_moves
-            else 0.0
-        )
+        w = state.plate.extended.item(self.contact.row) if self.contact.plate_moves else 0.0
         motion = step.free_motion(state.rod)
-        base, gain = float(motion[2 * step.n]), float(step.h[2 * step.n])
+        base, gain = motion.item(2 * step.n), step.gain
         u, v, acceleration = state.rod.motion[:, 0].tolist()
         drift, weight = u + dt * v + dt**2 / 3.0 * acceleration, dt**2 / 6.0
         carried = (1.0 - WILSON_THETA) * last.force
@@ -230,7 +228,7 @@ class Impact:
             state.unsettled += 1
         motion += step.h * (carried + WILSON_THETA * force)
         state.rod = RodState(motion.reshape(3, step.n))
-        indentation = -float(motion[0]) - w
+        indentation = -motion.item(0) - w
         state.memory = law.accept(memory, last, indentation)
         state.contact = Point(indentation, force)
         state.plate_w = w

@@ -173,6 +173,8 @@ class MemoryLaw:
         """Memory on whose curve `a` lies, coming from the last accepted point."""
         falls = a < last.indentation
         virgin = m.branch == VIRGIN
+        if virgin is True and not falls:
+            return m  # one case, on the first loading curve: the most frequent one
         leaves = virgin & falls
         returns = (m.branch != VIRGIN) & (a >= m.peak)
         turns_up = (m.branch == UNLOADING) & (a > last.indentation) & (a < m.peak)

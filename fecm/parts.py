@@ -19,7 +19,12 @@ from fecm.laminate import laminate_of
 from fecm.mesh import Mesh
 from fecm.plate import StrainField
 from fecm.projectile import LISTING_DENSITY, REPORT_DENSITY, Rod, Station, report_rod
-from fecm.solvers import AUTO
+from fecm.reduction import reduction
+from fecm.solvers import AUTO, CSR
+from fecm.workers import Workers, available
+
+# Unknowns from which on threads save more than they cost.
+WORTH_SHARING = 50_000
 
 
 @dataclass(frozen=True)
@@ -90,7 +95,7 @@ def build_impact(deck: Deck, motion: PlateMotion, rod: Rod, slips: frozenset[str
     constants = Constants(measured.k, measured.alpha_p, measured.s_p, measured.q)
     law: Law = StickyLaw(constants) if "reload" in slips else MemoryLaw(constants)
     contact = Contact(
-        equation=int(motion.plate.mesh.equations[card.node - 1, card.dof - 1]) - 1,
+        row=motion.row(card.node - 1, card.dof - 1),
         velocity=card.velocity,
         plate_moves="target" not in slips,
         strains_start_moving="rod-start" in slips,
@@ -100,7 +105,14 @@ def build_impact(deck: Deck, motion: PlateMotion, rod: Rod, slips: frozenset[str
 
 
 def set_up(
-    deck: Deck, mesh: Mesh, slips: frozenset[str], *, hits: bool = True, solver: str = AUTO
+    deck: Deck,
+    mesh: Mesh,
+    slips: frozenset[str],
+    *,
+    hits: bool = True,
+    moves_only: bool = False,
+    solver: str = AUTO,
+    threads: int = 0,
 ) -> Setup:
     """Make the parts of a checked problem, with the slips that are on.
 
@@ -111,11 +123,21 @@ def set_up(
     slips : frozenset of str
     hits : bool
         Whether there is a projectile.
+    moves_only : bool
+        Whether the plate only moves from rest, so that what provably stays at rest can be left out.
     solver : str
-        How K u is had: see :meth:`PlateModel.product`.
+        How K u is had: see :func:`~fecm.products.product_of`.
+    threads : int
+        Threads that share the work of a step; 0 takes every core for a large mesh.
     """
     plate, rod = build_plate(deck, mesh, slips), build_rod(slips)
-    motion = PlateMotion(plate, solver)
+    hit = None
+    if hits:
+        card = deck.need(ImpactCard)
+        hit = (card.node - 1, card.dof - 1)
+    reduced = reduction(plate, hit) if moves_only and solver != CSR else None
+    workers = Workers(threads or (available() if plate.neq >= WORTH_SHARING else 1))
+    motion = PlateMotion(plate, solver, reduced, workers)
     middle = rod.elements // 2 + 1
     return Setup(
         plate=plate,

@@ -8,6 +8,7 @@ kappa_y = -theta_y,y.  Arrays over elements have the element first, then the qua
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -291,6 +292,10 @@ def consistent_mass(family: Family, laminate: Laminate, rule: Rule) -> Floats:
     return M.reshape(ne, nn * UNKNOWNS, nn * UNKNOWNS)
 
 
+# Elements whose strains are found at once: so few that BLAS uses one thread.
+STRAIN_BLOCK = 256
+
+
 class StrainField:
     """Curvatures and transverse shear strains at the same points of every element.
 
@@ -310,46 +315,65 @@ class StrainField:
         self, elements: Ints, coordinates: Floats, rule: Rule, *, transposed: bool = False
     ) -> None:
         self.shape = (len(elements), len(rule.xi))
-        self._parts: list[tuple[Family, Floats, Floats]] = []
+        self._families: list[tuple[Family, Floats]] = []
+        self._blocks: list[tuple[NDArray[np.intp], NDArray[np.intp], Floats, Floats]] = []
         for family in families(elements, coordinates):
             values, local = local_shape_functions(family, rule)
-            # Columns: d/dxi, d/deta and value at every point, so that one product gives them all.
-            table = np.concatenate([local[:, 0], local[:, 1], values]).T.copy()
+            self._families.append((family, values))
+            # Rows: d/dxi, d/deta and value at every point, so that one product gives them all.
+            table = np.concatenate([local[:, 0], local[:, 1], values])
             inverse = inverse_jacobian(family, local, transposed=transposed)[0]
-            self._parts.append((family, table, inverse.transpose(2, 3, 1, 0).copy()))
+            for start in range(0, len(family.rows), STRAIN_BLOCK):
+                cut = slice(start, start + STRAIN_BLOCK)
+                places = family.nodes[cut].T[:, None] * UNKNOWNS + np.array([2, 3, 4])[:, None]
+                self._blocks.append(
+                    (
+                        family.rows[cut],
+                        places,
+                        table,
+                        inverse[cut].transpose(2, 3, 1, 0)[:, :, :, None].copy(),
+                    )
+                )
 
     def places(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """Where the points are: x and y, (numel, npt)."""
         x, y = np.empty((2, *self.shape))
-        for family, table, _ in self._parts:
-            values = table[:, 2 * self.shape[1] :]
-            place = np.einsum("eni,np->iep", coordinates[family.nodes], values)
+        for family, values in self._families:
+            place = np.einsum("eni,pn->iep", coordinates[family.nodes], values)
             x[family.rows], y[family.rows] = place
         return x, y
 
     def evaluate(self, displacement: Floats) -> Floats:
-        """Strains of a displacement field.
+        """Strains of a displacement field, or of several.
 
         Parameters
         ----------
-        displacement : ndarray (numnp, 5)
+        displacement : ndarray (numnp, 5) or (rows, numnp, 5)
             All unknowns of all nodes.
 
         Returns
         -------
-        ndarray (5, numel, npt)
+        ndarray (5, numel, npt) or (5, rows, numel, npt)
             kappa_x, kappa_y, kappa_xy (1/length), gamma_yz, gamma_xz.
         """
-        strains = np.empty((len(STRAINS), *self.shape))
-        for family, table, inverse in self._parts:
-            ne, npt = len(family.rows), self.shape[1]
-            q = displacement[family.nodes, 2:].transpose(2, 0, 1).reshape(3 * ne, -1)
-            at = (q @ table).reshape(3, ne, 3, npt).transpose(0, 2, 3, 1)  # unknown, kind, point, e
-            xi, eta, (_, theta_x, theta_y) = at[:, 0], at[:, 1], at[:, 2]
-            w_x, tx_x, ty_x = inverse[0, 0] * xi + inverse[0, 1] * eta
-            w_y, tx_y, ty_y = inverse[1, 0] * xi + inverse[1, 1] * eta
+        leading = displacement.shape[:-2]
+        fields = displacement.reshape(math.prod(leading), -1)
+        strains = np.empty((len(STRAINS), len(fields), *self.shape))
+        npt = self.shape[1]
+        for rows, places, table, inverse in self._blocks:
+            q = fields.take(places, axis=1).reshape(len(fields), len(places), -1)
+            at = (table @ q).reshape(len(fields), 3, npt, 3, len(rows))
+            xi, eta, values = at.swapaxes(0, 1)  # each: field, point, unknown, element
+            dx = inverse[0, 0] * xi + inverse[0, 1] * eta
+            dy = inverse[1, 0] * xi + inverse[1, 1] * eta
             # 0.0 - a, so that a plate at rest has no negative zeros.
-            parts = (0.0 - tx_x, 0.0 - ty_y, 0.0 - tx_y - ty_x, w_y - theta_y, w_x - theta_x)
-            for component, values in enumerate(parts):
-                strains[component, family.rows] = values.T
-        return strains
+            parts = (
+                0.0 - dx[:, :, 1],
+                0.0 - dy[:, :, 2],
+                0.0 - dy[:, :, 1] - dx[:, :, 2],
+                dy[:, :, 0] - values[:, :, 2],
+                dx[:, :, 0] - values[:, :, 1],
+            )
+            for component, part in enumerate(parts):
+                strains[component][:, rows] = part.swapaxes(1, 2)
+        return strains.reshape(len(STRAINS), *leading, *self.shape)

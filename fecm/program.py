@@ -27,8 +27,9 @@ class Word:
     meaning : str
         What it does, in one sentence.
     value : str
-        What its number is: ``"count"`` (whole, not negative), ``"time step"`` or ``"tolerance"``
-        (positive; 0 is a time step by itself), or empty where it takes none.
+        What its number is: ``"count"`` (whole, not negative), ``"every"`` (the same, 0 or blank
+        counting as 1), ``"time step"`` or ``"tolerance"`` (positive; 0 is a time step by itself),
+        or empty where it takes none.
     needs : tuple of str
         Words that must have been carried out before; ``"LMAS|CMAS"`` is one or the other.
     inside : bool
@@ -60,17 +61,17 @@ WORDS = {
         Word("TOL", "Sets the tolerance of CONV.", "tolerance"),
         Word("CONV", "Leaves the loop once the solution stands still.", "", ("SOLV",), True),
         Word("REAC", "Stores and prints the reactions.", "", ("SOLV|EXCD|RODP",)),
-        Word("EIGE", "Finds the N lowest natural modes.", "count", ("LMAS|CMAS",)),
+        Word("EIGE", "Finds the N lowest natural modes.", "every", ("LMAS|CMAS",)),
         Word("EXCD", "Takes one step of central differences.", "", ("LMAS", "DT")),
         Word(
             "RODP",
             "Takes one impact step; stores contact and strains at every N-th.",
-            "count",
+            "every",
             ("LMAS", "DT"),
         ),
-        Word("DISP", "Stores displacements at every N-th pass of the loop.", "count"),
+        Word("DISP", "Stores displacements at every N-th pass of the loop.", "every"),
         Word(
-            "STRE", "Stores and prints strains and stress resultants at every N-th pass.", "count"
+            "STRE", "Stores and prints strains and stress resultants at every N-th pass.", "every"
         ),
         Word("CHEC", "Reports mesh and storage."),
     )
@@ -92,6 +93,11 @@ Body = tuple[Macro | Loop, ...]
 def every(macro: Macro) -> int:
     """N of a macro that acts at every N-th step or pass; 1 where it is blank."""
     return max(1, int(macro.value))
+
+
+def number(macro: Macro) -> float:
+    """What a macro's number means: its N where it has one, otherwise what stands on the card."""
+    return every(macro) if WORDS[macro.word].value == "every" else macro.value
 
 
 def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
@@ -178,7 +184,7 @@ def _check_order(word: Word, macro: Macro, done: set[str], findings: Findings) -
 
 def _check_value(word: Word, macro: Macro, findings: Findings) -> None:
     value = macro.value
-    if word.value == "count" and (value < 0 or not value.is_integer()):
+    if word.value in ("count", "every") and (value < 0 or not value.is_integer()):
         findings.add(
             "E505",
             f"{word.name} takes a whole number that is not negative, not {value:g}.",
@@ -220,6 +226,11 @@ def flat(body: Body) -> Iterator[Macro]:
 def hits(body: Body) -> bool:
     """Whether a program takes impact steps."""
     return any(macro.word == "RODP" for macro in flat(body))
+
+
+def moves_only(body: Body) -> bool:
+    """Whether a program moves the plate from rest, and finds no static solution."""
+    return all(macro.word not in ("TANG", "FORM", "SOLV") for macro in flat(body))
 
 
 # Words that take a time step.

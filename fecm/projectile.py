@@ -90,6 +90,19 @@ class Rod:
             m[2 * element : 2 * element + 4] += np.tile(share, 2)
         return m
 
+    def kinetic_energy(self, velocity: Floats) -> Floats:
+        """Kinetic energy of velocities (rows, n), one a row (force*length)."""
+        return np.asarray(0.5 * np.einsum("ri,ri,i->r", velocity, velocity, self.mass()))
+
+    def strain_energy(self, displacement: Floats) -> Floats:
+        """Strain energy of displacements (rows, n), one a row (force*length)."""
+        K, u = self.stiffness(), displacement
+        # Diagonal by diagonal, of which there are few, and in an order of its own.
+        energy = 0.5 * np.einsum("ri,ri,i->r", u, u, np.diagonal(K))
+        for off in range(1, 4):
+            energy += np.einsum("ri,ri,i->r", u[:, :-off], u[:, off:], np.diagonal(K, off))
+        return np.asarray(energy)
+
 
 @dataclass(frozen=True)
 class Station:
@@ -179,6 +192,8 @@ class WilsonStep:
     ----------
     T : ndarray (3 n, 3 n)
     h : ndarray (3 n,)
+    gain : float
+        The tip's acceleration per force, of `h`.
     n : int
         Number of the rod's unknowns.
     """
@@ -206,6 +221,7 @@ class WilsonStep:
         self.T = np.vstack([displacement, velocity, acceleration])
         gain = a4 * effective[:, 0]
         self.h = np.concatenate([tau**2 / 6.0 * gain, tau / 2.0 * gain, gain])
+        self.gain = float(gain[0])
 
     def free_motion(self, state: RodState) -> Floats:
         """New state if no force acted on the tip, (3 n, ...)."""

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from fecm.assembly import UnsoundPlateError
 from fecm.check import Checked
 from fecm.deck.model import Material
-from fecm.deck.records import LoadTable, Macro
+from fecm.deck.records import LoadTable
 from fecm.dynamics import DivergenceError, PlateState
 from fecm.impact import ImpactState
 from fecm.indentation import VIRGIN
@@ -18,7 +20,7 @@ from fecm.modes import modes
 from fecm.parts import Setup, set_up
 from fecm.plate import Floats
 from fecm.printout import Printer
-from fecm.program import every, hits, tally, walk
+from fecm.program import Body, Loop, hits, moves_only, number, tally
 from fecm.proportional import load_factor
 from fecm.recording.recorder import Recorder
 from fecm.results.schema import FORMAT, FORMAT_VERSION
@@ -31,6 +33,8 @@ from fecm.units import unit_names
 from fecm.version import __version__
 
 Progress = Callable[[int, int], None]
+# Given the pass; whether to leave the innermost loop.
+Act = Callable[[int], "bool | None"]
 
 # Change of the displacement, relative to it, below which CONV leaves its loop.
 TOLERANCE = 1.0e-9
@@ -53,7 +57,9 @@ class Simulation:
     printer : Printer
         Writes the printed output.
     solver : str
-        How K u is had: see :meth:`PlateModel.product`.
+        How K u is had: see :func:`~fecm.products.product_of`.
+    threads : int
+        Threads that share the work of a step; 0 takes every core for a large mesh.
     notes : list of str
         What the user should know of the run.
     """
@@ -64,6 +70,7 @@ class Simulation:
     progress: Progress = lambda done, steps: None
     printer: Printer = field(default_factory=Printer)
     solver: str = AUTO
+    threads: int = 0
     notes: list[str] = field(default_factory=list, init=False)
     setup: Setup = field(init=False)
     plate: PlateState = field(init=False)
@@ -83,7 +90,15 @@ class Simulation:
     def __post_init__(self) -> None:
         deck, mesh, program = self.checked.deck, self.checked.mesh, self.checked.program
         with np.errstate(all="ignore"):
-            self.setup = set_up(deck, mesh, self.slips, hits=hits(program), solver=self.solver)
+            self.setup = set_up(
+                deck,
+                mesh,
+                self.slips,
+                hits=hits(program),
+                moves_only=moves_only(program),
+                solver=self.solver,
+                threads=self.threads,
+            )
         self.plate = self.setup.motion.start()
         if self.setup.impact is not None:
             self.impact = self.setup.impact.start(self.plate)
@@ -144,20 +159,43 @@ class Simulation:
             If a static solution is asked for and the plate is not held.
         """
         self.printer.problem(self.checked.deck, self.checked.mesh, self.setup.plate)
-        program = walk(self.checked.program)
+        carry_out = self._bound(self.checked.program)
         try:
             with np.errstate(all="ignore"):  # an overflow is found, and said better, below
-                answer: bool | None = None
-                while not self.ended:
-                    try:
-                        macro, current = program.send(answer)
-                    except StopIteration:
-                        break
-                    answer = ACTIONS[macro.word](self, macro, current)
+                carry_out(1)
                 self._recorder.finish()
             self._footer()
         except DivergenceError as diverged:
             raise DivergenceError(diverged.step, f"{diverged.reason}; {self._cause()}") from None
+
+    def _bound(self, body: Body) -> Act:
+        """Bind a program's macros to what they do, so that a pass only has to call them."""
+        acts = [
+            self._repeated(item)
+            if isinstance(item, Loop)
+            else partial(ACTIONS[item.word], self, number(item))
+            for item in body
+        ]
+
+        def carry_out(current: int) -> bool:
+            for act in acts:  # noqa: SIM110, a generator would cost a third of a pass
+                if act(current):
+                    return True
+            return False
+
+        return carry_out
+
+    def _repeated(self, loop: Loop) -> Act:
+        """Bind a loop."""
+        carry_out = self._bound(loop.body)
+
+        def repeat(_: int) -> bool:
+            for current in range(1, loop.count + 1):
+                if carry_out(current):
+                    break
+            return self.ended
+
+        return repeat
 
     def _cause(self) -> str:
         """Why a run diverged, as far as the time step tells."""
@@ -180,25 +218,25 @@ class Simulation:
 
     def field(self) -> Floats:
         """Every unknown of every node now, (numnp, 5)."""
-        return self.setup.plate.field(self.plate.displacement, self.factor())
+        return self.setup.motion.field(self.plate, self.factor())
 
-    def proportional_load(self, macro: Macro, current: int) -> None:
+    def proportional_load(self, n: float, current: int) -> None:
         """PROP: read a table, or (under the slip ``prop``) take its value at t = 0."""
-        if macro.value > 0:
+        if n > 0:
             self.table = self._tables.pop(0) if self._tables else self.table
             self.constant_factor = 0.0
         elif self.table is not None:
             self.constant_factor = load_factor(self.table, 0.0)
 
-    def set_time_step(self, macro: Macro, current: int) -> None:
+    def set_time_step(self, n: float, current: int) -> None:
         """DT; 0 takes a part of the critical time step."""
-        self.dt = macro.value
+        self.dt = n
         if not self.dt:
             critical = self.setup.plate.critical_time_step()
             self.dt = float(f"{SAFE * critical:.3g}")
             self.notes.append(f"DT 0: took {self.dt:g}, {SAFE:g} of the critical {critical:.4g}")
 
-    def advance_clock(self, macro: Macro, current: int) -> None:
+    def advance_clock(self, n: float, current: int) -> None:
         """TIME."""
         if "time" not in self.slips:
             self.clock += self.dt
@@ -213,21 +251,22 @@ class Simulation:
         if not self.plate.step % self._tick:
             self.progress(self.plate.step, self._sizes.steps)
 
-    def impact_step(self, macro: Macro, current: int) -> None:
+    def impact_step(self, n: int, current: int) -> None:
         """RODP: one impact step; contact and strains at every N-th."""
         if self.setup.impact is None or self.impact is None:
             return
         self._before_step()
-        stores = (self.plate.step + 1) % every(macro) == 0
+        plate = self.plate
+        stores = not (plate.step + 1) % n
         if stores and "tapes" in self.slips:
-            self._recorder.strains(self.plate.step + 1, self.plate.time, self.field())
+            self._recorder.strains(plate.step + 1, plate.time, self.field())
         self.setup.impact.advance(self.impact, self.dt, self.factor())
-        self._recorder.steps.step(self.plate, self.impact, self.factor(), contact_row=stores)
+        self._recorder.steps.step(plate, self.impact, self.factor(), contact_row=stores)
         if stores and "tapes" not in self.slips:
-            self._recorder.strains(self.plate.step, self.plate.time, self.field())
+            self._recorder.strains(plate.step, plate.time, self.field())
         self._after_step()
 
-    def central_difference(self, macro: Macro, current: int) -> None:
+    def central_difference(self, n: float, current: int) -> None:
         """EXCD: one step of the plate alone, under the given loads."""
         self._before_step()
         # Central differences take the loads of the state's own instant, which TIME has left.
@@ -239,71 +278,72 @@ class Simulation:
 
     # Statics and modes ---------------------------------------------------------------------------
 
-    def form_tangent(self, macro: Macro, current: int) -> None:
+    def form_tangent(self, n: float, current: int) -> None:
         """TANG."""
         if self._tangent is None:
             self._tangent = Tangent(self.setup.plate)
 
-    def form_residual(self, macro: Macro, current: int) -> None:
+    def form_residual(self, n: float, current: int) -> None:
         """FORM."""
         self._residual = self.setup.motion.unbalanced(self.plate, self.factor())
 
-    def solve(self, macro: Macro, current: int) -> None:
+    def solve(self, n: float, current: int) -> None:
         """SOLV."""
         if self._tangent is None or self._residual is None:
             return
         change = self._tangent.solve(self._residual)
-        self.plate.displacement += change
+        displacement = self.plate.displacement
+        displacement += change
         self.setup.motion.refresh(self.plate)
-        size = float(np.linalg.norm(self.plate.displacement))
+        size = float(np.linalg.norm(displacement))
         self._settled = float(np.linalg.norm(change)) <= self.tolerance * size
 
-    def set_tolerance(self, macro: Macro, current: int) -> None:
+    def set_tolerance(self, n: float, current: int) -> None:
         """TOL."""
-        self.tolerance = macro.value
+        self.tolerance = n
 
-    def leave_if_settled(self, macro: Macro, current: int) -> bool:
+    def leave_if_settled(self, n: float, current: int) -> bool:
         """CONV: leave the loop once the last solution changed nothing."""
         return self._settled
 
-    def lump_mass(self, macro: Macro, current: int) -> None:
+    def lump_mass(self, n: float, current: int) -> None:
         """LMAS."""
         self.consistent = False
 
-    def form_consistent_mass(self, macro: Macro, current: int) -> None:
+    def form_consistent_mass(self, n: float, current: int) -> None:
         """CMAS."""
         self.consistent = True
 
-    def find_modes(self, macro: Macro, current: int) -> None:
+    def find_modes(self, n: int, current: int) -> None:
         """EIGE."""
-        found = modes(self.setup.plate, every(macro), consistent=self.consistent)
-        for number, (omega, shape) in enumerate(
+        found = modes(self.setup.plate, n, consistent=self.consistent)
+        for mode, (omega, shape) in enumerate(
             zip(found.angular_frequency, found.shapes, strict=True), start=1
         ):
             field = self.setup.plate.field(shape, 0.0)
-            columns = {"number": number, "angular_frequency": omega, "shape": field}
+            columns = {"number": mode, "angular_frequency": omega, "shape": field}
             self._recorder.row("modes", self.plate.step, self.plate.time, columns)
         self.printer.modes(found.angular_frequency)
 
     # Output --------------------------------------------------------------------------------------
 
-    def store_displacements(self, macro: Macro, current: int) -> None:
+    def store_displacements(self, n: float, current: int) -> None:
         """DISP."""
-        if current % every(macro) == 0:
+        if current % n == 0:
             field = self.field()
             self._recorder.displacements(self.plate.step, self.plate.time, field)
             if self.impact is None:
                 self.printer.displacements(field, self.plate.time)
 
-    def store_reactions(self, macro: Macro, current: int) -> None:
+    def store_reactions(self, n: float, current: int) -> None:
         """REAC."""
-        force = reactions(self.setup.plate, self.plate.displacement, self.factor())
+        force = reactions(self.setup.plate, self.field(), self.factor())
         self._recorder.row("reactions", self.plate.step, self.plate.time, {"force": force})
         self.printer.reactions(force, self.checked.mesh, self.plate.time)
 
-    def store_stresses(self, macro: Macro, current: int) -> None:
+    def store_stresses(self, n: float, current: int) -> None:
         """STRE."""
-        if current % every(macro):
+        if current % n:
             return
         points = self.setup.stress_points
         values = strains_and_resultants(points, self.setup.plate.laminate, self.field())
@@ -311,15 +351,17 @@ class Simulation:
         places = points.places(self.checked.mesh.coordinates)
         self.printer.stresses(values, places, self.clock)
 
-    def check(self, macro: Macro, current: int) -> None:
+    def check(self, n: float, current: int) -> bool:
         """CHEC; ends the program under its slip."""
         profile = self.setup.plate.profile()
         self.sink.attributes("mesh", {"equations": self.setup.plate.neq, "profile": profile})
         self.printer.check(self.setup.plate, profile)
         self.ended = "check-end" in self.slips
+        return self.ended
 
 
-Action = Callable[[Simulation, Macro, int], "bool | None"]
+# Given N, or what else stands on the card, and the pass; True leaves the innermost loop.
+Action = Callable[[Simulation, Any, int], "bool | None"]
 
 ACTIONS: dict[str, Action] = {
     "DT": Simulation.set_time_step,
@@ -349,6 +391,7 @@ def simulate(
     progress: Progress = lambda done, steps: None,
     printer: Printer | None = None,
     solver: str = AUTO,
+    threads: int = 0,
 ) -> Simulation:
     """Run a problem into a sink and return the finished simulation.
 
@@ -359,6 +402,8 @@ def simulate(
     SingularStiffnessError
         If a static solution is asked for and the plate is not held.
     """
-    simulation = Simulation(checked, frozenset(slips), sink, progress, printer or Printer(), solver)
+    simulation = Simulation(
+        checked, frozenset(slips), sink, progress, printer or Printer(), solver, threads
+    )
     simulation.run()
     return simulation

@@ -61,7 +61,7 @@ class Tangent:
         return np.asarray(change)
 
 
-def reactions(plate: PlateModel, displacement: Floats, factor: float) -> Floats:
+def reactions(plate: PlateModel, field: Floats, factor: float) -> Floats:
     """Internal less applied force of every unknown of every node.
 
     Forces of the supports where an unknown is restrained; what is out of balance where it is not.
@@ -69,16 +69,17 @@ def reactions(plate: PlateModel, displacement: Floats, factor: float) -> Floats:
     Parameters
     ----------
     plate : PlateModel
-    displacement : ndarray (neq,)
+    field : ndarray (numnp, 5)
+        Every unknown of every node.
     factor : float
-        Load factor of nodal forces and prescribed displacements.
+        Load factor of nodal forces.
 
     Returns
     -------
     ndarray (numnp, 5)
         Force, and force times length for the rotations.
     """
-    internal = plate.internal_forces(plate.field(displacement, factor))
+    internal = plate.internal_forces(field)
     free = plate.mesh.equations > 0
     internal[free] -= factor * plate.mesh.forces[free]
     return internal

@@ -12,6 +12,7 @@ import pytest
 from fecm import plate
 from fecm.assembly import assemble
 from fecm.elements.quadrature import Rule, gauss, nodal
+from fecm.products import product_of
 from tests.builders import (
     SKEWED,
     SQUARE,
@@ -219,5 +220,5 @@ def test_every_way_to_multiply_by_the_stiffness_gives_the_same_forces(kind: int)
     u = np.random.default_rng(2).standard_normal(mesh.number_of_equations)
     expected = model.stiffness.toarray() @ u
     for solver in ("", "csr"):
-        found = model.product(solver)(u)
+        found = product_of(model, solver)(u)
         np.testing.assert_allclose(found, expected, atol=1e-13 * np.abs(expected).max())

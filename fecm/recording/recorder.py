@@ -20,6 +20,9 @@ Floats = NDArray[np.float64]
 
 BUFFERED = ("tape3", "tape8", "stresses", "reactions", "modes")
 
+# Elements whose strains are found at once: several rows of a small mesh, which costs less a row.
+AT_ONCE = 1024
+
 
 class Recorder:
     """Stores what a run gives.
@@ -57,6 +60,8 @@ class Recorder:
         )
         self._room = self._rows_to_come(sizes, contact_at_every_step)
         self._buffers: dict[str, RowBuffer] = {}
+        self._fields: list[tuple[int, float, Floats]] = []
+        self._at_once = max(1, AT_ONCE // len(setup.plate.mesh.elements))
         self._create()
         self._store_plate(setup.plate)
 
@@ -139,8 +144,19 @@ class Recorder:
 
     def strains(self, step: int, time: float, field: Floats) -> None:
         """Store a row of tape8: strains of a field that belongs to `time`."""
-        values = self._setup.strains.evaluate(field)
-        self.row("tape8", step, time, dict(zip(STRAINS, values, strict=True)))
+        self._fields.append((step, time, field))
+        if len(self._fields) == self._at_once:
+            self._flush_strains()
+
+    def _flush_strains(self) -> None:
+        """Find the strains of the fields that were held back."""
+        if not self._fields:
+            return
+        steps, times, fields = zip(*self._fields, strict=True)
+        values = self._setup.strains.evaluate(np.array(fields))
+        columns = {"step": np.array(steps), "time": np.array(times)}
+        self._buffers["tape8"].put_all(columns | dict(zip(STRAINS, values, strict=True)))
+        self._fields.clear()
 
     def finish(self) -> None:
         """Store all that is held back, and cut off the rows that never came.
@@ -151,6 +167,7 @@ class Recorder:
             If the energy has grown without bound.
         """
         self.steps.flush()
+        self._flush_strains()
         stored = dict(self.steps.rows)
         for group, buffer in self._buffers.items():
             buffer.flush()

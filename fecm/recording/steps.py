@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.dynamics import DivergenceError, PlateMotion, PlateState, inner
+from fecm.dynamics import DivergenceError, PlateMotion, PlateState
 from fecm.impact import Impact, ImpactState
 from fecm.projectile import Station
 from fecm.results.schema import DATASETS
@@ -80,10 +80,9 @@ class StepRecorder:
 
     def begin(self, plate: PlateState, impact: ImpactState | None) -> None:
         """Note the energy before the first step (force*length)."""
-        energy = 0.5 * inner(plate.displacement, plate.internal)
+        energy = plate.strain_energy
         if self._impact is not None and impact is not None:
-            velocity = impact.rod.velocity
-            energy += 0.5 * float(np.einsum("i,i,i", self._impact.rod_mass, velocity, velocity))
+            energy += float(self._impact.rod.kinetic_energy(impact.rod.velocity[None])[0])
         self.initial = float(energy)
         self._sink.attributes("energy", {"initial": self.initial})
 
@@ -110,7 +109,7 @@ class StepRecorder:
         if self._impact is not None and impact is not None:
             point = self._impact.point_force(impact)
         kinetic = self._motion.kinetic_energy(plate, factor, point)
-        strain = 0.5 * inner(plate.displacement, plate.internal)
+        strain = plate.strain_energy
         own = (plate.step, plate.time, kinetic, strain, plate.external_work)
         if impact is None:
             self._rows.append((*own, 0.0, 0.0, 0.0, 0.0))
@@ -166,10 +165,9 @@ class StepRecorder:
         u, v = motion[:, 0], motion[:, 1]
         table["transducer"] = self._gauge * u[:, self._station]
         table["displacement"], table["velocity"], table["acceleration"] = motion[:, :, 0].T
-        table["projectile_kinetic"] = 0.5 * np.einsum("ri,i->r", v**2, self._impact.rod_mass)
-        table["projectile_strain"] = 0.5 * np.einsum(
-            "ri,ij,rj->r", u, self._impact.rod_stiffness, u, optimize=False
-        )
+        rod = self._impact.rod
+        table["projectile_kinetic"] = rod.kinetic_energy(v)
+        table["projectile_strain"] = rod.strain_energy(u)
 
     def _watch(self, table: Mapping[str, Floats], held: Floats) -> None:
         """Stop a run that has lost all sense."""

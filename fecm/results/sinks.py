@@ -117,6 +117,11 @@ class RowBuffer:
         if self._filled == self._room:
             self.flush()
 
+    def put_all(self, columns: Mapping[str, Array]) -> None:
+        """Add rows; `columns` has an array of them for every dataset."""
+        for row in range(len(next(iter(columns.values())))):
+            self.put({name: values[row] for name, values in columns.items()})
+
     def flush(self) -> None:
         """Hand over what was gathered."""
         if self._filled:
