@@ -77,6 +77,7 @@ def run(
     output: str | Path | None = None,
     force: bool = False,
     solver: str = AUTO,
+    threads: int = 0,
 ) -> Result | list[Result]:
     """Run every problem of a deck.
 
@@ -95,6 +96,9 @@ def run(
         Run with a time step above the critical one all the same.
     solver : str
         How K u is had: ``"auto"`` by what suits the mesh, ``"csr"`` by a sparse matrix.
+    threads : int
+        Threads that share the work of a step; 0 takes every core for a large mesh. The result does
+        not depend on it.
 
     Returns
     -------
@@ -126,7 +130,7 @@ def run(
     for number, problem in enumerate(prepared.problems, start=1):
         if output is None:
             memory = MemorySink()
-            simulate(problem, active, memory, solver=solver)
+            simulate(problem, active, memory, solver=solver, threads=threads)
             results.append(Result(memory.arrays, memory.texts, memory.groups))
         else:
             from fecm.results import hdf5
@@ -134,7 +138,7 @@ def run(
 
             path = numbered(Path(output), number)
             with hdf5.writing(path) as sink:
-                simulate(problem, active, sink, solver=solver)
+                simulate(problem, active, sink, solver=solver, threads=threads)
             results.append(load(path))
     return results[0] if len(results) == 1 else results
 

@@ -61,7 +61,7 @@ class ImpactState:
         """Store the state as plain arrays, from which :meth:`from_arrays` makes it again."""
         plate = self.plate
         scalars = [
-            plate.step, plate.time, plate.dt, plate.area, plate.external_work,
+            plate.step, plate.time, plate.dt, plate.area, plate.external_work, self.rod.tip,
             self.contact.indentation, self.contact.force, self.plate_w, self.contact_work,
             self.unsettled,
         ]  # fmt: skip
@@ -79,7 +79,9 @@ class ImpactState:
     @classmethod
     def from_arrays(cls, arrays: dict[str, Floats]) -> ImpactState:
         """Make the state again that :meth:`to_arrays` stored."""
-        step, time, dt, area, external, a, force, w, work, unsettled = arrays["scalars"].tolist()
+        step, time, dt, area, external, tip, a, force, w, work, unsettled = arrays[
+            "scalars"
+        ].tolist()
         branch, *curve = arrays["memory"].tolist()
         plate = PlateState(
             arrays["extended"].copy(),
@@ -94,7 +96,7 @@ class ImpactState:
         )
         return cls(
             plate,
-            RodState(arrays["rod"].copy()),
+            RodState(arrays["rod"].copy(), tip),
             Memory(int(branch), *curve),
             Point(a, force),
             w,
@@ -213,8 +215,8 @@ class Impact:
         w = state.plate.extended.item(self.contact.row) if self.contact.plate_moves else 0.0
         motion = step.free_motion(state.rod)
         base, gain = motion.item(2 * step.n), step.gain
-        u, v, acceleration = state.rod.motion[:, 0].tolist()
-        drift, weight = u + dt * v + dt**2 / 3.0 * acceleration, dt**2 / 6.0
+        _, v, acceleration = state.rod.motion[:, 0].tolist()
+        drift, weight = state.rod.tip + dt * v + dt**2 / 3.0 * acceleration, dt**2 / 6.0
         carried = (1.0 - WILSON_THETA) * last.force
         tip, force = drift + weight * acceleration, last.force
         for _ in range(PASSES):
@@ -227,8 +229,8 @@ class Impact:
         else:
             state.unsettled += 1
         motion += step.h * (carried + WILSON_THETA * force)
-        state.rod = RodState(motion.reshape(3, step.n))
-        indentation = -motion.item(0) - w
+        state.rod = rod = RodState(motion.reshape(3, step.n), state.rod.tip + motion.item(0))
+        indentation = -rod.tip - w
         state.memory = law.accept(memory, last, indentation)
         state.contact = Point(indentation, force)
         state.plate_w = w

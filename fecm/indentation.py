@@ -173,8 +173,10 @@ class MemoryLaw:
         """Memory on whose curve `a` lies, coming from the last accepted point."""
         falls = a < last.indentation
         virgin = m.branch == VIRGIN
-        if virgin is True and not falls:
-            return m  # one case, on the first loading curve: the most frequent one
+        if isinstance(a, float):  # one case, most often on its way along the same curve
+            unloading = m.branch == UNLOADING
+            if not falls if virgin else a < m.peak and falls == unloading:
+                return m
         leaves = virgin & falls
         returns = (m.branch != VIRGIN) & (a >= m.peak)
         turns_up = (m.branch == UNLOADING) & (a > last.indentation) & (a < m.peak)

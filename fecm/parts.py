@@ -23,8 +23,8 @@ from fecm.reduction import reduction
 from fecm.solvers import AUTO, CSR
 from fecm.workers import Workers, available
 
-# Unknowns from which on threads save more than they cost.
-WORTH_SHARING = 50_000
+# Moving unknowns from which on threads save more than they cost.
+WORTH_SHARING = 100_000
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,8 @@ def set_up(
         card = deck.need(ImpactCard)
         hit = (card.node - 1, card.dof - 1)
     reduced = reduction(plate, hit) if moves_only and solver != CSR else None
-    workers = Workers(threads or (available() if plate.neq >= WORTH_SHARING else 1))
+    moving = plate.neq if reduced is None else reduced.count
+    workers = Workers(threads or (available() if moving >= WORTH_SHARING else 1))
     motion = PlateMotion(plate, solver, reduced, workers)
     middle = rod.elements // 2 + 1
     return Setup(

@@ -85,9 +85,12 @@ def families(elements: Ints, coordinates: Floats) -> list[Family]:
     nodes = np.zeros((len(elements), max(MOST_NODES, elements.shape[1])), dtype=np.intp)
     nodes[:, : elements.shape[1]] = elements
     found: list[Family] = []
-    patterns, which = np.unique(nodes > 0, axis=0, return_inverse=True)
-    for number, present in enumerate(patterns):
-        rows = np.flatnonzero(which.ravel() == number)
+    given = nodes > 0
+    # Patterns in the order of their bits, first node first.
+    codes = given @ (1 << np.arange(given.shape[1])[::-1])
+    for code in np.unique(codes):
+        rows = np.flatnonzero(codes == code)
+        present = given[rows[0]]
         shape = shape_of(present)
         if not present[: shape.corners].all():
             raise ValueError(

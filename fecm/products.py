@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -36,8 +35,10 @@ PIECE = 8192
 BLOCK = 256
 # Fewer congruent elements than this, and a matrix for each of them is as fast as one for all.
 WORTH_GROUPING = 4
-# Gathered unknowns that a thread takes at a time.
+# Nodal values of the elements that a thread takes at a time; so many share the cache.
 BATCH = 65536
+# Large meshes are cut into a multiple of so many domains, that as many threads have equal shares.
+SHARES = 4
 
 
 def pieces(neq: int) -> list[slice]:
@@ -60,7 +61,7 @@ class Product(ABC):
         extended : ndarray (size,)
             The displacement at its beginning, and a zero at its end.
         use : callable
-            Given a piece's number and its forces; may run in any thread.
+            Given a piece's number and its forces.
 
         Returns
         -------
@@ -94,19 +95,81 @@ class CsrProduct(Product):
         return [use(number, forces[piece]) for number, piece in enumerate(self._pieces)]
 
 
-# Nodal values of a part's elements, their matrix or matrices, their forces, and how it is done.
-_Part = tuple[Callable[..., Any], Floats, Floats, Floats]
-_Batch = tuple[Indices, Floats, list[_Part]]
+# Stiffness that a group's elements share, (n, n), or (ne, n, n) where each has its own; places of
+# their unknowns in the extended vector, (ne, n).
+Group = tuple[Floats, Indices]
 
 
-class ElementProduct(Product):
-    """K u element by element: gather, small matrix products, scatter.
+class _Domain:
+    """Some elements: gather, small matrix products, scatter.
 
     Parameters
     ----------
-    groups : sequence of (K, places)
-        Stiffness (n, n) that a group's elements share, or (ne, n, n) where each has its own, and
-        the places of its elements' unknowns in the extended vector, (ne, n).
+    groups : sequence of Group
+    count : int
+        Number of unknowns.
+    size : int
+        Entries of an extended vector.
+    scratch : ndarray (2, entries)
+        Room for nodal values and forces, which other domains may use at other times.
+    """
+
+    def __init__(self, groups: Sequence[Group], count: int, size: int, scratch: Floats) -> None:
+        lists: list[Indices] = []
+        matrices: list[Floats] = []
+        for K, places in groups:
+            kept = (places < size - 1).any(axis=0)
+            lists.append(places[:, kept])
+            matrices.append(np.ascontiguousarray(K[..., kept, :][..., kept]))
+        self.places = np.concatenate([part.ravel() for part in lists])
+        self._gathered, self.forces = scratch[:, : len(self.places)]
+        # How it is multiplied, nodal values, matrix or matrices, forces.
+        self._parts: list[tuple[Callable[..., Any], Floats, Floats, Floats]] = []
+        end = 0
+        for K, part in zip(matrices, lists, strict=True):
+            for first in range(0, len(part), BLOCK):
+                rows = slice(first, first + BLOCK)
+                shape = part[rows].shape
+                cut = slice(end, end + shape[0] * shape[1])
+                q, f = self._gathered[cut].reshape(shape), self.forces[cut].reshape(shape)
+                if K.ndim == 2:
+                    self._parts.append((np.dot, q, K, f))
+                else:
+                    self._parts.append((np.matmul, q[:, None], K[rows], f[:, None]))
+                end = cut.stop
+        self._count, self._last = count, size - 1
+
+    def multiply(self, extended: Floats) -> None:
+        """Find the forces of each element."""
+        extended.take(self.places, out=self._gathered, mode="clip")
+        for product, q, K, forces in self._parts:
+            product(q, K, out=forces)
+
+    def prepare_sums(self) -> None:
+        """Make the matrix that sums the elements' forces, for the range of rows that it needs."""
+        turned = (self.places >= self._count) & (self.places < self._last)
+        rows = np.where(turned, self.places - self._count, self.places)
+        entries = np.flatnonzero(self.places < self._last)
+        signs, rows = np.where(turned, -1.0, 1.0)[entries], rows[entries]
+        self.rows = slice(int(rows.min()), int(rows.max()) + 1)
+        self._sums = sparse.csr_array(
+            (signs, ((rows - self.rows.start).astype(np.int32), entries.astype(np.int32))),
+            shape=(self.rows.stop - self.rows.start, len(self.places)),
+        )
+
+    def sums(self, extended: Floats) -> Floats:
+        """Forces of the domain's unknowns, those of :attr:`rows`."""
+        self.multiply(extended)
+        return np.asarray(self._sums @ self.forces)
+
+
+class ElementProduct(Product):
+    """K u element by element, domain by domain.
+
+    Parameters
+    ----------
+    domains : sequence of sequence of Group
+        The elements; domains may be taken by different threads.
     count : int
         Number of unknowns.
     signed : bool
@@ -117,7 +180,7 @@ class ElementProduct(Product):
 
     def __init__(
         self,
-        groups: Sequence[tuple[Floats, Indices]],
+        domains: Sequence[Sequence[Group]],
         count: int,
         *,
         signed: bool = False,
@@ -126,78 +189,46 @@ class ElementProduct(Product):
         self._count, self._signed = count, signed
         self._workers = workers or Workers()
         self.size = (2 if signed else 1) * count + 1
-        lists: list[Indices] = []
-        matrices: list[Floats] = []
-        for K, places in groups:
-            kept = (places < self.size - 1).any(axis=0)
-            lists.append(places[:, kept])
-            matrices.append(np.ascontiguousarray(K[..., kept, :][..., kept]))
-        self._places = np.concatenate([part.ravel() for part in lists])
-        self._gathered = np.empty(len(self._places))
-        self._forces = np.empty(len(self._places))
-        self._batches = self._cut(lists, matrices)
-        # A count is the faster scatter of a short vector, a sparse matrix that of a long one.
-        self._scatter: list[tuple[int, sparse.csr_array]] = []
-        if count > PIECE:
-            whole = self._scatter_matrix()
-            self._scatter = [(n, whole[piece]) for n, piece in enumerate(pieces(count))]
-
-    def _scatter_matrix(self) -> sparse.csr_array:
-        """Sums of the elements' forces, (count, entries)."""
-        turned = (self._places >= self._count) & (self._places < self.size - 1)
-        rows = np.where(turned, self._places - self._count, self._places).astype(np.int32)
-        entries = np.flatnonzero(self._places < self.size - 1).astype(np.int32)
-        signs = np.where(turned, -1.0, 1.0)[entries]
-        shape = (self._count, len(self._places))
-        return sparse.csr_array((signs, (rows[entries], entries)), shape=shape)
-
-    def _cut(self, lists: list[Indices], matrices: list[Floats]) -> list[_Batch]:
-        """Blocks of elements, and batches of blocks."""
-        batches: list[_Batch] = []
-        parts: list[_Part] = []
-        begin = end = 0
-        for K, places in zip(matrices, lists, strict=True):
-            for first in range(0, len(places), BLOCK):
-                rows = slice(first, first + BLOCK)
-                shape = places[rows].shape
-                cut = slice(end, end + shape[0] * shape[1])
-                q, f = self._gathered[cut].reshape(shape), self._forces[cut].reshape(shape)
-                if K.ndim == 2:
-                    parts.append((np.dot, q, K, f))
-                else:
-                    parts.append((np.matmul, q[:, None], K[rows], f[:, None]))
-                end = cut.stop
-                if end - begin >= BATCH:
-                    batches.append((self._places[begin:end], self._gathered[begin:end], parts))
-                    parts, begin = [], end
-        if parts:
-            batches.append((self._places[begin:end], self._gathered[begin:end], parts))
-        return batches
+        share = -(-len(domains) // self._workers.count)
+        most = max(sum(places.size for _, places in groups) for groups in domains)
+        scratches = [np.empty((2, most)) for _ in range(0, len(domains), share)]
+        self._domains = [
+            _Domain(groups, count, self.size, scratches[number // share])
+            for number, groups in enumerate(domains)
+        ]
+        self._total = np.empty(count)
+        self._pieces = pieces(count)
+        # A count is the faster sum of few forces, a sparse matrix that of many.
+        self._small = len(self._domains) == 1
+        if not self._small:
+            for domain in self._domains:
+                domain.prepare_sums()
 
     def each(self, extended: Floats, use: Callable[[int, Floats], R]) -> list[R]:
         """Hand K u on, piece by piece."""
         count = self._count
         if self._signed:
             np.negative(extended[:count], out=extended[count:-1])
-        self._workers.map(partial(self._multiply, extended), self._batches)
-        if self._scatter:
-            return self._workers.map(partial(self._gather, use), self._scatter)
-        forces: Floats = np.bincount(self._places, self._forces, self.size)  # type: ignore[assignment]
-        total = forces[:count]
+        total = self._sum(extended) if self._small else self._sum_of_domains(extended)
+        if len(self._pieces) == 1:
+            return [use(0, total)]
+        return [use(number, total[piece]) for number, piece in enumerate(self._pieces)]
+
+    def _sum(self, extended: Floats) -> Floats:
+        (domain,) = self._domains
+        domain.multiply(extended)
+        forces: Floats = np.bincount(domain.places, domain.forces, self.size)  # type: ignore[assignment]
+        total = forces[: self._count]
         if self._signed:
-            total -= forces[count:-1]
-        return [use(0, total)]
+            total -= forces[self._count : -1]
+        return total
 
-    @staticmethod
-    def _multiply(extended: Floats, batch: _Batch) -> None:
-        places, gathered, parts = batch
-        extended.take(places, out=gathered, mode="clip")
-        for product, q, K, forces in parts:
-            product(q, K, out=forces)
-
-    def _gather(self, use: Callable[[int, Floats], R], piece: tuple[int, sparse.csr_array]) -> R:
-        number, sums = piece
-        return use(number, sums @ self._forces)
+    def _sum_of_domains(self, extended: Floats) -> Floats:
+        sums = self._workers.map(lambda domain: domain.sums(extended), self._domains)
+        self._total.fill(0.0)
+        for domain, forces in zip(self._domains, sums, strict=True):
+            self._total[domain.rows] += forces
+        return self._total
 
 
 def product_of(
@@ -222,22 +253,31 @@ def product_of(
     if solver == CSR:
         return CsrProduct(plate.stiffness)
     kept = reduced or whole(plate)
-    groups: list[tuple[Floats, Indices]] = []
+    domains: list[list[Group]] = []
     for family in plate.families:
         weights = kept.weights[family.rows]
+        members = np.flatnonzero(weights)
+        entries = len(members) * family.nodes.shape[1] * kept.unknowns_a_node
+        shares = 1 if entries <= BATCH else SHARES * -(-entries // (SHARES * BATCH))
         same = congruence(family)
-        places = kept.slots[family.nodes].reshape(len(family.rows), -1)
         # An element that is its own image counts once, where the others count twice.
-        most = weights.max()
-        sizes = np.bincount(same.group[weights == most], minlength=len(same.representatives))
+        common = weights == weights.max()
+        sizes = np.bincount(same.group[common], minlength=len(same.representatives))
         shared = sizes >= WORTH_GROUPING
-        matrices = plate.stiffness_of(family.take(same.representatives[shared]))
-        for K, number in zip(matrices, np.flatnonzero(shared), strict=True):
-            members = (same.group == number) & (weights == most)
-            groups.append((most * K, places[members]))
-        alone = np.flatnonzero((weights > 0) & ~(shared[same.group] & (weights == most)))
-        for start in range(0, len(alone), BLOCK):
-            rows = alone[start : start + BLOCK]
-            K = plate.stiffness_of(family.take(rows))
-            groups.append((weights[rows, None, None] * K, places[rows]))
-    return ElementProduct(groups, kept.count, signed=kept.signed, workers=workers)
+        numbers = np.flatnonzero(shared)
+        stiffness = plate.stiffness_of(family.take(same.representatives[numbers]))
+        matrices = dict(zip(numbers.tolist(), weights.max() * stiffness, strict=True))
+        places = kept.slots[family.nodes].reshape(len(family.rows), -1)
+        for share in np.array_split(members, shares):
+            groups: list[Group] = []
+            grouped = common[share] & shared[same.group[share]]
+            for number in np.unique(same.group[share[grouped]]):
+                inside = share[grouped & (same.group[share] == number)]
+                groups.append((matrices[int(number)], places[inside]))
+            alone = share[~grouped]
+            for start in range(0, len(alone), BLOCK):
+                rows = alone[start : start + BLOCK]
+                K = plate.stiffness_of(family.take(rows))
+                groups.append((weights[rows, None, None] * K, places[rows]))
+            domains.append(groups)
+    return ElementProduct(domains, kept.count, signed=kept.signed, workers=workers)

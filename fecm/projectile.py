@@ -10,6 +10,7 @@ column a case, may follow.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,12 +92,12 @@ class Rod:
         return m
 
     def kinetic_energy(self, velocity: Floats) -> Floats:
-        """Kinetic energy of velocities (rows, n), one a row (force*length)."""
+        """Kinetic energy of velocities (rows, n) (force*length)."""
         return np.asarray(0.5 * np.einsum("ri,ri,i->r", velocity, velocity, self.mass()))
 
-    def strain_energy(self, displacement: Floats) -> Floats:
-        """Strain energy of displacements (rows, n), one a row (force*length)."""
-        K, u = self.stiffness(), displacement
+    def strain_energy(self, deformation: Floats) -> Floats:
+        """Strain energy of displacements (rows, n) relative to the tip (force*length)."""
+        K, u = self.stiffness(), deformation
         # Diagonal by diagonal, of which there are few, and in an order of its own.
         energy = 0.5 * np.einsum("ri,ri,i->r", u, u, np.diagonal(K))
         for off in range(1, 4):
@@ -131,18 +132,41 @@ def report_rod(density: float = REPORT_DENSITY) -> Rod:
 class RodState:
     """State of a rod.
 
+    Displacements are kept relative to the tip: a projectile flies far, and what is strain in them
+    would drown in the rounding of the flight.
+
     Attributes
     ----------
     motion : ndarray (3, n, ...)
-        Displacement, velocity and acceleration of every unknown.
+        Displacement relative to the tip, velocity and acceleration of every unknown; in the place
+        of the tip's own displacement stands what the last step added to it.
+    tip : float or ndarray (...)
+        Displacement of the tip.
     """
 
     motion: Floats
+    tip: Any = 0.0
+
+    @classmethod
+    def of(cls, displacement: Floats, velocity: Floats, acceleration: Floats) -> RodState:
+        """Make a state of the displacement, velocity and acceleration of every unknown."""
+        motion = np.array([displacement, velocity, acceleration])
+        motion[0, ::2] -= displacement[0]
+        return cls(motion, displacement[0])
+
+    @property
+    def deformation(self) -> Floats:
+        """Displacement of every unknown relative to the tip, (n, ...)."""
+        deformation = self.motion[0].copy()
+        deformation[0] = 0.0
+        return np.asarray(deformation)
 
     @property
     def displacement(self) -> Floats:
         """Displacement of every unknown, (n, ...)."""
-        return np.asarray(self.motion[0])
+        displacement = self.deformation
+        displacement[::2] += self.tip
+        return displacement
 
     @property
     def velocity(self) -> Floats:
@@ -174,8 +198,8 @@ def rigid_approach(rod: Rod, velocity: float, *, derivatives_too: bool = False) 
 class WilsonStep:
     r"""One step of Wilson's theta method as a linear map, for a rod and a time step.
 
-    With :math:`y` the state (u, v, a of every unknown) and :math:`f` the force on the tip at
-    :math:`t + \theta \Delta t`, the new state is :math:`y' = T y + h f`.
+    With :math:`y` the motion of :class:`RodState` and :math:`f` the force on the tip at
+    :math:`t + \theta \Delta t`, the new motion is :math:`y' = T y + h f`.
 
     Parameters
     ----------
@@ -215,15 +239,25 @@ class WilsonStep:
                 2.0 * a4 * effective * m + (1.0 - 3.0 / theta) * one,
             ]
         )
+        # Rigid displacements cause no force, and displacements are relative to the tip.
+        acceleration[:, 0] = 0.0
+        kept, relative = one.copy(), one.copy()
+        kept[0, 0] = 0.0
+        relative[2::2, 0] = -1.0
         # The acceleration is linear over the step.
         velocity = np.hstack([none, one, tau / 2.0 * one]) + tau / 2.0 * acceleration
-        displacement = np.hstack([one, dt * one, tau**2 / 3.0 * one]) + tau**2 / 6.0 * acceleration
+        moved = np.hstack([none, dt * one, tau**2 / 3.0 * one]) + tau**2 / 6.0 * acceleration
+        displacement = np.hstack([kept, none, none]) + relative @ moved
         self.T = np.vstack([displacement, velocity, acceleration])
         gain = a4 * effective[:, 0]
-        self.h = np.concatenate([tau**2 / 6.0 * gain, tau / 2.0 * gain, gain])
+        self.h = np.concatenate([tau**2 / 6.0 * relative @ gain, tau / 2.0 * gain, gain])
         self.gain = float(gain[0])
 
     def free_motion(self, state: RodState) -> Floats:
-        """New state if no force acted on the tip, (3 n, ...)."""
+        """New motion if no force acted on the tip, (3 n, ...)."""
         y = state.motion.reshape(3 * self.n, *state.motion.shape[2:])
         return np.asarray(np.dot(self.T, y))
+
+    def end(self, state: RodState, motion: Floats) -> RodState:
+        """State after a step from `state` whose new motion is `motion`, (3 n, ...)."""
+        return RodState(motion.reshape(3, self.n, *motion.shape[1:]), state.tip + motion[0])

@@ -61,6 +61,11 @@ class Reduction:
         turned = np.where(self.sign < 0.0, self.count, 0)
         return np.where(self.sign == 0.0, zero, self.index + turned)
 
+    @property
+    def unknowns_a_node(self) -> int:
+        """The most unknowns of a node that move."""
+        return int((self.sign != 0.0).sum(axis=1).max())
+
     def gather(self, values: Floats) -> Floats:
         """Sum values of all unknowns, (numnp, 5), into those of the ones that they follow."""
         signed = (self.sign * values).ravel()

@@ -36,7 +36,10 @@ class Workers:
         self._pool = ThreadPoolExecutor(self.count - 1) if self.count > 1 else None
 
     def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
-        """Results of a function that lets other threads run, in the order of the items."""
+        """Results of a function that lets other threads run, in the order of the items.
+
+        Each thread takes ceil(items / count) items that follow one another.
+        """
         if self._pool is None or len(items) < 2:
             return [function(item) for item in items]
         share = -(-len(items) // self.count)

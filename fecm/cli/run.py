@@ -48,6 +48,14 @@ if TYPE_CHECKING:
     show_default=True,
     help="How K u is had: by what suits the mesh, or by a sparse matrix in any case.",
 )
+@click.option(
+    "--threads",
+    type=click.IntRange(0, 1024),
+    default=0,
+    metavar="N",
+    help="Threads that share the work of a step; 0 takes every core for a large mesh.  "
+    "[default: 0]",
+)
 @click.option("--force", is_flag=True, help="Run with a time step above the critical one.")
 @click.option(
     "--print",
@@ -63,6 +71,7 @@ def run(
     slips: tuple[str, ...],
     overwrite: bool,
     solver: str,
+    threads: int,
     force: bool,
     printed: Path | None,
 ) -> None:
@@ -87,7 +96,7 @@ def run(
     for number, path in enumerate(paths):
         if number:
             click.echo()
-        _run_one(prepared, number, active, solver, path, prints[number])
+        _run_one(prepared, number, active, solver, threads, path, prints[number])
 
 
 def _run_one(
@@ -95,6 +104,7 @@ def _run_one(
     number: int,
     active: frozenset[str],
     solver: str,
+    threads: int,
     path: Path,
     printed: Path | None,
 ) -> None:
@@ -117,7 +127,7 @@ def _run_one(
         printer = Printer() if printed is None else Printer(stack.enter_context(writing(printed)))
         advance = stack.enter_context(_progress(tally(problem.program).steps))
         try:
-            simulation = simulate(problem, active, sink, advance, printer, solver)
+            simulation = simulate(problem, active, sink, advance, printer, solver, threads)
         except SingularStiffnessError as error:
             raise Refused(
                 f"{error}: the plate is not held, so that it has no static displacement; restrain "

@@ -25,7 +25,7 @@ GROWTH = 10.0
 
 SCALARS = (
     "step", "time", "plate_kinetic", "plate_strain", "external_work",
-    "force", "indentation", "plate_w", "contact_work",
+    "force", "indentation", "plate_w", "contact_work", "displacement",
 )  # fmt: skip
 CONTACT = ("force", "indentation", "transducer", "displacement", "velocity", "acceleration")
 
@@ -112,15 +112,14 @@ class StepRecorder:
         strain = plate.strain_energy
         own = (plate.step, plate.time, kinetic, strain, plate.external_work)
         if impact is None:
-            self._rows.append((*own, 0.0, 0.0, 0.0, 0.0))
+            self._rows.append((*own, 0.0, 0.0, 0.0, 0.0, 0.0))
         else:
             self._rod[len(self._rows)] = impact.rod.motion
             if contact_row or self._all_contact:
                 self._contact_rows.append(len(self._rows))
-            contact = impact.contact
-            self._rows.append(
-                (*own, contact.force, contact.indentation, impact.plate_w, impact.contact_work)
-            )
+            indentation, force = impact.contact
+            hit = (force, indentation, impact.plate_w, impact.contact_work, impact.rod.tip)
+            self._rows.append((*own, *hit))
         if len(self._rows) == BLOCK:
             self.flush()
 
@@ -161,10 +160,10 @@ class StepRecorder:
         if self._impact is None:
             table["projectile_kinetic"] = table["projectile_strain"] = np.zeros(count)
             return
-        motion = self._rod[:count]
-        u, v = motion[:, 0], motion[:, 1]
+        u, v, a = self._rod[:count].swapaxes(0, 1)
+        u[:, 0] = 0.0  # the tip, to which the others are relative
         table["transducer"] = self._gauge * u[:, self._station]
-        table["displacement"], table["velocity"], table["acceleration"] = motion[:, :, 0].T
+        table["velocity"], table["acceleration"] = v[:, 0], a[:, 0]
         rod = self._impact.rod
         table["projectile_kinetic"] = rod.kinetic_energy(v)
         table["projectile_strain"] = rod.strain_energy(u)

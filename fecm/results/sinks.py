@@ -111,6 +111,9 @@ class RowBuffer:
 
     def put(self, columns: Mapping[str, Any]) -> None:
         """Add one row; `columns` has a value or an array for every dataset."""
+        if self._room == 1:
+            self._hand_over({name: np.asarray(columns[name])[None] for name in self._paths}, 1)
+            return
         for name, block in self._blocks.items():
             block[self._filled] = columns[name]
         self._filled += 1
@@ -125,7 +128,11 @@ class RowBuffer:
     def flush(self) -> None:
         """Hand over what was gathered."""
         if self._filled:
-            for name, block in self._blocks.items():
-                self._sink.write(self._paths[name], self.stored, block[: self._filled])
-        self.stored += self._filled
+            blocks = {name: block[: self._filled] for name, block in self._blocks.items()}
+            self._hand_over(blocks, self._filled)
         self._filled = 0
+
+    def _hand_over(self, blocks: Mapping[str, Array], rows: int) -> None:
+        for name, path in self._paths.items():
+            self._sink.write(path, self.stored, blocks[name])
+        self.stored += rows
