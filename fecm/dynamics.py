@@ -20,6 +20,7 @@ from fecm.solvers import AUTO, CSR
 from fecm.workers import Workers
 
 Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 
 class DivergenceError(ArithmeticError):
@@ -113,6 +114,29 @@ class PointForce(NamedTuple):
     force: float
 
 
+@dataclass(frozen=True)
+class Watch:
+    """Sums over unknowns: strains of gages, say.
+
+    Attributes
+    ----------
+    slots : ndarray (n, m)
+        Places in the extended displacement.
+    weights : ndarray (n, m)
+    prescribed : ndarray (n,)
+        What the prescribed displacements add, for a load factor of 1.
+    """
+
+    slots: Indices
+    weights: Floats
+    prescribed: Floats
+
+    def read(self, state: PlateState, factor: float) -> Floats:
+        """Values of the sums, (n,), under a load factor."""
+        values = np.einsum("gi,gi->g", state.extended.take(self.slots), self.weights)
+        return np.asarray(values + factor * self.prescribed)
+
+
 class PlateMotion:
     """Moves a plate through time.
 
@@ -182,6 +206,18 @@ class PlateMotion:
         full = state.extended.take(self._slots)
         full += factor * self._prescribed if self._prescribes else 0.0  # no negative zeros
         return full
+
+    def watch(self, places: Indices, weights: Floats) -> Watch:
+        """Sums over unknowns, ready to be taken at every step.
+
+        Parameters
+        ----------
+        places : ndarray (n, m)
+            Places of unknowns in a field laid out flat.
+        weights : ndarray (n, m)
+        """
+        prescribed = (weights * self._prescribed.ravel()[places]).sum(axis=1)
+        return Watch(self._slots.ravel()[places], weights, prescribed)
 
     def refresh(self, state: PlateState) -> None:
         """Make all that follows from the displacement agree with it."""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from fecm.assembly import PlateModel
 from fecm.dynamics import DivergenceError, PlateMotion, PlateState, PointForce, Sums
 from fecm.indentation import Law, Memory, Point
-from fecm.projectile import WILSON_THETA, Rod, RodState, WilsonStep, rigid_approach
+from fecm.projectile import WILSON_THETA, Projectile, RodState, WilsonStep, rigid_approach
 
 Floats = NDArray[np.float64]
 
@@ -136,12 +136,12 @@ class Impact:
     Parameters
     ----------
     motion : PlateMotion
-    rod : Rod
+    rod : Rod or RigidMass
     law : Law
     contact : Contact
     """
 
-    def __init__(self, motion: PlateMotion, rod: Rod, law: Law, contact: Contact) -> None:
+    def __init__(self, motion: PlateMotion, rod: Projectile, law: Law, contact: Contact) -> None:
         self.motion = motion
         self.rod = rod
         self.law = law

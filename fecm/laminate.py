@@ -8,12 +8,12 @@ shear), transverse shear in the order xz, yz.  No shear correction factor is app
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.deck.model import Material
+from fecm.deck.model import Deck, Material, ShearCorrection
 from fecm.deck.records import Ply
 
 Floats = NDArray[np.float64]
@@ -152,13 +152,17 @@ def laminate(
     )
 
 
-def laminate_of(material: Material, *, isotropic_g12: bool = False) -> Laminate:
+def laminate_of(
+    material: Material, shear_factor: float = 1.0, *, isotropic_g12: bool = False
+) -> Laminate:
     """Laminate of a deck's MATE segment; its inertia uses the card's total thickness.
 
     Parameters
     ----------
     material : Material
         The segment.
+    shear_factor : float
+        Shear correction factor, on the transverse shear stiffness.
     isotropic_g12 : bool
         Replace G12 by E1/2(1+nu12) where E1 = E2 (the slip ``g12``).
     """
@@ -170,4 +174,18 @@ def laminate_of(material: Material, *, isotropic_g12: bool = False) -> Laminate:
         )  # fmt: skip
     angles = [layer.angle for layer in material.layers]
     thicknesses = [layer.thickness for layer in material.layers]
-    return laminate(ply, angles, thicknesses, material.integration.thickness)
+    made = laminate(ply, angles, thicknesses, material.integration.thickness)
+    return replace(made, shear=shear_factor * made.shear)
+
+
+def laminate_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> Laminate:
+    """Laminate of a deck, with the shear correction factor of its SHEA segment.
+
+    Raises
+    ------
+    LookupError
+        If the deck has no MATE segment.
+    """
+    correction = deck.last(ShearCorrection)
+    factor = 1.0 if correction is None else correction.factor
+    return laminate_of(deck.need(Material), factor, isotropic_g12=isotropic_g12)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.deck.findings import Findings, Place
-from fecm.deck.model import Boundary, Coordinates, Deck, Elements, Forces
+from fecm.deck.model import Boundary, Coordinates, Deck, Elements, Forces, Projectile
 from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
 
 Floats = NDArray[np.float64]
@@ -100,6 +100,44 @@ def generate(deck: Deck, findings: Findings | None = None) -> Mesh:
     free = codes.ravel() == 0
     equations = np.where(free, np.cumsum(free), 0).astype(np.int32).reshape(codes.shape)
     return Mesh(coordinates, elements, codes, forces, equations)
+
+
+def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floats:
+    """Diameter of every element of a rod, generated from PROJ's cards as coordinates are.
+
+    Parameters
+    ----------
+    segment : Projectile
+    findings : Findings, optional
+        Receives what can't be generated.
+
+    Returns
+    -------
+    ndarray (elements,)
+        Length; NaN where no card gives the element.
+    """
+    noted = Findings() if findings is None else findings
+    values = np.full((segment.elements, 1), np.nan)
+    known: list[NodeValues] = []
+    for record in segment.diameters:
+        if not 1 <= record.element <= segment.elements:
+            noted.add(
+                "E420",
+                f"Rod element {record.element} does not exist; PROJ gives the rod elements 1 to "
+                f"{segment.elements}.",
+                record.place("element"),
+            )
+        elif known and record.element <= known[-1].node:
+            noted.add(
+                "E421",
+                f"Rod element {record.element} stands after element {known[-1].node}; elements "
+                "must ascend.",
+                record.place("element"),
+            )
+        else:
+            known.append(NodeValues(record.element, record.increment, (record.diameter,)))
+    _interpolate(values, known, noted)
+    return values[:, 0]
 
 
 _R = TypeVar("_R", NodeValues, NodeCodes, ElementNodes)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fecm.check import Checked
 from fecm.check.run import output_bytes
-from fecm.parts import build_plate, build_rod
+from fecm.parts import build_plate, build_projectile
 from fecm.program import estimate, flat
 from fecm.solvers import SAFE
 from fecm.units import unit_names, unit_of
@@ -130,7 +130,7 @@ def overview(checked: Checked) -> Overview:
         D=laminate.D,
         shear=laminate.shear,
         plate_mass=plate.area() * laminate.mass,
-        projectile_mass=build_rod().total_mass,
+        projectile_mass=build_projectile(deck).total_mass,
         critical_time_step=plate.critical_time_step(),
         time_steps=[m.value for m in flat(checked.program) if m.word == "DT"],
         output_bytes=output_bytes(deck, sizes),

@@ -10,15 +10,26 @@ from dataclasses import dataclass
 
 from fecm.assembly import PlateModel, Rules, assemble
 from fecm.deck.model import Deck, Indentation, Material
+from fecm.deck.model import Gages as GageCards
 from fecm.deck.model import Impact as ImpactCard
+from fecm.deck.model import Projectile as ProjectileCard
 from fecm.dynamics import PlateMotion
 from fecm.elements.quadrature import HIGHEST_ORDER, Rule, gauss, nodal
+from fecm.gages import Gages, gages
 from fecm.impact import Contact, Impact
 from fecm.indentation import Constants, Law, MemoryLaw, StickyLaw
-from fecm.laminate import laminate_of
-from fecm.mesh import Mesh
+from fecm.laminate import laminate_of_deck
+from fecm.mesh import Mesh, rod_diameters
 from fecm.plate import StrainField
-from fecm.projectile import LISTING_DENSITY, REPORT_DENSITY, Rod, Station, report_rod
+from fecm.projectile import (
+    LISTING_DENSITY,
+    REPORT_DENSITY,
+    Projectile,
+    RigidMass,
+    Rod,
+    Station,
+    report_rod,
+)
 from fecm.reduction import reduction
 from fecm.solvers import AUTO, CSR
 from fecm.workers import Workers, available
@@ -42,6 +53,8 @@ class Setup:
         The transducer.
     strains, stress_points : StrainField
         Points of tape8, and of the stresses.
+    gages : Gages or None
+        Strain gages.
     """
 
     plate: PlateModel
@@ -50,6 +63,7 @@ class Setup:
     station: Station
     strains: StrainField
     stress_points: StrainField
+    gages: Gages | None
 
 
 def rules(material: Material) -> tuple[Rule, Rule, Rule]:
@@ -74,7 +88,7 @@ def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> 
     bending, shear, points = rules(material)
     return assemble(
         mesh,
-        laminate_of(material, isotropic_g12="g12" in slips),
+        laminate_of_deck(deck, isotropic_g12="g12" in slips),
         Rules(
             bending=bending,
             shear=bending if "shear-order" in slips else shear,
@@ -84,12 +98,36 @@ def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> 
     )
 
 
-def build_rod(slips: frozenset[str] = frozenset()) -> Rod:
-    """Make the projectile, with the slips that are on."""
-    return report_rod(LISTING_DENSITY if "density" in slips else REPORT_DENSITY)
+def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> Projectile:
+    """Make the projectile of a deck; without a PROJ segment the report's, with the slips on."""
+    card = deck.last(ProjectileCard)
+    if card is None:
+        return report_rod(LISTING_DENSITY if "density" in slips else REPORT_DENSITY)
+    if not card.elements:
+        return RigidMass(card.size)
+    diameters = tuple(rod_diameters(card).tolist())
+    return Rod(card.size, diameters, card.modulus, card.density)
 
 
-def build_impact(deck: Deck, motion: PlateMotion, rod: Rod, slips: frozenset[str]) -> Impact:
+def build_station(deck: Deck, projectile: Projectile, slips: frozenset[str]) -> Station:
+    """Make the transducer: PROJ's node, or the rod's middle (one node on under its slip)."""
+    sign = 1.0 if "station" in slips else -1.0
+    if isinstance(projectile, RigidMass):
+        return Station(0, sign)
+    card = deck.last(ProjectileCard)
+    middle = projectile.elements // 2 + (2 if "station" in slips else 1)
+    return Station(middle if card is None or not card.transducer else card.transducer, sign)
+
+
+def build_gages(deck: Deck, mesh: Mesh, plate: PlateModel) -> Gages | None:
+    """Make the strain gages of a deck; None without a GAGE segment."""
+    segment = deck.last(GageCards)
+    if segment is None:
+        return None
+    return gages(mesh, segment.records, transposed=plate.rules.transposed)
+
+
+def build_impact(deck: Deck, motion: PlateMotion, rod: Projectile, slips: frozenset[str]) -> Impact:
     """Make projectile, law and contact, with the slips that are on."""
     card, measured = deck.need(ImpactCard), deck.need(Indentation)
     constants = Constants(measured.k, measured.alpha_p, measured.s_p, measured.q)
@@ -130,7 +168,7 @@ def set_up(
     threads : int
         Threads that share the work of a step; 0 takes every core for a large mesh.
     """
-    plate, rod = build_plate(deck, mesh, slips), build_rod(slips)
+    plate, rod = build_plate(deck, mesh, slips), build_projectile(deck, slips)
     hit = None
     if hits:
         card = deck.need(ImpactCard)
@@ -139,12 +177,12 @@ def set_up(
     moving = plate.neq if reduced is None else reduced.count
     workers = Workers(threads or (available() if moving >= WORTH_SHARING else 1))
     motion = PlateMotion(plate, solver, reduced, workers)
-    middle = rod.elements // 2 + 1
     return Setup(
         plate=plate,
         motion=motion,
         impact=build_impact(deck, motion, rod, slips) if hits else None,
-        station=Station(middle + 1, 1.0) if "station" in slips else Station(middle),
+        station=build_station(deck, rod, slips),
         strains=plate.strain_field(plate.rules.strains),
         stress_points=plate.strain_field(rules(deck.need(Material))[2]),
+        gages=build_gages(deck, mesh, plate),
     )

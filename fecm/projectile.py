@@ -1,4 +1,4 @@
-"""The projectile: an elastic rod of two-unknown elements, report section 4.3.2.
+"""The projectile: a rigid mass, or an elastic rod of two-unknown elements, report section 4.3.2.
 
 Conventions: unknowns of a node are u and du/dx, node by node; x runs from the impacted end (node 1)
 into the rod.  Displacement, velocity and acceleration are positive away from the plate, so that an
@@ -106,13 +106,45 @@ class Rod:
 
 
 @dataclass(frozen=True)
+class RigidMass:
+    """A projectile that does not deform: a rod of one unknown.
+
+    Attributes
+    ----------
+    total_mass : float
+        Mass.
+    """
+
+    total_mass: float
+
+    def stiffness(self) -> Floats:
+        """Stiffness matrix, (1, 1): none."""
+        return np.zeros((1, 1))
+
+    def mass(self) -> Floats:
+        """Mass of the unknown, (1,)."""
+        return np.array([self.total_mass])
+
+    def kinetic_energy(self, velocity: Floats) -> Floats:
+        """Kinetic energy of velocities (rows, 1) (force*length)."""
+        return np.asarray(0.5 * self.total_mass * velocity[:, 0] ** 2)
+
+    def strain_energy(self, deformation: Floats) -> Floats:
+        """Strain energy of displacements (rows, 1) relative to the tip: none."""
+        return np.zeros(len(deformation))
+
+
+Projectile = Rod | RigidMass
+
+
+@dataclass(frozen=True)
 class Station:
     """Where and how the transducer measures.
 
     Attributes
     ----------
     node : int
-        Node of the rod, from 1.
+        Node of the rod, from 1; 0 for the contact force itself.
     sign : float
         -1 for a force that is positive in compression, +1 in tension.
     """
@@ -179,18 +211,18 @@ class RodState:
         return np.asarray(self.motion[2])
 
 
-def rigid_approach(rod: Rod, velocity: float, *, derivatives_too: bool = False) -> RodState:
-    """State of a rod that approaches the plate as a rigid body.
+def rigid_approach(rod: Projectile, velocity: float, *, derivatives_too: bool = False) -> RodState:
+    """State of a projectile that approaches the plate as a rigid body.
 
     Parameters
     ----------
-    rod : Rod
+    rod : Rod or RigidMass
     velocity : float
         Approach velocity, positive towards the plate, length/time.
     derivatives_too : bool
         Start du/dx at the same velocity (the slip ``rod-start``).
     """
-    motion = np.zeros((3, 2 * rod.elements + 2))
+    motion = np.zeros((3, len(rod.mass())))
     motion[1, :: 1 if derivatives_too else 2] = -velocity
     return RodState(motion)
 

@@ -26,6 +26,10 @@ SECONDS = 1.0
 FORC = (
     "FORC\n    1    1       0.0       0.0       1.0\n   25    0       0.0       0.0       1.0\n\n"
 )
+OWN = (
+    "PROJ\n    3    0       1.0     30.E6 .0006875\n    1    1      0.22\n    3    0     0.625\n\n"
+    "SHEA\n  0.822467\nGAGE\n    1           0.5       0.5     0.053       45.\n\n"
+)
 SPECIAL = [
     "999999999", "99999", "-1", "0", "1E300", "1E-300", "NaN", "inf", ",", "!", "\t", "1.5-3", "é",
     "\x00", "9" * 400, "LOOP      99999", "COOR", "END", "STOP", "MACR", "FECM", "", "RODP", "NEXT",
@@ -92,7 +96,12 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     appendix = APPENDIX.read_text()
-    bases = [small(), small().replace("ROD\n", FORC + "ROD\n"), small(stop=False) + small()]
+    bases = [
+        small(),
+        small().replace("ROD\n", FORC + "ROD\n"),
+        small().replace("ROD\n", OWN + "ROD\n"),
+        small(stop=False) + small(),
+    ]
     counted: Counter[str] = Counter()
     broken = 0
 

@@ -10,7 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fecm.check.impact import check_impact, check_law, check_projectile, check_resolution
+from fecm.check.impact import (
+    check_gages,
+    check_impact,
+    check_law,
+    check_projectile,
+    check_resolution,
+    check_shear_correction,
+    warn_of_the_reports_rod,
+)
 from fecm.check.material import check_material
 from fecm.check.mesh import check_mesh
 from fecm.check.run import check_output, check_program, check_time_step
@@ -20,10 +28,13 @@ from fecm.deck.model import (
     Coordinates,
     Deck,
     Elements,
+    Gages,
     Impact,
     Indentation,
     Material,
+    Projectile,
     Segment,
+    ShearCorrection,
     Units,
 )
 from fecm.deck.reader import Problem
@@ -33,7 +44,9 @@ from fecm.program import Body, compile_program, hits
 ALWAYS: tuple[type[Segment], ...] = (Coordinates, Elements, Material)
 IN_AN_IMPACT: tuple[type[Segment], ...] = (Impact, Indentation)
 # Segments of which only the last counts.
-SINGLE: tuple[type[Segment], ...] = (Coordinates, Elements, Material, Impact, Indentation, Units)
+SINGLE: tuple[type[Segment], ...] = (
+    Coordinates, Elements, Material, Impact, Indentation, Projectile, ShearCorrection, Gages, Units
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -85,13 +98,20 @@ def check(problem: Problem, findings: Findings) -> Checked | None:
         check_impact(impact, deck, mesh, findings)
     if (law := deck.last(Indentation)) is not None:
         check_law(law, findings)
+    if (projectile := deck.last(Projectile)) is not None:
+        check_projectile(projectile, findings)
+    if (correction := deck.last(ShearCorrection)) is not None:
+        check_shear_correction(correction, findings)
+    if (segment := deck.last(Gages)) is not None and len(findings.errors) == before:
+        check_gages(segment, mesh, deck, findings)
     checked = Checked(deck, mesh, program)
     if len(findings.errors) == before and not unsound:
         with np.errstate(all="ignore"):  # numbers beyond all range end in a finding
             check_time_step(deck, mesh, findings)
             check_program(deck, program, findings)
             if hits(program):
-                check_projectile(deck.need(Impact), findings)
+                if not deck.has(Projectile):
+                    warn_of_the_reports_rod(deck.need(Impact), findings)
                 check_resolution(deck, mesh, findings)
             check_output(deck, program, findings)
     return checked

@@ -1,16 +1,30 @@
-"""Checks of ROD and EXPE, and whether the mesh resolves the impact."""
+"""Checks of ROD, EXPE, PROJ, SHEA and GAGE, and whether the mesh resolves the impact."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from fecm import plate
+from fecm.check import gather
 from fecm.deck.findings import Findings
-from fecm.deck.model import Deck, Impact, Indentation, Material
-from fecm.laminate import laminate_of
-from fecm.mesh import Mesh
-from fecm.parts import build_rod
+from fecm.deck.model import (
+    Deck,
+    Gages,
+    Impact,
+    Indentation,
+    Material,
+    Projectile,
+    ShearCorrection,
+)
+from fecm.gages import locate
+from fecm.laminate import laminate_of_deck
+from fecm.mesh import Mesh, rod_diameters
+from fecm.parts import build_projectile
+from fecm.projectile import report_rod
 
 W = 3
+# A rod's step is a full matrix of three times as many rows and columns as it has unknowns.
+MOST_ROD_ELEMENTS = 500
 # Elements that a bending wave of the contact's duration needs.
 ELEMENTS_A_WAVE = 4
 
@@ -58,15 +72,106 @@ def check_impact(impact: Impact, deck: Deck, mesh: Mesh, findings: Findings) -> 
         )
 
 
-def check_projectile(impact: Impact, findings: Findings) -> None:
+def check_projectile(projectile: Projectile, findings: Findings) -> None:
+    """Check a PROJ segment."""
+
+    def needs(code: str, sound: bool, what: str, name: str, hint: str = "") -> None:
+        if not sound:
+            findings.add(code, what, projectile.place(name), hint)
+
+    count = projectile.elements
+    needs(
+        "E418", 0 <= count <= MOST_ROD_ELEMENTS,
+        f"The projectile has {count} rod elements; it must have 0 (a rigid mass) to "
+        f"{MOST_ROD_ELEMENTS}.", "number of rod elements",
+    )  # fmt: skip
+    if not 0 <= count <= MOST_ROD_ELEMENTS:
+        return
+    what = "length" if count else "mass"
+    needs(
+        "E419", projectile.size > 0.0,
+        f"The projectile's {what} is {projectile.size:g}; it must be positive.", "length or mass",
+    )  # fmt: skip
+    if not count:
+        return
+    for name, value in (("modulus", projectile.modulus), ("density", projectile.density)):
+        field = "rod's Young's modulus" if name == "modulus" else "rod's density"
+        needs("E419", value > 0.0, f"The rod's {name} is {value:g}; it must be positive.", field)
+    needs(
+        "E423", 0 <= projectile.transducer <= count + 1,
+        f"The transducer node {projectile.transducer} does not exist; the rod has nodes 1 to "
+        f"{count + 1}.", "transducer node", "blank is the middle",
+    )  # fmt: skip
+    before = len(findings.errors)
+    diameters = rod_diameters(projectile, findings)
+    if len(findings.errors) > before:
+        return
+    missing = np.flatnonzero(np.isnan(diameters))
+    if len(missing):
+        findings.add(
+            "E422", f"Rod elements {gather.ranges(missing + 1)} have no diameter.",
+            projectile.place("number of rod elements"),
+            "give the first and the last element, with an increment of 1 on the first card",
+        )  # fmt: skip
+    for record in projectile.diameters:
+        if not record.diameter > 0.0:
+            findings.add(
+                "E422", f"The diameter of rod element {record.element} is {record.diameter:g}; it "
+                "must be positive.", record.place("diameter"),
+            )  # fmt: skip
+
+
+def check_gages(segment: Gages, mesh: Mesh, deck: Deck, findings: Findings) -> None:
+    """Check a GAGE segment on a sound mesh."""
+    families = plate.families(mesh.elements, mesh.coordinates)
+    seen: set[int] = set()
+    for record in segment.records:
+        if record.number in seen:
+            findings.add(
+                "E425", f"Gage {record.number} is given twice.", record.place("gage"),
+                "give each gage a number of its own",
+            )  # fmt: skip
+        seen.add(record.number)
+        if not locate(families, record.x, record.y):
+            findings.add(
+                "E424",
+                f"Gage {record.number} at ({record.x:g}, {record.y:g}) is not on the plate.",
+                record.place("gage's x"),
+            )
+        material = deck.last(Material)
+        half = 0.0 if material is None else material.integration.thickness / 2.0
+        if material is not None and abs(record.z) > half * (1.0 + 1e-9):
+            findings.add(
+                "W426",
+                f"Gage {record.number} at z = {record.z:g} is outside of the laminate, whose faces "
+                f"are at {half:g} from the mid-plane.", record.place("gage's z"),
+            )  # fmt: skip
+
+
+def check_shear_correction(segment: ShearCorrection, findings: Findings) -> None:
+    """Check a SHEA segment."""
+    if not segment.factor > 0.0:
+        findings.add(
+            "E427", f"The shear correction factor is {segment.factor:g}; it must be positive.",
+            segment.place("shear correction factor"), "1 as in the report, or pi^2/12 = 0.822467",
+        )  # fmt: skip
+    elif segment.factor > 1.0:
+        findings.add(
+            "W428", f"The shear correction factor is {segment.factor:g}, more than 1.",
+            segment.place("shear correction factor"),
+        )  # fmt: skip
+
+
+def warn_of_the_reports_rod(impact: Impact, findings: Findings) -> None:
     """Warn that the report's rod is assumed, in the report's units."""
-    rod = build_rod()
+    rod = report_rod()
     findings.add(
         "W414",
         f"No projectile is given: the report's steel rod is assumed, in lb, in and s whatever the "
         f"deck's units (length {rod.length:g}, diameter {rod.diameters[-1]:g}, E {rod.modulus:g}, "
         f"density {rod.density:g}, mass {rod.total_mass:.5g}).",
         impact.place("impact node"),
+        "give the projectile by a PROJ segment",
     )
 
 
@@ -91,11 +196,11 @@ def check_resolution(deck: Deck, mesh: Mesh, findings: Findings) -> None:
     impact, law = deck.need(Impact), deck.need(Indentation)
     if impact.velocity <= 0.0:
         return
-    plate, mass = laminate_of(deck.need(Material)), build_rod().total_mass
+    laminate, mass = laminate_of_deck(deck), build_projectile(deck).total_mass
     v = np.float64(impact.velocity)  # a division by zero is then infinite, not an error
     contact = 2.94 * (5.0 * mass * v**2 / (4.0 * law.k)) ** 0.4 / v
-    rigidity = float(min(plate.D[0, 0], plate.D[1, 1]))
-    wave = 2.0 * np.pi * (rigidity / (plate.mass * (np.pi / contact) ** 2)) ** 0.25
+    rigidity = float(min(laminate.D[0, 0], laminate.D[1, 1]))
+    wave = 2.0 * np.pi * (rigidity / (laminate.mass * (np.pi / contact) ** 2)) ** 0.25
     touching = (mesh.elements == impact.node).any(axis=1)
     nodes = mesh.elements[touching, :4]
     nodes = np.where(nodes == 0, nodes[:, :1], nodes)  # a triangle returns to its first corner

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fecm.assembly import UnsoundPlateError
 from fecm.deck.findings import Findings
-from fecm.deck.model import Deck, Material
+from fecm.deck.model import Deck, Gages, Material
 from fecm.elements.quadrature import HIGHEST_ORDER
 from fecm.mesh import Mesh
 from fecm.parts import build_plate, rules
@@ -86,13 +86,14 @@ def output_bytes(deck: Deck, sizes: Tally) -> int:
     control = deck.control
     card = deck.need(Material).integration
     points = len(rules(deck.need(Material))[2].xi) if 1 <= abs(card.points) <= HIGHEST_ORDER else 0
+    gages = sum(len(segment.records) for segment in deck.all(Gages)[-1:])
     field, point = control.numnp * control.ndf, control.numel * points
     return 8 * (
         sizes.passes["DISP"] * (field + control.numnp)
         + sizes.passes["STRE"] * point * 16
         + (sizes.passes["REAC"] + sizes.passes["EIGE"]) * field
         + sizes.contact_rows * (point * 5 + 8)
-        + sizes.steps * 18
+        + sizes.steps * (18 + gages)
     )
 
 

@@ -16,6 +16,7 @@ from fecm.deck.card import Fields, Value, layout, write_card
 from fecm.deck.records import (
     Control,
     ElementNodes,
+    Gage,
     Integration,
     Layer,
     LoadTable,
@@ -24,6 +25,7 @@ from fecm.deck.records import (
     NodeValues,
     Ply,
     Record,
+    RodDiameter,
     code_fields,
     element_fields,
     force_fields,
@@ -194,6 +196,87 @@ class Indentation(Segment):
         """Text of the segment's cards."""
         yield "EXPE"
         yield write_card(self.fields, [self.k, self.alpha_p, self.s_p, self.q])
+
+
+@dataclass(frozen=True)
+class Projectile(Segment):
+    """PROJ: (2I5,3F10.0) and, for a rod, its diameters; the projectile (not in the report).
+
+    Attributes
+    ----------
+    elements : int
+        Number of the rod's elements; 0 for a rigid mass.
+    transducer : int
+        Node at which its force is measured, from 1 at the impacted end; 0 for the middle.
+    size : float
+        Length of the rod; the mass where there are no elements.
+    modulus, density : float
+        Young's modulus, and mass per volume, of a rod.
+    diameters : tuple of RodDiameter
+        From the impacted end on; those between two cards are interpolated.
+    """
+
+    elements: int
+    transducer: int
+    size: float
+    modulus: float = 0.0
+    density: float = 0.0
+    diameters: tuple[RodDiameter, ...] = ()
+    keyword: ClassVar[str] = "PROJ"
+
+    fields: ClassVar[Fields] = layout(
+        "I5 number of rod elements|elms", "I5 transducer node|node", "F10 length or mass|len/mass",
+        "F10 rod's Young's modulus|modulus", "F10 rod's density|density",
+    )  # fmt: skip
+
+    def cards(self, control: Control) -> Iterator[str]:
+        """Text of the segment's cards."""
+        head = [self.elements, self.transducer, self.size]
+        if not self.elements:
+            yield "PROJ"
+            yield write_card(self.fields[: len(head)], head)
+            return
+        yield "PROJ"
+        yield write_card(self.fields, [*head, self.modulus, self.density])
+        for record in self.diameters:
+            yield write_card(
+                RodDiameter.fields, [record.element, record.increment, record.diameter]
+            )
+        yield ""
+
+
+@dataclass(frozen=True)
+class ShearCorrection(Segment):
+    """SHEA: (F10.0); factor on the transverse shear stiffness (not in the report's program).
+
+    Attributes
+    ----------
+    factor : float
+        1 in the report's program; its page on cut-off frequencies recommends pi^2/12.
+    """
+
+    factor: float
+    keyword: ClassVar[str] = "SHEA"
+
+    fields: ClassVar[Fields] = layout("F10 shear correction factor|factor")
+
+    def cards(self, control: Control) -> Iterator[str]:
+        """Text of the segment's cards."""
+        yield "SHEA"
+        yield write_card(self.fields, [self.factor])
+
+
+@dataclass(frozen=True)
+class Gages(Segment):
+    """GAGE: strain gages, read at every step (not in the report's program)."""
+
+    records: tuple[Gage, ...]
+    keyword: ClassVar[str] = "GAGE"
+
+    def cards(self, control: Control) -> Iterator[str]:
+        """Text of the segment's cards."""
+        rows = [(r.number, r.x, r.y, r.z, r.direction) for r in self.records]
+        return _numbered("GAGE", Gage.fields, rows)
 
 
 @dataclass(frozen=True)

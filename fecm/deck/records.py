@@ -67,6 +67,43 @@ class NodeValues(Record):
 
 
 @dataclass(frozen=True)
+class RodDiameter(Record):
+    """PROJ card: (2I5,F10.0); an element's diameter (length), and the step to generated ones."""
+
+    element: int
+    increment: int
+    diameter: float
+
+    fields: ClassVar[Fields] = layout("I5 element|elm", "I5 increment|incr", "F10 diameter")
+
+
+@dataclass(frozen=True)
+class Gage(Record):
+    """GAGE card: (I5,5X,4F10.0); a strain gage.
+
+    Attributes
+    ----------
+    number : int
+        Its name in the result.
+    x, y, z : float
+        Where it sits; z from the mid-plane, positive on the face away from the projectile (length).
+    direction : float
+        Degrees from the x-axis to the y-axis.
+    """
+
+    number: int
+    x: float
+    y: float
+    z: float
+    direction: float
+
+    fields: ClassVar[Fields] = layout(
+        "I5 gage", "X5", "F10 gage's x|x", "F10 gage's y|y", "F10 gage's z|z",
+        "F10 gage's direction|degrees",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
 class NodeCodes(Record):
     """BOUN card: restraint codes of a node; a negative code carries on to generated nodes."""
 

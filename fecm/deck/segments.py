@@ -10,22 +10,27 @@ from fecm.deck.model import (
     Coordinates,
     Elements,
     Forces,
+    Gages,
     Impact,
     Indentation,
     Material,
     Page,
     PrintOption,
+    Projectile,
     Segment,
+    ShearCorrection,
     Units,
 )
 from fecm.deck.records import (
     Control,
     ElementNodes,
+    Gage,
     Integration,
     Layer,
     NodeCodes,
     NodeValues,
     Ply,
+    RodDiameter,
     code_fields,
     element_fields,
     force_fields,
@@ -154,6 +159,32 @@ class SegmentReader:
         row = self._single(head, Indentation.fields, "The card of the indentation law")
         return None if row is None else Indentation(*map(float, row[0]), source=row[1])
 
+    def _projectile(self, head: Card) -> Segment | None:
+        row = self._single(head, Projectile.fields, "The first card of PROJ")
+        if row is None:
+            return None
+        (elements, transducer, size, modulus, density), source = row
+        diameters = [
+            RodDiameter(int(v[0]), int(v[1]), float(v[2]), source=at)
+            for v, at in (self._rows(head, RodDiameter.fields) if elements else [])
+        ]
+        return Projectile(
+            int(elements), int(transducer), float(size), float(modulus), float(density),
+            tuple(diameters), source=source,
+        )  # fmt: skip
+
+    def _shear_correction(self, head: Card) -> Segment | None:
+        row = self._single(head, ShearCorrection.fields, "The card of the shear correction factor")
+        return None if row is None else ShearCorrection(float(row[0][0]), source=row[1])
+
+    def _gages(self, head: Card) -> Segment:
+        rows = self._rows(head, Gage.fields)
+        records = [
+            Gage(int(v[0]), *(float(number) for number in v[1:]), source=source)
+            for v, source in rows
+        ]
+        return Gages(tuple(records), source=Source(head, ()))
+
     def _units(self, head: Card) -> Segment | None:
         card = self._stream.take()
         names = [] if card is None else card.data.replace(",", " ").split()
@@ -220,6 +251,9 @@ READERS: dict[str, Callable[[SegmentReader, Card], Segment | None]] = {
     "ROD": SegmentReader._impact,
     "EXPE": SegmentReader._indentation,
     "FORC": SegmentReader._forces,
+    "PROJ": SegmentReader._projectile,
+    "SHEA": SegmentReader._shear_correction,
+    "GAGE": SegmentReader._gages,
     "UNIT": SegmentReader._units,
     "PRIN": SegmentReader._print_option,
     "NOPR": SegmentReader._print_option,

@@ -74,7 +74,8 @@ def table(result: Result, name: str = "history") -> Table:
         If the result has no such dataset or group, or the group's datasets have not the same axes.
     """
     members = _members(result, name.strip("/"))
-    clock = [path for column in CLOCK if (path := _beside(members[0], column)) in result]
+    beside = [_beside(members[0], column) for column in CLOCK]
+    clock = [path for path in beside if path in result and _in_rows(path)]
     values = [path for path in members if path not in clock]
     if clock and values and not any(map(_in_rows, values)):
         clock = []
@@ -94,7 +95,7 @@ def table(result: Result, name: str = "history") -> Table:
     rows = _rows(
         [result[path] for path in values],
         [result[path] for path in clock],
-        [length for _, length in sizes],
+        [_labels(result, size, length) for size, length in sizes],
     )
     return Table((*_names(clock), *keys, *columns), rows)
 
@@ -142,6 +143,13 @@ def _beside(path: str, name: str) -> str:
     return f"{path.rpartition('/')[0]}/{name}"
 
 
+def _labels(result: Result, size: str | int, length: int) -> Sequence[int]:
+    """Numbers along an axis: those of the gages' cards, from 1 elsewhere."""
+    if size == "gages" and "gages/number" in result:
+        return [int(number) for number in result["gages/number"]]
+    return range(1, length + 1)
+
+
 def _sizes(path: str, shape: tuple[int, ...]) -> list[tuple[str | int, int]]:
     """Name and length of every axis."""
     known = DATASETS[path].shape if path in DATASETS else shape
@@ -149,12 +157,12 @@ def _sizes(path: str, shape: tuple[int, ...]) -> list[tuple[str | int, int]]:
 
 
 def _rows(
-    arrays: Sequence[Array], clock: Sequence[Array], keys: Sequence[int]
+    arrays: Sequence[Array], clock: Sequence[Array], keys: Sequence[Sequence[int]]
 ) -> Iterator[tuple[float, ...]]:
     """Rows of arrays that have the axes (instants, keys, columns); the first only with a clock."""
     if not clock:
         arrays = [array[None] for array in arrays]
-    numbers = list(itertools.product(*(range(1, length + 1) for length in keys)))
+    numbers = list(itertools.product(*keys))
     step = max(1, BLOCK // len(numbers))
     for start in range(0, len(arrays[0]), step):
         block = slice(start, start + step)

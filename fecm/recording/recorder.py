@@ -52,9 +52,7 @@ class Recorder:
         self._setup = setup
         self.steps = StepRecorder(
             sink,
-            setup.motion,
-            setup.impact,
-            setup.station,
+            setup,
             contact_at_every_step=contact_at_every_step,
             watches=watches,
         )
@@ -74,6 +72,7 @@ class Recorder:
             "tape9": (sizes.steps if contact_at_every_step else sizes.contact_rows) if hits else 0,
             "history": sizes.steps if hits else 0,
             "energy": sizes.steps,
+            "gages": sizes.steps if self._setup.gages is not None else 0,
             "stresses": sizes.passes["STRE"],
             "reactions": sizes.passes["REAC"],
             "modes": sizes.passes["EIGE"],
@@ -87,6 +86,7 @@ class Recorder:
             "numel": mesh.elements.shape[0], "nen": mesh.elements.shape[1],
             "ndf": mesh.equations.shape[1], "npt": self._setup.strains.shape[1],
             "nps": self._setup.stress_points.shape[1],
+            "gages": 0 if self._setup.gages is None else len(self._setup.gages.numbers),
         }  # fmt: skip
         for dataset in DATASETS.values():
             rows = self._room.get(dataset.group)
@@ -119,6 +119,8 @@ class Recorder:
             ("laminate/shear", laminate.shear),
         ):
             self._sink.write(path, 0, array)
+        if self._room["gages"] and self._setup.gages is not None:
+            self._sink.write("gages/number", 0, self._setup.gages.numbers)
 
     def constant(self, path: str, array: Floats) -> None:
         """Store a dataset that has no rows."""

@@ -11,9 +11,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.dynamics import DivergenceError, PlateMotion, PlateState
-from fecm.impact import Impact, ImpactState
-from fecm.projectile import Station
+from fecm.dynamics import DivergenceError, PlateState, Watch
+from fecm.impact import ImpactState
+from fecm.parts import Setup
+from fecm.projectile import Rod
 from fecm.results.schema import DATASETS
 from fecm.results.sinks import Sink
 
@@ -37,12 +38,8 @@ class StepRecorder:
     ----------
     sink : Sink
         Receives the rows; the datasets of history, energy and tape9 stand there already.
-    motion : PlateMotion
-        The plate.
-    impact : Impact or None
-        Plate and projectile; None for a plate alone, which has energies only.
-    station : Station
-        The transducer.
+    setup : Setup
+        The run's parts; a plate alone has energies and gages only.
     contact_at_every_step : bool
         Store contact on tape9 at every step instead of every N-th (the slip ``tapes``).
     watches : bool
@@ -53,29 +50,28 @@ class StepRecorder:
     def __init__(
         self,
         sink: Sink,
-        motion: PlateMotion,
-        impact: Impact | None,
-        station: Station,
+        setup: Setup,
         *,
         contact_at_every_step: bool = False,
         watches: bool = True,
     ) -> None:
         self._sink = sink
-        self._motion = motion
-        self._impact = impact
+        self._motion = setup.motion
+        self._impact = impact = setup.impact
         self._watches = watches
         self._all_contact = contact_at_every_step
         self._rows: list[tuple[float, ...]] = []
         self._contact_rows: list[int] = []
         self._stored = self._tape9_rows = 0
-        self._station = 2 * station.node - 1
-        self._gauge = 0.0
+        self._station = setup.station
         self._rod = np.empty((0, 3, 0))
         if impact is not None:
-            rod = impact.rod
-            element = min(station.node, rod.elements) - 1
-            self._gauge = station.sign * rod.modulus * float(rod.areas[element])
-            self._rod = np.empty((BLOCK, 3, 2 * rod.elements + 2))
+            self._rod = np.empty((BLOCK, 3, len(impact.rod_mass)))
+        self._gages: Watch | None = None
+        self._strains = np.empty((0, 0))
+        if setup.gages is not None:
+            self._gages = setup.motion.watch(setup.gages.places, setup.gages.weights)
+            self._strains = np.empty((BLOCK, len(setup.gages.numbers)))
         self.initial = 0.0
 
     def begin(self, plate: PlateState, impact: ImpactState | None) -> None:
@@ -111,6 +107,8 @@ class StepRecorder:
         kinetic = self._motion.kinetic_energy(plate, factor, point)
         strain = plate.strain_energy
         own = (plate.step, plate.time, kinetic, strain, plate.external_work)
+        if self._gages is not None:
+            self._strains[len(self._rows)] = self._gages.read(plate, factor)
         if impact is None:
             self._rows.append((*own, 0.0, 0.0, 0.0, 0.0, 0.0))
         else:
@@ -142,9 +140,10 @@ class StepRecorder:
         )  # fmt: skip
         table["balance_error"] = held - self.initial - table["external_work"]
         self._watch(table, held)
-        groups = ("energy",) if self._impact is None else ("history", "energy")
+        table["strain"] = self._strains[:count]
+        groups = self.rows.keys() - {"tape9"}
         for dataset in DATASETS.values():
-            if dataset.group in groups:
+            if dataset.group in groups and dataset.shape[0] == "rows":
                 self._sink.write(dataset.path, self._stored, table[dataset.name])
         rows = np.array(self._contact_rows, dtype=int)
         if len(rows):
@@ -162,11 +161,20 @@ class StepRecorder:
             return
         u, v, a = self._rod[:count].swapaxes(0, 1)
         u[:, 0] = 0.0  # the tip, to which the others are relative
-        table["transducer"] = self._gauge * u[:, self._station]
+        table["transducer"] = self._transducer(table["force"], u)
         table["velocity"], table["acceleration"] = v[:, 0], a[:, 0]
         rod = self._impact.rod
         table["projectile_kinetic"] = rod.kinetic_energy(v)
         table["projectile_strain"] = rod.strain_energy(u)
+
+    def _transducer(self, force: Floats, deformation: Floats) -> Floats:
+        """Force at the transducer: E A du/dx of its node; the contact force on a rigid mass."""
+        node, sign = self._station.node, self._station.sign
+        if self._impact is None or not isinstance(self._impact.rod, Rod):
+            return -sign * force
+        rod = self._impact.rod
+        area = float(rod.areas[min(node, rod.elements) - 1])
+        return sign * rod.modulus * area * deformation[:, 2 * node - 1]
 
     def _watch(self, table: Mapping[str, Floats], held: Floats) -> None:
         """Stop a run that has lost all sense."""
@@ -187,5 +195,9 @@ class StepRecorder:
     @property
     def rows(self) -> dict[str, int]:
         """Rows stored in each group."""
-        history = {} if self._impact is None else {"history": self._stored}
-        return {"energy": self._stored, "tape9": self._tape9_rows, **history}
+        rows = {"energy": self._stored, "tape9": self._tape9_rows}
+        if self._impact is not None:
+            rows["history"] = self._stored
+        if self._gages is not None:
+            rows["gages"] = self._stored
+        return rows

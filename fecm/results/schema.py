@@ -1,7 +1,7 @@
 """What a result file holds: every dataset, its shape, its dimension and what it is.
 
 Shapes are given in the sizes of a run: ``rows`` of the group, ``numnp``, ``ndm``, ``ndf``,
-``numel``, ``nen``, ``npt`` and ``nps`` (points an element of tape8 and of the stresses).
+``numel``, ``nen``, ``npt`` and ``nps`` (points an element of tape8 and of the stresses), ``gages``.
 """
 
 from __future__ import annotations
@@ -136,6 +136,9 @@ DATASETS = {
                 "force*length",
             ),
         ),
+        *_clock("gages"),
+        Dataset("gages/number", ("gages",), "number of every gage", dtype="i4"),
+        Dataset("gages/strain", ("rows", "gages"), "normal strain of every gage in its direction"),
         *_clock("stresses"),
         Dataset("stresses/x", ("numel", "nps"), "x of every point of every element", "length"),
         Dataset("stresses/y", ("numel", "nps"), "y of every point of every element", "length"),
@@ -181,6 +184,7 @@ SCALES = {
     "npt": ("point", "number of the point in its element"),
     "nps": ("stress_point", "number of the stress point in its element"),
     "ndf": ("unknown", "name of the unknown"),
+    "gages": ("gage", "position of the gage among the gages, from 1"),
 }
 
 
@@ -229,6 +233,7 @@ GROUP_DESCRIPTIONS = {
     "tape9": "contact and the projectile, stored by RODP",
     "history": "contact and the projectile at every step; row n is the state after step n",
     "energy": "energies at every step",
+    "gages": "strain gages, read at every step",
     "stresses": "strains and stress resultants, stored by STRE",
     "reactions": "forces of the supports, stored by REAC",
     "modes": "natural modes, found by EIGE",
@@ -237,5 +242,6 @@ GROUP_DESCRIPTIONS = {
 # The macro that makes a group.
 STORED_BY = {
     "tape3": "DISP", "tape8": "RODP", "tape9": "RODP", "history": "RODP", "energy": "RODP",
+    "gages": "RODP or EXCD",
     "stresses": "STRE", "reactions": "REAC", "modes": "EIGE",
 }  # fmt: skip
