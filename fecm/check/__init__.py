@@ -102,7 +102,7 @@ def check(problem: Problem, findings: Findings) -> Checked | None:
         check_projectile(projectile, findings)
     if (correction := deck.last(ShearCorrection)) is not None:
         check_shear_correction(correction, findings)
-    if (segment := deck.last(Gages)) is not None and len(findings.errors) == before:
+    if (segment := deck.last(Gages)) is not None and len(findings.errors) == before and not unsound:
         check_gages(segment, mesh, deck, findings)
     checked = Checked(deck, mesh, program)
     if len(findings.errors) == before and not unsound:
