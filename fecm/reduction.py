@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.assembly import PlateModel
-from fecm.laminate import Laminate
 from fecm.plate import Family
 
 Floats = NDArray[np.float64]
@@ -24,8 +23,6 @@ Indices = NDArray[np.intp]
 TURNED = np.array([-1.0, -1.0, 1.0, -1.0, -1.0])
 # Two nodes are one another's images if their places agree to this part of the plate's size.
 TOLERANCE = 1.0e-9
-# Coupling that the rounding of its sums explains, in units of max|A| h.
-ROUNDING = 64.0 * np.finfo(float).eps
 
 
 @dataclass(frozen=True)
@@ -120,15 +117,9 @@ def _numbered(
     return Reduction(count, index, sign, weights)
 
 
-def uncoupled(laminate: Laminate) -> bool:
-    """Whether stretching and bending are independent: B is zero, but for rounding."""
-    scale = float(np.abs(laminate.A).max()) * laminate.thickness
-    return bool(np.abs(laminate.B).max() <= ROUNDING * scale)
-
-
 def _in_plane_rests(plate: PlateModel, hit: tuple[int, int] | None) -> bool:
     pulled = plate.mesh.forces[:, :2].any() or (hit is not None and hit[1] < 2)
-    return uncoupled(plate.laminate) and not pulled
+    return not (plate.laminate.is_coupled or pulled)
 
 
 def _images(

@@ -18,9 +18,10 @@ from fecm.authoring.materials import MATERIALS
 from fecm.cli import cli
 from fecm.deck import Deck
 from fecm.deck.formatting import format_deck
-from fecm.deck.model import Impact, Material
+from fecm.deck.model import Impact, Material, Projectile
 from fecm.deck.records import Control
 from fecm.mesh import generate
+from fecm.parts import build_projectile
 from tests.decks import APPENDIX, LONG, small
 
 REPORT = [
@@ -233,3 +234,23 @@ def test_fmt_check_answers_whether_a_deck_would_change(tmp_path: Path) -> None:
     assert CliRunner().invoke(cli, ["fmt", "--check", str(deck)]).exit_code == 1
     assert CliRunner().invoke(cli, ["fmt", str(deck)]).exit_code == 0
     assert CliRunner().invoke(cli, ["fmt", "--check", str(deck)]).exit_code == 0
+
+
+def test_a_new_deck_carries_its_own_projectile_in_its_own_units() -> None:
+    rigid = new(*PLATE, "--projectile", "mass:0.05")
+    assert rigid.exit_code == 0
+    assert "W414" not in [f.code for f in prepare(rigid.stdout).findings]
+    deck = fecm.read_deck(rigid.stdout)
+    assert isinstance(deck, Deck)
+    assert deck.need(Projectile) == Projectile(0, 0, 0.05)
+    rod = fecm.read_deck(new(*PLATE, "--projectile", "rod:.02,.016,210e9,7800").stdout)
+    assert isinstance(rod, Deck)
+    mass = 7800 * 0.02 * np.pi * 0.008**2
+    assert build_projectile(rod).total_mass == pytest.approx(mass, rel=1e-9)
+
+
+@pytest.mark.parametrize("text", ["0.05", "mass:", "mass:-1", "mass:x", "rod:1,2,3", "ball:1"])
+def test_what_is_no_projectile_is_refused(text: str) -> None:
+    result = new(*PLATE, "--projectile", text)
+    assert result.exit_code == 2
+    assert result.stdout == ""

@@ -14,7 +14,7 @@ from fecm.deck.model import Forces, Impact
 from fecm.deck.records import NodeValues
 from fecm.parts import build_plate
 from fecm.products import ElementProduct, product_of
-from fecm.reduction import Reduction, reduction, uncoupled
+from fecm.reduction import Reduction, reduction
 from fecm.results.result import Result
 from fecm.workers import Workers
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, small
@@ -139,9 +139,9 @@ def test_rounding_of_a_symmetric_layup_counts_as_no_coupling() -> None:
     assert isinstance(deck, Deck)
     plate = build_plate(deck, fecm.mesh.generate(deck))
     assert np.abs(plate.laminate.B).max() > 0.0
-    assert uncoupled(plate.laminate)
+    assert not plate.laminate.is_coupled
     tilted = replace(plate.laminate, B=plate.laminate.B + 1e-9 * plate.laminate.A)
-    assert not uncoupled(tilted)
+    assert tilted.is_coupled
 
 
 @pytest.mark.parametrize("threads", [2, 3, 5])

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from fecm.authoring.grid import Grid
-from fecm.deck.model import Deck, Impact, Indentation, Material, Segment, Units
+from fecm.deck.model import Deck, Impact, Indentation, Material, Projectile, Segment, Units
 from fecm.deck.records import Control, Integration, Layer, Macro, Ply
 from fecm.laminate import laminate
 from fecm.mesh import generate
@@ -44,6 +44,8 @@ class Specification:
     velocity : float
         Approach velocity, length/time.
     law : Indentation
+    projectile : Projectile or None
+        None for the report's rod.
     duration : float
         Time.
     dt : float or None
@@ -64,6 +66,7 @@ class Specification:
     velocity: float
     law: Indentation
     duration: float
+    projectile: Projectile | None = None
     dt: float | None = None
     every: int | None = None
     units: Units | None = None
@@ -104,6 +107,7 @@ def new_deck(spec: Specification) -> Deck:
     segments: list[Segment] = [] if spec.units is None else [spec.units]
     segments += [grid.coordinates(), grid.element_cards()]
     segments += [] if boundary is None else [boundary]
+    segments += [] if spec.projectile is None else [spec.projectile]
     segments += [Impact(node, 3, spec.velocity), spec.law, material]
     control = Control(grid.nodes, grid.elements, len(layers), 2, 5, 9)
     deck = Deck(spec.title, control, tuple(segments), ())

@@ -10,11 +10,13 @@ from fecm.authoring.grid import Grid, Section, graded, listed, uniform
 from fecm.authoring.layup import LayupError, parse_layup
 from fecm.authoring.materials import MATERIALS, SYSTEMS
 from fecm.authoring.new import EDGES, SUPPORTS, Specification, new_deck
-from fecm.deck.model import Deck, Indentation, Units
-from fecm.deck.records import Ply
+from fecm.deck.model import Deck, Indentation, Projectile, Units
+from fecm.deck.records import Ply, RodDiameter
 
 # Elements in one direction, at the most.
 MOST = 2000
+# Elements of a rod, as many as the report's has.
+ROD_ELEMENTS = 20
 
 
 class OptionError(ValueError):
@@ -39,6 +41,7 @@ def deck_of_options(
     at: str | None,
     velocity: float,
     law: str,
+    projectile: str | None,
     duration: float,
     dt: float | None,
     every: int | None,
@@ -75,6 +78,7 @@ def deck_of_options(
         at=(x, y),
         velocity=velocity,
         law=Indentation(*_numbers("--law", law, 4)),
+        projectile=_projectile(projectile),
         duration=duration,
         dt=dt,
         every=every,
@@ -96,6 +100,21 @@ def _numbers(option: str, text: str, count: int) -> list[float]:
     if len(values) != count or not all(map(math.isfinite, values)):
         raise OptionError(f"{option} takes {count} numbers with commas between them, not `{text}`")
     return values
+
+
+def _projectile(text: str | None) -> Projectile | None:
+    """A rigid mass, or a cylindrical rod."""
+    if text is None:
+        return None
+    kind, _, values = text.partition(":")
+    if kind == "mass":
+        (mass,) = _numbers("--projectile mass", values, 1)
+        return Projectile(0, 0, mass)
+    if kind == "rod":
+        length, diameter, modulus, density = _numbers("--projectile rod", values, 4)
+        ends = (RodDiameter(1, 1, diameter), RodDiameter(ROD_ELEMENTS, 0, diameter))
+        return Projectile(ROD_ELEMENTS, 0, length, modulus, density, ends)
+    raise OptionError(f"--projectile takes mass:M or rod:LENGTH,DIAMETER,E,DENSITY, not `{text}`")
 
 
 def _pair(option: str, text: str | None) -> tuple[float, float]:

@@ -107,6 +107,9 @@ def fmt(deck: Path, output: Path | None, only_check: bool) -> None:
 @click.option("--at", metavar="X,Y", help="Impact point.  [default: the plate's middle]")
 @click.option("--velocity", type=float, required=True, help="Approach velocity.")
 @click.option("--law", required=True, metavar="K,ALPHA_P,S_P,Q", help="The indentation law.")
+@click.option("--projectile", metavar="WHAT",
+              help="mass:M, or rod:LENGTH,DIAMETER,E,DENSITY.  [default: the report's rod, in lb, "
+                   "in and s]")  # fmt: skip
 @click.option("--duration", type=float, required=True, help="Time to run.")
 @click.option("--dt", type=float, help="Time step.  [default: 0.9 of the critical one]")
 @click.option("--every", type=click.IntRange(min=1),
