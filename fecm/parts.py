@@ -18,8 +18,9 @@ from fecm.indentation import Constants, Law, MemoryLaw, StickyLaw
 from fecm.laminate import laminate_of
 from fecm.mesh import Mesh
 from fecm.plate import StrainField
-from fecm.projectile import LISTING_DENSITY, REPORT_DENSITY, Rod, Station, report_rod
+from fecm.projectile import LISTING_DENSITY, REPORT_DENSITY, STEPS, Rod, Station, report_rod
 from fecm.reduction import reduction
+from fecm.rod_method import WILSON, RodMethod
 from fecm.solvers import AUTO, CSR
 from fecm.workers import Workers, available
 
@@ -89,7 +90,9 @@ def build_rod(slips: frozenset[str] = frozenset()) -> Rod:
     return report_rod(LISTING_DENSITY if "density" in slips else REPORT_DENSITY)
 
 
-def build_impact(deck: Deck, motion: PlateMotion, rod: Rod, slips: frozenset[str]) -> Impact:
+def build_impact(
+    deck: Deck, motion: PlateMotion, rod: Rod, slips: frozenset[str], integrator: str = WILSON
+) -> Impact:
     """Make projectile, law and contact, with the slips that are on."""
     card, measured = deck.need(ImpactCard), deck.need(Indentation)
     constants = Constants(measured.k, measured.alpha_p, measured.s_p, measured.q)
@@ -101,7 +104,7 @@ def build_impact(deck: Deck, motion: PlateMotion, rod: Rod, slips: frozenset[str
         strains_start_moving="rod-start" in slips,
         keeps_first_step="rod-dt" in slips,
     )
-    return Impact(motion, rod, law, contact)
+    return Impact(motion, rod, law, contact, STEPS[integrator])
 
 
 def set_up(
@@ -113,6 +116,7 @@ def set_up(
     moves_only: bool = False,
     solver: str = AUTO,
     threads: int = 0,
+    rod_method: RodMethod | None = None,
 ) -> Setup:
     """Make the parts of a checked problem, with the slips that are on.
 
@@ -129,8 +133,11 @@ def set_up(
         How K u is had: see :func:`~fecm.products.product_of`.
     threads : int
         Threads that share the work of a step; 0 takes every core for a large mesh.
+    rod_method : RodMethod, optional
+        The rod's mass matrix and integrator; the report's without it.
     """
-    plate, rod = build_plate(deck, mesh, slips), build_rod(slips)
+    method = rod_method or RodMethod()
+    plate, rod = build_plate(deck, mesh, slips), build_rod(slips).with_mass(method.mass)
     hit = None
     if hits:
         card = deck.need(ImpactCard)
@@ -143,7 +150,7 @@ def set_up(
     return Setup(
         plate=plate,
         motion=motion,
-        impact=build_impact(deck, motion, rod, slips) if hits else None,
+        impact=build_impact(deck, motion, rod, slips, method.integrator) if hits else None,
         station=Station(middle + 1, 1.0) if "station" in slips else Station(middle),
         strains=plate.strain_field(plate.rules.strains),
         stress_points=plate.strain_field(rules(deck.need(Material))[2]),
