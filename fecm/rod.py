@@ -63,7 +63,7 @@ class RodHistory:
     def mean_ratios(self) -> Floats:
         """Mean of the ratio over all rows at which the pulse is above 1 % of its peak, (stations,).
 
-        The report's 0.498 (page 88) for its exponential pulse is this.
+        The report's 0.498 (section 4.2) for its exponential pulse is this.
         """
         size = np.abs(self.applied)
         counted = size > COUNTS * size.max()

@@ -6,11 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from fecm.filters import FIRST_ORDER, KINDS, MOVING_AVERAGE, Filter, filter_of
-
-Floats = NDArray[np.float64]
 
 RISE = 10e-6
 JUMP = 1e-13  # width of what stands for a step
@@ -46,7 +43,7 @@ def test_points_put_on_the_lines_of_a_polygon_change_nothing(kind: str) -> None:
 @pytest.mark.parametrize(("kind", "delay"), [(FIRST_ORDER, RISE / math.log(9.0)),
                                               (MOVING_AVERAGE, RISE / 1.6)])  # fmt: skip
 def test_a_ramp_is_followed_with_a_constant_delay(kind: str, delay: float) -> None:
-    time: Floats = np.linspace(0.0, 40 * RISE, 57, dtype=np.float64)
+    time = np.array([n * RISE for n in range(41)])
     answer = Filter(kind, RISE)(time, 3.0 * time)
     late = time > 20 * RISE
     np.testing.assert_allclose(answer[late], 3.0 * (time[late] - delay), rtol=1e-7)
@@ -54,7 +51,7 @@ def test_a_ramp_is_followed_with_a_constant_delay(kind: str, delay: float) -> No
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_stands_still_stays_and_a_filter_without_inertia_changes_nothing(kind: str) -> None:
-    time, values = np.arange(50) * 2e-7, np.sin(np.arange(50.0))
+    time, values = np.array([n * 2e-7 for n in range(50)]), np.sin(np.arange(50.0))
     np.testing.assert_allclose(Filter(kind, RISE)(time, np.full(50, 7.0)), 7.0, rtol=1e-13)
     np.testing.assert_allclose(Filter(kind, 1e-22)(time, values), values, rtol=0, atol=1e-13)
 

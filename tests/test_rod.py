@@ -98,7 +98,7 @@ def test_the_whole_rod_gets_the_pulses_impulse_at_every_point() -> None:
     impulse = found.applied.sum() * 2e-7
     gained = found.accelerations.sum(axis=0) * 2e-7 * rod().total_mass
     assert gained == pytest.approx([impulse] * 3, rel=1e-3)
-    # Page 88: virtually no difference between the accelerations.
+    # Section 4.2: virtually no difference between the accelerations.
     late = found.time > 50e-6
     assert np.ptp(found.accelerations[late], axis=1).max() < 0.02 * found.accelerations.max()
 
