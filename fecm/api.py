@@ -13,6 +13,7 @@ from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, load_text
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
+from fecm.rod_method import LUMPED, WILSON, RodMethod
 from fecm.simulation import simulate
 from fecm.slips import LISTING, REPORT, active_slips
 from fecm.solvers import AUTO
@@ -78,6 +79,8 @@ def run(
     force: bool = False,
     solver: str = AUTO,
     threads: int = 0,
+    rod_mass: str = LUMPED,
+    rod_integrator: str = WILSON,
 ) -> Result | list[Result]:
     """Run every problem of a deck.
 
@@ -99,6 +102,11 @@ def run(
     threads : int
         Threads that share the work of a step; 0 takes every core for a large mesh. The result does
         not depend on it.
+    rod_mass : str
+        The projectile's mass matrix: ``"lumped"`` as in the report's program, or ``"consistent"``.
+    rod_integrator : str
+        The projectile's integration: ``"wilson"`` as in the report's program, or
+        ``"average-acceleration"``.
 
     Returns
     -------
@@ -112,7 +120,7 @@ def run(
     DivergenceError
         If the motion grows without bound.
     ValueError
-        If the mode or a slip is unknown.
+        If the mode, a slip, the rod's mass or its integrator is unknown.
     OSError
         If a file can't be read or written.
 
@@ -122,7 +130,7 @@ def run(
     >>> print(f"{result.force.max():.2f} lb")
     6.19 lb
     """
-    active = active_slips(mode, slips)
+    active, method = active_slips(mode, slips), RodMethod(rod_mass, rod_integrator)
     prepared = prepare(deck, mode)
     if prepared.errors(force):
         raise DeckError(prepared.findings, prepared.source)
@@ -130,7 +138,7 @@ def run(
     for number, problem in enumerate(prepared.problems, start=1):
         if output is None:
             memory = MemorySink()
-            simulate(problem, active, memory, solver=solver, threads=threads)
+            simulate(problem, active, memory, solver=solver, threads=threads, rod_method=method)
             results.append(Result(memory.arrays, memory.texts, memory.groups))
         else:
             from fecm.results import hdf5
@@ -138,7 +146,7 @@ def run(
 
             path = numbered(Path(output), number)
             with hdf5.writing(path) as sink:
-                simulate(problem, active, sink, solver=solver, threads=threads)
+                simulate(problem, active, sink, solver=solver, threads=threads, rod_method=method)
             results.append(load(path))
     return results[0] if len(results) == 1 else results
 

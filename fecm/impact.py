@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from fecm.assembly import PlateModel
 from fecm.dynamics import DivergenceError, PlateMotion, PlateState, PointForce, Sums
 from fecm.indentation import Law, Memory, Point
-from fecm.projectile import WILSON_THETA, Projectile, RodState, WilsonStep, rigid_approach
+from fecm.projectile import CollocationStep, Projectile, RodState, WilsonStep, rigid_approach
 
 Floats = NDArray[np.float64]
 
@@ -139,16 +139,26 @@ class Impact:
     rod : Rod or RigidMass
     law : Law
     contact : Contact
+    integrator : type of CollocationStep
+        The rod's.
     """
 
-    def __init__(self, motion: PlateMotion, rod: Projectile, law: Law, contact: Contact) -> None:
+    def __init__(
+        self,
+        motion: PlateMotion,
+        rod: Projectile,
+        law: Law,
+        contact: Contact,
+        integrator: type[CollocationStep] = WilsonStep,
+    ) -> None:
         self.motion = motion
         self.rod = rod
         self.law = law
         self.contact = contact
         self.rod_stiffness = rod.stiffness()
         self.rod_mass = rod.mass()
-        self._wilson: WilsonStep | None = None
+        self._integrator = integrator
+        self._step: CollocationStep | None = None
         self._first_dt: float | None = None
 
     @property
@@ -200,13 +210,13 @@ class Impact:
         if not math.isfinite(state.contact.indentation + state.contact.force):
             raise DivergenceError(step, "the motion is no longer finite")
 
-    def _rod_step(self, dt: float) -> WilsonStep:
+    def _rod_step(self, dt: float) -> CollocationStep:
         """Give the rod's linear map for a time step."""
-        if self._wilson is None or self._wilson.dt != dt:
+        if self._step is None or self._step.dt != dt:
             if not self.contact.keeps_first_step or self._first_dt is None:
                 self._first_dt = dt
-            self._wilson = WilsonStep(self.rod_stiffness, self.rod_mass, dt, self._first_dt)
-        return self._wilson
+            self._step = self._integrator(self.rod_stiffness, self.rod_mass, dt, self._first_dt)
+        return self._step
 
     def move_projectile(self, state: ImpactState, dt: float) -> None:
         """Iterate force and tip acceleration, then move the whole rod with what came out."""
@@ -214,21 +224,22 @@ class Impact:
         step = self._rod_step(dt)
         w = state.plate.extended.item(self.contact.row) if self.contact.plate_moves else 0.0
         motion = step.free_motion(state.rod)
-        base, gain = motion.item(2 * step.n), step.gain
+        base, gain, theta = motion.item(2 * step.n), step.gain, step.theta
         _, v, acceleration = state.rod.motion[:, 0].tolist()
-        drift, weight = state.rod.tip + dt * v + dt**2 / 3.0 * acceleration, dt**2 / 6.0
-        carried = (1.0 - WILSON_THETA) * last.force
+        begin, weight = step.weights
+        drift = state.rod.tip + dt * v + begin * acceleration
+        carried = (1.0 - theta) * last.force
         tip, force = drift + weight * acceleration, last.force
         for _ in range(PASSES):
             before = tip
             force, memory = law.trial(memory, last, -before - w)
-            acceleration = base + gain * (carried + WILSON_THETA * force)
+            acceleration = base + gain * (carried + theta * force)
             tip = drift + weight * acceleration
             if abs(tip - before) < TOLERANCE * abs(tip):
                 break
         else:
             state.unsettled += 1
-        motion += step.h * (carried + WILSON_THETA * force)
+        motion += step.h * (carried + theta * force)
         state.rod = rod = RodState(motion.reshape(3, step.n), state.rod.tip + motion.item(0))
         indentation = -rod.tip - w
         state.memory = law.accept(memory, last, indentation)

@@ -24,6 +24,7 @@ from fecm.plate import StrainField
 from fecm.projectile import (
     LISTING_DENSITY,
     REPORT_DENSITY,
+    STEPS,
     Projectile,
     RigidMass,
     Rod,
@@ -31,6 +32,7 @@ from fecm.projectile import (
     report_rod,
 )
 from fecm.reduction import reduction
+from fecm.rod_method import WILSON, RodMethod
 from fecm.solvers import AUTO, CSR
 from fecm.workers import Workers, available
 
@@ -127,7 +129,13 @@ def build_gages(deck: Deck, mesh: Mesh, plate: PlateModel) -> Gages | None:
     return gages(mesh, segment.records, transposed=plate.rules.transposed)
 
 
-def build_impact(deck: Deck, motion: PlateMotion, rod: Projectile, slips: frozenset[str]) -> Impact:
+def build_impact(
+    deck: Deck,
+    motion: PlateMotion,
+    rod: Projectile,
+    slips: frozenset[str],
+    integrator: str = WILSON,
+) -> Impact:
     """Make projectile, law and contact, with the slips that are on."""
     card, measured = deck.need(ImpactCard), deck.need(Indentation)
     constants = Constants(measured.k, measured.alpha_p, measured.s_p, measured.q)
@@ -139,7 +147,7 @@ def build_impact(deck: Deck, motion: PlateMotion, rod: Projectile, slips: frozen
         strains_start_moving="rod-start" in slips,
         keeps_first_step="rod-dt" in slips,
     )
-    return Impact(motion, rod, law, contact)
+    return Impact(motion, rod, law, contact, STEPS[integrator])
 
 
 def set_up(
@@ -151,6 +159,7 @@ def set_up(
     moves_only: bool = False,
     solver: str = AUTO,
     threads: int = 0,
+    rod_method: RodMethod | None = None,
 ) -> Setup:
     """Make the parts of a checked problem, with the slips that are on.
 
@@ -167,8 +176,12 @@ def set_up(
         How K u is had: see :func:`~fecm.products.product_of`.
     threads : int
         Threads that share the work of a step; 0 takes every core for a large mesh.
+    rod_method : RodMethod, optional
+        The rod's mass matrix and integrator; the report's without it.
     """
+    method = rod_method or RodMethod()
     plate, rod = build_plate(deck, mesh, slips), build_projectile(deck, slips)
+    rod = rod.with_mass(method.mass)
     hit = None
     if hits:
         card = deck.need(ImpactCard)
@@ -180,7 +193,7 @@ def set_up(
     return Setup(
         plate=plate,
         motion=motion,
-        impact=build_impact(deck, motion, rod, slips) if hits else None,
+        impact=build_impact(deck, motion, rod, slips, method.integrator) if hits else None,
         station=build_station(deck, rod, slips),
         strains=plate.strain_field(plate.rules.strains),
         stress_points=plate.strain_field(rules(deck.need(Material))[2]),

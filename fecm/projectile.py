@@ -9,11 +9,13 @@ column a case, may follow.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from fecm.rod_method import AVERAGE, CONSISTENT, WILSON
 
 Floats = NDArray[np.float64]
 
@@ -43,12 +45,15 @@ class Rod:
         Young's modulus, force/area.
     density : float
         Mass per volume.
+    consistent : bool
+        Whether the mass matrix is the consistent one, equation 4-24, instead of the lumped one.
     """
 
     length: float
     diameters: tuple[float, ...]
     modulus: float
     density: float
+    consistent: bool = False
 
     @property
     def elements(self) -> int:
@@ -82,7 +87,32 @@ class Rod:
             K[unknowns, unknowns] += self.modulus * area / (30.0 * L) * shape
         return K
 
+    def with_mass(self, mass: str) -> Rod:
+        """The same rod with another mass matrix, one of :data:`fecm.rod_method.MASSES`."""
+        return replace(self, consistent=mass == CONSISTENT)
+
     def mass(self) -> Floats:
+        """The mass in use: lumped, (n,), or consistent, (n, n)."""
+        return self.consistent_mass() if self.consistent else self.lumped_mass()
+
+    def consistent_mass(self) -> Floats:
+        """Consistent mass matrix of the whole rod, equation 4-24: (n, n)."""
+        L = self.length / self.elements
+        shape = np.array(
+            [
+                [156.0, 22.0 * L, 54.0, -13.0 * L],
+                [22.0 * L, 4.0 * L**2, 13.0 * L, -3.0 * L**2],
+                [54.0, 13.0 * L, 156.0, -22.0 * L],
+                [-13.0 * L, -3.0 * L**2, -22.0 * L, 4.0 * L**2],
+            ]
+        )
+        M = np.zeros((2 * self.elements + 2, 2 * self.elements + 2))
+        for element, area in enumerate(self.areas):
+            unknowns = slice(2 * element, 2 * element + 4)
+            M[unknowns, unknowns] += self.density * area * L / 420.0 * shape
+        return M
+
+    def lumped_mass(self) -> Floats:
         """Lumped mass of each unknown, (n,): rho A L/2 for u and rho A L^3/420 for du/dx."""
         L = self.length / self.elements
         m = np.zeros(2 * self.elements + 2)
@@ -93,16 +123,22 @@ class Rod:
 
     def kinetic_energy(self, velocity: Floats) -> Floats:
         """Kinetic energy of velocities (rows, n) (force*length)."""
-        return np.asarray(0.5 * np.einsum("ri,ri,i->r", velocity, velocity, self.mass()))
+        return _energy(self.mass(), velocity)
 
     def strain_energy(self, deformation: Floats) -> Floats:
         """Strain energy of displacements (rows, n) relative to the tip (force*length)."""
-        K, u = self.stiffness(), deformation
-        # Diagonal by diagonal, of which there are few, and in an order of its own.
-        energy = 0.5 * np.einsum("ri,ri,i->r", u, u, np.diagonal(K))
-        for off in range(1, 4):
-            energy += np.einsum("ri,ri,i->r", u[:, :-off], u[:, off:], np.diagonal(K, off))
-        return np.asarray(energy)
+        return _energy(self.stiffness(), deformation)
+
+
+def _energy(matrix: Floats, x: Floats) -> Floats:
+    """Half of x' A x for each row of x (rows, n), where A is diagonal, (n,), or the rod's band."""
+    if matrix.ndim == 1:
+        return np.asarray(0.5 * np.einsum("ri,ri,i->r", x, x, matrix))
+    # Diagonal by diagonal, of which there are few, and in an order of its own.
+    energy = 0.5 * np.einsum("ri,ri,i->r", x, x, np.diagonal(matrix))
+    for off in range(1, 4):
+        energy += np.einsum("ri,ri,i->r", x[:, :-off], x[:, off:], np.diagonal(matrix, off))
+    return np.asarray(energy)
 
 
 @dataclass(frozen=True)
@@ -116,6 +152,10 @@ class RigidMass:
     """
 
     total_mass: float
+
+    def with_mass(self, mass: str) -> RigidMass:
+        """The same mass, whatever the matrix."""
+        return self
 
     def stiffness(self) -> Floats:
         """Stiffness matrix, (1, 1): none."""
@@ -227,18 +267,22 @@ def rigid_approach(rod: Projectile, velocity: float, *, derivatives_too: bool = 
     return RodState(motion)
 
 
-class WilsonStep:
-    r"""One step of Wilson's theta method as a linear map, for a rod and a time step.
+class CollocationStep:
+    r"""One step of an implicit method as a linear map, for a rod and a time step.
 
-    With :math:`y` the motion of :class:`RodState` and :math:`f` the force on the tip at
-    :math:`t + \theta \Delta t`, the new motion is :math:`y' = T y + h f`.
+    Equilibrium is met at :math:`t + \theta \Delta t`, the acceleration running linearly from
+    :math:`a` to :math:`a'` over the step; displacements are those of Newmark's method,
+    :math:`u' = u + \Delta t v + \Delta t^2 ((1/2 - \beta) a + \beta a')`, velocities
+    :math:`v' = v + \Delta t (a + a') / 2`.  With :math:`y` the motion of :class:`RodState` and
+    :math:`f` the force on the tip at :math:`t + \theta \Delta t`, the new motion is
+    :math:`y' = T y + h f`.
 
     Parameters
     ----------
     K : ndarray (n, n)
         Stiffness.
-    m : ndarray (n,)
-        Lumped mass.
+    m : ndarray (n,) or (n, n)
+        Lumped mass, or mass matrix.
     dt : float
         Time step.
     constants_dt : float, optional
@@ -246,29 +290,47 @@ class WilsonStep:
 
     Attributes
     ----------
+    theta : float
+        Where in the step equilibrium is met.
+    inverse_beta : float
+        1/beta, above 2.
     T : ndarray (3 n, 3 n)
     h : ndarray (3 n,)
     gain : float
         The tip's acceleration per force, of `h`.
+    weights : (float, float)
+        The tip's displacement per acceleration at the step's begin and at its end.
     n : int
         Number of the rod's unknowns.
     """
 
+    theta: ClassVar[float]
+    inverse_beta: ClassVar[float]
+
     def __init__(self, K: Floats, m: Floats, dt: float, constants_dt: float | None = None) -> None:
-        theta, tau = WILSON_THETA, dt if constants_dt is None else constants_dt
+        theta, tau, r = self.theta, dt if constants_dt is None else constants_dt, self.inverse_beta
         self.dt = dt
         self.n = n = len(m)
-        a0 = 6.0 / (theta * tau) ** 2
-        a2 = 6.0 / (theta * tau)
+        # Divisors of dt^2: 1/begin = 1/2 - beta, 1/end = beta.
+        begin, end = 2.0 * r / (r - 2.0), r
+        self.weights = (dt**2 / begin, dt**2 / end)
+        a0 = r / (theta * tau) ** 2
+        a2 = r / (theta * tau)
         a4 = a0 / theta
         one, none = np.eye(n), np.zeros((n, n))
-        effective = np.linalg.inv(K + a0 * np.diag(m))
+        lumped = m.ndim == 1
+        effective = np.linalg.inv(K + a0 * (np.diag(m) if lumped else m))
+
+        def on_mass(factor: float) -> Floats:
+            weighed = factor * effective
+            return np.asarray(weighed * m if lumped else weighed @ m)
+
         # Written for the increment from u, so that the rigid motion does not cancel against it.
         acceleration = np.hstack(
             [
                 -a4 * effective @ K,
-                a4 * a2 * effective * m - a2 / theta * one,
-                2.0 * a4 * effective * m + (1.0 - 3.0 / theta) * one,
+                on_mass(a4 * a2) - a2 / theta * one,
+                on_mass((r / 2.0 - 1.0) * a4) + (1.0 - r / 2.0 / theta) * one,
             ]
         )
         # Rigid displacements cause no force, and displacements are relative to the tip.
@@ -276,13 +338,12 @@ class WilsonStep:
         kept, relative = one.copy(), one.copy()
         kept[0, 0] = 0.0
         relative[2::2, 0] = -1.0
-        # The acceleration is linear over the step.
         velocity = np.hstack([none, one, tau / 2.0 * one]) + tau / 2.0 * acceleration
-        moved = np.hstack([none, dt * one, tau**2 / 3.0 * one]) + tau**2 / 6.0 * acceleration
+        moved = np.hstack([none, dt * one, tau**2 / begin * one]) + tau**2 / end * acceleration
         displacement = np.hstack([kept, none, none]) + relative @ moved
         self.T = np.vstack([displacement, velocity, acceleration])
         gain = a4 * effective[:, 0]
-        self.h = np.concatenate([tau**2 / 6.0 * relative @ gain, tau / 2.0 * gain, gain])
+        self.h = np.concatenate([tau**2 / end * relative @ gain, tau / 2.0 * gain, gain])
         self.gain = float(gain[0])
 
     def free_motion(self, state: RodState) -> Floats:
@@ -293,3 +354,20 @@ class WilsonStep:
     def end(self, state: RodState, motion: Floats) -> RodState:
         """State after a step from `state` whose new motion is `motion`, (3 n, ...)."""
         return RodState(motion.reshape(3, self.n, *motion.shape[1:]), state.tip + motion[0])
+
+
+class WilsonStep(CollocationStep):
+    """Wilson's theta method: the report's program."""
+
+    theta = WILSON_THETA
+    inverse_beta = 6.0
+
+
+class AverageAccelerationStep(CollocationStep):
+    """Newmark's average acceleration, which keeps the energy of free motion."""
+
+    theta = 1.0
+    inverse_beta = 4.0
+
+
+STEPS: dict[str, type[CollocationStep]] = {WILSON: WilsonStep, AVERAGE: AverageAccelerationStep}

@@ -25,6 +25,7 @@ from fecm.proportional import load_factor
 from fecm.recording.recorder import Recorder
 from fecm.results.schema import FORMAT, FORMAT_VERSION
 from fecm.results.sinks import Sink
+from fecm.rod_method import RodMethod
 from fecm.slips import LISTING, NAMES, REPORT
 from fecm.solvers import AUTO, SAFE
 from fecm.statics import Tangent, reactions
@@ -60,6 +61,8 @@ class Simulation:
         How K u is had: see :func:`~fecm.products.product_of`.
     threads : int
         Threads that share the work of a step; 0 takes every core for a large mesh.
+    rod_method : RodMethod
+        The rod's mass matrix and integrator.
     notes : list of str
         What the user should know of the run.
     """
@@ -71,6 +74,7 @@ class Simulation:
     printer: Printer = field(default_factory=Printer)
     solver: str = AUTO
     threads: int = 0
+    rod_method: RodMethod = field(default_factory=RodMethod)
     notes: list[str] = field(default_factory=list, init=False)
     setup: Setup = field(init=False)
     plate: PlateState = field(init=False)
@@ -98,6 +102,7 @@ class Simulation:
                 moves_only=moves_only(program),
                 solver=self.solver,
                 threads=self.threads,
+                rod_method=self.rod_method,
             )
         self.plate = self.setup.motion.start()
         if self.setup.impact is not None:
@@ -134,6 +139,7 @@ class Simulation:
             "title": deck.title,
             "mode": LISTING if listing else REPORT,
             "slips": sorted(self.slips),
+            **self.rod_method.attributes,
             **{f"unit_{name}": unit for name, unit in unit_names(deck).items()},
         }
         self.sink.attributes("", attributes)
@@ -392,6 +398,7 @@ def simulate(
     printer: Printer | None = None,
     solver: str = AUTO,
     threads: int = 0,
+    rod_method: RodMethod | None = None,
 ) -> Simulation:
     """Run a problem into a sink and return the finished simulation.
 
@@ -403,7 +410,14 @@ def simulate(
         If a static solution is asked for and the plate is not held.
     """
     simulation = Simulation(
-        checked, frozenset(slips), sink, progress, printer or Printer(), solver, threads
+        checked,
+        frozenset(slips),
+        sink,
+        progress,
+        printer or Printer(),
+        solver,
+        threads,
+        rod_method or RodMethod(),
     )
     simulation.run()
     return simulation

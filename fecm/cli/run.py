@@ -23,6 +23,7 @@ from fecm.cli.common import (
     signals,
     writing,
 )
+from fecm.rod_method import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
 from fecm.slips import NAMES, active_slips
 from fecm.solvers import AUTO, SOLVERS
 
@@ -56,6 +57,11 @@ if TYPE_CHECKING:
     help="Threads that share the work of a step; 0 takes every core for a large mesh.  "
     "[default: 0]",
 )
+@click.option("--rod-mass", type=click.Choice(MASSES), default=LUMPED, show_default=True,
+              help="The projectile's mass matrix; the report's program lumps it.")  # fmt: skip
+@click.option("--rod-integrator", type=click.Choice(INTEGRATORS), default=WILSON,
+              show_default=True,
+              help="The projectile's integration; the report's is Wilson's.")  # fmt: skip
 @click.option("--force", is_flag=True, help="Run with a time step above the critical one.")
 @click.option(
     "--print",
@@ -72,6 +78,8 @@ def run(
     overwrite: bool,
     solver: str,
     threads: int,
+    rod_mass: str,
+    rod_integrator: str,
     force: bool,
     printed: Path | None,
 ) -> None:
@@ -93,10 +101,11 @@ def run(
     paths = [numbered(first, n) for n in range(1, len(prepared.problems) + 1)]
     prints = [None if printed is None else numbered(printed, n + 1) for n in range(len(paths))]
     check_outputs([*paths, *(path for path in prints if path is not None)], overwrite)
+    method = RodMethod(rod_mass, rod_integrator)
     for number, path in enumerate(paths):
         if number:
             click.echo()
-        _run_one(prepared, number, active, solver, threads, path, prints[number])
+        _run_one(prepared, number, active, solver, threads, method, path, prints[number])
 
 
 def _run_one(
@@ -105,6 +114,7 @@ def _run_one(
     active: frozenset[str],
     solver: str,
     threads: int,
+    method: RodMethod,
     path: Path,
     printed: Path | None,
 ) -> None:
@@ -127,7 +137,7 @@ def _run_one(
         printer = Printer() if printed is None else Printer(stack.enter_context(writing(printed)))
         advance = stack.enter_context(_progress(tally(problem.program).steps))
         try:
-            simulation = simulate(problem, active, sink, advance, printer, solver, threads)
+            simulation = simulate(problem, active, sink, advance, printer, solver, threads, method)
         except SingularStiffnessError as error:
             raise Refused(
                 f"{error}: the plate is not held, so that it has no static displacement; restrain "

@@ -1,0 +1,378 @@
+"""``fecm rod``: the instrumented rod by itself, its calibration, its rise time."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fecm.cli.common import (
+    DECK_PATH,
+    FORMAT_OPTION,
+    Refused,
+    check_outputs,
+    count_errors,
+    report,
+    writing,
+)
+from fecm.rod_method import INTEGRATORS, LUMPED, MASSES, WILSON
+
+if TYPE_CHECKING:
+    from fecm.plot import Picture
+    from fecm.projectile import Rod
+    from fecm.rod import RodHistory
+
+STANDARD_OUTPUT = "-"
+
+
+def _finite(ctx: click.Context, param: click.Parameter, value: Any) -> Any:
+    """Refuse NaN and infinities, alone or among several numbers."""
+    for number in value if isinstance(value, tuple) else (value,):
+        if number is not None and not math.isfinite(number):
+            raise click.BadParameter(f"{number} is no finite number")
+    return value
+
+
+def _positive(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
+    """Refuse what is no positive number."""
+    if value is not None and not 0.0 < value < math.inf:
+        raise click.BadParameter(f"{value:g} is no positive number")
+    return value
+
+
+OUTPUT = click.option("-o", "--output", type=click.Path(path_type=Path, allow_dash=True),
+                      metavar="OUT.csv", help="File for the CSV; - is standard output.  "
+                      "[default: standard output]")  # fmt: skip
+PLOT = click.option("--plot", "picture", type=click.Path(path_type=Path), metavar="FILE",
+                    help="Also draw it (.png, .svg, .pdf).")  # fmt: skip
+OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace files that exist.")
+FILTER_HELP = ("first-order:RISE or moving-average:RISE; RISE is the time from 10 to 90 % of the "
+               "answer to a step.")  # fmt: skip
+
+
+class _PulseGroup(click.Group):
+    """A group of commands; what begins with none of their names is meant for the first."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Put the first command's name where there is none."""
+        if args and args[0] not in self.commands and args[0] not in ("-h", "--help"):
+            args = ["pulse", *args]
+        return super().parse_args(ctx, args)
+
+
+@click.group(cls=_PulseGroup)
+def rod() -> None:
+    """The projectile's rod by itself: a pulse on its end, its transducer.
+
+    `fecm rod [DECK] --pulse ...` is short for `fecm rod pulse [DECK] --pulse ...`.
+    """
+
+
+@rod.command()
+@click.argument("deck", type=DECK_PATH, required=False)
+@click.option("--pulse", "pulse_text", required=True, metavar="PULSE",
+              help="gauss:F0,TAU,B (F0 exp(-(t-TAU)²/4B²)), sine:F0,B (F0 sin(πt/B), zero after "
+                   "B), or a CSV of time and force, linear between its rows.")  # fmt: skip
+@click.option("--length", type=float, callback=_positive, help="Length of the rod, without a deck.")
+@click.option("--modulus", type=float, callback=_positive, help="Young's modulus, without a deck.")
+@click.option("--density", type=float, callback=_positive, help="Mass per volume, without a deck.")
+@click.option("--diameter", type=float, callback=_positive, help="Diameter, without a deck.")
+@click.option("--elements", type=click.IntRange(1, 1000), metavar="N",
+              help="Number of elements, without a deck.  [default: 20]")  # fmt: skip
+@click.option("--dt", type=float, callback=_positive,
+              help="Time step.  [default: the deck's DT, or 0.8 of a wave's time through an "
+                   "element]")  # fmt: skip
+@click.option("--duration", type=float, callback=_positive,
+              help="Time to cover.  [default: TAU + 10 B, 1.5 B, or the table's]")  # fmt: skip
+@click.option("--station", "stations", type=float, callback=_finite, multiple=True, metavar="X",
+              help="Distance from the struck end at which the force is wanted; may be repeated.  "
+                   "[default: the middle]")  # fmt: skip
+@click.option("--filter", "filter_text", metavar="FILTER",
+              help=f"Also show these forces through a transducer that rises slowly: {FILTER_HELP}",
+              )  # fmt: skip
+@click.option("--mass-matrix", type=click.Choice(MASSES), default=LUMPED, show_default=True,
+              help="The report's program lumps the mass.")  # fmt: skip
+@click.option("--integrator", type=click.Choice(INTEGRATORS), default=WILSON, show_default=True,
+              help="The report's is Wilson's.")  # fmt: skip
+@OUTPUT
+@PLOT
+@OVERWRITE
+def pulse(
+    deck: Path | None,
+    pulse_text: str,
+    dt: float | None,
+    duration: float | None,
+    stations: tuple[float, ...],
+    filter_text: str | None,
+    mass_matrix: str,
+    integrator: str,
+    output: Path | None,
+    picture: Path | None,
+    overwrite: bool,
+    **shape: float | int | None,
+) -> None:
+    """Push a free rod at one end; the forces and accelerations in it as CSV.
+
+    The rod is the projectile of DECK, or uniform by --length, --modulus, --density and --diameter.
+    Force is positive in compression.
+    """
+    _check_targets(output, picture, overwrite)
+    _check_shape(deck, shape)
+    from fecm.filters import filter_of
+    from fecm.pulses import pulse_of
+    from fecm.rod import default_time_step, strike, table
+
+    units: Mapping[str, str] = {}
+    deck_dt = None
+    if deck is None:
+        struck = _uniform(shape)
+        middle = struck.length / 2.0
+    else:
+        struck, middle, deck_dt, units = _of_deck(deck)
+    struck = struck.with_mass(mass_matrix)
+    try:
+        push = pulse_of(pulse_text)
+        slow = None if filter_text is None else filter_of(filter_text)
+        history = strike(
+            struck,
+            push,
+            dt or deck_dt or default_time_step(struck),
+            duration or push.duration,
+            tuple(dict.fromkeys(stations)) or (middle,),
+            integrator,
+        )
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    filtered = None if slow is None else slow(history.time, history.forces)
+
+    def draw() -> Picture:
+        from fecm.plot.rod import pulse_picture
+
+        return pulse_picture(history, filtered, units)
+
+    _hand_out(table(history, filtered), output, picture, draw)
+    if _to_file(output):
+        click.echo("\n".join(_summary(struck, history)))
+
+
+def _check_shape(deck: Path | None, shape: Mapping[str, float | int | None]) -> None:
+    """Refuse a rod that is given twice, or not wholly."""
+    given = [name for name, value in shape.items() if value is not None]
+    if deck is not None and given:
+        raise click.UsageError(f"--{given[0]} is for a rod without a deck; {deck} has its own")
+    missing = [name for name, value in shape.items() if value is None and name != "elements"]
+    if deck is None and missing:
+        options = ", ".join(f"--{name}" for name in missing)
+        raise click.UsageError(f"the rod lacks {options}; or name a deck whose rod it is")
+
+
+def _uniform(shape: Mapping[str, Any]) -> Rod:
+    """The rod of the options."""
+    from fecm.projectile import REPORT_ELEMENTS, Rod
+
+    diameters = (shape["diameter"],) * (shape["elements"] or REPORT_ELEMENTS)
+    return Rod(shape["length"], diameters, shape["modulus"], shape["density"])
+
+
+def _of_deck(deck: Path) -> tuple[Rod, float, float | None, Mapping[str, str]]:
+    """The projectile of a deck's first problem, its transducer's x, its first DT, its units."""
+    from fecm.api import prepare
+    from fecm.parts import build_projectile, build_station
+    from fecm.projectile import RigidMass
+    from fecm.units import unit_names
+
+    prepared = prepare(deck)
+    report(prepared)
+    if errors := prepared.errors(force=True):
+        raise Refused(count_errors(errors))
+    if not prepared.problems:
+        raise Refused(f"{deck} holds no problem")
+    first = prepared.problems[0].deck
+    steps = [macro.value for macro in first.macros if macro.word == "DT" and macro.value > 0.0]
+    projectile = build_projectile(first)
+    if isinstance(projectile, RigidMass):
+        raise Refused(f"{deck}: the projectile is a rigid mass, through which no wave runs")
+    node = build_station(first, projectile, frozenset()).node
+    x = (node - 1) * projectile.length / projectile.elements
+    return projectile, x, steps[0] if steps else None, unit_names(first)
+
+
+def _summary(struck: Rod, history: RodHistory) -> list[str]:
+    """What came out, for a person."""
+    dt, peak = history.time[1], abs(history.applied).argmax()
+    lines = [
+        f"rod               {struck.elements} elements, length {struck.length:g}, "
+        f"mass {struck.total_mass:.5g}",
+        f"steps             {len(history.time) - 1} of {dt:g}",
+        f"applied           peak {history.applied[peak]:.6g} at time {history.time[peak]:.6g}",
+    ]
+    for x, force, ratio in zip(
+        history.stations, history.forces.T, history.mean_ratios, strict=True
+    ):
+        row = abs(force).argmax()
+        lines.append(
+            f"force at {x:<8.4g} peak {force[row]:.6g} at time {history.time[row]:.6g}; "
+            f"mean ratio to the applied {ratio:.3f}"
+        )
+    return lines
+
+
+@rod.command("filter")
+@click.argument("history", type=DECK_PATH, metavar="RESULT")
+@click.option("--filter", "filter_text", required=True, metavar="FILTER", help=FILTER_HELP)
+@click.option("--column", metavar="NAME",
+              help="What to filter: a column of a result's history, or of a CSV.  [default: "
+                   "transducer; of a CSV without one, the second]")  # fmt: skip
+@OUTPUT
+@PLOT
+@OVERWRITE
+def filter_(
+    history: Path,
+    filter_text: str,
+    column: str | None,
+    output: Path | None,
+    picture: Path | None,
+    overwrite: bool,
+) -> None:
+    """Show a history as a transducer with a rise time would.
+
+    RESULT is what `fecm run` wrote, or a CSV with a column of times; the CSV that comes out has the
+    columns time, the history, and filtered.
+    """
+    _check_targets(output, picture, overwrite, history)
+    from fecm.filters import filter_of
+    from fecm.recorded import recorded
+
+    try:
+        slow = filter_of(filter_text)
+        series = recorded(history, column)
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    filtered = slow(series.time, series.values)
+
+    def draw() -> Picture:
+        from fecm.plot.rod import filter_picture
+
+        named = {**series.beside, series.name: series.values, "filtered": filtered}
+        return filter_picture(series.time, named, series.units, series.dimension)
+
+    def lines() -> Iterable[str]:
+        yield f"time,{series.name},filtered\n"
+        columns = (series.time.tolist(), series.values.tolist(), filtered.tolist())
+        for row in list(zip(*columns, strict=True))[series.first :]:
+            yield ",".join(map(repr, row)) + "\n"
+
+    _hand_out(lines(), output, picture, draw)
+
+
+@rod.command()
+@click.argument("test", type=DECK_PATH, metavar="TEST.csv")
+@click.option("--mass", type=float, callback=_positive, required=True, help="Mass of the target.")
+@click.option("--c-a", type=float, callback=_positive, required=True,
+              help="Sensitivity of the accelerometer, V_a per acceleration.")  # fmt: skip
+@click.option("--through-origin", is_flag=True, help="Fit a line without an offset.")
+@FORMAT_OPTION
+@PLOT
+@OVERWRITE
+def calibrate(
+    test: Path,
+    mass: float,
+    c_a: float,
+    through_origin: bool,
+    form: str,
+    picture: Path | None,
+    overwrite: bool,
+) -> None:
+    """Sensitivity of the impact-force transducer from TEST.csv.
+
+    TEST.csv has the columns time, V_F and V_a: outputs of the transducer on the projectile and of
+    the accelerometer on a free target.  The slope of V_F over V_a gives c_F = (c_a / m) V_F / V_a.
+    """
+    _check_targets(None, picture, overwrite)
+    from fecm import calibration
+    from fecm.columns import read_columns
+
+    try:
+        columns = read_columns(test, ("time", "V_F", "V_a"), increasing="time")
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    try:
+        found = calibration.calibrate(
+            columns["V_F"], columns["V_a"], mass, c_a, through_origin=through_origin
+        )
+    except ValueError as error:
+        raise Refused(f"{test}: {error}") from None
+
+    def draw() -> Picture:
+        from fecm.plot.rod import calibration_picture
+
+        return calibration_picture(columns["time"], columns["V_F"], columns["V_a"], found)
+
+    text = json.dumps(vars(found)) if form == "json" else "\n".join(_told(found))
+    _hand_out([text + "\n"], None, picture, draw)
+
+
+def _told(found: Any) -> list[str]:
+    """A calibration, for a person."""
+    return [
+        f"points            {found.points}",
+        f"slope V_F/V_a     {found.slope:.6g} ± {found.slope_error:.2g}",
+        f"offset of V_F     {found.offset:.6g} ± {found.offset_error:.2g}",
+        f"R²                {found.r_squared:.6f}",
+        f"sensitivity c_F   {found.sensitivity:.6g} ± {found.sensitivity_error:.2g}",
+    ]
+
+
+# Output ------------------------------------------------------------------------------------------
+
+
+def _to_file(output: Path | None) -> bool:
+    return output is not None and str(output) != STANDARD_OUTPUT
+
+
+def _check_targets(
+    output: Path | None, picture: Path | None, overwrite: bool, source: Path | None = None
+) -> None:
+    """Refuse outputs that can't be written, before anything is computed."""
+    paths = [output] if output is not None and _to_file(output) else []
+    if picture is not None:
+        from fecm.plot import SUFFIXES
+
+        if picture.suffix.lower() not in SUFFIXES:
+            raise Refused(f"{picture}: a picture is written as {' or '.join(SUFFIXES)}")
+        paths.append(picture)
+    check_outputs(paths, overwrite)
+    if len({path.resolve() for path in paths}) < len(paths):
+        raise Refused(f"{picture} can't be both the CSV and the picture")
+    if source is not None and source.resolve() in {path.resolve() for path in paths}:
+        raise Refused(f"{source} would be replaced by what comes out of it")
+
+
+def _hand_out(
+    lines: Iterable[str],
+    output: Path | None,
+    picture: Path | None,
+    draw: Callable[[], Picture],
+) -> None:
+    """Write the text, and before it the picture if one is asked for."""
+    from fecm.plot import MISSING, save
+
+    try:
+        drawn = None if picture is None else draw()
+    except ImportError as error:
+        if not (error.name or "").startswith("matplotlib"):
+            raise
+        raise Refused(MISSING) from None
+    if picture is not None and drawn is not None:
+        save(drawn, picture)
+        click.echo(f"fecm: drew {picture}", err=True)
+    if output is not None and _to_file(output):
+        with writing(output) as file:
+            file.writelines(lines)
+    else:
+        sys.stdout.writelines(lines)
