@@ -10,15 +10,23 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecm.assembly import PlateModel
 from fecm.dynamics import DivergenceError, PlateMotion, PlateState, PointForce, Sums
-from fecm.indentation import Law, Memory, Point
-from fecm.projectile import CollocationStep, Projectile, RodState, WilsonStep, rigid_approach
+from fecm.indentation import Law, Memory, Number, Point
+from fecm.projectile import (
+    CollocationStep,
+    Projectile,
+    RodState,
+    TipStep,
+    WilsonStep,
+    rigid_approach,
+)
 
 Floats = NDArray[np.float64]
 
@@ -28,14 +36,14 @@ TOLERANCE = 1.0e-6
 
 
 @dataclass(slots=True)
-class ImpactState:
-    """Everything that one step hands to the next.
+class Encounter:
+    """The projectile's and the law's part of what one step hands to the next.
+
+    Values are floats, or arrays with one entry a case.
 
     Attributes
     ----------
-    plate : PlateState
-        The plate, with the number of steps and their time.
-    rod : RodState
+    rod : RodState or TipState
         The projectile.
     memory : Memory
         The indentation law.
@@ -49,13 +57,25 @@ class ImpactState:
         Steps whose contact iteration did not settle.
     """
 
-    plate: PlateState
-    rod: RodState
+    rod: Any
     memory: Memory
     contact: Point
-    plate_w: float = 0.0
-    contact_work: float = 0.0
-    unsettled: int = 0
+    plate_w: Number = 0.0
+    contact_work: Number = 0.0
+    unsettled: Number = 0
+
+
+@dataclass(slots=True)
+class ImpactState(Encounter):
+    """Everything that one step hands to the next.
+
+    Attributes
+    ----------
+    plate : PlateState
+        The plate, with the number of steps and their time.
+    """
+
+    plate: PlateState = field(kw_only=True)
 
     def to_arrays(self) -> dict[str, Floats]:
         """Store the state as plain arrays, from which :meth:`from_arrays` makes it again."""
@@ -95,13 +115,13 @@ class ImpactState:
             Sums(*arrays["sums"].tolist()),
         )
         return cls(
-            plate,
             RodState(arrays["rod"].copy(), tip),
             Memory(int(branch), *curve),
             Point(a, force),
             w,
             work,
             int(unsettled),
+            plate=plate,
         )
 
 
@@ -178,7 +198,7 @@ class Impact:
             self.rod, self.contact.velocity, derivatives_too=self.contact.strains_start_moving
         )
         state = self.motion.start() if plate is None else plate
-        return ImpactState(state, rod, self.law.start(), Point(0.0, 0.0))
+        return ImpactState(rod, self.law.start(), Point(0.0, 0.0), plate=state)
 
     def point_force(self, state: ImpactState) -> PointForce:
         """The contact force on the plate."""
@@ -219,30 +239,83 @@ class Impact:
         return self._step
 
     def move_projectile(self, state: ImpactState, dt: float) -> None:
-        """Iterate force and tip acceleration, then move the whole rod with what came out."""
-        law, last, memory = self.law, state.contact, state.memory
-        step = self._rod_step(dt)
+        """Bring projectile and law to the plate's instant."""
         w = state.plate.extended.item(self.contact.row) if self.contact.plate_moves else 0.0
-        motion = step.free_motion(state.rod)
-        base, gain, theta = motion.item(2 * step.n), step.gain, step.theta
-        _, v, acceleration = state.rod.motion[:, 0].tolist()
-        begin, weight = step.weights
-        drift = state.rod.tip + dt * v + begin * acceleration
-        carried = (1.0 - theta) * last.force
-        tip, force = drift + weight * acceleration, last.force
-        for _ in range(PASSES):
-            before = tip
-            force, memory = law.trial(memory, last, -before - w)
-            acceleration = base + gain * (carried + theta * force)
-            tip = drift + weight * acceleration
-            if abs(tip - before) < TOLERANCE * abs(tip):
-                break
-        else:
-            state.unsettled += 1
-        motion += step.h * (carried + theta * force)
-        state.rod = rod = RodState(motion.reshape(3, step.n), state.rod.tip + motion.item(0))
-        indentation = -rod.tip - w
-        state.memory = law.accept(memory, last, indentation)
-        state.contact = Point(indentation, force)
-        state.plate_w = w
-        state.contact_work += (last.force + force) / 2.0 * (indentation - last.indentation)
+        meet(self._rod_step(dt), self.law, state, w)
+
+
+def meet(step: TipStep, law: Law, state: Encounter, w: Number) -> None:
+    """Iterate force and tip acceleration, then move the whole projectile with what came out.
+
+    Parameters
+    ----------
+    step : TipStep
+        The projectile's step.
+    law : Law
+    state : Encounter
+        Changed in place.
+    w : float
+        The plate's displacement under the projectile; an array where there are many cases.
+    """
+    last = state.contact
+    motion, base, drift, acceleration = step.begin(state.rod)
+    carried = (1.0 - step.theta) * last.force
+    iterate = _iterate_cases if isinstance(w, np.ndarray) else _iterate
+    guess = drift + step.weight * acceleration
+    force, state.memory, settled = iterate(step, law, state, w, guess, base, drift, carried)
+    state.unsettled += 1 - settled
+    state.rod = step.end(state.rod, motion, carried + step.theta * force)
+    indentation = -state.rod.tip - w
+    state.memory = law.accept(state.memory, last, indentation)
+    state.contact = Point(indentation, force)
+    state.plate_w = w
+    state.contact_work += (last.force + force) / 2.0 * (indentation - last.indentation)
+
+
+def _iterate(
+    step: TipStep,
+    law: Law,
+    state: Encounter,
+    w: float,
+    tip: float,
+    base: float,
+    drift: float,
+    carried: float,
+) -> tuple[float, Memory, bool]:
+    """Contact force of one case, the memory that its trials leave, and whether it settled."""
+    memory, last = state.memory, state.contact
+    theta, gain, weight = step.theta, step.gain, step.weight
+    force = last.force
+    for _ in range(PASSES):
+        before = tip
+        force, memory = law.trial(memory, last, -before - w)
+        tip = drift + weight * (base + gain * (carried + theta * force))
+        if abs(tip - before) < TOLERANCE * abs(tip):
+            return force, memory, True
+    return force, memory, False
+
+
+def _iterate_cases(
+    step: TipStep,
+    law: Law,
+    state: Encounter,
+    w: Floats,
+    tip: Floats,
+    base: Floats,
+    drift: Floats,
+    carried: Floats,
+) -> tuple[Floats, Memory, NDArray[np.int_]]:
+    """The same of many cases, each of which stands still once it has settled."""
+    last, memory = state.contact, state.memory
+    force: Floats = last.force
+    open_cases = np.ones(len(w), dtype=bool)
+    for _ in range(PASSES):
+        before = tip
+        trial, memory = law.trial(memory, last, -before - w)
+        force = np.asarray(np.where(open_cases, trial, force))
+        moved = drift + step.weight * (base + step.gain * (carried + step.theta * force))
+        open_cases &= ~(np.abs(moved - before) < TOLERANCE * np.abs(moved))
+        tip = moved
+        if not open_cases.any():
+            break
+    return force, memory, np.where(open_cases, 0, 1)

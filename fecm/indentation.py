@@ -8,10 +8,12 @@ are positive in compression.  All values are floats, or arrays with one entry a 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 # A float or an array of floats; a bool or an array of bools.
 Number = Any
@@ -96,6 +98,15 @@ class Memory:
     peak_force: Number
     permanent: Number
 
+    def with_rows(self, rows: NDArray[np.intp], new: Memory) -> Memory:
+        """The same with other values in some cases."""
+        values = []
+        for name in Memory.__slots__:
+            array = getattr(self, name).copy()
+            array[rows] = getattr(new, name)
+            values.append(array)
+        return Memory(*values)
+
     def force(self, indentation: Number) -> Number:
         """Force on the branch's curve."""
         return _power(self.f, self.b, self.w, self.p, indentation)
@@ -169,20 +180,35 @@ class MemoryLaw:
         """Memory after a step that ended at an indentation."""
         return self._follow(memory, last, indentation)
 
+    def permanent(self, memory: Memory, last: Point) -> Number:
+        """Permanent indentation that the law would leave behind now (length)."""
+        peak = _select(memory.branch == VIRGIN, last.indentation, memory.peak)
+        return self.constants.permanent(_select(peak > memory.peak, peak, memory.peak))
+
     def _follow(self, m: Memory, last: Point, a: Number) -> Memory:
         """Memory on whose curve `a` lies, coming from the last accepted point."""
         falls = a < last.indentation
-        virgin = m.branch == VIRGIN
-        if isinstance(a, float):  # one case, most often on its way along the same curve
-            unloading = m.branch == UNLOADING
-            if not falls if virgin else a < m.peak and falls == unloading:
+        virgin, unloading = m.branch == VIRGIN, m.branch == UNLOADING
+        if isinstance(a, np.ndarray):
+            rises = a > last.indentation
+            turns = np.where(virgin, falls, (a >= m.peak) | np.where(unloading, rises, falls))
+            rows = np.flatnonzero(turns)
+            if not len(rows):
                 return m
-        leaves = virgin & falls
+            law, at = MemoryLaw(_taken(self.constants, rows)), Point(*(x[rows] for x in last))
+            return m.with_rows(rows, law._turned(_taken(m, rows), at, a[rows]))
+        # Most often the way goes on along the same curve.
+        if not falls if virgin else a < m.peak and falls == unloading:
+            return m
+        return self._turned(m, last, a)
+
+    def _turned(self, m: Memory, last: Point, a: Number) -> Memory:
+        """The same where the curve may end."""
+        falls = a < last.indentation
+        leaves = (m.branch == VIRGIN) & falls
         returns = (m.branch != VIRGIN) & (a >= m.peak)
         turns_up = (m.branch == UNLOADING) & (a > last.indentation) & (a < m.peak)
         turns_down = (m.branch == RELOADING) & falls
-        if not _any(leaves | returns | turns_up | turns_down):
-            return m
         c = self.constants
         peak = _select(leaves, last.indentation, m.peak)
         peak_force = _select(leaves, c.loading(last.indentation), m.peak_force)
@@ -265,3 +291,20 @@ def _choose(condition: Truth, yes: Memory, no: Memory) -> Memory:
     if not isinstance(condition, np.ndarray):
         return yes if condition else no
     return Memory(*(np.where(condition, getattr(yes, n), getattr(no, n)) for n in Memory.__slots__))
+
+
+def _taken(record: Any, rows: NDArray[np.intp]) -> Any:
+    """A record with the values of some cases."""
+    taken = object.__new__(type(record))
+    for part in fields(record):
+        value = getattr(record, part.name)
+        some = value[rows] if isinstance(value, np.ndarray) else value
+        object.__setattr__(taken, part.name, some)
+    return taken
+
+
+def stacked(records: Sequence[Constants]) -> Constants:
+    """Constants of many cases in one, of one kind."""
+    kind = type(records[0])
+    names = [part.name for part in fields(kind) if part.init]
+    return kind(*(np.array([getattr(record, name) for record in records]) for name in names))

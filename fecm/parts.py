@@ -129,6 +129,13 @@ def build_gages(deck: Deck, mesh: Mesh, plate: PlateModel) -> Gages | None:
     return gages(mesh, segment.records, transposed=plate.rules.transposed)
 
 
+def build_law(deck: Deck, slips: frozenset[str] = frozenset()) -> Law:
+    """Make the indentation law of a deck, with the slips that are on."""
+    measured = deck.need(Indentation)
+    constants = Constants(measured.k, measured.alpha_p, measured.s_p, measured.q)
+    return StickyLaw(constants) if "reload" in slips else MemoryLaw(constants)
+
+
 def build_impact(
     deck: Deck,
     motion: PlateMotion,
@@ -137,9 +144,7 @@ def build_impact(
     integrator: str = WILSON,
 ) -> Impact:
     """Make projectile, law and contact, with the slips that are on."""
-    card, measured = deck.need(ImpactCard), deck.need(Indentation)
-    constants = Constants(measured.k, measured.alpha_p, measured.s_p, measured.q)
-    law: Law = StickyLaw(constants) if "reload" in slips else MemoryLaw(constants)
+    card = deck.need(ImpactCard)
     contact = Contact(
         row=motion.row(card.node - 1, card.dof - 1),
         velocity=card.velocity,
@@ -147,7 +152,7 @@ def build_impact(
         strains_start_moving="rod-start" in slips,
         keeps_first_step="rod-dt" in slips,
     )
-    return Impact(motion, rod, law, contact, STEPS[integrator])
+    return Impact(motion, rod, build_law(deck, slips), contact, STEPS[integrator])
 
 
 def set_up(

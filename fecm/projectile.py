@@ -10,7 +10,7 @@ column a case, may follow.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -267,6 +267,33 @@ def rigid_approach(rod: Projectile, velocity: float, *, derivatives_too: bool = 
     return RodState(motion)
 
 
+class TipStep(Protocol):
+    """What the contact iteration needs of a projectile's step; see :class:`CollocationStep`."""
+
+    @property
+    def theta(self) -> float:
+        """Where in the step equilibrium is met."""
+        ...
+
+    @property
+    def gain(self) -> Any:
+        """The tip's acceleration per force."""
+        ...
+
+    @property
+    def weight(self) -> Any:
+        """The tip's displacement per new acceleration."""
+        ...
+
+    def begin(self, state: Any) -> tuple[Any, Any, Any, Any]:
+        """Free motion, and of the tip: acceleration in it, drift, acceleration so far."""
+        ...
+
+    def end(self, state: Any, motion: Any, force: Any) -> Any:
+        """State after the step, with the displacement `tip`."""
+        ...
+
+
 class CollocationStep:
     r"""One step of an implicit method as a linear map, for a rod and a time step.
 
@@ -300,6 +327,8 @@ class CollocationStep:
         The tip's acceleration per force, of `h`.
     weights : (float, float)
         The tip's displacement per acceleration at the step's begin and at its end.
+    weight : float
+        The latter.
     n : int
         Number of the rod's unknowns.
     """
@@ -314,6 +343,7 @@ class CollocationStep:
         # Divisors of dt^2: 1/begin = 1/2 - beta, 1/end = beta.
         begin, end = 2.0 * r / (r - 2.0), r
         self.weights = (dt**2 / begin, dt**2 / end)
+        self.weight = self.weights[1]
         a0 = r / (theta * tau) ** 2
         a2 = r / (theta * tau)
         a4 = a0 / theta
@@ -346,14 +376,32 @@ class CollocationStep:
         self.h = np.concatenate([tau**2 / end * relative @ gain, tau / 2.0 * gain, gain])
         self.gain = float(gain[0])
 
-    def free_motion(self, state: RodState) -> Floats:
-        """New motion if no force acted on the tip, (3 n, ...)."""
-        y = state.motion.reshape(3 * self.n, *state.motion.shape[2:])
-        return np.asarray(np.dot(self.T, y))
+    def begin(self, state: RodState) -> tuple[Floats, Any, Any, Any]:
+        """Begin a step.
 
-    def end(self, state: RodState, motion: Floats) -> RodState:
-        """State after a step from `state` whose new motion is `motion`, (3 n, ...)."""
-        return RodState(motion.reshape(3, self.n, *motion.shape[1:]), state.tip + motion[0])
+        Returns
+        -------
+        motion : ndarray (3 n, ...)
+            New motion if no force acted on the tip.
+        base, drift, acceleration : float or ndarray (...)
+            The tip's acceleration in it; its displacement but for what the new acceleration adds,
+            `weight` times it; its acceleration so far.
+        """
+        motion = np.dot(self.T, state.motion.reshape(3 * self.n, *state.motion.shape[2:]))
+        _, v, a = state.motion[:, 0].tolist() if motion.ndim == 1 else state.motion[:, 0]
+        base = motion.item(2 * self.n) if motion.ndim == 1 else motion[2 * self.n]
+        return motion, base, state.tip + self.dt * v + self.weights[0] * a, a
+
+    def end(self, state: RodState, motion: Floats, force: Any) -> RodState:
+        """End a step that began with `motion`, under a force on the tip at t + theta dt."""
+        h = self.h if motion.ndim == 1 else self.h[:, None]
+        motion += h * force
+        moved = motion.item(0) if motion.ndim == 1 else motion[0]
+        return RodState(motion.reshape(3, self.n, *motion.shape[1:]), state.tip + moved)
+
+    def advance(self, state: RodState, force: Any = 0.0) -> RodState:
+        """State after a whole step under a force on the tip at t + theta dt."""
+        return self.end(state, self.begin(state)[0], force)
 
 
 class WilsonStep(CollocationStep):

@@ -156,7 +156,7 @@ def _march(
     note(0)
     forces = (1.0 - step.theta) * applied[:-1] + step.theta * applied[1:]
     for row, force in enumerate(forces.tolist(), start=1):
-        state = step.end(state, step.free_motion(state) + step.h * force)
+        state = step.advance(state, force)
         note(row)
     return noted
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from fecm.results.schema import (
     FORMAT_VERSION,
     GROUP_DESCRIPTIONS,
     SCALES,
+    SWEEP,
     Dataset,
     ResultFileError,
     ResultWriteError,
@@ -134,6 +135,11 @@ class FileSink:
     def text(self, path: str, value: str, description: str) -> None:
         """Store a text."""
         made = self._file.create_dataset(path, data=value, dtype=h5py.string_dtype())
+        made.attrs["description"] = description
+
+    def texts(self, path: str, values: Sequence[str], description: str) -> None:
+        """Store texts, one a row."""
+        made = self._file.create_dataset(path, data=list(values), dtype=h5py.string_dtype())
         made.attrs["description"] = description
 
 
@@ -300,8 +306,12 @@ def _troubles(path: Path) -> Iterator[None]:
         raise ResultFileError(f"{path}: this is no readable HDF5 file ({told})") from None
 
 
-def read(path: Path) -> tuple[FileArrays, dict[str, str], dict[str, dict[str, Any]]]:
+def read(
+    path: Path, form: str = FORMAT
+) -> tuple[FileArrays, dict[str, Any], dict[str, dict[str, Any]]]:
     """Datasets, texts and attributes of a result file.
+
+    A dataset of texts is given as a list.
 
     Links are not followed, and attributes of a type that Python has no plain value for are given
     by the name of that type.
@@ -320,8 +330,8 @@ def read(path: Path) -> tuple[FileArrays, dict[str, str], dict[str, dict[str, An
         pass  # a missing or forbidden file says so itself
     with _troubles(path), h5py.File(path) as file:
         root = _attributes(file)
-        if root.get("format") != FORMAT:
-            raise ResultFileError(f"{path}: this HDF5 file is not a result of fecm")
+        if root.get("format") != form:
+            raise ResultFileError(f"{path}: this HDF5 file is {_other(root, form)}")
         if root.get("format_version") != FORMAT_VERSION:
             raise ResultFileError(
                 f"{path}: format version {root.get('format_version')} is not "
@@ -331,6 +341,15 @@ def read(path: Path) -> tuple[FileArrays, dict[str, str], dict[str, dict[str, An
         file.visititems(visitor)
     arrays = FileArrays(path, visitor.shapes, visitor.dtypes)
     return arrays, visitor.texts, {"": root, **visitor.groups}
+
+
+def _other(root: Mapping[str, Any], form: str) -> str:
+    """What a file is that is not of the form that was asked for."""
+    if form == FORMAT and root.get("format") == SWEEP:
+        return "the result of a sweep, not of a run"
+    if form == SWEEP and root.get("format") == FORMAT:
+        return "the result of a run, not of a sweep"
+    return "not a result of fecm"
 
 
 # No filter of HDF5 packs numbers more tightly than this; deflate reaches 1032.
@@ -345,7 +364,7 @@ class _Visitor:
         self.size = path.stat().st_size
         self.shapes: dict[str, tuple[int, ...]] = {}
         self.dtypes: dict[str, np.dtype[Any]] = {}
-        self.texts: dict[str, str] = {}
+        self.texts: dict[str, Any] = {}
         self.groups: dict[str, dict[str, Any]] = {}
 
     def __call__(self, name: str, item: h5py.HLObject) -> None:
@@ -359,6 +378,8 @@ class _Visitor:
             return  # it numbers an axis
         if h5py.check_string_dtype(item.dtype) and item.shape == ():
             self.texts[name] = str(_plain(item[()]))
+        elif h5py.check_string_dtype(item.dtype) and len(item.shape) == 1:
+            self.texts[name] = [str(_plain(value)) for value in item[()].tolist()]
         elif item.dtype.kind in "biuf" and item.shape is not None and not item.dtype.shape:
             shape = tuple(map(int, item.shape))
             room = self.size * (PACKED if item.chunks else 1)

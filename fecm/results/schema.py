@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 FORMAT = "fecm"
+# Format of a sweep's result.
+SWEEP = "fecm-sweep"
 FORMAT_VERSION = 1
 
 
