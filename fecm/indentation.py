@@ -8,7 +8,9 @@ are positive in compression.  All values are floats, or arrays with one entry a 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -18,6 +20,8 @@ Number = Any
 Truth = Any
 
 LOADING_POWER = 1.5
+# The only unloading power that equation 3-7 holds for.
+ACR_POWER = 2.5
 
 # Branches.
 VIRGIN, UNLOADING, RELOADING = 0, 1, 2
@@ -35,8 +39,64 @@ def _any(condition: Truth) -> bool:
     return bool(condition.any()) if isinstance(condition, np.ndarray) else bool(condition)
 
 
+def hertz_coefficient(radius: float, e_s: float, nu_s: float, e_t: float) -> float:
+    """Contact coefficient of a sphere on a half-space, equation 3-2 (force/length^1.5).
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the sphere, R_s (length).
+    e_s, nu_s : float
+        Young's modulus (force/length^2) and Poisson's ratio of the sphere.
+    e_t : float
+        Young's modulus of the laminate through its thickness, force/length^2.
+
+    Raises
+    ------
+    ValueError
+        If radius or a modulus is not positive, or Poisson's ratio not between -1 and 0.5.
+    """
+    for name, value in (("radius", radius), ("E_s", e_s), ("E_t", e_t)):
+        if not 0.0 < value < math.inf:
+            raise ValueError(f"{name} must be positive, not {value:g}")
+    if not -1.0 < nu_s <= 0.5:
+        raise ValueError(f"nu_s must lie between -1 and 0.5, not {nu_s:g}")
+    return 4.0 / 3.0 * math.sqrt(radius) / ((1.0 - nu_s**2) / e_s + 1.0 / e_t)
+
+
+class Measured(ABC):
+    """What was measured: the first loading curve, the unloading power, and what remains.
+
+    Attributes
+    ----------
+    k : float
+        Contact coefficient, force/length^1.5 (equation 3-1).
+    q : float
+        Power of the unloading curve (equation 3-3).
+    """
+
+    __slots__ = ()
+    k: Number
+    q: Number
+
+    @abstractmethod
+    def permanent(self, peak: Number) -> Number:
+        """Permanent indentation after a peak (length)."""
+
+    def loading(self, indentation: Number) -> Number:
+        """Force on the first loading curve, equation 3-1."""
+        return power_curve(self.k, 0.0, 1.0, LOADING_POWER, indentation)
+
+    def rigidity(self, peak: Number) -> Number:
+        """Unloading rigidity s after a positive peak, equation 3-5, force/length^q.
+
+        With the permanent indentation of 3-8 it is 3-9 and 3-10, with that of 3-7 it is 3-6.
+        """
+        return self.loading(peak) / (peak - self.permanent(peak)) ** self.q
+
+
 @dataclass(frozen=True, slots=True)
-class Constants:
+class Constants(Measured):
     """What was measured: EXPE's card.
 
     Attributes
@@ -59,12 +119,33 @@ class Constants:
         value = self.s_p * (peak - self.alpha_p)
         return _select(value > 0.0, value, 0.0)
 
-    def loading(self, indentation: Number) -> Number:
-        """Force on the first loading curve, equation 3-1."""
-        return _power(self.k, 0.0, 1.0, LOADING_POWER, indentation)
+
+@dataclass(frozen=True, slots=True)
+class CriticalConstants(Measured):
+    """What was measured, with one unloading rigidity k/alpha_cr for every peak: EXPE ACR's card.
+
+    Attributes
+    ----------
+    k : float
+        Contact coefficient, force/length^1.5 (equation 3-1).
+    alpha_cr : float
+        Critical indentation of equation 3-6 (length).
+    q : float
+        5/2.
+    """
+
+    k: Number
+    alpha_cr: Number
+    q: Number = field(default=ACR_POWER, init=False)
+
+    def permanent(self, peak: Number) -> Number:
+        """Permanent indentation after a peak, equation 3-7, never negative (length)."""
+        top = _select(peak > 0.0, peak, 0.0)
+        value = top - self.alpha_cr**0.4 * top**0.6
+        return _select(value > 0.0, value, 0.0)
 
 
-def _power(f: Number, b: Number, w: Number, p: Number, a: Number) -> Number:
+def power_curve(f: Number, b: Number, w: Number, p: Number, a: Number) -> Number:
     """F = f ((a - b)/w)^p, zero for a <= b."""
     if isinstance(a, np.ndarray):
         return np.where(a > b, f * (np.maximum(a - b, 0.0) / w) ** p, 0.0)
@@ -98,7 +179,7 @@ class Memory:
 
     def force(self, indentation: Number) -> Number:
         """Force on the branch's curve."""
-        return _power(self.f, self.b, self.w, self.p, indentation)
+        return power_curve(self.f, self.b, self.w, self.p, indentation)
 
 
 class Point(NamedTuple):
@@ -112,7 +193,7 @@ class Law(Protocol):
     """An indentation law."""
 
     @property
-    def constants(self) -> Constants:
+    def constants(self) -> Measured:
         """What was measured."""
         ...
 
@@ -139,7 +220,7 @@ class Law(Protocol):
         ...
 
 
-def _start(constants: Constants) -> Memory:
+def _start(constants: Measured) -> Memory:
     zero = 0.0 * constants.k
     one = zero + 1.0
     branch = VIRGIN + (zero == one)  # VIRGIN, once a case
@@ -155,7 +236,7 @@ class MemoryLaw:
     the other ended, so that the force is continuous.  At the peak the first curve goes on.
     """
 
-    constants: Constants
+    constants: Measured
 
     def start(self) -> Memory:
         """Memory before the first contact."""
@@ -225,7 +306,7 @@ class StickyLaw:
     those that the contact iteration discards.
     """
 
-    constants: Constants
+    constants: Measured
 
     def start(self) -> Memory:
         """Memory before the first contact."""

@@ -17,7 +17,7 @@ from fecm.dynamics import PlateMotion
 from fecm.elements.quadrature import HIGHEST_ORDER, Rule, gauss, nodal
 from fecm.gages import Gages, gages
 from fecm.impact import Contact, Impact
-from fecm.indentation import Constants, Law, MemoryLaw, StickyLaw
+from fecm.indentation import Constants, CriticalConstants, Law, Measured, MemoryLaw, StickyLaw
 from fecm.laminate import laminate_of_deck
 from fecm.mesh import Mesh, rod_diameters
 from fecm.plate import StrainField
@@ -111,6 +111,13 @@ def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> Project
     return Rod(card.size, diameters, card.modulus, card.density)
 
 
+def build_constants(measured: Indentation) -> Measured:
+    """Make what an EXPE segment says of the indentation law."""
+    if measured.word == Indentation.ACR:
+        return CriticalConstants(measured.k, measured.alpha_p)
+    return Constants(*measured.values())
+
+
 def build_station(deck: Deck, projectile: Projectile, slips: frozenset[str]) -> Station:
     """Make the transducer: PROJ's node, or the rod's middle (one node on under its slip)."""
     sign = 1.0 if "station" in slips else -1.0
@@ -137,8 +144,7 @@ def build_impact(
     integrator: str = WILSON,
 ) -> Impact:
     """Make projectile, law and contact, with the slips that are on."""
-    card, measured = deck.need(ImpactCard), deck.need(Indentation)
-    constants = Constants(measured.k, measured.alpha_p, measured.s_p, measured.q)
+    card, constants = deck.need(ImpactCard), build_constants(deck.need(Indentation))
     law: Law = StickyLaw(constants) if "reload" in slips else MemoryLaw(constants)
     contact = Contact(
         row=motion.row(card.node - 1, card.dof - 1),
