@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
@@ -339,6 +340,35 @@ class StickyLaw:
     def accept(self, memory: Memory, last: Point, indentation: Number) -> Memory:
         """Memory after a step: trials have done everything."""
         return memory
+
+
+def follow(law: Law, corners: Sequence[float], points: int = 1) -> Iterator[tuple[Point, int]]:
+    """Force of one case along a path, from the first contact at zero on.
+
+    Parameters
+    ----------
+    law : Law
+    corners : sequence of float
+        Indentations between which the path goes straight; it starts at 0.
+    points : int
+        Points from one corner to the next.
+
+    Yields
+    ------
+    Point, int
+        Indentation and force, and the branch that they lie on; the start first.
+    """
+    memory, last, begin = law.start(), Point(0.0, 0.0), 0.0
+    yield last, VIRGIN
+    for corner in corners:
+        for n in range(1, points + 1):
+            part = n / points
+            indentation = corner if n == points else begin + part * (corner - begin)
+            force, memory = law.trial(memory, last, indentation)
+            memory = law.accept(memory, last, indentation)
+            last = Point(indentation, float(force))
+            yield last, int(memory.branch)
+        begin = corner
 
 
 def _choose(condition: Truth, yes: Memory, no: Memory) -> Memory:
