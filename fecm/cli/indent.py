@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from fecm.cli.common import DECK_PATH, FORMAT_OPTION, Refused
 from fecm.cli.indent_curve import curve
+from fecm.cli.numbers import POSITIVE, Finite
 from fecm.cli.pictures import OVERWRITE, PLOT, check_picture, drawing, outputs, save_picture
 
-POSITIVE = click.FloatRange(min=0.0, min_open=True)
+if TYPE_CHECKING:
+    from fecm.fitting.curves import Floats
+
+# Unloading powers that are searched.
+LIMITS_Q = (0.3, 12.0)
 
 
 @click.group()
@@ -30,7 +37,7 @@ indent.add_command(curve)
 @click.option("--acr", is_flag=True,
               help="Find alpha_cr of the law with one unloading rigidity (q = 5/2) instead of s_p "
                    "and alpha_p.")  # fmt: skip
-@click.option("--q", type=POSITIVE, help="Unloading power, instead of finding it.")
+@click.option("--q", type=Finite(*LIMITS_Q), help="Unloading power, instead of finding it.")
 @click.option("--turn", type=POSITIVE, metavar="LENGTH",
               help="How far the indentation goes back before a turn counts.  [default: 2 % of its "
                    "range, or 8 standard deviations of its noise]")  # fmt: skip
@@ -50,10 +57,10 @@ def fit(
 ) -> None:
     """Find the constants of the indentation law from a test, and print an EXPE card.
 
-    TEST.csv has the columns indentation and force in the order of measurement: first loading,
+    TEST.csv has the columns indentation and force, its rows in the order of measurement: first loading,
     unloading, reloading, as often as was done.
     """
-    from fecm.columns import TableError, read_columns
+    from fecm.columns import TableError
     from fecm.fitting.constants import fit as fitted
     from fecm.fitting.cycles import NoTestError
     from fecm.fitting.report import card, lines, notes, plain
@@ -64,8 +71,8 @@ def fit(
     check_picture(picture)
     outputs(overwrite, picture)
     try:
-        table = read_columns(test, ("indentation", "force"))
-        found = fitted(table["indentation"], table["force"], retreat=turn, q=q, acr=acr)
+        indentation, force = _test(test)
+        found = fitted(indentation, force, retreat=turn, q=q, acr=acr)
     except TableError as error:
         raise Refused(str(error)) from None
     except NoTestError as error:
@@ -74,7 +81,7 @@ def fit(
         with drawing():
             from fecm.plot.indentation import fit as drawn
 
-            made = drawn(table["indentation"], table["force"], found, names)
+            made = drawn(indentation, force, found, names)
         save_picture(made, picture)
     for note in notes(found):
         click.echo(f"fecm: note: {note}", err=True)
@@ -84,6 +91,23 @@ def fit(
     click.echo("\n".join(lines(found)))
     if text := card(found):
         click.echo(text)
+
+
+def _test(path: Path) -> tuple[Floats, Floats]:
+    """Indentation and force of a file; its first two columns where it names none."""
+    from fecm.columns import TableError, names_of, read_columns, same_name
+
+    wanted = ("indentation", "force")
+    present = names_of(path)
+    for name in wanted:
+        count = sum(same_name(name, one) for one in present)
+        if present and count != 1:
+            raise TableError(
+                f"{path}: the columns are {', '.join(present)[:80]}; there must be one called "
+                f"{name}"
+            )
+    table = read_columns(path, wanted)
+    return table["indentation"], table["force"]
 
 
 def _unit_names(text: str | None) -> dict[str, str]:
@@ -104,9 +128,9 @@ def _unit_names(text: str | None) -> dict[str, str]:
 @click.option("--nus", "nu_s", type=float, required=True, help="Poisson's ratio of the sphere.")
 @click.option("--et", "e_t", type=float, required=True,
               help="Young's modulus of the laminate through its thickness.")  # fmt: skip
-@click.option("--alpha-p", type=click.FloatRange(min=0.0), default=0.0, show_default=True,
+@click.option("--alpha-p", type=Finite(min=0.0), default=0.0, show_default=True,
               help="Critical indentation for the card.")  # fmt: skip
-@click.option("--s-p", type=click.FloatRange(0.0, 1.0, max_open=True), default=0.0,
+@click.option("--s-p", type=Finite(0.0, 1.0, max_open=True), default=0.0,
               show_default=True, help="Slope of permanent indentation for the card.")  # fmt: skip
 @click.option("--q", type=POSITIVE, default=1.5, show_default=True,
               help="Unloading power for the card; 1.5 is elastic.")  # fmt: skip
@@ -132,6 +156,8 @@ def hertz(
         k = hertz_coefficient(radius, e_s, nu_s, e_t)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
+    if not 0.0 < k < math.inf:
+        raise click.UsageError("radius and moduli are so large or small that k is no number")
     law = Indentation(float(f"{k:.6g}"), alpha_p, s_p, q)
     if form == "json":
         click.echo(json.dumps({"k": k, "card": law.text()}))

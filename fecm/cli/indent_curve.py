@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fecm.cli.common import DECK_PATH, Refused, write_text
+from fecm.cli.numbers import POSITIVE
 from fecm.cli.pictures import OVERWRITE, PLOT, check_picture, drawing, outputs, save_picture
 
 if TYPE_CHECKING:
     from fecm.deck.model import Deck, Indentation
     from fecm.indentation import Measured
     from fecm.plot import Picture
-
-POSITIVE = click.FloatRange(min=0.0, min_open=True)
 
 
 def _path(text: str | None) -> list[float]:
@@ -91,6 +90,8 @@ def curve(
     table = None if str(output) == "-" else output
     check_picture(picture)
     outputs(overwrite, table, picture)
+    if table is not None and table.exists() and table.samefile(deck):
+        raise Refused(f"{table} is the deck itself")
     if not rigidity:
         if not path:
             raise click.UsageError("--path is missing: indentations with commas between them")
@@ -126,7 +127,12 @@ def _forces(
 
     problem, card = _law(deck)
     law = MemoryLaw(build_constants(card))
-    walk = list(follow(law, path, points))
+    try:
+        walk = list(follow(law, path, points))
+    except OverflowError:
+        walk = []
+    if not walk or not all(math.isfinite(point.force) for point, _ in walk):
+        raise Refused("--path leads to forces beyond the range of numbers")
     names = ("loading", "unloading", "reloading")
     rows: list[Sequence[float | str]] = [("indentation", "force", "branch")]
     rows += [(point.indentation, point.force, names[branch]) for point, branch in walk]
@@ -156,6 +162,8 @@ def _rigidities(
     from fecm.parts import build_constants
     from fecm.units import unit_names
 
+    if path and (len(path) != 2 or not 0.0 <= path[0] < path[1]):
+        raise click.BadParameter("with --rigidity the range FROM,TO", param_hint="--path")
     problem, card = _law(deck)
     own = build_constants(card)
     alpha_p, s_p = _line(problem, own, line)
@@ -172,12 +180,13 @@ def _rigidities(
             "force/length^2.5: --q 2.5 makes them comparable",
             err=True,
         )
-    low, *rest = path or [0.0, 2.0 * max(critical.alpha_cr, slope.alpha_p)]
-    if len(rest) != 1 or not 0.0 <= low < rest[0]:
-        raise click.BadParameter("with --rigidity the range FROM,TO", param_hint="--path")
-    peaks = np.linspace(low, rest[0], points + 1)
+    low, high = path or [0.0, 2.0 * max(critical.alpha_cr, slope.alpha_p)]
+    peaks = np.linspace(low, high, points + 1)
     peaks = peaks[peaks > 0.0]
-    by = [np.asarray(relation.rigidity(peaks)) for relation in (slope, critical)]
+    with np.errstate(all="ignore"):
+        by = [np.asarray(relation.rigidity(peaks)) for relation in (slope, critical)]
+    if not np.all(np.isfinite(by)):
+        raise Refused("--path leads to rigidities beyond the range of numbers")
     rows: list[Sequence[float | str]] = [("alpha_m", "s_3_9", "s_3_7")]
     rows += list(zip(peaks, *by, strict=True))
     if not draw:

@@ -16,6 +16,9 @@ from fecm.indentation import ACR_POWER, LOADING_POWER, Constants, CriticalConsta
 
 Floats = NDArray[np.float64]
 
+# Numbers whose powers stay within range.
+LARGEST = 1e60
+
 
 @dataclass(frozen=True)
 class Cycle:
@@ -121,6 +124,9 @@ def fit(
         raise NoTestError("indentation and force are not equally many")
     if len(a) < 10:
         raise NoTestError(f"{len(a)} points are too few for a test")
+    for name, values in (("indentations", a), ("forces", f)):
+        if not 1.0 / LARGEST < float(np.abs(values).max()) < LARGEST:
+            raise NoTestError(f"the {name} are not between {1.0 / LARGEST:g} and {LARGEST:g}")
     curves = scaled(divide(a, retreat), a, f)
     solution = solve(curves, ACR_POWER if acr else q)
     at, division, p = solution.curves.layout, curves.division, solution.values

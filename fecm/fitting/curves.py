@@ -31,6 +31,8 @@ Bools = NDArray[np.bool_]
 FEWEST = 5
 FIRST_Q = 2.2
 LIMITS_Q = (0.3, 12.0)
+# Distance from a limit, in parts of the way between both, at which a value counts as at it.
+AT_LIMIT = 1e-4
 # How far a peak may move from its record, and where origins may lie, in parts of the peak.
 PEAK_MOVES = 0.15
 LIMITS_PERMANENT = (-0.5, 0.8)
@@ -191,12 +193,15 @@ class Solution:
     covariance : ndarray (m, m)
     held : frozenset of int
         Corners that stayed where they were recorded.
+    at_limit : bool
+        Whether a value lies where the search ended: the curves do not fit, and errors mean nothing.
     """
 
     curves: Curves
     values: Floats
     covariance: Floats
     held: frozenset[int]
+    at_limit: bool
 
     @property
     def scaled(self) -> Floats:
@@ -282,7 +287,8 @@ def _solve(curves: Curves, q: float | None, held: frozenset[int]) -> Solution:
         p[free] = found.x
     units = curves.units
     covariance = _covariance(curves, p, free) * np.outer(units, units)
-    return Solution(curves, p * units, covariance, held)
+    near = np.minimum(p - low, high - p)[free] < AT_LIMIT * (high - low)[free]
+    return Solution(curves, p * units, covariance, held, bool(near.any()))
 
 
 def _start(curves: Curves, q: float | None) -> tuple[Floats, Floats, Floats]:

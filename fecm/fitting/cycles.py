@@ -222,6 +222,8 @@ def divide(indentation: Floats, retreat: float | None = None) -> Division:
         raise NoTestError("the indentation never changes")
     if retreat is None:
         retreat = max(LEAST_RETREAT * path.range, SURE * path.noise)
+    if retreat >= path.range:
+        raise NoTestError(f"the whole path is not longer than a turn ({retreat:g})")
     found = turns(path, retreat)
     s = path.smooth
     if s[found[1]] <= s[0]:
@@ -254,8 +256,12 @@ class _Divider:
         return Division(self.path, self.retreat, tuple(self.stretches), tuple(self.corners))
 
     def _between(self, first: int, end: int, turns: bool) -> Ints:
-        """Points from one turn up to and without the next, without those too near to either."""
-        rows: Ints = np.arange(first, end if turns else end + 1, dtype=np.int64)
+        """Points between two turns, without the turns themselves and what is too near to them.
+
+        The point at a turn may have been read before or after it.
+        """
+        begin = first + 1 if first else 0
+        rows: Ints = np.arange(begin, end if turns else end + 1, dtype=np.int64)
         if not self.path.noise:
             return rows
         s, guard = self.path.smooth, GUARD * self.path.noise

@@ -38,8 +38,8 @@ def free_power(curves: Curves) -> FreePower:
     from scipy.optimize import least_squares
 
     rows = curves.division.rows(LOADING)
-    rows = rows[curves.a[rows] > 0.0]
-    a, f = curves.a[rows], curves.f[rows]
+    everywhere = np.maximum(curves.a[rows], 0.0), curves.f[rows]
+    a, f = (values[everywhere[0] > 0.0] for values in everywhere)
     log = np.log(a)
     found = least_squares(
         lambda p: f - p[0] * a ** p[1], [1.0, LOADING_POWER], xtol=1e-12, ftol=1e-12
@@ -56,5 +56,5 @@ def free_power(curves: Curves) -> FreePower:
     return FreePower(
         Estimate(float(n), float(covariance[1, 1] ** 0.5)),
         Estimate(float(k), float((by @ covariance @ by) ** 0.5)),
-        r_squared(fitted, f),
+        r_squared(c * everywhere[0] ** n, everywhere[1]),
     )

@@ -14,6 +14,8 @@ from fecm.indentation import Constants, CriticalConstants
 DIGITS = 5
 # Standard errors below which a slope may as well be none.
 SURE = 2.0
+# Scatter that a test of the law should not have.
+BAD = 0.05
 
 
 def card(fit: Fit) -> str:
@@ -42,6 +44,10 @@ def notes(fit: Fit) -> list[str]:
             "s_p and alpha_p need two peaks or more that leave an indentation: no card; "
             "--acr needs one"
         )
+    if fit.solution.at_limit:
+        told.append("a value lies at the limit of the search: the law does not fit this test")
+    if fit.scatter > BAD:
+        told.append(f"the points scatter by {100.0 * fit.scatter:.2g} % of the largest force")
     if held:
         which = ", ".join(map(str, sorted(held)))
         told.append(f"alpha_m of cycle {which} is as recorded: the curves do not tell it")

@@ -56,7 +56,10 @@ def fit(indentation: Floats, force: Floats, found: Fit, units: Mapping[str, str]
         )  # fmt: skip
         seen.add(stretch.kind)
         if number in curves.numbers(stretch.kind) and len(a):
-            x = np.linspace(max(0.0, a.min()), a.max(), POINTS)
+            top = float(a.max())
+            if stretch.kind == FALLING:  # from the turn itself, which is no point of the stretch
+                top = max(top, found.solution.values[curves.layout.corners[stretch.begin]])
+            x = np.linspace(max(0.0, a.min()), top, POINTS)
             y = curves.force * curves.stretch(p, number, x / curves.length)
             axes[0].plot(length.factor * x, pound.factor * y, color=colour)
     axes[0].set_xlabel(length.label("Indentation"))
