@@ -57,8 +57,8 @@ def fit(
 ) -> None:
     """Find the constants of the indentation law from a test, and print an EXPE card.
 
-    TEST.csv has the columns indentation and force, its rows in the order of measurement: first loading,
-    unloading, reloading, as often as was done.
+    TEST.csv has the columns indentation and force, its rows in the order of measurement:
+    first loading, unloading, reloading, as often as was done.
     """
     from fecm.columns import TableError
     from fecm.fitting.constants import fit as fitted
