@@ -8,8 +8,10 @@ are positive in compression.  All values are floats, or arrays with one entry a 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -20,6 +22,8 @@ Number = Any
 Truth = Any
 
 LOADING_POWER = 1.5
+# The only unloading power that equation 3-7 holds for.
+ACR_POWER = 2.5
 
 # Branches.
 VIRGIN, UNLOADING, RELOADING = 0, 1, 2
@@ -37,8 +41,64 @@ def _any(condition: Truth) -> bool:
     return bool(condition.any()) if isinstance(condition, np.ndarray) else bool(condition)
 
 
+def hertz_coefficient(radius: float, e_s: float, nu_s: float, e_t: float) -> float:
+    """Contact coefficient of a sphere on a half-space, equation 3-2 (force/length^1.5).
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the sphere, R_s (length).
+    e_s, nu_s : float
+        Young's modulus (force/length^2) and Poisson's ratio of the sphere.
+    e_t : float
+        Young's modulus of the laminate through its thickness, force/length^2.
+
+    Raises
+    ------
+    ValueError
+        If radius or a modulus is not positive, or Poisson's ratio not between -1 and 0.5.
+    """
+    for name, value in (("radius", radius), ("E_s", e_s), ("E_t", e_t)):
+        if not 0.0 < value < math.inf:
+            raise ValueError(f"{name} must be positive, not {value:g}")
+    if not -1.0 < nu_s <= 0.5:
+        raise ValueError(f"nu_s must lie between -1 and 0.5, not {nu_s:g}")
+    return 4.0 / 3.0 * math.sqrt(radius) / ((1.0 - nu_s**2) / e_s + 1.0 / e_t)
+
+
+class Measured(ABC):
+    """What was measured: the first loading curve, the unloading power, and what remains.
+
+    Attributes
+    ----------
+    k : float
+        Contact coefficient, force/length^1.5 (equation 3-1).
+    q : float
+        Power of the unloading curve (equation 3-3).
+    """
+
+    __slots__ = ()
+    k: Number
+    q: Number
+
+    @abstractmethod
+    def permanent(self, peak: Number) -> Number:
+        """Permanent indentation after a peak (length)."""
+
+    def loading(self, indentation: Number) -> Number:
+        """Force on the first loading curve, equation 3-1."""
+        return power_curve(self.k, 0.0, 1.0, LOADING_POWER, indentation)
+
+    def rigidity(self, peak: Number) -> Number:
+        """Unloading rigidity s after a positive peak, equation 3-5, force/length^q.
+
+        With the permanent indentation of 3-8 it is 3-9 and 3-10, with that of 3-7 it is 3-6.
+        """
+        return self.loading(peak) / (peak - self.permanent(peak)) ** self.q
+
+
 @dataclass(frozen=True, slots=True)
-class Constants:
+class Constants(Measured):
     """What was measured: EXPE's card.
 
     Attributes
@@ -61,12 +121,33 @@ class Constants:
         value = self.s_p * (peak - self.alpha_p)
         return _select(value > 0.0, value, 0.0)
 
-    def loading(self, indentation: Number) -> Number:
-        """Force on the first loading curve, equation 3-1."""
-        return _power(self.k, 0.0, 1.0, LOADING_POWER, indentation)
+
+@dataclass(frozen=True, slots=True)
+class CriticalConstants(Measured):
+    """What was measured, with one unloading rigidity k/alpha_cr for every peak: EXPE ACR's card.
+
+    Attributes
+    ----------
+    k : float
+        Contact coefficient, force/length^1.5 (equation 3-1).
+    alpha_cr : float
+        Critical indentation of equation 3-6 (length).
+    q : float
+        5/2.
+    """
+
+    k: Number
+    alpha_cr: Number
+    q: Number = field(default=ACR_POWER, init=False)
+
+    def permanent(self, peak: Number) -> Number:
+        """Permanent indentation after a peak, equation 3-7, never negative (length)."""
+        top = _select(peak > 0.0, peak, 0.0)
+        value = top - self.alpha_cr**0.4 * top**0.6
+        return _select(value > 0.0, value, 0.0)
 
 
-def _power(f: Number, b: Number, w: Number, p: Number, a: Number) -> Number:
+def power_curve(f: Number, b: Number, w: Number, p: Number, a: Number) -> Number:
     """F = f ((a - b)/w)^p, zero for a <= b."""
     if isinstance(a, np.ndarray):
         return np.where(a > b, f * (np.maximum(a - b, 0.0) / w) ** p, 0.0)
@@ -109,7 +190,7 @@ class Memory:
 
     def force(self, indentation: Number) -> Number:
         """Force on the branch's curve."""
-        return _power(self.f, self.b, self.w, self.p, indentation)
+        return power_curve(self.f, self.b, self.w, self.p, indentation)
 
 
 class Point(NamedTuple):
@@ -123,7 +204,7 @@ class Law(Protocol):
     """An indentation law."""
 
     @property
-    def constants(self) -> Constants:
+    def constants(self) -> Measured:
         """What was measured."""
         ...
 
@@ -150,7 +231,7 @@ class Law(Protocol):
         ...
 
 
-def _start(constants: Constants) -> Memory:
+def _start(constants: Measured) -> Memory:
     zero = 0.0 * constants.k
     one = zero + 1.0
     branch = VIRGIN + (zero == one)  # VIRGIN, once a case
@@ -166,7 +247,7 @@ class MemoryLaw:
     the other ended, so that the force is continuous.  At the peak the first curve goes on.
     """
 
-    constants: Constants
+    constants: Measured
 
     def start(self) -> Memory:
         """Memory before the first contact."""
@@ -251,7 +332,7 @@ class StickyLaw:
     those that the contact iteration discards.
     """
 
-    constants: Constants
+    constants: Measured
 
     def start(self) -> Memory:
         """Memory before the first contact."""
@@ -286,6 +367,35 @@ class StickyLaw:
         return memory
 
 
+def follow(law: Law, corners: Sequence[float], points: int = 1) -> Iterator[tuple[Point, int]]:
+    """Force of one case along a path, from the first contact at zero on.
+
+    Parameters
+    ----------
+    law : Law
+    corners : sequence of float
+        Indentations between which the path goes straight; it starts at 0.
+    points : int
+        Points from one corner to the next.
+
+    Yields
+    ------
+    Point, int
+        Indentation and force, and the branch that they lie on; the start first.
+    """
+    memory, last, begin = law.start(), Point(0.0, 0.0), 0.0
+    yield last, VIRGIN
+    for corner in corners:
+        for n in range(1, points + 1):
+            part = n / points
+            indentation = corner if n == points else begin + part * (corner - begin)
+            force, memory = law.trial(memory, last, indentation)
+            memory = law.accept(memory, last, indentation)
+            last = Point(indentation, float(force))
+            yield last, int(memory.branch)
+        begin = corner
+
+
 def _choose(condition: Truth, yes: Memory, no: Memory) -> Memory:
     """One memory or the other, case by case."""
     if not isinstance(condition, np.ndarray):
@@ -303,8 +413,9 @@ def _taken(record: Any, rows: NDArray[np.intp]) -> Any:
     return taken
 
 
-def stacked(records: Sequence[Constants]) -> Constants:
+def stacked(records: Sequence[Measured]) -> Measured:
     """Constants of many cases in one, of one kind."""
-    kind = type(records[0])
+    kind: Any = type(records[0])
     names = [part.name for part in fields(kind) if part.init]
-    return kind(*(np.array([getattr(record, name) for record in records]) for name in names))
+    made: Measured = kind(*(np.array([getattr(r, name) for r in records]) for name in names))
+    return made

@@ -17,7 +17,7 @@ from fecm.dynamics import PlateMotion
 from fecm.elements.quadrature import HIGHEST_ORDER, Rule, gauss, nodal
 from fecm.gages import Gages, gages
 from fecm.impact import Contact, Impact
-from fecm.indentation import Constants, Law, MemoryLaw, StickyLaw
+from fecm.indentation import Constants, CriticalConstants, Law, Measured, MemoryLaw, StickyLaw
 from fecm.laminate import laminate_of_deck
 from fecm.mesh import Mesh, rod_diameters
 from fecm.plate import StrainField
@@ -111,6 +111,13 @@ def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> Project
     return Rod(card.size, diameters, card.modulus, card.density)
 
 
+def build_constants(measured: Indentation) -> Measured:
+    """Make what an EXPE segment says of the indentation law."""
+    if measured.word == Indentation.ACR:
+        return CriticalConstants(measured.k, measured.alpha_p)
+    return Constants(*measured.values())
+
+
 def build_station(deck: Deck, projectile: Projectile, slips: frozenset[str]) -> Station:
     """Make the transducer: PROJ's node, or the rod's middle (one node on under its slip)."""
     sign = 1.0 if "station" in slips else -1.0
@@ -131,8 +138,7 @@ def build_gages(deck: Deck, mesh: Mesh, plate: PlateModel) -> Gages | None:
 
 def build_law(deck: Deck, slips: frozenset[str] = frozenset()) -> Law:
     """Make the indentation law of a deck, with the slips that are on."""
-    measured = deck.need(Indentation)
-    constants = Constants(measured.k, measured.alpha_p, measured.s_p, measured.q)
+    constants = build_constants(deck.need(Indentation))
     return StickyLaw(constants) if "reload" in slips else MemoryLaw(constants)
 
 

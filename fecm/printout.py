@@ -28,6 +28,7 @@ from fecm.deck.model import (
 )
 from fecm.deck.records import UNKNOWNS
 from fecm.mesh import Mesh
+from fecm.parts import build_constants
 from fecm.program import WORDS
 from fecm.stresses import RESULTANTS, STRAINS
 
@@ -114,11 +115,18 @@ class Printer:
             self._material(segment, plate)
         elif isinstance(segment, Indentation):
             self._page("Indentation law")
+            law = build_constants(segment)
             for name, value in (
-                ("Contact coefficient k", segment.k),
-                ("Critical indentation alpha_p", segment.alpha_p),
-                ("Constant s_p", segment.s_p),
-                ("Power of the unloading law q", segment.q),
+                ("Contact coefficient k", law.k),
+                *(
+                    [("Critical indentation alpha_cr", segment.alpha_p)]
+                    if segment.word
+                    else [
+                        ("Critical indentation alpha_p", segment.alpha_p),
+                        ("Constant s_p", segment.s_p),
+                    ]
+                ),
+                ("Power of the unloading law q", law.q),
             ):
                 self._write([f"  {name:32}{value:14.6g}"])
             self._write([""])

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 
+from fecm.authoring.contacts import CONTACTS
 from fecm.authoring.grid import Grid, Section, graded, listed, uniform
 from fecm.authoring.layup import LayupError, parse_layup
 from fecm.authoring.materials import MATERIALS, SYSTEMS
@@ -40,7 +41,8 @@ def deck_of_options(
     edges: Sequence[str],
     at: str | None,
     velocity: float,
-    law: str,
+    law: str | None,
+    contact: str | None,
     projectile: str | None,
     duration: float,
     dt: float | None,
@@ -77,7 +79,7 @@ def deck_of_options(
         supports=_supports(support, edges),
         at=(x, y),
         velocity=velocity,
-        law=Indentation(*_numbers("--law", law, 4)),
+        law=_law(law, contact, units, material),
         projectile=_projectile(projectile),
         duration=duration,
         dt=dt,
@@ -181,6 +183,23 @@ def _ply(text: str | None, name: str | None, system: str | None) -> tuple[Ply, s
     if material is None:
         raise OptionError(f"--material takes {', '.join(MATERIALS)}, not `{name}`")
     return material.converted(system or material.system), system
+
+
+def _law(
+    text: str | None, name: str | None, system: str | None, material: str | None
+) -> Indentation:
+    """The indentation law, a named one in the units of the ply."""
+    if (text is None) == (name is None):
+        raise OptionError("give either --law or --contact")
+    if text is not None:
+        k, alpha_p, s_p, q = _numbers("--law", text, 4)
+        return Indentation(k, alpha_p, s_p, q)
+    contact = CONTACTS.get(name or "")
+    if contact is None:
+        raise OptionError(f"--contact takes {', '.join(CONTACTS)}, not `{name}`")
+    if system is None and material is None:
+        raise OptionError("--contact with --ply needs --units, which say what the ply is given in")
+    return contact.converted(system or MATERIALS[material or ""].system)
 
 
 def _supports(support: str, edges: Sequence[str]) -> dict[str, str]:

@@ -17,6 +17,7 @@ from fecm.deck.model import (
     ShearCorrection,
 )
 from fecm.gages import locate
+from fecm.indentation import ACR_POWER
 from fecm.laminate import laminate_of_deck
 from fecm.mesh import Mesh, rod_diameters
 from fecm.parts import build_projectile
@@ -177,12 +178,24 @@ def warn_of_the_reports_rod(impact: Impact, findings: Findings) -> None:
 
 def check_law(law: Indentation, findings: Findings) -> None:
     """Check an EXPE segment."""
-    for name, value, sound, rule in (
-        ("contact coefficient k", law.k, law.k > 0.0, "positive"),
-        ("critical indentation alpha_p", law.alpha_p, law.alpha_p >= 0.0, "0 or more"),
-        ("constant s_p", law.s_p, 0.0 <= law.s_p < 1.0, "at least 0 and below 1"),
-        ("unloading power q", law.q, law.q > 0.0, "positive"),
-    ):
+    if law.word == Indentation.ACR:
+        rules = (
+            (law.k > 0.0, "positive"),
+            (law.alpha_p > 0.0, "positive"),
+            (law.s_p == 0.0, "blank or 0 with ACR, whose equation 3-7 has no such constant"),
+            (
+                law.q in (0.0, ACR_POWER),
+                "blank or 2.5 with ACR, as equation 3-7 holds for no other",
+            ),
+        )
+    else:
+        rules = (
+            (law.k > 0.0, "positive"),
+            (law.alpha_p >= 0.0, "0 or more"),
+            (0.0 <= law.s_p < 1.0, "at least 0 and below 1"),
+            (law.q > 0.0, "positive"),
+        )
+    for name, value, (sound, rule) in zip(law.names(), law.values(), rules, strict=True):
         if not sound:
             findings.add("E412", f"The {name} is {value:g}; it must be {rule}.", law.place(name))
 

@@ -17,6 +17,7 @@ from fecm.cli.common import INTERRUPTED, UNUSABLE, signals
 from fecm.cli.decks import check, fmt, materials, new
 from fecm.cli.diff import diff
 from fecm.cli.export import export
+from fecm.cli.indent import indent
 from fecm.cli.info import info
 from fecm.cli.plot import plot
 from fecm.cli.results import tapes
@@ -32,7 +33,7 @@ def cli() -> None:
     """Impact on laminated composite plates, from the punched-card decks of NASA CR-168057."""
 
 
-for _command in (run, check, new, fmt, materials, info, tapes, diff, export, plot, rod):
+for _command in (run, check, new, fmt, materials, info, tapes, diff, export, plot, rod, indent):
     cli.add_command(_command)
 
 

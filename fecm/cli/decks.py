@@ -106,7 +106,9 @@ def fmt(deck: Path, output: Path | None, only_check: bool) -> None:
               help="Support of one edge: left, right, bottom or top; may be repeated.")  # fmt: skip
 @click.option("--at", metavar="X,Y", help="Impact point.  [default: the plate's middle]")
 @click.option("--velocity", type=float, required=True, help="Approach velocity.")
-@click.option("--law", required=True, metavar="K,ALPHA_P,S_P,Q", help="The indentation law.")
+@click.option("--law", metavar="K,ALPHA_P,S_P,Q", help="The indentation law.")
+@click.option("--contact", metavar="NAME",
+              help="A named law instead; `fecm indent contacts` lists them.")  # fmt: skip
 @click.option("--projectile", metavar="WHAT",
               help="mass:M, or rod:LENGTH,DIAMETER,E,DENSITY.  [default: the report's rod, in lb, "
                    "in and s]")  # fmt: skip

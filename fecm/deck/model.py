@@ -169,33 +169,54 @@ class Impact(Segment):
 class Indentation(Segment):
     """EXPE: (4F10.0); the measured indentation law, equations 3-1, 3-3 and 3-8.
 
+    With the second word ACR the permanent indentation follows equation 3-7 instead of 3-8.
+
     Attributes
     ----------
     k : float
         Contact coefficient, force/length^1.5.
     alpha_p : float
-        Critical indentation (length), beyond which an indentation remains.
+        Critical indentation (length), beyond which an indentation remains; alpha_cr with ACR.
     s_p : float
-        Slope of the permanent over the maximum indentation.
+        Slope of the permanent over the maximum indentation; 0 with ACR.
     q : float
-        Power of the unloading curve.
+        Power of the unloading curve; 5/2 or 0 (which stands for it) with ACR.
+    word : str
+        The keyword card's second word: ``""`` for equation 3-8, ``"ACR"`` for 3-7.
     """
 
     k: float
     alpha_p: float
     s_p: float
     q: float
+    word: str = ""
     keyword: ClassVar[str] = "EXPE"
 
+    ACR: ClassVar[str] = "ACR"
     fields: ClassVar[Fields] = layout(
         "F10 contact coefficient k|k", "F10 critical indentation alpha_p|alpha_p",
         "F10 constant s_p|s_p", "F10 unloading power q|q",
     )  # fmt: skip
+    acr_fields: ClassVar[Fields] = layout(
+        "F10 contact coefficient k|k", "F10 critical indentation alpha_cr|alpha_cr",
+        "F10 constant s_p|(none)", "F10 unloading power q|q",
+    )  # fmt: skip
+
+    def values(self) -> tuple[float, float, float, float]:
+        """Values in the card's order."""
+        return self.k, self.alpha_p, self.s_p, self.q
+
+    def names(self) -> list[str]:
+        """Names of the values."""
+        return [field.name for field in (self.acr_fields if self.word else self.fields)]
+
+    def text(self) -> str:
+        """Text of the segment's two cards."""
+        return f"{f'EXPE {self.word}'.rstrip()}\n{write_card(self.fields, self.values())}"
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
-        yield "EXPE"
-        yield write_card(self.fields, [self.k, self.alpha_p, self.s_p, self.q])
+        yield from self.text().splitlines()
 
 
 @dataclass(frozen=True)

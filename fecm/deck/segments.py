@@ -156,8 +156,21 @@ class SegmentReader:
         return Impact(int(node), int(dof), float(velocity), source=source)
 
     def _indentation(self, head: Card) -> Segment | None:
-        row = self._single(head, Indentation.fields, "The card of the indentation law")
-        return None if row is None else Indentation(*map(float, row[0]), source=row[1])
+        word = " ".join(head.data.split()[1:]).upper()
+        if word and word != Indentation.ACR:
+            self._stream.findings.add(
+                "W416",
+                f"`{word}` behind EXPE is not read: the law is that of equation 3-8.",
+                head.place,
+                "EXPE ACR takes the law of equation 3-7",
+            )
+            word = ""
+        fields = Indentation.acr_fields if word else Indentation.fields
+        row = self._single(head, fields, "The card of the indentation law")
+        if row is None:
+            return None
+        k, alpha, s_p, q = map(float, row[0])
+        return Indentation(k, alpha, s_p, q, word, source=row[1])
 
     def _projectile(self, head: Card) -> Segment | None:
         row = self._single(head, Projectile.fields, "The first card of PROJ")

@@ -337,7 +337,7 @@ def read(
                 f"{path}: format version {root.get('format_version')} is not "
                 f"{FORMAT_VERSION}, which this program reads"
             )
-        visitor = _Visitor(path)
+        visitor = _Visitor(path, lists=form == SWEEP)
         file.visititems(visitor)
     arrays = FileArrays(path, visitor.shapes, visitor.dtypes)
     return arrays, visitor.texts, {"": root, **visitor.groups}
@@ -359,8 +359,9 @@ PACKED = 2000
 class _Visitor:
     """Notes what stands in a file: shapes, texts, attributes of groups."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, lists: bool = False) -> None:
         self.path = path
+        self.lists = lists  # of texts
         self.size = path.stat().st_size
         self.shapes: dict[str, tuple[int, ...]] = {}
         self.dtypes: dict[str, np.dtype[Any]] = {}
@@ -378,7 +379,7 @@ class _Visitor:
             return  # it numbers an axis
         if h5py.check_string_dtype(item.dtype) and item.shape == ():
             self.texts[name] = str(_plain(item[()]))
-        elif h5py.check_string_dtype(item.dtype) and len(item.shape) == 1:
+        elif self.lists and h5py.check_string_dtype(item.dtype) and len(item.shape or ()) == 1:
             self.texts[name] = [str(_plain(value)) for value in item[()].tolist()]
         elif item.dtype.kind in "biuf" and item.shape is not None and not item.dtype.shape:
             shape = tuple(map(int, item.shape))

@@ -1,0 +1,238 @@
+"""``fecm indent curve``: forces and rigidities by the law of a deck."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fecm.cli.common import DECK_PATH, Refused, write_text
+from fecm.cli.numbers import POSITIVE
+from fecm.cli.pictures import OVERWRITE, PLOT, check_picture, drawing, outputs, save_picture
+
+if TYPE_CHECKING:
+    from fecm.deck.model import Deck, Indentation
+    from fecm.indentation import Measured
+    from fecm.plot import Picture
+
+
+def _path(text: str | None) -> list[float]:
+    """Corners of a path."""
+    try:
+        corners = [] if text is None else [float(part) for part in text.split(",")]
+    except ValueError:
+        corners = [math.nan]
+    if not all(map(math.isfinite, corners)):
+        raise click.BadParameter(f"{text} is not of the form A,B,C", param_hint="--path")
+    return corners
+
+
+def _law(deck: Path) -> tuple[Deck, Indentation]:
+    """The first problem of a deck that has an EXPE segment, and the segment."""
+    from fecm.check.impact import check_law
+    from fecm.deck.model import Indentation
+    from fecm.deck.reader import Reader, decode
+
+    reader = Reader(decode(deck.read_bytes()))
+    problems = [problem.deck for problem in reader.problems() if problem.deck is not None]
+    laws = [(one, law) for one in problems if (law := one.last(Indentation)) is not None]
+    if laws:
+        check_law(laws[0][1], reader.findings)
+    for finding in reader.findings:
+        click.echo(finding.render(str(deck)), err=True)
+    if reader.findings.errors:
+        raise Refused(f"{deck} has errors")
+    if not laws:
+        raise Refused(f"{deck} has no EXPE segment, and so no indentation law")
+    return laws[0]
+
+
+@click.command()
+@click.argument("deck", type=DECK_PATH)
+@click.option("--path", "corners", metavar="A,B,C,...",
+              help="Indentations between which the path goes straight, from 0 on; with --rigidity "
+                   "the range.")  # fmt: skip
+@click.option("--points", type=click.IntRange(min=1, max=100_000), default=100, show_default=True,
+              help="Points from one corner to the next.")  # fmt: skip
+@click.option("--rigidity", is_flag=True,
+              help="Unloading rigidity s against alpha_m by equations 3-9 and 3-7 instead.",
+              )  # fmt: skip
+@click.option("--q", type=POSITIVE, help="With --rigidity: power of 3-9, instead of the deck's.")
+@click.option("--alpha-cr", type=POSITIVE,
+              help="With --rigidity: alpha_cr of 3-7.  [default: the deck's, or the report's]",
+              )  # fmt: skip
+@click.option("--line", metavar="ALPHA_P,S_P",
+              help="With --rigidity: constants of 3-8.  [default: the deck's, or the report's]",
+              )  # fmt: skip
+@click.option("-o", "--output", type=click.Path(path_type=Path, allow_dash=True), metavar="FILE",
+              default="-", help="Where the table goes.  [default: standard output]")  # fmt: skip
+@PLOT
+@OVERWRITE
+def curve(
+    deck: Path,
+    corners: str | None,
+    points: int,
+    rigidity: bool,
+    output: Path,
+    picture: Path | None,
+    overwrite: bool,
+    **constants: Any,
+) -> None:
+    """Write the force along an indentation path, by the law of DECK, as CSV.
+
+    Columns are indentation, force and the branch of the law; with --rigidity alpha_m, s_3_9 and
+    s_3_7.
+    """
+    path = _path(corners)
+    table = None if str(output) == "-" else output
+    check_picture(picture)
+    outputs(overwrite, table, picture)
+    if table is not None and table.exists() and table.samefile(deck):
+        raise Refused(f"{table} is the deck itself")
+    if not rigidity:
+        if not path:
+            raise click.UsageError("--path is missing: indentations with commas between them")
+        if any(value is not None for value in constants.values()):
+            raise click.UsageError("--q, --alpha-cr and --line belong to --rigidity")
+    made = _rigidities if rigidity else _forces
+    rows, drawn = made(deck, path, points, picture is not None, **constants)
+    text = "".join(f"{','.join(map(_cell, row))}\n" for row in rows)
+    if drawn is not None and picture is not None:
+        save_picture(drawn, picture)
+    if table is None:
+        click.echo(text, nl=False)
+    else:
+        write_text(table, text)
+
+
+def _cell(value: float | str) -> str:
+    return value if isinstance(value, str) else repr(float(value))
+
+
+Rows = Iterable[Sequence[float | str]]
+
+
+def _forces(
+    deck: Path, path: list[float], points: int, draw: bool, **_: Any
+) -> tuple[Rows, Picture | None]:
+    """Indentation, force and branch along a path, and a picture of them."""
+    import numpy as np
+
+    from fecm.indentation import MemoryLaw, follow
+    from fecm.parts import build_constants
+    from fecm.units import unit_names
+
+    problem, card = _law(deck)
+    law = MemoryLaw(build_constants(card))
+    try:
+        walk = list(follow(law, path, points))
+    except OverflowError:
+        walk = []
+    if not walk or not all(math.isfinite(point.force) for point, _ in walk):
+        raise Refused("--path leads to forces beyond the range of numbers")
+    names = ("loading", "unloading", "reloading")
+    rows: list[Sequence[float | str]] = [("indentation", "force", "branch")]
+    rows += [(point.indentation, point.force, names[branch]) for point, branch in walk]
+    if not draw:
+        return rows, None
+    with drawing():
+        from fecm.plot import indentation
+
+        columns = np.array([point for point, _ in walk])
+        return rows, indentation.path(columns[:, 0], columns[:, 1], unit_names(problem))
+
+
+def _rigidities(
+    deck: Path,
+    path: list[float],
+    points: int,
+    draw: bool,
+    *,
+    q: float | None,
+    alpha_cr: float | None,
+    line: str | None,
+) -> tuple[Rows, Picture | None]:
+    """Largest indentation and rigidities by both equations, and a picture of them."""
+    import numpy as np
+
+    from fecm.indentation import ACR_POWER, Constants, CriticalConstants
+    from fecm.parts import build_constants
+    from fecm.units import unit_names
+
+    if path and (len(path) != 2 or not 0.0 <= path[0] < path[1]):
+        raise click.BadParameter("with --rigidity the range FROM,TO", param_hint="--path")
+    problem, card = _law(deck)
+    own = build_constants(card)
+    alpha_p, s_p = _line(problem, own, line)
+    critical = CriticalConstants(card.k, _alpha_cr(problem, own, alpha_cr))
+    slope = Constants(card.k, alpha_p, s_p, own.q if q is None else q)
+    if slope.q != ACR_POWER and draw:
+        raise Refused(
+            f"s of 3-9 is force/length^{slope.q:g} here, that of 3-7 force/length^2.5: they can't "
+            "share axes; --q 2.5 makes them comparable"
+        )
+    if slope.q != ACR_POWER:
+        click.echo(
+            f"fecm: note: s of 3-9 is force/length^{slope.q:g} here, that of 3-7 "
+            "force/length^2.5: --q 2.5 makes them comparable",
+            err=True,
+        )
+    low, high = path or [0.0, 2.0 * max(critical.alpha_cr, slope.alpha_p)]
+    peaks = np.linspace(low, high, points + 1)
+    peaks = peaks[peaks > 0.0]
+    with np.errstate(all="ignore"):
+        by = [np.asarray(relation.rigidity(peaks)) for relation in (slope, critical)]
+    if not np.all(np.isfinite(by)):
+        raise Refused("--path leads to rigidities beyond the range of numbers")
+    rows: list[Sequence[float | str]] = [("alpha_m", "s_3_9", "s_3_7")]
+    rows += list(zip(peaks, *by, strict=True))
+    if not draw:
+        return rows, None
+    with drawing():
+        from fecm.plot import indentation
+
+        named = dict(zip(("equation 3-9", "equation 3-7"), by, strict=True))
+        return rows, indentation.rigidity(peaks, named, slope.q, unit_names(problem))
+
+
+def _report_length(deck: Deck, value: float, what: str, option: str) -> float:
+    """A length of the report in a deck's unit; without a unit the report's, and a note of it."""
+    from fecm.authoring.contacts import SYSTEM, lengths
+    from fecm.authoring.materials import SYSTEMS
+    from fecm.units import unit_names
+
+    name = unit_names(deck).get("length", "in")
+    system = {names[0]: key for key, (names, _) in SYSTEMS.items()}.get(name)
+    if system is None:
+        raise Refused(f"the report's {what} is in inches and the deck's in {name}: give {option}")
+    click.echo(f"fecm: note: {what} is the report's {value:g} in; {option} gives another", err=True)
+    return value * (1.0 if system == SYSTEM else lengths(system))
+
+
+def _alpha_cr(deck: Deck, own: Measured, given: float | None) -> float:
+    from fecm.authoring.contacts import ALPHA_CR
+    from fecm.indentation import CriticalConstants
+
+    if given is not None:
+        return given
+    if isinstance(own, CriticalConstants):
+        return float(own.alpha_cr)
+    return _report_length(deck, ALPHA_CR, "alpha_cr", "--alpha-cr")
+
+
+def _line(deck: Deck, own: Measured, given: str | None) -> tuple[float, float]:
+    """alpha_p and s_p."""
+    from fecm.authoring.contacts import ALPHA_P, S_P
+    from fecm.indentation import Constants
+
+    if given is not None:
+        values = _path(given)
+        if len(values) != 2 or values[0] < 0.0 or not 0.0 <= values[1] < 1.0:
+            raise click.BadParameter("alpha_p and s_p, s_p below 1", param_hint="--line")
+        return values[0], values[1]
+    if isinstance(own, Constants):
+        return float(own.alpha_p), float(own.s_p)
+    return _report_length(deck, ALPHA_P, "alpha_p", "--line"), S_P

@@ -1,0 +1,6 @@
+"""Constants of the indentation law from an indentation test (the report's chapter 3).
+
+A test is a series of indentations and forces in the order of measurement.  `cycles` finds where
+it turns, `curves` fits the loading, unloading and reloading curves, `permanent` the relation of
+permanent to largest indentation, and `test` puts all together.
+"""
