@@ -21,6 +21,7 @@ from fecm.cli.info import info
 from fecm.cli.plot import plot
 from fecm.cli.results import tapes
 from fecm.cli.run import run
+from fecm.cli.waves import waves
 from fecm.results.schema import ResultFileError
 from fecm.version import __version__
 
@@ -31,7 +32,7 @@ def cli() -> None:
     """Impact on laminated composite plates, from the punched-card decks of NASA CR-168057."""
 
 
-for _command in (run, check, new, fmt, materials, info, tapes, diff, export, plot):
+for _command in (run, check, new, fmt, materials, info, tapes, diff, export, plot, waves):
     cli.add_command(_command)
 
 
