@@ -69,7 +69,7 @@ def deck_of_options(
     point = None if at is None else _numbers("--at", at, 2)
     grid = _grid(size, mesh, grading, columns, rows, point)
     x, y = point or (grid.columns[-1].end / 2.0, grid.rows[-1].end / 2.0)
-    constants, system = _ply(ply, material, units)
+    constants, system = ply_of_options(ply, material, units)
     spec = Specification(
         title=title,
         grid=grid,
@@ -171,8 +171,25 @@ def _grid(
     return grid
 
 
-def _ply(text: str | None, name: str | None, system: str | None) -> tuple[Ply, str | None]:
-    """Constants of the ply, and the system of units that the deck declares."""
+def ply_of_options(
+    text: str | None, name: str | None, system: str | None
+) -> tuple[Ply, str | None]:
+    """Constants of the ply, and the system of units that the deck declares.
+
+    Parameters
+    ----------
+    text : str or None
+        The constants, as ``--ply`` takes them.
+    name : str or None
+        A named ply, as ``--material`` takes it, instead.
+    system : str or None
+        A key of :data:`fecm.authoring.materials.SYSTEMS`.
+
+    Raises
+    ------
+    OptionError
+        If an option can't be meant; the message names it.
+    """
     if system is not None and system not in SYSTEMS:
         raise OptionError(f"--units takes {', '.join(SYSTEMS)}, not `{system}`")
     if (text is None) == (name is None):

@@ -23,6 +23,7 @@ from fecm.cli.plot import plot
 from fecm.cli.results import tapes
 from fecm.cli.rod import rod
 from fecm.cli.run import run
+from fecm.cli.waves import waves
 from fecm.results.schema import ResultFileError
 from fecm.version import __version__
 
@@ -33,7 +34,9 @@ def cli() -> None:
     """Impact on laminated composite plates, from the punched-card decks of NASA CR-168057."""
 
 
-for _command in (run, check, new, fmt, materials, info, tapes, diff, export, plot, rod, indent):
+for _command in (
+    run, check, new, fmt, materials, info, tapes, diff, export, plot, waves, indent, rod,
+):  # fmt: skip
     cli.add_command(_command)
 
 

@@ -1,0 +1,171 @@
+"""Pictures of waves in a laminate (the report's figures 2.4 to 2.12)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from fecm.plot import Picture, PlotError
+from fecm.plot.style import COLOURS, RC, panels, scale
+from fecm.units import unit_of
+from fecm.waves import FRONTS, MODES, Cusp, Dispersion, Medium, WaveSurfaces
+
+Floats = NDArray[np.float64]
+
+AROUND = np.arange(1441) / 4.0  # normals of the points of a curve, degrees
+RAYS = 45.0  # degrees between the normals whose rays are drawn
+WORDS = {name: name.replace("_", " ").replace("in plane", "in-plane") for name in (*MODES, *FRONTS)}
+DASHES: tuple[Any, ...] = (
+    "-", (0, (5, 1.5)), (0, (1, 1)), (0, (7, 1.5, 1, 1.5)), (0, (7, 1.5, 1, 1.5, 1, 1.5))
+)  # fmt: skip
+
+
+def dispersion_picture(medium: Medium, curves: Sequence[Dispersion]) -> Picture:
+    """Phase velocities and frequencies of all modes against the wavelength.
+
+    Velocities are scaled by that of transverse shear and frequencies by it over the thickness, as
+    in figures 2.4 and 2.5.  The axes end a little above the in-plane modes and the cut-off.
+
+    Raises
+    ------
+    PlotError
+        If there are more directions than colours.
+    """
+    _within(len(curves), "directions")
+    unit = medium.shear_velocity
+    velocities = [curve.phase_velocity / unit for curve in curves]
+    frequencies = [c.angular_frequency * medium.laminate.thickness / unit for c in curves]
+    with matplotlib.rc_context(RC):
+        figure, axes = panels("full", 1, 2, ratio=0.66)
+        for curve, colour, *both in zip(curves, COLOURS, velocities, frequencies, strict=False):
+            for ax, values in zip(axes, both, strict=True):
+                for column, dashes in zip(values.T, DASHES, strict=True):
+                    ax.plot(curve.wavelength, column, color=colour, ls=dashes)
+        angles = [f"{curve.angle:g}°" for curve in curves]
+        colours = [Line2D([], [], color=colour) for colour in COLOURS[: len(curves)]]
+        figure.legend(colours, angles, loc="outside upper left", ncols=4)
+        modes = [Line2D([], [], color="0.3", ls=dashes) for dashes in DASHES]
+        figure.legend(
+            modes, [WORDS[mode] for mode in MODES], loc="outside upper right", ncols=5,
+            handlelength=2.6,
+        )  # fmt: skip
+        longest = max(float(curve.wavelength[-1]) for curve in curves)
+        tops = (
+            1.15 * max(float(values[:, 3:].max()) for values in velocities),
+            2.6 * max(float(values[-1, 1:3].max()) for values in frequencies),
+        )
+        names = ("Phase velocity $c/c_s$", "Frequency $\\omega h/c_s$")
+        for ax, top, name in zip(axes, tops, names, strict=True):
+            ax.set(
+                xlim=(0.0, longest), ylim=(0.0, top), xlabel="Wavelength $\\lambda/h$", ylabel=name
+            )
+    return Picture(figure)
+
+
+def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
+    """Normal velocities of in-plane and of flexural fronts, as distances in the normal's direction.
+
+    Parameters
+    ----------
+    surfaces : WaveSurfaces
+    units : mapping of str to str
+        As :func:`fecm.units.unit_names` gives them.
+    """
+    fronts = surfaces.fronts(AROUND)
+    speed = scale(float(fronts.velocity.max()), unit_of("length/time", dict(units)))
+    with matplotlib.rc_context(RC):
+        figure, axes = panels("full", 1, 2, ratio=1.16, subplot_kw={"projection": "polar"})
+        figure.set_layout_engine("constrained")
+        graphs: Any = axes  # polar ones have methods of their own
+        for place, colour in enumerate(COLOURS[: len(FRONTS)]):
+            graphs[0 if place < 2 else 1].plot(
+                np.deg2rad(fronts.normal),
+                speed.factor * fronts.velocity[:, place],
+                color=colour,
+                label=WORDS[FRONTS[place]],
+            )
+        for ax, title in zip(graphs, ("In-plane fronts", "Flexural fronts"), strict=True):
+            ax.set_title(speed.label(f"{title}: normal velocity"))
+            ax.set_rlim(0.0, 1.06 * speed.factor * float(fronts.velocity.max()))
+            ax.set_rlabel_position(112.5)
+            ax.tick_params(labelsize=6.5, pad=1)
+            ax.grid(lw=0.4, color="0.8")
+            ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=3)
+    return Picture(figure)
+
+
+def fronts_picture(
+    surfaces: WaveSurfaces, times: Sequence[float], radius: float, units: Mapping[str, str]
+) -> Picture:
+    """Fronts at several times with rays and cusps, one graph a mode.
+
+    Raises
+    ------
+    PlotError
+        If there are more times than colours.
+    """
+    _within(len(times), "times")
+    fronts, some = surfaces.fronts(AROUND), surfaces.fronts(np.arange(0.0, 360.0, RAYS))
+    places = [fronts.positions(time, radius) for time in times]
+    ends = some.positions(0.0, radius), some.positions(max(times), radius)
+    turns = [surfaces.cusps(time, radius) for time in times]
+    length = scale(max(float(np.abs(at).max()) for at in places), unit_of("length", dict(units)))
+    clock = scale(max(times), unit_of("time", dict(units)))
+    with matplotlib.rc_context(RC):
+        figure, axes = panels("full", 2, 3, ratio=0.95)
+        for mode, ax in enumerate(axes[:5]):
+            _circle(ax, length.factor * radius)
+            for start, end in zip(*(length.factor * at[:, mode] for at in ends), strict=True):
+                ax.plot(*zip(start, end, strict=True), color="0.6", lw=0.5)
+            for at, colour in zip(places, COLOURS, strict=False):
+                ax.plot(*(length.factor * at[:, mode].T), color=colour)
+            _dots(
+                ax, [c for found in turns for c in found if c.mode == FRONTS[mode]], length.factor
+            )
+            ax.set_title(WORDS[FRONTS[mode]])
+            ax.locator_params(nbins=5)
+            ax.set(aspect="equal", xlabel=length.label("$x$"), ylabel=length.label("$y$"))
+        axes[5].set_axis_off()
+        handles = [Line2D([], [], color=colour) for _, colour in zip(times, COLOURS, strict=False)]
+        labels = [clock.show(time) for time in times]
+        extra = (
+            ("time 0", Line2D([], [], color="0.4", ls=DASHES[2])),
+            (f"rays, normals {RAYS:g}° apart", Line2D([], [], color="0.6", lw=0.5)),
+            ("cusps", Line2D([], [], **_DOT)),
+        )
+        axes[5].legend(
+            [*handles, *(handle for _, handle in extra)],
+            [*labels, *(label for label, _ in extra)],
+            loc="center",
+        )
+    return Picture(figure)
+
+
+_DOT: dict[str, Any] = {
+    "ls": "",
+    "marker": "o",
+    "ms": 3.0,
+    "mfc": "white",
+    "mec": "black",
+    "mew": 0.6,
+}
+
+
+def _circle(ax: Axes, radius: float) -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 181)
+    ax.plot(radius * np.cos(angle), radius * np.sin(angle), color="0.4", ls=DASHES[2])
+
+
+def _dots(ax: Axes, found: Sequence[Cusp], factor: float) -> None:
+    ax.plot([factor * c.x for c in found], [factor * c.y for c in found], **_DOT)
+
+
+def _within(count: int, what: str) -> None:
+    if count > len(COLOURS):
+        raise PlotError(f"more than {len(COLOURS)} {what} can't be told apart in one picture")

@@ -1,0 +1,349 @@
+"""``fecm waves``: its tables are the solutions' numbers, its pictures their curves."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fecm.authoring.laminates import laminate_of_options
+from fecm.authoring.options import OptionError
+from fecm.plot import PlotError
+from fecm.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
+from tests.builders import general_plate, report_plate, table
+from tests.calls import Done, assert_unusable, call
+from tests.decks import DATA_CARDS, LONG, small
+
+LAYUP = ("--layup", "[0/45/0/-45/0]2s", "--ply-thickness", ".0053")
+LAMINATE = (*LAYUP, "--material", "report")
+UNSYMMETRIC = ("--layup", "0/30/70", "--ply-thickness", ".1", "--material", "report")
+
+
+def rows(done: Done) -> list[dict[str, str]]:
+    """The table that a call has printed."""
+    assert done.exit_code == 0, done.stderr
+    return list(csv.DictReader(io.StringIO(done.stdout)))
+
+
+# Tables -----------------------------------------------------------------------------------------
+
+
+def test_dispersion_of_the_report_s_deck_is_the_reference_file_s() -> None:
+    expected = {
+        (float(row["alpha_deg"]), float(row["lambda_over_h"])): row
+        for row in table("waves_dispersion.csv")
+    }
+    done = call("waves", "dispersion", LONG, "--wavelengths", "1:10:10")
+    assert done.stdout.splitlines()[0] == (
+        "angle_deg,wavelength_over_h,mode,phase_velocity,angular_frequency"
+    )
+    found = rows(done)
+    assert len(found) == 3 * 10 * 5
+    assert [row["mode"] for row in found[:5]] == list(MODES)
+    compared = 0
+    for row in found:
+        known = expected[float(row["angle_deg"]), float(row["wavelength_over_h"])]
+        if row["mode"].startswith("flexural"):
+            velocity = float(known[f"mode{row['mode'][-1]}_c_in/s"])
+            assert float(row["phase_velocity"]) == pytest.approx(velocity, rel=1e-8)
+            k = float(known["k_1/in"])
+            assert float(row["angular_frequency"]) == pytest.approx(k * velocity, rel=1e-8)
+            compared += 1
+    assert compared == 90
+
+
+def test_speeds_of_the_report_s_deck_are_the_reference_file_s() -> None:
+    done = call("waves", "speeds", LONG, "--step", "15")
+    header = "angle_deg,extension,in_plane_shear,bending,twisting,transverse_shear"
+    assert done.stdout.splitlines()[0] == header
+    found = np.array([list(map(float, row.values())) for row in rows(done)])
+    expected = [list(map(float, row.values())) for row in table("waves_normal_velocity.csv")]
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    assert done.stderr == ""
+
+
+def test_fronts_of_the_report_s_deck_are_the_reference_file_s() -> None:
+    done = call("waves", "fronts", LONG, "--step", "45", "--time", "2e-6", "1e-5")
+    assert done.stdout.splitlines()[0] == "mode,normal_deg,time,x,y,ray_deg"
+    found = {(r["mode"], float(r["normal_deg"]), float(r["time"])): r for r in rows(done)}
+    assert len(found) == 5 * 9 * 2
+    for row in table("waves_wavefront_rays.csv"):
+        mode = row["mode"].replace("inplane", "in_plane")
+        for time, name in ((2e-6, "t2us"), (1e-5, "t10us")):
+            mine = found[mode, float(row["normal_deg"]), time]
+            for axis in "xy":
+                expected = float(row[f"{axis}_{name}"])
+                assert float(mine[axis]) == pytest.approx(expected, rel=1e-7, abs=1e-8)
+            assert float(mine["ray_deg"]) == pytest.approx(float(row["ray_dir_deg"]), abs=1e-6)
+
+
+@pytest.mark.parametrize("command", [("dispersion",), ("speeds",), ("fronts", "--time", "1e-6")])
+def test_a_layup_gives_what_the_same_laminate_in_a_deck_gives(command: tuple[str, ...]) -> None:
+    deck, layup = (rows(call("waves", *command, *source)) for source in ((LONG,), LAMINATE))
+    assert len(deck) == len(layup)
+    for ours, theirs in zip(deck, layup, strict=True):
+        for name, value in ours.items():
+            if name == "mode":
+                assert theirs[name] == value
+            else:
+                assert float(theirs[name]) == pytest.approx(float(value), rel=1e-9, abs=1e-12)
+
+
+def test_constants_of_a_ply_stand_for_a_named_one() -> None:
+    ply = "0.000148,0.3,17.5e6,1.15e6,.8e6,.8e6,.8e6"
+    assert call("waves", "speeds", *LAYUP, "--ply", ply) == call("waves", "speeds", *LAMINATE)
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        ("--time", "1e-6", "--time", "2e-6", LONG),
+        ("--time", "1e-6", "2e-6", LONG),
+        (LONG, "--time=1e-6", "2e-6"),
+        ("--time", "1e-6,2e-6", LONG),
+        ("--step", "5", "--time", "1e-6", "2e-6", "--", LONG),
+    ],
+)
+def test_several_times_may_be_given_in_several_ways(times: tuple[object, ...]) -> None:
+    found = rows(call("waves", "fronts", *times))
+    assert {float(row["time"]) for row in found} == {1e-6, 2e-6}
+    assert len(found) == 5 * 73 * 2
+
+
+def test_negative_angles_are_no_options() -> None:
+    found = rows(call("waves", "dispersion", "--angle", "-45", "30", LONG,
+                      "--wavelengths", "2:2:1"))  # fmt: skip
+    assert [float(row["angle_deg"]) for row in found] == [-45.0] * 5 + [30.0] * 5
+    waves = dispersion(Medium(report_plate()), -45.0, [2.0]).phase_velocity[0]
+    np.testing.assert_allclose([float(r["phase_velocity"]) for r in found[:5]], waves, rtol=1e-9)
+
+
+def test_the_shear_factor_multiplies_the_transverse_shear_stiffness() -> None:
+    plain, reduced = (
+        rows(call("waves", "speeds", LONG, "--shear-factor", factor)) for factor in ("1", "0.81")
+    )
+    for one, other in zip(plain, reduced, strict=True):
+        assert float(other["transverse_shear"]) == pytest.approx(
+            0.9 * float(one["transverse_shear"]), rel=1e-12
+        )
+        assert other["bending"] == one["bending"]
+
+
+def test_fronts_start_from_a_circle_of_the_given_radius() -> None:
+    for option, radius in (((), 0.106), (("--radius", "2"), 2.0), (("--radius", "0"), 0.0)):
+        for row in rows(call("waves", "fronts", LONG, "--time", "0", *option)):
+            assert np.hypot(float(row["x"]), float(row["y"])) == pytest.approx(radius, abs=1e-15)
+
+
+def test_normals_run_from_0_to_360_as_far_as_the_step_goes() -> None:
+    for step, expected in (("90", [0, 90, 180, 270, 360]), ("100", [0, 100, 200, 300])):
+        found = [
+            float(row["angle_deg"]) for row in rows(call("waves", "speeds", LONG, "--step", step))
+        ]
+        assert found == expected
+    tenths = rows(call("waves", "speeds", LONG, "--step", ".1"))
+    assert len(tenths) == 3601
+    assert float(tenths[-1]["angle_deg"]) == 360.0
+
+
+def test_cusps_are_reported_on_standard_error_alone() -> None:
+    done = call("waves", "fronts", LONG, "--time", "0", "5e-6")
+    notes = done.stderr.splitlines()
+    assert notes[0] == "fecm: note: no cusps at time 0"
+    cusps = WaveSurfaces(Medium(report_plate())).cusps(5e-6, 0.106)
+    assert [note.split()[2] for note in notes[1:]] == ["in_plane_shear", "twisting"]
+    for cusp in cusps:
+        assert any(
+            f"{cusp.mode} has 4 cusps at time 5e-06" in note
+            and f"normal {cusp.normal:.4f} deg at" in note
+            for note in notes
+        )
+    assert "cusp" not in done.stdout
+
+
+def test_a_name_that_does_not_tell_the_motion_everywhere_is_reported() -> None:
+    notes = call("waves", "speeds", *UNSYMMETRIC).stderr.splitlines()
+    assert len(notes) == 4
+    assert all(" moves more in another way at normals " in note for note in notes)
+
+
+# Files ------------------------------------------------------------------------------------------
+
+
+def test_a_table_goes_to_a_file_whole(tmp_path: Path) -> None:
+    path = tmp_path / "speeds.csv"
+    done = call("waves", "speeds", LONG, "-o", path)
+    assert (done.exit_code, done.stdout, done.stderr) == (0, f"{path}\n", "")
+    assert path.read_text() == call("waves", "speeds", LONG).stdout
+    assert_unusable(call("waves", "speeds", LONG, "-o", path))
+    assert call("waves", "speeds", LONG, "-o", path, "--overwrite").exit_code == 0
+    assert [one.name for one in tmp_path.iterdir()] == ["speeds.csv"]
+
+
+@pytest.mark.parametrize(
+    "command", [("dispersion",), ("speeds",), ("fronts", "--time", "2e-6", "1e-5")]
+)
+def test_a_picture_is_drawn_beside_the_table(command: tuple[str, ...], tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    path = tmp_path / "waves.png"
+    done = call("waves", *command, LONG, "--plot", path)
+    assert done.stdout == call("waves", *command, LONG).stdout
+    assert done.stderr.splitlines()[-1] == str(path)
+    assert path.read_bytes().startswith(b"\x89PNG")
+
+
+# Pictures ---------------------------------------------------------------------------------------
+
+
+def drawn(axes: Any) -> list[Any]:
+    """Data of an axes' lines, (2, n) each."""
+    return [np.array(line.get_data()) for line in axes.get_lines()]
+
+
+def test_the_picture_of_dispersion_shows_scaled_velocities_and_frequencies() -> None:
+    pytest.importorskip("matplotlib")
+    from fecm.plot.waves import dispersion_picture
+
+    medium = Medium(report_plate())
+    curves = [dispersion(medium, angle, np.linspace(0.5, 20.0, 40)) for angle in (0.0, 90.0)]
+    velocity, frequency = dispersion_picture(medium, curves).figure.axes
+    unit = (0.8e6 / 0.000148) ** 0.5
+    for axes, factor, name in (
+        (velocity, 1.0 / unit, "phase_velocity"),
+        (frequency, 0.106 / unit, "angular_frequency"),
+    ):
+        found = drawn(axes)
+        assert len(found) == 2 * 5
+        for n, (x, y) in enumerate(found):
+            np.testing.assert_allclose(x, curves[n // 5].wavelength)
+            expected = factor * getattr(curves[n // 5], name)[:, n % 5]
+            np.testing.assert_allclose(y, expected, rtol=1e-9)
+    with pytest.raises(PlotError, match="more than 7 directions"):
+        dispersion_picture(medium, curves * 4)
+
+
+def test_the_picture_of_speeds_is_polar_and_in_the_deck_s_units() -> None:
+    pytest.importorskip("matplotlib")
+    from fecm.plot.waves import speeds_picture
+
+    surfaces = WaveSurfaces(Medium(report_plate()))
+    units = {"length": "in", "force": "lbf", "time": "s"}
+    in_plane, flexural = speeds_picture(surfaces, units).figure.axes
+    assert in_plane.get_title() == "In-plane fronts: normal velocity (10³ in/s)"
+    curves = drawn(in_plane) + drawn(flexural)
+    assert (len(drawn(in_plane)), len(curves)) == (2, 5)
+    for place, (angle, speed) in enumerate(curves):
+        expected = surfaces.fronts(np.rad2deg(angle)).velocity[:, place] / 1e3
+        np.testing.assert_allclose(speed, expected, rtol=1e-9)
+
+
+def test_the_picture_of_fronts_shows_circle_rays_fronts_and_cusps() -> None:
+    pytest.importorskip("matplotlib")
+    from fecm.plot.waves import fronts_picture
+
+    surfaces = WaveSurfaces(Medium(report_plate()))
+    times = (2e-6, 1e-5)
+    figure = fronts_picture(surfaces, times, 0.106, {}).figure
+    for place, mode in enumerate(FRONTS):
+        axes = figure.axes[place]
+        assert axes.get_title() == mode.replace("in_plane", "in-plane").replace("_", " ")
+        circle, *rest = drawn(axes)
+        np.testing.assert_allclose(np.hypot(*circle), 0.106)
+        rays, fronts, dots = rest[:8], rest[8:10], rest[10]
+        for number, ray in enumerate(rays):
+            end = surfaces.fronts(45.0 * number).positions(times[-1], 0.106)[0, place]
+            np.testing.assert_allclose(ray[:, 1], end, atol=1e-12)
+        for time, front in zip(times, fronts, strict=True):
+            at = surfaces.fronts(np.arange(1441) / 4.0).positions(time, 0.106)[:, place]
+            np.testing.assert_allclose(front.T, at, atol=1e-12)
+        assert dots.shape == (2, 8 if mode in ("in_plane_shear", "twisting") else 0)
+
+
+# Wrong input ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("dispersion",), "give a DECK, or --layup"),
+        (("speeds", "--material", "report"), "give a DECK, or --layup"),
+        (("speeds", LONG, "--layup", "0"), "--layup stands for a deck"),
+        (("speeds", LONG, "--ply-thickness", "1"), "--ply-thickness stands for a deck"),
+        (("speeds", "--layup", "0"), "--layup needs a positive --ply-thickness"),
+        (("speeds", *LAYUP), "give either --ply or --material"),
+        (("speeds", *LAYUP, "--ply", "1,2"), "--ply takes 7 numbers"),
+        (("speeds", *LAYUP, "--ply", "1,.3,1,1,-1,1,1"), "shear modulus G12 is -1"),
+        (("speeds", *LAYUP, "--ply", "1,.3,1e300,1,1,1,1"), "too far apart"),
+        (("dispersion", *LAYUP, "--ply", "1,.3,1e300,1,1,1,1"), "too far apart"),
+        (("speeds", *LAMINATE, "--units", "furlong"), "--units takes"),
+        (("speeds", "--layup", "[0/", "--ply-thickness", "1"), "can't be read at its end"),
+        (("dispersion", LONG, "--wavelengths", "1:2"), "FROM:TO:N"),
+        (("dispersion", LONG, "--wavelengths", "2:1:5"), "FROM:TO:N"),
+        (("dispersion", LONG, "--wavelengths", "0:1:5"), "FROM:TO:N"),
+        (("dispersion", LONG, "--wavelengths", "1:2:2.5"), "FROM:TO:N"),
+        (("dispersion", LONG, "--wavelengths", "1:inf:5"), "FROM:TO:N"),
+        (("dispersion", LONG, "--wavelengths", "1:2:1"), "one wavelength"),
+        (("dispersion", LONG, "--wavelengths", "1:2:99999999"), "are the most"),
+        (("dispersion", LONG, "--wavelengths", "1e-99:1:5"), "between 1e-9 and 1e9"),
+        (("dispersion", LONG, "--angle", "north"), "--angle takes a number, not `north`"),
+        (("dispersion", LONG, "--angle", "0", "nan"), "--angle takes a number, not `nan`"),
+        (("speeds", LONG, "--step", "0"), "--step takes a number above 0"),
+        (("speeds", LONG, "--step", "1e-9"), "are the most"),
+        (("speeds", LONG, "--shear-factor", "-1"), "--shear-factor takes a number above 0"),
+        (("fronts", LONG, "--time", "-1e-6"), "--time takes a number of at least 0"),
+        (("fronts", LONG, "--time", "1e308"), "beyond all range"),
+        (("fronts", LONG, "--time", "1", "--radius", "x"), "--radius takes a number"),
+        (("speeds", LONG, "--plot", "x.jpg"), "written as .png or .svg or .pdf"),
+        (("speeds", LONG, "--plot", "x.png", "-o", "x.png"), "the table and the picture"),
+        (("speeds", LONG, "-o", "no/such/folder.csv"), "there is no folder"),
+        (("fronts", LONG, *("--time", "1e-6,2e-6,3e-6,4e-6,5e-6,6e-6,7e-6,8e-6"),
+          "--plot", "x.png"), "more than 7 times"),
+    ],
+)  # fmt: skip
+def test_wrong_input_ends_in_one_line(
+    arguments: tuple[object, ...],
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    done = call("waves", *arguments)
+    assert_unusable(done)
+    assert words in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_deck_with_errors_is_told_and_refused(tmp_path: Path) -> None:
+    deck = tmp_path / "wrong.inp"
+    deck.write_text(small(data=DATA_CARDS.replace("17500000.", "-7500000.")))
+    done = call("waves", "speeds", deck)
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert "error[E403]" in done.stderr
+    assert done.stderr.endswith("fecm: error: the deck has 1 error; no waves were computed\n")
+
+
+def test_of_a_deck_with_several_problems_the_first_is_taken(tmp_path: Path) -> None:
+    deck = tmp_path / "two.inp"
+    thick = DATA_CARDS.replace(".106", ".212").replace("0.053", "0.106")
+    deck.write_text(small(stop=False) + small(data=thick))
+    done = call("waves", "fronts", deck, "--time", "0")
+    assert float(rows(done)[0]["x"]) == pytest.approx(0.106)
+    assert "has 2 problems; the first one's laminate is taken" in done.stderr
+
+
+def test_options_make_the_laminate_of_their_plies() -> None:
+    made, names = laminate_of_options("0/30/70", 0.1, "1.5,.3,20,1.5,.9,.8,.5", None, "m-N-s")
+    assert names == {"length": "m", "force": "N", "time": "s"}
+    assert made.thickness == pytest.approx(0.3)
+    assert made.is_coupled
+    assert made.shear[0, 0] == pytest.approx(
+        general_plate().shear[0, 0] + 0.05 * (0.8 * 0.75 + 0.5 * 0.25)
+        - 0.05 * (0.8 * np.cos(np.deg2rad(70)) ** 2 + 0.5 * np.sin(np.deg2rad(70)) ** 2)
+    )  # fmt: skip
+    with pytest.raises(OptionError, match="positive --ply-thickness, not -1"):
+        laminate_of_options("0", -1.0, None, "report", None)
