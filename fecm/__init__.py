@@ -19,8 +19,22 @@ if TYPE_CHECKING:
     from fecm.deck.reader import read_deck
     from fecm.dynamics import DivergenceError
     from fecm.results.result import Result, load
+    from fecm.sweeps.api import sweep
+    from fecm.sweeps.result import SweepResult
+    from fecm.sweeps.result import load as load_sweep
 
-__all__ = ["DeckError", "DivergenceError", "Result", "__version__", "load", "read_deck", "run"]
+__all__ = [
+    "DeckError",
+    "DivergenceError",
+    "Result",
+    "SweepResult",
+    "__version__",
+    "load",
+    "load_sweep",
+    "read_deck",
+    "run",
+    "sweep",
+]
 
 _HOMES = {
     "run": "fecm.api",
@@ -29,6 +43,9 @@ _HOMES = {
     "DivergenceError": "fecm.dynamics",
     "Result": "fecm.results.result",
     "load": "fecm.results.result",
+    "sweep": "fecm.sweeps.api",
+    "SweepResult": "fecm.sweeps.result",
+    "load_sweep": "fecm.sweeps.result:load",
 }
 
 
@@ -36,4 +53,5 @@ def __getattr__(name: str) -> Any:
     """Import a public name when it is first asked for, so that `import fecm` costs nothing."""
     if name not in _HOMES:
         raise AttributeError(f"module 'fecm' has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+    module, _, own = _HOMES[name].partition(":")
+    return getattr(import_module(module), own or name)

@@ -1,0 +1,229 @@
+"""``fecm sweep``."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from fecm.cli.common import (
+    DECK_PATH,
+    FILE_PATH,
+    Refused,
+    check_outputs,
+    count_errors,
+    signals,
+)
+
+if TYPE_CHECKING:
+    from fecm.check import Checked
+    from fecm.sweeps.cases import Case
+    from fecm.sweeps.outcome import Outcome
+    from fecm.sweeps.result import SweepResult
+    from fecm.sweeps.run import Task
+    from fecm.sweeps.store import Parts
+    from fecm.sweeps.tasks import Plan
+
+# Reasons of failed cases that are told one by one.
+TOLD = 5
+
+
+@click.command()
+@click.argument("deck", type=DECK_PATH)
+@click.option("--vary", "varied", multiple=True, metavar="NAME=VALUES",
+              help="FROM:TO:N or A,B,C; may be repeated, for a full grid.  Names: velocity, k, "
+                   "alpha_p, s_p, q, rod_length, rod_modulus, rod_density, rod_mass; impact_node, "
+                   "thickness, density, nu12, e1, e2, g12, g13, g23, layup, dt.")  # fmt: skip
+@click.option("--cases", "table", type=DECK_PATH, metavar="CASES.csv",
+              help="A table instead: a header of names, a row a case.")  # fmt: skip
+@click.option("-o", "--output", type=FILE_PATH, metavar="SWEEP.h5",
+              help="Result.  [default: the deck's name with -sweep.h5, in this "
+                   "folder]")  # fmt: skip
+@click.option("--history", is_flag=True, help="Also store the contact force of every step.")
+@click.option("--full", metavar="CASE,...", default="",
+              help="Also run these cases in full, into SWEEP-CASE.h5; cases count from "
+                   "0.")  # fmt: skip
+@click.option("--workers", type=click.IntRange(1, 1024), default=1, show_default=True, metavar="N",
+              help="Worker processes on this machine.")  # fmt: skip
+@click.option("--scheduler", metavar="ADDRESS",
+              help="A running Dask scheduler instead, as in tcp://host:8786.")  # fmt: skip
+@click.option("--overwrite", is_flag=True, help="Replace results that exist.")
+def sweep(
+    deck: Path,
+    varied: tuple[str, ...],
+    table: Path | None,
+    output: Path | None,
+    history: bool,
+    full: str,
+    workers: int,
+    scheduler: str | None,
+    overwrite: bool,
+) -> None:
+    """Run DECK with other values, many times.
+
+    Cases that differ in the projectile, its velocity or the indentation law alone share one run of
+    the plate.  An interrupted sweep goes on where it was when the same command is given again.
+    """
+    from fecm.sweeps.cases import CasesError
+    from fecm.sweeps.result import save
+    from fecm.sweeps.tasks import plan
+
+    path = output or Path(f"{deck.stem}-sweep.h5")
+    try:
+        cases = _cases(varied, table)
+        chosen = _chosen(full, len(cases))
+        fulls = {case: path.with_name(f"{path.stem}-{case}{path.suffix}") for case in chosen}
+        check_outputs([path, *fulls.values()], overwrite)
+        problem = _problem(deck)
+        made = plan(problem, cases, history=history)
+        result = _carry_out(problem, made, path, workers, scheduler, overwrite=overwrite)
+    except CasesError as error:
+        raise Refused(str(error)) from None
+    save(result, path)
+    _parts(made, path, restart=True).clear()
+    for line in _summary(result):
+        click.echo(line)
+    click.echo(f"  result            {path}")
+    _run_in_full(made, fulls)
+
+
+def _cases(varied: tuple[str, ...], table: Path | None) -> list[Case]:
+    from fecm.sweeps.cases import grid, parse_vary, read_cases
+
+    if bool(varied) == (table is not None):
+        raise click.UsageError("give either --vary or --cases")
+    return read_cases(table) if table is not None else grid([parse_vary(v) for v in varied])
+
+
+def _chosen(text: str, count: int) -> list[int]:
+    """Numbers of the cases that are run in full."""
+    try:
+        numbers = [int(part) for part in text.split(",") if part.strip()]
+    except ValueError:
+        raise click.UsageError(f"--full takes numbers of cases, not `{text}`") from None
+    for number in numbers:
+        if not 0 <= number < count:
+            raise click.UsageError(f"--full: there is no case {number}; there are 0 to {count - 1}")
+    return list(dict.fromkeys(numbers))
+
+
+def _problem(deck: Path) -> Checked:
+    from fecm.deck.findings import DeckError
+    from fecm.sweeps.api import problem_of
+
+    try:
+        return problem_of(deck)
+    except DeckError as error:
+        click.echo(str(error), err=True)
+        errors = [finding for finding in error.findings if finding.severity == "error"]
+        raise Refused(f"{count_errors(errors)}; nothing was run") from None
+
+
+def _parts(made: Plan, path: Path, *, restart: bool) -> Parts:
+    from fecm.sweeps.store import OtherSweepError, Parts
+
+    try:
+        return Parts(path, made.fingerprint(), restart=restart)
+    except OtherSweepError as error:
+        raise Refused(str(error)) from None
+
+
+def _carry_out(
+    problem: Checked,
+    made: Plan,
+    path: Path,
+    workers: int,
+    scheduler: str | None,
+    *,
+    overwrite: bool,
+) -> SweepResult:
+    """Run the plan with a progress bar; what is finished survives whatever happens."""
+    from fecm.sweeps.api import carry_out
+    from fecm.sweeps.schedule import SchedulerError
+
+    parts = _parts(made, path, restart=overwrite)
+    try:
+        with signals.deferred(), _progress(len(made.cases)) as done:
+            return carry_out(
+                problem, made, workers=workers, scheduler=scheduler, parts=parts, done=done,
+                idle=signals.heed,
+            )  # fmt: skip
+    except SchedulerError as error:
+        parts.clear()
+        raise Refused(str(error)) from None
+    except (KeyboardInterrupt, SystemExit):
+        click.echo("fecm: the same command goes on where this sweep was", err=True)
+        raise
+
+
+@contextlib.contextmanager
+def _progress(count: int) -> Iterator[Callable[[Task, Outcome], None]]:
+    """Show cases done, their rate and the time left, where standard error is a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda task, outcome: None
+        return
+    begin, finished = time.monotonic(), 0
+
+    def rate(_: object) -> str:
+        seconds = time.monotonic() - begin
+        return f"{finished} cases, {finished / seconds:.3g} a second" if seconds else ""
+
+    with click.progressbar(
+        length=count, label="fecm", file=sys.stderr, show_eta=True, item_show_func=rate
+    ) as bar:
+
+        def done(task: Task, outcome: Outcome) -> None:
+            nonlocal finished
+            finished += len(task.numbers)
+            bar.update(len(task.numbers), finished)
+
+        yield done
+
+
+def _summary(result: SweepResult) -> list[str]:
+    """What came out, for a person."""
+    fine = result.fine
+    lines = [result.title or "sweep", f"  cases             {len(result)}"]
+    if fine.any():
+        force = result["peak_force"]
+        for word, row in (("smallest", "argmin"), ("largest", "argmax")):
+            rows = fine.nonzero()[0]
+            case = int(rows[getattr(force[rows], row)()])
+            values = ", ".join(f"{name} {values[case]}" for name, values in result.cases.items())
+            unit = result.unit("peak_force")
+            lines.append(
+                f"  {word + ' peak':17} {force[case]:.6g} {unit}".rstrip() + f" ({values})"
+            )
+    reasons = Counter(result["status"][~fine].tolist())
+    for reason, times in reasons.most_common(TOLD):
+        lines.append(f"  failed            {times}: {reason}")
+    if len(reasons) > TOLD:
+        lines.append(f"  failed            for {len(reasons) - TOLD} other reasons")
+    return lines
+
+
+def _run_in_full(made: Plan, fulls: dict[int, Path]) -> None:
+    """Run chosen cases with everything that their deck stores."""
+    from fecm.api import prepare
+    from fecm.results import hdf5
+    from fecm.simulation import simulate
+    from fecm.sweeps.cases import CasesError
+    from fecm.sweeps.variations import varied
+
+    for case, path in fulls.items():
+        try:
+            prepared = prepare(varied(made.deck, made.cases[case]))
+            if errors := prepared.errors(force=True):
+                raise CasesError(errors[0].message)
+            with hdf5.writing(path) as sink:
+                simulate(prepared.problems[0], (), sink)
+        except (CasesError, ArithmeticError) as error:
+            click.echo(f"fecm: note: case {case} was not run in full: {error}", err=True)
+            continue
+        click.echo(f"  case {case:<12} {path}")

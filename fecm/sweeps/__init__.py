@@ -1,0 +1,1 @@
+"""Many impacts of one deck, varied."""

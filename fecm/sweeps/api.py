@@ -1,0 +1,162 @@
+"""Sweeps in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from fecm.api import prepare
+from fecm.check import Checked
+from fecm.deck.findings import DeckError
+from fecm.deck.model import Deck
+from fecm.sweeps.cases import Case, CasesError, checked, grid
+from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.result import SweepResult, result_of, save
+from fecm.sweeps.run import Task, joined
+from fecm.sweeps.schedule import Done, Idle, here, on_dask, on_workers
+from fecm.sweeps.store import Parts
+from fecm.sweeps.tasks import Plan, plan, tasks
+
+
+def problem_of(deck: str | Path | Deck) -> Checked:
+    """The one problem of a deck, checked.
+
+    Raises
+    ------
+    DeckError
+        If the deck has errors.
+    CasesError
+        If it holds several problems.
+    """
+    prepared = prepare(deck)
+    if prepared.errors(force=True):
+        raise DeckError(prepared.findings, prepared.source)
+    if len(prepared.problems) != 1:
+        raise CasesError(f"{prepared.source} holds {len(prepared.problems)} problems; sweep one")
+    return prepared.problems[0]
+
+
+def carry_out(
+    problem: Checked,
+    made: Plan,
+    *,
+    workers: int = 1,
+    scheduler: str | None = None,
+    parts: Parts | None = None,
+    done: Done = lambda task, outcome: None,
+    idle: Idle = lambda: None,
+) -> SweepResult:
+    """Run a plan.
+
+    Parameters
+    ----------
+    problem : Checked
+        The deck that is varied.
+    made : Plan
+    workers : int
+        Worker processes on this machine; 1 runs everything in this process.
+    scheduler : str, optional
+        Address of a Dask scheduler, whose workers run everything instead.
+    parts : Parts, optional
+        What was finished before, and where to keep what is.
+    done : callable
+        Told of each task as it is finished, and of those that were before.
+    idle : callable
+        Called now and then.
+    """
+    outcomes: list[Outcome] = []
+    left: list[Task] = []
+    for task in tasks(problem, made):
+        before = None if parts is None else parts.get(task)
+        if before is None:
+            left.append(task)
+        else:
+            outcomes.append(before)
+            done(task, before)
+
+    def keep(task: Task, outcome: Outcome) -> None:
+        if parts is not None:
+            parts.put(task, outcome)
+        outcomes.append(outcome)
+        done(task, outcome)
+
+    if scheduler is not None:
+        on_dask(left, scheduler, keep, idle)
+    elif workers > 1 and len(left) > 1:
+        on_workers(left, workers, keep, idle)
+    else:
+        here(left, keep, idle)
+    outcome = joined(outcomes)
+    if not made.history:
+        outcome.force = None
+    return result_of(made, outcome)
+
+
+def sweep(
+    deck: str | Path | Deck,
+    vary: Mapping[str, Sequence[Any]] | None = None,
+    cases: Iterable[Mapping[str, Any]] | None = None,
+    *,
+    history: bool = False,
+    workers: int = 1,
+    scheduler: str | None = None,
+    output: str | Path | None = None,
+) -> SweepResult:
+    """Run a deck with other values, many times.
+
+    Parameters
+    ----------
+    deck : str, Path or Deck
+        A deck of one problem.
+    vary : mapping of str to sequence
+        Values by name; every combination is run.
+    cases : iterable of mapping, optional
+        One mapping a case instead.
+    history : bool
+        Keep the contact force of every step.
+    workers : int
+        Worker processes on this machine. Where it is above 1 a script needs the usual
+        ``if __name__ == "__main__"``.
+    scheduler : str, optional
+        Address of a Dask scheduler (needs dask.distributed).
+    output : str or Path, optional
+        File to write, in place of an earlier one.
+
+    Returns
+    -------
+    SweepResult
+
+    Raises
+    ------
+    CasesError
+        If the cases can't be meant.
+    DeckError
+        If the deck has errors.
+    SchedulerError
+        If the scheduler can't be used.
+    OSError
+        If a file can't be read or written.
+
+    Examples
+    --------
+    >>> found = sweep("decks/appendix.inp", {"velocity": [50.0, 100.0]})
+    >>> [f"{force:.3f}" for force in found["peak_force"]]
+    ['1.820', '5.044']
+    """
+    if (vary is None) == (cases is None):
+        raise CasesError("give either vary or cases")
+    made: list[Case]
+    if vary is not None:
+        values = [(name, [case[name] for case in checked({name: v} for v in vary[name])])
+                  for name in vary]  # fmt: skip
+        made = grid(values)
+    else:
+        made = checked(cases or ())
+    problem = problem_of(deck)
+    result = carry_out(
+        problem, plan(problem, made, history=history), workers=workers, scheduler=scheduler
+    )
+    if output is not None:
+        save(result, Path(output))
+    return result

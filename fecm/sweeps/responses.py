@@ -1,0 +1,185 @@
+"""Responses to a unit force in the first step, and what a history of forces makes of them.
+
+The plate is linear and feels the projectile at one unknown, so that its displacement there is the
+sum of its impulse responses, step by step and exactly: w_n = sum over m < n of g_(n-m) F_m.  A rod
+is linear too: its tip's acceleration is such a sum of the forces on the tip.  All sums are taken
+block by block: what earlier blocks contribute is a matrix product, what the block's own steps do is
+added as they come.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.dynamics import PlateMotion, PointForce
+from fecm.projectile import CollocationStep, RodState
+
+Floats = NDArray[np.float64]
+
+# Steps of a block, and steps and cases of a matrix product with those before it: so few that BLAS
+# uses one thread.
+BLOCK = 64
+
+
+def plate_response(motion: PlateMotion, row: int, dt: float, steps: int) -> Floats:
+    """Displacement of one unknown after 1 to `steps` steps, the first under a unit force on it.
+
+    Parameters
+    ----------
+    motion : PlateMotion
+        A plate without nodal loads.
+    row : int
+        Place of the unknown among those that move.
+    dt : float
+        Time step.
+    steps : int
+
+    Returns
+    -------
+    ndarray (steps,)
+        Length per force.
+    """
+    state = motion.start()
+    response = np.empty(steps)
+    for step in range(steps):
+        motion.advance(state, dt, 0.0, PointForce(row, 1.0) if step == 0 else None)
+        response[step] = state.extended[row]
+    return response
+
+
+def tip_response(step: CollocationStep, steps: int) -> Floats:
+    """Acceleration of a projectile's tip after 1 to `steps` steps, the first under a unit force.
+
+    Returns
+    -------
+    ndarray (steps,)
+        1/mass.
+    """
+    state = step.advance(RodState(np.zeros((3, step.n))), 1.0)
+    response = np.empty(steps)
+    response[0] = state.acceleration[0]
+    for number in range(1, steps):
+        state = step.advance(state)
+        response[number] = state.acceleration[0]
+    return response
+
+
+class Convolution:
+    """Sums x_n = sum over m < n of r_(n-m) f_m of many cases, of which each f_n may need x_n.
+
+    Parameters
+    ----------
+    response : ndarray (steps,) or (steps, kinds)
+        r_1, r_2, ...; of each kind.
+    kinds : ndarray (cases,) of int
+        Which response each case has; its cases stand side by side.
+    """
+
+    def __init__(self, responses: Floats, kinds: NDArray[np.intp]) -> None:
+        self._responses = responses.reshape(len(responses), -1)
+        self._kinds = kinds
+        self._cuts = [
+            (kind, slice(int(rows[0]), int(rows[-1]) + 1))
+            for kind in np.unique(kinds)
+            for rows in [np.flatnonzero(kinds == kind)]
+        ]
+        steps, cases = len(responses), len(kinds)
+        self._given = np.zeros((steps + 1, cases))
+        self._block = np.zeros((BLOCK, cases))
+        # r_1 to r_BLOCK of each case, for what the block's own steps add.
+        self._near = np.zeros((BLOCK, cases))
+        self._near[:steps] = self._responses[:BLOCK, kinds]
+        self._step = 0
+
+    def next(self) -> Floats:
+        """x_n of the next step n = 1, 2, ..., (cases,)."""
+        row = self._step % BLOCK
+        self._step += 1
+        if row == 0:
+            self._begin_block()
+        return np.asarray(self._block[row])
+
+    def give(self, values: Floats) -> None:
+        """Give f_n of the step that :meth:`next` was called for last; f_0 before the first."""
+        self._given[self._step] = values
+        row = self._step % BLOCK  # of the next step's x in its block
+        left = BLOCK - row
+        if row:
+            self._block[row:] += self._near[:left] * values
+
+    def _begin_block(self) -> None:
+        """What all steps before the block contribute to each of its steps."""
+        known = self._step  # f_0 to f_(known - 1)
+        rows = min(BLOCK, len(self._responses) - self._step + 1)
+        for kind, cases in self._cuts:
+            # Entry (i, m): r_(known + i - m), with r_1 first in memory.
+            windows = np.lib.stride_tricks.sliding_window_view(self._responses[:, kind], known)
+            table = windows[:rows, ::-1]
+            self._block[:rows, cases] = 0.0
+            for start in range(0, known, BLOCK):
+                part = slice(start, min(start + BLOCK, known))
+                factors = np.ascontiguousarray(table[:, part])
+                for first in range(cases.start, cases.stop, BLOCK):
+                    some = slice(first, min(first + BLOCK, cases.stop))
+                    self._block[:rows, some] += factors @ self._given[part, some]
+
+
+@dataclass(slots=True)
+class TipState:
+    """Motion of the projectiles' tips, one a case.
+
+    Attributes
+    ----------
+    tip, velocity, acceleration : ndarray (cases,)
+    """
+
+    tip: Floats
+    velocity: Floats
+    acceleration: Floats
+
+
+class TipSteps:
+    """Steps of many projectiles, of which only the tips' motion is followed.
+
+    Parameters
+    ----------
+    steps : sequence of CollocationStep
+        One a kind of projectile, of the same time step and method.
+    kinds : ndarray (cases,) of int
+        The kind of each case; cases of a kind stand side by side.
+    count : int
+        Number of time steps.
+    """
+
+    def __init__(
+        self, steps: Sequence[CollocationStep], kinds: NDArray[np.intp], count: int
+    ) -> None:
+        first = steps[0]
+        self.theta, self.weight, self.dt = first.theta, first.weight, first.dt
+        self._begin = first.weights[0]
+        self.gain: Floats = np.array([step.gain for step in steps])[kinds]
+        # r_1 = gain comes with the force itself; the sum of earlier forces begins with r_2.
+        responses = np.column_stack([tip_response(step, count + 1)[1:] for step in steps])
+        self._carried = Convolution(responses, kinds)
+
+    def begin(self, state: TipState) -> tuple[Floats, Floats, Floats, Floats]:
+        """Free acceleration (twice), drift, and acceleration so far."""
+        base = self._carried.next()
+        drift = state.tip + self.dt * state.velocity + self._begin * state.acceleration
+        return base, base, drift, state.acceleration
+
+    def end(self, state: TipState, motion: Floats, force: Any) -> TipState:
+        """State after a step under forces at t + theta dt."""
+        acceleration = motion + self.gain * force
+        self._carried.give(force)
+        tip = state.tip + self.dt * state.velocity + self._begin * state.acceleration
+        return TipState(
+            tip + self.weight * acceleration,
+            state.velocity + self.dt / 2.0 * (state.acceleration + acceleration),
+            acceleration,
+        )

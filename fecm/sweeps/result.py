@@ -1,0 +1,192 @@
+"""A sweep's result: values and numbers of every case, in memory or in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.results.schema import FORMAT_VERSION, SWEEP, Dataset
+from fecm.sweeps.outcome import FINE, SUMMARY, Outcome
+from fecm.sweeps.tasks import Plan
+from fecm.units import unit_names, unit_of
+from fecm.version import __version__
+
+if TYPE_CHECKING:
+    import pandas
+
+Array = NDArray[Any]
+
+# Physical dimension of what varies.
+DIMENSIONS = {
+    "velocity": "length/time", "k": "force/length^1.5", "alpha_p": "length",
+    "rod_length": "length", "rod_modulus": "force/length^2",
+    "rod_density": "force*time^2/length^4", "rod_mass": "force*time^2/length",
+    "thickness": "length", "density": "force*time^2/length^4", "dt": "time",
+    **dict.fromkeys(("e1", "e2", "g12", "g13", "g23"), "force/length^2"),
+}  # fmt: skip
+
+
+@dataclass
+class SweepResult:
+    """What a sweep gave.
+
+    Attributes
+    ----------
+    cases : dict of ndarray (n,)
+        Values of every case, by name.
+    summary : dict of ndarray (n,)
+        Numbers of every case, and ``status``: ``"ok"``, or why a case failed.
+    dt, steps : ndarray (n,)
+        Time step and number of steps of every case.
+    force : ndarray (n, steps) or None
+        Contact force after every step, NaN beyond a case's steps; None unless asked for.
+    deck : str
+        The deck that was varied.
+    title : str
+        Its title.
+    units : dict
+        Names of its units; empty where it gives none.
+    """
+
+    cases: dict[str, Array]
+    summary: dict[str, Array]
+    dt: Array
+    steps: Array
+    force: Array | None = None
+    deck: str = ""
+    title: str = ""
+    units: dict[str, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.dt)
+
+    def __getitem__(self, name: str) -> Array:
+        """Values or numbers of every case, by name."""
+        return self.cases[name] if name in self.cases else self.summary[name]
+
+    @property
+    def fine(self) -> NDArray[np.bool_]:
+        """Which cases were run."""
+        return np.asarray(self.summary["status"] == FINE)
+
+    def unit(self, name: str) -> str:
+        """Unit of a value or a number, as the deck names it; empty where it has none."""
+        dimension = SUMMARY[name][1] if name in SUMMARY else DIMENSIONS.get(name, "")
+        return unit_of(dimension, self.units)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Values and numbers as a table, a row a case (needs pandas)."""
+        import pandas
+
+        table = pandas.DataFrame({**self.cases, **self.summary})
+        table.index.name = "case"
+        return table
+
+
+def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
+    """Put a plan and its outcome together."""
+    names = list(plan.cases[0])
+    cases = {name: np.array([case[name] for case in plan.cases]) for name in names}
+    summary: dict[str, Array] = dict(outcome.summary)
+    summary["status"] = np.array(outcome.status)
+    deck = plan.deck
+    return SweepResult(
+        cases, summary, outcome.dt, outcome.steps, outcome.force,
+        deck.text or deck.to_text(), deck.title, unit_names(deck),
+    )  # fmt: skip
+
+
+def save(result: SweepResult, path: Path) -> None:
+    """Write a sweep's result.
+
+    Raises
+    ------
+    ResultWriteError
+        If the file can't be written; what stood under the name is then untouched.
+    """
+    from fecm.results import hdf5
+
+    count = len(result)
+    with hdf5.writing(path) as sink:
+        sink.attributes(
+            "",
+            {
+                "format": SWEEP,
+                "format_version": FORMAT_VERSION,
+                "fecm_version": __version__,
+                "title": result.title,
+                **{f"unit_{name}": unit for name, unit in result.units.items()},
+            },
+        )
+        sink.text("deck", result.deck, "the cards of the deck that was varied")
+
+        def store(path: str, values: Array, text: str, dimension: str = "") -> None:
+            if values.dtype.kind in "US":
+                sink.texts(path, values.tolist(), text)
+                return
+            dtype = "i8" if values.dtype.kind in "iu" else "f8"
+            dataset = Dataset(path, ("cases",), text, dimension, dtype)
+            sink.create(dataset, values.shape)
+            sink.write(path, 0, values)
+
+        for name, values in result.cases.items():
+            dimension = DIMENSIONS.get(name, "")
+            store(f"cases/{name}", values, f"{name} of every case", dimension)
+        for name, (text, dimension) in SUMMARY.items():
+            store(f"summary/{name}", result.summary[name], text, dimension)
+        store("summary/status", result.summary["status"], "ok, or why the case failed")
+        store("history/dt", result.dt, "time step of every case", "time")
+        store("history/steps", result.steps, "number of steps of every case")
+        if result.force is not None and count:
+            store("history/force", result.force, "contact force after every step", "force")
+
+
+def load(path: Path) -> SweepResult:
+    """Read a sweep's result.
+
+    Raises
+    ------
+    ResultFileError
+        If the file is none.
+    OSError
+        If it can't be opened.
+    """
+    from fecm.results import hdf5
+
+    arrays, texts, groups = hdf5.read(path, SWEEP)
+    return _from(arrays, texts, groups, path)
+
+
+def _from(
+    arrays: Mapping[str, Array],
+    texts: Mapping[str, Any],
+    groups: Mapping[str, Mapping[str, Any]],
+    path: Path,
+) -> SweepResult:
+    from fecm.results.schema import ResultFileError, declared_units
+
+    def group(prefix: str) -> dict[str, Array]:
+        found = {p.removeprefix(prefix): arrays[p] for p in arrays if p.startswith(prefix)}
+        found |= {
+            p.removeprefix(prefix): np.array(value)
+            for p, value in texts.items()
+            if p.startswith(prefix) and isinstance(value, list)
+        }
+        return found
+
+    cases, summary = group("cases/"), group("summary/")
+    missing = [name for name in (*SUMMARY, "status") if name not in summary]
+    lengths = {len(values) for values in (*cases.values(), *summary.values())}
+    if missing or len(lengths) > 1 or "history/dt" not in arrays or "history/steps" not in arrays:
+        raise ResultFileError(f"{path}: this result of a sweep is not whole")
+    root = groups[""]
+    return SweepResult(
+        cases, summary, arrays["history/dt"], arrays["history/steps"],
+        arrays.get("history/force", None),
+        str(texts.get("deck", "")), str(root.get("title", "")), declared_units(root),
+    )  # fmt: skip

@@ -1,0 +1,103 @@
+"""Who runs the tasks: this process, worker processes on this machine, or a Dask cluster.
+
+Tasks are independent and their outcome does not depend on who runs them.  Each is told of as soon
+as it is done, so that an interrupted sweep has lost no more than what was under way.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any
+
+from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.run import Task, run
+
+Done = Callable[[Task, Outcome], None]
+# Given now and then while others work, so that a signal can be heeded.
+Idle = Callable[[], None]
+
+# Times that workers may die without a task being finished, before what is left counts as lost.
+DEATHS = 3
+# Seconds between two looks at what else there is.
+LOOK = 0.5
+LOST = "the worker that ran this case died, again and again"
+
+
+class SchedulerError(RuntimeError):
+    """A scheduler can't be used."""
+
+
+def attempt(task: Task) -> Outcome:
+    """Run a task; whatever goes wrong in it is its cases' reason."""
+    try:
+        return run(task)
+    except Exception as error:  # a case that fails is a row, not the end of the sweep
+        reason = f"{type(error).__name__}: {error}"
+        return Outcome.failed(list(task.numbers), [reason] * len(task.numbers))
+
+
+def here(tasks: Sequence[Task], done: Done, idle: Idle) -> None:
+    """Run tasks one after the other."""
+    for task in tasks:
+        idle()
+        done(task, attempt(task))
+
+
+def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> None:
+    """Run tasks in worker processes; those of a worker that died are run again."""
+    left = {task.number: task for task in tasks}
+    deaths = 0
+    while left and deaths < DEATHS:
+        before = len(left)
+        pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"))
+        try:
+            running: dict[Future[Outcome], Task] = {
+                pool.submit(attempt, task): task for task in left.values()
+            }
+            while running:
+                idle()
+                finished, _ = wait(running, timeout=LOOK, return_when=FIRST_COMPLETED)
+                for future in finished:
+                    task = running.pop(future)
+                    done(task, future.result())
+                    del left[task.number]
+        except BrokenProcessPool:
+            deaths = 0 if len(left) < before else deaths + 1
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+    for task in left.values():
+        done(task, Outcome.failed(list(task.numbers), [LOST] * len(task.numbers)))
+
+
+def on_dask(tasks: Sequence[Task], address: str, done: Done, idle: Idle) -> None:
+    """Run tasks on a Dask cluster, which runs those of a dead worker again.
+
+    Raises
+    ------
+    SchedulerError
+        If dask.distributed is missing, or nothing answers at the address.
+    """
+    try:
+        import distributed
+    except ImportError:
+        raise SchedulerError(
+            "--scheduler needs dask.distributed: pip install 'fecm[sweep]'"
+        ) from None
+    try:
+        module: Any = distributed
+        client = module.Client(address, timeout="10s", set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise SchedulerError(f"no Dask scheduler answers at {address} ({error})") from None
+    with client:
+        futures = {client.submit(attempt, task, pure=False): task for task in tasks}
+        for future in module.as_completed(futures):
+            idle()
+            task = futures[future]
+            if future.status == "finished":
+                done(task, future.result())
+            else:
+                reason = f"{LOST} ({type(future.exception()).__name__})"
+                done(task, Outcome.failed(list(task.numbers), [reason] * len(task.numbers)))

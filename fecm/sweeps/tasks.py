@@ -1,0 +1,72 @@
+"""The work of a sweep: its cases in groups that can be run apart from one another."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fecm.check import Checked
+from fecm.deck.model import Deck
+from fecm.sweeps.cases import PLATE, Case, CasesError
+from fecm.sweeps.run import Task, shares_plate
+from fecm.version import __version__
+
+# Cases that are advanced together; fixed, as sums depend on it in their last digit.
+TOGETHER = 1024
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a sweep does.
+
+    Attributes
+    ----------
+    deck : Deck
+        What is varied.
+    cases : tuple of dict
+        Values of every case.
+    history : bool
+        Whether forces are stored.
+    """
+
+    deck: Deck
+    cases: tuple[Case, ...]
+    history: bool = False
+
+    def fingerprint(self) -> str:
+        """What tells this sweep from another one."""
+        parts = [__version__, self.deck.to_text(), self.cases, self.history, TOGETHER]
+        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def plan(checked: Checked, cases: Sequence[Case], *, history: bool = False) -> Plan:
+    """Make the plan of a sweep.
+
+    Raises
+    ------
+    CasesError
+        If the deck has no impact, or there are no cases.
+    """
+    if not any(macro.word == "RODP" for macro in checked.deck.macros):
+        raise CasesError("the deck takes no impact step (RODP): there is nothing to sweep")
+    if not cases:
+        raise CasesError("there are no cases")
+    return Plan(checked.deck, tuple(cases), history)
+
+
+def tasks(checked: Checked, made: Plan) -> list[Task]:
+    """Cut a plan into tasks: cases that share a plate together, whole runs one by one."""
+    together = TOGETHER if shares_plate(checked) else 1
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for number, case in enumerate(made.cases):
+        key = tuple(case[name] for name in PLATE if name in case)
+        groups.setdefault(key, []).append(number)
+    cut: list[Task] = []
+    for numbers in groups.values():
+        for start in range(0, len(numbers), together):
+            some = tuple(numbers[start : start + together])
+            cases = tuple(made.cases[n] for n in some)
+            cut.append(Task(len(cut), made.deck, some, cases, made.history))
+    return cut

@@ -1,0 +1,137 @@
+"""A deck with the values of a case in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from fecm.authoring.layup import LayupError, parse_layup
+from fecm.deck.model import Deck, Impact, Indentation, Material, Projectile, Segment
+from fecm.deck.records import Layer, Ply, RodDiameter
+from fecm.parts import build_projectile
+from fecm.projectile import RigidMass
+from fecm.sweeps.cases import NAMES, Case, CasesError, Value
+
+# Fields of a ply's card by their names in a sweep.
+PLY = ("density", "nu12", "e1", "e2", "g12", "g13", "g23")
+
+
+def varied(deck: Deck, case: Case) -> Deck:
+    """Put a case's values into a deck.
+
+    A layup takes the deck's ply thickness, so that more plies make a thicker plate; a thickness
+    scales every layer.  A mass scales a rod's density.
+
+    Raises
+    ------
+    CasesError
+        If a value can't be used with this deck.
+    """
+    if "rod_mass" in case and "rod_density" in case:
+        raise CasesError("rod_mass and rod_density are two ways to say the same")
+    made = deck
+    # The layup before the whole laminate's thickness, the mass behind what else the rod is made of.
+    for name in sorted(case, key=lambda name: (name != "layup", NAMES.index(name))):
+        made = _SETTERS[name](made, name, case[name])
+    return replace(made, text="")
+
+
+def _swap(deck: Deck, old: Segment, new: Segment) -> Deck:
+    segments = tuple(new if segment is old else segment for segment in deck.segments)
+    return replace(deck, segments=segments)
+
+
+def _impact(deck: Deck, name: str, value: Value) -> Deck:
+    old = deck.need(Impact)
+    new = (
+        replace(old, velocity=float(value), source=None)
+        if name == "velocity"
+        else replace(old, node=int(value), source=None)
+    )
+    return _swap(deck, old, new)
+
+
+def _law(deck: Deck, name: str, value: Value) -> Deck:
+    old = deck.need(Indentation)
+    changed: dict[str, Any] = {name: float(value), "source": None}
+    return _swap(deck, old, replace(old, **changed))
+
+
+def _rod(deck: Deck, name: str, value: Value) -> Deck:
+    """Change the projectile, which a deck without one gets as a segment."""
+    rod, old = build_projectile(deck), deck.last(Projectile)
+    number = float(value)
+    if isinstance(rod, RigidMass):
+        if name != "rod_mass":
+            raise CasesError(f"{name}: the deck's projectile is a rigid mass")
+        new = Projectile(0, 0, number)
+    else:
+        diameters = tuple(RodDiameter(n, 0, d) for n, d in enumerate(rod.diameters, start=1))
+        transducer = 0 if old is None else old.transducer
+        new = Projectile(rod.elements, transducer, rod.length, rod.modulus, rod.density, diameters)
+        if name == "rod_length":
+            new = replace(new, size=number)
+        elif name == "rod_modulus":
+            new = replace(new, modulus=number)
+        elif name == "rod_density":
+            new = replace(new, density=number)
+        else:
+            new = replace(new, density=rod.density * number / rod.total_mass)
+    if old is None:
+        return replace(deck, segments=(*deck.segments, new))
+    return _swap(deck, old, new)
+
+
+def _ply(deck: Deck, name: str, value: Value) -> Deck:
+    old = deck.need(Material)
+    ply: Ply = replace(old.ply, **{name: float(value)}, source=None)
+    return _swap(deck, old, replace(old, ply=ply))
+
+
+def _thickness(deck: Deck, name: str, value: Value) -> Deck:
+    old = deck.need(Material)
+    total = float(value)
+    factor = total / sum(layer.thickness for layer in old.layers)
+    layers = tuple(
+        replace(layer, thickness=layer.thickness * factor, source=None) for layer in old.layers
+    )
+    integration = replace(old.integration, thickness=total, source=None)
+    return _swap(deck, old, replace(old, integration=integration, layers=layers))
+
+
+def _layup(deck: Deck, name: str, value: Value) -> Deck:
+    old = deck.need(Material)
+    thicknesses = {layer.thickness for layer in old.layers}
+    if len(thicknesses) > 1:
+        raise CasesError("layup: the deck's plies differ in thickness")
+    (ply,) = thicknesses
+    try:
+        angles = parse_layup(str(value))
+    except LayupError as error:
+        raise CasesError(f"layup: {error}") from None
+    layers = tuple(Layer(n, angle, ply) for n, angle in enumerate(angles, start=1))
+    integration = replace(old.integration, thickness=len(angles) * ply, source=None)
+    control = replace(deck.control, layers=len(layers), source=None)
+    made = _swap(deck, old, replace(old, integration=integration, layers=layers))
+    return replace(made, control=control)
+
+
+def _dt(deck: Deck, name: str, value: Value) -> Deck:
+    """Change every time step; the program keeps its number of steps."""
+    macros = tuple(
+        replace(m, value=float(value), source=None) if m.word == "DT" else m for m in deck.macros
+    )
+    return replace(deck, macros=macros)
+
+
+_SETTERS: dict[str, Callable[[Deck, str, Value], Deck]] = {
+    "velocity": _impact,
+    "impact_node": _impact,
+    **dict.fromkeys(("k", "alpha_p", "s_p", "q"), _law),
+    **dict.fromkeys(("rod_length", "rod_modulus", "rod_density", "rod_mass"), _rod),
+    **dict.fromkeys(PLY, _ply),
+    "thickness": _thickness,
+    "layup": _layup,
+    "dt": _dt,
+}
