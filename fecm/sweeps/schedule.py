@@ -88,12 +88,12 @@ def on_dask(tasks: Sequence[Task], address: str, done: Done, idle: Idle) -> None
         ) from None
     try:
         module: Any = distributed
-        client = module.Client(address, timeout="10s", set_as_default=False)
+        client = module.Client(address, timeout="5s", set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise SchedulerError(f"no Dask scheduler answers at {address} ({error})") from None
     with client:
         futures = {client.submit(attempt, task, pure=False): task for task in tasks}
-        for future in module.as_completed(futures):
+        for future in module.as_completed(futures, loop=client.loop):
             idle()
             task = futures[future]
             if future.status == "finished":

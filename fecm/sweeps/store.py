@@ -68,7 +68,7 @@ class Parts:
         if not path.exists():
             return None
         try:
-            with np.load(path, allow_pickle=False) as arrays:
+            with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
                 return Outcome(
                     arrays["numbers"].tolist(),
                     {name: arrays[name] for name in SUMMARY},

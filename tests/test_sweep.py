@@ -1,0 +1,474 @@
+"""Sweeps: many impacts from one run of a plate, on any number of workers."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from numpy.typing import NDArray
+
+import fecm
+from fecm.cli import cli
+from fecm.deck import Deck
+from fecm.dynamics import PointForce
+from fecm.indentation import Constants, MemoryLaw, Point, stacked
+from fecm.mesh import generate
+from fecm.parts import build_law, build_projectile, set_up
+from fecm.sweeps.api import carry_out, problem_of
+from fecm.sweeps.cases import Case, CasesError, grid, parse_vary, read_cases
+from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.responses import Convolution, plate_response
+from fecm.sweeps.result import SweepResult
+from fecm.sweeps.run import Task, shares_plate
+from fecm.sweeps.schedule import LOST, on_workers
+from fecm.sweeps.store import OtherSweepError, Parts
+from fecm.sweeps.tasks import plan, tasks
+from fecm.sweeps.variations import varied
+from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, small
+
+Floats = NDArray[np.float64]
+
+LAYUPS = [f"[{angle}/{angle - 90}]" for angle in range(0, 80, 2)]
+STEPS = PROGRAM.replace("LOOP         10", "LOOP        400")
+CLAMPED = MESH.replace("    1    1   -1   -1    0    0    0", "    1    1    1    1    1    1    1")
+
+
+def model(text: str | Path) -> Deck:
+    """Model of a deck of one problem."""
+    deck = fecm.read_deck(text)
+    assert isinstance(deck, Deck)
+    return deck
+
+
+def full(deck: Deck) -> fecm.Result:
+    """Full run of a deck of one problem."""
+    result = fecm.run(deck)
+    assert isinstance(result, fecm.Result)
+    return result
+
+
+def assert_same(a: SweepResult, b: SweepResult) -> None:
+    """Two sweeps are the same to the last bit."""
+    for name in a.summary:
+        np.testing.assert_array_equal(a[name], b[name])
+    if a.force is not None or b.force is not None:
+        assert a.force is not None
+        assert b.force is not None
+        np.testing.assert_array_equal(a.force, b.force)
+
+
+# The identity ------------------------------------------------------------------------------------
+
+
+def test_a_plates_displacement_is_the_sum_of_its_impulse_responses() -> None:
+    # An unsymmetric laminate, clamped on one corner only, hit beside its middle.
+    data = DATA_CARDS.replace("    2  90. ", "    2  30. ").replace("   13    3", "    8    3")
+    corner = MESH[: MESH.index("BOUN")] + "BOUN\n    1    0    1    1    1    1    1\n\n"
+    deck = model(small(mesh=corner, data=data))
+    motion = set_up(deck, generate(deck), frozenset(), moves_only=True).motion
+    row, dt, steps = motion.row(7, 2), 2e-7, 300
+    force = np.random.default_rng(5).standard_normal(steps)
+    state, direct = motion.start(), np.empty(steps)
+    for step in range(steps):
+        motion.advance(state, dt, 0.0, PointForce(row, float(force[step])))
+        direct[step] = state.displacement[row]
+    response = plate_response(motion, row, dt, steps)
+    sums = np.convolve(response, force)[:steps]
+    np.testing.assert_allclose(sums, direct, atol=1e-12 * np.abs(direct).max())
+    blocks = Convolution(response, np.zeros(1, dtype=np.intp))
+    found = np.empty(steps)
+    blocks.give(np.array([force[0]]))  # f_0 pushes in the first step
+    for step in range(steps):
+        found[step] = blocks.next()[0]
+        blocks.give(np.array([force[step + 1] if step + 1 < steps else 0.0]))
+    np.testing.assert_allclose(found, direct, atol=1e-12 * np.abs(direct).max())
+
+
+def test_the_law_of_many_cases_is_the_law_of_each() -> None:
+    random = np.random.default_rng(11)
+    measured = [
+        Constants(k, a, s, q)
+        for k, a, s, q in zip(
+            random.uniform(1e6, 3e6, 40), random.uniform(0, 1e-3, 40), random.uniform(0, 0.2, 40),
+            random.uniform(1.5, 2.5, 40), strict=True,
+        )
+    ]  # fmt: skip
+    together = MemoryLaw(stacked(measured))
+    memory, last = together.start(), Point(np.zeros(40), np.zeros(40))
+    alone = [(MemoryLaw(c), MemoryLaw(c).start(), Point(0.0, 0.0)) for c in measured]
+    a = np.zeros(40)
+    for _ in range(300):
+        a = np.maximum(a + random.normal(0.0, 2e-4, 40), -1e-4)
+        force, _ = together.trial(memory, last, a)
+        memory, last = together.accept(memory, last, a), Point(a, force)
+        for case, (law, own, point) in enumerate(alone):
+            value = float(a[case])
+            single, _ = law.trial(own, point, value)
+            assert force[case] == pytest.approx(single, rel=1e-12, abs=1e-9)
+            alone[case] = (law, law.accept(own, point, value), Point(value, single))
+    assert len(set(memory.branch.tolist())) == 3
+
+
+# Against full runs -------------------------------------------------------------------------------
+
+
+def test_cases_on_the_reports_plate_equal_their_full_runs() -> None:
+    cases: list[Case] = [
+        {"velocity": 50.0, "k": 1.0e6, "rod_mass": 1.8e-4, "s_p": 0.094, "q": 2.0},
+        {"velocity": 115.0, "k": 1.912e6, "rod_mass": 1.8e-4, "s_p": 0.05, "q": 2.5},
+        {"velocity": 150.0, "k": 2.5e6, "rod_mass": 4.0e-4, "s_p": 0.2, "q": 1.5},
+    ]
+    found = fecm.sweep(LONG, cases=cases, history=True)
+    assert found.force is not None
+    assert found["status"].tolist() == ["ok"] * 3
+    for number, case in enumerate(cases):
+        result = full(varied(model(LONG), case))
+        peak = result.force.max()
+        assert np.abs(found.force[number] - result.force).max() < 1e-9 * peak
+        assert found["peak_force"][number] == pytest.approx(peak, rel=1e-9)
+        assert found["time_of_peak"][number] == result.time[result.force.argmax()]
+        assert found["max_indentation"][number] == pytest.approx(result.indentation.max(), rel=1e-9)
+        permanent = result.history.attributes["permanent_indentation"]
+        assert found["permanent_indentation"][number] == pytest.approx(permanent, rel=1e-7)
+
+
+def test_momentum_and_energy_of_the_summary_are_those_of_the_rods_centre() -> None:
+    found = fecm.sweep(LONG, {"velocity": [115.0]})
+    result = full(model(LONG))
+    mass = build_projectile(model(LONG)).total_mass
+    # Momentum after the last contact: the rod's kinetic energy is that of its centre and of its
+    # ringing, which is the smaller part.
+    rebound = float(found["rebound_velocity"][0])
+    centre = 0.5 * mass * rebound**2
+    kinetic = float(result["energy/projectile_kinetic"][-1])
+    assert centre < kinetic < 1.02 * centre + 1e-3 * 1.1966
+    assert found["energy_absorbed"][0] == pytest.approx(0.5 * mass * 115.0**2 - centre, rel=1e-12)
+    assert found["impulse"][0] == pytest.approx(mass * (115.0 + rebound), rel=1e-12)
+    assert found["contacts"][0] == 2
+    assert found["contact_time"][0] == pytest.approx((result.force > 0.0).sum() * 2e-7, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        {"thickness": 0.08}, {"e1": 2.0e7}, {"layup": "[0/45/-45/90]"}, {"dt": 3e-7},
+        {"impact_node": 8}, {"rod_length": 2.0}, {"rod_modulus": 1.0e7}, {"rod_density": 1e-3},
+        {"nu12": 0.2}, {"density": 2e-4}, {"alpha_p": 1e-5},
+    ],
+)  # fmt: skip
+def test_whatever_varies_the_case_is_the_changed_decks_run(case: Case) -> None:
+    deck = model(small(STEPS))
+    found = fecm.sweep(deck, cases=[case], history=True)
+    assert found["status"].tolist() == ["ok"]
+    assert found.force is not None
+    result, plain = full(varied(deck, case)), full(deck)
+    difference = np.abs(found.force[0] - result.force).max()
+    assert difference < 1e-9 * result.force.max()
+    assert np.abs(result.force - plain.force).max() > 1e-4 * plain.force.max()
+
+
+def test_a_layup_keeps_the_plys_thickness_and_a_thickness_scales_all() -> None:
+    deck = model(small())
+    made = varied(deck, {"thickness": 0.3, "layup": "[0/45/90]"})
+    material = made.need(fecm.deck.model.Material)
+    assert [layer.thickness for layer in material.layers] == pytest.approx([0.1] * 3)
+    assert made.control.layers == 3
+    thin = varied(deck, {"layup": "[0/45/90]"}).need(fecm.deck.model.Material)
+    assert thin.integration.thickness == pytest.approx(3 * 0.053)
+
+
+def test_a_plate_with_other_loads_is_run_whole() -> None:
+    load = "FORC\n    8    0       0.0       0.0       1.0\n\n"
+    deck = model(small(STEPS, data=load + DATA_CARDS))
+    problem = problem_of(deck)
+    assert not shares_plate(problem)
+    found = fecm.sweep(deck, {"velocity": [50.0, 100.0]}, history=True)
+    assert found.force is not None
+    result = full(varied(deck, {"velocity": 100.0}))
+    np.testing.assert_array_equal(found.force[1], result.force)
+
+
+def test_a_case_that_fails_is_a_row_with_its_reason() -> None:
+    found = fecm.sweep(
+        model(small(STEPS)),
+        cases=[{"thickness": 0.1, "k": 1e6}, {"thickness": -1.0, "k": 1e6},
+               {"thickness": 0.1, "k": -1e6}],
+    )  # fmt: skip
+    assert found.fine.tolist() == [True, False, False]
+    assert "thick" in found["status"][1]
+    assert "contact coefficient" in found["status"][2]
+    assert np.isnan(found["peak_force"][1:]).all()
+    assert found["peak_force"][0] > 0.0
+
+
+# What varies -------------------------------------------------------------------------------------
+
+
+def test_ranges_and_lists_of_values_are_read() -> None:
+    assert parse_vary("velocity=10:20:3") == ("velocity", [10.0, 15.0, 20.0])
+    assert parse_vary("k = 1e6, 2e6") == ("k", [1e6, 2e6])
+    assert parse_vary("layup=[0/90]s,[45,-45]") == ("layup", ["[0/90]s", "[45,-45]"])
+    assert parse_vary("impact_node=3:5:3") == ("impact_node", [3, 4, 5])
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["velocity", "velocity=", "speed=1", "velocity=1:2", "velocity=1:2:0", "velocity=1:2:x",
+     "velocity=a", "velocity=nan", "velocity=1e999", "impact_node=1.5", "k=1:2:1000000000"],
+)  # fmt: skip
+def test_what_is_no_variation_is_refused(text: str) -> None:
+    with pytest.raises(CasesError):
+        parse_vary(text)
+
+
+def test_a_grid_has_every_combination_once_and_a_table_its_rows(tmp_path: Path) -> None:
+    cases = grid([("velocity", [1.0, 2.0]), ("k", [3.0, 4.0, 5.0])])
+    assert [(c["velocity"], c["k"]) for c in cases] == [
+        (v, k) for v in (1.0, 2.0) for k in (3.0, 4.0, 5.0)
+    ]
+    table = tmp_path / "cases.csv"
+    table.write_text("velocity, layup\n1, [0/90]s\n\n2, [45]\n")
+    assert read_cases(table) == [
+        {"velocity": 1.0, "layup": "[0/90]s"}, {"velocity": 2.0, "layup": "[45]"}
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "where"),
+    [("", "header"), ("velocity\n", "header"), ("velocity\n1,2\n", ":2"), ("speed\n1\n", ":1"),
+     ("velocity\nfast\n", ":2"), ("velocity,velocity\n1,2\n", ":1")],
+)  # fmt: skip
+def test_a_table_of_cases_that_can_not_be_read_says_where(
+    text: str, where: str, tmp_path: Path
+) -> None:
+    table = tmp_path / "cases.csv"
+    table.write_text(text)
+    with pytest.raises(CasesError, match=where):
+        read_cases(table)
+
+
+# Workers -----------------------------------------------------------------------------------------
+
+
+def serial() -> SweepResult:
+    """Forty layups in this process."""
+    return fecm.sweep(model(small(STEPS)), {"layup": LAYUPS}, history=True)
+
+
+def test_two_workers_give_what_one_process_does() -> None:
+    shared = fecm.sweep(model(small(STEPS)), {"layup": LAYUPS}, history=True, workers=2)
+    assert_same(shared, serial())
+    assert shared.fine.all()
+
+
+def children() -> list[int]:
+    """Processes that this one has started."""
+    found = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+    return [int(pid) for pid in found]
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs /proc")
+def test_a_worker_that_dies_costs_time_only() -> None:
+    problem = problem_of(model(small(STEPS)))
+    made = plan(problem, grid([("layup", list(LAYUPS))]), history=True)
+    killed: list[int] = []
+
+    def kill(task: Task, outcome: object) -> None:
+        if task.number == 3 and not killed:
+            killed.append(children()[-1])
+            os.kill(killed[0], signal.SIGKILL)
+
+    shared = carry_out(problem, made, workers=2, done=kill)
+    assert killed
+    assert_same(shared, serial())
+
+
+def die(task: Task) -> Outcome:
+    """End the process that runs a task."""
+    os._exit(1)
+
+
+def test_tasks_whose_workers_always_die_end_as_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = problem_of(model(small()))
+    made = plan(problem, grid([("layup", ["[0]", "[90]"])]))
+    monkeypatch.setattr("fecm.sweeps.schedule.attempt", die)
+    lost: dict[int, str] = {}
+
+    def note(task: Task, outcome: Outcome) -> None:
+        lost[task.number] = outcome.status[0]
+
+    on_workers(tasks(problem, made), 2, note, lambda: None)
+    assert lost == {0: LOST, 1: LOST}
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """Address of a Dask scheduler on loopback, and its two workers."""
+    pytest.importorskip("distributed")
+    file = tmp_path / "scheduler.json"
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with ExitStack() as stack:
+
+        def start(module: str, *options: str) -> subprocess.Popen[bytes]:
+            command = [
+                sys.executable,
+                "-m",
+                f"distributed.cli.{module}",
+                *options,
+                "--no-dashboard",
+            ]
+            process = subprocess.Popen(command, cwd=tmp_path, **quiet)  # type: ignore[call-overload]
+            stack.callback(process.wait)
+            stack.callback(process.kill)
+            assert isinstance(process, subprocess.Popen)
+            return process
+
+        start("dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file))
+        until = time.monotonic() + 30.0
+        while not file.exists() and time.monotonic() < until:
+            time.sleep(0.05)
+        address = str(json.loads(file.read_text())["address"])
+        options = ("--nworkers", "1", "--nthreads", "1", "--no-nanny", "--host", "127.0.0.1")
+        workers = [start("dask_worker", address, *options) for _ in range(2)]
+        yield address, workers
+
+
+def test_a_dask_cluster_that_loses_a_worker_gives_the_same_rows(
+    cluster: tuple[str, list[subprocess.Popen[bytes]]],
+) -> None:
+    address, workers = cluster
+    problem = problem_of(model(small(STEPS)))
+    made = plan(problem, grid([("layup", list(LAYUPS))]), history=True)
+    finished: list[int] = []
+
+    def kill(task: Task, outcome: object) -> None:
+        finished.append(task.number)
+        if len(finished) == 5:
+            workers[0].kill()
+
+    found = carry_out(problem, made, scheduler=address, done=kill)
+    assert workers[0].poll() is not None or workers[0].wait(10) is not None
+    assert sorted(finished) == list(range(40))
+    assert_same(found, serial())
+
+
+def test_a_scheduler_that_does_not_answer_is_told() -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(fecm.sweeps.schedule.SchedulerError, match="127"):
+        fecm.sweep(model(small()), {"k": [1e6]}, scheduler="tcp://127.0.0.1:9")
+
+
+# Interruption ------------------------------------------------------------------------------------
+
+
+def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
+    problem = problem_of(model(small(STEPS)))
+    made = plan(problem, grid([("layup", list(LAYUPS))]), history=True)
+    path = tmp_path / "sweep.h5"
+    begun: list[int] = []
+
+    def stop(task: Task, outcome: object) -> None:
+        begun.append(task.number)
+        if len(begun) == 15:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        carry_out(problem, made, parts=Parts(path, made.fingerprint()), done=stop)
+    again = Parts(path, made.fingerprint())
+    before = [task.number for task in tasks(problem, made) if again.get(task) is not None]
+    assert before == begun
+    # A part that is not whole is run again.
+    (again.folder / "task-000002.npz").write_bytes(b"PK\x03\x04 and no more")
+    assert_same(carry_out(problem, made, parts=again), serial())
+    with pytest.raises(OtherSweepError):
+        Parts(path, "another one")
+
+
+def test_a_sweep_that_is_interrupted_from_outside_ends_in_the_same_file(tmp_path: Path) -> None:
+    deck = tmp_path / "plate.inp"
+    deck.write_text(small(STEPS.replace("LOOP        400", "LOOP       4000")))
+    command = [sys.executable, "-m", "fecm", "sweep", "plate.inp", "--vary",
+               "layup=" + ",".join(LAYUPS[:12]), "-o", "s.h5"]  # fmt: skip
+    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE)
+    folder = tmp_path / ".s.h5.parts"
+    until = time.monotonic() + 60.0
+    while len(list(folder.glob("task-*.npz"))) < 3 and time.monotonic() < until:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert b"goes on where this sweep was" in said
+    assert not (tmp_path / "s.h5").exists()
+    assert 3 <= len(list(folder.glob("task-*.npz"))) < 12
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    assert not folder.exists()
+    subprocess.run([*command[:-1], "t.h5"], cwd=tmp_path, check=True, capture_output=True)
+    assert (tmp_path / "s.h5").read_bytes() == (tmp_path / "t.h5").read_bytes()
+
+
+# The command -------------------------------------------------------------------------------------
+
+
+def call(*arguments: object) -> Result:
+    """Run ``fecm sweep``."""
+    return CliRunner().invoke(cli, ["sweep", *map(str, arguments)])
+
+
+def test_a_result_keeps_cases_numbers_and_forces(tmp_path: Path) -> None:
+    deck, path = tmp_path / "plate.inp", tmp_path / "s.h5"
+    deck.write_text(small(STEPS, data="UNIT\nin lbf s\n" + DATA_CARDS))
+    done = call(deck, "--vary", "velocity=50,100", "--vary", "layup=[0/90],[x]", "-o", path,
+                "--history", "--full", "2")  # fmt: skip
+    assert done.exit_code == 0
+    assert "failed            2: layup" in done.stdout
+    stored = fecm.load_sweep(path)
+    assert stored.cases["velocity"].tolist() == [50.0, 50.0, 100.0, 100.0]
+    assert stored.cases["layup"].tolist() == ["[0/90]", "[x]", "[0/90]", "[x]"]
+    assert stored.fine.tolist() == [True, False, True, False]
+    assert stored.unit("peak_force") == "lbf"
+    assert stored.force is not None
+    assert stored.force.shape == (4, 400)
+    again = fecm.load(tmp_path / "s-2.h5")
+    difference = np.abs(stored.force[2] - again.force).max()
+    assert difference < 1e-9 * again.force.max()
+    assert call(deck, "--vary", "velocity=50,100", "-o", path).exit_code == 2
+    assert fecm.load_sweep(path).cases["velocity"].tolist() == [50.0, 50.0, 100.0, 100.0]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [[], ["--vary", "speed=1"], ["--vary", "k=1", "--vary", "k=2"], ["--cases", "none.csv"],
+     ["--vary", "k=1", "--full", "1"], ["--vary", "k=1", "--full", "x"],
+     ["--vary", "k=1", "-o", "no/folder.h5"], ["--vary", "k=1", "--workers", "0"]],
+)  # fmt: skip
+def test_a_call_that_can_not_be_meant_leaves_nothing_behind(
+    options: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("plate.inp").write_text(small())
+    refused = call("plate.inp", *options)
+    assert refused.exit_code == 2
+    assert refused.stdout == ""
+    assert [path.name for path in tmp_path.iterdir()] == ["plate.inp"]
+
+
+def test_a_run_and_a_sweep_are_not_taken_for_one_another(tmp_path: Path) -> None:
+    deck = tmp_path / "plate.inp"
+    deck.write_text(small())
+    call(deck, "--vary", "k=1e6", "-o", tmp_path / "s.h5")
+    with pytest.raises(ValueError, match="sweep"):
+        fecm.load(tmp_path / "s.h5")
+    fecm.run(deck, output=tmp_path / "r.h5")
+    with pytest.raises(ValueError, match="run"):
+        fecm.load_sweep(tmp_path / "r.h5")
+    assert build_law(model(deck)).constants.k == 1912000.0
