@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from fecm.check import Checked, check
 from fecm.check.run import UNSTABLE
@@ -14,7 +15,7 @@ from fecm.deck.reader import Reader, load_text
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.rod_method import LUMPED, WILSON, RodMethod
-from fecm.simulation import simulate
+from fecm.simulation import ENERGY_LIMIT, simulate
 from fecm.slips import LISTING, REPORT, active_slips
 from fecm.solvers import AUTO
 
@@ -81,6 +82,7 @@ def run(
     threads: int = 0,
     rod_mass: str = LUMPED,
     rod_integrator: str = WILSON,
+    energy_limit: float = ENERGY_LIMIT,
 ) -> Result | list[Result]:
     """Run every problem of a deck.
 
@@ -107,6 +109,8 @@ def run(
     rod_integrator : str
         The projectile's integration: ``"wilson"`` as in the report's program, or
         ``"average-acceleration"``.
+    energy_limit : float
+        Error of the energy balance, as a part of what was given, that ends a run without slips.
 
     Returns
     -------
@@ -118,7 +122,7 @@ def run(
     DeckError
         If the deck has errors.
     DivergenceError
-        If the motion grows without bound.
+        If the motion grows without bound, or the energy balance passes its limit.
     ValueError
         If the mode, a slip, the rod's mass or its integrator is unknown.
     OSError
@@ -134,11 +138,14 @@ def run(
     prepared = prepare(deck, mode)
     if prepared.errors(force):
         raise DeckError(prepared.findings, prepared.source)
+    how: dict[str, Any] = {
+        "solver": solver, "threads": threads, "rod_method": method, "energy_limit": energy_limit
+    }  # fmt: skip
     results: list[Result] = []
     for number, problem in enumerate(prepared.problems, start=1):
         if output is None:
             memory = MemorySink()
-            simulate(problem, active, memory, solver=solver, threads=threads, rod_method=method)
+            simulate(problem, active, memory, **how)
             results.append(Result(memory.arrays, memory.texts, memory.groups))
         else:
             from fecm.results import hdf5
@@ -146,7 +153,7 @@ def run(
 
             path = numbered(Path(output), number)
             with hdf5.writing(path) as sink:
-                simulate(problem, active, sink, solver=solver, threads=threads, rod_method=method)
+                simulate(problem, active, sink, **how)
             results.append(load(path))
     return results[0] if len(results) == 1 else results
 

@@ -7,6 +7,7 @@ are gone through piece by piece.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -94,6 +95,33 @@ class PlateState:
     def strain_energy(self) -> float:
         """U K u / 2 (force*length)."""
         return 0.5 * self.sums.strain
+
+    def to_arrays(self) -> dict[str, Floats]:
+        """Store the state as plain arrays, from which :meth:`from_arrays` makes it again."""
+        scalars = [self.step, self.time, self.dt, self.area, self.external_work]
+        return {
+            "plate": np.array(scalars, dtype=float),
+            "sums": np.array(self.sums),
+            "extended": self.extended.copy(),
+            "increment": self.increment.copy(),
+            "pull": self.pull.copy(),
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, Floats]) -> PlateState:
+        """Make the state again that :meth:`to_arrays` stored."""
+        step, time, dt, area, external_work = arrays["plate"].tolist()
+        return cls(
+            arrays["extended"].copy(),
+            arrays["increment"].copy(),
+            arrays["pull"].copy(),
+            int(step),
+            time,
+            dt,
+            area,
+            external_work,
+            Sums(*arrays["sums"].tolist()),
+        )
 
 
 class Sums(NamedTuple):

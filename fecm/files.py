@@ -8,6 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 
+def partial_of(path: Path) -> Path:
+    """Where this process writes a file before it gets its name."""
+    return path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
+
+
 @contextlib.contextmanager
 def beside(path: Path) -> Iterator[Path]:
     """Give the path of a partial file that takes the final name if the block ends well.
@@ -19,9 +24,29 @@ def beside(path: Path) -> Iterator[Path]:
     OSError
         If the file can't be written; what stood under the final name is then untouched.
     """
-    partial = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
+    partial = partial_of(path)
     try:
         yield partial
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def clear_stale(*paths: Path) -> None:
+    """Remove partial files that processes have left which are no more."""
+    for path in paths:
+        for partial in path.parent.glob(f".{path.stem}.*.partial{path.suffix}"):
+            process = partial.name.removeprefix(f".{path.stem}.").partition(".")[0]
+            if process.isdigit() and not _alive(int(process)):
+                partial.unlink(missing_ok=True)
+
+
+def _alive(process: int) -> bool:
+    """Whether a process is still there, as far as this one may know."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.assembly import PlateModel
-from fecm.dynamics import DivergenceError, PlateMotion, PlateState, PointForce, Sums
+from fecm.dynamics import DivergenceError, PlateMotion, PlateState, PointForce
 from fecm.indentation import Law, Memory, Number, Point
 from fecm.projectile import (
     CollocationStep,
@@ -79,49 +80,31 @@ class ImpactState(Encounter):
 
     def to_arrays(self) -> dict[str, Floats]:
         """Store the state as plain arrays, from which :meth:`from_arrays` makes it again."""
-        plate = self.plate
         scalars = [
-            plate.step, plate.time, plate.dt, plate.area, plate.external_work, self.rod.tip,
-            self.contact.indentation, self.contact.force, self.plate_w, self.contact_work,
-            self.unsettled,
+            self.rod.tip, self.contact.indentation, self.contact.force, self.plate_w,
+            self.contact_work, self.unsettled,
         ]  # fmt: skip
         memory = [getattr(self.memory, f.name) for f in dataclasses.fields(Memory)]
         return {
-            "scalars": np.array(scalars, dtype=float),
-            "sums": np.array(plate.sums),
+            "contact": np.array(scalars, dtype=float),
             "memory": np.array(memory, dtype=float),
-            "extended": plate.extended.copy(),
-            "increment": plate.increment.copy(),
-            "pull": plate.pull.copy(),
             "rod": self.rod.motion.copy(),
+            **self.plate.to_arrays(),
         }
 
     @classmethod
-    def from_arrays(cls, arrays: dict[str, Floats]) -> ImpactState:
+    def from_arrays(cls, arrays: Mapping[str, Floats]) -> ImpactState:
         """Make the state again that :meth:`to_arrays` stored."""
-        step, time, dt, area, external, tip, a, force, w, work, unsettled = arrays[
-            "scalars"
-        ].tolist()
+        tip, indentation, force, w, work, unsettled = arrays["contact"].tolist()
         branch, *curve = arrays["memory"].tolist()
-        plate = PlateState(
-            arrays["extended"].copy(),
-            arrays["increment"].copy(),
-            arrays["pull"].copy(),
-            int(step),
-            time,
-            dt,
-            area,
-            external,
-            Sums(*arrays["sums"].tolist()),
-        )
         return cls(
             RodState(arrays["rod"].copy(), tip),
             Memory(int(branch), *curve),
-            Point(a, force),
+            Point(indentation, force),
             w,
             work,
             int(unsettled),
-            plate=plate,
+            plate=PlateState.from_arrays(arrays),
         )
 
 
@@ -161,6 +144,11 @@ class Impact:
     contact : Contact
     integrator : type of CollocationStep
         The rod's.
+
+    Attributes
+    ----------
+    first_dt : float or None
+        Time step that the rod's constants are made for.
     """
 
     def __init__(
@@ -179,7 +167,7 @@ class Impact:
         self.rod_mass = rod.mass()
         self._integrator = integrator
         self._step: CollocationStep | None = None
-        self._first_dt: float | None = None
+        self.first_dt: float | None = None
 
     @property
     def plate(self) -> PlateModel:
@@ -233,9 +221,9 @@ class Impact:
     def _rod_step(self, dt: float) -> CollocationStep:
         """Give the rod's linear map for a time step."""
         if self._step is None or self._step.dt != dt:
-            if not self.contact.keeps_first_step or self._first_dt is None:
-                self._first_dt = dt
-            self._step = self._integrator(self.rod_stiffness, self.rod_mass, dt, self._first_dt)
+            if not self.contact.keeps_first_step or self.first_dt is None:
+                self.first_dt = dt
+            self._step = self._integrator(self.rod_stiffness, self.rod_mass, dt, self.first_dt)
         return self._step
 
     def move_projectile(self, state: ImpactState, dt: float) -> None:

@@ -7,7 +7,8 @@ a page: ``1`` a new page (a form feed), ``0`` a blank line, ``-`` two of them.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TextIO
+from pathlib import Path
+from typing import Any, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +57,23 @@ class Printer:
     def is_on(self) -> bool:
         """Whether anything is printed."""
         return self._file is not None
+
+    def state(self) -> dict[str, Any]:
+        """What was printed so far, and what the next page needs."""
+        text = ""
+        if self._file is not None:
+            self._file.flush()
+            text = Path(self._file.name).read_text(encoding="utf-8")
+        return {
+            "title": self._title, "control": self._control, "pages": self._pages, "text": text
+        }  # fmt: skip
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Print what :meth:`state` gave, and go on behind it."""
+        self._title, self._control = state["title"], state["control"]
+        self._pages = state["pages"]
+        if self._file is not None:
+            self._file.write(state["text"])
 
     def _write(self, lines: Iterable[str]) -> None:
         if self._file is not None:

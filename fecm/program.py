@@ -6,8 +6,9 @@ any loop it is 1.  LOOP 0 runs once.
 
 from __future__ import annotations
 
+import contextlib
 import difflib
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 
 from fecm.deck.findings import Findings
@@ -252,6 +253,85 @@ def walk(body: Body, current: int = 1) -> Walk:
         elif (yield item, current):
             return True
     return False
+
+
+# Given the pass; whether to leave the innermost loop.
+Act = Callable[[int], "bool | None"]
+
+
+class EndedError(Exception):
+    """The program ends before its last macro."""
+
+
+class Course:
+    """A program being carried out, which knows where it is and can go on there.
+
+    Parameters
+    ----------
+    body : tuple
+        The program.
+    bind : callable
+        Gives what a macro does.
+
+    Attributes
+    ----------
+    place : list of (int, int)
+        From the program itself to the innermost loop: which of its items is being carried out, and
+        in which pass.
+    """
+
+    def __init__(self, body: Body, bind: Callable[[Macro], Act]) -> None:
+        self.place: list[tuple[int, int]] = []
+        self._bind = bind
+        self._goal: list[tuple[int, int]] = []
+        self._carry_out = self._bound(body, 0)
+
+    def run(self, after: Sequence[tuple[int, int]] = ()) -> None:
+        """Carry the program out, from its begin or from behind the macro at a place."""
+        self._goal = [(int(index), int(current)) for index, current in after]
+        with contextlib.suppress(EndedError):
+            self._carry_out(1)
+
+    def _bound(self, body: Body, depth: int) -> Act:
+        """Bind a program's macros to what they do, so that a pass only has to call them."""
+        acts = [
+            self._repeated(item, depth + 1) if isinstance(item, Loop) else self._bind(item)
+            for item in body
+        ]
+        self.place += [(0, 0)] * (depth + 1 - len(self.place))
+        place, count = self.place, len(acts)
+
+        def carry_out(current: int) -> bool:
+            for index in range(self._first(depth), count):
+                place[depth] = index, current
+                if acts[index](current):
+                    return True
+            return False
+
+        return carry_out
+
+    def _repeated(self, loop: Loop, depth: int) -> Act:
+        """Bind a loop, whose body is at a depth."""
+        carry_out = self._bound(loop.body, depth)
+
+        def repeat(_: int) -> None:
+            first = self._goal[depth][1] if self._goal else 1
+            for current in range(first, loop.count + 1):
+                if carry_out(current):
+                    break
+            self.place[depth:] = [(0, 0)] * (len(self.place) - depth)
+
+        return repeat
+
+    def _first(self, depth: int) -> int:
+        """Which of a body's items comes first: not the first one on the way to where to go on."""
+        if not self._goal:
+            return 0
+        index, _ = self._goal[depth]
+        if any(current for _, current in self._goal[depth + 1 :]):
+            return index  # a loop, in which it is still going on
+        self._goal = []
+        return index + 1
 
 
 @dataclass(frozen=True, slots=True)

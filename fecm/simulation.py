@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from fecm.assembly import UnsoundPlateError
 from fecm.check import Checked
 from fecm.deck.model import Material
-from fecm.deck.records import LoadTable
+from fecm.deck.records import LoadTable, Macro
 from fecm.dynamics import DivergenceError, PlateState
 from fecm.impact import ImpactState
 from fecm.indentation import VIRGIN
@@ -20,7 +20,7 @@ from fecm.modes import modes
 from fecm.parts import Setup, set_up
 from fecm.plate import Floats
 from fecm.printout import Printer
-from fecm.program import Body, Loop, hits, moves_only, number, tally
+from fecm.program import Act, Course, EndedError, hits, moves_only, number, tally
 from fecm.proportional import load_factor
 from fecm.recording.recorder import Recorder
 from fecm.results.schema import FORMAT, FORMAT_VERSION
@@ -34,8 +34,11 @@ from fecm.units import unit_names
 from fecm.version import __version__
 
 Progress = Callable[[int, int], None]
-# Given the pass; whether to leave the innermost loop.
-Act = Callable[[int], "bool | None"]
+Look = Callable[["Simulation"], None]
+
+# Error of the energy balance, as a part of what was given, that is told, and that ends a run.
+ENERGY_WARNING = 0.01
+ENERGY_LIMIT = 0.1
 
 # Change of the displacement, relative to it, below which CONV leaves its loop.
 TOLERANCE = 1.0e-9
@@ -63,6 +66,10 @@ class Simulation:
         Threads that share the work of a step; 0 takes every core for a large mesh.
     rod_method : RodMethod
         The rod's mass matrix and integrator.
+    energy_limit : float
+        Error of the energy balance, as a part of what was given, that ends a run without slips.
+    look : callable
+        Called between two steps, as often as `progress`; may write a checkpoint, or end the run.
     notes : list of str
         What the user should know of the run.
     """
@@ -75,6 +82,8 @@ class Simulation:
     solver: str = AUTO
     threads: int = 0
     rod_method: RodMethod = field(default_factory=RodMethod)
+    energy_limit: float = ENERGY_LIMIT
+    look: Look = lambda simulation: None
     notes: list[str] = field(default_factory=list, init=False)
     setup: Setup = field(init=False)
     plate: PlateState = field(init=False)
@@ -85,11 +94,12 @@ class Simulation:
     table: LoadTable | None = field(default=None, init=False)
     tolerance: float = field(default=TOLERANCE, init=False)
     consistent: bool = field(default=False, init=False)
-    ended: bool = field(default=False, init=False)
+    course: Course = field(init=False)
     _tangent: Tangent | None = field(default=None, init=False)
     _residual: Floats | None = field(default=None, init=False)
     _settled: bool = field(default=False, init=False)
     _state_clock: float = field(default=0.0, init=False)
+    _place: list[tuple[int, int]] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
         deck, mesh, program = self.checked.deck, self.checked.mesh, self.checked.program
@@ -107,6 +117,7 @@ class Simulation:
         self.plate = self.setup.motion.start()
         if self.setup.impact is not None:
             self.impact = self.setup.impact.start(self.plate)
+        self.course = Course(program, self._bind)
         self._sizes = tally(program)
         self._tables = list(deck.tables)
         self._tick = max(1, min(64, 100_000 // self.setup.plate.neq))
@@ -116,7 +127,7 @@ class Simulation:
             self.setup,
             self._sizes,
             contact_at_every_step="tapes" in self.slips,
-            watches=not self.slips,
+            limit=None if self.slips else self.energy_limit,
         )
         if self._sizes.contact_rows and self.impact is not None:
             self.sink.attributes("tape8", {"location": self._location()})
@@ -155,7 +166,7 @@ class Simulation:
         self.sink.attributes("history", values)
 
     def run(self) -> None:
-        """Carry out the program.
+        """Carry out the program, from its begin or from where :meth:`restore` has put it.
 
         Raises
         ------
@@ -164,44 +175,79 @@ class Simulation:
         SingularStiffnessError
             If a static solution is asked for and the plate is not held.
         """
-        self.printer.problem(self.checked.deck, self.checked.mesh, self.setup.plate)
-        carry_out = self._bound(self.checked.program)
+        if not self._place:
+            self.printer.problem(self.checked.deck, self.checked.mesh, self.setup.plate)
         try:
             with np.errstate(all="ignore"):  # an overflow is found, and said better, below
-                carry_out(1)
+                self.course.run(self._place)
                 self._recorder.finish()
             self._footer()
+            self._judge()
         except DivergenceError as diverged:
             raise DivergenceError(diverged.step, f"{diverged.reason}; {self._cause()}") from None
 
-    def _bound(self, body: Body) -> Act:
-        """Bind a program's macros to what they do, so that a pass only has to call them."""
-        acts = [
-            self._repeated(item)
-            if isinstance(item, Loop)
-            else partial(ACTIONS[item.word], self, number(item))
-            for item in body
-        ]
+    def _judge(self) -> None:
+        """Note what makes the result doubtful."""
+        error, step = self._recorder.steps.worst
+        if error > ENERGY_WARNING:
+            why = " (slips are on: it is not judged)" if self.slips else ""
+            self.notes.append(
+                f"the energy balance is off by {error:.2%} of what was given, at step {step}{why}"
+            )
+        if self.impact is not None and self.impact.unsettled and not self.slips:
+            self.notes.append(
+                f"the contact iteration did not settle in {self.impact.unsettled} steps; a smaller "
+                "DT helps"
+            )
 
-        def carry_out(current: int) -> bool:
-            for act in acts:  # noqa: SIM110, a generator would cost a third of a pass
-                if act(current):
-                    return True
-            return False
+    def state(self) -> dict[str, Any]:
+        """Everything that :meth:`restore` needs: values that JSON knows, and arrays."""
+        plate = self.impact.to_arrays() if self.impact is not None else self.plate.to_arrays()
+        table = None if self.table is None else self.checked.deck.tables.index(self.table)
+        state = {
+            "place": [list(part) for part in self.course.place],
+            "dt": self.dt, "clock": self.clock, "state_clock": self._state_clock,
+            "constant_factor": self.constant_factor, "table": table, "tables": len(self._tables),
+            "tolerance": self.tolerance, "consistent": self.consistent, "notes": list(self.notes),
+            "tangent": self._tangent is not None, "settled": self._settled,
+            "residual": np.empty(0) if self._residual is None else self._residual,
+            "printed": self.printer.state(),
+            "first_dt": None if self.setup.impact is None else self.setup.impact.first_dt,
+        }  # fmt: skip
+        state |= {f"state/{name}": array for name, array in plate.items()}
+        state |= {f"recorder/{name}": value for name, value in self._recorder.state().items()}
+        return state
 
-        return carry_out
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Take the state that another simulation of the same problem gave."""
 
-    def _repeated(self, loop: Loop) -> Act:
-        """Bind a loop."""
-        carry_out = self._bound(loop.body)
+        def part(prefix: str) -> dict[str, Any]:
+            return {n.removeprefix(prefix): v for n, v in state.items() if n.startswith(prefix)}
 
-        def repeat(_: int) -> bool:
-            for current in range(1, loop.count + 1):
-                if carry_out(current):
-                    break
-            return self.ended
+        if self.impact is not None:
+            self.impact = ImpactState.from_arrays(part("state/"))
+            self.plate = self.impact.plate
+        else:
+            self.plate = PlateState.from_arrays(part("state/"))
+        self.dt, self.clock, self._state_clock = state["dt"], state["clock"], state["state_clock"]
+        self.constant_factor, self.tolerance = state["constant_factor"], state["tolerance"]
+        tables = self.checked.deck.tables
+        self.table = None if state["table"] is None else tables[state["table"]]
+        self._tables = list(tables[len(tables) - state["tables"] :])
+        self.consistent, self.notes = state["consistent"], list(state["notes"])
+        if state["tangent"]:
+            self._tangent = Tangent(self.setup.plate)
+        self._settled = state["settled"]
+        self._residual = state["residual"] if len(state["residual"]) else None
+        if self.setup.impact is not None:
+            self.setup.impact.first_dt = state["first_dt"]
+        self.printer.restore(state["printed"])
+        self._recorder.restore(part("recorder/"))
+        self._place = [(index, current) for index, current in state["place"]]
 
-        return repeat
+    def _bind(self, macro: Macro) -> Act:
+        """What a macro does, given the pass."""
+        return partial(ACTIONS[macro.word], self, number(macro))
 
     def _cause(self) -> str:
         """Why a run diverged, as far as the time step tells."""
@@ -256,6 +302,7 @@ class Simulation:
     def _after_step(self) -> None:
         if not self.plate.step % self._tick:
             self.progress(self.plate.step, self._sizes.steps)
+            self.look(self)
 
     def impact_step(self, n: int, current: int) -> None:
         """RODP: one impact step; contact and strains at every N-th."""
@@ -357,13 +404,13 @@ class Simulation:
         places = points.places(self.checked.mesh.coordinates)
         self.printer.stresses(values, places, self.clock)
 
-    def check(self, n: float, current: int) -> bool:
+    def check(self, n: float, current: int) -> None:
         """CHEC; ends the program under its slip."""
         profile = self.setup.plate.profile()
         self.sink.attributes("mesh", {"equations": self.setup.plate.neq, "profile": profile})
         self.printer.check(self.setup.plate, profile)
-        self.ended = "check-end" in self.slips
-        return self.ended
+        if "check-end" in self.slips:
+            raise EndedError
 
 
 # Given N, or what else stands on the card, and the pass; True leaves the innermost loop.
@@ -399,6 +446,7 @@ def simulate(
     solver: str = AUTO,
     threads: int = 0,
     rod_method: RodMethod | None = None,
+    energy_limit: float = ENERGY_LIMIT,
 ) -> Simulation:
     """Run a problem into a sink and return the finished simulation.
 
@@ -418,6 +466,7 @@ def simulate(
         solver,
         threads,
         rod_method or RodMethod(),
+        energy_limit,
     )
     simulation.run()
     return simulation

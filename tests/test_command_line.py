@@ -179,7 +179,7 @@ def test_tapes_go_to_the_folder_that_is_asked_for(deck: Path) -> None:
     assert len((deck.parent / "new/tapes/tape3").read_text().splitlines()) == 2 * 5
 
 
-def test_a_terminated_run_exits_143_and_leaves_nothing_behind(deck: Path) -> None:
+def test_a_terminated_run_exits_143_and_leaves_a_checkpoint_alone(deck: Path) -> None:
     deck.write_text(small("LMAS\nDT        .1E-6\nLOOP      99999\nTIME\nRODP\nNEXT\n"))
     for number, status in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
         process = subprocess.Popen(
@@ -193,11 +193,16 @@ def test_a_terminated_run_exits_143_and_leaves_nothing_behind(deck: Path) -> Non
             time.sleep(0.02)
             if len(list(deck.parent.iterdir())) > 1:
                 break
+        time.sleep(0.3)  # until it steps
         process.send_signal(number)
         errors = process.communicate(timeout=20)[1]
         assert process.returncode == status
         assert b"Traceback" not in errors
-        assert [p.name for p in deck.parent.iterdir()] == ["small.inp"]
+        left = sorted(p.name for p in deck.parent.iterdir())
+        assert left == ["small.h5.checkpoint", "small.h5.spool", "small.inp"]
+        assert b"--resume goes on to small.h5" in errors
+        for name in left[:2]:
+            (deck.parent / name).unlink()
 
 
 def test_a_result_that_cannot_be_written_ends_in_one_line_and_leaves_what_was_there(

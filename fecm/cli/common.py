@@ -126,6 +126,11 @@ class Signals:
             self._deferred = False
         self.heed()
 
+    @property
+    def came(self) -> bool:
+        """Whether a signal came that asks for the program's end."""
+        return bool(self._received)
+
     def heed(self) -> None:
         """End the program if a signal came."""
         if self._received == signal.SIGTERM:

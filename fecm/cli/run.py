@@ -6,8 +6,9 @@ import contextlib
 import shutil
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -23,6 +24,7 @@ from fecm.cli.common import (
     signals,
     writing,
 )
+from fecm.files import clear_stale
 from fecm.rod_method import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
 from fecm.slips import NAMES, active_slips
 from fecm.solvers import AUTO, SOLVERS
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
     from click._termui_impl import ProgressBar
 
     from fecm.api import Prepared
+    from fecm.checkpoint import Checkpointer
+    from fecm.simulation import Simulation
 
 
 @click.command()
@@ -62,6 +66,14 @@ if TYPE_CHECKING:
 @click.option("--rod-integrator", type=click.Choice(INTEGRATORS), default=WILSON,
               show_default=True,
               help="The projectile's integration; the report's is Wilson's.")  # fmt: skip
+@click.option("--checkpoint", "every", type=click.FloatRange(min=0.0), metavar="SECONDS",
+              help="Keep a checkpoint beside the output, written every so often.")  # fmt: skip
+@click.option("--resume", is_flag=True,
+              help="Go on from the checkpoint that an interrupted run has left.")  # fmt: skip
+@click.option("--energy-limit", type=click.FloatRange(min=0.0, min_open=True), default=0.1,
+              show_default=True, metavar="PART",
+              help="Error of the energy balance, as a part of what was given, that ends a run "
+                   "without slips.")  # fmt: skip
 @click.option("--force", is_flag=True, help="Run with a time step above the critical one.")
 @click.option(
     "--print",
@@ -76,22 +88,24 @@ def run(
     mode: str,
     slips: tuple[str, ...],
     overwrite: bool,
-    solver: str,
-    threads: int,
-    rod_mass: str,
-    rod_integrator: str,
     force: bool,
     printed: Path | None,
+    resume: bool,
+    rod_mass: str,
+    rod_integrator: str,
+    **options: Any,
 ) -> None:
     """Run every problem in DECK and write its result.
 
-    A second problem in the deck goes to OUT-2.h5, and so on.
+    A second problem in the deck goes to OUT-2.h5, and so on.  An interrupted run leaves a
+    checkpoint beside its output; --resume with the same options goes on from it, to the same bytes.
     """
     try:
         active = active_slips(mode, slips)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
     from fecm.api import numbered, prepare
+    from fecm.checkpoint import checkpoint_of
 
     prepared = prepare(deck, mode)
     report(prepared)
@@ -100,54 +114,72 @@ def run(
     first = output or Path(f"{deck.stem}.h5")
     paths = [numbered(first, n) for n in range(1, len(prepared.problems) + 1)]
     prints = [None if printed is None else numbered(printed, n + 1) for n in range(len(paths))]
-    check_outputs([*paths, *(path for path in prints if path is not None)], overwrite)
-    method = RodMethod(rod_mass, rod_integrator)
+    check_outputs([*paths, *(p for p in prints if p is not None)], overwrite or resume)
+    left = [path for path in paths if checkpoint_of(path).exists()]
+    if resume and not left:
+        raise Refused(f"there is no checkpoint {checkpoint_of(paths[0])} to go on from")
+    choices = Choices(active, RodMethod(rod_mass, rod_integrator), **options)
     for number, path in enumerate(paths):
         if number:
             click.echo()
-        _run_one(prepared, number, active, solver, threads, method, path, prints[number])
+        if resume and path not in left and path.exists():
+            click.echo(f"fecm: note: {path} is whole already", err=True)
+            continue
+        _run_one(prepared, number, path, prints[number], choices, resumes=resume and path in left)
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What can be chosen about a run; see the options."""
+
+    slips: frozenset[str]
+    method: RodMethod
+    solver: str
+    threads: int
+    every: float | None
+    energy_limit: float
 
 
 def _run_one(
     prepared: Prepared,
     number: int,
-    active: frozenset[str],
-    solver: str,
-    threads: int,
-    method: RodMethod,
     path: Path,
     printed: Path | None,
+    choices: Choices,
+    *,
+    resumes: bool,
 ) -> None:
     """Run one problem of a deck into a file and say what came out."""
     from fecm.check.run import output_bytes
-    from fecm.dynamics import DivergenceError
+    from fecm.checkpoint import Checkpointer, checkpoint_of
     from fecm.printout import Printer
     from fecm.program import tally
     from fecm.results import hdf5
+    from fecm.results.journal import Journal
     from fecm.results.result import load
     from fecm.results.summary import summary
-    from fecm.simulation import simulate
-    from fecm.statics import SingularStiffnessError
+    from fecm.simulation import Simulation
 
     problem = prepared.problems[number]
     _check_room(path, output_bytes(problem.deck, tally(problem.program)))
+    clear_stale(path, checkpoint_of(path), *([] if printed is None else [printed]))
     with contextlib.ExitStack() as stack:
         stack.enter_context(signals.deferred())
-        sink = stack.enter_context(hdf5.writing(path))
+        stack.enter_context(_ends(path))
+        journal = Journal(stack.enter_context(hdf5.writing(path)), muted=resumes)
+        checkpointer = Checkpointer(path, journal)
         printer = Printer() if printed is None else Printer(stack.enter_context(writing(printed)))
         advance = stack.enter_context(_progress(tally(problem.program).steps))
-        try:
-            simulation = simulate(problem, active, sink, advance, printer, solver, threads, method)
-        except SingularStiffnessError as error:
-            raise Refused(
-                f"{error}: the plate is not held, so that it has no static displacement; restrain "
-                f"it with BOUN; {path} was not written"
-            ) from None
-        except DivergenceError as diverged:
-            raise AnswerIsNo(
-                f"the run diverged at step {diverged.step}: {diverged.reason}; "
-                f"{path} was not written"
-            ) from None
+        simulation = Simulation(
+            problem, choices.slips, journal, advance, printer, choices.solver, choices.threads,
+            choices.method, choices.energy_limit, _Look(checkpointer, choices.every, path),
+        )  # fmt: skip
+        if resumes:
+            checkpointer.restore(simulation)
+            step = simulation.plate.step
+            click.echo(f"fecm: note: {path} goes on behind step {step}", err=True)
+        simulation.run()
+    checkpointer.clear()
     for note in simulation.notes:
         click.echo(f"fecm: note: {note}", err=True)
     click.echo(problem.deck.title or prepared.source)
@@ -156,6 +188,59 @@ def _run_one(
     click.echo(f"  result            {path}")
     if printed is not None:
         click.echo(f"  printed           {printed}")
+
+
+@contextlib.contextmanager
+def _ends(path: Path) -> Iterator[None]:
+    """Say how a run ended that did not end well."""
+    from fecm.checkpoint import CheckpointError
+    from fecm.dynamics import DivergenceError
+    from fecm.results.journal import SpoolError
+    from fecm.statics import SingularStiffnessError
+
+    try:
+        yield
+    except SingularStiffnessError as error:
+        raise Refused(
+            f"{error}: the plate is not held, so that it has no static displacement; restrain "
+            f"it with BOUN; {path} was not written"
+        ) from None
+    except DivergenceError as diverged:
+        raise AnswerIsNo(
+            f"the run diverged at step {diverged.step}: {diverged.reason}; {path} was not written"
+        ) from None
+    except (CheckpointError, SpoolError) as error:
+        raise Refused(f"{error}; run the deck anew, without --resume") from None
+
+
+class _Look:
+    """Looks for signals between two steps, and writes checkpoints.
+
+    Parameters
+    ----------
+    checkpointer : Checkpointer
+    every : float or None
+        Seconds between two checkpoints; None writes one only when a signal ends the run.
+    path : Path
+        The result.
+    """
+
+    def __init__(self, checkpointer: Checkpointer, every: float | None, path: Path) -> None:
+        self._checkpointer = checkpointer
+        self._every = every
+        self._path = path
+
+    def __call__(self, simulation: Simulation) -> None:
+        if signals.came:
+            self._checkpointer.write(simulation)
+            click.echo(
+                f"fecm: stopped behind step {simulation.plate.step}; the same command with "
+                f"--resume goes on to {self._path}",
+                err=True,
+            )
+            signals.heed()
+        elif self._every is not None and self._checkpointer.age >= self._every:
+            self._checkpointer.write(simulation)
 
 
 def _check_room(path: Path, size: int) -> None:
@@ -189,7 +274,6 @@ class _Advance:
         self.done = 0
 
     def __call__(self, done: int, steps: int) -> None:
-        signals.heed()
         if self.bar is not None:
             self.bar.update(done - self.done)
         self.done = done

@@ -35,7 +35,7 @@ class Recorder:
         The run's parts.
     sizes : Tally
         How many rows there will be at the most.
-    contact_at_every_step, watches : bool
+    contact_at_every_step, limit
         See :class:`~fecm.recording.steps.StepRecorder`.
     """
 
@@ -46,7 +46,7 @@ class Recorder:
         sizes: Tally,
         *,
         contact_at_every_step: bool = False,
-        watches: bool = True,
+        limit: float | None = None,
     ) -> None:
         self._sink = sink
         self._setup = setup
@@ -54,7 +54,7 @@ class Recorder:
             sink,
             setup,
             contact_at_every_step=contact_at_every_step,
-            watches=watches,
+            limit=limit,
         )
         self._room = self._rows_to_come(sizes, contact_at_every_step)
         self._buffers: dict[str, RowBuffer] = {}
@@ -159,6 +159,31 @@ class Recorder:
         columns = {"step": np.array(steps), "time": np.array(times)}
         self._buffers["tape8"].put_all(columns | dict(zip(STRAINS, values, strict=True)))
         self._fields.clear()
+
+    def state(self) -> dict[str, Any]:
+        """What is held back."""
+        steps, times, fields = zip(*self._fields, strict=True) if self._fields else ((), (), ())
+        state: dict[str, Any] = {
+            "fields/step": list(steps),
+            "fields/time": list(times),
+            "fields/field": np.array(fields),
+            **{f"steps/{name}": value for name, value in self.steps.state().items()},
+        }
+        for group, buffer in self._buffers.items():
+            state |= {f"rows/{group}/{name}": value for name, value in buffer.state().items()}
+        return state
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Hold back again what :meth:`state` gave."""
+
+        def part(prefix: str) -> dict[str, Any]:
+            return {n.removeprefix(prefix): v for n, v in state.items() if n.startswith(prefix)}
+
+        clock = zip(state["fields/step"], state["fields/time"], strict=True)
+        self._fields = [(*when, f) for when, f in zip(clock, state["fields/field"], strict=True)]
+        self.steps.restore(part("steps/"))
+        for group, buffer in self._buffers.items():
+            buffer.restore(part(f"rows/{group}/"))
 
     def finish(self) -> None:
         """Store all that is held back, and cut off the rows that never came.

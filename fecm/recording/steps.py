@@ -7,6 +7,7 @@ projectile's energies, the balance) is computed when it is full.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +22,6 @@ from fecm.results.sinks import Sink
 Floats = NDArray[np.float64]
 
 BLOCK = 1024
-# A run whose energy has grown by this factor has diverged.
-GROWTH = 10.0
 
 SCALARS = (
     "step", "time", "plate_kinetic", "plate_strain", "external_work",
@@ -42,9 +41,14 @@ class StepRecorder:
         The run's parts; a plate alone has energies and gages only.
     contact_at_every_step : bool
         Store contact on tape9 at every step instead of every N-th (the slip ``tapes``).
-    watches : bool
-        Stop the run when its energy grows without bound; it is stopped in any case when the energy
-        is no longer finite.
+    limit : float or None
+        Error of the energy balance, as a part of what was given, at which the run is stopped; it is
+        stopped in any case when the energy is no longer finite.
+
+    Attributes
+    ----------
+    worst : (float, int)
+        Largest error of the energy balance so far, as a part of what was given, and its step.
     """
 
     def __init__(
@@ -53,12 +57,14 @@ class StepRecorder:
         setup: Setup,
         *,
         contact_at_every_step: bool = False,
-        watches: bool = True,
+        limit: float | None = None,
     ) -> None:
         self._sink = sink
         self._motion = setup.motion
         self._impact = impact = setup.impact
-        self._watches = watches
+        self._limit = limit
+        self._most_work = 0.0
+        self.worst = (0.0, 0)
         self._all_contact = contact_at_every_step
         self._rows: list[tuple[float, ...]] = []
         self._contact_rows: list[int] = []
@@ -121,6 +127,31 @@ class StepRecorder:
         if len(self._rows) == BLOCK:
             self.flush()
 
+    def state(self) -> dict[str, Any]:
+        """What is held back, and how much was stored."""
+        count = len(self._rows)
+        return {
+            "rows": np.array(self._rows).reshape(count, len(SCALARS)),
+            "contact": list(self._contact_rows),
+            "rod": self._rod[:count].copy(),
+            "strains": self._strains[:count].copy(),
+            "stored": self._stored,
+            "tape9": self._tape9_rows,
+            "initial": self.initial,
+            "work": self._most_work,
+            "worst": self.worst,
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Hold back again what :meth:`state` gave."""
+        self._rows = [tuple(row) for row in state["rows"].tolist()]
+        self._contact_rows = list(state["contact"])
+        self._rod[: len(self._rows)] = state["rod"]
+        self._strains[: len(self._rows)] = state["strains"]
+        self._stored, self._tape9_rows = state["stored"], state["tape9"]
+        self.initial, self._most_work = state["initial"], state["work"]
+        self.worst = (state["worst"][0], state["worst"][1])
+
     def flush(self) -> None:
         """Store what was gathered.
 
@@ -177,19 +208,29 @@ class StepRecorder:
         return sign * rod.modulus * area * deformation[:, 2 * node - 1]
 
     def _watch(self, table: Mapping[str, Floats], held: Floats) -> None:
-        """Stop a run that has lost all sense."""
+        """Stop a run that has lost all sense, or more energy than its limit allows.
+
+        The error is judged against what was given up to the end of the block: the first steps of a
+        load have done no work yet that it could be compared with.
+        """
         lost = ~np.isfinite(held)
         if lost.any():
             step = int(table["step"][np.flatnonzero(lost)[0]])
             raise DivergenceError(step, "the motion is no longer finite")
-        given = self.initial + np.maximum.accumulate(np.abs(table["external_work"]))
-        lost = ~(np.abs(held) <= GROWTH * given) & (given > 0.0)
-        if self._watches and lost.any():
-            row = int(np.flatnonzero(lost)[0])
-            factor = held[row] / given[row]
+        self._most_work = max(self._most_work, float(np.abs(table["external_work"]).max()))
+        given = self.initial + self._most_work
+        if not given > 0.0:
+            return
+        error = np.abs(table["balance_error"]) / given
+        row = int(error.argmax())
+        if error[row] > self.worst[0]:
+            self.worst = (float(error[row]), int(table["step"][row]))
+        if self._limit is not None and error[row] > self._limit:
+            row = int(np.flatnonzero(error > self._limit)[0])
             raise DivergenceError(
                 int(table["step"][row]),
-                f"the energy has grown to {factor:.3g} times what was given",
+                f"the energy balance is off by {error[row]:.2%} of what was given, more than the "
+                f"limit of {self._limit:.3g}",
             )
 
     @property

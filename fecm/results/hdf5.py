@@ -114,9 +114,22 @@ class FileSink:
         OSError
             If this or an earlier write failed.
         """
+        self.check()
+        self._datasets[path][start : start + len(rows)] = rows
+
+    def check(self) -> None:
+        """Raise the first error of writing.
+
+        Raises
+        ------
+        OSError
+        """
         if self._guarded.error is not None:
             raise self._guarded.error
-        self._datasets[path][start : start + len(rows)] = rows
+
+    def stored(self, path: str, start: int, stop: int) -> Array:
+        """Rows of a dataset as they stand in the file."""
+        return np.asarray(self._datasets[path][start:stop])
 
     def trim(self, path: str, rows: int) -> None:
         """Cut a dataset down to its first rows; without any it goes, and an empty group with it."""

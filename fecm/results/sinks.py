@@ -109,6 +109,18 @@ class RowBuffer:
         self._filled = 0
         self.stored = 0
 
+    def state(self) -> dict[str, Any]:
+        """What is held back, and how much was handed over."""
+        held = {name: block[: self._filled].copy() for name, block in self._blocks.items()}
+        return {"stored": self.stored, **held}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Hold back again what :meth:`state` gave."""
+        self.stored = state["stored"]
+        for name, block in self._blocks.items():
+            self._filled = len(state[name])
+            block[: self._filled] = state[name]
+
     def put(self, columns: Mapping[str, Any]) -> None:
         """Add one row; `columns` has a value or an array for every dataset."""
         if self._room == 1:

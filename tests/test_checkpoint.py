@@ -1,0 +1,356 @@
+"""Runs that are stopped, killed or starved of disk go on to the same bytes, or say why not."""
+
+from __future__ import annotations
+
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+import fecm
+from fecm.api import prepare
+from fecm.check import Checked
+from fecm.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
+from fecm.results import hdf5
+from fecm.results.journal import Journal
+from fecm.results.sinks import MemorySink
+from fecm.rod_method import RodMethod
+from fecm.simulation import Simulation, simulate
+from fecm.slips import active_slips
+from tests.decks import DATA_CARDS, LONG, PROGRAM, small
+from tests.kill_runs import trial
+
+# Two problems' worth of words in one: nested loops, loads, a change of the time step, gages.
+WORDS = """\
+LMAS
+DT        .5E-6
+PROP          1
+LOOP          3
+LOOP         50
+TIME
+RODP          7
+DISP          5
+NEXT
+REAC
+STRE
+DT        .4E-6
+NEXT
+CHEC
+LOOP         40
+TIME
+EXCD
+NEXT
+"""
+TABLE = "    1    1       0.0       1.0     100.0\n"
+LOADED = (
+    "FORC\n    8    0       0.0       0.0       1.0\n\n"
+    "GAGE\n1, 0.5, 0.5, 0.053, 45.\n\nPROJ\n3, 0, 1.0, 30.E6, .0006875\n1, 1, 0.2\n3, 0, 0.6\n\n"
+)
+
+
+class StoppedError(Exception):
+    """The run is stopped for the test's sake."""
+
+
+def deck(program: str = WORDS) -> str:
+    """A small deck that uses many words."""
+    text = small(program, data=LOADED + DATA_CARDS, stop=False)
+    return f"{text}{TABLE}STOP\n" if "PROP" in program else f"{text}STOP\n"
+
+
+def run(text: str, path: Path, stop: int = 0, *, resume: bool = False, slips: str = "") -> int:
+    """Run a deck into a file; stop with a checkpoint at the n-th look.  Looks that there were."""
+    looks = 0
+
+    def look(simulation: Simulation) -> None:
+        nonlocal looks
+        looks += 1
+        if looks == stop:
+            checkpointer.write(simulation)
+            raise StoppedError
+
+    problem = prepare(text).problems[0]
+    names = frozenset(slips.split())
+    with hdf5.writing(path) as sink:
+        journal = Journal(sink, muted=resume)
+        checkpointer = Checkpointer(path, journal)
+        simulation = Simulation(problem, names, journal, rod_method=RodMethod(), look=look)
+        simulation._tick = 1
+        if resume:
+            checkpointer.restore(simulation)
+        simulation.run()
+    checkpointer.clear()
+    return looks
+
+
+@pytest.mark.parametrize("slips", ["", "rod-dt tapes reload"])
+def test_a_run_stopped_anywhere_goes_on_to_the_same_bytes(tmp_path: Path, slips: str) -> None:
+    whole = tmp_path / "whole.h5"
+    looks = run(deck(), whole, slips=slips)
+    assert looks == 3 * 50 + 40
+    chance = random.Random(7)
+    for stop in [1, 50, 51, 149, 150, 151, looks, *chance.sample(range(2, looks), 12)]:
+        path = tmp_path / "stopped.h5"
+        with pytest.raises(StoppedError):
+            run(deck(), path, stop, slips=slips)
+        assert not path.exists()
+        # StoppedError once more on the way, and then not any more.
+        if stop < looks - 3:
+            with pytest.raises(StoppedError):
+                run(deck(), path, 3, resume=True, slips=slips)
+        run(deck(), path, resume=True, slips=slips)
+        assert path.read_bytes() == whole.read_bytes(), f"stopped at {stop}"
+        assert sorted(p.name for p in tmp_path.iterdir()) == ["stopped.h5", "whole.h5"]
+        path.unlink()
+
+
+def test_a_checkpoint_of_another_run_is_refused_and_says_why(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    with pytest.raises(StoppedError):
+        run(deck(), path, 5)
+    for text, slips, why in (
+        (deck(WORDS.replace(".5E-6", ".3E-6")), "", "another deck"),
+        (deck(), "density", "another mode or other slips"),
+    ):
+        with pytest.raises(CheckpointError, match=why):
+            run(text, path, resume=True, slips=slips)
+    stored = checkpoint_of(path).read_bytes()
+    checkpoint_of(path).write_bytes(stored[: len(stored) // 2])
+    with pytest.raises(CheckpointError, match="damaged"):
+        run(deck(), path, resume=True)
+    checkpoint_of(path).write_bytes(stored)
+    spool_of(path).write_bytes(spool_of(path).read_bytes()[:-9])
+    with pytest.raises(ValueError, match="damaged|cut short"):
+        run(deck(), path, resume=True)
+    checkpoint_of(path).unlink()
+    with pytest.raises(CheckpointError, match="there is no checkpoint"):
+        run(deck(), path, resume=True)
+    assert not path.exists()
+
+
+def test_a_checkpoint_of_another_version_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.h5"
+    with pytest.raises(StoppedError):
+        run(deck(), path, 5)
+    monkeypatch.setattr("fecm.checkpoint.__version__", "99.0")
+    with pytest.raises(CheckpointError, match="another version"):
+        run(deck(), path, resume=True)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the long deck and the result of a run that nothing disturbed."""
+    folder = tmp_path_factory.mktemp("whole")
+    shutil.copy(LONG, folder / "deck.inp")
+    assert fecm_in(folder, "run", "deck.inp", "-o", "whole.h5").returncode == 0
+    return folder
+
+
+def fecm_in(folder: Path, *arguments: str, **options: object) -> subprocess.CompletedProcess[str]:
+    """Run the command in a folder."""
+    command = [sys.executable, "-m", "fecm", *arguments]
+    how: dict[str, Any] = {"cwd": folder, "capture_output": True, "text": True, **options}
+    done: subprocess.CompletedProcess[str] = subprocess.run(command, check=False, **how)
+    return done
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_killed_run_resumes_to_the_same_bytes(whole: Path, seed: int) -> None:
+    assert trial(whole, whole / "whole.h5", 1.2, seed).startswith("same")
+
+
+def test_an_interrupted_command_says_how_to_go_on_and_does(whole: Path) -> None:
+    for number, status in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+        command = [
+            sys.executable,
+            "-m",
+            "fecm",
+            "run",
+            "deck.inp",
+            "-o",
+            "i.h5",
+            "--print",
+            "i.txt",
+        ]
+        with subprocess.Popen(command, cwd=whole, stderr=subprocess.PIPE, text=True) as process:
+            until = time.monotonic() + 20.0
+            while not list(whole.glob(".i.*.partial.h5")) and time.monotonic() < until:
+                time.sleep(0.01)
+            time.sleep(0.1)
+            process.send_signal(number)
+            _, said = process.communicate(timeout=20)
+        assert process.returncode == status
+        assert "--resume goes on to i.h5" in said
+        assert not (whole / "i.h5").exists()
+        other = fecm_in(whole, "run", "deck.inp", "-o", "i.h5", "--resume")
+        assert other.returncode == 2
+        assert "another choice of --print" in other.stderr
+        done = fecm_in(whole, "run", "deck.inp", "-o", "i.h5", "--print", "i.txt", "--resume")
+        assert done.returncode == 0
+        assert (whole / "i.h5").read_bytes() == (whole / "whole.h5").read_bytes()
+        printed = (whole / "i.txt").read_text()
+        fecm_in(whole, "run", "deck.inp", "-o", "i.h5", "--print", "i.txt", "--overwrite")
+        assert (whole / "i.txt").read_text() == printed
+        (whole / "i.h5").unlink()
+        (whole / "i.txt").unlink()
+
+
+def test_a_second_signal_stops_at_once(tmp_path: Path) -> None:
+    program = "LMAS\nDT        .1E-6\nLOOP      99999\nTIME\nRODP       9999\nNEXT\n"
+    (tmp_path / "d.inp").write_text(small(program))
+    command = [sys.executable, "-m", "fecm", "run", "d.inp"]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL) as process:
+        time.sleep(1.0)
+        process.send_signal(signal.SIGINT)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(10) == 130
+    assert not (tmp_path / "d.h5").exists()
+
+
+def test_resuming_without_a_checkpoint_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(small())
+    done = fecm_in(tmp_path, "run", "d.inp", "--resume")
+    assert done.returncode == 2
+    assert "there is no checkpoint d.h5.checkpoint" in done.stderr
+
+
+def stop_at_once(problem: Checked, path: Path) -> None:
+    """Stop a run with a checkpoint, as soon as it looks up."""
+    with hdf5.writing(path) as sink:
+        journal = Journal(sink)
+        checkpointer = Checkpointer(path, journal)
+
+        def look(simulation: Simulation) -> None:
+            checkpointer.write(simulation)
+            raise StoppedError
+
+        Simulation(problem, frozenset(), journal, look=look).run()
+
+
+def test_of_two_problems_the_finished_one_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(
+        small(stop=False) + small(PROGRAM.replace("     10", "     90"))
+    )
+    assert fecm_in(tmp_path, "run", "d.inp").returncode == 0
+    first, second = (tmp_path / "d.h5").read_bytes(), (tmp_path / "d-2.h5").read_bytes()
+    (tmp_path / "d-2.h5").unlink()
+    problem = prepare((tmp_path / "d.inp").read_text()).problems[1]
+    with pytest.raises(StoppedError):
+        stop_at_once(problem, tmp_path / "d-2.h5")
+    done = fecm_in(tmp_path, "run", "d.inp", "--resume")
+    assert done.returncode == 0
+    assert "d.h5 is whole already" in done.stderr
+    assert (tmp_path / "d.h5").read_bytes() == first
+    assert (tmp_path / "d-2.h5").read_bytes() == second
+
+
+# Faults ------------------------------------------------------------------------------------------
+
+
+def small_files(limit: int) -> None:
+    """Let no file grow beyond a size, as a full disk does."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+
+def test_a_disk_that_fills_leaves_the_last_checkpoint_usable(whole: Path) -> None:
+    (whole / "f.h5").write_text("precious")
+    done = fecm_in(whole, "run", "deck.inp", "-o", "f.h5", "--overwrite", "--checkpoint", "0",
+                   preexec_fn=lambda: small_files(2_000_000))  # fmt: skip
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert "File too large" in done.stderr
+    assert (whole / "f.h5").read_text() == "precious"
+    again = fecm_in(whole, "run", "deck.inp", "-o", "f.h5", "--resume")
+    assert again.returncode == 0
+    assert "goes on behind step" in again.stderr
+    assert (whole / "f.h5").read_bytes() == (whole / "whole.h5").read_bytes()
+
+
+def as_nobody(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the command as a user who owns nothing, where this user may do so."""
+    if os.geteuid() == 0:
+        return fecm_in(folder, *arguments, user=65534, env={**os.environ, "HOME": "/nonexistent"})
+    return fecm_in(folder, *arguments)
+
+
+def test_a_read_only_folder_is_told_and_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(small())
+    tmp_path.chmod(0o555)
+    for parent in tmp_path.parents[:3]:
+        if parent != Path("/tmp") and os.geteuid() == 0:
+            parent.chmod(parent.stat().st_mode | 0o055)
+    try:
+        probe = as_nobody(tmp_path, "--version")
+        if probe.returncode:
+            pytest.skip("another user can't run this interpreter")
+        done = as_nobody(tmp_path, "run", "d.inp")
+    finally:
+        tmp_path.chmod(0o755)
+    assert done.returncode == 2
+    assert "Permission denied" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["d.inp"]
+
+
+def test_a_folder_that_goes_away_during_the_run_ends_in_one_line(tmp_path: Path) -> None:
+    program = "LMAS\nDT        .1E-6\nLOOP      30000\nTIME\nRODP       9999\nNEXT\n"
+    (tmp_path / "d.inp").write_text(small(program))
+    (tmp_path / "out").mkdir()
+    command = [sys.executable, "-m", "fecm", "run", "d.inp", "-o", "out/d.h5"]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        until = time.monotonic() + 20.0
+        while not list((tmp_path / "out").iterdir()) and time.monotonic() < until:
+            time.sleep(0.01)
+        shutil.rmtree(tmp_path / "out")
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert "Traceback" not in said
+    assert "out" in said.splitlines()[-1]
+    assert [path.name for path in tmp_path.iterdir()] == ["d.inp"]
+
+
+def test_a_result_that_a_reader_has_open_is_replaced_without_disturbing_it(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(small())
+    assert fecm_in(tmp_path, "run", "d.inp").returncode == 0
+    with h5py.File(tmp_path / "d.h5") as reader:
+        before = reader["history/force"][:]
+        (tmp_path / "d.inp").write_text(small(data=DATA_CARDS.replace("115.0", " 90.0")))
+        assert fecm_in(tmp_path, "run", "d.inp", "--overwrite").returncode == 0
+        np.testing.assert_array_equal(reader["history/force"][:], before)
+    found = fecm.load(tmp_path / "d.h5")
+    assert found.force.max() < before.max()
+
+
+# Energy ------------------------------------------------------------------------------------------
+
+
+def test_a_run_that_passes_its_energy_limit_exits_1_and_leaves_no_file(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(small(PROGRAM.replace("     10", "    400")))
+    done = fecm_in(tmp_path, "run", "d.inp", "--energy-limit", "1e-9")
+    assert done.returncode == 1
+    assert "the energy balance is off by" in done.stderr
+    assert "more than the limit of 1e-09" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["d.inp"]
+    assert fecm_in(tmp_path, "run", "d.inp").returncode == 0
+    with pytest.raises(fecm.DivergenceError, match="limit"):
+        fecm.run(tmp_path / "d.inp", energy_limit=1e-9)
+
+
+def test_the_listings_rigid_target_is_warned_of_and_not_judged() -> None:
+    problem = prepare(LONG, "listing").problems[0]
+    simulation = simulate(problem, active_slips("listing"), MemorySink())
+    assert len([note for note in simulation.notes if "slips are on: it is not judged" in note]) == 1
+    sound = simulate(prepare(LONG).problems[0], (), MemorySink())
+    assert sound.notes == []
