@@ -49,7 +49,8 @@ def trial(folder: Path, whole: Path, seconds: float, seed: int) -> str:
         if process.wait() != 0:
             return "failed"
         break
-    if not (folder / name).exists():
+    # Killed on the way, or between the result's renaming and the checkpoint's removal.
+    if not (folder / name).exists() or (folder / f"{name}.spool").exists():
         resumed = (folder / f"{name}.checkpoint").exists()
         last = [*command, *(["--resume"] if resumed else ["--overwrite"])]
         if subprocess.run(last, cwd=folder, check=False, **quiet).returncode:  # type: ignore[call-overload]
