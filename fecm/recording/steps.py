@@ -63,7 +63,7 @@ class StepRecorder:
         self._motion = setup.motion
         self._impact = impact = setup.impact
         self._limit = limit
-        self._most_work = 0.0
+        self._most_work = self._last_work = self._jump = 0.0
         self.worst = (0.0, 0)
         self._all_contact = contact_at_every_step
         self._rows: list[tuple[float, ...]] = []
@@ -138,7 +138,7 @@ class StepRecorder:
             "stored": self._stored,
             "tape9": self._tape9_rows,
             "initial": self.initial,
-            "work": self._most_work,
+            "work": [self._most_work, self._last_work, self._jump],
             "worst": self.worst,
         }
 
@@ -149,7 +149,8 @@ class StepRecorder:
         self._rod[: len(self._rows)] = state["rod"]
         self._strains[: len(self._rows)] = state["strains"]
         self._stored, self._tape9_rows = state["stored"], state["tape9"]
-        self.initial, self._most_work = state["initial"], state["work"]
+        self.initial = state["initial"]
+        self._most_work, self._last_work, self._jump = state["work"]
         self.worst = (state["worst"][0], state["worst"][1])
 
     def flush(self) -> None:
@@ -211,17 +212,21 @@ class StepRecorder:
         """Stop a run that has lost all sense, or more energy than its limit allows.
 
         The error is judged against what was given up to the end of the block: the first steps of a
-        load have done no work yet that it could be compared with.
+        load have done no work yet that it could be compared with.  What a load does in one step is
+        no error: the work belongs to the step, the energies to its end.
         """
         lost = ~np.isfinite(held)
         if lost.any():
             step = int(table["step"][np.flatnonzero(lost)[0]])
             raise DivergenceError(step, "the motion is no longer finite")
-        self._most_work = max(self._most_work, float(np.abs(table["external_work"]).max()))
+        work = table["external_work"]
+        self._most_work = max(self._most_work, float(np.abs(work).max()))
+        jump = float(np.abs(np.diff(work, prepend=self._last_work)).max())
+        self._jump, self._last_work = max(self._jump, jump), float(work[-1])
         given = self.initial + self._most_work
         if not given > 0.0:
             return
-        error = np.abs(table["balance_error"]) / given
+        error = np.maximum(np.abs(table["balance_error"]) - self._jump, 0.0) / given
         row = int(error.argmax())
         if error[row] > self.worst[0]:
             self.worst = (float(error[row]), int(table["step"][row]))

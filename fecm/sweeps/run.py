@@ -20,6 +20,7 @@ from fecm.deck.reader import Problem
 from fecm.dynamics import DivergenceError
 from fecm.impact import Encounter, meet
 from fecm.indentation import MemoryLaw, Point, stacked
+from fecm.mesh import Mesh, generate
 from fecm.parts import build_law, build_projectile, set_up
 from fecm.program import Body, Loop, estimate, flat
 from fecm.projectile import WilsonStep
@@ -69,13 +70,14 @@ def run(task: Task) -> Outcome:
         except CasesError as error:
             lost[number] = str(error)
     parts: list[Outcome] = []
-    if good:
-        checked, reason = _checked(good[0][1])
+    mesh = generate(good[0][1]) if good else None
+    sound = [] if mesh is None else [pair for pair in good if not _refuse(*pair, mesh, lost)]
+    if sound:
+        checked, reason = _checked(sound[0][1])
         if checked is None:
-            lost |= dict.fromkeys((number for number, _ in good), reason)
+            lost |= dict.fromkeys((number for number, _ in sound), reason)
         else:
-            sound = [pair for pair in good if not _refuse(*pair, checked, lost)]
-            if sound and shares_plate(checked):
+            if shares_plate(checked):
                 parts.append(_together([n for n, _ in sound], [d for _, d in sound], checked))
             else:
                 parts += [_alone(number, replace(checked, deck=deck)) for number, deck in sound]
@@ -94,10 +96,10 @@ def _checked(deck: Deck) -> tuple[Checked | None, str]:
     return checked, ""
 
 
-def _refuse(number: int, deck: Deck, plate: Checked, lost: dict[int, str]) -> bool:
+def _refuse(number: int, deck: Deck, mesh: Mesh, lost: dict[int, str]) -> bool:
     """Whether a case's own cards, the plate's apart, can't be used; note why."""
     findings = Findings()
-    check_impact(deck.need(Impact), deck, plate.mesh, findings)
+    check_impact(deck.need(Impact), deck, mesh, findings)
     check_law(deck.need(Indentation), findings)
     if (projectile := deck.last(Projectile)) is not None:
         check_projectile(projectile, findings)
