@@ -205,7 +205,7 @@ def _cells(
             grid.x, grid.y, grid.values, inside, colors=LEVEL_COLOUR,
             linestyles=[DASHES], linewidths=1.2,
         )  # fmt: skip
-        axes.clabel(marked, fontsize=6.0, inline_spacing=2)
+        axes.clabel(marked, fontsize=6.0, inline_spacing=2, colors="white")
 
 
 def _crossings(axes: Axes, grid: Grid, level: float) -> None:
