@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, check_outputs
-from fecm.plot import KINDS, Options, Picture, PlotError, check_suffix, draw, save
+from fecm.plot import KINDS, Options, Picture, PlotError, check_kind, check_suffix, draw, save
 
 if TYPE_CHECKING:
     from fecm.results.result import Result
+    from fecm.sweeps.result import SweepResult
 
 _KIND_HELP = "; ".join(f"{name}: {kind.summary}" for name, kind in KINDS.items())
 
@@ -39,11 +40,35 @@ def _numbers(form: str, count: int = 0) -> Callable[[click.Context, click.Parame
     return callback
 
 
+def _names(context: click.Context, parameter: click.Parameter, value: str) -> tuple[str, ...]:
+    """One or two names."""
+    names = tuple(part.strip() for part in value.split(",")) if value else ()
+    if len(names) > 2 or not all(names):
+        raise click.BadParameter(f"{value} is not of the form NAME or NAME,NAME")
+    return names
+
+
+def _pairs(
+    context: click.Context, parameter: click.Parameter, values: tuple[str, ...]
+) -> dict[str, str]:
+    """Values by name."""
+    pairs = {}
+    for value in values:
+        name, _, wanted = (part.strip() for part in value.partition("="))
+        if not name or not wanted:
+            raise click.BadParameter(f"{value} is not of the form NAME=VALUE")
+        if name in pairs:
+            raise click.BadParameter(f"{name} is given twice")
+        pairs[name] = wanted
+    return pairs
+
+
 @click.command()
 @click.argument("results", type=DECK_PATH, nargs=-1, required=True, metavar="RESULT...")
 @click.option("--kind", "kinds", type=click.Choice(list(KINDS)), multiple=True,
-              default=("force",), show_default=True, metavar="KIND",
-              help=f"What to draw; may be repeated.  {_KIND_HELP}.")  # fmt: skip
+              metavar="KIND",
+              help=f"What to draw; may be repeated.  {_KIND_HELP}.  [default: force; map of a "
+                   "sweep]")  # fmt: skip
 @click.option("-o", "--output", type=FILE_PATH, metavar="PATH",
               help="Picture (.png, .svg, .pdf; .gif for animation), or folder for several.  "
                    "[default: RESULT-KIND.png in this folder]")  # fmt: skip
@@ -61,6 +86,15 @@ def _numbers(form: str, count: int = 0) -> Callable[[click.Context, click.Parame
               help="Direction of line.")  # fmt: skip
 @click.option("--width", type=click.Choice(["column", "full"]), default="column",
               show_default=True, help="3.5 in, or 7.2 in.")  # fmt: skip
+@click.option("--quantity", metavar="NAME", default="peak_force", show_default=True,
+              help="What map shows: a name of the sweep's summary.")  # fmt: skip
+@click.option("--over", callback=_names, metavar="NAME[,NAME]", default="",
+              help="What map is over.  [default: what varies]")  # fmt: skip
+@click.option("--where", callback=_pairs, multiple=True, metavar="NAME=VALUE",
+              help="The map's cases with this value alone, the nearest there is; may be "
+                   "repeated.")  # fmt: skip
+@click.option("--level", callback=_numbers("VALUE,..."), metavar="VALUE,...",
+              help="Values to mark in map, in the deck's unit.")  # fmt: skip
 @click.option("--overwrite", is_flag=True, help="Replace pictures that exist.")
 def plot(
     results: tuple[Path, ...],
@@ -72,14 +106,19 @@ def plot(
     times: tuple[float, ...],
     along: str,
     width: str,
+    quantity: str,
+    over: tuple[str, ...],
+    where: dict[str, str],
+    level: tuple[float, ...],
     overwrite: bool,
 ) -> None:
-    """Draw the report's figures from one RESULT or several."""
-    options = Options(at, gages, face, times, along, width)
+    """Draw the report's figures from one RESULT or several, or the map of a sweep."""
+    options = Options(at, gages, face, times, along, width, quantity, over, where, level)
     try:
-        paths = _paths(results[0], list(dict.fromkeys(kinds)), output)
+        paths = _paths(results[0], list(dict.fromkeys(kinds)) or _usual(results[0]), output)
         check_outputs(list(paths.values()), overwrite)
-        pictures = _draw(_named(results), list(paths), options)
+        _check_kinds(results, list(paths))
+        pictures = _draw(_named(results, list(paths)), list(paths), options)
         for kind, path in paths.items():
             save(pictures[kind], path)
             click.echo(path)
@@ -102,19 +141,54 @@ def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path
     return {kind: folder / f"{first.stem}-{kind}{KINDS[kind].suffixes[0]}" for kind in kinds}
 
 
-def _named(paths: tuple[Path, ...]) -> dict[str, Result]:
+def _form(path: Path) -> str:
+    """What a file says that it is; nothing where it can't be read."""
+    from fecm.results.hdf5 import OpenArrays
+    from fecm.results.schema import ResultFileError
+
+    if not path.is_file():
+        return ""
+    try:
+        with OpenArrays(path) as file:
+            return str(file.attributes("/").get("format", ""))
+    except ResultFileError:
+        return ""
+
+
+def _usual(path: Path) -> list[str]:
+    """The kind that is drawn when none is asked for."""
+    from fecm.results.schema import SWEEP
+
+    return ["map" if _form(path) == SWEEP else "force"]
+
+
+def _check_kinds(paths: Sequence[Path], kinds: Sequence[str]) -> None:
+    """Refuse a run's result for a map, and a sweep's for anything else."""
+    from fecm.results.schema import FORMAT, SWEEP
+
+    for path in paths:
+        form = _form(path)
+        for kind in kinds if form in (FORMAT, SWEEP) else ():
+            check_kind(kind, str(path), sweep=form == SWEEP)
+
+
+def _named(paths: tuple[Path, ...], kinds: Sequence[str]) -> dict[str, Result | SweepResult]:
     """Results by the shortest names that tell them apart."""
     from fecm.results.result import load
+    from fecm.sweeps.result import load as load_sweep
 
     names = [path.stem for path in paths]
     if len(set(names)) < len(names):
         names = [str(path) for path in paths]
     if len(set(names)) < len(names):
         raise Refused("a result is given twice")
-    return {name: load(path) for name, path in zip(names, paths, strict=True)}
+    read = load_sweep if KINDS[kinds[0]].sweep else load
+    return {name: read(path) for name, path in zip(names, paths, strict=True)}
 
 
-def _draw(results: dict[str, Result], kinds: list[str], options: Options) -> dict[str, Picture]:
+def _draw(
+    results: dict[str, Result | SweepResult], kinds: list[str], options: Options
+) -> dict[str, Picture]:
     """Draw all pictures, before any is written."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)

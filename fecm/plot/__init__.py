@@ -7,7 +7,7 @@ is a row of `KINDS`; its function takes named results and options and gives a :c
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fecm.results.result import Result
+    from fecm.sweeps.result import SweepResult
 
 SUFFIXES = (".png", ".svg", ".pdf")
 MISSING = "pictures need matplotlib: pip install 'fecm[plot]'"
@@ -39,12 +40,15 @@ class Kind:
         Whether several results go into one picture.
     suffixes : tuple of str
         Formats it can be written in, the usual one first.
+    sweep : bool
+        Whether it shows the result of a sweep, not of a run.
     """
 
     function: str
     summary: str
     several: bool = False
     suffixes: tuple[str, ...] = SUFFIXES
+    sweep: bool = False
 
 
 KINDS = {
@@ -57,6 +61,7 @@ KINDS = {
     "surface": Kind("deflection:surface", "the deflected plate"),
     "mesh": Kind("meshes:mesh", "mesh, supports and impact point"),
     "animation": Kind("deflection:animation", "the moving plate", suffixes=(".gif",)),
+    "map": Kind("maps:parameter_map", "a number of a sweep over what varies", sweep=True),
 }
 
 
@@ -78,6 +83,14 @@ class Options:
         Direction of the line, ``"x"`` or ``"y"``.
     width : str
         ``"column"`` (3.5 in) or ``"full"`` (7.2 in).
+    quantity : str
+        What a map shows: a name of a sweep's summary.
+    over : tuple of str
+        One or two names of what varies; all that does if empty.
+    where : mapping of str to float or str
+        A map's cases alone whose values, by name, are these; of numbers the nearest ones.
+    level : tuple of float
+        Values of the quantity to mark in a map (the deck's unit).
     """
 
     at: tuple[tuple[float, float], ...] = ()
@@ -86,6 +99,10 @@ class Options:
     times: tuple[float, ...] = ()
     along: str = "x"
     width: str = "column"
+    quantity: str = "peak_force"
+    over: tuple[str, ...] = ()
+    where: Mapping[str, float | str] = field(default_factory=dict)
+    level: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -96,14 +113,30 @@ class Picture:
     frames: Sequence[Callable[[], Any]] = ()
 
 
-def draw(kind: str, results: Mapping[str, Result], options: Options | None = None) -> Picture:
+def check_kind(kind: str, name: str, *, sweep: bool) -> None:
+    """Refuse a kind that does not show such a result.
+
+    Raises
+    ------
+    PlotError
+    """
+    if KINDS[kind].sweep != sweep:
+        what, fits = ("sweep", "the kind map does") if sweep else ("run", "the other kinds do")
+        raise PlotError(
+            f"{name} is the result of a {what}, which the kind {kind} can't show; {fits}"
+        )
+
+
+def draw(
+    kind: str, results: Mapping[str, Result | SweepResult], options: Options | None = None
+) -> Picture:
     """Draw a picture.
 
     Parameters
     ----------
     kind : str
         One of `KINDS`.
-    results : mapping of str to Result
+    results : mapping of str to Result or SweepResult
         Results by the name they have in the legend.
     options : Options, optional
 
@@ -123,7 +156,10 @@ def draw(kind: str, results: Mapping[str, Result], options: Options | None = Non
     except ImportError:
         raise ImportError(MISSING) from None
     from fecm.plot.style import RC
+    from fecm.results.result import Result
 
+    for name, result in results.items():
+        check_kind(kind, name, sweep=not isinstance(result, Result))
     module, _, function = KINDS[kind].function.partition(":")
     drawn = getattr(import_module(f"fecm.plot.{module}"), function)
     with matplotlib.rc_context(RC):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from fecm.version import __version__
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.figure import Figure
 
 Array = NDArray[Any]
 
@@ -86,6 +87,48 @@ class SweepResult:
         table = pandas.DataFrame({**self.cases, **self.summary})
         table.index.name = "case"
         return table
+
+    def plot(
+        self,
+        quantity: str = "peak_force",
+        over: str | Sequence[str] = (),
+        path: str | Path | None = None,
+        **options: Any,
+    ) -> Figure:
+        """Draw a map, and write it if there is a path.
+
+        Parameters
+        ----------
+        quantity : str
+            What it shows, a name of the summary.
+        over : str or sequence of str
+            One or two names of what varies; all that does if empty.
+        path : str or Path, optional
+            Where to write it, in place of what is there; its suffix is the format.
+        **options
+            Other fields of :class:`fecm.plot.Options`: ``where``, ``level``, ``width``.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        PlotError
+            If the sweep lacks what is asked for.
+        ImportError
+            If matplotlib is not installed.
+        """
+        from fecm.plot import Options, check_suffix, draw, save
+
+        if path is not None:
+            check_suffix("map", Path(path))
+        names = (over,) if isinstance(over, str) else tuple(over)
+        chosen = Options(quantity=quantity, over=names, **options)
+        picture = draw("map", {self.title or "the sweep": self}, chosen)
+        if path is not None:
+            save(picture, Path(path))
+        return picture.figure
 
 
 def result_of(plan: Plan, outcome: Outcome) -> SweepResult:

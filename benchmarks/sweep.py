@@ -1,0 +1,116 @@
+"""A thousand impacts as a whole process, against their full runs and a plain sparse loop.
+
+    python benchmarks/sweep.py [--write]
+
+The report's plate over 800 µs (4000 steps) is hit at 40 velocities with 25 contact coefficients:
+``fecm sweep`` in a process of its own, from its start to its end, and the same with ``--history``.
+Every 50th case is run in full by ``fecm.run``; what is compared is the contact force of every step,
+over the peak force.  The plain loop is that of run.py, once, times 1000.
+`--write` keeps the figures in benchmarks/results, under the machine's name.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import platform
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import scipy
+from run import HERE, ROUNDS, checked, plain, report
+
+import fecm
+from fecm.sweeps.cases import Case
+from fecm.sweeps.variations import varied
+
+DECK = HERE.parent / "decks" / "impact-115.inp"
+VARY = ("--vary", "velocity=50:300:40", "--vary", "k=1e6:3e6:25")
+CASES, STEPS, EVERY = 1000, 4000, 50
+
+
+def process(output: Path, *options: str) -> float:
+    """Seconds of a sweep as a process."""
+    command = [sys.executable, "-m", "fecm", "sweep", str(DECK), *VARY, "-o", str(output),
+               "--overwrite", *options]  # fmt: skip
+    begin = time.perf_counter()
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return time.perf_counter() - begin
+
+
+def full(case: Case) -> tuple[fecm.Result, float]:
+    """A case's full run, and its seconds."""
+    begin = time.perf_counter()
+    result = fecm.run(varied(report(), case))
+    if not isinstance(result, fecm.Result):
+        raise TypeError("the deck holds several problems")
+    return result, time.perf_counter() - begin
+
+
+def compare(sweep: fecm.SweepResult) -> tuple[float, list[float]]:
+    """Largest difference of every 50th case over its peak force, and seconds of the full runs."""
+    if sweep.force is None or sweep.force.shape != (CASES, STEPS) or not sweep.fine.all():
+        raise ValueError("the sweep is not whole")
+    worst, seconds = 0.0, []
+    for number in range(0, CASES, EVERY):
+        result, took = full({name: values[number] for name, values in sweep.cases.items()})
+        seconds.append(took)
+        difference = np.abs(sweep.force[number] - result.force).max() / result.force.max()
+        worst = max(worst, float(difference))
+    return worst, seconds
+
+
+def measure() -> dict[str, float | int]:
+    """All figures."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "sweep.h5"
+        alone = [process(path) for _ in range(ROUNDS)]
+        peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+        stored = [process(path, "--history") for _ in range(ROUNDS)]
+        worst, seconds = compare(fecm.load_sweep(path))
+    problem = checked(report(), STEPS)
+    csr = statistics.median(plain(problem, STEPS) for _ in range(ROUNDS))
+    return {
+        "cases": CASES,
+        "steps": STEPS,
+        "seconds": round(statistics.median(alone), 2),
+        "slowest_seconds": round(max(alone), 2),
+        "seconds_with_history": round(statistics.median(stored), 2),
+        "peak_memory_mb": round(peak, 1),
+        "compared": len(seconds),
+        "largest_difference": float(f"{worst:.2g}"),
+        "full_run_seconds": round(statistics.median(seconds), 3),
+        "csr_run_seconds": round(csr, 3),
+        "full_runs_seconds": round(CASES * statistics.median(seconds)),
+        "csr_runs_seconds": round(CASES * csr),
+    }
+
+
+def main() -> None:
+    """Measure, print a table, and keep it if asked."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--write", action="store_true", help="keep the figures as JSON")
+    options = parser.parse_args()
+    figures = measure()
+    for name, value in figures.items():
+        print(f"{name.replace('_', ' '):24}{value:>10}")
+    if options.write:
+        versions = {m.__name__: m.__version__ for m in (fecm, np, scipy, h5py)}
+        machine = f"{platform.system()}-{platform.machine()}-{multiprocessing.cpu_count()}cores"
+        path = HERE / "results" / f"{machine.lower()}-sweep.json"
+        path.parent.mkdir(exist_ok=True)
+        content = {"machine": machine, "python": platform.python_version(), **versions}
+        path.write_text(json.dumps({**content, "sweep": figures}, indent=2) + "\n")
+        print(path)
+
+
+if __name__ == "__main__":
+    main()

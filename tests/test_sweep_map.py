@@ -1,0 +1,333 @@
+"""Maps of sweeps: what is drawn is the summary, in units, with gaps where cases failed."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import fecm
+from fecm.plot import KINDS, Options, PlotError, draw
+from fecm.sweeps.result import SweepResult, save
+from tests.calls import assert_unusable, call
+from tests.decks import DATA_CARDS, PROGRAM, small
+
+Floats = NDArray[np.float64]
+
+pytest.importorskip("matplotlib")
+
+STEPS = PROGRAM.replace("LOOP         10", "LOOP         60")
+NAMED = small(STEPS, data=DATA_CARDS + "UNIT\nin lbf s\n")
+VELOCITIES = [150.0, 50.0, 100.0]
+STIFFNESSES = [1e6, 2e6, 4e6, 3e6]
+LAYUPS = ["[0/90]", "[0/45]", "[30/-30]"]
+
+
+@pytest.fixture(scope="module")
+def plane() -> SweepResult:
+    """Velocity by k, neither in rising order."""
+    return fecm.sweep(NAMED, {"velocity": VELOCITIES, "k": STIFFNESSES})
+
+
+@pytest.fixture(scope="module")
+def layups() -> SweepResult:
+    """Velocity by layup, of which one can't be read."""
+    return fecm.sweep(NAMED, {"layup": [*LAYUPS, "[0/"], "velocity": VELOCITIES})
+
+
+@pytest.fixture
+def file(plane: SweepResult, tmp_path: Path) -> Path:
+    """The plane's file."""
+    save(plane, tmp_path / "plane.h5")
+    return tmp_path / "plane.h5"
+
+
+def some_failed(sweep: SweepResult, *cases: int) -> SweepResult:
+    """The same sweep with failed cases."""
+    summary = {name: values.copy() for name, values in sweep.summary.items()}
+    summary["status"] = summary["status"].astype("U40")
+    for case in cases:
+        for name, values in summary.items():
+            values[case] = "it went wrong" if name == "status" else np.nan
+    return SweepResult(sweep.cases, summary, sweep.dt, sweep.steps, units=sweep.units)
+
+
+def mesh_of(figure: Any) -> Any:
+    """The cells of a map."""
+    return figure.axes[0].collections[0]
+
+
+def data_of(line: Any) -> tuple[Floats, Floats]:
+    """What a line goes through."""
+    x, y = line.get_data()
+    return np.asarray(x), np.asarray(y)
+
+
+# Two values --------------------------------------------------------------------------------------
+
+
+def test_a_full_grid_is_a_cell_a_case_in_rising_order(plane: SweepResult) -> None:
+    figure = plane.plot()
+    axes, bar = figure.axes
+    assert axes.get_xlabel() == "Impact velocity (in/s)"
+    assert axes.get_ylabel() == "Contact coefficient $k$ (10⁶ lbf/in¹·⁵)"
+    assert bar.get_xlabel() == "Peak force (lbf)"
+    drawn = mesh_of(figure).get_array()
+    assert drawn.shape == (4, 3)
+    for velocity, k, force in zip(plane["velocity"], plane["k"], plane["peak_force"], strict=True):
+        row, column = sorted(STIFFNESSES).index(k), sorted(VELOCITIES).index(velocity)
+        assert drawn[row, column] == force
+    corners = mesh_of(figure).get_coordinates()
+    np.testing.assert_allclose(corners[0, :, 0], [25.0, 75.0, 125.0, 175.0])
+    np.testing.assert_allclose(corners[:, 0, 1], [0.5, 1.5, 2.5, 3.5, 4.5])
+
+
+def test_lines_of_equal_value_are_labelled_and_lie_where_the_values_are(
+    plane: SweepResult,
+) -> None:
+    level = 0.5 * float(plane["peak_force"].min() + plane["peak_force"].max())
+    figure = plane.plot(level=(level,))
+    marked: Any = figure.axes[0].collections[-1]
+    np.testing.assert_allclose(marked.levels, [level])
+    (path,) = [p for p in marked.get_paths() if len(p.vertices)]
+    # On the grid's own line of k = 2e6, between the velocities, the value is linear.
+    at = float(np.interp(2.0, *path.vertices[np.argsort(path.vertices[:, 1])].T[::-1]))
+    fixed = plane["k"] == 2e6
+    order = np.argsort(plane["velocity"][fixed])
+    expected = np.interp(level, plane["peak_force"][fixed][order], plane["velocity"][fixed][order])
+    assert at == pytest.approx(float(expected), rel=1e-6)
+    assert figure.axes[0].texts  # numbers on the lines
+
+
+def test_over_says_which_value_lies_across(plane: SweepResult) -> None:
+    figure = plane.plot(over=("k", "velocity"))
+    assert figure.axes[0].get_ylabel() == "Impact velocity (in/s)"
+    np.testing.assert_array_equal(mesh_of(figure).get_array(), mesh_of(plane.plot()).get_array().T)
+
+
+def test_failed_cases_are_gaps_and_told(plane: SweepResult) -> None:
+    holed = some_failed(plane, 1, 6)
+    with pytest.warns(UserWarning, match=r"2 of 12 cases of .* failed \(it went wrong\)"):
+        drawn = mesh_of(holed.plot()).get_array()
+    at = {
+        (sorted(STIFFNESSES).index(plane["k"][n]), sorted(VELOCITIES).index(plane["velocity"][n]))
+        for n in (1, 6)
+    }
+    assert {tuple(map(int, place)) for place in np.argwhere(drawn.mask)} == at
+
+
+def test_counts_have_a_colour_each_and_no_lines(plane: SweepResult) -> None:
+    figure = plane.plot("contacts")
+    assert len(figure.axes[0].collections) == 1
+    drawn = mesh_of(figure).get_array()
+    assert sorted(drawn.ravel()) == sorted(plane["contacts"])
+    assert figure.axes[1].get_xlabel() == "Contacts"
+
+
+def test_cases_that_are_no_grid_are_coloured_points() -> None:
+    cases = [{"velocity": v, "k": 1e6 + 1e4 * v} for v in (50.0, 80.0, 120.0)]
+    sweep = fecm.sweep(NAMED, cases=cases)
+    figure = sweep.plot("max_indentation", level=(float(sweep["max_indentation"][1]),))
+    points = mesh_of(figure)
+    np.testing.assert_allclose(
+        points.get_offsets(), np.column_stack([sweep["velocity"], 1e-6 * sweep["k"]])
+    )
+    shown = points.get_array() / sweep["max_indentation"]
+    np.testing.assert_allclose(shown, shown[0], rtol=1e-12)
+    assert list(points.get_linewidths()) == [0.0, 0.9, 0.9]
+
+
+def test_each_layup_is_a_curve(layups: SweepResult) -> None:
+    with pytest.warns(UserWarning, match="3 of 12 cases"):
+        figure = layups.plot(level=(100.0,))
+    (axes,) = figure.axes
+    lines = {line.get_label(): line for line in axes.get_lines()}
+    for layup in LAYUPS:
+        here = layups["layup"] == layup
+        x, y = data_of(lines[layup])
+        assert x.tolist() == sorted(VELOCITIES)
+        order = np.argsort(layups["velocity"][here])
+        np.testing.assert_array_equal(y, layups["peak_force"][here][order])
+    assert np.isnan(data_of(lines["[0/"])[1]).all()
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [*LAYUPS, "[0/"]
+    assert data_of(axes.get_lines()[-1])[1].tolist() == [100.0, 100.0]
+    assert axes.get_ylabel() == "Peak force (lbf)"
+
+
+def test_more_layups_than_colours_are_rows_that_show_where_they_pass_a_level() -> None:
+    angles = [f"[{angle}/0]" for angle in range(0, 80, 10)]
+    sweep = fecm.sweep(NAMED, {"layup": angles, "velocity": [50.0, 100.0]})
+    first = sweep["peak_force"][:2]
+    level = float(first.mean())
+    figure = sweep.plot(level=(level,))
+    axes = figure.axes[0]
+    assert [text.get_text() for text in axes.get_yticklabels()] == angles
+    assert axes.yaxis.get_inverted()
+    drawn = mesh_of(figure).get_array()
+    np.testing.assert_array_equal(drawn, sweep["peak_force"].reshape(8, 2))
+    mark: Any = axes.collections[1]
+    ((ends),) = mark.get_segments()
+    np.testing.assert_allclose(ends, [[75.0, -0.5], [75.0, 0.5]])
+
+
+# One value ---------------------------------------------------------------------------------------
+
+
+def test_one_value_is_a_line_with_a_gap_at_a_failed_case() -> None:
+    sweep = some_failed(fecm.sweep(NAMED, {"velocity": [100.0, 50.0, 150.0]}), 0)
+    with pytest.warns(UserWarning, match="1 of 3 cases"):
+        (axes,) = sweep.plot("time_of_peak").axes
+    (line,) = axes.get_lines()
+    x, y = data_of(line)
+    assert x.tolist() == [50.0, 100.0, 150.0]
+    np.testing.assert_allclose(y, 1e6 * sweep["time_of_peak"][[1, 0, 2]], rtol=1e-12)
+    assert np.isnan(y[1])
+    assert (line.get_linestyle(), line.get_marker()) == ("-", "o")
+    assert axes.get_ylabel() == "Time of peak (µs)"
+
+
+def test_one_layup_a_row_with_a_point(layups: SweepResult) -> None:
+    with pytest.warns(UserWarning, match="1 of 4 cases"):
+        (axes,) = layups.plot("impulse", where={"velocity": 101.0}).axes
+    assert [text.get_text() for text in axes.get_yticklabels()] == [*LAYUPS, "[0/"]
+    assert axes.get_title(loc="left") == "velocity 100 in/s"
+    x, y = data_of(axes.get_lines()[0])
+    assert y.tolist() == [0, 1, 2, 3]
+    here = layups["velocity"] == 100.0
+    shown = x[:3] / layups["impulse"][here][:3]
+    np.testing.assert_allclose(shown, shown[0], rtol=1e-12)
+    assert "lbf·s" in axes.get_xlabel()
+
+
+def test_points_are_not_joined_where_other_values_vary_too(plane: SweepResult) -> None:
+    (axes,) = plane.plot(over="velocity").axes
+    (line,) = axes.get_lines()
+    assert line.get_linestyle() == "None"
+    assert sorted(data_of(line)[1]) == sorted(plane["peak_force"])
+
+
+def test_a_sweep_without_units_has_none_on_its_axes() -> None:
+    (axes,) = fecm.sweep(small(STEPS), {"velocity": [50.0, 100.0]}).plot().axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("Impact velocity", "Peak force")
+
+
+# What is refused ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"quantity": "force"}, "no quantity force; there is peak_force, "),
+        ({"over": "q"}, "q is not among what .* varies: velocity and k"),
+        ({"over": "velocity", "where": {"velocity": 50.0}}, "velocity is the same in all"),
+        ({"where": {"velocity": 50.0, "k": 1e6}}, "nothing varies"),
+        ({"where": {"velocity": 500.0}}, "no velocity 500.0; its values reach from 50 to 150"),
+        ({"where": {"velocity": "fast"}}, "no velocity fast"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(
+    plane: SweepResult, options: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(PlotError, match=words):
+        plane.plot(**options)
+
+
+def test_more_than_two_values_need_a_choice() -> None:
+    sweep = fecm.sweep(NAMED, {"velocity": [50.0, 60.0], "k": [1e6, 2e6], "s_p": [0.1, 0.2]})
+    with pytest.raises(PlotError, match="velocity, k and s_p are 3 values to draw over; --over"):
+        sweep.plot()
+    with pytest.raises(PlotError, match=r"s_p varies too, .*; --where s_p=VALUE picks"):
+        sweep.plot(over=("velocity", "k"))
+    figure = sweep.plot(over=("velocity", "k"), where={"s_p": 0.2})
+    kept = sweep["s_p"] == 0.2
+    drawn = mesh_of(figure).get_array()
+    np.testing.assert_array_equal(drawn.T.ravel(), sweep["peak_force"][kept])
+    assert figure.axes[0].get_title(loc="left") == "s_p 0.2"
+
+
+def test_a_sweep_that_failed_whole_says_why(plane: SweepResult) -> None:
+    with pytest.raises(PlotError, match=r"12 of 12 cases .* failed \(it went wrong\)"):
+        some_failed(plane, *range(12)).plot()
+
+
+def test_a_level_beyond_all_values_is_told(plane: SweepResult) -> None:
+    with pytest.warns(UserWarning, match="level 1e.06 is outside"):
+        plane.plot(level=(1e6,))
+
+
+@pytest.mark.parametrize("kind", [name for name, kind in KINDS.items() if not kind.sweep])
+def test_kinds_of_runs_do_not_show_a_sweep(plane: SweepResult, kind: str) -> None:
+    with pytest.raises(PlotError, match=f"plane is the result of a sweep, .* {kind} can't show"):
+        draw(kind, {"plane": plane}, Options())
+
+
+# The command -------------------------------------------------------------------------------------
+
+
+def test_the_command_draws_a_map_without_being_asked_for_its_kind(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(file.parent)
+    done = call("plot", "plane.h5")
+    assert (done.exit_code, done.stdout, done.stderr) == (0, "plane-map.png\n", "")
+    assert Path("plane-map.png").read_bytes().startswith(b"\x89PNG")
+    done = call("plot", "plane.h5", "--over", "velocity", "--where", "k=2e6", "--quantity",
+                "impulse", "--level", "1e9", "-o", "line.svg")  # fmt: skip
+    assert (done.exit_code, done.stdout) == (0, "line.svg\n")
+    assert done.stderr.startswith("fecm: note: the level 1e+09 is outside")
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_command_notes_failed_cases(plane: SweepResult, tmp_path: Path) -> None:
+    save(some_failed(plane, 3), tmp_path / "holed.h5")
+    done = call("plot", tmp_path / "holed.h5", "-o", tmp_path / "map.png")
+    assert done.exit_code == 0
+    assert done.stderr == (
+        "fecm: note: 1 of 12 cases of holed failed (it went wrong); they are gaps in the picture\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "words"),
+    [
+        ("plane.h5", ("--kind", "force"), "result of a sweep, which the kind force can't show"),
+        ("run.h5", ("--kind", "map"), "result of a run, which the kind map can't show"),
+        ("run.h5", ("--kind", "force", "--kind", "map"), "the kind map can't show"),
+        ("plane.h5", ("copy/plane.h5",), "one result; 2 were given"),
+        ("plane.h5", ("--over", "q"), "q is not among what plane varies"),
+        ("plane.h5", ("--quantity", "status"), "no quantity status"),
+        ("deck.inp", ("--kind", "map"), "no readable HDF5 file"),
+    ],
+)
+def test_a_call_that_makes_no_map_is_refused_in_one_line(
+    file: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    name: str,
+    arguments: tuple[str, ...],
+    words: str,
+) -> None:
+    monkeypatch.chdir(file.parent)
+    fecm.run(small(), output="run.h5")
+    Path("deck.inp").write_text(NAMED)
+    Path("copy").mkdir()
+    shutil.copy(file, "copy")
+    done = call("plot", name, *arguments)
+    assert_unusable(done)
+    assert words in done.stderr
+    assert not list(file.parent.glob("*.png"))
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("--over", "a,b,c"), ("--over", "a,"), ("--where", "k"), ("--where", "k=1", "--where", "k=2"),
+     ("--level", "high"), ("--level", "nan")],
+)  # fmt: skip
+def test_an_option_of_the_wrong_form_is_refused(file: Path, arguments: tuple[str, ...]) -> None:
+    done = call("plot", file, *arguments)
+    assert done.exit_code == 2
+    assert arguments[0] in done.stderr
+    assert "Traceback" not in done.stderr
