@@ -24,6 +24,7 @@ from fecm.dynamics import PointForce
 from fecm.indentation import Constants, MemoryLaw, Point, stacked
 from fecm.mesh import generate
 from fecm.parts import build_law, build_projectile, set_up
+from fecm.sweeps import schedule
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.cases import Case, CasesError, grid, parse_vary, read_cases
 from fecm.sweeps.outcome import Outcome
@@ -301,7 +302,8 @@ def die(task: Task) -> Outcome:
 def test_tasks_whose_workers_always_die_end_as_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = problem_of(model(small()))
     made = plan(problem, grid([("layup", ["[0]", "[90]"])]))
-    monkeypatch.setattr("fecm.sweeps.schedule.attempt", die)
+    monkeypatch.setattr(schedule, "attempt", die)
+    monkeypatch.setattr(schedule, "DEATHS", 1)
     lost: dict[int, str] = {}
 
     def note(task: Task, outcome: Outcome) -> None:
@@ -362,9 +364,10 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_rows(
     assert_same(found, serial())
 
 
-def test_a_scheduler_that_does_not_answer_is_told() -> None:
+def test_a_scheduler_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    with pytest.raises(fecm.sweeps.schedule.SchedulerError, match="127"):
+    monkeypatch.setattr(schedule, "PATIENCE", "0.5s")
+    with pytest.raises(schedule.SchedulerError, match="127"):
         fecm.sweep(model(small()), {"k": [1e6]}, scheduler="tcp://127.0.0.1:9")
 
 

@@ -23,6 +23,8 @@ Idle = Callable[[], None]
 DEATHS = 3
 # Seconds between two looks at what else there is.
 LOOK = 0.5
+# How long a scheduler may take to answer.
+PATIENCE = "5s"
 LOST = "the worker that ran this case died, again and again"
 
 
@@ -88,7 +90,7 @@ def on_dask(tasks: Sequence[Task], address: str, done: Done, idle: Idle) -> None
         ) from None
     try:
         module: Any = distributed
-        client = module.Client(address, timeout="5s", set_as_default=False)
+        client = module.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise SchedulerError(f"no Dask scheduler answers at {address} ({error})") from None
     with client:
