@@ -25,11 +25,11 @@ def report_laminate() -> Laminate:
     "fronts in the report's laminate",
     Check("extension, 0° (in/s)", 294407.05115866, "√(A11/P)", 1e-11, CLOSED),
     Check("in-plane shear, 0° (in/s)", 124300.34606670, "√(A66/P)", 1e-11, CLOSED),
-    Check("bending, 0° (in/s)", 296304.98915263, "equation 2-69", 1e-11, CLOSED),
-    Check("twisting, 0° (in/s)", 122459.06491923, "equation 2-69", 1e-11, CLOSED),
+    Check("bending, 0° (in/s)", 296304.98915263, "determinant 2-70", 1e-11, CLOSED),
+    Check("twisting, 0° (in/s)", 122459.06491923, "determinant 2-70", 1e-11, CLOSED),
     Check("transverse shear, 0° (in/s)", 73521.46220938, "√(G13/ρ)", 1e-11, CLOSED),
-    Check("extension, 45° (in/s)", 236877.60935881, "equation 2-66", 1e-11, CLOSED),
-    Check("its ray's direction (degrees)", 15.916812, "equation 2-85", 1e-6, CLOSED),
+    Check("extension, 45° (in/s)", 236877.60935881, "determinant 2-69", 1e-11, CLOSED),
+    Check("its ray's direction (degrees)", 15.916812, "equation 2-84", 1e-6, CLOSED),
 )
 def wave_fronts() -> Sequence[float]:
     """Normal velocities, and a ray."""
@@ -49,8 +49,8 @@ CUTOFF = math.sqrt(12.0 * 0.8e6 / 0.000148) / 0.106
 @case(
     "dispersion",
     "harmonic flexural waves along 0° in the report's laminate",
-    Check("ω, wavelength 10 h (1/s)", 2.5518238987e5, "determinant 2-32", 1e-9, CLOSED),
-    Check("ω, wavelength h (1/s)", 4.3146696888e6, "determinant 2-32", 1e-9, CLOSED),
+    Check("ω, wavelength 10 h (1/s)", 2.5518238987e5, "determinant 2-30", 1e-9, CLOSED),
+    Check("ω, wavelength h (1/s)", 4.3146696888e6, "determinant 2-30", 1e-9, CLOSED),
     Check("cut-off ω (1/s)", CUTOFF, "√(12 G13/ρ)/h, the report, chapter 2", 1e-7,
           "at a wavelength of 10⁵ h"),
 )  # fmt: skip
