@@ -11,8 +11,6 @@ from fecm.verification.case import Case, Row
 
 HEAD = ("case", "source", "quantity", "expected", "got", "error", "allowed", "label", "verdict")
 FINE, NOT_FINE = "ok", "FAILED"
-# Columns of the page that are not the same on every machine.
-MEASURED = ("got", "error")
 
 
 def cells(row: Row) -> tuple[str, ...]:
@@ -100,7 +98,8 @@ fecm verify --markdown             # this page
 The error is what was got less what was expected, relative to what was expected; where that is zero,
 relative to the scale that the quantity names or that suits it. What is allowed is what the theory
 of the discretisation justifies, for the reason beside it. Each independent row fails when the
-physics that it speaks of is broken on purpose; `tests/test_verify.py` breaks it.
+physics that it speaks of is broken on purpose: `tests/test_verify_breaks.py` does it, break by
+break, and requires that no independent row is left out.
 
 Units are lb, in and s, except for the square plates of `static-bending` and `frequencies`, whose
 sides, moduli and densities are 1."""
