@@ -24,6 +24,7 @@ from fecm.cli.results import tapes
 from fecm.cli.rod import rod
 from fecm.cli.run import run
 from fecm.cli.sweep import sweep
+from fecm.cli.verify import verify
 from fecm.cli.waves import waves
 from fecm.results.schema import ResultFileError
 from fecm.version import __version__
@@ -37,6 +38,7 @@ def cli() -> None:
 
 for _command in (
     run, check, new, fmt, materials, info, tapes, diff, export, plot, waves, indent, rod, sweep,
+    verify,
 ):  # fmt: skip
     cli.add_command(_command)
 

@@ -1,0 +1,79 @@
+"""``fecm verify``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import click
+
+from fecm.cli.common import FORMAT_OPTION, AnswerIsNo, Refused
+
+if TYPE_CHECKING:
+    from fecm.verification import Case, Row
+
+
+@click.command()
+@click.argument("cases", nargs=-1, metavar="[CASE]...")
+@click.option("--list", "listing", is_flag=True, help="Name the cases and compute nothing.")
+@click.option("--markdown", is_flag=True, help="Write the documentation's page instead.")
+@FORMAT_OPTION
+def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: str) -> None:
+    """Compare this program with closed forms and known figures.
+
+    All cases are computed, or those named. Exit status 1 if a row is beyond its tolerance.
+    """
+    from fecm.verification import UnknownCaseError, chosen
+
+    if markdown and (listing or form == "json"):
+        raise Refused("--markdown goes with neither --list nor --format json")
+    try:
+        wanted = chosen(cases)
+    except UnknownCaseError as error:
+        raise Refused(str(error)) from None
+    if listing:
+        _name(wanted, form)
+        return
+    rows = _printed(wanted, form, markdown)
+    bad = sum(not row.within for row in rows)
+    count = f"{len(rows)} row{'s' * (len(rows) != 1)}"
+    if bad:
+        raise AnswerIsNo(f"{bad} of {count} {'is' if bad == 1 else 'are'} beyond tolerance")
+    if form == "text" and not markdown:
+        click.echo(f"{count}, all within tolerance")
+
+
+def _name(cases: Sequence[Case], form: str) -> None:
+    """Tell which cases there are."""
+    if form == "json":
+        told = [{"case": c.name, "title": c.title, "rows": len(c.checks)} for c in cases]
+        click.echo(json.dumps({"cases": told}, ensure_ascii=False))
+        return
+    width = max(len(one.name) for one in cases)
+    for one in cases:
+        click.echo(f"{one.name.ljust(width)}  {one.title}")
+
+
+def _printed(cases: Sequence[Case], form: str, markdown: bool) -> list[Row]:
+    """Compute cases and print their rows; a table grows while they are computed."""
+    from fecm.verification import carry_out, table
+
+    found: list[Row] = []
+
+    def rows() -> Iterator[Row]:
+        for one in cases:
+            for row in carry_out(one):
+                found.append(row)
+                yield row
+
+    if markdown:
+        click.echo(table.page(rows()), nl=False)
+    elif form == "json":
+        told = [table.values(row) for row in rows()]
+        fine = all(row.within for row in found)
+        click.echo(json.dumps({"ok": fine, "rows": told}, ensure_ascii=False, allow_nan=False))
+    else:
+        for line in table.lines(cases, rows()):
+            click.echo(line)
+    return found

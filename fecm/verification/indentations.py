@@ -1,0 +1,63 @@
+"""The indentation law along paths, against the report's equations and their integrals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from fecm.indentation import Constants, MemoryLaw, Point, follow
+from fecm.verification.case import Check, case
+
+# The report's laminate with the 0.5 in indenter, and with the 0.75 in one (lb, in).
+HALF_INCH = Constants(k=1.330e6, alpha_p=6.564e-4, s_p=0.094, q=2.5)
+K, ALPHA_P, S_P, Q = 1.912e6, 6.564e-4, 0.094, 2.0
+LAW = MemoryLaw(Constants(K, ALPHA_P, S_P, Q))
+
+PEAK = 2e-3
+FORCE = K * PEAK**1.5
+REMAINS = S_P * (PEAK - ALPHA_P)
+HALFWAY = (PEAK + REMAINS) / 2.0
+LOST = 2.0 / 5.0 * K * PEAK**2.5 - FORCE * (PEAK - REMAINS) / (Q + 1.0)
+ROUNDING = "rounding"
+POINTS = 2000
+
+
+def _forces(corners: Sequence[float], points: int = 1) -> list[Point]:
+    return [point for point, _ in follow(LAW, corners, points)]
+
+
+@case(
+    "indentation",
+    "loading, unloading and reloading of the report's laminate",
+    Check("F(α_p), 0.5 in indenter (lb)", 22.4, "1.330·10⁶ α_p^1.5, three digits", 2e-3,
+          "three digits are given"),
+    Check("F at the peak (lb)", FORCE, "k α^1.5, equation 3-1", 1e-12, ROUNDING),
+    Check("F halfway down to α₀ (lb)", FORCE / 2.0**Q, "equations 3-3 and 3-8", 1e-12, ROUNDING),
+    Check("F at α₀ (lb)", 0.0, "equation 3-3", 1e-12, ROUNDING, scale=FORCE),
+    Check("jump of F where unloading begins (lb)", 0.0, "continuity", 1e-8,
+          "a step of 10⁻⁹ of the peak", scale=FORCE),
+    Check("jump of F where reloading begins (lb)", 0.0, "continuity", 1e-8,
+          "a step of 10⁻⁹ of the peak", scale=FORCE),
+    Check("F back at the peak (lb)", FORCE, "reloading returns to where unloading began", 1e-12,
+          ROUNDING),
+    Check("F halfway up from α₀ (lb)", FORCE / 2.0**1.5, "equation 3-11", 1e-12, ROUNDING),
+    Check("work lost in a cycle (lb in)", LOST, "integrals of 3-1 and 3-3", 1e-6,
+          "trapezoidal rule, 2000 points"),
+)  # fmt: skip
+def indentation() -> Sequence[float]:
+    """Forces at places of several paths, and the area of a loop."""
+    step = 1e-9 * PEAK
+    down = _forces((PEAK, HALFWAY, REMAINS))
+    top = _forces((PEAK, PEAK - step))
+    turn = _forces((PEAK, HALFWAY, HALFWAY + step))
+    up = _forces((PEAK, -PEAK, HALFWAY, PEAK))
+    loop = _forces((PEAK, 0.0), POINTS)
+    work = sum((b.indentation - a.indentation) * (a.force + b.force) / 2.0
+               for a, b in pairwise(loop))  # fmt: skip
+    return [
+        HALF_INCH.loading(ALPHA_P), down[1].force, down[2].force, down[3].force,
+        top[2].force - top[1].force, turn[3].force - turn[2].force, up[4].force, up[3].force, work,
+    ]  # fmt: skip
+
+
+CASES = (indentation,)

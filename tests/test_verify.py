@@ -1,0 +1,216 @@
+"""``fecm verify``: its figures and its output."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import fecm
+from fecm import laminate as laminates
+from fecm import plate
+from fecm.deck.model import Deck, Material
+from fecm.indentation import Constants
+from fecm.mesh import generate
+from fecm.verification import CASES, carry_out, chosen, table
+from fecm.verification.case import Case, Check, Row
+from fecm.verification.decks import report_impact
+from tests.builders import table as reference
+from tests.calls import assert_unusable, call
+from tests.decks import LONG, ROOT
+
+PAGE = ROOT / "docs" / "verification.md"
+
+
+def check_of(case: str, quantity: str) -> Check:
+    """A check by its case and the beginning of its quantity."""
+    (one,) = chosen([case])
+    (found,) = [check for check in one.checks if check.quantity.startswith(quantity)]
+    return found
+
+
+# Output ------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def rows() -> list[Row]:
+    """Every row, computed once."""
+    return [row for one in CASES for row in carry_out(one)]
+
+
+def test_every_row_is_within_its_tolerance(rows: list[Row]) -> None:
+    assert [(r.case, r.check.quantity, r.error, r.failure) for r in rows if not r.within] == []
+
+
+def test_the_page_is_made_from_the_cases(rows: list[Row]) -> None:
+    def fixed(text: str) -> list[list[str]]:
+        # Everything but the cells that differ between machines.
+        lines = [line.split(" | ") for line in text.splitlines()]
+        return [cells[:3] + cells[5:] if len(cells) == 8 else cells for cells in lines]
+
+    assert fixed(PAGE.read_text()) == fixed(table.page(rows))
+    assert "**" not in PAGE.read_text().partition("## ")[2]  # no row of it has failed
+
+
+def test_some_cases_are_computed_and_told_in_a_table() -> None:
+    done = call("verify", "time-step", "cross-ply")
+    assert done.exit_code == 0
+    assert done.stderr == ""
+    head, *body, last = done.stdout.splitlines()
+    assert head.split() == list(table.HEAD)
+    assert [line.split()[0] for line in body] == ["cross-ply"] * 8 + ["time-step"] * 2
+    assert all(line.endswith("independent  ok") for line in body)
+    assert {line.index("independent") for line in body} == {head.index("label")}
+    assert last == "10 rows, all within tolerance"
+
+
+def test_programs_get_every_number_and_what_could_not_be_computed_is_null(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    done = call("verify", "indentation", "--format", "json")
+    told = json.loads(done.stdout)
+    assert (done.exit_code, told["ok"], len(told["rows"])) == (0, True, 9)
+    first = told["rows"][0]
+    assert first["expected"] == 22.4
+    assert first["error"] == pytest.approx(first["got"] / 22.4 - 1.0)
+    monkeypatch.setattr(Constants, "loading", None)
+    done = call("verify", "indentation", "--format", "json")
+    told = json.loads(done.stdout)
+    assert (done.exit_code, told["ok"], told["rows"][0]["got"]) == (1, False, None)
+    assert told["rows"][0]["failure"].startswith("TypeError: ")
+
+
+def test_a_row_beyond_its_tolerance_is_told_and_the_answer_is_no(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    right = laminates.transformed_shear
+    monkeypatch.setattr(
+        laminates, "transformed_shear", lambda g13, g23, angle: 1.01 * right(g13, g23, angle)
+    )
+    done = call("verify", "cross-ply", "angle-ply")
+    assert done.exit_code == 1
+    assert [line.split()[-1] for line in done.stdout.splitlines()].count("FAILED") == 2
+    assert done.stderr == "fecm: error: 2 of 17 rows are beyond tolerance\n"
+
+
+def test_a_case_that_can_not_be_computed_says_why_and_fails(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(plate, "stiffness", lambda *_, **__: 1 / 0)
+    done = call("verify", "static-bending")
+    assert done.exit_code == 1
+    assert "\n  ZeroDivisionError: division by zero\n" in done.stdout
+    assert done.stderr == "fecm: error: 4 of 4 rows are beyond tolerance\n"
+    assert "Traceback" not in done.stdout
+
+
+def test_a_list_names_the_cases_without_computing_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fecm.verification.carry_out", None)
+    done = call("verify", "--list")
+    assert [line.split()[0] for line in done.stdout.splitlines()] == [one.name for one in CASES]
+    told = json.loads(call("verify", "--list", "patch", "--format", "json").stdout)
+    assert [(one["case"], one["rows"]) for one in told["cases"]] == [("patch", 8)]
+
+
+def test_what_can_not_be_meant_is_refused() -> None:
+    done = call("verify", "patches")
+    assert_unusable(done)
+    assert "no case patches; there are isotropic-ply, cross-ply" in done.stderr
+    for options in (("--list",), ("--format", "json")):
+        assert_unusable(call("verify", "--markdown", *options))
+
+
+def test_numbers_that_are_missing_or_not_finite_are_never_within() -> None:
+    check = Check("x", 1.0, "nowhere", 0.1, "")
+    for given in ([], [math.nan], [math.inf], [1.0, 1.0]):
+        (row,) = carry_out(Case("made", "", (check,), lambda given=given: given))  # type: ignore[misc]
+        assert not row.within
+        assert table.cells(row)[-1] == "FAILED"
+
+
+# Figures -----------------------------------------------------------------------------------------
+
+
+def test_the_deck_made_in_python_is_the_reports() -> None:
+    made, given = report_impact(), fecm.read_deck(LONG)
+    assert isinstance(given, Deck)
+    ours, theirs = generate(made), generate(given)
+    for name in ("coordinates", "elements", "codes", "equations"):
+        np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name))
+    assert made.need(Material) == given.need(Material)
+    (dt,) = [macro.value for macro in made.macros if macro.word == "DT"]
+    assert dt == 2e-7
+
+
+def test_zeners_figures_are_the_solution_of_his_equations() -> None:
+    m, k, v = 2.0e-5, 5.0e4, 100.0
+    slope = 1.0 / (8.0 * math.sqrt(1.0e7 * 0.1**3 / 12.0 / (1.0 - 0.3**2) * 2.5e-4 * 0.1))
+
+    def rate(_: float, y: Any) -> list[float]:
+        force = k * max(y[0], 0.0) ** 1.5
+        return [y[1] - slope * force, -force / m]  # approach; velocity of the mass
+
+    found = solve_ivp(
+        rate, (0.0, 200e-6), [0.0, v], method="DOP853", rtol=1e-12, atol=1e-16,
+        dense_output=True, events=lambda t, y: rate(t, y)[0],
+    )  # fmt: skip
+    time = found.t_events[0][0]
+    figures = (
+        ("largest force", k * found.sol(time)[0] ** 1.5),
+        ("its time", time),
+        ("velocity at 200", -found.y[1, -1]),
+    )
+    for quantity, value in figures:
+        assert check_of("infinite-plate", quantity).expected == pytest.approx(value, rel=1e-8)
+
+
+def test_dalemberts_figures_are_the_sums_of_his_waves() -> None:
+    through = math.sqrt(7.33e-4 / 30.0e6)
+
+    def middle(time: np.ndarray[Any, Any], tau: float) -> Any:
+        total = np.zeros_like(time)
+        for turn in range(70):
+            for sign, path in ((1.0, 2 * turn + 0.5), (-1.0, 2 * turn + 1.5)):
+                late = time - path * through
+                pulse = 1000.0 * np.exp(-(((late - tau) / 80e-6) ** 2))
+                total += np.where(late >= 0.0, sign * pulse, 0.0)
+        return total
+
+    # Its largest value lies just before a jump comes by.
+    peak = middle(np.linspace(190e-6, 210e-6, 200_001), 200e-6).max()
+    assert check_of("rod-pulse", "largest force").expected == pytest.approx(peak, rel=1e-6)
+    later = middle(np.array([250e-6]), 300e-6)[0]
+    assert check_of("rod-pulse", "the same pulse").expected == pytest.approx(later, rel=1e-9)
+
+
+def test_figures_of_series_and_of_waves_are_those_of_the_reference_files() -> None:
+    def of(name: str, key: str, column: str, **where: str) -> float:
+        (value,) = [
+            float(row[column])
+            for row in reference(name)
+            if key in row[next(iter(row))] and all(row[k] == v for k, v in where.items())
+        ]
+        return value
+
+    static = "static_ssss_mindlin.csv"
+    expected = [check.expected for check in chosen(["static-bending"])[0].checks]
+    series = [
+        of(static, f"h/a={ratio}", column, load="uni (unit)")
+        for ratio, column in (
+            ("0.1 ks=1.0", "w_centre"), ("0.1 ks=1.0", "quarter_point w(a/4,b/4)"),
+            ("0.01 ks=1.0", "w_centre"), ("0.1 ks=0.83", "w_centre"),
+        )
+    ]  # fmt: skip
+    assert expected == pytest.approx(series, rel=1e-10)
+    for quantity, m, n in (("ω11, lumped", 1, 1), ("ω13, lumped", 1, 3), ("ω33, cons", 3, 3)):
+        value = of("freq_ssss_mindlin.csv", "h/a=0.1 ks=1.0", "omega_flex_rad/s_or_nondim",
+                   m=str(m), n=str(n))  # fmt: skip
+        assert check_of("frequencies", quantity).expected == pytest.approx(value, rel=1e-11)
+    (along,) = [r for r in reference("waves_normal_velocity.csv") if r["theta_deg"] == "0"]
+    given = [float(value) for value in list(along.values())[1:6]]
+    fronts = [check.expected for check in chosen(["wave-fronts"])[0].checks[:5]]
+    assert fronts == pytest.approx(given, rel=1e-13)
