@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -22,7 +24,7 @@ from fecm.deck.model import (
     PrintOption,
 )
 from fecm.deck.numbers import format_real, parse_real
-from fecm.deck.records import Control, Macro
+from fecm.deck.records import Control, Macro, NodeValues
 from tests.decks import APPENDIX, DATA_CARDS, LONG, MESH, small
 
 
@@ -264,3 +266,11 @@ def test_a_free_format_value_knows_its_place() -> None:
 
 def test_line_ends_and_byte_order_marks_of_other_systems_change_nothing() -> None:
     assert read("\ufeff" + small().replace("\n", "\r\n")) == read(small())
+
+
+def test_numpys_numbers_are_written_as_plain_ones() -> None:
+    deck = read(small())
+    node = NodeValues(1, 0, (np.float64(0.123456789012), np.float64(1.6)))
+    made = replace(deck, segments=(Coordinates((node,)),), text="")
+    assert "np." not in made.to_text()
+    assert "0.123456789012" in made.to_text()

@@ -289,10 +289,15 @@ def write_card(fields: Fields, values: Sequence[Value]) -> str:
     for field, value in zip(fields, values, strict=True):
         text = _written(field, value)
         if text is None:
-            return ", ".join(str(v) if isinstance(v, str) else repr(v) for v in values)
+            return ", ".join(map(_free, values))
         line = line.ljust(field.first - 1)
         line += text.ljust(field.width) if field.kind == "A" else text.rjust(field.width)
     return line.rstrip()
+
+
+def _free(value: Value) -> str:
+    """A value's text in free format; NumPy's numbers as Python's."""
+    return repr(float(value)) if isinstance(value, float) else str(value)
 
 
 def _written(field: Field, value: Value) -> str | None:
