@@ -13,6 +13,7 @@ from typing import NoReturn
 
 import click
 
+from fecm.cli import apart
 from fecm.cli.common import INTERRUPTED, UNUSABLE, signals
 from fecm.cli.decks import check, fmt, materials, new
 from fecm.cli.diff import diff
@@ -44,6 +45,7 @@ for _command in (
 def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoReturn:
     """Run the command line and leave with its exit status."""
     signals.install()
+    apart.switch.on = arguments is None
     try:
         cli.main(arguments, prog_name=prog_name, standalone_mode=False)
     except click.ClickException as error:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from fecm.cli.apart import reads
 from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, check_outputs
 from fecm.plot import KINDS, Options, Picture, PlotError, check_suffix, draw, save
 
@@ -62,6 +63,7 @@ def _numbers(form: str, count: int = 0) -> Callable[[click.Context, click.Parame
 @click.option("--width", type=click.Choice(["column", "full"]), default="column",
               show_default=True, help="3.5 in, or 7.2 in.")  # fmt: skip
 @click.option("--overwrite", is_flag=True, help="Replace pictures that exist.")
+@reads("results")
 def plot(
     results: tuple[Path, ...],
     kinds: tuple[str, ...],
