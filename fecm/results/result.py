@@ -82,7 +82,8 @@ class Result:
     @property
     def slips(self) -> tuple[str, ...]:
         """The slips that were on, sorted."""
-        return tuple(self.attributes.get("slips", ()))
+        slips = self.attributes.get("slips", ())
+        return tuple(map(str, slips)) if isinstance(slips, list | tuple) else ()
 
     def unit(self, dimension: str) -> str:
         """Unit of a dimension such as ``"force/length"``; empty where the deck names no units."""
