@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fecm.check import Checked, check
+from fecm.check.memory import check_memory
 from fecm.check.run import UNSTABLE
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.model import Deck
@@ -125,6 +126,8 @@ def run(
         If the motion grows without bound, or the energy balance passes its limit.
     ValueError
         If the mode, a slip, the rod's mass or its integrator is unknown.
+    NotEnoughMemoryError
+        If the run takes more memory than is free: a MemoryError.
     OSError
         If a file can't be read or written.
 
@@ -143,6 +146,7 @@ def run(
     }  # fmt: skip
     results: list[Result] = []
     for number, problem in enumerate(prepared.problems, start=1):
+        check_memory(problem, solver=solver, in_memory=output is None)
         if output is None:
             memory = MemorySink()
             simulate(problem, active, memory, **how)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 
@@ -50,3 +50,11 @@ def _alive(process: int) -> bool:
     except OSError:
         return True
     return True
+
+
+def clear_partials_of(process: int, folders: Iterable[Path]) -> None:
+    """Remove the partial files that a process which is no more has left in some folders."""
+    for folder in folders:
+        for partial in folder.glob(f".*.{process}.partial*"):
+            with contextlib.suppress(OSError):
+                partial.unlink()

@@ -13,6 +13,7 @@ from typing import NoReturn
 
 import click
 
+from fecm.cli import apart
 from fecm.cli.common import INTERRUPTED, UNUSABLE, signals
 from fecm.cli.decks import check, fmt, materials, new
 from fecm.cli.diff import diff
@@ -26,6 +27,8 @@ from fecm.cli.run import run
 from fecm.cli.sweep import sweep
 from fecm.cli.verify import verify
 from fecm.cli.waves import waves
+from fecm.memory import NotEnoughMemoryError
+from fecm.results.plain import printable
 from fecm.results.schema import ResultFileError
 from fecm.version import __version__
 
@@ -46,6 +49,7 @@ for _command in (
 def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoReturn:
     """Run the command line and leave with its exit status."""
     signals.install()
+    apart.switch.on = arguments is None
     try:
         cli.main(arguments, prog_name=prog_name, standalone_mode=False)
     except click.ClickException as error:
@@ -58,16 +62,18 @@ def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoR
         sys.stderr.close()
         raise SystemExit(UNUSABLE) from None
     except (OSError, MemoryError) as error:
-        click.echo(f"fecm: error: {_told(error)}", err=True)
+        click.echo(f"fecm: error: {printable(_told(error))}", err=True)
         raise SystemExit(UNUSABLE) from None
     except ResultFileError as error:
-        click.echo(f"fecm: error: {error}", err=True)
+        click.echo(f"fecm: error: {printable(str(error))}", err=True)
         raise SystemExit(UNUSABLE) from None
     raise SystemExit(0)
 
 
 def _told(error: Exception) -> str:
     """One line about an error of the operating system."""
+    if isinstance(error, NotEnoughMemoryError):
+        return str(error)
     if isinstance(error, MemoryError):
         return "there is not enough memory"
     if isinstance(error, OSError) and error.strerror:

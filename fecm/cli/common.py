@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, TextIO
 import click
 
 from fecm.files import beside
+from fecm.results.plain import printable
 from fecm.slips import MODES, REPORT
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ class Refused(click.ClickException):
 
     def show(self, file: object = None) -> None:
         """Print the message on standard error."""
-        click.echo(f"fecm: error: {self.message}", err=True)
+        click.echo(f"fecm: error: {printable(self.message)}", err=True)
 
 
 class AnswerIsNo(Refused):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from fecm.cli.apart import reads
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, Refused
 from fecm.results.plain import jsonable, printable, shown
 
@@ -41,6 +42,7 @@ def _tolerance(_: click.Context, option: click.Parameter, value: str) -> float:
                    "repeated.")  # fmt: skip
 @click.option("--brief", is_flag=True, help="Print only what differs, by name, and the verdict.")
 @FORMAT_OPTION
+@reads("a", "b")
 def diff(
     a: Path, b: Path, rtol: float, atol: float, only: tuple[str, ...], brief: bool, form: str
 ) -> None:

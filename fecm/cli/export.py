@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from fecm.cli.apart import reads
 from fecm.cli.common import DECK_PATH, Refused, check_outputs
 
 STANDARD_OUTPUT = "-"
@@ -23,6 +24,7 @@ STANDARD_OUTPUT = "-"
               help="What csv holds: a dataset as tape3/w, or a group.  [default: history]",
               )  # fmt: skip
 @click.option("--overwrite", is_flag=True, help="Replace a file that exists.")
+@reads("result")
 def export(
     result: Path, target: str, output: Path | None, dataset: str | None, overwrite: bool
 ) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from fecm.cli.apart import reads
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION
 from fecm.results.plain import jsonable, printable, shown
 
@@ -22,6 +23,7 @@ TOLD = ("title", "mode", "slips", "fecm_version", "format", "format_version",
 @click.command()
 @click.argument("result", type=FILE_PATH)
 @FORMAT_OPTION
+@reads("result")
 def info(result: Path, form: str) -> None:
     """Tell what is in RESULT: the run, its units and summary, and every group and dataset."""
     from fecm.results.information import information

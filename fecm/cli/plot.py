@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from fecm.cli.apart import reads
 from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, check_outputs
 from fecm.plot import KINDS, Options, Picture, PlotError, check_kind, check_suffix, draw, save
 
@@ -96,6 +97,7 @@ def _pairs(
 @click.option("--level", callback=_numbers("VALUE,..."), metavar="VALUE,...",
               help="Values to mark in map, in the deck's unit.")  # fmt: skip
 @click.option("--overwrite", is_flag=True, help="Replace pictures that exist.")
+@reads("results")
 def plot(
     results: tuple[Path, ...],
     kinds: tuple[str, ...],

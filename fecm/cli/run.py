@@ -150,6 +150,7 @@ def _run_one(
     resumes: bool,
 ) -> None:
     """Run one problem of a deck into a file and say what came out."""
+    from fecm.check.memory import check_memory
     from fecm.check.run import output_bytes
     from fecm.checkpoint import Checkpointer, checkpoint_of
     from fecm.printout import Printer
@@ -162,6 +163,7 @@ def _run_one(
 
     problem = prepared.problems[number]
     _check_room(path, output_bytes(problem.deck, tally(problem.program)))
+    check_memory(problem, solver=choices.solver)
     clear_stale(path, checkpoint_of(path), *([] if printed is None else [printed]))
     with contextlib.ExitStack() as stack:
         stack.enter_context(signals.deferred())

@@ -16,6 +16,7 @@ from fecm.deck.model import STOP, TITLE, Deck, Segment
 from fecm.deck.records import NODES_AN_ELEMENT, UNKNOWNS, Control, LoadTable, Macro
 from fecm.deck.segments import READERS, SegmentReader
 from fecm.deck.stream import Stream
+from fecm.memory import NotEnoughMemoryError, available, said
 
 MACROS = "MACR"
 END = "END"
@@ -23,6 +24,11 @@ END = "END"
 # What a card's count may be at the most: beyond it a deck is a slip of the pen, and reading on
 # would only exhaust the memory.
 MOST = 1_000_000
+
+# Bytes of a file that no deck of so many nodes and elements needs; and how many bytes of memory its
+# cards take for each of them.
+LARGEST_FILE = 1_000_000_000
+BYTES_A_BYTE = 80
 
 
 @dataclass
@@ -56,6 +62,7 @@ class Reader:
     def __init__(self, text: str, *, blanks_are_zeros: bool = False) -> None:
         self.stream = Stream(text, blanks_are_zeros=blanks_are_zeros)
         self._unsound: set[str] = set()
+        self._counted = {"NUMNP": 0, "NUMEL": 0}
 
     @property
     def findings(self) -> Findings:
@@ -153,6 +160,21 @@ class Reader:
                 must = f"{least}" if least == most else f"{least} to {most}"
                 self.findings.add(
                     "E201", f"{name} is {value}; it must be {must}.", control.place(name), hint
+                )
+        return len(self.findings) == before and self._is_few(control)
+
+    def _is_few(self, control: Control) -> bool:
+        """Whether the file's problems have together no more nodes and elements than one may."""
+        before = len(self.findings)
+        for name, value in (("NUMNP", control.numnp), ("NUMEL", control.numel)):
+            self._counted[name] += value
+            if self._counted[name] > MOST:
+                self.findings.add(
+                    "E201",
+                    f"The file's problems have together {name} {self._counted[name]}; it may be "
+                    f"{MOST} at the most.",
+                    control.place(name),
+                    "give the problems files of their own",
                 )
         return len(self.findings) == before
 
@@ -320,7 +342,29 @@ def load_text(path_or_text: str | Path) -> tuple[str, str]:
     """Text of a deck and the name to call it by: see :func:`read_deck`."""
     if isinstance(path_or_text, str) and ("\n" in path_or_text or not path_or_text.strip()):
         return path_or_text, "<text>"
-    return decode(Path(path_or_text).read_bytes()), str(path_or_text)
+    return decode(_bytes(Path(path_or_text))), str(path_or_text)
+
+
+def _bytes(path: Path) -> bytes:
+    """All bytes of a deck, which may come from a pipe, and need not end.
+
+    Raises
+    ------
+    NotEnoughMemoryError
+        If its cards would take more memory than is free.
+    OSError
+        If it can't be read.
+    """
+    free = available()
+    most = LARGEST_FILE if free is None else min(LARGEST_FILE, free // BYTES_A_BYTE)
+    with path.open("rb") as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise NotEnoughMemoryError(
+            f"{path}: the deck has more than {said(most)}, and its cards take about {BYTES_A_BYTE} "
+            "times as much memory"
+        )
+    return data
 
 
 def read_deck(path_or_text: str | Path) -> Deck | list[Deck]:

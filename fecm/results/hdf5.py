@@ -22,6 +22,7 @@ from fecm.results.schema import (
     SCALES,
     SWEEP,
     Dataset,
+    NotStoredError,
     ResultFileError,
     ResultWriteError,
     declared_units,
@@ -256,11 +257,14 @@ class FileArrays(Mapping[str, Array]):
 
     def __getitem__(self, key: str) -> Array:
         if key not in self.shapes:
-            raise KeyError(key)
+            raise NotStoredError(f"{self.path}: there is no {key} in this result")
         if key not in self._read:
             with _troubles(self.path), h5py.File(self.path) as file:
                 self._read[key] = np.asarray(file[key][()])
         return self._read[key]
+
+    def __contains__(self, key: object) -> bool:
+        return key in self.shapes  # Mapping's own would read the dataset
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.shapes)

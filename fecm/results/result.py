@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.results.schema import DATASETS, ResultFileError, declared_units, misfit
+from fecm.results.schema import DATASETS, NotStoredError, ResultFileError, declared_units, misfit
 from fecm.units import unit_of
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class Group:
         try:
             return self._arrays[f"{self._name}/{name}"]
         except KeyError:
-            raise AttributeError(f"there is no {self._name}/{name} in this result") from None
+            raise NotStoredError(f"there is no {self._name}/{name} in this result") from None
 
     def __dir__(self) -> list[str]:
         own = [p.rpartition("/")[2] for p in self._arrays if p.startswith(f"{self._name}/")]
@@ -82,7 +82,8 @@ class Result:
     @property
     def slips(self) -> tuple[str, ...]:
         """The slips that were on, sorted."""
-        return tuple(self.attributes.get("slips", ()))
+        slips = self.attributes.get("slips", ())
+        return tuple(map(str, slips)) if isinstance(slips, list | tuple) else ()
 
     def unit(self, dimension: str) -> str:
         """Unit of a dimension such as ``"force/length"``; empty where the deck names no units."""
@@ -159,7 +160,7 @@ class Result:
             return self._arrays[f"{HISTORY}/{name}"]
         if any(path.startswith(f"{name}/") for path in self._arrays):
             return Group(name, self._arrays, self._groups.get(name, {}))
-        raise AttributeError(f"there is no {name} in this result")
+        raise NotStoredError(f"there is no {name} in this result")
 
     def __dir__(self) -> list[str]:
         heads = {path.partition("/")[0] for path in self._arrays}

@@ -20,6 +20,13 @@ class ResultFileError(ValueError):
     """A file is not a result that this program can read."""
 
 
+class NotStoredError(AttributeError, KeyError, ResultFileError):
+    """A result lacks a dataset that was asked for, as ``result["mesh/elements"]`` or otherwise."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
 class ResultWriteError(OSError):
     """A result can't be written."""
 

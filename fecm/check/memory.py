@@ -1,0 +1,157 @@
+"""Memory that a run will take, known before it takes any.
+
+The large parts are the element matrices, the assembled stiffness and its factors where a macro or
+the solver wants them, the vectors over nodes, and, of a run without an output file, the result.
+The factors below are upper bounds of what was measured on meshes of 4 000 to 160 000 nodes; the
+memory of interpreter and libraries is not counted.
+"""
+
+from __future__ import annotations
+
+import math
+
+from fecm import plate
+from fecm.check import Checked
+from fecm.check.run import output_bytes
+from fecm.congruence import congruence
+from fecm.deck.model import Material, Projectile
+from fecm.elements.quadrature import HIGHEST_ORDER
+from fecm.laminate import laminate_of_deck
+from fecm.memory import NotEnoughMemoryError, available, said
+from fecm.modes import DENSE
+from fecm.parts import rules
+from fecm.products import WORTH_GROUPING
+from fecm.program import every, flat, tally
+from fecm.projectile import REPORT_ELEMENTS
+from fecm.results.sinks import RowBuffer
+from fecm.solvers import AUTO, CSR
+
+# Bytes a node: mesh, state, fields, rows on their way to the file.
+NODE = 800
+# Bytes an element's unknown: its places, its forces, and the matrix that sums them.
+PLACE = 60
+# Bytes an element's point of strains: Jacobians and strains.
+POINT = 250
+# Bytes an entry of the element matrices: of those that are kept; assembled, with all that assembly
+# holds at the same time; in a matrix that is being integrated, for each row of B and point.
+KEPT, ASSEMBLED, INTEGRATED = 12, 24, 24
+# Strains in B: six of the membrane and of bending, two of the transverse shear.
+ROWS = 8
+# Bytes of factors of a plate without coupling: TANG's over n log2 n, EIGE's over n^1.5.
+TANGENT, SHIFTED = 300, 70
+# Bytes a step that the summary behind a run takes.
+STEP = 80
+# Elements whose matrices are integrated at once.
+BLOCK = 1024
+
+STATIC = {"TANG", "EIGE"}
+
+
+def needed_bytes(checked: Checked, *, solver: str = AUTO, in_memory: bool = False) -> int:
+    """Memory that a run takes at the most, about.
+
+    Parameters
+    ----------
+    checked : Checked
+        A problem without errors.
+    solver : str
+        How K u is had.
+    in_memory : bool
+        Whether the result is kept in memory instead of being written to a file.
+    """
+    return _whole(checked, solver, in_memory, exact=True)
+
+
+def check_memory(checked: Checked, *, solver: str = AUTO, in_memory: bool = False) -> None:
+    """Refuse a run that takes more memory than is free.
+
+    Raises
+    ------
+    NotEnoughMemoryError
+        With both numbers.
+    """
+    free = available()
+    if free is None or _whole(checked, solver, in_memory, exact=False) <= free:
+        return  # the congruent elements need not be counted
+    needed = _whole(checked, solver, in_memory, exact=True)
+    if needed > free:
+        remedy = "write it to a file, or store fewer rows" if in_memory else "take a coarser mesh"
+        raise NotEnoughMemoryError(
+            f"the run takes about {said(needed)} of memory, and {said(free)} are free; {remedy}"
+        )
+
+
+def _whole(checked: Checked, solver: str, in_memory: bool, *, exact: bool) -> int:
+    """Sum of all parts; without `exact` as if no two elements were congruent."""
+    words = {macro.word for macro in flat(checked.program)}
+    sizes = tally(checked.program)
+    output = output_bytes(checked.deck, sizes)
+    total = NODE * checked.deck.control.numnp + _strains(checked)
+    assembled = ASSEMBLED * _entries(checked)
+    if solver == CSR or words & STATIC:
+        total += assembled
+    if solver != CSR:
+        total += _product(checked, exact=exact)
+    total += _factors(checked, words) + _modes(checked)
+    total += 8 * 6 * (2 * _rod_elements(checked) + 2) ** 2
+    if in_memory:
+        return total + output
+    held = output if "CONV" in words else 0  # rows that never came are cut off in memory
+    return total + held + STEP * sizes.steps + 5 * RowBuffer.BYTES
+
+
+def _entries(checked: Checked) -> int:
+    """Entries of all element matrices."""
+    nodes = (checked.mesh.elements != 0).sum(axis=1)
+    return int(((plate.UNKNOWNS * nodes) ** 2).sum())
+
+
+def _strains(checked: Checked) -> int:
+    card = checked.deck.need(Material).integration
+    points = len(rules(checked.deck.need(Material))[2].xi)
+    return POINT * checked.deck.control.numel * max(points, min(card.bending, HIGHEST_ORDER) ** 2)
+
+
+def _product(checked: Checked, *, exact: bool) -> int:
+    """Element matrices of the product K u, and what it is to gather and sum."""
+    points = max(len(rule.xi) for rule in rules(checked.deck.need(Material))[:2])
+    total = 0
+    for family in plate.families(checked.mesh.elements, checked.mesh.coordinates):
+        count, n = len(family.rows), plate.UNKNOWNS * family.nodes.shape[1]
+        alone, shared = count, 0
+        if exact:
+            same = congruence(family)
+            sizes = [0] * len(same.representatives)
+            for group in same.group.tolist():
+                sizes[group] += 1
+            shared = sum(size >= WORTH_GROUPING for size in sizes)
+            alone = sum(size for size in sizes if size < WORTH_GROUPING)
+        at_once = max(shared, min(alone, BLOCK))
+        total += (alone + shared) * n * n * KEPT + count * n * PLACE
+        total += at_once * points * ROWS * n * INTEGRATED
+    return total
+
+
+def _factors(checked: Checked, words: set[str]) -> int:
+    """Factors of the stiffness: n log n in a plane mesh ordered well, n^1.5 ordered by columns."""
+    n = checked.mesh.number_of_equations
+    total = TANGENT * n * math.log2(max(2, n)) if "TANG" in words else 0.0
+    total += SHIFTED * n**1.5 if "EIGE" in words else 0.0
+    # With coupling all five unknowns of two nodes meet, instead of 2 x 2 and 3 x 3 of them.
+    coupled = laminate_of_deck(checked.deck).is_coupled
+    return int(total * (25 / 13 if coupled else 1.0))
+
+
+def _modes(checked: Checked) -> int:
+    """Matrices of EIGE, dense where it looks for many modes."""
+    n = checked.mesh.number_of_equations
+    counts = [min(n, every(m)) for m in flat(checked.program) if m.word == "EIGE"]
+    if not counts:
+        return 0
+    most = max(counts)
+    return 8 * n * (5 * n if n < DENSE or most >= n // 2 else 6 * most + 60)
+
+
+def _rod_elements(checked: Checked) -> int:
+    card = checked.deck.last(Projectile)
+    return REPORT_ELEMENTS if card is None else card.elements

@@ -1,0 +1,120 @@
+"""What a run takes of memory is known before, and decks can't exhaust it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import fecm
+import fecm.check.memory
+import fecm.deck.reader
+from fecm.api import prepare
+from fecm.check.memory import needed_bytes
+from fecm.memory import NotEnoughMemoryError, available
+from tests.calls import assert_unusable, call
+from tests.decks import small
+
+MEGABYTE = 10**6
+
+PEAK = """
+import fecm
+from pathlib import Path
+def peak():  # getrusage would tell that of the process before exec
+    status = Path("/proc/self/status").read_text()
+    return 1024 * int(status.partition("VmHWM:")[2].split()[0])
+fecm.run({small!r}, output="first.h5")
+fecm.run({static!r}, output="second.h5")
+before = peak()
+fecm.run("plate.inp", output="x.h5")
+print(peak() - before)
+"""
+
+IMPACT = "LMAS\nDT        1.E-8\nLOOP         20\nTIME\nRODP         10\nNEXT\n"
+STATIC = "TANG\nFORM\nSOLV\nDISP\n"
+MODES = "LMAS\nEIGE          5\n"
+
+
+def plate(folder: Path, elements: int, macros: str, *options: str) -> Path:
+    """Write a deck of a square plate with a macro program."""
+    path = folder / "plate.inp"
+    done = call(
+        "new", path, "--size", "6x6", "--mesh", f"{elements}x{elements}", "--layup", "[0/90]s",
+        "--ply-thickness", "0.0053", "--ply", "0.000148,0.3,1.75e7,1.15e6,8e5,8e5,8e5",
+        "--support", "clamped", "--velocity", "100", "--law", "1912000,0.0006564,0.094,2",
+        "--duration", "2e-7", "--dt", "1e-8", "--every", "10", *options,
+    )  # fmt: skip
+    assert done.exit_code == 0, done.stderr
+    head = path.read_text().partition("MACR")[0]
+    path.write_text(f"{head}MACR\n{macros}END\nSTOP\n")
+    return path
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="Linux tells the peak")
+@pytest.mark.parametrize(
+    ("macros", "options"),
+    [(IMPACT, ()), (IMPACT, ("--grading", "3", "--at", "2.1,1.3")), (STATIC, ()), (MODES, ())],
+    ids=["impact", "graded", "static", "modes"],
+)
+def test_the_estimate_bounds_what_is_measured(
+    tmp_path: Path, macros: str, options: tuple[str, ...]
+) -> None:
+    deck = plate(tmp_path, 40, macros, *options)
+    problem = prepare(deck).problems[0]
+    head = small().partition("MACR")[0]
+    program = PEAK.format(small=small(), static=f"{head}MACR\nLMAS\nEIGE\nEND\nSTOP\n")
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", program], cwd=tmp_path, capture_output=True,
+        text=True, check=True,
+    )  # fmt: skip
+    measured = int(done.stdout)
+    assert measured <= needed_bytes(problem) <= 4 * measured + 60 * MEGABYTE
+
+
+def test_a_run_that_needs_more_than_is_free_is_refused_with_both_numbers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fecm.check.memory, "available", lambda: 10 * MEGABYTE)
+    deck, output = tmp_path / "small.inp", tmp_path / "small.h5"
+    deck.write_text(small().replace("DISP          5", "DISP"))
+    done = call("run", deck, "-o", output)
+    assert (done.exit_code, done.stdout) == (2, "")
+    told = done.stderr.splitlines()[-1]
+    assert told.startswith("fecm: error: the run takes about ")
+    assert "MB of memory, and 10 MB are free" in told
+    assert not output.exists()
+
+
+def test_a_result_in_memory_counts_with_all_its_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fecm.check.memory, "available", lambda: 100 * MEGABYTE)
+    many = small().replace("LOOP         10", "LOOP      99999").replace("DISP          5", "DISP")
+    problem = prepare(many).problems[0]
+    # w and five unknowns of 25 nodes in each of the rows.
+    assert needed_bytes(problem, in_memory=True) > 99999 * 25 * 6 * 8
+    with pytest.raises(NotEnoughMemoryError, match=r"takes about 1\d\d MB .* store fewer rows"):
+        fecm.run(many)
+
+
+def test_many_small_problems_with_large_counts_are_refused() -> None:
+    one = "FECM x\n999999999,1,1,2,5,4\nEND\nMACR\nEND\n".replace("999999999", "900000")
+    prepared = prepare(one * 50 + "STOP\n")
+    assert len(prepared.problems) == 1
+    told = [f.message for f in prepared.findings if "together" in f.message]
+    assert len(told) == 49
+    assert told[0] == (
+        "The file's problems have together NUMNP 1800000; it may be 1000000 at the most."
+    )
+
+
+def test_a_deck_that_never_ends_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fecm.deck.reader, "available", lambda: 80 * MEGABYTE)
+    done = call("check", "/dev/zero")
+    assert_unusable(done)
+    assert "/dev/zero: the deck has more than 1 MB" in done.stderr
+
+
+def test_free_memory_is_a_part_of_the_machines() -> None:
+    free = available()
+    assert free is None or 0 < free < 10**15
