@@ -18,11 +18,14 @@ from fecm import plate
 from fecm.congruence import congruence
 from fecm.elements.quadrature import Rule
 from fecm.laminate import Laminate
+from fecm.memory import require
 from fecm.mesh import Mesh
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
+# Bytes that assembly takes an entry of the element matrices: more than were measured.
+ASSEMBLED = 24
 # Elements whose matrices are in memory at the same time.
 BLOCK = 1024
 
@@ -118,9 +121,17 @@ class PlateModel:
                 matrices = matrices_of(family.take(same.representatives[wanted]))
                 yield self._unknowns(family.take(block)), matrices[which.ravel()]
 
+    @property
+    def entries(self) -> int:
+        """Entries of all element matrices."""
+        return sum(
+            f.nodes.shape[0] * (plate.UNKNOWNS * f.nodes.shape[1]) ** 2 for f in self.families
+        )
+
     def _assembled(self, matrices_of: Callable[[plate.Family], Floats]) -> sparse.csr_array:
         """Sum of matrices, the restrained unknowns' columns behind those of the equations."""
         neq, whole = self.neq, self._numbers.size
+        require(ASSEMBLED * self.entries, "to assemble the plate's matrices")
         total = sparse.csr_array((neq, whole))
         for unknowns, matrices in self._element_matrices(matrices_of):
             rows = np.broadcast_to(unknowns[:, :, None], matrices.shape)

@@ -11,6 +11,10 @@ CGROUP = Path("/proc/self/cgroup")
 CGROUPS = Path("/sys/fs/cgroup")
 
 
+# Bytes that may be taken without a look at what is free.
+UNNOTICED = 100_000_000
+
+
 class NotEnoughMemoryError(MemoryError):
     """Something takes more memory than is free; the message says how much."""
 
@@ -23,6 +27,23 @@ def available() -> int | None:
     """
     known = [count for count in (_of_machine(), *_of_groups()) if count is not None]
     return max(0, min(known)) if known else None
+
+
+def require(count: int, what: str) -> None:
+    """Refuse to take more memory than is free.
+
+    Raises
+    ------
+    NotEnoughMemoryError
+        With both numbers.
+    """
+    if count < UNNOTICED:
+        return
+    free = available()
+    if free is not None and count > free:
+        raise NotEnoughMemoryError(
+            f"{what} takes about {said(count)} of memory, and {said(free)} are free"
+        )
 
 
 def _of_machine() -> int | None:

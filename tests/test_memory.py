@@ -11,6 +11,7 @@ import pytest
 import fecm
 import fecm.check.memory
 import fecm.deck.reader
+import fecm.memory
 from fecm.api import prepare
 from fecm.check.memory import needed_bytes
 from fecm.memory import NotEnoughMemoryError, available
@@ -95,6 +96,18 @@ def test_a_result_in_memory_counts_with_all_its_rows(monkeypatch: pytest.MonkeyP
     assert needed_bytes(problem, in_memory=True) > 99999 * 25 * 6 * 8
     with pytest.raises(NotEnoughMemoryError, match=r"takes about 1\d\d MB .* store fewer rows"):
         fecm.run(many)
+
+
+def test_matrices_that_do_not_fit_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    deck = plate(tmp_path, 60, IMPACT)
+    monkeypatch.setattr(fecm.memory, "available", lambda: 120 * MEGABYTE)
+    done = call("check", deck)
+    assert done.exit_code == 2
+    told = done.stderr.splitlines()[-1]
+    # 24 bytes for each of the 45 x 45 entries of 3600 matrices.
+    assert "assemble the plate's matrices takes about 175 MB of memory, and 120 MB are free" in told
 
 
 def test_many_small_problems_with_large_counts_are_refused() -> None:

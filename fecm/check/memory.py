@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 from fecm import plate
+from fecm.assembly import ASSEMBLED
 from fecm.check import Checked
 from fecm.check.run import output_bytes
 from fecm.congruence import congruence
@@ -32,9 +33,9 @@ NODE = 800
 PLACE = 60
 # Bytes an element's point of strains: Jacobians and strains.
 POINT = 250
-# Bytes an entry of the element matrices: of those that are kept; assembled, with all that assembly
-# holds at the same time; in a matrix that is being integrated, for each row of B and point.
-KEPT, ASSEMBLED, INTEGRATED = 12, 24, 24
+# Bytes an entry of the element matrices that are kept; and of one that is being integrated, for each
+# row of B and point.
+KEPT, INTEGRATED = 12, 24
 # Strains in B: six of the membrane and of bending, two of the transverse shear.
 ROWS = 8
 # Bytes of factors of a plate without coupling: TANG's over n log2 n, EIGE's over n^1.5.
