@@ -35,7 +35,7 @@ import numpy as np
 
 from fecm.api import run
 from fecm.cli import main as fecm
-from fecm.results import hdf5
+from fecm.sweeps.api import sweep
 from tests.decks import small
 
 # Seconds of the clock after which a command hangs.
@@ -50,7 +50,9 @@ COMMANDS = {
     "export vtkhdf": ["{}", "--to", "vtkhdf", "-o", "{made}/x.vtkhdf"],
     "plot": ["{}", "--kind", "force", "--kind", "line", "-o", "{made}"],
 }
+SWEEP = "sweep"
 USUAL = ("info", "diff")
+OF_A_SWEEP = {"plot map": ["{}", "-o", "{made}"], "info": ["{}"]}
 
 
 def mutate(source: Path, target: Path, random: random.Random) -> str:
@@ -221,7 +223,8 @@ def examine(sound: Path, folder: Path, seed: int, commands: Sequence[str], tally
     for command in commands:
         shutil.rmtree(made, ignore_errors=True)
         made.mkdir()
-        arguments = [text.format(bad, sound=sound, made=made) for text in COMMANDS[command]]
+        texts = (OF_A_SWEEP if sound.stem == SWEEP else COMMANDS)[command]
+        arguments = [text.format(bad, sound=sound, made=made) for text in texts]
         begin = time.monotonic()
         status = call([*command.split()[:1], *arguments], out, err)
         tally.longest = max(tally.longest, time.monotonic() - begin)
@@ -243,9 +246,12 @@ def work(first: int, count: int, step: int, commands: Sequence[str]) -> Tally:
     tally = Tally()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        sound = folder / "sound.h5"
-        run(small(), output=sound)
-        hdf5.read(sound)
+        sound = folder / (f"{SWEEP}.h5" if "plot map" in commands else "run.h5")
+        if sound.stem == SWEEP:
+            sweep(small(), {"velocity": [50.0, 100.0, 150.0], "alpha_p": [0.0005, 0.0007]},
+                  output=sound)  # fmt: skip
+        else:
+            run(small(), output=sound)
         for seed in range(first, first + count, step):
             examine(sound, folder, seed, commands, tally)
     return tally
@@ -259,8 +265,11 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--step", type=int, default=0, help=argparse.SUPPRESS)
     parser.add_argument("--all", action="store_true", help="every command that reads results")
+    parser.add_argument("--sweep", action="store_true", help="results of sweeps")
     options = parser.parse_args()
     commands = list(COMMANDS) if options.all else USUAL
+    if options.sweep:
+        commands = list(OF_A_SWEEP)
     if options.step:
         tally = work(options.seed, options.count, options.step, commands)
         print(json.dumps(tally.__dict__))
@@ -271,7 +280,8 @@ def main() -> int:
     workers = []
     for number in range(options.workers):
         arguments = ["--seed", options.seed + number, "--count", options.count - number,
-                     "--step", options.workers, *["--all"] * options.all]  # fmt: skip
+                     "--step", options.workers, *["--all"] * options.all,
+                     *["--sweep"] * options.sweep]  # fmt: skip
         workers.append(subprocess.Popen([*head, *map(str, arguments)], env=environment,
                                         stdout=subprocess.PIPE, text=True))  # fmt: skip
     tally = Tally()

@@ -190,3 +190,20 @@ def test_mutated_results_end_in_one_line() -> None:
 @pytest.mark.long
 def test_ten_thousand_mutated_results_end_in_one_line() -> None:
     assert "broken 0" in fuzz("--count", 10_000, "--seed", 100_000, patience="1")
+
+
+def test_mutated_results_of_sweeps_end_in_one_line() -> None:
+    told = fuzz("--count", 16, "--seed", 70, "--sweep", patience="0.25")
+    assert "broken 0" in told
+    assert "'plot map 0'" in told
+
+
+def test_a_sweep_whose_cases_are_single_numbers_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "sweep.h5"
+    fecm.sweep(small(), {"velocity": [50.0, 100.0]}, output=path)
+    with h5py.File(path, "r+") as file:
+        del file["cases/velocity"]
+        file["cases/velocity"] = 1.0
+    done = call("plot", path, "-o", tmp_path / "x.png")
+    assert_unusable(done)
+    assert "the cases of this result of a sweep are not all there" in done.stderr

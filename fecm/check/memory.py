@@ -33,8 +33,8 @@ NODE = 800
 PLACE = 60
 # Bytes an element's point of strains: Jacobians and strains.
 POINT = 250
-# Bytes an entry of the element matrices that are kept; and of one that is being integrated, for each
-# row of B and point.
+# Bytes an entry of the element matrices that are kept; and of one that is being integrated, for
+# each row of B and point.
 KEPT, INTEGRATED = 12, 24
 # Strains in B: six of the membrane and of bending, two of the transverse shear.
 ROWS = 8

@@ -224,9 +224,18 @@ def _from(
 
     cases, summary = group("cases/"), group("summary/")
     missing = [name for name in (*SUMMARY, "status") if name not in summary]
-    lengths = {len(values) for values in (*cases.values(), *summary.values())}
-    if missing or len(lengths) > 1 or "history/dt" not in arrays or "history/steps" not in arrays:
+    if missing or "history/dt" not in arrays or "history/steps" not in arrays:
         raise ResultFileError(f"{path}: this result of a sweep is not whole")
+    count = np.shape(arrays["history/dt"])[:1]
+    rows = (*cases.values(), *summary.values(), arrays["history/dt"], arrays["history/steps"])
+    force = arrays.get("history/force", np.empty((*count, 0)))
+    kinds = {name: summary[name].dtype.kind for name in SUMMARY}
+    if (
+        any(values.shape != count for values in rows)
+        or (force.ndim, force.shape[:1]) != (2, count)
+        or not set(kinds.values()) <= set("fiu")
+    ):
+        raise ResultFileError(f"{path}: the cases of this result of a sweep are not all there")
     root = groups[""]
     return SweepResult(
         cases, summary, arrays["history/dt"], arrays["history/steps"],
