@@ -207,3 +207,16 @@ def test_a_sweep_whose_cases_are_single_numbers_is_one_line(tmp_path: Path) -> N
     done = call("plot", path, "-o", tmp_path / "x.png")
     assert_unusable(done)
     assert "the cases of this result of a sweep are not all there" in done.stderr
+
+
+def test_elements_of_nodes_that_the_mesh_has_not_are_one_line(result: Path) -> None:
+    with h5py.File(result, "r+") as file:
+        file["mesh/elements"][0, 0] = 188
+    for command, output in (
+        (["export", "--to", "vtkhdf"], "x.vtkhdf"),
+        (["plot", "--kind", "line"], "x.png"),
+    ):
+        done = call(command[0], result, *command[1:], "-o", result.with_name(output))
+        assert_unusable(done)
+        assert "mesh/elements names nodes outside 1 to 25" in done.stderr
+    assert [path.name for path in result.parent.iterdir()] == [result.name]

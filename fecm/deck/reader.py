@@ -21,12 +21,10 @@ from fecm.memory import NotEnoughMemoryError, available, said
 MACROS = "MACR"
 END = "END"
 
-# What a card's count may be at the most: beyond it a deck is a slip of the pen, and reading on
-# would only exhaust the memory.
+# What a card's count may be at the most: beyond it a deck is a slip of the pen.
 MOST = 1_000_000
 
-# Bytes of a file that no deck of so many nodes and elements needs; and how many bytes of memory its
-# cards take for each of them.
+# Bytes of a file that no such deck needs, and bytes of memory that its cards take for each of them.
 LARGEST_FILE = 1_000_000_000
 BYTES_A_BYTE = 80
 

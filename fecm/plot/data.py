@@ -60,10 +60,19 @@ def deck_of(result: Result, name: str) -> Deck:
 
 
 def struck(result: Result, name: str) -> Floats:
-    """Coordinates of the impact node, (1, 2), length; (0, 2) where nothing strikes the plate."""
+    """Coordinates of the impact node, (1, 2), length; (0, 2) where nothing strikes the plate.
+
+    Raises
+    ------
+    PlotError
+        If the deck's impact node is none of the mesh's.
+    """
     impact = deck_of(result, name).last(Impact)
     nodes = [] if impact is None else [impact.node - 1]
-    return np.asarray(result["mesh/coordinates"][nodes, :2])
+    coordinates = result["mesh/coordinates"][:, :2]
+    if impact is not None and not 1 <= impact.node <= len(coordinates):
+        raise PlotError(f"{name} has no node {impact.node}, which its deck says is struck")
+    return np.asarray(coordinates[nodes])
 
 
 def impact_point(result: Result, name: str) -> Floats:
@@ -89,6 +98,8 @@ def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -
         If there are no rows, or a time is outside them.
     """
     (stored,) = need(result, name, "tape3/time")
+    if not len(stored):
+        raise PlotError(f"{name} has no rows of displacements")
     if not times:
         ends = np.arange(1, min(count, len(stored)) + 1) / min(count, len(stored))
         return (ends * len(stored)).round().astype(np.intp) - 1

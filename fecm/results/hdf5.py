@@ -31,6 +31,7 @@ from fecm.units import unit_of
 
 Array = NDArray[Any]
 TIME = "time"
+ELEMENTS, COORDINATES = "mesh/elements", "mesh/coordinates"
 
 
 class FileSink:
@@ -260,8 +261,17 @@ class FileArrays(Mapping[str, Array]):
             raise NotStoredError(f"{self.path}: there is no {key} in this result")
         if key not in self._read:
             with _troubles(self.path), h5py.File(self.path) as file:
-                self._read[key] = np.asarray(file[key][()])
+                values = np.asarray(file[key][()])
+            if key == ELEMENTS:
+                self._check_nodes(values)
+            self._read[key] = values
         return self._read[key]
+
+    def _check_nodes(self, elements: Array) -> None:
+        """Refuse elements with nodes that the mesh has not; whoever draws them takes their word."""
+        count = self.shapes.get(COORDINATES, (0,))[0]
+        if elements.size and not 0 <= elements.min() <= elements.max() <= count:
+            raise ResultFileError(f"{self.path}: {ELEMENTS} names nodes outside 1 to {count}")
 
     def __contains__(self, key: object) -> bool:
         return key in self.shapes  # Mapping's own would read the dataset
