@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import difflib
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from fecm.deck.findings import Findings
@@ -237,24 +237,6 @@ def moves_only(body: Body) -> bool:
 # Words that take a time step.
 STEPS = {"RODP", "EXCD"}
 
-Walk = Generator[tuple[Macro, int], "bool | None", bool]
-
-
-def walk(body: Body, current: int = 1) -> Walk:
-    """Carry out a program: every macro as often as it runs, with the pass it runs in.
-
-    Sending True in answer to a macro leaves the innermost loop.
-    """
-    for item in body:
-        if isinstance(item, Loop):
-            for number in range(1, item.count + 1):
-                if (yield from walk(item.body, number)):
-                    break
-        elif (yield item, current):
-            return True
-    return False
-
-
 # Given the pass; whether to leave the innermost loop.
 Act = Callable[[int], "bool | None"]
 
@@ -418,7 +400,16 @@ def tally(body: Body) -> Tally:
     if len({every(m) if m.word == "RODP" else 0 for m in flat(body) if m.word in STEPS}) <= 1:
         return counted
     step = rows = 0
-    for macro, _ in walk(body):
-        step += macro.word in STEPS
-        rows += macro.word == "RODP" and step % every(macro) == 0
+
+    def bind(macro: Macro) -> Act:
+        steps, every_nth = macro.word in STEPS, every(macro) if macro.word == "RODP" else 0
+
+        def act(_: int) -> None:
+            nonlocal step, rows
+            step += steps
+            rows += every_nth > 0 and step % every_nth == 0
+
+        return act
+
+    Course(body, bind).run()
     return Tally(counted.macros, counted.steps, rows, counted.passes)

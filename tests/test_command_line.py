@@ -241,3 +241,42 @@ def test_listing_mode_is_all_slips_and_report_mode_none() -> None:
     assert slips.active_slips("listing") == frozenset(slips.NAMES)
     assert slips.active_slips("report", ["target"]) == {"target"}
     assert len(slips.NAMES) == len(set(slips.NAMES)) == 14
+
+
+@pytest.mark.parametrize(
+    "arguments", [("--help",), ("run", "--help"), ("indent", "contacts"), ("diff", "A", "B")]
+)
+def test_a_reader_that_leaves_is_no_answer(arguments: tuple[str, ...], tmp_path: Path) -> None:
+    run_result = tmp_path / "small.h5"
+    if "A" in arguments:
+        (tmp_path / "small.inp").write_text(small())
+        assert fecm("run", "small.inp", cwd=tmp_path).returncode == 0
+        arguments = ("diff", str(run_result), str(run_result))
+    read, write = os.pipe()
+    os.close(read)
+    with os.fdopen(write, "w") as gone:
+        done = subprocess.run(
+            [sys.executable, "-m", "fecm", *arguments],
+            stdout=gone, stderr=subprocess.PIPE, text=True, check=False,
+        )  # fmt: skip
+    assert (done.returncode, done.stderr) == (2, "")
+
+
+def test_a_full_output_ends_in_one_line(tmp_path: Path) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "fecm", "rod", "--pulse", "sine:1,1", *("--length", "1"),
+             *("--modulus", "1", "--density", "1", "--diameter", "1")],
+            stdout=full, stderr=subprocess.PIPE, text=True, check=False, cwd=tmp_path,
+        )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr == "fecm: error: No space left on device\n"
+
+
+@pytest.mark.parametrize("option", ["--energy-limit", "--checkpoint"])
+@pytest.mark.parametrize("value", ["nan", "inf", "-1"])
+def test_a_limit_that_is_no_number_is_refused(option: str, value: str, deck: Path) -> None:
+    done = fecm("run", deck, option, value, cwd=deck.parent)
+    assert done.returncode == 2
+    assert f"Invalid value for '{option}'" in done.stderr
+    assert [path.name for path in deck.parent.iterdir()] == ["small.inp"]

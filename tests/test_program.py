@@ -9,7 +9,7 @@ import fecm
 from fecm.api import prepare
 from fecm.deck import Findings
 from fecm.deck.records import Macro
-from fecm.program import compile_program, tally, walk
+from fecm.program import Act, Course, compile_program, tally
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.simulation import simulate
@@ -35,8 +35,13 @@ def program(*cards: str) -> tuple[Macro, ...]:
 def compiled(*cards: str) -> tuple[list[str], list[str]]:
     """Codes of a program's findings, and the words it carries out."""
     findings = Findings()
-    body = compile_program(program(*cards), findings)
-    return [f.code for f in findings], [macro.word for macro, _ in walk(body)]
+    words: list[str] = []
+
+    def bind(macro: Macro) -> Act:
+        return lambda _: words.append(macro.word)
+
+    Course(compile_program(program(*cards), findings), bind).run()
+    return [f.code for f in findings], words
 
 
 def test_nested_loops_carry_out_their_bodies_in_order() -> None:

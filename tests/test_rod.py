@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from pathlib import Path
 from typing import Any
 
@@ -231,7 +232,7 @@ def test_a_table_in_a_file_is_a_pulse(tmp_path: Path) -> None:
         ((*PUSH, "--station", 1.5), "not on the rod, which reaches to 1"),
         ((*PUSH, "--filter", "slow:1"), "slow:1 is no filter"),
         ((*PUSH, "--duration", 1e3), "more than 2,000,000 steps"),
-        ((*PUSH, "--plot", "out.bmp"), "written as .png or .svg or .pdf"),
+        ((*PUSH, "--plot", "out.bmp"), "written as .png, .svg, .pdf"),
         ((*PUSH, "-o", "no-such-folder/out.csv"), "there is no folder"),
         (("--pulse", "sine:1e308,1", "--dt", 0.1), "the motion is not finite"),
     ],
@@ -248,7 +249,7 @@ def test_a_measure_that_is_not_positive_is_refused_by_name(option: str, value: s
     done = call("rod", *SHAPE, *PUSH, option, value)
     assert done.exit_code == 2
     assert done.stdout == ""
-    assert f"'{option}': {value} is no positive number" in done.stderr
+    assert re.search(f"'{option}': '?{value}(.0)?'? is not ", done.stderr)
 
 
 def test_a_rod_that_is_not_whole_is_refused_with_what_it_lacks() -> None:
@@ -322,7 +323,7 @@ def test_pictures_are_drawn_beside_the_numbers(tmp_path: Path, result: Path) -> 
         done = call("rod", *command, "--plot", picture)
         assert done.exit_code == 0
         assert picture.stat().st_size > 5000
-        assert done.stderr == f"fecm: drew {picture}\n"
+        assert done.stderr == f"fecm: note: drew {picture}\n"
         assert call("rod", *command, "--plot", picture).exit_code == 2
 
 

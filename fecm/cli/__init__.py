@@ -7,9 +7,11 @@ by the command that needs them.
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sys
-from collections.abc import Sequence
-from typing import NoReturn
+from collections.abc import Iterator, Sequence
+from typing import Any, NoReturn
 
 import click
 
@@ -33,7 +35,35 @@ from fecm.results.schema import ResultFileError
 from fecm.version import __version__
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@contextlib.contextmanager
+def _unread() -> Iterator[None]:
+    """End with 2 when the reader of the output has left; click itself would answer 1."""
+    try:
+        yield
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # What is still buffered would be complained of when the program ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise SystemExit(UNUSABLE) from None
+
+
+class _Program(click.Group):
+    """The program."""
+
+    def make_context(self, *arguments: Any, **extra: Any) -> click.Context:
+        """Read the command line; tell the help or the version."""
+        with _unread():
+            return super().make_context(*arguments, **extra)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Carry out a command."""
+        with _unread():
+            return super().invoke(ctx)
+
+
+@click.group(
+    cls=_Program, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+)
 @click.version_option(__version__, prog_name="fecm")
 def cli() -> None:
     """Impact on laminated composite plates, from the punched-card decks of NASA CR-168057."""
@@ -58,9 +88,6 @@ def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoR
     except (KeyboardInterrupt, click.Abort):
         click.echo("fecm: interrupted", err=True)
         raise SystemExit(INTERRUPTED) from None
-    except BrokenPipeError:
-        sys.stderr.close()
-        raise SystemExit(UNUSABLE) from None
     except (OSError, MemoryError) as error:
         click.echo(f"fecm: error: {printable(_told(error))}", err=True)
         raise SystemExit(UNUSABLE) from None

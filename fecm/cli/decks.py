@@ -18,6 +18,7 @@ from fecm.cli.common import (
     count_errors,
     write_text,
 )
+from fecm.cli.numbers import Finite
 
 
 @click.command()
@@ -85,7 +86,7 @@ def fmt(deck: Path, output: Path | None, only_check: bool) -> None:
 @click.option("--title", default="", help="Title of the deck.")
 @click.option("--size", metavar="LXxLY", help="Size of the plate, as in 6x4.")
 @click.option("--mesh", metavar="NXxNY", help="Elements along x and y, as in 14x10.")
-@click.option("--grading", type=click.FloatRange(min=1.0), default=1.0, metavar="RATIO",
+@click.option("--grading", type=Finite(min=1.0), default=1.0, metavar="RATIO",
               help="Largest over smallest element; the smallest at the impact point.")  # fmt: skip
 @click.option("--columns", metavar="LIST",
               help="Elements along x one by one, as in 3*0.5,8*0.375,3*0.5, instead of --size and "

@@ -12,10 +12,11 @@ import click
 from fecm.cli.common import DECK_PATH, FORMAT_OPTION, Refused
 from fecm.cli.indent_curve import curve
 from fecm.cli.numbers import POSITIVE, Finite
-from fecm.cli.pictures import OVERWRITE, PLOT, check_picture, drawing, outputs, save_picture
+from fecm.cli.tables import OVERWRITE, PLOT, STANDARD_OUTPUT, Targets
 
 if TYPE_CHECKING:
     from fecm.fitting.curves import Floats
+    from fecm.plot import Picture
 
 # Unloading powers that are searched.
 LIMITS_Q = (0.3, 12.0)
@@ -68,8 +69,7 @@ def fit(
     if acr and q not in (None, 2.5):
         raise click.UsageError("--acr takes q = 5/2, as equation 3-7 holds for no other")
     names = _unit_names(units)
-    check_picture(picture)
-    outputs(overwrite, picture)
+    targets = Targets.checked(STANDARD_OUTPUT, picture, overwrite, test)
     try:
         indentation, force = _test(test)
         found = fitted(indentation, force, retreat=turn, q=q, acr=acr)
@@ -77,12 +77,13 @@ def fit(
         raise Refused(str(error)) from None
     except NoTestError as error:
         raise Refused(f"{test}: {error}") from None
-    if picture is not None:
-        with drawing():
-            from fecm.plot.indentation import fit as drawn
 
-            made = drawn(indentation, force, found, names)
-        save_picture(made, picture)
+    def draw() -> Picture:
+        from fecm.plot.indentation import fit_picture
+
+        return fit_picture(indentation, force, found, names)
+
+    targets.draw(draw)
     for note in notes(found):
         click.echo(f"fecm: note: {note}", err=True)
     if form == "json":

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from fecm.cli.common import DECK_PATH, Refused, write_text
+from fecm.cli.common import DECK_PATH, Refused
 from fecm.cli.numbers import POSITIVE
-from fecm.cli.pictures import OVERWRITE, PLOT, check_picture, drawing, outputs, save_picture
+from fecm.cli.tables import OUTPUT, OVERWRITE, PLOT, Targets
 
 if TYPE_CHECKING:
     from fecm.deck.model import Deck, Indentation
@@ -67,8 +67,7 @@ def _law(deck: Path) -> tuple[Deck, Indentation]:
 @click.option("--line", metavar="ALPHA_P,S_P",
               help="With --rigidity: constants of 3-8.  [default: the deck's, or the report's]",
               )  # fmt: skip
-@click.option("-o", "--output", type=click.Path(path_type=Path, allow_dash=True), metavar="FILE",
-              default="-", help="Where the table goes.  [default: standard output]")  # fmt: skip
+@OUTPUT
 @PLOT
 @OVERWRITE
 def curve(
@@ -87,25 +86,16 @@ def curve(
     s_3_7.
     """
     path = _path(corners)
-    table = None if str(output) == "-" else output
-    check_picture(picture)
-    outputs(overwrite, table, picture)
-    if table is not None and table.exists() and table.samefile(deck):
-        raise Refused(f"{table} is the deck itself")
+    targets = Targets.checked(output, picture, overwrite, deck)
     if not rigidity:
         if not path:
             raise click.UsageError("--path is missing: indentations with commas between them")
         if any(value is not None for value in constants.values()):
             raise click.UsageError("--q, --alpha-cr and --line belong to --rigidity")
     made = _rigidities if rigidity else _forces
-    rows, drawn = made(deck, path, points, picture is not None, **constants)
-    text = "".join(f"{','.join(map(_cell, row))}\n" for row in rows)
-    if drawn is not None and picture is not None:
-        save_picture(drawn, picture)
-    if table is None:
-        click.echo(text, nl=False)
-    else:
-        write_text(table, text)
+    rows, draw = made(deck, path, points, picture is not None, **constants)
+    targets.draw(draw)
+    targets.write(f"{','.join(map(_cell, row))}\n" for row in rows)
 
 
 def _cell(value: float | str) -> str:
@@ -116,9 +106,9 @@ Rows = Iterable[Sequence[float | str]]
 
 
 def _forces(
-    deck: Path, path: list[float], points: int, draw: bool, **_: Any
-) -> tuple[Rows, Picture | None]:
-    """Indentation, force and branch along a path, and a picture of them."""
+    deck: Path, path: list[float], points: int, draws: bool, **_: Any
+) -> tuple[Rows, Callable[[], Picture]]:
+    """Indentation, force and branch along a path, and how they are drawn."""
     import numpy as np
 
     from fecm.indentation import MemoryLaw, follow
@@ -136,26 +126,27 @@ def _forces(
     names = ("loading", "unloading", "reloading")
     rows: list[Sequence[float | str]] = [("indentation", "force", "branch")]
     rows += [(point.indentation, point.force, names[branch]) for point, branch in walk]
-    if not draw:
-        return rows, None
-    with drawing():
-        from fecm.plot import indentation
+
+    def draw() -> Picture:
+        from fecm.plot.indentation import path_picture
 
         columns = np.array([point for point, _ in walk])
-        return rows, indentation.path(columns[:, 0], columns[:, 1], unit_names(problem))
+        return path_picture(columns[:, 0], columns[:, 1], unit_names(problem))
+
+    return rows, draw
 
 
 def _rigidities(
     deck: Path,
     path: list[float],
     points: int,
-    draw: bool,
+    draws: bool,
     *,
     q: float | None,
     alpha_cr: float | None,
     line: str | None,
-) -> tuple[Rows, Picture | None]:
-    """Largest indentation and rigidities by both equations, and a picture of them."""
+) -> tuple[Rows, Callable[[], Picture]]:
+    """Largest indentation and rigidities by both equations, and how they are drawn."""
     import numpy as np
 
     from fecm.indentation import ACR_POWER, Constants, CriticalConstants
@@ -169,7 +160,7 @@ def _rigidities(
     alpha_p, s_p = _line(problem, own, line)
     critical = CriticalConstants(card.k, _alpha_cr(problem, own, alpha_cr))
     slope = Constants(card.k, alpha_p, s_p, own.q if q is None else q)
-    if slope.q != ACR_POWER and draw:
+    if slope.q != ACR_POWER and draws:
         raise Refused(
             f"s of 3-9 is force/length^{slope.q:g} here, that of 3-7 force/length^2.5: they can't "
             "share axes; --q 2.5 makes them comparable"
@@ -189,13 +180,14 @@ def _rigidities(
         raise Refused("--path leads to rigidities beyond the range of numbers")
     rows: list[Sequence[float | str]] = [("alpha_m", "s_3_9", "s_3_7")]
     rows += list(zip(peaks, *by, strict=True))
-    if not draw:
-        return rows, None
-    with drawing():
-        from fecm.plot import indentation
+
+    def draw() -> Picture:
+        from fecm.plot.indentation import rigidity_picture
 
         named = dict(zip(("equation 3-9", "equation 3-7"), by, strict=True))
-        return rows, indentation.rigidity(peaks, named, slope.q, unit_names(problem))
+        return rigidity_picture(peaks, named, slope.q, unit_names(problem))
+
+    return rows, draw
 
 
 def _report_length(deck: Deck, value: float, what: str, option: str) -> float:

@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import json
-import math
-import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from fecm.cli.common import (
-    DECK_PATH,
-    FORMAT_OPTION,
-    Refused,
-    check_outputs,
-    count_errors,
-    report,
-    writing,
-)
+from fecm.cli.common import DECK_PATH, FORMAT_OPTION, Refused, count_errors, report
+from fecm.cli.numbers import POSITIVE, Finite
+from fecm.cli.tables import OUTPUT, OVERWRITE, PLOT, STANDARD_OUTPUT, Targets
 from fecm.rod_method import INTEGRATORS, LUMPED, MASSES, WILSON
 
 if TYPE_CHECKING:
@@ -27,30 +19,6 @@ if TYPE_CHECKING:
     from fecm.projectile import Rod
     from fecm.rod import RodHistory
 
-STANDARD_OUTPUT = "-"
-
-
-def _finite(ctx: click.Context, param: click.Parameter, value: Any) -> Any:
-    """Refuse NaN and infinities, alone or among several numbers."""
-    for number in value if isinstance(value, tuple) else (value,):
-        if number is not None and not math.isfinite(number):
-            raise click.BadParameter(f"{number} is no finite number")
-    return value
-
-
-def _positive(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
-    """Refuse what is no positive number."""
-    if value is not None and not 0.0 < value < math.inf:
-        raise click.BadParameter(f"{value:g} is no positive number")
-    return value
-
-
-OUTPUT = click.option("-o", "--output", type=click.Path(path_type=Path, allow_dash=True),
-                      metavar="OUT.csv", help="File for the CSV; - is standard output.  "
-                      "[default: standard output]")  # fmt: skip
-PLOT = click.option("--plot", "picture", type=click.Path(path_type=Path), metavar="FILE",
-                    help="Also draw it (.png, .svg, .pdf).")  # fmt: skip
-OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace files that exist.")
 FILTER_HELP = ("first-order:RISE or moving-average:RISE; RISE is the time from 10 to 90 % of the "
                "answer to a step.")  # fmt: skip
 
@@ -78,18 +46,18 @@ def rod() -> None:
 @click.option("--pulse", "pulse_text", required=True, metavar="PULSE",
               help="gauss:F0,TAU,B (F0 exp(-(t-TAU)²/4B²)), sine:F0,B (F0 sin(πt/B), zero after "
                    "B), or a CSV of time and force, linear between its rows.")  # fmt: skip
-@click.option("--length", type=float, callback=_positive, help="Length of the rod, without a deck.")
-@click.option("--modulus", type=float, callback=_positive, help="Young's modulus, without a deck.")
-@click.option("--density", type=float, callback=_positive, help="Mass per volume, without a deck.")
-@click.option("--diameter", type=float, callback=_positive, help="Diameter, without a deck.")
+@click.option("--length", type=POSITIVE, help="Length of the rod, without a deck.")
+@click.option("--modulus", type=POSITIVE, help="Young's modulus, without a deck.")
+@click.option("--density", type=POSITIVE, help="Mass per volume, without a deck.")
+@click.option("--diameter", type=POSITIVE, help="Diameter, without a deck.")
 @click.option("--elements", type=click.IntRange(1, 1000), metavar="N",
               help="Number of elements, without a deck.  [default: 20]")  # fmt: skip
-@click.option("--dt", type=float, callback=_positive,
+@click.option("--dt", type=POSITIVE,
               help="Time step.  [default: the deck's DT, or 0.8 of a wave's time through an "
                    "element]")  # fmt: skip
-@click.option("--duration", type=float, callback=_positive,
+@click.option("--duration", type=POSITIVE,
               help="Time to cover.  [default: TAU + 10 B, 1.5 B, or the table's]")  # fmt: skip
-@click.option("--station", "stations", type=float, callback=_finite, multiple=True, metavar="X",
+@click.option("--station", "stations", type=Finite(), multiple=True, metavar="X",
               help="Distance from the struck end at which the force is wanted; may be repeated.  "
                    "[default: the middle]")  # fmt: skip
 @click.option("--filter", "filter_text", metavar="FILTER",
@@ -111,7 +79,7 @@ def pulse(
     filter_text: str | None,
     mass_matrix: str,
     integrator: str,
-    output: Path | None,
+    output: Path,
     picture: Path | None,
     overwrite: bool,
     **shape: float | int | None,
@@ -121,7 +89,7 @@ def pulse(
     The rod is the projectile of DECK, or uniform by --length, --modulus, --density and --diameter.
     Force is positive in compression.
     """
-    _check_targets(output, picture, overwrite)
+    targets = Targets.checked(output, picture, overwrite)
     _check_shape(deck, shape)
     from fecm.filters import filter_of
     from fecm.pulses import pulse_of
@@ -155,8 +123,9 @@ def pulse(
 
         return pulse_picture(history, filtered, units)
 
-    _hand_out(table(history, filtered), output, picture, draw)
-    if _to_file(output):
+    targets.draw(draw)
+    targets.write(table(history, filtered))
+    if targets.table is not None:
         click.echo("\n".join(_summary(struck, history)))
 
 
@@ -235,7 +204,7 @@ def filter_(
     history: Path,
     filter_text: str,
     column: str | None,
-    output: Path | None,
+    output: Path,
     picture: Path | None,
     overwrite: bool,
 ) -> None:
@@ -244,7 +213,7 @@ def filter_(
     RESULT is what `fecm run` wrote, or a CSV with a column of times; the CSV that comes out has the
     columns time, the history, and filtered.
     """
-    _check_targets(output, picture, overwrite, history)
+    targets = Targets.checked(output, picture, overwrite, history)
     from fecm.filters import filter_of
     from fecm.recorded import recorded
 
@@ -267,13 +236,14 @@ def filter_(
         for row in list(zip(*columns, strict=True))[series.first :]:
             yield ",".join(map(repr, row)) + "\n"
 
-    _hand_out(lines(), output, picture, draw)
+    targets.draw(draw)
+    targets.write(lines())
 
 
 @rod.command()
 @click.argument("test", type=DECK_PATH, metavar="TEST.csv")
-@click.option("--mass", type=float, callback=_positive, required=True, help="Mass of the target.")
-@click.option("--c-a", type=float, callback=_positive, required=True,
+@click.option("--mass", type=POSITIVE, required=True, help="Mass of the target.")
+@click.option("--c-a", type=POSITIVE, required=True,
               help="Sensitivity of the accelerometer, V_a per acceleration.")  # fmt: skip
 @click.option("--through-origin", is_flag=True, help="Fit a line without an offset.")
 @FORMAT_OPTION
@@ -293,7 +263,7 @@ def calibrate(
     TEST.csv has the columns time, V_F and V_a: outputs of the transducer on the projectile and of
     the accelerometer on a free target.  The slope of V_F over V_a gives c_F = (c_a / m) V_F / V_a.
     """
-    _check_targets(None, picture, overwrite)
+    targets = Targets.checked(STANDARD_OUTPUT, picture, overwrite)
     from fecm import calibration
     from fecm.columns import read_columns
 
@@ -314,7 +284,8 @@ def calibrate(
         return calibration_picture(columns["time"], columns["V_F"], columns["V_a"], found)
 
     text = json.dumps(vars(found)) if form == "json" else "\n".join(_told(found))
-    _hand_out([text + "\n"], None, picture, draw)
+    targets.draw(draw)
+    targets.write([text + "\n"])
 
 
 def _told(found: Any) -> list[str]:
@@ -326,53 +297,3 @@ def _told(found: Any) -> list[str]:
         f"R²                {found.r_squared:.6f}",
         f"sensitivity c_F   {found.sensitivity:.6g} ± {found.sensitivity_error:.2g}",
     ]
-
-
-# Output ------------------------------------------------------------------------------------------
-
-
-def _to_file(output: Path | None) -> bool:
-    return output is not None and str(output) != STANDARD_OUTPUT
-
-
-def _check_targets(
-    output: Path | None, picture: Path | None, overwrite: bool, source: Path | None = None
-) -> None:
-    """Refuse outputs that can't be written, before anything is computed."""
-    paths = [output] if output is not None and _to_file(output) else []
-    if picture is not None:
-        from fecm.plot import SUFFIXES
-
-        if picture.suffix.lower() not in SUFFIXES:
-            raise Refused(f"{picture}: a picture is written as {' or '.join(SUFFIXES)}")
-        paths.append(picture)
-    check_outputs(paths, overwrite)
-    if len({path.resolve() for path in paths}) < len(paths):
-        raise Refused(f"{picture} can't be both the CSV and the picture")
-    if source is not None and source.resolve() in {path.resolve() for path in paths}:
-        raise Refused(f"{source} would be replaced by what comes out of it")
-
-
-def _hand_out(
-    lines: Iterable[str],
-    output: Path | None,
-    picture: Path | None,
-    draw: Callable[[], Picture],
-) -> None:
-    """Write the text, and before it the picture if one is asked for."""
-    from fecm.plot import MISSING, save
-
-    try:
-        drawn = None if picture is None else draw()
-    except ImportError as error:
-        if not (error.name or "").startswith("matplotlib"):
-            raise
-        raise Refused(MISSING) from None
-    if picture is not None and drawn is not None:
-        save(drawn, picture)
-        click.echo(f"fecm: drew {picture}", err=True)
-    if output is not None and _to_file(output):
-        with writing(output) as file:
-            file.writelines(lines)
-    else:
-        sys.stdout.writelines(lines)

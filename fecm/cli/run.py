@@ -24,6 +24,7 @@ from fecm.cli.common import (
     signals,
     writing,
 )
+from fecm.cli.numbers import POSITIVE, Finite
 from fecm.files import clear_stale
 from fecm.rod_method import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
 from fecm.slips import NAMES, active_slips
@@ -66,11 +67,11 @@ if TYPE_CHECKING:
 @click.option("--rod-integrator", type=click.Choice(INTEGRATORS), default=WILSON,
               show_default=True,
               help="The projectile's integration; the report's is Wilson's.")  # fmt: skip
-@click.option("--checkpoint", "every", type=click.FloatRange(min=0.0), metavar="SECONDS",
+@click.option("--checkpoint", "every", type=Finite(min=0.0), metavar="SECONDS",
               help="Keep a checkpoint beside the output, written every so often.")  # fmt: skip
 @click.option("--resume", is_flag=True,
               help="Go on from the checkpoint that an interrupted run has left.")  # fmt: skip
-@click.option("--energy-limit", type=click.FloatRange(min=0.0, min_open=True), default=0.1,
+@click.option("--energy-limit", type=POSITIVE, default=0.1,
               show_default=True, metavar="PART",
               help="Error of the energy balance, as a part of what was given, that ends a run "
                    "without slips.")  # fmt: skip

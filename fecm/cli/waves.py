@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -10,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, check_outputs, count_errors, write_text
+from fecm.cli.common import DECK_PATH, Refused, count_errors
 from fecm.cli.numbers import ListCommand, number
+from fecm.cli.tables import OUTPUT, OVERWRITE, PLOT, Targets
 
 if TYPE_CHECKING:
     from fecm.laminate import Laminate
@@ -60,11 +62,9 @@ _SHARED = (
                  show_default=True,
                  help="Multiplies the transverse shear stiffness (a deck's own by SHEA, too); with "
                       "pi^2/12 = 0.822467 the cut-off frequencies are exact."),
-    click.option("-o", "--output", type=FILE_PATH, metavar="FILE",
-                 help="Where the CSV goes.  [default: standard output]"),
-    click.option("--plot", type=FILE_PATH, metavar="FILE",
-                 help="Also draw the figure: .png, .svg or .pdf."),
-    click.option("--overwrite", is_flag=True, help="Replace files that exist."),
+    OUTPUT,
+    PLOT,
+    OVERWRITE,
 )  # fmt: skip
 
 
@@ -81,8 +81,7 @@ class _Job:
 
     medium: Medium
     units: dict[str, str]
-    output: Path | None
-    plot: Path | None
+    targets: Targets
 
     def finish(
         self,
@@ -92,30 +91,11 @@ class _Job:
         notes: Iterable[str] = (),
     ) -> None:
         """Tell the notes, write the table and the picture."""
-        picture = None if self.plot is None else _drawn(draw)
+        self.targets.draw(draw)
         for note in notes:
             _note(note)
-        lines = (",".join(map(str, row)) for row in rows)
-        text = "\n".join([header, *lines]) + "\n"
-        if self.output is not None:
-            write_text(self.output, text)
-            click.echo(self.output)
-        if picture is not None and self.plot is not None:
-            from fecm.plot import save
-
-            save(picture, self.plot)
-            click.echo(self.plot, err=self.output is None)
-        if self.output is None:
-            click.echo(text, nl=False)
-
-
-def _drawn(draw: Callable[[], Picture]) -> Picture:
-    from fecm.plot import PlotError
-
-    try:
-        return draw()
-    except PlotError as error:
-        raise Refused(str(error)) from None
+        lines = (",".join(map(str, row)) + "\n" for row in rows)
+        self.targets.write(itertools.chain([header + "\n"], lines))
 
 
 def _job(
@@ -123,8 +103,8 @@ def _job(
     deck: Path | None,
     layup: str | None,
     shear_factor: float,
-    output: Path | None,
-    plot: Path | None,
+    output: Path,
+    picture: Path | None,
     overwrite: bool,
     **constants: Any,
 ) -> _Job:
@@ -133,30 +113,13 @@ def _job(
 
     from fecm.waves import Medium
 
-    paths = [path for path in (output, plot) if path is not None]
-    if len(set(paths)) < len(paths):
-        raise Refused(f"{output} can't hold the table and the picture")
-    check_outputs(paths, overwrite)
-    if plot is not None:
-        _check_picture(plot)
+    targets = Targets.checked(output, picture, overwrite, deck)
     laminate, units = _laminate(deck, layup, constants)
     try:
         medium = Medium(replace(laminate, shear=shear_factor * laminate.shear))
     except ValueError as error:
         raise Refused(str(error)) from None
-    return _Job(medium, units, output, plot)
-
-
-def _check_picture(path: Path) -> None:
-    """Refuse a picture that can't be drawn, before anything is computed."""
-    from fecm.plot import MISSING, SUFFIXES
-
-    if path.suffix.lower() not in SUFFIXES:
-        raise Refused(f"{path}: a picture is written as {' or '.join(SUFFIXES)}")
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        raise Refused(MISSING) from None
+    return _Job(medium, units, targets)
 
 
 def _laminate(

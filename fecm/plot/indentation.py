@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fecm.fitting.constants import Fit
 from fecm.fitting.cycles import FALLING, LOADING, RISING
 from fecm.plot import Picture
-from fecm.plot.style import COLOURS, RATIO, STYLES, Scale, lines_legend, panels, scale
+from fecm.plot.style import COLOURS, RATIO, STYLES, Scale, lines_legend, panels, scale, styled
 from fecm.units import unit_of
 
 Floats = NDArray[np.float64]
@@ -29,7 +29,10 @@ def _scale(values: Floats, dimension: str, units: Mapping[str, str]) -> Scale:
     return scale(top, unit_of(dimension, dict(units)))
 
 
-def fit(indentation: Floats, force: Floats, found: Fit, units: Mapping[str, str]) -> Picture:
+@styled
+def fit_picture(
+    indentation: Floats, force: Floats, found: Fit, units: Mapping[str, str]
+) -> Picture:
     """A test's points with the fitted curves, and permanent against largest indentation.
 
     Parameters
@@ -92,7 +95,8 @@ def _permanent(axes: Axes, found: Fit, length: Scale) -> None:
     axes.set_ylabel(length.label("Permanent indentation"))
 
 
-def path(indentation: Floats, force: Floats, units: Mapping[str, str]) -> Picture:
+@styled
+def path_picture(indentation: Floats, force: Floats, units: Mapping[str, str]) -> Picture:
     """Force along an indentation path."""
     length, pound = _scale(indentation, "length", units), _scale(force, "force", units)
     figure, axes = panels("column", ratio=RATIO["column"])
@@ -102,7 +106,8 @@ def path(indentation: Floats, force: Floats, units: Mapping[str, str]) -> Pictur
     return Picture(figure)
 
 
-def rigidity(
+@styled
+def rigidity_picture(
     peaks: Floats, relations: Mapping[str, Floats], power: float, units: Mapping[str, str]
 ) -> Picture:
     """Unloading rigidity against largest indentation (figure 3.19).

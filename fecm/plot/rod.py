@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from fecm.calibration import Calibration
 from fecm.plot import Picture
-from fecm.plot.style import COLOURS, RATIO, RC, STYLES, legend, lines_legend, panels, scale
+from fecm.plot.style import COLOURS, RATIO, STYLES, legend, lines_legend, panels, scale, styled
 from fecm.rod import RodHistory
 from fecm.units import unit_of
 
@@ -33,16 +32,6 @@ class _Line:
     style: Any = field(default="-")
 
 
-def _styled(drawn: Callable[..., Picture]) -> Callable[..., Picture]:
-    """Draw in the project's style."""
-
-    def draw(*arguments: Any, **options: Any) -> Picture:
-        with matplotlib.rc_context(RC):
-            return drawn(*arguments, **options)
-
-    return draw
-
-
 def _against_time(
     axes: Axes, time: Floats, lines: Sequence[_Line], name: str, dimension: str, units: Any
 ) -> None:
@@ -60,7 +49,7 @@ def _against_time(
     axes.set_ylabel(size.label(name))
 
 
-@_styled
+@styled
 def pulse_picture(
     history: RodHistory, filtered: Floats | None = None, units: Mapping[str, str] | None = None
 ) -> Picture:
@@ -94,7 +83,7 @@ def pulse_picture(
     return Picture(figure)
 
 
-@_styled
+@styled
 def filter_picture(
     time: Floats,
     named: Mapping[str, Floats],
@@ -124,7 +113,7 @@ def filter_picture(
     return Picture(figure)
 
 
-@_styled
+@styled
 def calibration_picture(time: Floats, v_f: Floats, v_a: Floats, found: Calibration) -> Picture:
     """Both outputs against time (figure 4.5), and one against the other with the line (4.6)."""
     figure, (left, right) = panels("full", 1, 2, ratio=2 * RATIO["full"])

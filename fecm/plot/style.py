@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ParamSpec
 
+import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from fecm.plot import PlotError
+from fecm.plot import Picture, PlotError
 from fecm.results.result import Result
 
 # Width of a column and of a page (in); points an inch of pictures in print and on a screen.
@@ -66,6 +68,20 @@ _PREFIXED = {
 }  # fmt: skip
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+Drawn = ParamSpec("Drawn")
+
+
+def styled(function: Callable[Drawn, Picture]) -> Callable[Drawn, Picture]:
+    """Have a function draw in this style."""
+
+    @functools.wraps(function)
+    def draw(*arguments: Drawn.args, **options: Drawn.kwargs) -> Picture:
+        with matplotlib.rc_context(RC):
+            return function(*arguments, **options)
+
+    return draw
 
 
 @dataclass(frozen=True)

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from fecm.plot import Picture, PlotError
-from fecm.plot.style import COLOURS, RC, panels, scale
+from fecm.plot.style import COLOURS, panels, scale, styled
 from fecm.units import unit_of
 from fecm.waves import FRONTS, MODES, Cusp, Dispersion, Medium, WaveSurfaces
 
@@ -26,6 +25,7 @@ DASHES: tuple[Any, ...] = (
 )  # fmt: skip
 
 
+@styled
 def dispersion_picture(medium: Medium, curves: Sequence[Dispersion]) -> Picture:
     """Phase velocities and frequencies of all modes against the wavelength.
 
@@ -41,33 +41,31 @@ def dispersion_picture(medium: Medium, curves: Sequence[Dispersion]) -> Picture:
     unit = medium.shear_velocity
     velocities = [curve.phase_velocity / unit for curve in curves]
     frequencies = [c.angular_frequency * medium.laminate.thickness / unit for c in curves]
-    with matplotlib.rc_context(RC):
-        figure, axes = panels("full", 1, 2, ratio=0.66)
-        for curve, colour, *both in zip(curves, COLOURS, velocities, frequencies, strict=False):
-            for ax, values in zip(axes, both, strict=True):
-                for column, dashes in zip(values.T, DASHES, strict=True):
-                    ax.plot(curve.wavelength, column, color=colour, ls=dashes)
-        angles = [f"{curve.angle:g}°" for curve in curves]
-        colours = [Line2D([], [], color=colour) for colour in COLOURS[: len(curves)]]
-        figure.legend(colours, angles, loc="outside upper left", ncols=4)
-        modes = [Line2D([], [], color="0.3", ls=dashes) for dashes in DASHES]
-        figure.legend(
-            modes, [WORDS[mode] for mode in MODES], loc="outside upper right", ncols=5,
-            handlelength=2.6,
-        )  # fmt: skip
-        longest = max(float(curve.wavelength[-1]) for curve in curves)
-        tops = (
-            1.15 * max(float(values[:, 3:].max()) for values in velocities),
-            2.6 * max(float(values[-1, 1:3].max()) for values in frequencies),
-        )
-        names = ("Phase velocity $c/c_s$", "Frequency $\\omega h/c_s$")
-        for ax, top, name in zip(axes, tops, names, strict=True):
-            ax.set(
-                xlim=(0.0, longest), ylim=(0.0, top), xlabel="Wavelength $\\lambda/h$", ylabel=name
-            )
+    figure, axes = panels("full", 1, 2, ratio=0.66)
+    for curve, colour, *both in zip(curves, COLOURS, velocities, frequencies, strict=False):
+        for ax, values in zip(axes, both, strict=True):
+            for column, dashes in zip(values.T, DASHES, strict=True):
+                ax.plot(curve.wavelength, column, color=colour, ls=dashes)
+    angles = [f"{curve.angle:g}°" for curve in curves]
+    colours = [Line2D([], [], color=colour) for colour in COLOURS[: len(curves)]]
+    figure.legend(colours, angles, loc="outside upper left", ncols=4)
+    modes = [Line2D([], [], color="0.3", ls=dashes) for dashes in DASHES]
+    figure.legend(
+        modes, [WORDS[mode] for mode in MODES], loc="outside upper right", ncols=5,
+        handlelength=2.6,
+    )  # fmt: skip
+    longest = max(float(curve.wavelength[-1]) for curve in curves)
+    tops = (
+        1.15 * max(float(values[:, 3:].max()) for values in velocities),
+        2.6 * max(float(values[-1, 1:3].max()) for values in frequencies),
+    )
+    names = ("Phase velocity $c/c_s$", "Frequency $\\omega h/c_s$")
+    for ax, top, name in zip(axes, tops, names, strict=True):
+        ax.set(xlim=(0.0, longest), ylim=(0.0, top), xlabel="Wavelength $\\lambda/h$", ylabel=name)
     return Picture(figure)
 
 
+@styled
 def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
     """Normal velocities of in-plane and of flexural fronts, as distances in the normal's direction.
 
@@ -79,27 +77,27 @@ def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
     """
     fronts = surfaces.fronts(AROUND)
     speed = scale(float(fronts.velocity.max()), unit_of("length/time", dict(units)))
-    with matplotlib.rc_context(RC):
-        figure, axes = panels("full", 1, 2, ratio=1.16, subplot_kw={"projection": "polar"})
-        figure.set_layout_engine("constrained")
-        graphs: Any = axes  # polar ones have methods of their own
-        for place, colour in enumerate(COLOURS[: len(FRONTS)]):
-            graphs[0 if place < 2 else 1].plot(
-                np.deg2rad(fronts.normal),
-                speed.factor * fronts.velocity[:, place],
-                color=colour,
-                label=WORDS[FRONTS[place]],
-            )
-        for ax, title in zip(graphs, ("In-plane fronts", "Flexural fronts"), strict=True):
-            ax.set_title(speed.label(f"{title}: normal velocity"))
-            ax.set_rlim(0.0, 1.06 * speed.factor * float(fronts.velocity.max()))
-            ax.set_rlabel_position(112.5)
-            ax.tick_params(labelsize=6.5, pad=1)
-            ax.grid(lw=0.4, color="0.8")
-            ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=3)
+    figure, axes = panels("full", 1, 2, ratio=1.16, subplot_kw={"projection": "polar"})
+    figure.set_layout_engine("constrained")
+    graphs: Any = axes  # polar ones have methods of their own
+    for place, colour in enumerate(COLOURS[: len(FRONTS)]):
+        graphs[0 if place < 2 else 1].plot(
+            np.deg2rad(fronts.normal),
+            speed.factor * fronts.velocity[:, place],
+            color=colour,
+            label=WORDS[FRONTS[place]],
+        )
+    for ax, title in zip(graphs, ("In-plane fronts", "Flexural fronts"), strict=True):
+        ax.set_title(speed.label(f"{title}: normal velocity"))
+        ax.set_rlim(0.0, 1.06 * speed.factor * float(fronts.velocity.max()))
+        ax.set_rlabel_position(112.5)
+        ax.tick_params(labelsize=6.5, pad=1)
+        ax.grid(lw=0.4, color="0.8")
+        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=3)
     return Picture(figure)
 
 
+@styled
 def fronts_picture(
     surfaces: WaveSurfaces, times: Sequence[float], radius: float, units: Mapping[str, str]
 ) -> Picture:
@@ -117,33 +115,30 @@ def fronts_picture(
     turns = [surfaces.cusps(time, radius) for time in times]
     length = scale(max(float(np.abs(at).max()) for at in places), unit_of("length", dict(units)))
     clock = scale(max(times), unit_of("time", dict(units)))
-    with matplotlib.rc_context(RC):
-        figure, axes = panels("full", 2, 3, ratio=0.95)
-        for mode, ax in enumerate(axes[:5]):
-            _circle(ax, length.factor * radius)
-            for start, end in zip(*(length.factor * at[:, mode] for at in ends), strict=True):
-                ax.plot(*zip(start, end, strict=True), color="0.6", lw=0.5)
-            for at, colour in zip(places, COLOURS, strict=False):
-                ax.plot(*(length.factor * at[:, mode].T), color=colour)
-            _dots(
-                ax, [c for found in turns for c in found if c.mode == FRONTS[mode]], length.factor
-            )
-            ax.set_title(WORDS[FRONTS[mode]])
-            ax.locator_params(nbins=5)
-            ax.set(aspect="equal", xlabel=length.label("$x$"), ylabel=length.label("$y$"))
-        axes[5].set_axis_off()
-        handles = [Line2D([], [], color=colour) for _, colour in zip(times, COLOURS, strict=False)]
-        labels = [clock.show(time) for time in times]
-        extra = (
-            ("time 0", Line2D([], [], color="0.4", ls=DASHES[2])),
-            (f"rays, normals {RAYS:g}° apart", Line2D([], [], color="0.6", lw=0.5)),
-            ("cusps", Line2D([], [], **_DOT)),
-        )
-        axes[5].legend(
-            [*handles, *(handle for _, handle in extra)],
-            [*labels, *(label for label, _ in extra)],
-            loc="center",
-        )
+    figure, axes = panels("full", 2, 3, ratio=0.95)
+    for mode, ax in enumerate(axes[:5]):
+        _circle(ax, length.factor * radius)
+        for start, end in zip(*(length.factor * at[:, mode] for at in ends), strict=True):
+            ax.plot(*zip(start, end, strict=True), color="0.6", lw=0.5)
+        for at, colour in zip(places, COLOURS, strict=False):
+            ax.plot(*(length.factor * at[:, mode].T), color=colour)
+        _dots(ax, [c for found in turns for c in found if c.mode == FRONTS[mode]], length.factor)
+        ax.set_title(WORDS[FRONTS[mode]])
+        ax.locator_params(nbins=5)
+        ax.set(aspect="equal", xlabel=length.label("$x$"), ylabel=length.label("$y$"))
+    axes[5].set_axis_off()
+    handles = [Line2D([], [], color=colour) for _, colour in zip(times, COLOURS, strict=False)]
+    labels = [clock.show(time) for time in times]
+    extra = (
+        ("time 0", Line2D([], [], color="0.4", ls=DASHES[2])),
+        (f"rays, normals {RAYS:g}° apart", Line2D([], [], color="0.6", lw=0.5)),
+        ("cusps", Line2D([], [], **_DOT)),
+    )
+    axes[5].legend(
+        [*handles, *(handle for _, handle in extra)],
+        [*labels, *(label for label, _ in extra)],
+        loc="center",
+    )
     return Picture(figure)
 
 
