@@ -39,7 +39,7 @@ from fecm.deck.records import Control, NodeValues
 from fecm.mesh import generate
 from fecm.parts import set_up
 from fecm.program import compile_program
-from fecm.results import hdf5
+from fecm.results import file_writer
 from fecm.simulation import Simulation
 from fecm.workers import available
 
@@ -125,7 +125,7 @@ def full(problem: Checked, folder: str, threads: int = 1) -> float:
     begin = 0.0
     path = Path(folder) / "run.h5"
     path.unlink(missing_ok=True)
-    with hdf5.writing(path) as sink:
+    with file_writer.writing(path) as sink:
         simulation = Simulation(problem, frozenset(), sink, threads=threads)
         begin = time.perf_counter()
         simulation.run()

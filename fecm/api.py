@@ -152,11 +152,11 @@ def run(
             simulate(problem, active, memory, **how)
             results.append(Result(memory.arrays, memory.texts, memory.groups))
         else:
-            from fecm.results import hdf5
+            from fecm.results import file_writer
             from fecm.results.result import load
 
             path = numbered(Path(output), number)
-            with hdf5.writing(path) as sink:
+            with file_writer.writing(path) as sink:
                 simulate(problem, active, sink, **how)
             results.append(load(path))
     return results[0] if len(results) == 1 else results

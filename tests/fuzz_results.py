@@ -52,7 +52,9 @@ COMMANDS = {
 }
 SWEEP = "sweep"
 USUAL = ("info", "diff")
-OF_A_SWEEP = {"plot map": ["{}", "-o", "{made}"], "info": ["{}"]}
+OF_A_SWEEP = {
+    "info": ["{}"], "diff": ["{sound}", "{}"], "plot map": ["{}", "-o", "{made}"]
+}  # fmt: skip
 
 
 def mutate(source: Path, target: Path, random: random.Random) -> str:

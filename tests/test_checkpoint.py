@@ -24,7 +24,7 @@ import fecm
 from fecm.api import prepare
 from fecm.check import Checked
 from fecm.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
-from fecm.results import hdf5
+from fecm.results import file_writer
 from fecm.results.journal import Journal
 from fecm.results.sinks import MemorySink
 from fecm.rod_method import RodMethod
@@ -84,7 +84,7 @@ def run(text: str, path: Path, stop: int = 0, *, resume: bool = False, slips: st
 
     problem = prepare(text).problems[0]
     names = frozenset(slips.split())
-    with hdf5.writing(path) as sink:
+    with file_writer.writing(path) as sink:
         journal = Journal(sink, muted=resume)
         checkpointer = Checkpointer(path, journal)
         simulation = Simulation(problem, names, journal, rod_method=RodMethod(), look=look)
@@ -233,7 +233,7 @@ def test_resuming_without_a_checkpoint_is_refused(tmp_path: Path) -> None:
 
 def stop_at_once(problem: Checked, path: Path) -> None:
     """Stop a run with a checkpoint, as soon as it looks up."""
-    with hdf5.writing(path) as sink:
+    with file_writer.writing(path) as sink:
         journal = Journal(sink)
         checkpointer = Checkpointer(path, journal)
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.results import hdf5
+from fecm.results.file_reader import read
 from fecm.results.schema import ResultFileError
 from tests.calls import assert_unusable, call
 from tests.decks import APPENDIX, DATA_CARDS, small
@@ -301,7 +301,7 @@ def test_a_dataset_that_vanishes_while_it_is_read_is_one_error(
     changed: Callable[[Edit], Path],
 ) -> None:
     path = changed(lambda file: None)
-    arrays, _, _ = hdf5.read(path)
+    arrays = read(path).arrays
     path.write_bytes(b"gone")
     with pytest.raises(ResultFileError, match=r"changed\.h5: this is no readable HDF5 file"):
         arrays["tape3/w"]

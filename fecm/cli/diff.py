@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -46,7 +47,9 @@ def _tolerance(_: click.Context, option: click.Parameter, value: str) -> float:
 def diff(
     a: Path, b: Path, rtol: float, atol: float, only: tuple[str, ...], brief: bool, form: str
 ) -> None:
-    """Compare two results dataset by dataset; A and B are result files or folders of tapes.
+    """Compare two results dataset by dataset.
+
+    A and B are result files or folders of tapes, or both results of sweeps.
 
     Two numbers are the same if |a - b| <= T + R * max, max being the largest absolute value of the
     whole dataset.  NaN is the same as NaN, an infinity as the same infinity.  Whole numbers (steps,
@@ -61,12 +64,12 @@ def diff(
     Exit status: 0 the same, 1 different, 2 a file or the call can't be used.
     """
     from fecm.results.compare import Tolerance
-    from fecm.results.sides import UnknownNameError, difference, opened
+    from fecm.results.sides import IncomparableError, difference, opened
 
     try:
         with opened(a) as left, opened(b) as right:
             found = difference(left, right, Tolerance(rtol, atol), only)
-    except UnknownNameError as error:
+    except IncomparableError as error:
         raise Refused(printable(str(error))) from None
     if form == "json":
         head = {"a": printable(str(a)), "b": printable(str(b)), "rtol": rtol, "atol": atol}
@@ -113,14 +116,12 @@ def _told(found: Comparison) -> str:
     """What there is to say about a dataset: sizes, then where, then since when."""
     a, b = found.layouts
     parts: list[str] = []
-    if not found.comparable:
+    if a.shape != b.shape:
         parts.append(f"shape {_shape(a.shape)} against {_shape(b.shape)}")
     if not found.same_type:
-        parts.append(f"type {a.dtype} against {b.dtype}")
+        parts.append(f"type {a.kind} against {b.kind}")
     if found.at and found.values:
-        left, right = (f"{value:.6g}" for value in found.values)
-        if left == right:
-            left, right = (repr(value) for value in found.values)
+        left, right = _values(found.values)
         if math.isinf(found.largest):
             parts.append(f"{left} against {right}{_where(found.at)}")
         else:
@@ -129,10 +130,19 @@ def _told(found: Comparison) -> str:
                 f"largest {found.largest:.3g} ({share}), {left} against {right}{_where(found.at)}"
             )
     if found.differing:
-        parts.append(f"{found.differing} number{'s differ' if found.differing > 1 else ' differs'}")
+        what = "text" if a.holds_texts else "number"
+        parts.append(f"{found.differing} {what}{'s differ' if found.differing > 1 else ' differs'}")
     if found.first:
         parts.append(f"first{_where(found.first)}")
     return "; ".join(parts)
+
+
+def _values(values: Sequence[float | str]) -> list[str]:
+    """Two values that differ, in as many digits as it takes to see it."""
+    if any(isinstance(value, str) for value in values):
+        return [f"`{shown(value)}`" for value in values]
+    short = [f"{value:.6g}" for value in values]
+    return short if short[0] != short[1] else list(map(repr, values))
 
 
 def _shape(shape: tuple[int, ...]) -> str:
@@ -175,19 +185,19 @@ def _json(found: Difference, head: dict[str, Any], brief: bool) -> dict[str, Any
 def _entry(found: Comparison) -> dict[str, Any]:
     """One dataset for programs."""
     a, b = found.layouts
-    numbers = found.comparable
+    numbers = found.comparable and not a.holds_texts
     finite = numbers and math.isfinite(found.largest)
     values = found.values or (None, None)
     return {
         "name": found.path,
         "same": found.same,
         "shape_a": list(a.shape), "shape_b": list(b.shape),
-        "dtype_a": str(a.dtype), "dtype_b": str(b.dtype),
+        "dtype_a": a.kind, "dtype_b": b.kind,
         "largest_difference": found.largest if finite else None,
         "relative": found.relative if finite else None,
         "maximum": found.maximum if numbers else None,
         "tolerance": found.tolerance if numbers else None,
-        "differing": found.differing if numbers else None,
+        "differing": found.differing if found.comparable else None,
         "at": _place(found.at), "a": values[0], "b": values[1],
         "first": _place(found.first),
     }  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,11 +14,15 @@ from fecm.cli.common import FILE_PATH, FORMAT_OPTION
 from fecm.results.plain import jsonable, printable, shown
 
 if TYPE_CHECKING:
+    from fecm.results.file_reader import Contents
     from fecm.results.information import DatasetInformation, GroupInformation, Information
 
 # Attributes of the file that have lines of their own.
 TOLD = ("title", "mode", "slips", "fecm_version", "format", "format_version",
         "unit_length", "unit_force", "unit_time")  # fmt: skip
+
+# Of these, what a sweep has as well.
+IN_FRONT = ("title", "fecm_version", "format", "format_version")
 
 
 @click.command()
@@ -25,35 +30,70 @@ TOLD = ("title", "mode", "slips", "fecm_version", "format", "format_version",
 @FORMAT_OPTION
 @reads("result")
 def info(result: Path, form: str) -> None:
-    """Tell what is in RESULT: the run, its units and summary, and every group and dataset."""
+    """Tell what is in RESULT, of a run or of a sweep: its units, its summary, every dataset."""
+    from fecm.results.file_reader import read
     from fecm.results.information import information
+    from fecm.results.schema import FORMAT, SWEEP
 
-    told = information(result)
+    contents = read(result, FORMAT, SWEEP)
+    about = _of_sweep(contents) if contents.form == SWEEP else _of_run(contents)
+    told = information(contents)
     if form == "json":
-        click.echo(json.dumps(jsonable(_json(told))))
+        click.echo(json.dumps(jsonable(_json(told, about))))
     else:
-        click.echo("\n".join(_lines(told)))
+        click.echo("\n".join(_lines(told, about)))
 
 
-def _lines(told: Information) -> list[str]:
+def _of_run(contents: Contents) -> dict[str, Any]:
+    """Steps, first and last time, and summary of a run."""
+    from fecm.results.information import summary_of_run
+    from fecm.results.result import result_of
+
+    result = result_of(contents)
+    steps, span = 0, None
+    if "history/time" in result and (steps := len(times := result["history/time"])):
+        span = float(times[0]), float(times[-1])
+    return {"steps": steps, "time": span, "summary": summary_of_run(result)}
+
+
+def _of_sweep(contents: Contents) -> dict[str, Any]:
+    """Cases, failed ones among them, and summary of a sweep."""
+    from fecm.sweeps.result import sweep_of
+    from fecm.sweeps.summary import summary
+
+    result = sweep_of(contents)
+    failed = len(result) - int(result.fine.sum())
+    return {"cases": len(result), "failed": failed, "summary": summary(result)}
+
+
+def _extent(about: Mapping[str, Any]) -> tuple[str, str]:
+    """How much was computed."""
+    if "cases" in about:
+        return "cases", f"{about['cases']}, {about['failed'] or 'none'} failed"
+    first_last = about["time"]
+    span = f", time {first_last[0]:.6g} to {first_last[1]:.6g}" if first_last else ""
+    return "steps", f"{about['steps']}{span}"
+
+
+def _lines(told: Information, about: Mapping[str, Any]) -> list[str]:
     """The whole page."""
     attributes = told.attributes
     slips = attributes.get("slips", [])
+    listed = ", ".join(map(str, slips)) if isinstance(slips, list) and slips else "none"
+    of_a_run = [("mode", attributes.get("mode", "not told")), ("slips", listed)]
     units = ", ".join(f"{name} {unit}" for name, unit in told.units.items())
-    span = f", time {told.time[0]:.6g} to {told.time[1]:.6g}" if told.time else ""
     rows = [
         ("file", f"{told.path}, {told.size} bytes"),
-        ("mode", attributes.get("mode", "not told")),
-        ("slips", ", ".join(map(str, slips)) if isinstance(slips, list) and slips else "none"),
+        *([] if "cases" in about else of_a_run),
         ("written by", f"fecm {attributes.get('fecm_version', 'of no version')}, "
                        f"format version {attributes.get('format_version')}"),
         ("units", units or "the deck names none"),
-        ("steps", f"{told.steps}{span}"),
+        _extent(about),
         *((name, shown(value)) for name, value in attributes.items() if name not in TOLD),
     ]  # fmt: skip
     lines = [printable(str(attributes.get("title", "") or "(no title)"))]
     lines += [f"  {printable(name):17} {printable(str(value))}" for name, value in rows]
-    lines += ["", "summary", *(f"  {printable(line)}" for line in told.summary)]
+    lines += ["", "summary", *(f"  {printable(line)}" for line in about["summary"])]
     for group in told.groups:
         lines += ["", *_group(group)]
     if told.texts:
@@ -83,7 +123,9 @@ def _cells(dataset: DatasetInformation) -> tuple[str, ...]:
     """Name, shape, type, dimension and unit, range."""
     name = dataset.path.rpartition("/")[2]
     dimension = dataset.dimension + (f" ({dataset.unit})" if dataset.unit else "")
-    if dataset.minimum is None:
+    if dataset.different is not None:
+        span = f"{dataset.different} different"
+    elif dataset.minimum is None:
         span = "no finite number"
     else:
         span = f"{dataset.minimum:.6g} to {dataset.maximum:.6g}"
@@ -93,18 +135,17 @@ def _cells(dataset: DatasetInformation) -> tuple[str, ...]:
     return printable(name), shape, dataset.dtype, printable(dimension), span
 
 
-def _json(told: Information) -> dict[str, Any]:
+def _json(told: Information, about: Mapping[str, Any]) -> dict[str, Any]:
     """Everything for programs."""
     attributes = told.attributes
     return {
         "file": printable(str(told.path)),
         "size": told.size,
-        **{name: attributes.get(name) for name in TOLD[:6]},
+        **{name: attributes.get(name) for name in (IN_FRONT if "cases" in about else TOLD[:6])},
         "units": told.units,
-        "steps": told.steps,
-        "time": told.time,
+        **{name: value for name, value in about.items() if name != "summary"},
         "attributes": {n: v for n, v in attributes.items() if n not in TOLD},
-        "summary": told.summary,
+        "summary": about["summary"],
         "groups": [
             {
                 "name": group.name,
@@ -131,4 +172,5 @@ def _entry(dataset: DatasetInformation) -> dict[str, Any]:
         "min": dataset.minimum,
         "max": dataset.maximum,
         "not_finite": dataset.not_finite,
+        "different": dataset.different,
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ import click
 
 from fecm.cli.apart import reads
 from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, check_outputs
-from fecm.plot import KINDS, Options, Picture, PlotError, check_kind, check_suffix, draw, save
+from fecm.plot import KINDS, Options, Picture, PlotError, check_suffix, draw, save
 
 if TYPE_CHECKING:
     from fecm.results.result import Result
@@ -117,10 +117,11 @@ def plot(
     """Draw the report's figures from one RESULT or several, or the map of a sweep."""
     options = Options(at, gages, face, times, along, width, quantity, over, where, level)
     try:
-        paths = _paths(results[0], list(dict.fromkeys(kinds)) or _usual(results[0]), output)
+        named = _named(results)
+        chosen = list(dict.fromkeys(kinds)) or [_usual(next(iter(named.values())))]
+        paths = _paths(results[0], chosen, output)
         check_outputs(list(paths.values()), overwrite)
-        _check_kinds(results, list(paths))
-        pictures = _draw(_named(results, list(paths)), list(paths), options)
+        pictures = _draw(named, chosen, options)
         for kind, path in paths.items():
             save(pictures[kind], path)
             click.echo(path)
@@ -143,49 +144,31 @@ def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path
     return {kind: folder / f"{first.stem}-{kind}{KINDS[kind].suffixes[0]}" for kind in kinds}
 
 
-def _form(path: Path) -> str:
-    """What a file says that it is; nothing where it can't be read."""
-    from fecm.results.hdf5 import OpenArrays
-    from fecm.results.schema import ResultFileError
-
-    if not path.is_file():
-        return ""
-    try:
-        with OpenArrays(path) as file:
-            return str(file.attributes("/").get("format", ""))
-    except ResultFileError:
-        return ""
-
-
-def _usual(path: Path) -> list[str]:
+def _usual(result: Result | SweepResult) -> str:
     """The kind that is drawn when none is asked for."""
-    from fecm.results.schema import SWEEP
+    from fecm.results.result import Result
 
-    return ["map" if _form(path) == SWEEP else "force"]
-
-
-def _check_kinds(paths: Sequence[Path], kinds: Sequence[str]) -> None:
-    """Refuse a run's result for a map, and a sweep's for anything else."""
-    from fecm.results.schema import FORMAT, SWEEP
-
-    for path in paths:
-        form = _form(path)
-        for kind in kinds if form in (FORMAT, SWEEP) else ():
-            check_kind(kind, str(path), sweep=form == SWEEP)
+    return "force" if isinstance(result, Result) else "map"
 
 
-def _named(paths: tuple[Path, ...], kinds: Sequence[str]) -> dict[str, Result | SweepResult]:
+def _named(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:
     """Results by the shortest names that tell them apart."""
-    from fecm.results.result import load
-    from fecm.sweeps.result import load as load_sweep
-
     names = [path.stem for path in paths]
     if len(set(names)) < len(names):
         names = [str(path) for path in paths]
     if len(set(names)) < len(names):
         raise Refused("a result is given twice")
-    read = load_sweep if KINDS[kinds[0]].sweep else load
-    return {name: read(path) for name, path in zip(names, paths, strict=True)}
+    return {name: _loaded(path) for name, path in zip(names, paths, strict=True)}
+
+
+def _loaded(path: Path) -> Result | SweepResult:
+    from fecm.results.file_reader import read
+    from fecm.results.result import result_of
+    from fecm.results.schema import FORMAT, SWEEP
+    from fecm.sweeps.result import sweep_of
+
+    contents = read(path, FORMAT, SWEEP)
+    return sweep_of(contents) if contents.form == SWEEP else result_of(contents)
 
 
 def _draw(

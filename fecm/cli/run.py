@@ -156,7 +156,7 @@ def _run_one(
     from fecm.checkpoint import Checkpointer, checkpoint_of
     from fecm.printout import Printer
     from fecm.program import tally
-    from fecm.results import hdf5
+    from fecm.results import file_writer
     from fecm.results.journal import Journal
     from fecm.results.result import load
     from fecm.results.summary import summary
@@ -169,7 +169,7 @@ def _run_one(
     with contextlib.ExitStack() as stack:
         stack.enter_context(signals.deferred())
         stack.enter_context(_ends(path))
-        journal = Journal(stack.enter_context(hdf5.writing(path)), muted=resumes)
+        journal = Journal(stack.enter_context(file_writer.writing(path)), muted=resumes)
         checkpointer = Checkpointer(path, journal)
         printer = Printer() if printed is None else Printer(stack.enter_context(writing(printed)))
         advance = stack.enter_context(_progress(tally(problem.program).steps))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,9 +28,6 @@ if TYPE_CHECKING:
     from fecm.sweeps.run import Task
     from fecm.sweeps.store import Parts
     from fecm.sweeps.tasks import Plan
-
-# Reasons of failed cases that are told one by one.
-TOLD = 5
 
 
 @click.command()
@@ -72,6 +68,7 @@ def sweep(
     """
     from fecm.sweeps.cases import CasesError
     from fecm.sweeps.result import save
+    from fecm.sweeps.summary import summary
     from fecm.sweeps.tasks import plan
 
     path = output or Path(f"{deck.stem}-sweep.h5")
@@ -87,8 +84,9 @@ def sweep(
         raise Refused(str(error)) from None
     save(result, path)
     _parts(made, path, restart=True).clear()
-    for line in _summary(result):
-        click.echo(line)
+    click.echo(result.title or "sweep")
+    for line in summary(result):
+        click.echo(f"  {line}")
     click.echo(f"  result            {path}")
     _run_in_full(made, fulls)
 
@@ -186,32 +184,10 @@ def _progress(count: int) -> Iterator[Callable[[Task, Outcome], None]]:
         yield done
 
 
-def _summary(result: SweepResult) -> list[str]:
-    """What came out, for a person."""
-    fine = result.fine
-    lines = [result.title or "sweep", f"  cases             {len(result)}"]
-    if fine.any():
-        force = result["peak_force"]
-        for word, row in (("smallest", "argmin"), ("largest", "argmax")):
-            rows = fine.nonzero()[0]
-            case = int(rows[getattr(force[rows], row)()])
-            values = ", ".join(f"{name} {values[case]}" for name, values in result.cases.items())
-            unit = result.unit("peak_force")
-            lines.append(
-                f"  {word + ' peak':17} {force[case]:.6g} {unit}".rstrip() + f" ({values})"
-            )
-    reasons = Counter(result["status"][~fine].tolist())
-    for reason, times in reasons.most_common(TOLD):
-        lines.append(f"  failed            {times}: {reason}")
-    if len(reasons) > TOLD:
-        lines.append(f"  failed            for {len(reasons) - TOLD} other reasons")
-    return lines
-
-
 def _run_in_full(made: Plan, fulls: dict[int, Path]) -> None:
     """Run chosen cases with everything that their deck stores."""
     from fecm.api import prepare
-    from fecm.results import hdf5
+    from fecm.results import file_writer
     from fecm.simulation import simulate
     from fecm.sweeps.cases import CasesError
     from fecm.sweeps.variations import varied
@@ -221,7 +197,7 @@ def _run_in_full(made: Plan, fulls: dict[int, Path]) -> None:
             prepared = prepare(varied(made.deck, made.cases[case]))
             if errors := prepared.errors(force=True):
                 raise CasesError(errors[0].message)
-            with hdf5.writing(path) as sink:
+            with file_writer.writing(path) as sink:
                 simulate(prepared.problems[0], (), sink)
         except (CasesError, ArithmeticError) as error:
             click.echo(f"fecm: note: case {case} was not run in full: {error}", err=True)

@@ -4,7 +4,7 @@ Two numbers are the same where |a - b| <= atol + rtol*max, max being the largest
 value of the whole dataset in both results together: a history's zero crossing is judged by the
 history's size, not by its own.  Whole numbers (steps, node and equation numbers) are names rather
 than quantities; they have to be equal.  NaN is the same as NaN, an infinity as the same infinity;
-either of them against anything else is a difference at any tolerance.
+either of them against anything else is a difference at any tolerance.  Texts have to be equal.
 
 Datasets are read in blocks of rows, so memory does not grow with the results.
 """
@@ -52,11 +52,30 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Layout:
-    """Shape and type of a dataset, and what its indices are where the schema does not say."""
+    """Shape and type of a dataset, and what its indices are where the schema does not say.
+
+    Attributes
+    ----------
+    shape : tuple of int
+    dtype : numpy.dtype
+        Of objects where it holds texts.
+    axes : tuple of (str, int)
+        What an index is called along each axis, and the number of the first.
+    """
 
     shape: tuple[int, ...]
     dtype: np.dtype[Any]
-    axes: tuple[str, ...] = ()
+    axes: tuple[tuple[str, int], ...] = ()
+
+    @property
+    def holds_texts(self) -> bool:
+        """Whether it holds texts instead of numbers."""
+        return self.dtype.kind == "O"
+
+    @property
+    def kind(self) -> str:
+        """Name of its type."""
+        return "text" if self.holds_texts else str(self.dtype)
 
     @property
     def rows(self) -> int:
@@ -107,7 +126,7 @@ class Comparison:
     layouts : tuple of Layout
         In A and in B.
     comparable : bool
-        Whether the shapes are equal, so that numbers could be compared.
+        Whether the shapes are equal, and both are numbers or both texts.
     maximum, tolerance : float
         Largest finite absolute value in both, and the largest difference that is none.
     largest : float
@@ -127,7 +146,7 @@ class Comparison:
     tolerance: float = 0.0
     largest: float = 0.0
     at: Place | None = None
-    values: tuple[float, float] | None = None
+    values: tuple[float, float] | tuple[str, str] | None = None
     differing: int = 0
     first: Place | None = None
 
@@ -162,9 +181,13 @@ def compare(a: Side, b: Side, path: str, tolerance: Tolerance) -> Comparison:
     ResultFileError
         If a file can't be read there.
     """
-    layouts = a.layouts[path], b.layouts[path]
-    found = Comparison(path, layouts, layouts[0].shape == layouts[1].shape)
+    layouts = left, right = a.layouts[path], b.layouts[path]
+    alike = left.shape == right.shape and left.holds_texts == right.holds_texts
+    found = Comparison(path, layouts, alike)
     if not found.comparable:
+        return found
+    if left.holds_texts:
+        _compare_texts(found, a, b)
         return found
     index, lost = _measure(found, a, b)
     whole = all(layout.dtype.kind in "biu" for layout in layouts)
@@ -174,6 +197,18 @@ def compare(a: Side, b: Side, path: str, tolerance: Tolerance) -> Comparison:
     if lost or found.largest > found.tolerance:
         _count(found, a, b)
     return found
+
+
+def _compare_texts(found: Comparison, a: Side, b: Side) -> None:
+    """Count the texts that differ, and find the first."""
+    left, right = (side.rows(found.path, 0, found.layouts[0].rows) for side in (a, b))
+    rows = np.flatnonzero(left != right)
+    found.differing = len(rows)
+    if len(rows):
+        row = int(rows[0])
+        found.largest = float("inf")
+        found.at = _place(a, b, found.path, (row,))
+        found.values = str(left[row]), str(right[row])
 
 
 def _measure(found: Comparison, a: Side, b: Side) -> tuple[tuple[int, ...] | None, bool]:
@@ -272,7 +307,7 @@ def _named(
 ) -> dict[str, int | str]:
     """Names of a place's indices, from 1; a row that the clock tells needs none."""
     if layout.axes:
-        return {name: i + 1 for name, i in zip(layout.axes, index, strict=False)}
+        return {name: first + i for (name, first), i in zip(layout.axes, index, strict=False)}
     dataset = DATASETS.get(path)
     names: dict[str, int | str] = {}
     if not clocked and path.startswith("tape"):

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fecm.results import hdf5
-from fecm.results.result import Result, load
+from fecm.results.file_reader import Contents, FileArrays, OpenArrays
+from fecm.results.result import Result
 from fecm.results.schema import DATASETS, GROUP_DESCRIPTIONS, declared_units
 from fecm.results.summary import summary
 
@@ -28,12 +28,15 @@ class DatasetInformation:
     path : str
     shape : tuple of int
     dtype : str
+        ``"text"`` for texts.
     description, dimension, unit : str
         Empty where there is none.
     minimum, maximum : float or None
         Of its finite numbers; None where it has none.
     not_finite : int
         How many of its numbers are NaN or infinite.
+    different : int or None
+        How many of its texts are; None of numbers.
     """
 
     path: str
@@ -45,6 +48,7 @@ class DatasetInformation:
     minimum: float | None
     maximum: float | None
     not_finite: int
+    different: int | None = None
 
 
 @dataclass(frozen=True)
@@ -83,12 +87,6 @@ class Information:
         Those of the file.
     units : mapping
         Names of the units of length, force and time; empty where the deck gave none.
-    steps : int
-        Impact steps taken.
-    time : tuple of float or None
-        Time after the first and after the last step.
-    summary : list of str
-        What `fecm run` said at its end.
     groups : list of GroupInformation
     texts : mapping
         Number of lines of every text, by name.
@@ -98,42 +96,32 @@ class Information:
     size: int
     attributes: Mapping[str, Any]
     units: Mapping[str, str]
-    steps: int
-    time: tuple[float, float] | None
-    summary: list[str]
     groups: list[GroupInformation]
     texts: Mapping[str, int]
 
 
-def information(path: Path) -> Information:
-    """Tell what is in a result file.
+def information(contents: Contents) -> Information:
+    """Tell what is in a result file, of a run or of a sweep.
 
     Raises
     ------
     ResultFileError
-        If the file is no result.
-    OSError
-        If it can't be opened.
+        If the file can't be read.
     """
-    result = load(path)
-    arrays, texts, groups = hdf5.read(path)
-    with hdf5.OpenArrays(path) as opened:
-        told = [_dataset(opened, arrays, name) for name in arrays]
-    times = result["history/time"] if "history/time" in result else np.empty(0)
+    with OpenArrays(contents.path) as opened:
+        told = [_dataset(opened, contents.arrays, name) for name in contents.arrays]
+        told += [_texts(opened, name, values) for name, values in contents.lists.items()]
     return Information(
-        path=path,
-        size=path.stat().st_size,
-        attributes=result.attributes,
-        units=declared_units(result.attributes),
-        steps=len(times),
-        time=(float(times[0]), float(times[-1])) if len(times) else None,
-        summary=_summary(result),
-        groups=_groups(told, groups),
-        texts={name: len(text.splitlines()) for name, text in texts.items()},
+        path=contents.path,
+        size=contents.path.stat().st_size,
+        attributes=contents.attributes,
+        units=declared_units(contents.attributes),
+        groups=_groups(told, contents.groups),
+        texts={name: len(text.splitlines()) for name, text in contents.texts.items()},
     )
 
 
-def _summary(result: Result) -> list[str]:
+def summary_of_run(result: Result) -> list[str]:
     """Summary of a run; a file that lacks something of a result still has the rest told."""
     needed = ("history/time", "history/indentation", "energy/balance_error")
     if "history/force" in result:
@@ -174,7 +162,7 @@ def _order(dataset: DatasetInformation) -> tuple[int, str]:
     return place, dataset.path
 
 
-def _dataset(opened: hdf5.OpenArrays, arrays: hdf5.FileArrays, path: str) -> DatasetInformation:
+def _dataset(opened: OpenArrays, arrays: FileArrays, path: str) -> DatasetInformation:
     """Shape, attributes and range of one dataset, read in blocks of rows."""
     shape = arrays.shapes[path]
     minimum, maximum, strange = math.inf, -math.inf, 0
@@ -187,15 +175,26 @@ def _dataset(opened: hdf5.OpenArrays, arrays: hdf5.FileArrays, path: str) -> Dat
         if finite.any():
             minimum = min(minimum, block[finite].min().item())
             maximum = max(maximum, block[finite].max().item())
-    attributes = opened.attributes(path)
     return DatasetInformation(
-        path=path,
-        shape=shape,
-        dtype=str(arrays.dtypes[path]),
-        description=str(attributes.get("description", "")),
-        dimension=str(attributes.get("dimension", "")),
-        unit=str(attributes.get("unit", "")),
+        path,
+        shape,
+        str(arrays.dtypes[path]),
+        *_words(opened, path),
         minimum=minimum if minimum <= maximum else None,
         maximum=maximum if minimum <= maximum else None,
         not_finite=strange,
     )
+
+
+def _texts(opened: OpenArrays, path: str, values: Sequence[str]) -> DatasetInformation:
+    """A dataset of texts."""
+    return DatasetInformation(
+        path, (len(values),), "text", *_words(opened, path), None, None, 0, len(set(values))
+    )
+
+
+def _words(opened: OpenArrays, path: str) -> tuple[str, str, str]:
+    """Description, dimension and unit of a dataset."""
+    attributes = opened.attributes(path)
+    told = [str(attributes.get(name, "")) for name in ("description", "dimension", "unit")]
+    return told[0], told[1], told[2]

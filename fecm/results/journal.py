@@ -16,7 +16,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.results.hdf5 import FileSink
+from fecm.results.file_writer import FileSink
 from fecm.results.schema import DATASETS, Dataset
 
 Array = NDArray[Any]

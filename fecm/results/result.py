@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+    from fecm.results.file_reader import Contents
+
 Array = NDArray[Any]
 HISTORY = "history"
 
@@ -193,13 +195,24 @@ def load(path: str | Path) -> Result:
     >>> float(result.force.max())  # doctest: +SKIP
     6.19
     """
-    from fecm.results import hdf5
+    from fecm.results.file_reader import read
 
-    arrays, texts, groups = hdf5.read(Path(path))
+    return result_of(read(Path(path)))
+
+
+def result_of(contents: Contents) -> Result:
+    """A run's result, of what stands in its file.
+
+    Raises
+    ------
+    ResultFileError
+        If a dataset's shape or type is none of a result's.
+    """
+    arrays = contents.arrays
     kinds = {name: dtype.kind for name, dtype in arrays.dtypes.items()}
     if found := misfit(arrays.shapes, kinds):
-        raise ResultFileError(f"{path}: {found}")
-    return Result(arrays, texts, groups)
+        raise ResultFileError(f"{contents.path}: {found}")
+    return Result(arrays, contents.texts, {"": contents.attributes, **contents.groups})
 
 
 def contact_intervals(force: Array, time: Array) -> list[tuple[float, float]]:

@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.results import hdf5
 from fecm.results.compare import Comparison, Layout, Side, Tolerance, compare
+from fecm.results.file_reader import OpenArrays, read
+from fecm.results.schema import FORMAT, SWEEP
 from fecm.results.tape_reader import SHEARS, TapeText, W, read_tapes
 from fecm.results.tapes import CONTACT, CURVATURES
 
@@ -32,31 +33,44 @@ ON_TAPE = frozenset(
 )
 
 
-class UnknownNameError(ValueError):
-    """A dataset or group was asked for that neither side has, or tapes have no place for."""
+# Axes of a sweep's datasets; its cases count from 0, as on the command line.
+CASES = (("case", 0), ("step", 1))
+
+TAPES = "tapes"
+WHAT = {FORMAT: "the result of a run", SWEEP: "the result of a sweep", TAPES: "a folder of tapes"}
+
+
+class IncomparableError(ValueError):
+    """The sides have nothing in common, or not what was asked for."""
 
 
 class FileSide:
-    """A result file that stays open."""
+    """A result file, of a run or of a sweep, that stays open."""
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        arrays, self.texts, self.groups = hdf5.read(path)
+        self.contents = contents = read(path, FORMAT, SWEEP)
+        axes = CASES if contents.form == SWEEP else ()
+        arrays = contents.arrays
         self.layouts = {
-            name: Layout(shape, arrays.dtypes[name]) for name, shape in arrays.shapes.items()
+            name: Layout(shape, arrays.dtypes[name], axes) for name, shape in arrays.shapes.items()
         }
-        self.opened = hdf5.OpenArrays(path)
+        self.layouts |= {
+            name: Layout((len(values),), np.dtype(object), axes)
+            for name, values in contents.lists.items()
+        }
+        self.opened = OpenArrays(path)
 
     def rows(self, path: str, start: int, stop: int) -> Array:
         """Rows of a dataset."""
+        if path in self.contents.lists:
+            return np.array(self.contents.lists[path][start:stop], dtype=object)
         return self.opened.rows(path, start, stop)
 
 
 class TapeSide:
     """A folder of tapes."""
 
-    def __init__(self, path: Path, text: TapeText) -> None:
-        self.path = path
+    def __init__(self, text: TapeText) -> None:
         self.text = text
         self.layouts: dict[str, Layout] = {}
         self.fit(0)
@@ -64,7 +78,7 @@ class TapeSide:
     def fit(self, nodes: int) -> None:
         """Divide tape3 into rows of this many nodes where it can't tell them itself."""
         self.text = self.text.fitted(nodes)
-        by_lines = {W: ("line", "column")} if self.text.lines else {}
+        by_lines = {W: (("line", 1), ("column", 1))} if self.text.lines else {}
         self.layouts = {
             name: Layout(values.shape, values.dtype, by_lines.get(name, ()))
             for name, values in self.text.arrays.items()
@@ -130,7 +144,7 @@ def opened(path: Path) -> Iterator[FileSide | TapeSide]:
         If it can't be opened.
     """
     if path.is_dir():
-        yield TapeSide(path, read_tapes(path))
+        yield TapeSide(read_tapes(path))
         return
     side = FileSide(path)
     with side.opened:
@@ -154,11 +168,15 @@ def difference(
 
     Raises
     ------
-    UnknownNameError
-        If `only` names what can't be compared.
+    IncomparableError
+        If one is of a sweep and the other is not, or `only` names what can't be compared.
     ResultFileError
         If a file can't be read.
     """
+    kinds = [_kind(side) for side in (a, b)]
+    if SWEEP in kinds and kinds[0] != kinds[1]:
+        told = " and B ".join(WHAT[kind] for kind in kinds)
+        raise IncomparableError(f"A is {told}: they can't be compared")
     for side, other in ((a, b), (b, a)):
         shape = other.layouts[W].shape if W in other.layouts else ()
         if isinstance(side, TapeSide) and len(shape) == 2 and isinstance(other, FileSide):
@@ -170,6 +188,11 @@ def difference(
         (sorted((left - right) & chosen), sorted((right - left) & chosen)),
         _listed(a, b),
     )
+
+
+def _kind(side: FileSide | TapeSide) -> str:
+    """What a side is, a name of `WHAT`."""
+    return TAPES if isinstance(side, TapeSide) else side.contents.form
 
 
 def _names(side: Side, *both: Side) -> set[str]:
@@ -187,7 +210,7 @@ def _chosen(names: set[str], only: Sequence[str]) -> set[str]:
         plain = asked.strip("/")
         found = {name for name in names if name == plain or name.startswith(f"{plain}/")}
         if not found:
-            raise UnknownNameError(f"there is no `{asked}` to compare{_hint(plain, names)}")
+            raise IncomparableError(f"there is no `{asked}` to compare{_hint(plain, names)}")
         chosen |= found
     return chosen
 
@@ -215,18 +238,19 @@ def _listed(a: FileSide | TapeSide, b: FileSide | TapeSide) -> list[Listed]:
         for name in dict.fromkeys((*mine, *theirs))
         if repr(mine.get(name)) != repr(theirs.get(name))
     ]
-    for name in dict.fromkeys((*a.texts, *b.texts)):
-        if (texts := (a.texts.get(name), b.texts.get(name))) and texts[0] != texts[1]:
-            listed.append(_listed_text(name, *texts))
+    left, right = a.contents.texts, b.contents.texts
+    for name in dict.fromkeys((*left, *right)):
+        if left.get(name) != right.get(name):
+            listed.append(_listed_text(name, left.get(name), right.get(name)))
     return listed
 
 
 def _attributes(side: FileSide) -> Mapping[str, Any]:
     """All attributes by name: ``title``, ``energy:initial``, ``tape3/w:unit``."""
     values: dict[str, Any] = {}
-    for group, attributes in side.groups.items():
-        lead = f"{group}:" if group else ""
-        values.update({f"{lead}{name}": value for name, value in attributes.items()})
+    values.update(side.contents.attributes)
+    for group, attributes in side.contents.groups.items():
+        values.update({f"{group}:{name}": value for name, value in attributes.items()})
     for path in side.layouts:
         attributes = side.opened.attributes(path)
         values.update({f"{path}:{name}": value for name, value in attributes.items()})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.results.schema import FORMAT_VERSION, SWEEP, Dataset
+from fecm.results.schema import FORMAT_VERSION, SWEEP, Dataset, ResultFileError, declared_units
 from fecm.sweeps.outcome import FINE, SUMMARY, Outcome
 from fecm.sweeps.tasks import Plan
 from fecm.units import unit_names, unit_of
@@ -19,6 +19,8 @@ from fecm.version import __version__
 if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
+
+    from fecm.results.file_reader import Contents
 
 Array = NDArray[Any]
 
@@ -30,6 +32,13 @@ DIMENSIONS = {
     "thickness": "length", "density": "force*time^2/length^4", "dt": "time",
     **dict.fromkeys(("e1", "e2", "g12", "g13", "g23"), "force/length^2"),
 }  # fmt: skip
+
+# Groups of the file.
+GROUPS = {
+    "cases": "values of what varies",
+    "summary": "what came out of every case",
+    "history": "time steps of every case, and its contact force if asked for",
+}
 
 
 @dataclass
@@ -152,10 +161,10 @@ def save(result: SweepResult, path: Path) -> None:
     ResultWriteError
         If the file can't be written; what stood under the name is then untouched.
     """
-    from fecm.results import hdf5
+    from fecm.results.file_writer import writing
 
     count = len(result)
-    with hdf5.writing(path) as sink:
+    with writing(path) as sink:
         sink.attributes(
             "",
             {
@@ -187,6 +196,8 @@ def save(result: SweepResult, path: Path) -> None:
         store("history/steps", result.steps, "number of steps of every case")
         if result.force is not None and count:
             store("history/force", result.force, "contact force after every step", "force")
+        for group, text in GROUPS.items():
+            sink.attributes(group, {"description": text})
 
 
 def load(path: Path) -> SweepResult:
@@ -199,28 +210,26 @@ def load(path: Path) -> SweepResult:
     OSError
         If it can't be opened.
     """
-    from fecm.results import hdf5
+    from fecm.results.file_reader import read
 
-    arrays, texts, groups = hdf5.read(path, SWEEP)
-    return _from(arrays, texts, groups, path)
+    return sweep_of(read(path, SWEEP))
 
 
-def _from(
-    arrays: Mapping[str, Array],
-    texts: Mapping[str, Any],
-    groups: Mapping[str, Mapping[str, Any]],
-    path: Path,
-) -> SweepResult:
-    from fecm.results.schema import ResultFileError, declared_units
+def sweep_of(contents: Contents) -> SweepResult:
+    """A sweep's result, of what stands in its file.
+
+    Raises
+    ------
+    ResultFileError
+        If something of it is missing, or does not belong to as many cases.
+    """
+    arrays, path = contents.arrays, contents.path
 
     def group(prefix: str) -> dict[str, Array]:
         found = {p.removeprefix(prefix): arrays[p] for p in arrays if p.startswith(prefix)}
-        found |= {
-            p.removeprefix(prefix): np.array(value)
-            for p, value in texts.items()
-            if p.startswith(prefix) and isinstance(value, list)
-        }
-        return found
+        lists = contents.lists.items()
+        texts = {p.removeprefix(prefix): np.array(v) for p, v in lists if p.startswith(prefix)}
+        return found | texts
 
     cases, summary = group("cases/"), group("summary/")
     missing = [name for name in (*SUMMARY, "status") if name not in summary]
@@ -228,17 +237,16 @@ def _from(
         raise ResultFileError(f"{path}: this result of a sweep is not whole")
     count = np.shape(arrays["history/dt"])[:1]
     rows = (*cases.values(), *summary.values(), arrays["history/dt"], arrays["history/steps"])
-    force = arrays.get("history/force", np.empty((*count, 0)))
+    force = arrays.get("history/force")
     kinds = {name: summary[name].dtype.kind for name in SUMMARY}
     if (
         any(values.shape != count for values in rows)
-        or (force.ndim, force.shape[:1]) != (2, count)
+        or (force is not None and (force.ndim, force.shape[:1]) != (2, count))
         or not set(kinds.values()) <= set("fiu")
     ):
         raise ResultFileError(f"{path}: the cases of this result of a sweep are not all there")
-    root = groups[""]
     return SweepResult(
-        cases, summary, arrays["history/dt"], arrays["history/steps"],
-        arrays.get("history/force", None),
-        str(texts.get("deck", "")), str(root.get("title", "")), declared_units(root),
+        cases, summary, arrays["history/dt"], arrays["history/steps"], force,
+        contents.texts.get("deck", ""), str(contents.attributes.get("title", "")),
+        declared_units(contents.attributes),
     )  # fmt: skip

@@ -1,0 +1,266 @@
+"""Reads result files, of runs and of sweeps: HDF5 that may come from anywhere.
+
+A file is looked through once (:func:`read`); its numbers are read when they are asked for.  Links
+are not followed, and whatever a damaged file raises inside of the library is one
+:class:`~fecm.results.schema.ResultFileError`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.results.schema import FORMAT, FORMAT_VERSION, SWEEP, NotStoredError, ResultFileError
+
+Array = NDArray[Any]
+ELEMENTS, COORDINATES = "mesh/elements", "mesh/coordinates"
+
+# What a file of each form is the result of.
+RESULT_OF = {FORMAT: "a run", SWEEP: "a sweep"}
+
+# No filter of HDF5 packs numbers more tightly than this; deflate reaches 1032.
+PACKED = 2000
+
+
+class FileArrays(Mapping[str, Array]):
+    """The datasets of a result file, each read when it is asked for.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    shapes : dict
+        Shape of every dataset of numbers.
+    dtypes : dict
+        Its type, in this machine's byte order.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.shapes: dict[str, tuple[int, ...]] = {}
+        self.dtypes: dict[str, np.dtype[Any]] = {}
+        self._read: dict[str, Array] = {}
+
+    def __getitem__(self, key: str) -> Array:
+        if key not in self.shapes:
+            raise NotStoredError(f"{self.path}: there is no {key} in this result")
+        if key not in self._read:
+            with _troubles(self.path), h5py.File(self.path) as file:
+                values = np.asarray(file[key][()])
+            if key == ELEMENTS:
+                self._check_nodes(values)
+            self._read[key] = values
+        return self._read[key]
+
+    def _check_nodes(self, elements: Array) -> None:
+        """Refuse elements with nodes that the mesh has not; whoever draws them takes their word."""
+        count = self.shapes.get(COORDINATES, (0,))[0]
+        if elements.size and not 0 <= elements.min() <= elements.max() <= count:
+            raise ResultFileError(f"{self.path}: {ELEMENTS} names nodes outside 1 to {count}")
+
+    def __contains__(self, key: object) -> bool:
+        return key in self.shapes  # Mapping's own would read the dataset
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.shapes)
+
+    def __len__(self) -> int:
+        return len(self.shapes)
+
+
+class OpenArrays:
+    """The datasets of a result file that stays open: rows are read as they are asked for.
+
+    Used in a ``with`` statement; memory holds no more than the rows of one call.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __enter__(self) -> OpenArrays:
+        with _troubles(self.path):
+            self._file = h5py.File(self.path)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with contextlib.suppress(Exception):  # nothing was written that closing could lose
+            self._file.close()
+
+    def rows(self, path: str, start: int, stop: int) -> Array:
+        """Rows `start` to `stop` of a dataset; a single number is one row.
+
+        Raises
+        ------
+        ResultFileError
+            If the file can't be read there.
+        """
+        with _troubles(self.path):
+            dataset = self._file[path]
+            if not dataset.shape:
+                return np.asarray(dataset[()]).reshape(1)[start:stop]
+            return np.asarray(dataset[start:stop])
+
+    def attributes(self, path: str) -> dict[str, Any]:
+        """Attributes of a dataset or group."""
+        with _troubles(self.path):
+            return _attributes(self._file[path])
+
+
+@contextlib.contextmanager
+def _troubles(path: Path) -> Iterator[None]:
+    """Turn whatever a damaged file raises into one :class:`ResultFileError`."""
+    try:
+        yield
+    except (ResultFileError, MemoryError):
+        raise
+    except Exception as error:  # a damaged file may raise anything inside of HDF5
+        told = " ".join(str(error).split())
+        raise ResultFileError(f"{path}: this is no readable HDF5 file ({told})") from None
+
+
+@dataclass
+class Contents:
+    """What stands in a result file.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    arrays : FileArrays
+        Datasets of numbers, by path.
+    texts : dict of str
+        Single texts, by path.
+    lists : dict of list of str
+        Datasets of texts, by path; only results of sweeps have them.
+    attributes : dict
+        Those of the file itself; of a type that Python has no plain value for, the type's name.
+    groups : dict of dict
+        Those of its groups, by path.
+    """
+
+    path: Path
+    arrays: FileArrays
+    texts: dict[str, str] = field(default_factory=dict)
+    lists: dict[str, list[str]] = field(default_factory=dict)
+    attributes: dict[str, Any] = field(default_factory=dict)
+    groups: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    @property
+    def form(self) -> str:
+        """``"fecm"`` for a run, ``"fecm-sweep"`` for a sweep."""
+        return str(self.attributes["format"])
+
+
+def read(path: Path, *forms: str) -> Contents:
+    """Look through a result file.
+
+    Parameters
+    ----------
+    path : Path
+    *forms : str
+        Formats that will do; that of a run if there are none.
+
+    Raises
+    ------
+    ResultFileError
+        If the file is no HDF5 file, or no result of these forms.
+    OSError
+        If it can't be opened.
+    """
+    path = Path(path)
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise ResultFileError(f"{path}: this is no file but a device or a pipe")
+    with path.open("rb"):
+        pass  # a missing or forbidden file says so itself
+    with _troubles(path), h5py.File(path) as file:
+        attributes = _attributes(file)
+        _check_form(path, attributes, forms or (FORMAT,))
+        contents = Contents(path, FileArrays(path), attributes=attributes)
+        file.visititems(_Visitor(contents))
+    return contents
+
+
+def _check_form(path: Path, attributes: Mapping[str, Any], forms: tuple[str, ...]) -> None:
+    """Refuse a file that is none of these forms, or of another version."""
+    form, version = attributes.get("format"), attributes.get("format_version")
+    if form not in forms:
+        wanted = " or ".join(RESULT_OF[one] for one in forms)
+        what = "not a result of fecm"
+        if form in (FORMAT, SWEEP):
+            what = f"the result of {RESULT_OF[form]}, not of {wanted}"
+        raise ResultFileError(f"{path}: this HDF5 file is {what}")
+    if version != FORMAT_VERSION:
+        raise ResultFileError(
+            f"{path}: format version {version} is not {FORMAT_VERSION}, which this program reads"
+        )
+
+
+class _Visitor:
+    """Notes what stands in a file."""
+
+    def __init__(self, contents: Contents) -> None:
+        self._contents = contents
+        self._size = contents.path.stat().st_size
+
+    def __call__(self, name: str, item: h5py.HLObject) -> None:
+        if isinstance(item, h5py.Group):
+            self._contents.groups[name] = _attributes(item)
+        elif isinstance(item, h5py.Dataset):  # a named type is nothing to read
+            self._dataset(name, item)
+
+    def _dataset(self, name: str, item: h5py.Dataset) -> None:
+        if "/" not in name and item.is_scale:
+            return  # it numbers an axis
+        contents, path = self._contents, self._contents.path
+        if h5py.check_string_dtype(item.dtype) and item.shape == ():
+            contents.texts[name] = str(_plain(item[()]))
+        elif contents.form == SWEEP and h5py.check_string_dtype(item.dtype) and item.ndim == 1:
+            contents.lists[name] = [str(_plain(value)) for value in item[()].tolist()]
+        elif item.dtype.kind in "biuf" and item.shape is not None and not item.dtype.shape:
+            shape = tuple(map(int, item.shape))
+            room = self._size * (PACKED if item.chunks else 1)
+            # A damaged shape would have a reader go through more rows than any disk holds.
+            if math.prod(shape) * item.dtype.itemsize > room:
+                raise ResultFileError(
+                    f"{path}: {name} has the shape {shape}, which is more than the file holds"
+                )
+            contents.arrays.shapes[name] = shape
+            contents.arrays.dtypes[name] = item.dtype.newbyteorder("=")
+        else:
+            raise ResultFileError(f"{path}: {name} holds neither numbers nor one text")
+
+
+def _attributes(item: h5py.HLObject) -> dict[str, Any]:
+    """Attributes as Python values."""
+    values: dict[str, Any] = {}
+    for name in item.attrs:
+        try:
+            values[_text(name)] = _plain(item.attrs[name])
+        except (TypeError, OSError, ValueError):  # a type that NumPy has no counterpart of
+            values[_text(name)] = "<unreadable>"
+    return values
+
+
+def _plain(value: Any) -> Any:
+    """Numbers, texts and lists of them; anything else by the name of its type."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, str | bytes):
+        return _text(value)
+    return value if isinstance(value, bool | int | float) else f"<{type(value).__name__}>"
+
+
+def _text(value: str | bytes) -> str:
+    """A text whose undecodable bytes are replaced, so that it can be printed."""
+    raw = value.encode("utf-8", "surrogateescape") if isinstance(value, str) else value
+    return raw.decode("utf-8", "replace")

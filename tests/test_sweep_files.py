@@ -1,0 +1,133 @@
+"""Results of sweeps as files: what `fecm info` tells of them, and how `fecm diff` compares them."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import fecm
+from tests.calls import assert_unusable, call
+from tests.decks import small
+
+VELOCITIES = (50.0, 100.0, 150.0)
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sweep of velocities and two layups, one of which can't be read."""
+    path = tmp_path_factory.mktemp("sweep") / "sweep.h5"
+    fecm.sweep(
+        small(), {"velocity": VELOCITIES, "layup": ["[0/90]", "nonsense"]}, history=True,
+        output=path,
+    )  # fmt: skip
+    return path
+
+
+@pytest.fixture
+def changed(swept: Path, tmp_path: Path) -> Callable[[str, object], Path]:
+    """Make a copy of the sweep with another value at case 4 of a dataset."""
+
+    def change(name: str, value: object) -> Path:
+        path = tmp_path / "changed.h5"
+        shutil.copy(swept, path)
+        with h5py.File(path, "r+") as file:
+            file[name][4] = value
+        return path
+
+    return change
+
+
+def test_info_tells_the_cases_and_what_came_out(swept: Path) -> None:
+    done = call("info", swept)
+    assert (done.exit_code, done.stderr) == (0, "")
+    text = "\n".join(" ".join(line.split()) for line in done.stdout.splitlines())
+    forces = fecm.load_sweep(swept)["peak_force"]
+    for line in (
+        "cases 6, 3 failed",
+        f"largest peak {np.nanmax(forces):.6g} (velocity 150.0, layup [0/90])",
+        "velocity 6 float64 length/time 50 to 150",
+        "layup 6 text 2 different",
+        "peak_force 6 float64 force "
+        f"{np.nanmin(forces):.6g} to {np.nanmax(forces):.6g}, 3 not finite",
+        "cases: values of what varies",
+    ):
+        assert line in text
+
+
+def test_info_tells_programs_the_same(swept: Path) -> None:
+    told = json.loads(call("info", swept, "--format", "json").stdout)
+    assert (told["format"], told["cases"], told["failed"]) == ("fecm-sweep", 6, 3)
+    assert "steps" not in told
+    datasets = {d["name"]: d for group in told["groups"] for d in group["datasets"]}
+    assert datasets["cases/layup"]["different"] == 2
+    assert datasets["cases/velocity"]["max"] == 150.0
+
+
+def test_a_sweep_is_the_same_as_itself_run_again(swept: Path, tmp_path: Path) -> None:
+    again = tmp_path / "again.h5"
+    fecm.sweep(
+        small(), {"velocity": VELOCITIES, "layup": ["[0/90]", "nonsense"]}, history=True,
+        output=again,
+    )  # fmt: skip
+    assert again.read_bytes() == swept.read_bytes()
+    done = call("diff", swept, again)
+    assert done.exit_code == 0
+    assert done.stdout.endswith("same: 16 datasets within rtol 0, atol 0\n")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("summary/peak_force", 1e9, "1e+09 at case 4"),
+        ("history/force", 1e9, "at case 4, step 1"),
+        ("history/steps", 3, "against 3 at case 4"),
+        ("cases/layup", b"[90/0]", "`[0/90]` against `[90/0]` at case 4; 1 text differs"),
+        ("summary/status", b"lost", "`ok` against `lost` at case 4; 1 text differs"),
+    ],
+)
+def test_another_number_or_text_of_a_case_is_a_difference(
+    swept: Path, changed: Callable[[str, object], Path], name: str, value: object, told: str
+) -> None:
+    done = call("diff", swept, changed(name, value))
+    assert done.exit_code == 1
+    (line,) = [line for line in done.stdout.splitlines() if line.startswith("different  ")]
+    assert name in line
+    assert told in line
+    assert call("diff", swept, changed(name, value), "--only", "history/dt").exit_code == 0
+
+
+def test_texts_differ_at_any_tolerance(swept: Path, changed: Callable[[str, object], Path]) -> None:
+    other = changed("summary/status", b"lost")
+    assert call("diff", swept, other, "--rtol", 1e9, "--atol", 1e9).exit_code == 1
+    (told,) = json.loads(call("diff", swept, other, "--format", "json", "--brief").stdout)[
+        "datasets"
+    ]
+    assert (told["a"], told["b"], told["at"]["case"]) == ("ok", "lost", 4)
+
+
+def test_numbers_in_the_place_of_texts_are_a_difference(swept: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.h5"
+    shutil.copy(swept, other)
+    with h5py.File(other, "r+") as file:
+        del file["cases/layup"]
+        file["cases/layup"] = np.arange(6.0)
+    done = call("diff", swept, other)
+    assert done.exit_code == 1
+    assert "type text against float64" in done.stdout
+
+
+def test_a_sweep_and_a_run_or_tapes_can_not_be_compared(swept: Path, tmp_path: Path) -> None:
+    run = tmp_path / "run.h5"
+    fecm.run(small(), output=run)
+    assert call("tapes", run, "-d", tmp_path / "tapes").exit_code == 0
+    for other in (run, tmp_path / "tapes"):
+        for pair in ((swept, other), (other, swept)):
+            done = call("diff", *pair)
+            assert_unusable(done)
+            assert "the result of a sweep" in done.stderr
