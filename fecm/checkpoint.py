@@ -2,18 +2,19 @@
 
 Two files: the checkpoint with the state, which is written beside its name, synced and renamed, and
 the spool with everything stored so far, which only grows.  A checkpoint names the part of the spool
-that belongs to it, so that whatever ends a run, the last checkpoint is whole.  The run that goes on
-from it ends in the same bytes as one that was never stopped.
+that belongs to it, by length and checksum, so that whatever ends a run, the last checkpoint is
+whole.  The run that goes on from it ends in the same bytes as one that was never stopped.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
 import time
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.files import partial_of
-from fecm.results.journal import Journal
+from fecm.results.journal import Journal, Part
 from fecm.simulation import Simulation
 from fecm.version import __version__
 
@@ -83,7 +84,6 @@ class Checkpointer:
     def __init__(self, result: Path, journal: Journal) -> None:
         self._checkpoint, self._spool = checkpoint_of(result), spool_of(result)
         self._journal = journal
-        self._length = 0
         self._written = time.monotonic()
 
     @property
@@ -99,12 +99,10 @@ class Checkpointer:
         OSError
             If it can't be written; the one before is then untouched.
         """
-        with self._spool.open("r+b" if self._length else "w+b") as spool:
-            spool.truncate(self._length)
-            spool.seek(self._length)
-            length = self._journal.spool(spool)
+        with self._spool.open("r+b" if self._journal.spooled.length else "w+b") as spool:
+            part = self._journal.spool(spool)
         values, arrays = _split(simulation.state())
-        about = {"identity": identity(simulation), "spool": length, "values": values}
+        about = {"identity": identity(simulation), "spool": vars(part), "values": values}
         partial = partial_of(self._checkpoint)
         try:
             with partial.open("wb") as file:
@@ -117,7 +115,7 @@ class Checkpointer:
         finally:
             partial.unlink(missing_ok=True)
         _sync(self._checkpoint.parent)
-        self._length = length
+        self._journal.keep(part)
         self._written = time.monotonic()
 
     def restore(self, simulation: Simulation) -> None:
@@ -130,26 +128,35 @@ class Checkpointer:
         OSError
             If it can't be read.
         """
-        about, arrays = self._read()
-        theirs, ours = about["identity"], identity(simulation)
-        for name, value in ours.items():
-            if theirs.get(name) != value:
-                told = f" ({theirs['version']}, not {value})" if name == "version" else ""
-                raise CheckpointError(f"{self._checkpoint} belongs to {_NAMES[name]}{told}")
-        self._journal.replay(self._spool, about["spool"])
-        self._length = about["spool"]
-        self._journal.muted = False
-        simulation.restore(_joined(about["values"], arrays))
+        with self._reading():
+            about, arrays = self._read()
+            theirs, ours = about["identity"], identity(simulation)
+            for name, value in ours.items():
+                if theirs.get(name) != value:
+                    told = f" ({theirs['version']}, not {value})" if name == "version" else ""
+                    raise CheckpointError(f"{self._checkpoint} belongs to {_NAMES[name]}{told}")
+            part = Part(**about["spool"])
+        self._journal.replay(self._spool, part)
+        with self._reading():
+            simulation.restore({**about["values"], **arrays})
 
     def _read(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+        """What a checkpoint says in JSON, and its arrays."""
         if not self._checkpoint.exists():
             raise CheckpointError(f"there is no checkpoint {self._checkpoint}")
+        with self._checkpoint.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
+        return json.loads(arrays.pop("about").tobytes()), arrays
+
+    @contextlib.contextmanager
+    def _reading(self) -> Iterator[None]:
+        """Say of whatever does not fit together that the checkpoint is damaged."""
         try:
-            with self._checkpoint.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-                arrays = {name: stored[name] for name in stored.files}
-            about = json.loads(arrays.pop("about").tobytes())
-            return about, arrays
-        except (ValueError, KeyError, zipfile.BadZipFile, EOFError) as error:
+            yield
+        except CheckpointError:
+            raise
+        except (ValueError, LookupError, TypeError, AttributeError, zipfile.BadZipFile,
+                EOFError) as error:  # fmt: skip
             raise CheckpointError(f"{self._checkpoint} is damaged ({error})") from None
 
     def clear(self) -> None:
@@ -162,11 +169,6 @@ def _split(state: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, NDArray[
     """Values that JSON knows, and arrays, of a state."""
     arrays = {name: value for name, value in state.items() if isinstance(value, np.ndarray)}
     return {name: value for name, value in state.items() if name not in arrays}, arrays
-
-
-def _joined(values: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
-    """A state of its two parts."""
-    return {**values, **arrays}
 
 
 def _sync(folder: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import random
 import re
@@ -25,7 +26,7 @@ from fecm.api import prepare
 from fecm.check import Checked
 from fecm.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
 from fecm.results import file_writer
-from fecm.results.journal import Journal
+from fecm.results.journal import Journal, SpoolError
 from fecm.results.sinks import MemorySink
 from fecm.rod_method import RodMethod
 from fecm.simulation import Simulation, simulate
@@ -133,12 +134,81 @@ def test_a_checkpoint_of_another_run_is_refused_and_says_why(tmp_path: Path) -> 
         run(deck(), path, resume=True)
     checkpoint_of(path).write_bytes(stored)
     spool_of(path).write_bytes(spool_of(path).read_bytes()[:-9])
-    with pytest.raises(ValueError, match=r"damaged|cut short"):
+    with pytest.raises(SpoolError, match="damaged, or was written by another run"):
         run(deck(), path, resume=True)
     checkpoint_of(path).unlink()
     with pytest.raises(CheckpointError, match="there is no checkpoint"):
         run(deck(), path, resume=True)
     assert not path.exists()
+
+
+@pytest.mark.parametrize("place", [0.02, 0.5, 0.999])
+def test_a_spool_with_one_other_bit_is_refused(tmp_path: Path, place: float) -> None:
+    path = tmp_path / "run.h5"
+    with pytest.raises(StoppedError):
+        run(deck(), path, 60)
+    spool = bytearray(spool_of(path).read_bytes())
+    spool[int(place * len(spool))] ^= 1
+    spool_of(path).write_bytes(spool)
+    with pytest.raises(SpoolError, match="damaged, or was written by another run"):
+        run(deck(), path, resume=True)
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("lost", ["about", "identity", "values", "plate", "length", "recorder"])
+def test_a_checkpoint_that_lacks_something_is_refused(tmp_path: Path, lost: str) -> None:
+    path = tmp_path / "run.h5"
+    with pytest.raises(StoppedError):
+        run(deck(), path, 5)
+    with np.load(checkpoint_of(path)) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    about = json.loads(arrays.pop("about").tobytes())
+    about.pop(lost, None)
+    about["spool"].pop(lost, None)
+    kept = {name: array for name, array in arrays.items() if lost not in name}
+    if lost != "about":
+        kept["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
+    with checkpoint_of(path).open("wb") as file:
+        np.savez(file, **kept)
+    with pytest.raises(CheckpointError, match="damaged"):
+        run(deck(), path, resume=True)
+
+
+def test_a_checkpoint_that_can_not_be_written_leaves_the_one_before_in_force(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole, path = tmp_path / "whole.h5", tmp_path / "run.h5"
+    run(deck(), whole)
+    looks: list[str] = []
+
+    def savez(*arguments: object, **arrays: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    def look(simulation: Simulation) -> None:
+        looks.append("")
+        if len(looks) in (20, 60):
+            checkpointer.write(simulation)
+        if (
+            len(looks) == 40
+        ):  # the spool is written, the checkpoint is not
+            with monkeypatch.context() as patch:
+                patch.setattr(np, "savez", savez)
+                with pytest.raises(OSError, match="No space"):
+                    checkpointer.write(simulation)
+        if len(looks) == 70:
+            raise StoppedError
+
+    with contextlib.suppress(StoppedError), file_writer.writing(path) as sink:
+        journal = Journal(sink)
+        checkpointer = Checkpointer(path, journal)
+        simulation = Simulation(
+            prepare(deck()).problems[0], frozenset(), journal, rod_method=RodMethod(), look=look
+        )
+        simulation._tick = 1
+        simulation.run()
+    assert len(looks) == 70
+    run(deck(), path, resume=True)
+    assert path.read_bytes() == whole.read_bytes()
 
 
 def test_a_checkpoint_of_another_version_is_refused(
@@ -222,6 +292,20 @@ def test_a_second_signal_stops_at_once(tmp_path: Path) -> None:
         process.send_signal(signal.SIGINT)
         assert process.wait(10) == 130
     assert not (tmp_path / "d.h5").exists()
+
+
+def test_what_an_interrupted_run_has_left_is_not_thrown_away_unasked(whole: Path) -> None:
+    problem = prepare(LONG).problems[0]
+    with pytest.raises(StoppedError):
+        stop_at_once(problem, whole / "l.h5")
+    left = checkpoint_of(whole / "l.h5").read_bytes()
+    done = fecm_in(whole, "run", "deck.inp", "-o", "l.h5")
+    assert done.returncode == 2
+    assert "--resume goes on from it, --overwrite begins anew" in done.stderr
+    assert checkpoint_of(whole / "l.h5").read_bytes() == left
+    assert fecm_in(whole, "run", "deck.inp", "-o", "l.h5", "--overwrite").returncode == 0
+    assert sorted(path.name for path in whole.glob("l.h5*")) == ["l.h5"]
+    (whole / "l.h5").unlink()
 
 
 def test_resuming_without_a_checkpoint_is_refused(tmp_path: Path) -> None:

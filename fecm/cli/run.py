@@ -46,7 +46,11 @@ if TYPE_CHECKING:
 @click.option("--slip", "slips", type=click.Choice(NAMES), multiple=True, metavar="NAME",
               help=f"Add a single slip of the program to report mode; may be repeated.  Names: "
                    f"{', '.join(NAMES)}.")  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace result files that exist.")
+@click.option(
+    "--overwrite",
+    is_flag=True,
+    help="Replace result files that exist, and what interrupted runs have left.",
+)
 @click.option(
     "--solver",
     type=click.Choice(SOLVERS),
@@ -119,6 +123,11 @@ def run(
     left = [path for path in paths if checkpoint_of(path).exists()]
     if resume and not left:
         raise Refused(f"there is no checkpoint {checkpoint_of(paths[0])} to go on from")
+    if left and not (resume or overwrite):
+        raise Refused(
+            f"{checkpoint_of(left[0])} is what an interrupted run has left: --resume goes on from "
+            "it, --overwrite begins anew"
+        )
     choices = Choices(active, RodMethod(rod_mass, rod_integrator), **options)
     for number, path in enumerate(paths):
         if number:

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import json
 import os
+import zlib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -21,9 +23,20 @@ from fecm.results.schema import DATASETS, Dataset
 
 Array = NDArray[Any]
 
+# Bytes that are read at once to check a spool.
+CHUNK = 1_000_000
+
 
 class SpoolError(ValueError):
     """A spool is not whole."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """The part of a spool that belongs to a checkpoint: its first bytes, and their CRC."""
+
+    length: int
+    checksum: int
 
 
 class Journal:
@@ -37,11 +50,17 @@ class Journal:
         The result.
     muted : bool
         Take nothing in: what comes stands in a spool already.
+
+    Attributes
+    ----------
+    spooled : Part
+        What stands in the spool for good.
     """
 
     def __init__(self, sink: FileSink, *, muted: bool = False) -> None:
         self._sink = sink
         self.muted = muted
+        self.spooled = Part(0, 0)
         self._new: list[dict[str, Any]] = []
 
     def attributes(self, group: str, values: Mapping[str, Any]) -> None:
@@ -73,8 +92,10 @@ class Journal:
             self._new.append(told)
             self._sink.text(path, value, description)
 
-    def spool(self, file: BinaryIO) -> int:
-        """Append what is new to a spool and bring it to the disk; the spool's length.
+    def spool(self, file: BinaryIO) -> Part:
+        """Write what is new behind what stands in a spool for good, and bring it to the disk.
+
+        It stands there for good once a checkpoint names it: see :meth:`keep`.
 
         Raises
         ------
@@ -82,22 +103,32 @@ class Journal:
             If it can't be written, or the result can't.
         """
         self._sink.check()
+        file.truncate(self.spooled.length)
+        file.seek(self.spooled.length)
+        checksum = self.spooled.checksum
         for told in self._new:
-            if told["do"] != "write":
-                file.write(_line(told))
-                continue
-            stop = told["start"] + told["rows"]
-            rows = np.ascontiguousarray(self._sink.stored(told["path"], told["start"], stop))
-            head = {**told, "dtype": rows.dtype.str, "shape": rows.shape}
-            file.write(_line(head))
-            file.write(rows.data)
-        self._new.clear()
+            for data in self._data(told):
+                file.write(data)
+                checksum = zlib.crc32(data, checksum)
         file.flush()
         os.fsync(file.fileno())
-        return file.tell()
+        return Part(file.tell(), checksum)
 
-    def replay(self, path: Path, length: int) -> None:
-        """Do again what the first `length` bytes of a spool say.
+    def _data(self, told: dict[str, Any]) -> list[bytes | memoryview]:
+        """What a spool says of an operation: its line, and its rows if it has any."""
+        if told["do"] != "write":
+            return [_line(told)]
+        stop = told["start"] + told["rows"]
+        rows = np.ascontiguousarray(self._sink.stored(told["path"], told["start"], stop))
+        return [_line({**told, "dtype": rows.dtype.str, "shape": rows.shape}), rows.data.cast("B")]
+
+    def keep(self, part: Part) -> None:
+        """Take it that a checkpoint names this part of the spool."""
+        self.spooled = part
+        self._new.clear()
+
+    def replay(self, path: Path, part: Part) -> None:
+        """Do again what a part of a spool says, and take it from there.
 
         Raises
         ------
@@ -107,14 +138,16 @@ class Journal:
             If it can't be read, or the result can't be written.
         """
         with path.open("rb") as file:
-            while file.tell() < length:
+            if _checksum(file, part.length) != part.checksum:
+                raise SpoolError(f"{path} is damaged, or was written by another run")
+            file.seek(0)
+            while file.tell() < part.length:
                 try:
-                    told = json.loads(file.readline())
-                    self._do(told, file)
+                    self._do(json.loads(file.readline()), file)
                 except (ValueError, KeyError, TypeError) as error:
                     raise SpoolError(f"{path} is damaged ({error})") from None
-            if file.tell() != length:
-                raise SpoolError(f"{path} is cut short")
+        self.spooled = part
+        self.muted = False
 
     def _do(self, told: dict[str, Any], file: BinaryIO) -> None:
         match told["do"]:
@@ -126,14 +159,20 @@ class Journal:
                 self._sink.text(told["path"], told["value"], told["description"])
             case "write":
                 dtype, shape = np.dtype(told["dtype"]), tuple(told["shape"])
-                count = int(np.prod(shape)) * dtype.itemsize
-                data = file.read(count)
-                if len(data) != count:
-                    raise ValueError("its rows are cut short")
+                data = file.read(int(np.prod(shape)) * dtype.itemsize)
                 rows = np.frombuffer(data, dtype).reshape(shape)
                 self._sink.write(told["path"], told["start"], rows)
             case other:
                 raise ValueError(f"it says `{other}`")
+
+
+def _checksum(file: BinaryIO, length: int) -> int:
+    """CRC of so many bytes; of fewer if there are not as many."""
+    checksum = 0
+    while length > 0 and (data := file.read(min(length, CHUNK))):
+        checksum = zlib.crc32(data, checksum)
+        length -= len(data)
+    return checksum
 
 
 def _line(told: Mapping[str, Any]) -> bytes:
