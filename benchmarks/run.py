@@ -15,9 +15,7 @@ Each case has a process of its own, and its peak memory is read before the plain
 from __future__ import annotations
 
 import argparse
-import json
 import multiprocessing
-import platform
 import resource
 import statistics
 import tempfile
@@ -26,9 +24,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import h5py
 import numpy as np
-import scipy
+from figures import keep
 
 import fecm
 from fecm.authoring.grid import Grid, Section
@@ -206,13 +203,7 @@ def main() -> None:
             flush=True,
         )
     if options.write:
-        versions = {m.__name__: m.__version__ for m in (fecm, np, scipy, h5py)}
-        machine = f"{platform.system()}-{platform.machine()}-{multiprocessing.cpu_count()}cores"
-        path = HERE / "results" / f"{machine.lower()}.json"
-        path.parent.mkdir(exist_ok=True)
-        content = {"machine": machine, "python": platform.python_version(), **versions}
-        path.write_text(json.dumps({**content, "cases": figures}, indent=2) + "\n")
-        print(path)
+        print(keep({"cases": figures}))
 
 
 if __name__ == "__main__":

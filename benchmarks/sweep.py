@@ -12,9 +12,6 @@ over the peak force.  The plain loop is that of run.py, once, times 1000.
 from __future__ import annotations
 
 import argparse
-import json
-import multiprocessing
-import platform
 import resource
 import statistics
 import subprocess
@@ -23,9 +20,8 @@ import tempfile
 import time
 from pathlib import Path
 
-import h5py
 import numpy as np
-import scipy
+from figures import keep
 from run import HERE, ROUNDS, checked, plain, report
 
 import fecm
@@ -103,13 +99,7 @@ def main() -> None:
     for name, value in figures.items():
         print(f"{name.replace('_', ' '):24}{value:>10}")
     if options.write:
-        versions = {m.__name__: m.__version__ for m in (fecm, np, scipy, h5py)}
-        machine = f"{platform.system()}-{platform.machine()}-{multiprocessing.cpu_count()}cores"
-        path = HERE / "results" / f"{machine.lower()}-sweep.json"
-        path.parent.mkdir(exist_ok=True)
-        content = {"machine": machine, "python": platform.python_version(), **versions}
-        path.write_text(json.dumps({**content, "sweep": figures}, indent=2) + "\n")
-        print(path)
+        print(keep({"sweep": figures}, "-sweep"))
 
 
 if __name__ == "__main__":

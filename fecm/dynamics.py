@@ -93,7 +93,7 @@ class PlateState:
 
     @property
     def strain_energy(self) -> float:
-        """U K u / 2 (force*length)."""
+        """Strain energy, half of the product of displacement and internal force (force*length)."""
         return 0.5 * self.sums.strain
 
     def to_arrays(self) -> dict[str, Floats]:

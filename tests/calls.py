@@ -36,6 +36,16 @@ def call(*arguments: object) -> Done:
     return Done(left.value.code, out.getvalue(), err.getvalue())
 
 
+def diff(*arguments: object) -> Done:
+    """Call ``fecm diff``."""
+    return call("diff", *arguments)
+
+
+def told(done: Done, name: str) -> str:
+    """The line about a dataset in what ``fecm diff`` says."""
+    return next(line for line in done.stdout.splitlines() if name in line.split())
+
+
 def assert_unusable(done: Done) -> None:
     """Status 2, nothing on standard output, one line on standard error."""
     assert done.exit_code == 2

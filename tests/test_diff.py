@@ -16,35 +16,15 @@ import pytest
 import fecm
 from fecm.results import compare
 from fecm.results.result import load
-from tests.calls import Done, assert_unusable, call
-from tests.decks import APPENDIX, small
+from tests.calls import Done, assert_unusable, diff, told
+from tests.decks import small
 
 Edit = Callable[[h5py.File], object]
-
-
-def diff(*arguments: object) -> Done:
-    """Call ``fecm diff``."""
-    return call("diff", *arguments)
 
 
 def verdict(done: Done) -> str:
     """The first word of the last line."""
     return done.stdout.splitlines()[-1].partition(":")[0]
-
-
-def told(done: Done, name: str) -> str:
-    """The line about a dataset."""
-    return next(line for line in done.stdout.splitlines() if name in line.split())
-
-
-@pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with results of the report's deck in both modes, and of a small deck."""
-    folder = tmp_path_factory.mktemp("runs")
-    for mode in ("report", "listing"):
-        fecm.run(APPENDIX, mode=mode, output=folder / f"{mode}.h5")
-    fecm.run(small(), output=folder / "small.h5")
-    return folder
 
 
 @pytest.fixture

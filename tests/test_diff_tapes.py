@@ -11,31 +11,11 @@ import h5py
 import numpy as np
 import pytest
 
-import fecm
 from fecm.results.result import load
 from fecm.results.tape_reader import fortran_number, read_tapes
 from fecm.results.tapes import write_tapes
-from tests.calls import Done, assert_unusable, call
-from tests.decks import APPENDIX, DATA
-
-
-def diff(*arguments: object) -> Done:
-    """Call ``fecm diff``."""
-    return call("diff", *arguments)
-
-
-def told(done: Done, name: str) -> str:
-    """The line about a dataset."""
-    return next(line for line in done.stdout.splitlines() if name in line.split())
-
-
-@pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with results of the report's deck in both modes."""
-    folder = tmp_path_factory.mktemp("runs")
-    for mode in ("report", "listing"):
-        fecm.run(APPENDIX, mode=mode, output=folder / f"{mode}.h5")
-    return folder
+from tests.calls import assert_unusable, diff, told
+from tests.decks import DATA
 
 
 def originals(mode: str, folder: Path) -> Path:

@@ -43,7 +43,7 @@ Mesh = tuple[Floats, Ints]
 
 # Orders under which mass and stiffness of a family are exact on parallelograms.
 EXACT = {3: 2, 4: 2, 8: 3, 9: 3, 10: 4, 11: 4, 12: 4}
-NEW_KINDS = (3, 10, 11, 12)
+TRIANGLE_AND_CUBICS = (3, 10, 11, 12)
 KINDS = (3, 4, 8, 9, 10, 11, 12)
 DENSITY, THICKNESS = GENERAL_PLY.density, sum(GENERAL_LAYERS)
 
@@ -59,7 +59,7 @@ def free_plate(mesh: Mesh, order: int) -> PlateModel:
 
 
 @pytest.mark.parametrize("order", [2, 3, 4])
-@pytest.mark.parametrize("kind", NEW_KINDS)
+@pytest.mark.parametrize("kind", TRIANGLE_AND_CUBICS)
 def test_lumped_masses_are_positive_and_add_up_under_orders_2_to_4(kind: int, order: int) -> None:
     mass = free_plate(distorted_square(3, 4, kind), order).mass.reshape(-1, 5)
     assert mass.min() > 0.0
@@ -202,7 +202,7 @@ def test_lumping_takes_the_12_node_element_s_rate_down_to_2() -> None:
     [(3, (2, 1), 1.5, 0.13), (10, (4, 4), 1.5, 0.07), (11, (4, 4), 1.6, 0.04),
      (12, (4, 4), 2.0, 1e-4)],
 )  # fmt: skip
-def test_bending_converges_on_ever_finer_distorted_meshes_of_new_elements(
+def test_bending_converges_on_ever_finer_distorted_meshes_of_triangles_and_cubics(
     kind: int, orders: tuple[int, int], rate: float, ceiling: float
 ) -> None:
     exact = reference_deflections(0.1, "1.000000")[0]

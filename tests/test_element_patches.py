@@ -44,7 +44,7 @@ from tests.test_quadrature import PATTERNS
 
 Mesh = tuple[Floats, Ints]
 
-NEW_KINDS = (3, 10, 11, 12)
+TRIANGLE_AND_CUBICS = (3, 10, 11, 12)
 
 
 def with_pattern_in_the_middle(present: Bools) -> Mesh:
@@ -104,9 +104,9 @@ def exact_on(mesh: Mesh, field: Floats) -> None:
 # Patches ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", NEW_KINDS)
+@pytest.mark.parametrize("kind", TRIANGLE_AND_CUBICS)
 @pytest.mark.parametrize("maker", [distorted_square, parallelograms])
-def test_a_patch_of_new_elements_reproduces_constant_membrane_strain(
+def test_a_patch_of_triangles_and_cubics_reproduces_constant_membrane_strain(
     maker: MeshMaker, kind: int
 ) -> None:
     mesh = maker(3, 4, kind)
@@ -166,8 +166,8 @@ def test_strains_of_linear_curvature_are_exact_in_12_node_parallelograms(
     np.testing.assert_allclose(strains[3:], 0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("kind", NEW_KINDS)
-def test_rigid_motions_of_new_elements_cause_neither_strains_nor_forces(kind: int) -> None:
+@pytest.mark.parametrize("kind", TRIANGLE_AND_CUBICS)
+def test_rigid_motions_of_triangles_and_cubics_cause_neither_strains_nor_forces(kind: int) -> None:
     rigid(distorted_square(3, 4, kind))
 
 
@@ -196,7 +196,7 @@ def rigid(mesh: Mesh) -> None:
     [(3, 1, 1, 3 + 3 + 3 - 2), (3, 2, 2, 6), (12, 3, 3, 6), (12, 4, 4, 6),
      (12, 4, 2, 3 + 3 + 12 - 8)],
 )  # fmt: skip
-def test_new_elements_have_six_rigid_modes_and_those_their_quadrature_misses(
+def test_triangles_and_cubics_have_six_rigid_modes_and_those_their_quadrature_misses(
     kind: int, bending: int, shear: int, modes: int, corners: Corners
 ) -> None:
     values = np.linalg.eigvalsh(free_stiffness(one_element(corners, kind), bending, shear))
@@ -212,7 +212,7 @@ def test_two_triangles_have_six_rigid_modes_under_one_shear_point_each() -> None
     assert values[6] > 1e-4 * values[-1]
 
 
-@pytest.mark.parametrize("kind", NEW_KINDS)
+@pytest.mark.parametrize("kind", TRIANGLE_AND_CUBICS)
 def test_every_way_to_multiply_by_the_stiffness_gives_the_same_forces(kind: int) -> None:
     coordinates, elements = square(6, 6, kind)
     mesh = with_restraints(coordinates, elements, boundary(coordinates, elements))

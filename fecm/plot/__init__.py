@@ -167,6 +167,21 @@ def draw(
     return picture
 
 
+def figure(
+    kind: str,
+    results: Mapping[str, Result | SweepResult],
+    options: Options,
+    path: str | Path | None,
+) -> Figure:
+    """Draw a picture, and write it if there is a path; see :func:`draw` and :func:`save`."""
+    if path is not None:
+        check_suffix(kind, Path(path))
+    picture = draw(kind, results, options)
+    if path is not None:
+        save(picture, Path(path))
+    return picture.figure
+
+
 def check_suffix(kind: str, path: Path) -> None:
     """Refuse a name whose suffix is no format of the kind.
 

@@ -136,14 +136,9 @@ class Result:
         ImportError
             If matplotlib is not installed.
         """
-        from fecm.plot import Options, check_suffix, draw, save
+        from fecm.plot import Options, figure
 
-        if path is not None:
-            check_suffix(kind, Path(path))
-        picture = draw(kind, {self.title or "the result": self}, Options(**options))
-        if path is not None:
-            save(picture, Path(path))
-        return picture.figure
+        return figure(kind, {self.title or "the result": self}, Options(**options), path)
 
     def __getitem__(self, path: str) -> Array:
         return self._arrays[path.strip("/")]

@@ -128,16 +128,11 @@ class SweepResult:
         ImportError
             If matplotlib is not installed.
         """
-        from fecm.plot import Options, check_suffix, draw, save
+        from fecm.plot import Options, figure
 
-        if path is not None:
-            check_suffix("map", Path(path))
         names = (over,) if isinstance(over, str) else tuple(over)
         chosen = Options(quantity=quantity, over=names, **options)
-        picture = draw("map", {self.title or "the sweep": self}, chosen)
-        if path is not None:
-            save(picture, Path(path))
-        return picture.figure
+        return figure("map", {self.title or "the sweep": self}, chosen, path)
 
 
 def result_of(plan: Plan, outcome: Outcome) -> SweepResult:

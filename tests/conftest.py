@@ -1,0 +1,20 @@
+"""What several test files share: results that are made once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import fecm
+from tests.decks import APPENDIX, small
+
+
+@pytest.fixture(scope="session")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with results of the report's deck in both modes, and of a small deck; left alone."""
+    folder = tmp_path_factory.mktemp("runs")
+    for mode in ("report", "listing"):
+        fecm.run(APPENDIX, mode=mode, output=folder / f"{mode}.h5")
+    fecm.run(small(), output=folder / "small.h5")
+    return folder
