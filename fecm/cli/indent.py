@@ -13,13 +13,11 @@ from fecm.cli.common import DECK_PATH, FORMAT_OPTION, Refused
 from fecm.cli.indent_curve import curve
 from fecm.cli.numbers import POSITIVE, Finite
 from fecm.cli.tables import OVERWRITE, PLOT, STANDARD_OUTPUT, Targets
+from fecm.fitting import LIMITS_Q
 
 if TYPE_CHECKING:
     from fecm.fitting.curves import Floats
     from fecm.plot import Picture
-
-# Unloading powers that are searched.
-LIMITS_Q = (0.3, 12.0)
 
 
 @click.group()

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm.fitting import LIMITS_Q
 from fecm.fitting.cycles import FALLING, LOADING, RISING, Division, NoTestError
 from fecm.fitting.estimates import Estimate, r_squared
 from fecm.indentation import LOADING_POWER, power_curve
@@ -30,7 +31,6 @@ Bools = NDArray[np.bool_]
 # Points that a curve needs.
 FEWEST = 5
 FIRST_Q = 2.2
-LIMITS_Q = (0.3, 12.0)
 # Distance from a limit, in parts of the way between both, at which a value counts as at it.
 AT_LIMIT = 1e-4
 # How far a peak may move from its record, and where origins may lie, in parts of the peak.

@@ -81,8 +81,6 @@ def _split(
     peaks: Floats, permanents: Floats, covariance: Floats, elastic: NDArray[np.intp]
 ) -> tuple[float, Line] | None:
     """Line and chi^2 where some cycles are taken for elastic."""
-    from scipy.stats import chi2
-
     n = len(peaks)
     beyond = np.full(n, 1.0)
     beyond[elastic] = 0.0
@@ -100,10 +98,8 @@ def _split(
         slope, level = np.linalg.solve(normal, design.T @ weight @ permanents)
     errors = np.linalg.inv(normal)
     left = permanents - design @ [slope, level]
-    chi, freedom = float(left @ weight @ left), n - 2
-    scatter = 1.0
-    if freedom > 0 and chi2.sf(chi, freedom) < UNLIKELY:
-        scatter = (chi / freedom) ** 0.5
+    chi = float(left @ weight @ left)
+    scatter = _scatter(chi, n - 2)
     if slope == 0.0:
         return None
     by = np.array([level / slope**2, -1.0 / slope])
@@ -113,6 +109,13 @@ def _split(
         tuple(int(i) for i in elastic),
         scatter,
     )
+
+
+def _scatter(chi: float, freedom: int) -> float:
+    """Root of chi^2 by degrees of freedom where that is more than noise explains, else 1."""
+    from scipy.stats import chi2
+
+    return (chi / freedom) ** 0.5 if freedom > 0 and chi2.sf(chi, freedom) < UNLIKELY else 1.0
 
 
 @dataclass(frozen=True)
@@ -137,8 +140,6 @@ def critical(peaks: Floats, permanents: Floats, covariance: Floats) -> Critical:
     Parameters are those of :func:`line`.  Of a cycle below alpha_cr nothing remains, and it says
     only that alpha_cr is larger: such cycles are left out while there are others.
     """
-    from scipy.stats import chi2
-
     covariance = covariance + np.eye(len(covariance)) * (ROUNDING * peaks.max()) ** 2
     own = (peaks - permanents) ** ACR_POWER / peaks**LOADING_POWER
     across = np.concatenate(
@@ -156,9 +157,6 @@ def critical(peaks: Floats, permanents: Floats, covariance: Floats) -> Critical:
     total = float(weight.sum())
     mean = float((weight @ own[deep]).sum()) / total if total > 0.0 else float(own[deep].mean())
     left = own[deep] - mean
-    chi, freedom = float(left @ weight @ left), int(deep.sum()) - 1
-    scatter = 1.0
-    if freedom > 0 and chi2.sf(chi, freedom) < UNLIKELY:
-        scatter = (chi / freedom) ** 0.5
+    scatter = _scatter(float(left @ weight @ left), int(deep.sum()) - 1)
     error = scatter * total**-0.5 if total > 0.0 else 0.0
     return Critical(Estimate(mean, error), scatter)
