@@ -74,4 +74,7 @@ def _of_groups() -> list[int]:
 
 def said(count: float) -> str:
     """A number of bytes as a person says it."""
-    return f"{count / 1e9:.3g} GB" if count >= 1e9 else f"{count / 1e6:.3g} MB"
+    for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= size:
+            return f"{count / size:.3g} {unit}"
+    return f"{count:g} bytes"

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fecm.check import Checked
 from fecm.check.run import output_bytes
+from fecm.memory import said
 from fecm.parts import build_plate, build_projectile
 from fecm.program import estimate, flat
 from fecm.solvers import SAFE
@@ -89,7 +90,7 @@ class Overview:
             lines.append(f"  DT                  {quantity(dt, 'time')} ({share:.0%} of it)")
         lines += [
             f"  impact steps        {self.steps}",
-            f"  output              {_size(self.output_bytes)}",
+            f"  output              {said(self.output_bytes)}",
         ]
         return lines
 
@@ -102,14 +103,6 @@ def _matrix(name: str, values: Floats, unit: str) -> list[str]:
     lines = [f"{head}{row}" for head, row in zip(heads, rows, strict=True)]
     lines[0] = f"{lines[0]}  {unit}".rstrip()
     return lines
-
-
-def _size(count: int) -> str:
-    """A number of bytes as a person says it."""
-    for unit, scale in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
-        if count >= scale:
-            return f"{count / scale:.3g} {unit}"
-    return f"{count} bytes"
 
 
 def overview(checked: Checked) -> Overview:

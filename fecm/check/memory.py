@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from fecm import plate
-from fecm.assembly import ASSEMBLED
+from fecm.assembly import ASSEMBLED, BLOCK
 from fecm.check import Checked
 from fecm.check.run import output_bytes
 from fecm.congruence import congruence
@@ -42,8 +42,6 @@ ROWS = 8
 TANGENT, SHIFTED = 300, 70
 # Bytes a step that the summary behind a run takes.
 STEP = 80
-# Elements whose matrices are integrated at once.
-BLOCK = 1024
 
 STATIC = {"TANG", "EIGE"}
 

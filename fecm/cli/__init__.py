@@ -104,5 +104,6 @@ def _told(error: Exception) -> str:
     if isinstance(error, MemoryError):
         return "there is not enough memory"
     if isinstance(error, OSError) and error.strerror:
-        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+        name = error.filename2 or error.filename  # of a renaming its target
+        return f"{name}: {error.strerror}" if name else error.strerror
     return str(error)

@@ -132,10 +132,15 @@ class Signals:
         """Whether a signal came that asks for the program's end."""
         return bool(self._received)
 
+    @property
+    def status(self) -> int:
+        """Exit status of a program that a signal has ended."""
+        return TERMINATED if self._received == signal.SIGTERM else INTERRUPTED
+
     def heed(self) -> None:
         """End the program if a signal came."""
         if self._received == signal.SIGTERM:
-            raise SystemExit(TERMINATED)
+            raise SystemExit(self.status)
         if self._received:
             raise KeyboardInterrupt
 

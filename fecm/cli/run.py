@@ -26,6 +26,7 @@ from fecm.cli.common import (
 )
 from fecm.cli.numbers import POSITIVE, Finite
 from fecm.files import clear_stale
+from fecm.memory import said
 from fecm.rod_method import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
 from fecm.slips import NAMES, active_slips
 from fecm.solvers import AUTO, SOLVERS
@@ -184,7 +185,7 @@ def _run_one(
         advance = stack.enter_context(_progress(tally(problem.program).steps))
         simulation = Simulation(
             problem, choices.slips, journal, advance, printer, choices.solver, choices.threads,
-            choices.method, choices.energy_limit, _Look(checkpointer, choices.every, path),
+            choices.method, choices.energy_limit, _Look(checkpointer, choices.every),
         )  # fmt: skip
         if resumes:
             checkpointer.restore(simulation)
@@ -223,6 +224,21 @@ def _ends(path: Path) -> Iterator[None]:
         ) from None
     except (CheckpointError, SpoolError) as error:
         raise Refused(f"{error}; run the deck anew, without --resume") from None
+    except _StoppedError as stopped:
+        click.echo(
+            f"fecm: stopped behind step {stopped.step}; the same command with --resume goes on to "
+            f"{path}",
+            err=True,
+        )
+        raise SystemExit(signals.status) from None
+
+
+class _StoppedError(Exception):
+    """A signal has ended the run, in good order."""
+
+    def __init__(self, step: int) -> None:
+        self.step = step
+        super().__init__(step)
 
 
 class _Look:
@@ -233,25 +249,17 @@ class _Look:
     checkpointer : Checkpointer
     every : float or None
         Seconds between two checkpoints; None writes one only when a signal ends the run.
-    path : Path
-        The result.
     """
 
-    def __init__(self, checkpointer: Checkpointer, every: float | None, path: Path) -> None:
+    def __init__(self, checkpointer: Checkpointer, every: float | None) -> None:
         self._checkpointer = checkpointer
         self._every = every
-        self._path = path
 
     def __call__(self, simulation: Simulation) -> None:
         if signals.came:
             self._checkpointer.write(simulation)
-            click.echo(
-                f"fecm: stopped behind step {simulation.plate.step}; the same command with "
-                f"--resume goes on to {self._path}",
-                err=True,
-            )
-            signals.heed()
-        elif self._every is not None and self._checkpointer.age >= self._every:
+            raise _StoppedError(simulation.plate.step)
+        if self._every is not None and self._checkpointer.age >= self._every:
             self._checkpointer.write(simulation)
 
 
@@ -260,8 +268,7 @@ def _check_room(path: Path, size: int) -> None:
     free = shutil.disk_usage(path.parent).free
     if size > free:
         raise Refused(
-            f"{path}: the result takes about {size / 1e6:.3g} MB, and the disk has "
-            f"{free / 1e6:.3g} MB left"
+            f"{path}: the result takes about {said(size)}, and the disk has {said(free)} left"
         )
 
 
