@@ -30,6 +30,7 @@ from figures import keep
 import fecm
 from fecm.authoring.grid import Grid, Section
 from fecm.check import Checked
+from fecm.choices import Choices
 from fecm.deck import Deck
 from fecm.deck.model import Boundary, Coordinates, Elements, Impact
 from fecm.deck.records import Control, NodeValues
@@ -123,7 +124,7 @@ def full(problem: Checked, folder: str, threads: int = 1) -> float:
     path = Path(folder) / "run.h5"
     path.unlink(missing_ok=True)
     with file_writer.writing(path) as sink:
-        simulation = Simulation(problem, frozenset(), sink, threads=threads)
+        simulation = Simulation(problem, sink, Choices(threads=threads))
         begin = time.perf_counter()
         simulation.run()
     return time.perf_counter() - begin
@@ -131,7 +132,7 @@ def full(problem: Checked, folder: str, threads: int = 1) -> float:
 
 def plain(problem: Checked, steps: int) -> float:
     """Seconds of the plain loop."""
-    setup = set_up(problem.deck, problem.mesh, frozenset())
+    setup = set_up(problem.deck, problem.mesh)
     impact, K, m = setup.impact, setup.plate.stiffness, setup.plate.mass
     if impact is None:
         raise ValueError("nothing hits in this deck")

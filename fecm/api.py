@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from fecm.check import Checked, check
 from fecm.check.memory import check_memory
 from fecm.check.run import UNSTABLE
+from fecm.choices import ENERGY_LIMIT, Choices
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, load_text
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.rod_method import LUMPED, WILSON, RodMethod
-from fecm.simulation import ENERGY_LIMIT, simulate
+from fecm.simulation import simulate
 from fecm.slips import LISTING, REPORT, active_slips
 from fecm.solvers import AUTO
 
@@ -125,7 +125,8 @@ def run(
     DivergenceError
         If the motion grows without bound, or the energy balance passes its limit.
     ValueError
-        If the mode, a slip, the rod's mass or its integrator is unknown.
+        If the mode, a slip, the solver, the rod's mass or its integrator is unknown, or a number
+        can't be meant.
     NotEnoughMemoryError
         If the run takes more memory than is free: a MemoryError.
     OSError
@@ -137,29 +138,33 @@ def run(
     >>> print(f"{result.force.max():.2f} lb")
     6.19 lb
     """
-    active, method = active_slips(mode, slips), RodMethod(rod_mass, rod_integrator)
+    choices = Choices(
+        active_slips(mode, slips), solver, threads, RodMethod(rod_mass, rod_integrator),
+        energy_limit,
+    )  # fmt: skip
     prepared = prepare(deck, mode)
     if prepared.errors(force):
         raise DeckError(prepared.findings, prepared.source)
-    how: dict[str, Any] = {
-        "solver": solver, "threads": threads, "rod_method": method, "energy_limit": energy_limit
-    }  # fmt: skip
     results: list[Result] = []
     for number, problem in enumerate(prepared.problems, start=1):
         check_memory(problem, solver=solver, in_memory=output is None)
-        if output is None:
-            memory = MemorySink()
-            simulate(problem, active, memory, **how)
-            results.append(Result(memory.arrays, memory.texts, memory.groups))
-        else:
-            from fecm.results import file_writer
-            from fecm.results.result import load
-
-            path = numbered(Path(output), number)
-            with file_writer.writing(path) as sink:
-                simulate(problem, active, sink, **how)
-            results.append(load(path))
+        path = None if output is None else numbered(Path(output), number)
+        results.append(_run_one(problem, choices, path))
     return results[0] if len(results) == 1 else results
+
+
+def _run_one(problem: Checked, choices: Choices, path: Path | None) -> Result:
+    """Run one problem, into a file if there is a path."""
+    if path is None:
+        memory = MemorySink()
+        simulate(problem, memory, choices)
+        return Result(memory.arrays, memory.texts, memory.groups)
+    from fecm.results.file_writer import writing
+    from fecm.results.result import load
+
+    with writing(path) as sink:
+        simulate(problem, sink, choices)
+    return load(path)
 
 
 def numbered(path: Path, number: int) -> Path:

@@ -45,15 +45,15 @@ def spool_of(result: Path) -> Path:
 
 def identity(simulation: Simulation) -> dict[str, Any]:
     """What a run must have in common with the one that goes on from its checkpoint."""
-    deck = simulation.checked.deck
+    deck, choices = simulation.checked.deck, simulation.choices
     text = deck.text or deck.to_text()
     return {
         "format": FORMAT,
         "version": __version__,
         "deck": hashlib.sha256(text.encode()).hexdigest(),
-        "slips": sorted(simulation.slips),
-        "solver": simulation.solver,
-        "rod": [simulation.rod_method.mass, simulation.rod_method.integrator],
+        "slips": sorted(choices.slips),
+        "solver": choices.solver,
+        "rod": [choices.rod_method.mass, choices.rod_method.integrator],
         "printed": simulation.printer.is_on,
     }
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fecm.assembly import PlateModel, Rules, assemble
+from fecm.choices import Choices
 from fecm.deck.model import Deck, Indentation, Material
 from fecm.deck.model import Gages as GageCards
 from fecm.deck.model import Impact as ImpactCard
@@ -32,8 +33,8 @@ from fecm.projectile import (
     report_rod,
 )
 from fecm.reduction import reduction
-from fecm.rod_method import WILSON, RodMethod
-from fecm.solvers import AUTO, CSR
+from fecm.rod_method import WILSON
+from fecm.solvers import CSR
 from fecm.workers import Workers, available
 
 # Moving unknowns from which on threads save more than they cost.
@@ -164,42 +165,35 @@ def build_impact(
 def set_up(
     deck: Deck,
     mesh: Mesh,
-    slips: frozenset[str],
+    choices: Choices | None = None,
     *,
     hits: bool = True,
     moves_only: bool = False,
-    solver: str = AUTO,
-    threads: int = 0,
-    rod_method: RodMethod | None = None,
 ) -> Setup:
-    """Make the parts of a checked problem, with the slips that are on.
+    """Make the parts of a checked problem, as it is to be run.
 
     Parameters
     ----------
     deck : Deck
     mesh : Mesh
-    slips : frozenset of str
+    choices : Choices, optional
+        The report's way without it.
     hits : bool
         Whether there is a projectile.
     moves_only : bool
         Whether the plate only moves from rest, so that what provably stays at rest can be left out.
-    solver : str
-        How K u is had: see :func:`~fecm.products.product_of`.
-    threads : int
-        Threads that share the work of a step; 0 takes every core for a large mesh.
-    rod_method : RodMethod, optional
-        The rod's mass matrix and integrator; the report's without it.
     """
-    method = rod_method or RodMethod()
-    plate, rod = build_plate(deck, mesh, slips), build_projectile(deck, slips)
-    rod = rod.with_mass(method.mass)
+    chosen = choices or Choices()
+    slips, solver, method = chosen.slips, chosen.solver, chosen.rod_method
+    plate = build_plate(deck, mesh, slips)
+    rod = build_projectile(deck, slips).with_mass(method.mass)
     hit = None
     if hits:
         card = deck.need(ImpactCard)
         hit = (card.node - 1, card.dof - 1)
     reduced = reduction(plate, hit) if moves_only and solver != CSR else None
     moving = plate.neq if reduced is None else reduced.count
-    workers = Workers(threads or (available() if moving >= WORTH_SHARING else 1))
+    workers = Workers(chosen.threads or (available() if moving >= WORTH_SHARING else 1))
     motion = PlateMotion(plate, solver, reduced, workers)
     return Setup(
         plate=plate,

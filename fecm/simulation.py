@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -11,6 +11,7 @@ import numpy as np
 
 from fecm.assembly import UnsoundPlateError
 from fecm.check import Checked
+from fecm.choices import Choices
 from fecm.deck.model import Material
 from fecm.deck.records import LoadTable, Macro
 from fecm.dynamics import DivergenceError, PlateState
@@ -25,9 +26,8 @@ from fecm.proportional import load_factor
 from fecm.recording.recorder import Recorder
 from fecm.results.schema import FORMAT, FORMAT_VERSION
 from fecm.results.sinks import Sink
-from fecm.rod_method import RodMethod
 from fecm.slips import LISTING, NAMES, REPORT
-from fecm.solvers import AUTO, SAFE
+from fecm.solvers import SAFE
 from fecm.statics import Tangent, reactions
 from fecm.stresses import strains_and_resultants
 from fecm.units import unit_names
@@ -36,9 +36,8 @@ from fecm.version import __version__
 Progress = Callable[[int, int], None]
 Look = Callable[["Simulation"], None]
 
-# Error of the energy balance, as a part of what was given, that is told, and that ends a run.
+# Error of the energy balance, as a part of what was given, that is told.
 ENERGY_WARNING = 0.01
-ENERGY_LIMIT = 0.1
 
 # Change of the displacement, relative to it, below which CONV leaves its loop.
 TOLERANCE = 1.0e-9
@@ -52,22 +51,14 @@ class Simulation:
     ----------
     checked : Checked
         The problem.
-    slips : frozenset of str
-        Slips that are on.
     sink : Sink
         Receives the result.
+    choices : Choices
+        How it is run.
     progress : callable
         Told of steps taken and steps to take, now and then.
     printer : Printer
         Writes the printed output.
-    solver : str
-        How K u is had: see :func:`~fecm.products.product_of`.
-    threads : int
-        Threads that share the work of a step; 0 takes every core for a large mesh.
-    rod_method : RodMethod
-        The rod's mass matrix and integrator.
-    energy_limit : float
-        Error of the energy balance, as a part of what was given, that ends a run without slips.
     look : callable
         Called between two steps, as often as `progress`; may write a checkpoint, or end the run.
     notes : list of str
@@ -75,14 +66,10 @@ class Simulation:
     """
 
     checked: Checked
-    slips: frozenset[str]
     sink: Sink
+    choices: Choices = field(default_factory=Choices)
     progress: Progress = lambda done, steps: None
     printer: Printer = field(default_factory=Printer)
-    solver: str = AUTO
-    threads: int = 0
-    rod_method: RodMethod = field(default_factory=RodMethod)
-    energy_limit: float = ENERGY_LIMIT
     look: Look = lambda simulation: None
     notes: list[str] = field(default_factory=list, init=False)
     setup: Setup = field(init=False)
@@ -105,14 +92,7 @@ class Simulation:
         deck, mesh, program = self.checked.deck, self.checked.mesh, self.checked.program
         with np.errstate(all="ignore"):
             self.setup = set_up(
-                deck,
-                mesh,
-                self.slips,
-                hits=hits(program),
-                moves_only=moves_only(program),
-                solver=self.solver,
-                threads=self.threads,
-                rod_method=self.rod_method,
+                deck, mesh, self.choices, hits=hits(program), moves_only=moves_only(program)
             )
         self.plate = self.setup.motion.start()
         if self.setup.impact is not None:
@@ -127,7 +107,7 @@ class Simulation:
             self.setup,
             self._sizes,
             contact_at_every_step="tapes" in self.slips,
-            limit=None if self.slips else self.energy_limit,
+            limit=None if self.slips else self.choices.energy_limit,
         )
         if self._sizes.contact_rows and self.impact is not None:
             self.sink.attributes("tape8", {"location": self._location()})
@@ -135,6 +115,11 @@ class Simulation:
             x, y = self.setup.stress_points.places(mesh.coordinates)
             self._recorder.constant("stresses/x", x)
             self._recorder.constant("stresses/y", y)
+
+    @property
+    def slips(self) -> frozenset[str]:
+        """Slips that are on."""
+        return self.choices.slips
 
     def _location(self) -> str:
         at_nodes = self.checked.deck.need(Material).integration.points < 0
@@ -150,7 +135,7 @@ class Simulation:
             "title": deck.title,
             "mode": LISTING if listing else REPORT,
             "slips": sorted(self.slips),
-            **self.rod_method.attributes,
+            **self.choices.rod_method.attributes,
             **{f"unit_{name}": unit for name, unit in unit_names(deck).items()},
         }
         self.sink.attributes("", attributes)
@@ -437,36 +422,16 @@ ACTIONS: dict[str, Action] = {
 }
 
 
-def simulate(
-    checked: Checked,
-    slips: Iterable[str],
-    sink: Sink,
-    progress: Progress = lambda done, steps: None,
-    printer: Printer | None = None,
-    solver: str = AUTO,
-    threads: int = 0,
-    rod_method: RodMethod | None = None,
-    energy_limit: float = ENERGY_LIMIT,
-) -> Simulation:
+def simulate(checked: Checked, sink: Sink, choices: Choices | None = None) -> Simulation:
     """Run a problem into a sink and return the finished simulation.
 
     Raises
     ------
     DivergenceError
-        If the motion grows without bound.
+        If the motion grows without bound, or the energy balance passes its limit.
     SingularStiffnessError
         If a static solution is asked for and the plate is not held.
     """
-    simulation = Simulation(
-        checked,
-        frozenset(slips),
-        sink,
-        progress,
-        printer or Printer(),
-        solver,
-        threads,
-        rod_method or RodMethod(),
-        energy_limit,
-    )
+    simulation = Simulation(checked, sink, choices or Choices())
     simulation.run()
     return simulation

@@ -60,7 +60,7 @@ NEXT
 def ready(deck: str | Path) -> Setup:
     """Parts of a deck's first problem."""
     problem = prepare(deck).problems[0]
-    return set_up(problem.deck, problem.mesh, frozenset())
+    return set_up(problem.deck, problem.mesh)
 
 
 def small(

@@ -25,10 +25,10 @@ import fecm
 from fecm.api import prepare
 from fecm.check import Checked
 from fecm.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
+from fecm.choices import Choices
 from fecm.results import file_writer
 from fecm.results.journal import Journal, SpoolError
 from fecm.results.sinks import MemorySink, RowBuffer
-from fecm.rod_method import RodMethod
 from fecm.simulation import Simulation, simulate
 from fecm.slips import active_slips
 from tests.decks import DATA_CARDS, LONG, PROGRAM, small
@@ -88,7 +88,7 @@ def run(text: str, path: Path, stop: int = 0, *, resume: bool = False, slips: st
     with file_writer.writing(path) as sink:
         journal = Journal(sink, muted=resume)
         checkpointer = Checkpointer(path, journal)
-        simulation = Simulation(problem, names, journal, rod_method=RodMethod(), look=look)
+        simulation = Simulation(problem, journal, Choices(names), look=look)
         simulation._tick = 1
         if resume:
             checkpointer.restore(simulation)
@@ -200,9 +200,7 @@ def test_a_checkpoint_that_can_not_be_written_leaves_the_one_before_in_force(
     with contextlib.suppress(StoppedError), file_writer.writing(path) as sink:
         journal = Journal(sink)
         checkpointer = Checkpointer(path, journal)
-        simulation = Simulation(
-            prepare(deck()).problems[0], frozenset(), journal, rod_method=RodMethod(), look=look
-        )
+        simulation = Simulation(prepare(deck()).problems[0], journal, look=look)
         simulation._tick = 1
         simulation.run()
     assert len(looks) == 70
@@ -325,7 +323,7 @@ def stop_at_once(problem: Checked, path: Path) -> None:
             checkpointer.write(simulation)
             raise StoppedError
 
-        Simulation(problem, frozenset(), journal, look=look).run()
+        Simulation(problem, journal, look=look).run()
 
 
 def test_of_two_problems_the_finished_one_is_left_alone(tmp_path: Path) -> None:
@@ -343,6 +341,23 @@ def test_of_two_problems_the_finished_one_is_left_alone(tmp_path: Path) -> None:
     assert "d.h5 is whole already" in done.stderr
     assert (tmp_path / "d.h5").read_bytes() == first
     assert (tmp_path / "d-2.h5").read_bytes() == second
+
+
+def test_what_stands_beyond_the_interrupted_problem_is_not_taken_for_done(tmp_path: Path) -> None:
+    longer = PROGRAM.replace("     10", "     90")
+    (tmp_path / "d.inp").write_text(small(longer, stop=False) + small(longer))
+    problem = prepare((tmp_path / "d.inp").read_text()).problems[0]
+    with pytest.raises(StoppedError):
+        stop_at_once(problem, tmp_path / "d.h5")
+    (tmp_path / "d-2.h5").write_text("of last week")
+    refused = fecm_in(tmp_path, "run", "d.inp", "--resume")
+    assert refused.returncode == 2
+    assert "d-2.h5 exists already; --overwrite replaces it" in refused.stderr
+    assert (tmp_path / "d-2.h5").read_text() == "of last week"
+    done = fecm_in(tmp_path, "run", "d.inp", "--resume", "--overwrite")
+    assert done.returncode == 0
+    assert "d.h5 goes on behind step" in done.stderr
+    assert (tmp_path / "d-2.h5").read_bytes() == (tmp_path / "d.h5").read_bytes()
 
 
 # Faults ------------------------------------------------------------------------------------------
@@ -457,7 +472,7 @@ def test_a_run_that_passes_its_energy_limit_exits_1_and_leaves_no_file(tmp_path:
 
 def test_the_listings_rigid_target_is_warned_of_and_not_judged() -> None:
     problem = prepare(LONG, "listing").problems[0]
-    simulation = simulate(problem, active_slips("listing"), MemorySink())
+    simulation = simulate(problem, MemorySink(), Choices(active_slips("listing")))
     assert len([note for note in simulation.notes if "slips are on: it is not judged" in note]) == 1
-    sound = simulate(prepare(LONG).problems[0], (), MemorySink())
+    sound = simulate(prepare(LONG).problems[0], MemorySink())
     assert sound.notes == []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -243,7 +245,7 @@ def test_dt_0_takes_nine_tenths_of_the_critical_time_step_and_says_so() -> None:
     assert prepare(text).errors() == []
     problem = prepare(text).problems[0]
     sink = MemorySink()
-    simulation = simulate(problem, frozenset(), sink)
+    simulation = simulate(problem, sink)
     critical = simulation.setup.plate.critical_time_step()
     assert simulation.dt == pytest.approx(0.9 * critical, rel=5e-3)
     assert sink.arrays["history/time"][0] == simulation.dt
@@ -256,3 +258,19 @@ def test_the_sparse_solver_gives_the_same_history_to_rounding() -> None:
     assert isinstance(auto, Result)
     assert isinstance(csr, Result)
     np.testing.assert_allclose(csr.force, auto.force, rtol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("choice", "told"),
+    [
+        ({"solver": "dense"}, "unknown solver 'dense'; known are auto, csr"),
+        ({"threads": -1}, "threads is -1; it must be 0 or more"),
+        ({"energy_limit": 0.0}, "energy_limit is 0; it must be positive"),
+        ({"energy_limit": float("nan")}, "energy_limit is nan; it must be positive"),
+        ({"rod_mass": "none"}, "unknown rod mass 'none'"),
+        ({"slips": ("denser",)}, "denser"),
+    ],
+)
+def test_a_choice_that_there_is_not_is_refused(choice: dict[str, Any], told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        fecm.run(small(), **choice)

@@ -76,7 +76,7 @@ def test_a_plates_displacement_is_the_sum_of_its_impulse_responses() -> None:
     data = DATA_CARDS.replace("    2  90. ", "    2  30. ").replace("   13    3", "    8    3")
     corner = MESH[: MESH.index("BOUN")] + "BOUN\n    1    0    1    1    1    1    1\n\n"
     deck = model(small(mesh=corner, data=data))
-    motion = set_up(deck, generate(deck), frozenset(), moves_only=True).motion
+    motion = set_up(deck, generate(deck), moves_only=True).motion
     row, dt, steps = motion.row(7, 2), 2e-7, 300
     force = np.random.default_rng(5).standard_normal(steps)
     state, direct = motion.start(), np.empty(steps)

@@ -6,12 +6,12 @@ import contextlib
 import shutil
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from fecm.choices import ENERGY_LIMIT, Choices
 from fecm.cli.common import (
     DECK_PATH,
     FILE_PATH,
@@ -34,7 +34,7 @@ from fecm.solvers import AUTO, SOLVERS
 if TYPE_CHECKING:
     from click._termui_impl import ProgressBar
 
-    from fecm.api import Prepared
+    from fecm.check import Checked
     from fecm.checkpoint import Checkpointer
     from fecm.simulation import Simulation
 
@@ -76,7 +76,7 @@ if TYPE_CHECKING:
               help="Keep a checkpoint beside the output, written every so often.")  # fmt: skip
 @click.option("--resume", is_flag=True,
               help="Go on from the checkpoint that an interrupted run has left.")  # fmt: skip
-@click.option("--energy-limit", type=POSITIVE, default=0.1,
+@click.option("--energy-limit", type=POSITIVE, default=ENERGY_LIMIT,
               show_default=True, metavar="PART",
               help="Error of the energy balance, as a part of what was given, that ends a run "
                    "without slips.")  # fmt: skip
@@ -99,7 +99,10 @@ def run(
     resume: bool,
     rod_mass: str,
     rod_integrator: str,
-    **options: Any,
+    solver: str,
+    threads: int,
+    every: float | None,
+    energy_limit: float,
 ) -> None:
     """Run every problem in DECK and write its result.
 
@@ -120,43 +123,37 @@ def run(
     first = output or Path(f"{deck.stem}.h5")
     paths = [numbered(first, n) for n in range(1, len(prepared.problems) + 1)]
     prints = [None if printed is None else numbered(printed, n + 1) for n in range(len(paths))]
-    check_outputs([*paths, *(p for p in prints if p is not None)], overwrite or resume)
-    left = [path for path in paths if checkpoint_of(path).exists()]
-    if resume and not left:
+    check_outputs([p for p in (*paths, *prints) if p is not None], overwrite=True)
+    left = next((n for n, path in enumerate(paths) if checkpoint_of(path).exists()), None)
+    if resume and left is None:
         raise Refused(f"there is no checkpoint {checkpoint_of(paths[0])} to go on from")
-    if left and not (resume or overwrite):
+    if left is not None and not (resume or overwrite):
         raise Refused(
-            f"{checkpoint_of(left[0])} is what an interrupted run has left: --resume goes on from "
-            "it, --overwrite begins anew"
+            f"{checkpoint_of(paths[left])} is what an interrupted run has left: --resume goes on "
+            "from it, --overwrite begins anew"
         )
-    choices = Choices(active, RodMethod(rod_mass, rod_integrator), **options)
+    # The interrupted run had got this far; what stands beyond is not its own.
+    own = left + 1 if resume and left is not None else 0
+    check_outputs([p for p in (*paths[own:], *prints[own:]) if p is not None], overwrite)
+    choices = Choices(
+        active, solver, threads, RodMethod(rod_mass, rod_integrator), energy_limit
+    )  # fmt: skip
     for number, path in enumerate(paths):
         if number:
             click.echo()
-        if resume and path not in left and path.exists():
+        if number < own - 1 and path.exists():
             click.echo(f"fecm: note: {path} is whole already", err=True)
             continue
-        _run_one(prepared, number, path, prints[number], choices, resumes=resume and path in left)
-
-
-@dataclass(frozen=True)
-class Choices:
-    """What can be chosen about a run; see the options."""
-
-    slips: frozenset[str]
-    method: RodMethod
-    solver: str
-    threads: int
-    every: float | None
-    energy_limit: float
+        _run_one(prepared.problems[number], path, prints[number], choices, every,
+                 resumes=number == own - 1)  # fmt: skip
 
 
 def _run_one(
-    prepared: Prepared,
-    number: int,
+    problem: Checked,
     path: Path,
     printed: Path | None,
     choices: Choices,
+    every: float | None,
     *,
     resumes: bool,
 ) -> None:
@@ -172,7 +169,6 @@ def _run_one(
     from fecm.results.summary import summary
     from fecm.simulation import Simulation
 
-    problem = prepared.problems[number]
     _check_room(path, output_bytes(problem.deck, tally(problem.program)))
     check_memory(problem, solver=choices.solver)
     clear_stale(path, checkpoint_of(path), *([] if printed is None else [printed]))
@@ -184,9 +180,8 @@ def _run_one(
         printer = Printer() if printed is None else Printer(stack.enter_context(writing(printed)))
         advance = stack.enter_context(_progress(tally(problem.program).steps))
         simulation = Simulation(
-            problem, choices.slips, journal, advance, printer, choices.solver, choices.threads,
-            choices.method, choices.energy_limit, _Look(checkpointer, choices.every),
-        )  # fmt: skip
+            problem, journal, choices, advance, printer, _Look(checkpointer, every)
+        )
         if resumes:
             checkpointer.restore(simulation)
             step = simulation.plate.step
@@ -195,7 +190,7 @@ def _run_one(
     checkpointer.clear()
     for note in simulation.notes:
         click.echo(f"fecm: note: {note}", err=True)
-    click.echo(problem.deck.title or prepared.source)
+    click.echo(problem.deck.title or "(no title)")
     for line in summary(load(path)):
         click.echo(f"  {line}")
     click.echo(f"  result            {path}")

@@ -198,7 +198,7 @@ def _run_in_full(made: Plan, fulls: dict[int, Path]) -> None:
             if errors := prepared.errors(force=True):
                 raise CasesError(errors[0].message)
             with file_writer.writing(path) as sink:
-                simulate(prepared.problems[0], (), sink)
+                simulate(prepared.problems[0], sink)
         except (CasesError, ArithmeticError) as error:
             click.echo(f"fecm: note: case {case} was not run in full: {error}", err=True)
             continue

@@ -129,7 +129,7 @@ def _time_step(checked: Checked, critical: Any) -> float:
 
 def _together(numbers: list[int], decks: list[Deck], checked: Checked) -> Outcome:
     """Run cases that share a plate, by its response to a unit force."""
-    setup = set_up(checked.deck, checked.mesh, frozenset(), moves_only=True)
+    setup = set_up(checked.deck, checked.mesh, moves_only=True)
     if setup.impact is None:
         raise ValueError("nothing hits in this deck")
     steps = estimate(checked.program).steps
@@ -230,7 +230,7 @@ def _alone(number: int, checked: Checked) -> Outcome:
     """Run one case as a whole, without storing fields."""
     sink = _HistorySink()
     try:
-        simulation = simulate(replace(checked, program=_quiet(checked.program)), (), sink)
+        simulation = simulate(replace(checked, program=_quiet(checked.program)), sink)
     except (DivergenceError, ArithmeticError) as error:
         return Outcome.failed([number], [str(error)])
     force, times = sink.arrays["history/force"], sink.arrays["history/time"]
