@@ -72,6 +72,7 @@ class Simulation:
     printer: Printer = field(default_factory=Printer)
     look: Look = lambda simulation: None
     notes: list[str] = field(default_factory=list, init=False)
+    slips: frozenset[str] = field(init=False)
     setup: Setup = field(init=False)
     plate: PlateState = field(init=False)
     impact: ImpactState | None = field(default=None, init=False)
@@ -90,6 +91,7 @@ class Simulation:
 
     def __post_init__(self) -> None:
         deck, mesh, program = self.checked.deck, self.checked.mesh, self.checked.program
+        self.slips = self.choices.slips
         with np.errstate(all="ignore"):
             self.setup = set_up(
                 deck, mesh, self.choices, hits=hits(program), moves_only=moves_only(program)
@@ -115,11 +117,6 @@ class Simulation:
             x, y = self.setup.stress_points.places(mesh.coordinates)
             self._recorder.constant("stresses/x", x)
             self._recorder.constant("stresses/y", y)
-
-    @property
-    def slips(self) -> frozenset[str]:
-        """Slips that are on."""
-        return self.choices.slips
 
     def _location(self) -> str:
         at_nodes = self.checked.deck.need(Material).integration.points < 0

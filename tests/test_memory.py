@@ -77,14 +77,14 @@ def test_the_estimate_bounds_what_is_measured(
 def test_a_run_that_needs_more_than_is_free_is_refused_with_both_numbers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fecm.check.memory, "available", lambda: 10 * MEGABYTE)
+    monkeypatch.setattr(fecm.check.memory, "available", lambda: 2 * MEGABYTE)
     deck, output = tmp_path / "small.inp", tmp_path / "small.h5"
     deck.write_text(small().replace("DISP          5", "DISP"))
     done = call("run", deck, "-o", output)
     assert (done.exit_code, done.stdout) == (2, "")
     told = done.stderr.splitlines()[-1]
     assert told.startswith("fecm: error: the run takes about ")
-    assert "MB of memory, and 10 MB are free" in told
+    assert "MB of memory, and 2 MB are free" in told
     assert not output.exists()
 
 

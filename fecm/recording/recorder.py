@@ -20,9 +20,6 @@ Floats = NDArray[np.float64]
 
 BUFFERED = ("tape3", "tape8", "stresses", "reactions", "modes")
 
-# Elements whose strains are found at once: several rows of a small mesh, which costs less a row.
-AT_ONCE = 1024
-
 
 class Recorder:
     """Stores what a run gives.
@@ -58,8 +55,6 @@ class Recorder:
         )
         self._room = self._rows_to_come(sizes, contact_at_every_step)
         self._buffers: dict[str, RowBuffer] = {}
-        self._fields: list[tuple[int, float, Floats]] = []
-        self._at_once = max(1, AT_ONCE // len(setup.plate.mesh.elements))
         self._create()
         self._store_plate(setup.plate)
 
@@ -146,29 +141,12 @@ class Recorder:
 
     def strains(self, step: int, time: float, field: Floats) -> None:
         """Store a row of tape8: strains of a field that belongs to `time`."""
-        self._fields.append((step, time, field))
-        if len(self._fields) == self._at_once:
-            self._flush_strains()
-
-    def _flush_strains(self) -> None:
-        """Find the strains of the fields that were held back."""
-        if not self._fields:
-            return
-        steps, times, fields = zip(*self._fields, strict=True)
-        values = self._setup.strains.evaluate(np.array(fields))
-        columns = {"step": np.array(steps), "time": np.array(times)}
-        self._buffers["tape8"].put_all(columns | dict(zip(STRAINS, values, strict=True)))
-        self._fields.clear()
+        values = self._setup.strains.evaluate(field)
+        self.row("tape8", step, time, dict(zip(STRAINS, values, strict=True)))
 
     def state(self) -> dict[str, Any]:
         """What is held back."""
-        steps, times, fields = zip(*self._fields, strict=True) if self._fields else ((), (), ())
-        state: dict[str, Any] = {
-            "fields/step": list(steps),
-            "fields/time": list(times),
-            "fields/field": np.array(fields),
-            **{f"steps/{name}": value for name, value in self.steps.state().items()},
-        }
+        state = {f"steps/{name}": value for name, value in self.steps.state().items()}
         for group, buffer in self._buffers.items():
             state |= {f"rows/{group}/{name}": value for name, value in buffer.state().items()}
         return state
@@ -179,8 +157,6 @@ class Recorder:
         def part(prefix: str) -> dict[str, Any]:
             return {n.removeprefix(prefix): v for n, v in state.items() if n.startswith(prefix)}
 
-        clock = zip(state["fields/step"], state["fields/time"], strict=True)
-        self._fields = [(*when, f) for when, f in zip(clock, state["fields/field"], strict=True)]
         self.steps.restore(part("steps/"))
         for group, buffer in self._buffers.items():
             buffer.restore(part(f"rows/{group}/"))
@@ -194,7 +170,6 @@ class Recorder:
             If the energy has grown without bound.
         """
         self.steps.flush()
-        self._flush_strains()
         stored = dict(self.steps.rows)
         for group, buffer in self._buffers.items():
             buffer.flush()

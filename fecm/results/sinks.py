@@ -92,7 +92,7 @@ class RowBuffer:
     """
 
     # Bytes that a block may hold: enough for few writes, little enough to stay unnoticed.
-    BYTES = 4_000_000
+    BYTES = 1_000_000
 
     def __init__(
         self, sink: Sink, datasets: Sequence[Dataset], shapes: Sequence[tuple[int, ...]]
@@ -131,11 +131,6 @@ class RowBuffer:
         self._filled += 1
         if self._filled == self._room:
             self.flush()
-
-    def put_all(self, columns: Mapping[str, Array]) -> None:
-        """Add rows; `columns` has an array of them for every dataset."""
-        for row in range(len(next(iter(columns.values())))):
-            self.put({name: values[row] for name, values in columns.items()})
 
     def flush(self) -> None:
         """Hand over what was gathered."""
