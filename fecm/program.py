@@ -239,6 +239,7 @@ STEPS = {"RODP", "EXCD"}
 
 # Given the pass; whether to leave the innermost loop.
 Act = Callable[[int], "bool | None"]
+Bind = Callable[[Macro], Act]
 
 
 class EndedError(Exception):
@@ -252,8 +253,6 @@ class Course:
     ----------
     body : tuple
         The program.
-    bind : callable
-        Gives what a macro does.
 
     Attributes
     ----------
@@ -262,22 +261,30 @@ class Course:
         in which pass.
     """
 
-    def __init__(self, body: Body, bind: Callable[[Macro], Act]) -> None:
+    def __init__(self, body: Body) -> None:
         self.place: list[tuple[int, int]] = []
-        self._bind = bind
+        self._body = body
         self._goal: list[tuple[int, int]] = []
-        self._carry_out = self._bound(body, 0)
 
-    def run(self, after: Sequence[tuple[int, int]] = ()) -> None:
-        """Carry the program out, from its begin or from behind the macro at a place."""
+    def run(self, bind: Bind, after: Sequence[tuple[int, int]] = ()) -> None:
+        """Carry the program out.
+
+        Parameters
+        ----------
+        bind : callable
+            Gives what a macro does.  It is not kept: whoever carries out a program may hold on to
+            its course without holding on to itself.
+        after : sequence of (int, int)
+            Begin behind the macro at this place.
+        """
         self._goal = [(int(index), int(current)) for index, current in after]
         with contextlib.suppress(EndedError):
-            self._carry_out(1)
+            self._bound(self._body, bind, 0)(1)
 
-    def _bound(self, body: Body, depth: int) -> Act:
+    def _bound(self, body: Body, bind: Bind, depth: int) -> Act:
         """Bind a program's macros to what they do, so that a pass only has to call them."""
         acts = [
-            self._repeated(item, depth + 1) if isinstance(item, Loop) else self._bind(item)
+            self._repeated(item, bind, depth + 1) if isinstance(item, Loop) else bind(item)
             for item in body
         ]
         self.place += [(0, 0)] * (depth + 1 - len(self.place))
@@ -292,9 +299,9 @@ class Course:
 
         return carry_out
 
-    def _repeated(self, loop: Loop, depth: int) -> Act:
+    def _repeated(self, loop: Loop, bind: Bind, depth: int) -> Act:
         """Bind a loop, whose body is at a depth."""
-        carry_out = self._bound(loop.body, depth)
+        carry_out = self._bound(loop.body, bind, depth)
 
         def repeat(_: int) -> None:
             first = self._goal[depth][1] if self._goal else 1
@@ -411,5 +418,5 @@ def tally(body: Body) -> Tally:
 
         return act
 
-    Course(body, bind).run()
+    Course(body).run(bind)
     return Tally(counted.macros, counted.steps, rows, counted.passes)

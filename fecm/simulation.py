@@ -99,7 +99,7 @@ class Simulation:
         self.plate = self.setup.motion.start()
         if self.setup.impact is not None:
             self.impact = self.setup.impact.start(self.plate)
-        self.course = Course(program, self._bind)
+        self.course = Course(program)
         self._sizes = tally(program)
         self._tables = list(deck.tables)
         self._tick = max(1, min(64, 100_000 // self.setup.plate.neq))
@@ -161,7 +161,7 @@ class Simulation:
             self.printer.problem(self.checked.deck, self.checked.mesh, self.setup.plate)
         try:
             with np.errstate(all="ignore"):  # an overflow is found, and said better, below
-                self.course.run(self._place)
+                self.course.run(self._bind, self._place)
                 self._recorder.finish()
             self._footer()
             self._judge()

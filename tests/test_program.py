@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from typing import Any
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 
 import fecm
 from fecm.api import prepare
+from fecm.choices import Choices
 from fecm.deck import Findings
 from fecm.deck.records import Macro
 from fecm.program import Act, Course, compile_program, tally
@@ -42,7 +45,7 @@ def compiled(*cards: str) -> tuple[list[str], list[str]]:
     def bind(macro: Macro) -> Act:
         return lambda _: words.append(macro.word)
 
-    Course(compile_program(program(*cards), findings), bind).run()
+    Course(compile_program(program(*cards), findings)).run(bind)
     return [f.code for f in findings], words
 
 
@@ -274,3 +277,23 @@ def test_the_sparse_solver_gives_the_same_history_to_rounding() -> None:
 def test_a_choice_that_there_is_not_is_refused(choice: dict[str, Any], told: str) -> None:
     with pytest.raises(ValueError, match=told):
         fecm.run(small(), **choice)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_finished_run_goes_with_its_plate_at_once(threads: int) -> None:
+    # Thousands of runs in one process would fill its memory before cycles are looked for.
+    gc.collect()
+    gc.disable()
+    try:
+        simulation = simulate(prepare(small()).problems[0], MemorySink(), Choices(threads=threads))
+        parts = [
+            simulation,
+            simulation.setup.motion,
+            simulation.setup.plate,
+            simulation.setup.impact,
+        ]
+        gone = [weakref.ref(part) for part in parts]
+        del simulation, parts
+        assert [one() for one in gone] == [None] * 4
+    finally:
+        gc.enable()
