@@ -15,17 +15,20 @@ import fecm.memory
 from fecm.api import prepare
 from fecm.check.memory import needed_bytes
 from fecm.memory import NotEnoughMemoryError, available
+from fecm.sweeps.memory import ADVANCED, KEPT
 from tests.calls import assert_unusable, call
 from tests.decks import small
 
 MEGABYTE = 10**6
 
-PEAK = """
+OWN = """
 import fecm
 from pathlib import Path
 def peak():  # getrusage would tell that of the process before exec
     status = Path("/proc/self/status").read_text()
     return 1024 * int(status.partition("VmHWM:")[2].split()[0])
+"""
+PEAK = """
 fecm.run({small!r}, output="first.h5")
 fecm.run({static!r}, output="second.h5")
 before = peak()
@@ -65,7 +68,7 @@ def test_the_estimate_bounds_what_is_measured(
     deck = plate(tmp_path, 40, macros, *options)
     problem = prepare(deck).problems[0]
     head = small().partition("MACR")[0]
-    program = PEAK.format(small=small(), static=f"{head}MACR\nLMAS\nEIGE\nEND\nSTOP\n")
+    program = OWN + PEAK.format(small=small(), static=f"{head}MACR\nLMAS\nEIGE\nEND\nSTOP\n")
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", program], cwd=tmp_path, capture_output=True,
         text=True, check=True,
@@ -96,6 +99,53 @@ def test_a_result_in_memory_counts_with_all_its_rows(monkeypatch: pytest.MonkeyP
     assert needed_bytes(problem, in_memory=True) > 99999 * 25 * 6 * 8
     with pytest.raises(NotEnoughMemoryError, match=r"takes about 1\d\d MB .* store fewer rows"):
         fecm.run(many)
+
+
+SWEPT = """
+deck = {deck!r}
+fecm.sweep(deck, {{"velocity": [9.0, 99.0]}})
+base = peak()
+fecm.sweep(deck, {{"velocity": [50.0 + 0.1 * n for n in range({cases})]}}, history={history})
+print(peak() - base)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="Linux tells the peak")
+@pytest.mark.parametrize(("cases", "history"), [(700, False), (1500, True)])
+def test_the_estimate_of_a_sweep_bounds_what_is_measured(cases: int, history: bool) -> None:
+    deck = small("LMAS\nDT        .5E-6\nLOOP       3000\nTIME\nRODP\nNEXT\n")
+    program = OWN + SWEPT.format(deck=deck, cases=cases, history=history)
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    measured = int(done.stdout)
+    estimated = 3000 * (ADVANCED * min(cases, 1024) + (KEPT * cases if history else 0))
+    assert measured <= estimated <= 2 * measured
+
+
+@pytest.mark.parametrize(
+    ("options", "free", "remedy"),
+    [((), 50, "fewer steps"), (("--workers", "3"), 500, "fewer workers"),
+     (("--history",), 500, "none of their histories")],
+)  # fmt: skip
+def test_a_sweep_that_needs_more_than_is_free_is_refused_with_both_numbers(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    options: tuple[str, ...],
+    free: int,
+    remedy: str,
+) -> None:
+    monkeypatch.setattr(fecm.sweeps.memory, "available", lambda: free * MEGABYTE)
+    deck = tmp_path / "small.inp"
+    deck.write_text(small().replace("LOOP         10", "LOOP       9000"))
+    vary = ("--vary", "velocity=50:100:3000", "-o", tmp_path / "s.h5")
+    done = call("sweep", deck, *vary, *options)
+    assert (done.exit_code, done.stdout) == (2, "")
+    told = done.stderr.splitlines()[-1]
+    assert told.startswith("fecm: error: the sweep takes about ")
+    assert f"MB of memory, and {free} MB are free; take " in told
+    assert remedy in told
+    assert [path.name for path in tmp_path.iterdir()] == ["small.inp"]
 
 
 def test_matrices_that_do_not_fit_are_refused(

@@ -46,7 +46,9 @@ STEP = 80
 STATIC = {"TANG", "EIGE"}
 
 
-def needed_bytes(checked: Checked, *, solver: str = AUTO, in_memory: bool = False) -> int:
+def needed_bytes(
+    checked: Checked, *, solver: str = AUTO, in_memory: bool = False, exact: bool = True
+) -> int:
     """Memory that a run takes at the most, about.
 
     Parameters
@@ -57,31 +59,9 @@ def needed_bytes(checked: Checked, *, solver: str = AUTO, in_memory: bool = Fals
         How K u is had.
     in_memory : bool
         Whether the result is kept in memory instead of being written to a file.
+    exact : bool
+        Count the elements that are congruent to others, instead of taking each for one of its kind.
     """
-    return _whole(checked, solver, in_memory, exact=True)
-
-
-def check_memory(checked: Checked, *, solver: str = AUTO, in_memory: bool = False) -> None:
-    """Refuse a run that takes more memory than is free.
-
-    Raises
-    ------
-    NotEnoughMemoryError
-        With both numbers.
-    """
-    free = available()
-    if free is None or _whole(checked, solver, in_memory, exact=False) <= free:
-        return  # the congruent elements need not be counted
-    needed = _whole(checked, solver, in_memory, exact=True)
-    if needed > free:
-        remedy = "write it to a file, or store fewer rows" if in_memory else "take a coarser mesh"
-        raise NotEnoughMemoryError(
-            f"the run takes about {said(needed)} of memory, and {said(free)} are free; {remedy}"
-        )
-
-
-def _whole(checked: Checked, solver: str, in_memory: bool, *, exact: bool) -> int:
-    """Sum of all parts; without `exact` as if no two elements were congruent."""
     words = {macro.word for macro in flat(checked.program)}
     sizes = tally(checked.program)
     output = output_bytes(checked.deck, sizes)
@@ -97,6 +77,28 @@ def _whole(checked: Checked, solver: str, in_memory: bool, *, exact: bool) -> in
         return total + output
     held = output if "CONV" in words else 0  # rows that never came are cut off in memory
     return total + held + STEP * sizes.steps + 5 * RowBuffer.BYTES
+
+
+def check_memory(checked: Checked, *, solver: str = AUTO, in_memory: bool = False) -> None:
+    """Refuse a run that takes more memory than is free.
+
+    Raises
+    ------
+    NotEnoughMemoryError
+        With both numbers.
+    """
+    free = available()
+    if free is None:
+        return
+    needed = 0
+    for exact in (False, True):  # the congruent elements need not always be counted
+        needed = needed_bytes(checked, solver=solver, in_memory=in_memory, exact=exact)
+        if needed <= free:
+            return
+    remedy = "write it to a file, or store fewer rows" if in_memory else "take a coarser mesh"
+    raise NotEnoughMemoryError(
+        f"the run takes about {said(needed)} of memory, and {said(free)} are free; {remedy}"
+    )
 
 
 def _entries(checked: Checked) -> int:

@@ -67,6 +67,7 @@ def sweep(
     the plate.  An interrupted sweep goes on where it was when the same command is given again.
     """
     from fecm.sweeps.cases import CasesError
+    from fecm.sweeps.memory import check_memory
     from fecm.sweeps.result import save
     from fecm.sweeps.summary import summary
     from fecm.sweeps.tasks import plan
@@ -79,6 +80,7 @@ def sweep(
         check_outputs([path, *fulls.values()], overwrite)
         problem = _problem(deck)
         made = plan(problem, cases, history=history)
+        check_memory(problem, made, 0 if scheduler is not None else workers)
         result = _carry_out(problem, made, path, workers, scheduler, overwrite=overwrite)
     except CasesError as error:
         raise Refused(str(error)) from None

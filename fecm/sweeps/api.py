@@ -11,6 +11,7 @@ from fecm.check import Checked
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
 from fecm.sweeps.cases import Case, CasesError, checked, grid
+from fecm.sweeps.memory import check_memory
 from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.result import SweepResult, result_of, save
 from fecm.sweeps.run import Task, joined
@@ -64,6 +65,11 @@ def carry_out(
         Told of each task as it is finished, and of those that were before.
     idle : callable
         Called now and then.
+
+    Raises
+    ------
+    SchedulerError
+        If the scheduler can't be used.
     """
     outcomes: list[Outcome] = []
     left: list[Task] = []
@@ -133,6 +139,8 @@ def sweep(
         If the cases can't be meant.
     DeckError
         If the deck has errors.
+    NotEnoughMemoryError
+        If the sweep takes more memory than is free: a MemoryError.
     SchedulerError
         If the scheduler can't be used.
     OSError
@@ -154,9 +162,9 @@ def sweep(
     else:
         made = checked(cases or ())
     problem = problem_of(deck)
-    result = carry_out(
-        problem, plan(problem, made, history=history), workers=workers, scheduler=scheduler
-    )
+    planned = plan(problem, made, history=history)
+    check_memory(problem, planned, 0 if scheduler is not None else workers)
+    result = carry_out(problem, planned, workers=workers, scheduler=scheduler)
     if output is not None:
         save(result, Path(output))
     return result

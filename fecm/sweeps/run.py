@@ -230,7 +230,7 @@ def _alone(number: int, checked: Checked) -> Outcome:
     """Run one case as a whole, without storing fields."""
     sink = _HistorySink()
     try:
-        simulation = simulate(replace(checked, program=_quiet(checked.program)), sink)
+        simulation = simulate(replace(checked, program=quiet(checked.program)), sink)
     except (DivergenceError, ArithmeticError) as error:
         return Outcome.failed([number], [str(error)])
     force, times = sink.arrays["history/force"], sink.arrays["history/time"]
@@ -244,17 +244,17 @@ def _alone(number: int, checked: Checked) -> Outcome:
     return Outcome([number], summary, [FINE], np.array([simulation.dt]), steps, force[None])
 
 
-def _quiet(body: Body) -> Body:
+def quiet(body: Body) -> Body:
     """A program that stores no fields."""
-    quiet: list[Any] = []
+    kept: list[Any] = []
     for item in body:
         if isinstance(item, Loop):
-            quiet.append(replace(item, body=_quiet(item.body)))
+            kept.append(replace(item, body=quiet(item.body)))
         elif item.word == "RODP":
-            quiet.append(replace(item, value=1e9))
+            kept.append(replace(item, value=1e9))
         elif item.word not in ("DISP", "STRE", "REAC", "EIGE"):
-            quiet.append(item)
-    return tuple(quiet)
+            kept.append(item)
+    return tuple(kept)
 
 
 def joined(parts: list[Outcome]) -> Outcome:
