@@ -401,18 +401,18 @@ def test_a_sweep_that_is_interrupted_from_outside_ends_in_the_same_file(tmp_path
     deck = tmp_path / "plate.inp"
     deck.write_text(small(STEPS.replace("LOOP        400", "LOOP       4000")))
     command = [sys.executable, "-m", "fecm", "sweep", "plate.inp", "--vary",
-               "layup=" + ",".join(LAYUPS[:12]), "-o", "s.h5"]  # fmt: skip
+               "layup=" + ",".join(LAYUPS[:6]), "-o", "s.h5"]  # fmt: skip
     process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE)
     folder = tmp_path / ".s.h5.parts"
     until = time.monotonic() + 60.0
-    while len(list(folder.glob("task-*.npz"))) < 3 and time.monotonic() < until:
+    while not list(folder.glob("task-*.npz")) and time.monotonic() < until:
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)
     assert process.returncode == 130
     assert b"goes on where this sweep was" in said
     assert not (tmp_path / "s.h5").exists()
-    assert 3 <= len(list(folder.glob("task-*.npz"))) < 12
+    assert 1 <= len(list(folder.glob("task-*.npz"))) < 6
     subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
     assert not folder.exists()
     subprocess.run([*command[:-1], "t.h5"], cwd=tmp_path, check=True, capture_output=True)
