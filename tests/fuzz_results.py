@@ -53,8 +53,11 @@ COMMANDS = {
 SWEEP = "sweep"
 USUAL = ("info", "diff")
 OF_A_SWEEP = {
-    "info": ["{}"], "diff": ["{sound}", "{}"], "plot map": ["{}", "-o", "{made}"]
-}  # fmt: skip
+    "info": ["{}"],
+    "diff": ["{sound}", "{}"],
+    "plot map": ["{}", "-o", "{made}"],
+    "export csv": ["{}", "--to", "csv", "--dataset", "history", "-o", "{made}/x.csv"],
+}
 
 
 def mutate(source: Path, target: Path, random: random.Random) -> str:
@@ -251,7 +254,7 @@ def work(first: int, count: int, step: int, commands: Sequence[str]) -> Tally:
         sound = folder / (f"{SWEEP}.h5" if "plot map" in commands else "run.h5")
         if sound.stem == SWEEP:
             sweep(small(), {"velocity": [50.0, 100.0, 150.0], "alpha_p": [0.0005, 0.0007]},
-                  output=sound)  # fmt: skip
+                  history=True, output=sound)  # fmt: skip
         else:
             run(small(), output=sound)
         for seed in range(first, first + count, step):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import shutil
 from collections.abc import Callable
@@ -131,3 +133,65 @@ def test_a_sweep_and_a_run_or_tapes_can_not_be_compared(swept: Path, tmp_path: P
             done = call("diff", *pair)
             assert_unusable(done)
             assert "the result of a sweep" in done.stderr
+
+
+def test_cases_are_exported_a_row_each_with_their_texts(swept: Path, tmp_path: Path) -> None:
+    target = tmp_path / "cases.csv"
+    done = call("export", swept, "--to", "csv", "-o", target)
+    assert (done.exit_code, done.stdout) == (0, f"{target}\n")
+    with target.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    found = fecm.load_sweep(swept)
+    assert [int(row["case"]) for row in rows] == list(range(6))
+    assert [float(row["velocity"]) for row in rows] == found["velocity"].tolist()
+    assert [row["layup"] for row in rows] == found["layup"].tolist()
+    assert [row["status"] for row in rows] == found["status"].tolist()
+    np.testing.assert_array_equal([float(row["impulse"]) for row in rows], found["impulse"])
+    assert call("export", swept, "--to", "csv", "-o", "-").stdout == target.read_text()
+
+
+def test_forces_of_the_cases_that_were_run_are_exported_a_row_a_step(swept: Path) -> None:
+    done = call("export", swept, "--to", "csv", "--dataset", "history", "-o", "-")
+    rows = list(csv.DictReader(io.StringIO(done.stdout)))
+    found = fecm.load_sweep(swept)
+    assert found.force is not None
+    assert len(rows) == int(found.steps[found.fine].sum()) == 3 * found.force.shape[1]
+    assert sorted({int(row["case"]) for row in rows}) == np.flatnonzero(found.fine).tolist()
+    assert max(float(row["force"]) for row in rows) == np.nanmax(found["peak_force"])
+    last = rows[-1]
+    assert float(last["time"]) == pytest.approx(int(last["step"]) * found.dt[4], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--to", "vtkhdf"), "a sweep has no fields; --to csv writes its cases"),
+        (("--to", "csv", "--dataset", "tape3"), "the tables cases and history, not tape3"),
+    ],
+)
+def test_what_a_sweep_has_not_is_not_exported(
+    swept: Path, tmp_path: Path, options: tuple[str, ...], told: str
+) -> None:
+    done = call("export", swept, *options, "-o", tmp_path / "x")
+    assert_unusable(done)
+    assert told in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_forces_that_were_not_kept_are_not_exported(tmp_path: Path) -> None:
+    path = tmp_path / "s.h5"
+    fecm.sweep(small(), {"velocity": [50.0]}, output=path)
+    done = call("export", path, "--to", "csv", "--dataset", "history", "-o", "-")
+    assert_unusable(done)
+    assert "run it again with --history" in done.stderr
+
+
+@pytest.mark.parametrize("steps", [-1, 10**6])
+def test_steps_that_there_are_not_end_in_one_line(
+    changed: Callable[[str, object], Path], steps: int
+) -> None:
+    bad = changed("history/steps", steps)
+    for command in (("info",), ("export", "--to", "csv", "-o", "-")):
+        done = call(*command, bad)
+        assert_unusable(done)
+        assert "history/steps counts other steps than there are" in done.stderr

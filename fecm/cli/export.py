@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from fecm.cli.apart import reads
 from fecm.cli.common import DECK_PATH, Refused, check_outputs
+
+if TYPE_CHECKING:
+    from fecm.results.file_reader import Contents
 
 STANDARD_OUTPUT = "-"
 
@@ -21,57 +25,73 @@ STANDARD_OUTPUT = "-"
               help="Where to write; - is standard output, for csv.  [default: RESULT's name with "
                    ".vtkhdf, or with -DATASET.csv, in this folder]")  # fmt: skip
 @click.option("--dataset", metavar="NAME",
-              help="What csv holds: a dataset as tape3/w, or a group.  [default: history]",
+              help="What csv holds: a dataset as tape3/w, or a group.  [default: history; cases of "
+                   "a sweep]",
               )  # fmt: skip
 @click.option("--overwrite", is_flag=True, help="Replace a file that exists.")
 @reads("result")
 def export(
     result: Path, target: str, output: Path | None, dataset: str | None, overwrite: bool
 ) -> None:
-    """Write RESULT in another program's format.
+    """Write RESULT, of a run or of a sweep, in another program's format.
 
     vtkhdf is one file with a time step for each row that DISP stored; csv is a table with a header
-    line.
+    line.  A sweep has the tables cases, a row a case, and with its forces kept history.
     """
-    name = (dataset or "history").strip("/")
-    if target == "vtkhdf":
-        if dataset is not None:
-            raise click.UsageError("--dataset is for --to csv; vtkhdf holds all fields")
-        if str(output) == STANDARD_OUTPUT:
-            raise click.UsageError("vtkhdf can't go to standard output")
-        path = output or Path(f"{result.stem}.vtkhdf")
-    else:
-        path = output or Path(f"{result.stem}-{name.replace('/', '-')}.csv")
+    if target == "vtkhdf" and dataset is not None:
+        raise click.UsageError("--dataset is for --to csv; vtkhdf holds all fields")
+    if target == "vtkhdf" and str(output) == STANDARD_OUTPUT:
+        raise click.UsageError("vtkhdf can't go to standard output")
+    from fecm.export import ExportError
+    from fecm.results.file_reader import read
+    from fecm.results.schema import FORMAT, SWEEP
+
+    contents = read(result, FORMAT, SWEEP)
+    name = (dataset or ("cases" if contents.form == SWEEP else "history")).strip("/")
+    ending = ".vtkhdf" if target == "vtkhdf" else f"-{name.replace('/', '-')}.csv"
+    path = output or Path(f"{result.stem}{ending}")
     if str(path) != STANDARD_OUTPUT:
         check_outputs([path], overwrite)
         if path.exists() and path.samefile(result):
             raise Refused(f"{path} is the result itself")
-    from fecm.export import ExportError
-
     try:
-        _write(result, target, path, name)
+        if target == "vtkhdf":
+            _write_fields(contents, path)
+        else:
+            _write_table(contents, name, path)
     except ExportError as error:
         raise Refused(f"{result}: {error}") from None
     if str(path) != STANDARD_OUTPUT:
         click.echo(path)
 
 
-def _write(source: Path, target: str, path: Path, name: str) -> None:
-    """Write one export."""
-    from fecm.results.result import load
+def _write_fields(contents: Contents, path: Path) -> None:
+    """Write the fields of a run for ParaView."""
+    from fecm.export import ExportError
+    from fecm.export.vtkhdf import write_vtkhdf
+    from fecm.results.result import result_of
+    from fecm.results.schema import SWEEP
 
-    result = load(source)
-    if target == "vtkhdf":
-        from fecm.export.vtkhdf import write_vtkhdf
+    if contents.form == SWEEP:
+        raise ExportError("a sweep has no fields; --to csv writes its cases")
+    result = result_of(contents)
+    write_vtkhdf(result, path, lambda text: click.echo(f"fecm: note: {text}", err=True))
 
-        write_vtkhdf(result, path, lambda text: click.echo(f"fecm: note: {text}", err=True))
-        return
-    from fecm.export.csv import table
-    from fecm.files import beside
 
-    lines = table(result, name).lines()
+def _write_table(contents: Contents, name: str, path: Path) -> None:
+    """Write a table of a run or of a sweep."""
+    from fecm.cli.common import writing
+    from fecm.export import csv, sweep_csv
+    from fecm.results.result import result_of
+    from fecm.results.schema import SWEEP
+    from fecm.sweeps.result import sweep_of
+
+    if contents.form == SWEEP:
+        lines = sweep_csv.lines(sweep_of(contents, history=name == sweep_csv.HISTORY), name)
+    else:
+        lines = csv.table(result_of(contents), name).lines()
     if str(path) == STANDARD_OUTPUT:
         sys.stdout.writelines(lines)
         return
-    with beside(path) as partial, partial.open("w", encoding="ascii", newline="\n") as file:
+    with writing(path) as file:
         file.writelines(lines)

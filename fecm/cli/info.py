@@ -61,7 +61,7 @@ def _of_sweep(contents: Contents) -> dict[str, Any]:
     from fecm.sweeps.result import sweep_of
     from fecm.sweeps.summary import summary
 
-    result = sweep_of(contents)
+    result = sweep_of(contents, history=False)
     failed = len(result) - int(result.fine.sum())
     return {"cases": len(result), "failed": failed, "summary": summary(result)}
 

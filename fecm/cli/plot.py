@@ -168,7 +168,7 @@ def _loaded(path: Path) -> Result | SweepResult:
     from fecm.sweeps.result import sweep_of
 
     contents = read(path, FORMAT, SWEEP)
-    return sweep_of(contents) if contents.form == SWEEP else result_of(contents)
+    return sweep_of(contents, history=False) if contents.form == SWEEP else result_of(contents)
 
 
 def _draw(

@@ -210,8 +210,14 @@ def load(path: Path) -> SweepResult:
     return sweep_of(read(path, SWEEP))
 
 
-def sweep_of(contents: Contents) -> SweepResult:
+def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     """A sweep's result, of what stands in its file.
+
+    Parameters
+    ----------
+    contents : Contents
+    history : bool
+        Read the forces as well, which may be many.
 
     Raises
     ------
@@ -232,16 +238,21 @@ def sweep_of(contents: Contents) -> SweepResult:
         raise ResultFileError(f"{path}: this result of a sweep is not whole")
     count = np.shape(arrays["history/dt"])[:1]
     rows = (*cases.values(), *summary.values(), arrays["history/dt"], arrays["history/steps"])
-    force = arrays.get("history/force")
+    shape = arrays.shapes.get("history/force")
     kinds = {name: summary[name].dtype.kind for name in SUMMARY}
     if (
         any(values.shape != count for values in rows)
-        or (force is not None and (force.ndim, force.shape[:1]) != (2, count))
+        or (shape is not None and (len(shape), shape[:1]) != (2, count))
         or not set(kinds.values()) <= set("fiu")
     ):
         raise ResultFileError(f"{path}: the cases of this result of a sweep are not all there")
+    steps = arrays["history/steps"]
+    most = np.inf if shape is None else shape[1]
+    if steps.dtype.kind not in "iu" or not ((steps >= 0) & (steps <= most)).all():
+        raise ResultFileError(f"{path}: history/steps counts other steps than there are")
     return SweepResult(
-        cases, summary, arrays["history/dt"], arrays["history/steps"], force,
+        cases, summary, arrays["history/dt"], steps,
+        arrays.get("history/force") if history else None,
         contents.texts.get("deck", ""), str(contents.attributes.get("title", "")),
         declared_units(contents.attributes),
     )  # fmt: skip
