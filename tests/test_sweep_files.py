@@ -143,6 +143,8 @@ def test_cases_are_exported_a_row_each_with_their_texts(swept: Path, tmp_path: P
         rows = list(csv.DictReader(file))
     found = fecm.load_sweep(swept)
     assert [int(row["case"]) for row in rows] == list(range(6))
+    assert list(rows[0])[:5] == ["case", "velocity", "layup", "peak_force", "time_of_peak"]
+    assert list(rows[0])[-3:] == ["dt", "steps", "status"]
     assert [float(row["velocity"]) for row in rows] == found["velocity"].tolist()
     assert [row["layup"] for row in rows] == found["layup"].tolist()
     assert [row["status"] for row in rows] == found["status"].tolist()

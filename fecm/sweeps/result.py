@@ -236,6 +236,7 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     missing = [name for name in (*SUMMARY, "status") if name not in summary]
     if missing or "history/dt" not in arrays or "history/steps" not in arrays:
         raise ResultFileError(f"{path}: this result of a sweep is not whole")
+    summary = {name: summary[name] for name in (*SUMMARY, "status")} | summary  # in their order
     count = np.shape(arrays["history/dt"])[:1]
     rows = (*cases.values(), *summary.values(), arrays["history/dt"], arrays["history/steps"])
     shape = arrays.shapes.get("history/force")
