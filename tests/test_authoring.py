@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -15,13 +14,13 @@ from fecm.api import prepare
 from fecm.authoring.grid import Grid, graded, lines, listed, uniform
 from fecm.authoring.layup import LayupError, parse_layup
 from fecm.authoring.materials import MATERIALS
-from fecm.cli import cli
 from fecm.deck import Deck
 from fecm.deck.formatting import format_deck
 from fecm.deck.model import Impact, Material, Projectile
 from fecm.deck.records import Control
 from fecm.mesh import generate
 from fecm.parts import build_projectile
+from tests.calls import Done, call
 from tests.decks import APPENDIX, LONG, small
 
 REPORT = [
@@ -38,9 +37,9 @@ PLATE = [
 ]  # fmt: skip
 
 
-def new(*options: str) -> Result:
+def new(*options: str) -> Done:
     """Run ``fecm new`` to standard output."""
-    return CliRunner().invoke(cli, ["new", "-", *options])
+    return call("new", "-", *options)
 
 
 @pytest.mark.parametrize(
@@ -143,10 +142,10 @@ def test_options_that_cannot_be_meant_exit_2(options: list[str]) -> None:
 def test_a_new_deck_never_replaces_an_old_one_unasked(tmp_path: Path) -> None:
     target = tmp_path / "plate.inp"
     target.write_text("precious")
-    refused = CliRunner().invoke(cli, ["new", str(target), *PLATE])
+    refused = call("new", str(target), *PLATE)
     assert refused.exit_code == 2
     assert target.read_text() == "precious"
-    assert CliRunner().invoke(cli, ["new", str(target), *PLATE, "--overwrite"]).exit_code == 0
+    assert call("new", str(target), *PLATE, "--overwrite").exit_code == 0
     assert prepare(target).errors() == []
 
 
@@ -188,15 +187,12 @@ def test_formatting_changes_neither_model_nor_itself(path: Path) -> None:
 
 def test_a_formatted_deck_runs_to_the_same_tapes(tmp_path: Path) -> None:
     formatted = tmp_path / "formatted.inp"
-    made = CliRunner().invoke(cli, ["fmt", str(APPENDIX), "-o", str(formatted)])
+    made = call("fmt", str(APPENDIX), "-o", str(formatted))
     assert made.exit_code == 0
     for path in (APPENDIX, formatted):
         out = tmp_path / f"{path.stem}.h5"
-        assert CliRunner().invoke(cli, ["run", str(path), "-o", str(out)]).exit_code == 0
-        assert (
-            CliRunner().invoke(cli, ["tapes", str(out), "-d", str(tmp_path / path.stem)]).exit_code
-            == 0
-        )
+        assert call("run", str(path), "-o", str(out)).exit_code == 0
+        assert call("tapes", str(out), "-d", str(tmp_path / path.stem)).exit_code == 0
     for name in ("tape3", "tape8", "tape9"):
         one, other = (tmp_path / stem / name for stem in ("appendix", "formatted"))
         assert one.read_bytes() == other.read_bytes()
@@ -222,7 +218,7 @@ def test_rulers_name_the_columns_above_which_they_stand() -> None:
 def test_a_deck_that_cannot_be_read_is_left_alone(tmp_path: Path) -> None:
     deck = tmp_path / "wrong.inp"
     deck.write_text(small().replace("115.0", "1l5.0"))
-    done = CliRunner().invoke(cli, ["fmt", str(deck)])
+    done = call("fmt", str(deck))
     assert done.exit_code == 2
     assert "E101" in done.stderr
     assert deck.read_text() == small().replace("115.0", "1l5.0")
@@ -231,9 +227,9 @@ def test_a_deck_that_cannot_be_read_is_left_alone(tmp_path: Path) -> None:
 def test_fmt_check_answers_whether_a_deck_would_change(tmp_path: Path) -> None:
     deck = tmp_path / "small.inp"
     deck.write_text(small())
-    assert CliRunner().invoke(cli, ["fmt", "--check", str(deck)]).exit_code == 1
-    assert CliRunner().invoke(cli, ["fmt", str(deck)]).exit_code == 0
-    assert CliRunner().invoke(cli, ["fmt", "--check", str(deck)]).exit_code == 0
+    assert call("fmt", "--check", str(deck)).exit_code == 1
+    assert call("fmt", str(deck)).exit_code == 0
+    assert call("fmt", "--check", str(deck)).exit_code == 0
 
 
 def test_a_new_deck_carries_its_own_projectile_in_its_own_units() -> None:

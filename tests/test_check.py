@@ -9,10 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 from fecm.api import prepare
-from fecm.cli import cli
+from tests.calls import call
 from tests.decks import APPENDIX, DATA_CARDS, LONG, MESH, PROGRAM, small
 
 WRONG = sorted((Path(__file__).parent / "wrong").glob("*.inp"))
@@ -38,10 +37,10 @@ def test_a_wrong_deck_shows_its_user_exactly_this(
 ) -> None:
     (tmp_path / deck.name).write_text(deck.read_text())
     monkeypatch.chdir(tmp_path)
-    checked = CliRunner().invoke(cli, ["check", deck.name])
+    checked = call("check", deck.name)
     assert checked.exit_code == 1
     assert checked.stdout == deck.with_suffix(".txt").read_text()
-    ran = CliRunner().invoke(cli, ["run", deck.name])
+    ran = call("run", deck.name)
     assert ran.exit_code == 2
     assert ran.stdout == ""
     assert ran.stderr.startswith(checked.stdout)
@@ -58,7 +57,7 @@ def test_five_independent_errors_are_five_findings_in_one_run() -> None:
 
 
 def test_the_summary_has_the_reports_critical_time_step_to_1_per_cent() -> None:
-    checked = CliRunner().invoke(cli, ["check", str(LONG)])
+    checked = call("check", str(LONG))
     assert checked.exit_code == 0
     match = re.search(r"critical time step +([0-9.e+-]+)", checked.stdout)
     assert match is not None
@@ -73,13 +72,13 @@ def test_the_summary_has_the_reports_critical_time_step_to_1_per_cent() -> None:
 
 
 def test_findings_and_summary_are_json_lines_for_programs() -> None:
-    sound = CliRunner().invoke(cli, ["check", str(LONG), "--format", "json"])
+    sound = call("check", str(LONG), "--format", "json")
     *findings, last = (json.loads(line) for line in sound.stdout.splitlines())
     assert [f["code"] for f in findings] == ["W414"]
     assert last["kind"] == "summary"
     assert last["equations"] == 1827
     assert last["D"][0][0] == pytest.approx(1287.414844365, rel=1e-10)
-    wrong = CliRunner().invoke(cli, ["check", str(WRONG[0]), "--format", "json"])
+    wrong = call("check", str(WRONG[0]), "--format", "json")
     (finding,) = (json.loads(line) for line in wrong.stdout.splitlines())
     assert wrong.exit_code == 1
     assert finding["severity"] == "error"
@@ -189,10 +188,10 @@ def test_loops_that_would_run_for_years_are_found_at_once() -> None:
 def test_units_are_named_in_summary_and_result(tmp_path: Path) -> None:
     deck = tmp_path / "units.inp"
     deck.write_text(small(data="UNIT\nin lbf s\n" + DATA_CARDS))
-    checked = CliRunner().invoke(cli, ["check", str(deck)])
+    checked = call("check", str(deck))
     assert re.search(r"critical time step  \S+ s\n", checked.stdout)
     assert "lbf*in" in checked.stdout
-    ran = CliRunner().invoke(cli, ["run", str(deck), "-o", str(tmp_path / "u.h5")])
+    ran = call("run", str(deck), "-o", str(tmp_path / "u.h5"))
     assert re.search(r"peak force +\S+ lbf at time \S+ s", ran.stdout)
     import h5py
 

@@ -7,16 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import fecm
 from fecm.api import prepare
-from fecm.cli import cli
 from fecm.deck.records import LoadTable
 from fecm.modes import modes
 from fecm.parts import build_plate
 from fecm.proportional import load_factor
 from fecm.results.result import Result
+from tests.calls import call
 from tests.decks import DATA, DATA_CARDS, MESH, PROGRAM, ROOT, small
 
 STATIC = ROOT / "decks" / "static-bending.inp"
@@ -160,7 +159,7 @@ def test_rows_that_never_came_are_cut_off_in_the_file_too(tmp_path: Path) -> Non
 def test_a_plate_that_is_not_held_has_no_static_solution(tmp_path: Path) -> None:
     deck = tmp_path / "free.inp"
     deck.write_text(small("TANG\nFORM\nSOLV\nDISP\n", data=DATA_CARDS + "FORC\n13, 0, 0, 0, 1\n\n"))
-    done = CliRunner().invoke(cli, ["run", str(deck), "-o", str(tmp_path / "x.h5")])
+    done = call("run", str(deck), "-o", str(tmp_path / "x.h5"))
     assert done.exit_code == 2
     assert "not held" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["free.inp"]
@@ -342,9 +341,7 @@ def test_the_printed_output_holds_what_the_original_printed(tmp_path: Path) -> N
     text = small(PROGRAM.replace("NEXT", "STRE         10\nCHEC\nNEXT"))
     deck = tmp_path / "small.inp"
     deck.write_text(text)
-    done = CliRunner().invoke(
-        cli, ["run", str(deck), "-o", str(tmp_path / "x.h5"), "--print", str(printed)]
-    )
+    done = call("run", str(deck), "-o", str(tmp_path / "x.h5"), "--print", str(printed))
     assert done.exit_code == 0
     page = printed.read_text()
     for heading in (
@@ -365,9 +362,7 @@ def test_nopr_silences_the_mesh_and_page_sets_the_carriage_control(tmp_path: Pat
     deck.write_text(
         "FECM x\n" + small().split("\n", 1)[1].replace("COOR\n", "PAGE\n0\nNOPR\nCOOR\n", 1)
     )
-    done = CliRunner().invoke(
-        cli, ["run", str(deck), "-o", str(tmp_path / "x.h5"), "--print", str(printed)]
-    )
+    done = call("run", str(deck), "-o", str(tmp_path / "x.h5"), "--print", str(printed))
     assert done.exit_code == 0
     page = printed.read_text()
     assert "Nodal coordinates" not in page
@@ -379,9 +374,7 @@ def test_nopr_silences_the_mesh_and_page_sets_the_carriage_control(tmp_path: Pat
 def test_an_existing_printout_is_kept(tmp_path: Path) -> None:
     printed = tmp_path / "out.txt"
     printed.write_text("precious")
-    done = CliRunner().invoke(
-        cli, ["run", str(STATIC), "-o", str(tmp_path / "x.h5"), "--print", str(printed)]
-    )
+    done = call("run", str(STATIC), "-o", str(tmp_path / "x.h5"), "--print", str(printed))
     assert done.exit_code == 2
     assert printed.read_text() == "precious"
     assert not (tmp_path / "x.h5").exists()

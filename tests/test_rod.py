@@ -9,11 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from numpy.typing import NDArray
 
 import fecm
-from fecm.cli import cli
 from fecm.filters import Filter
 from fecm.projectile import Rod, report_rod
 from fecm.pulses import GaussPulse, Pulse, SinePulse, TablePulse, pulse_of
@@ -348,11 +346,11 @@ def test_a_decks_own_rod_is_measured_at_its_own_transducer_and_a_rigid_mass_refu
     deck = tmp_path / "own.inp"
     deck.write_text(small(data=cards + DATA_CARDS))
     pulse = ["--pulse", "sine:1000,1e-4"]
-    own = CliRunner().invoke(cli, ["rod", str(deck), *pulse])
-    named = CliRunner().invoke(cli, ["rod", str(deck), *pulse, "--station", "0.5"])
+    own = call("rod", str(deck), *pulse)
+    named = call("rod", str(deck), *pulse, "--station", "0.5")
     assert own.exit_code == 0
     assert own.stdout == named.stdout
     deck.write_text(small(data="PROJ\n0, 0, 1.E-4\n" + DATA_CARDS))
-    rigid = CliRunner().invoke(cli, ["rod", str(deck), *pulse])
+    rigid = call("rod", str(deck), *pulse)
     assert rigid.exit_code == 2
     assert "rigid mass" in rigid.stderr

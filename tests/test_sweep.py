@@ -14,11 +14,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 import fecm
-from fecm.cli import cli
 from fecm.deck import Deck
 from fecm.dynamics import PointForce
 from fecm.indentation import Constants, MemoryLaw, Point, stacked
@@ -35,6 +33,7 @@ from fecm.sweeps.schedule import LOST, on_workers
 from fecm.sweeps.store import OtherSweepError, Parts
 from fecm.sweeps.tasks import plan, tasks
 from fecm.sweeps.variations import varied
+from tests.calls import Done, call
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, small
 
 Floats = NDArray[np.float64]
@@ -422,15 +421,15 @@ def test_a_sweep_that_is_interrupted_from_outside_ends_in_the_same_file(tmp_path
 # The command -------------------------------------------------------------------------------------
 
 
-def call(*arguments: object) -> Result:
-    """Run ``fecm sweep``."""
-    return CliRunner().invoke(cli, ["sweep", *map(str, arguments)])
+def swept(*arguments: object) -> Done:
+    """Call ``fecm sweep``."""
+    return call("sweep", *arguments)
 
 
 def test_a_result_keeps_cases_numbers_and_forces(tmp_path: Path) -> None:
     deck, path = tmp_path / "plate.inp", tmp_path / "s.h5"
     deck.write_text(small(STEPS, data="UNIT\nin lbf s\n" + DATA_CARDS))
-    done = call(deck, "--vary", "velocity=50,100", "--vary", "layup=[0/90],[x]", "-o", path,
+    done = swept(deck, "--vary", "velocity=50,100", "--vary", "layup=[0/90],[x]", "-o", path,
                 "--history", "--full", "2")  # fmt: skip
     assert done.exit_code == 0
     assert "failed            2: layup" in done.stdout
@@ -444,7 +443,7 @@ def test_a_result_keeps_cases_numbers_and_forces(tmp_path: Path) -> None:
     again = fecm.load(tmp_path / "s-2.h5")
     difference = np.abs(stored.force[2] - again.force).max()
     assert difference < 1e-9 * again.force.max()
-    assert call(deck, "--vary", "velocity=50,100", "-o", path).exit_code == 2
+    assert swept(deck, "--vary", "velocity=50,100", "-o", path).exit_code == 2
     assert fecm.load_sweep(path).cases["velocity"].tolist() == [50.0, 50.0, 100.0, 100.0]
 
 
@@ -459,7 +458,7 @@ def test_a_call_that_can_not_be_meant_leaves_nothing_behind(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("plate.inp").write_text(small())
-    refused = call("plate.inp", *options)
+    refused = swept("plate.inp", *options)
     assert refused.exit_code == 2
     assert refused.stdout == ""
     assert [path.name for path in tmp_path.iterdir()] == ["plate.inp"]
@@ -468,7 +467,7 @@ def test_a_call_that_can_not_be_meant_leaves_nothing_behind(
 def test_a_run_and_a_sweep_are_not_taken_for_one_another(tmp_path: Path) -> None:
     deck = tmp_path / "plate.inp"
     deck.write_text(small())
-    call(deck, "--vary", "k=1e6", "-o", tmp_path / "s.h5")
+    swept(deck, "--vary", "k=1e6", "-o", tmp_path / "s.h5")
     with pytest.raises(ValueError, match="sweep"):
         fecm.load(tmp_path / "s.h5")
     fecm.run(deck, output=tmp_path / "r.h5")

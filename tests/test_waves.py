@@ -8,10 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from numpy.polynomial import Polynomial
 
-from fecm.cli import cli
 from fecm.deck.records import Ply
 from fecm.laminate import Laminate, laminate
 from fecm.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
@@ -24,6 +22,7 @@ from tests.builders import (
     report_plate,
     table,
 )
+from tests.calls import call
 from tests.decks import DATA_CARDS, small
 
 NU = 0.3  # of the isotropic plate
@@ -404,8 +403,8 @@ def test_a_laminate_that_can_carry_no_waves_is_refused() -> None:
 def test_a_decks_own_shear_correction_counts(tmp_path: Path) -> None:
     deck = tmp_path / "corrected.inp"
     deck.write_text(small(data="SHEA\n0.8\n" + DATA_CARDS))
-    own = CliRunner().invoke(cli, ["waves", "speeds", str(deck), "--step", "45"])
+    own = call("waves", "speeds", str(deck), "--step", "45")
     deck.write_text(small())
     given = ["waves", "speeds", str(deck), "--step", "45", "--shear-factor", "0.8"]
     assert own.exit_code == 0
-    assert own.stdout == CliRunner().invoke(cli, given).stdout
+    assert own.stdout == call(*given).stdout
