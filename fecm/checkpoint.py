@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.files import partial_of
+from fecm.files import packed, partial_of
 from fecm.results.journal import Journal, Part
 from fecm.simulation import Simulation
 from fecm.version import __version__
@@ -107,8 +107,7 @@ class Checkpointer:
         try:
             with partial.open("wb") as file:
                 told = np.frombuffer(json.dumps(about).encode(), np.uint8)
-                named: dict[str, Any] = {"about": told, **arrays}
-                np.savez(file, **named)
+                file.write(packed({"about": told, **arrays}))
                 file.flush()
                 os.fsync(file.fileno())
             partial.replace(self._checkpoint)

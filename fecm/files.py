@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 
 def partial_of(path: Path) -> Path:
@@ -30,6 +32,19 @@ def beside(path: Path) -> Iterator[Path]:
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def packed(arrays: Mapping[str, Any]) -> memoryview:
+    """Arrays as the bytes of an .npz file.
+
+    They are put together in memory: where a disk is full, NumPy before version 2 leaves the archive
+    open, which complains once more at the end of the program.
+    """
+    import numpy as np
+
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    return buffer.getbuffer()
 
 
 def clear_stale(*paths: Path) -> None:

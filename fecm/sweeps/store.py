@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from fecm.files import beside
+from fecm.files import beside, packed
 from fecm.sweeps.outcome import SUMMARY, Outcome
 from fecm.sweeps.run import Task
 
@@ -92,7 +92,7 @@ class Parts:
         if outcome.force is not None:
             arrays["force"] = outcome.force
         with beside(self._path(task)) as partial:
-            np.savez(partial, **arrays)
+            partial.write_bytes(packed(arrays))
 
     def clear(self) -> None:
         """Throw everything away."""
