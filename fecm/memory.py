@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 MEMINFO = Path("/proc/meminfo")
@@ -44,6 +45,37 @@ def require(count: int, what: str) -> None:
         raise NotEnoughMemoryError(
             f"{what} takes about {said(count)} of memory, and {said(free)} are free"
         )
+
+
+def check(what: str, needed: Callable[[bool], int], remedy: Callable[[int], str]) -> None:
+    """Refuse to begin something that takes more memory than is free.
+
+    Parameters
+    ----------
+    what : str
+        What it is.
+    needed : callable
+        Gives the bytes that it takes: a quick bound for False, asked for first, or all that is
+        known for True.
+    remedy : callable
+        Given the bytes that are free, what to do about it.
+
+    Raises
+    ------
+    NotEnoughMemoryError
+        With both numbers.
+    """
+    free = available()
+    if free is None:
+        return
+    count = 0
+    for exact in (False, True):
+        count = needed(exact)
+        if count <= free:
+            return
+    raise NotEnoughMemoryError(
+        f"{what} takes about {said(count)} of memory, and {said(free)} are free; {remedy(free)}"
+    )
 
 
 def _of_machine() -> int | None:

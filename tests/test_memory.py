@@ -80,7 +80,7 @@ def test_the_estimate_bounds_what_is_measured(
 def test_a_run_that_needs_more_than_is_free_is_refused_with_both_numbers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fecm.check.memory, "available", lambda: 2 * MEGABYTE)
+    monkeypatch.setattr(fecm.memory, "available", lambda: 2 * MEGABYTE)
     deck, output = tmp_path / "small.inp", tmp_path / "small.h5"
     deck.write_text(small().replace("DISP          5", "DISP"))
     done = call("run", deck, "-o", output)
@@ -92,7 +92,7 @@ def test_a_run_that_needs_more_than_is_free_is_refused_with_both_numbers(
 
 
 def test_a_result_in_memory_counts_with_all_its_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fecm.check.memory, "available", lambda: 100 * MEGABYTE)
+    monkeypatch.setattr(fecm.memory, "available", lambda: 100 * MEGABYTE)
     many = small().replace("LOOP         10", "LOOP      99999").replace("DISP          5", "DISP")
     problem = prepare(many).problems[0]
     # w and five unknowns of 25 nodes in each of the rows.
@@ -135,7 +135,7 @@ def test_a_sweep_that_needs_more_than_is_free_is_refused_with_both_numbers(
     free: int,
     remedy: str,
 ) -> None:
-    monkeypatch.setattr(fecm.sweeps.memory, "available", lambda: free * MEGABYTE)
+    monkeypatch.setattr(fecm.memory, "available", lambda: free * MEGABYTE)
     deck = tmp_path / "small.inp"
     deck.write_text(small().replace("LOOP         10", "LOOP       9000"))
     vary = ("--vary", "velocity=50:100:3000", "-o", tmp_path / "s.h5")

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from fecm import plate
+from fecm import memory, plate
 from fecm.assembly import ASSEMBLED, BLOCK
 from fecm.check import Checked
 from fecm.check.run import output_bytes
@@ -18,7 +18,6 @@ from fecm.congruence import congruence
 from fecm.deck.model import Material, Projectile
 from fecm.elements.quadrature import HIGHEST_ORDER
 from fecm.laminate import laminate_of_deck
-from fecm.memory import NotEnoughMemoryError, available, said
 from fecm.modes import DENSE
 from fecm.parts import rules
 from fecm.products import WORTH_GROUPING
@@ -87,17 +86,11 @@ def check_memory(checked: Checked, *, solver: str = AUTO, in_memory: bool = Fals
     NotEnoughMemoryError
         With both numbers.
     """
-    free = available()
-    if free is None:
-        return
-    needed = 0
-    for exact in (False, True):  # the congruent elements need not always be counted
-        needed = needed_bytes(checked, solver=solver, in_memory=in_memory, exact=exact)
-        if needed <= free:
-            return
     remedy = "write it to a file, or store fewer rows" if in_memory else "take a coarser mesh"
-    raise NotEnoughMemoryError(
-        f"the run takes about {said(needed)} of memory, and {said(free)} are free; {remedy}"
+    memory.check(
+        "the run",
+        lambda exact: needed_bytes(checked, solver=solver, in_memory=in_memory, exact=exact),
+        lambda free: remedy,
     )
 
 

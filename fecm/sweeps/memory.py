@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from fecm import memory
 from fecm.check import Checked
 from fecm.check.memory import needed_bytes
-from fecm.memory import NotEnoughMemoryError, available, said
 from fecm.program import estimate
 from fecm.sweeps.run import quiet, shares_plate
 from fecm.sweeps.tasks import TOGETHER, Plan, tasks
@@ -32,24 +32,21 @@ def check_memory(checked: Checked, made: Plan, workers: int) -> None:
     NotEnoughMemoryError
         With both numbers.
     """
-    free = available()
-    if free is None:
-        return
     steps, cases = estimate(checked.program).steps, len(made.cases)
     together = min(TOGETHER, cases) if shares_plate(checked) else 1
+    at_once = min(workers, len(tasks(checked, made)))
     plate = replace(checked, program=quiet(checked.program))
     kept = KEPT * steps * cases if made.history else 0
-    at_once = min(workers, len(tasks(checked, made)))
-    needed = 0
-    for exact in (False, True):  # the congruent elements need not always be counted
-        needed = kept
-        if at_once:
-            needed += at_once * (needed_bytes(plate, exact=exact) + ADVANCED * steps * together)
-        if needed <= free:
-            return
-    remedy = "take fewer workers" if at_once > 1 else "take fewer steps or a coarser mesh"
-    if needed - kept <= free:
-        remedy = "take fewer cases, or none of their histories"
-    raise NotEnoughMemoryError(
-        f"the sweep takes about {said(needed)} of memory, and {said(free)} are free; {remedy}"
-    )
+
+    def needed(exact: bool) -> int:
+        if not at_once:
+            return kept
+        one = needed_bytes(plate, exact=exact) + ADVANCED * steps * together
+        return kept + at_once * one
+
+    def remedy(free: int) -> str:
+        if needed(True) - kept <= free:
+            return "take fewer cases, or none of their histories"
+        return "take fewer workers" if at_once > 1 else "take fewer steps or a coarser mesh"
+
+    memory.check("the sweep", needed, remedy)
