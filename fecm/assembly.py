@@ -238,60 +238,6 @@ class PlateModel:
         mesh, transposed = self.mesh, self.rules.transposed
         return plate.StrainField(mesh.elements, mesh.coordinates, points, transposed=transposed)
 
-    def safe_time_step(self) -> float:
-        """A lower bound of the critical time step, from the elements alone.
-
-        No mode of the plate is faster than the fastest of its unsupported elements (Irons and
-        Treharne's theorem).  A few per cent below the critical step, and far cheaper to have.
-
-        Raises
-        ------
-        UnsoundPlateError
-            If an element's numbers are beyond all range.
-        """
-        fastest = 0.0
-        for family in self.families:
-            same = congruence(family)
-            for block in family.take(same.representatives).blocks(BLOCK):
-                mass = plate.lumped_mass(block, self.laminate, self.rules.bending)
-                scale = 1.0 / np.sqrt(mass.reshape(len(block.rows), -1))
-                with np.errstate(all="ignore"):
-                    scaled = self.stiffness_of(block) * scale[:, :, None] * scale[:, None, :]
-                if not np.isfinite(scaled).all():
-                    raise UnsoundPlateError("the stiffness is beyond the range of numbers")
-                fastest = max(fastest, float(np.linalg.eigvalsh(scaled)[:, -1].max()))
-        return 2.0 / float(np.sqrt(fastest))
-
-    def critical_time_step(self) -> float:
-        """Largest stable step of the central differences: 2 over the largest angular frequency.
-
-        The time integrated by v += dt a, u += dt v is stable below it.  Found by Lanczos iteration
-        to a relative accuracy of 1e-4.
-
-        Raises
-        ------
-        UnsoundPlateError
-            If the iteration fails, as it does where numbers are beyond all range.
-        """
-        from scipy.sparse.linalg import ArpackError, eigsh
-
-        with np.errstate(all="ignore"):
-            scale = sparse.diags_array(1.0 / np.sqrt(self.mass))
-            scaled = (scale @ self.stiffness @ scale).tocsr()
-        if not np.isfinite(scaled.data).all():
-            raise UnsoundPlateError("the stiffness is beyond the range of numbers")
-        if scaled.shape[0] < 20:
-            largest = float(np.linalg.eigvalsh(scaled.toarray())[-1])
-        else:
-            start = np.random.default_rng(0).standard_normal(scaled.shape[0])
-            try:
-                largest = float(
-                    eigsh(scaled, k=1, which="LA", v0=start, tol=1e-5, return_eigenvectors=False)[0]
-                )
-            except ArpackError as error:
-                raise UnsoundPlateError(f"no largest frequency was found ({error})") from None
-        return 2.0 / float(np.sqrt(largest))
-
 
 def assemble(mesh: Mesh, laminate: Laminate, rules: Rules) -> PlateModel:
     """Make the plate of a mesh, a laminate and quadrature rules; matrices follow when needed.

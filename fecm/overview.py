@@ -13,6 +13,7 @@ from fecm.memory import said
 from fecm.parts import build_plate, build_projectile
 from fecm.program import estimate, flat
 from fecm.solvers import SAFE
+from fecm.stability import critical_time_step
 from fecm.units import unit_names, unit_of
 
 Floats = NDArray[np.float64]
@@ -124,7 +125,7 @@ def overview(checked: Checked) -> Overview:
         shear=laminate.shear,
         plate_mass=plate.area() * laminate.mass,
         projectile_mass=build_projectile(deck).total_mass,
-        critical_time_step=plate.critical_time_step(),
+        critical_time_step=critical_time_step(plate),
         time_steps=[m.value for m in flat(checked.program) if m.word == "DT"],
         output_bytes=output_bytes(deck, sizes),
         units=unit_names(deck),

@@ -28,6 +28,7 @@ from fecm.results.schema import FORMAT, FORMAT_VERSION
 from fecm.results.sinks import Sink
 from fecm.slips import LISTING, NAMES, REPORT
 from fecm.solvers import SAFE
+from fecm.stability import critical_time_step
 from fecm.statics import Tangent, reactions
 from fecm.stresses import strains_and_resultants
 from fecm.units import unit_names
@@ -234,7 +235,7 @@ class Simulation:
     def _cause(self) -> str:
         """Why a run diverged, as far as the time step tells."""
         try:
-            critical = self.setup.plate.critical_time_step()
+            critical = critical_time_step(self.setup.plate)
         except UnsoundPlateError as error:
             return str(error)
         where = "above" if self.dt > critical else "below"
@@ -266,7 +267,7 @@ class Simulation:
         """DT; 0 takes a part of the critical time step."""
         self.dt = n
         if not self.dt:
-            critical = self.setup.plate.critical_time_step()
+            critical = critical_time_step(self.setup.plate)
             self.dt = float(f"{SAFE * critical:.3g}")
             self.notes.append(f"DT 0: took {self.dt:g}, {SAFE:g} of the critical {critical:.4g}")
 

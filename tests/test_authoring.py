@@ -20,6 +20,7 @@ from fecm.deck.model import Impact, Material, Projectile
 from fecm.deck.records import Control
 from fecm.mesh import generate
 from fecm.parts import build_projectile
+from fecm.stability import critical_time_step
 from tests.calls import Done, call
 from tests.decks import APPENDIX, LONG, small
 
@@ -87,7 +88,7 @@ def test_a_new_deck_is_sound_and_declares_its_units() -> None:
     critical = prepare(made.stdout).problems[0]
     from fecm.parts import build_plate
 
-    ratio = dt / build_plate(critical.deck, critical.mesh).critical_time_step()
+    ratio = dt / critical_time_step(build_plate(critical.deck, critical.mesh))
     assert 0.8 < ratio <= 0.9
 
 

@@ -15,6 +15,8 @@ import fecm.memory
 from fecm.api import prepare
 from fecm.check.memory import needed_bytes
 from fecm.memory import NotEnoughMemoryError, available
+from fecm.parts import build_plate
+from fecm.stability import critical_time_step
 from fecm.sweeps.memory import ADVANCED, KEPT
 from tests.calls import assert_unusable, call
 from tests.decks import small
@@ -151,13 +153,14 @@ def test_a_sweep_that_needs_more_than_is_free_is_refused_with_both_numbers(
 def test_matrices_that_do_not_fit_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    deck = plate(tmp_path, 60, IMPACT)
+    problem = prepare(plate(tmp_path, 60, IMPACT)).problems[0]
+    model = build_plate(problem.deck, problem.mesh)
     monkeypatch.setattr(fecm.memory, "available", lambda: 120 * MEGABYTE)
-    done = call("check", deck)
-    assert done.exit_code == 2
-    told = done.stderr.splitlines()[-1]
     # 24 bytes for each of the 45 x 45 entries of 3600 matrices.
-    assert "assemble the plate's matrices takes about 175 MB of memory, and 120 MB are free" in told
+    told = "assemble the plate's matrices takes about 175 MB of memory, and 120 MB are free"
+    with pytest.raises(NotEnoughMemoryError, match=told):
+        _ = model.stiffness
+    assert critical_time_step(model) > 0.0  # for which no matrix is assembled
 
 
 def test_many_small_problems_with_large_counts_are_refused() -> None:

@@ -18,6 +18,7 @@ from fecm.program import Act, Course, compile_program, tally
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.simulation import simulate
+from fecm.stability import critical_time_step
 from tests.decks import DATA_CARDS, PROGRAM, ready, small
 
 
@@ -249,7 +250,7 @@ def test_dt_0_takes_nine_tenths_of_the_critical_time_step_and_says_so() -> None:
     problem = prepare(text).problems[0]
     sink = MemorySink()
     simulation = simulate(problem, sink)
-    critical = simulation.setup.plate.critical_time_step()
+    critical = critical_time_step(simulation.setup.plate)
     assert simulation.dt == pytest.approx(0.9 * critical, rel=5e-3)
     assert sink.arrays["history/time"][0] == simulation.dt
     (note,) = simulation.notes

@@ -13,6 +13,7 @@ from fecm.laminate import laminate
 from fecm.mesh import generate
 from fecm.parts import build_plate
 from fecm.solvers import SAFE
+from fecm.stability import critical_time_step
 
 EDGES = ("left", "right", "bottom", "top")
 # Restraints of an edge: nothing; w and the rotation along the edge; everything out of the plane.
@@ -117,7 +118,7 @@ def new_deck(spec: Specification) -> Deck:
 
 def _safe_step(deck: Deck) -> float:
     """0.9 of the critical time step, rounded down to two digits."""
-    critical = SAFE * build_plate(deck, generate(deck)).critical_time_step()
+    critical = SAFE * critical_time_step(build_plate(deck, generate(deck)))
     unit = 10.0 ** (math.floor(math.log10(critical)) - 1)
     return float(f"{math.floor(critical / unit) * unit:.1e}")
 

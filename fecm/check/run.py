@@ -9,6 +9,7 @@ from fecm.elements.quadrature import HIGHEST_ORDER
 from fecm.mesh import Mesh
 from fecm.parts import build_plate, rules
 from fecm.program import STEPS, Body, Tally, estimate, every, flat
+from fecm.stability import critical_time_step, safe_time_step
 
 # A program of more macros than this would run for days.
 MOST_MACROS = 10**9
@@ -54,9 +55,9 @@ def check_time_step(deck: Deck, mesh: Mesh, findings: Findings) -> None:
         return
     plate = build_plate(deck, mesh)
     try:
-        if max(macro.value for macro in steps) < plate.safe_time_step():
+        if max(macro.value for macro in steps) < safe_time_step(plate):
             return
-        critical = plate.critical_time_step()
+        critical = critical_time_step(plate)
     except UnsoundPlateError as error:
         findings.add(
             "E417",

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm.assembly import PlateModel
 from fecm.check import Checked, check
 from fecm.check.impact import check_impact, check_law, check_projectile
 from fecm.deck.findings import Findings
@@ -27,6 +28,7 @@ from fecm.projectile import WilsonStep
 from fecm.results.schema import Dataset
 from fecm.simulation import simulate
 from fecm.solvers import SAFE
+from fecm.stability import critical_time_step
 from fecm.sweeps.cases import Case, CasesError
 from fecm.sweeps.outcome import FINE, SUMMARY, Outcome, summarise
 from fecm.sweeps.responses import Convolution, TipState, TipSteps, plate_response
@@ -121,10 +123,10 @@ def shares_plate(checked: Checked) -> bool:
     )
 
 
-def _time_step(checked: Checked, critical: Any) -> float:
+def _time_step(checked: Checked, plate: PlateModel) -> float:
     """The program's time step; 0 is 0.9 of the critical one, as in a run."""
     dt = next(macro.value for macro in flat(checked.program) if macro.word == "DT")
-    return dt or float(f"{SAFE * critical():.3g}")
+    return dt or float(f"{SAFE * critical_time_step(plate):.3g}")
 
 
 def _together(numbers: list[int], decks: list[Deck], checked: Checked) -> Outcome:
@@ -133,7 +135,7 @@ def _together(numbers: list[int], decks: list[Deck], checked: Checked) -> Outcom
     if setup.impact is None:
         raise ValueError("nothing hits in this deck")
     steps = estimate(checked.program).steps
-    dt = _time_step(checked, setup.plate.critical_time_step)
+    dt = _time_step(checked, setup.plate)
     projectiles = [build_projectile(deck) for deck in decks]
     kinds = {projectile: number for number, projectile in enumerate(dict.fromkeys(projectiles))}
     # Cases of a kind side by side.

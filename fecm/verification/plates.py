@@ -14,6 +14,7 @@ from fecm.deck.model import Coordinates, Deck, Forces
 from fecm.deck.records import Macro, NodeValues
 from fecm.mesh import Mesh, generate
 from fecm.parts import build_plate
+from fecm.stability import critical_time_step
 from fecm.verification.case import Check, case, farthest
 from fecm.verification.decks import (
     deck,
@@ -216,7 +217,7 @@ def _critical(made: Deck, unknown: int) -> float:
     codes, equations = np.ones_like(mesh.codes), np.zeros_like(mesh.equations)
     codes[4, unknown], equations[4, unknown] = 0, 1
     held: Mesh = replace(mesh, codes=codes, equations=equations)
-    return build_plate(made, held).critical_time_step()
+    return critical_time_step(build_plate(made, held))
 
 
 CASES = (patch_test, static_bending, frequencies, time_step)

@@ -1,0 +1,83 @@
+"""Time steps below which the central differences are stable.
+
+They are stable below 2 over the largest angular frequency of the plate with its lumped mass.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm import plate
+from fecm.assembly import BLOCK, PlateModel, UnsoundPlateError
+from fecm.congruence import congruence
+from fecm.products import product_of
+
+Floats = NDArray[np.float64]
+
+# Residual of the highest mode over its eigenvalue, at the most; no eigenvalue is farther off.
+TOLERANCE = 1.0e-4
+# Equations below which all eigenvalues are as quick to find.
+FEW = 20
+
+BEYOND = "the stiffness is beyond the range of numbers"
+
+
+def safe_time_step(model: PlateModel) -> float:
+    """A lower bound of the critical time step, from the elements alone.
+
+    No mode of the plate is faster than the fastest of its unsupported elements (Irons and
+    Treharne's theorem).  A few per cent below the critical step, and far cheaper to have.
+
+    Raises
+    ------
+    UnsoundPlateError
+        If an element's numbers are beyond all range.
+    """
+    fastest = 0.0
+    for family in model.families:
+        same = congruence(family)
+        for block in family.take(same.representatives).blocks(BLOCK):
+            mass = plate.lumped_mass(block, model.laminate, model.rules.bending)
+            scale = 1.0 / np.sqrt(mass.reshape(len(block.rows), -1))
+            with np.errstate(all="ignore"):
+                scaled = model.stiffness_of(block) * scale[:, :, None] * scale[:, None, :]
+            if not np.isfinite(scaled).all():
+                raise UnsoundPlateError(BEYOND)
+            fastest = max(fastest, float(np.linalg.eigvalsh(scaled)[:, -1].max()))
+    return 2.0 / float(np.sqrt(fastest))
+
+
+def critical_time_step(model: PlateModel) -> float:
+    """Largest stable step of the central differences: 2 over the largest angular frequency.
+
+    The time integrated by v += dt a, u += dt v is stable below it.  Found by Lanczos iteration,
+    without a matrix of the whole plate, to a relative accuracy of 5e-5 at the least.
+
+    Raises
+    ------
+    UnsoundPlateError
+        If the iteration fails, as it does where numbers are beyond all range.
+    """
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+
+    product = product_of(model)
+    with np.errstate(all="ignore"):
+        scale = 1.0 / np.sqrt(model.mass)
+
+    def scaled(x: Floats) -> Floats:
+        with np.errstate(all="ignore"):
+            return np.asarray(scale * product(scale * x.ravel()))
+
+    start = np.random.default_rng(0).standard_normal(model.neq)
+    if not np.isfinite(scaled(start)).all():
+        raise UnsoundPlateError(BEYOND)
+    if model.neq < FEW:
+        matrix = np.column_stack([scaled(column) for column in np.eye(model.neq)])
+        return 2.0 / float(np.sqrt(np.linalg.eigvalsh(matrix)[-1]))
+    operator = LinearOperator((model.neq, model.neq), matvec=scaled, dtype=np.float64)
+    try:
+        found = eigsh(operator, k=1, which="LA", v0=start, tol=TOLERANCE, return_eigenvectors=False)
+    except ArpackError as error:
+        raise UnsoundPlateError(f"no largest frequency was found ({error})") from None
+    return 2.0 / float(np.sqrt(found[0]))
