@@ -11,17 +11,16 @@ from __future__ import annotations
 import math
 
 from fecm import memory, plate
-from fecm.assembly import ASSEMBLED, BLOCK
+from fecm.assembly import ASSEMBLED, BLOCK, PlateModel
 from fecm.check import Checked
 from fecm.check.run import output_bytes
 from fecm.congruence import congruence
 from fecm.deck.model import Material, Projectile
 from fecm.elements.quadrature import HIGHEST_ORDER
-from fecm.laminate import laminate_of_deck
 from fecm.modes import DENSE
-from fecm.parts import rules
+from fecm.parts import build_plate, rules
 from fecm.products import WORTH_GROUPING
-from fecm.program import every, flat, tally
+from fecm.program import estimate, every, flat
 from fecm.projectile import REPORT_ELEMENTS
 from fecm.results.sinks import RowBuffer
 from fecm.solvers import AUTO, CSR
@@ -62,15 +61,15 @@ def needed_bytes(
         Count the elements that are congruent to others, instead of taking each for one of its kind.
     """
     words = {macro.word for macro in flat(checked.program)}
-    sizes = tally(checked.program)
+    sizes = estimate(checked.program)
     output = output_bytes(checked.deck, sizes)
+    model = build_plate(checked.deck, checked.mesh)
     total = NODE * checked.deck.control.numnp + _strains(checked)
-    assembled = ASSEMBLED * _entries(checked)
     if solver == CSR or words & STATIC:
-        total += assembled
+        total += ASSEMBLED * model.entries
     if solver != CSR:
-        total += _product(checked, exact=exact)
-    total += _factors(checked, words) + _modes(checked)
+        total += _product(model, exact=exact)
+    total += _factors(model, words) + _modes(checked)
     total += 8 * 6 * (2 * _rod_elements(checked) + 2) ** 2
     if in_memory:
         return total + output
@@ -94,23 +93,17 @@ def check_memory(checked: Checked, *, solver: str = AUTO, in_memory: bool = Fals
     )
 
 
-def _entries(checked: Checked) -> int:
-    """Entries of all element matrices."""
-    nodes = (checked.mesh.elements != 0).sum(axis=1)
-    return int(((plate.UNKNOWNS * nodes) ** 2).sum())
-
-
 def _strains(checked: Checked) -> int:
     card = checked.deck.need(Material).integration
     points = len(rules(checked.deck.need(Material))[2].xi)
     return POINT * checked.deck.control.numel * max(points, min(card.bending, HIGHEST_ORDER) ** 2)
 
 
-def _product(checked: Checked, *, exact: bool) -> int:
+def _product(model: PlateModel, *, exact: bool) -> int:
     """Element matrices of the product K u, and what it is to gather and sum."""
-    points = max(len(rule.xi) for rule in rules(checked.deck.need(Material))[:2])
+    points = max(len(rule.xi) for rule in (model.rules.bending, model.rules.shear))
     total = 0
-    for family in plate.families(checked.mesh.elements, checked.mesh.coordinates):
+    for family in model.families:
         count, n = len(family.rows), plate.UNKNOWNS * family.nodes.shape[1]
         alone, shared = count, 0
         if exact:
@@ -126,14 +119,13 @@ def _product(checked: Checked, *, exact: bool) -> int:
     return total
 
 
-def _factors(checked: Checked, words: set[str]) -> int:
+def _factors(model: PlateModel, words: set[str]) -> int:
     """Factors of the stiffness: n log n in a plane mesh ordered well, n^1.5 ordered by columns."""
-    n = checked.mesh.number_of_equations
+    n = model.neq
     total = TANGENT * n * math.log2(max(2, n)) if "TANG" in words else 0.0
     total += SHIFTED * n**1.5 if "EIGE" in words else 0.0
     # With coupling all five unknowns of two nodes meet, instead of 2 x 2 and 3 x 3 of them.
-    coupled = laminate_of_deck(checked.deck).is_coupled
-    return int(total * (25 / 13 if coupled else 1.0))
+    return int(total * (25 / 13 if model.laminate.is_coupled else 1.0))
 
 
 def _modes(checked: Checked) -> int:

@@ -162,14 +162,15 @@ def _run_one(
     from fecm.check.run import output_bytes
     from fecm.checkpoint import Checkpointer, checkpoint_of
     from fecm.printout import Printer
-    from fecm.program import tally
+    from fecm.program import estimate
     from fecm.results import file_writer
     from fecm.results.journal import Journal
     from fecm.results.result import load
     from fecm.results.summary import summary
     from fecm.simulation import Simulation
 
-    _check_room(path, output_bytes(problem.deck, tally(problem.program)))
+    sizes = estimate(problem.program)
+    _check_room(path, output_bytes(problem.deck, sizes))
     check_memory(problem, solver=choices.solver)
     clear_stale(path, checkpoint_of(path), *([] if printed is None else [printed]))
     with contextlib.ExitStack() as stack:
@@ -178,7 +179,7 @@ def _run_one(
         journal = Journal(stack.enter_context(file_writer.writing(path)), muted=resumes)
         checkpointer = Checkpointer(path, journal)
         printer = Printer() if printed is None else Printer(stack.enter_context(writing(printed)))
-        advance = stack.enter_context(_progress(tally(problem.program).steps))
+        advance = stack.enter_context(_progress(sizes.steps))
         simulation = Simulation(
             problem, journal, choices, advance, printer, _Look(checkpointer, every)
         )
