@@ -23,7 +23,7 @@ from fecm.plate import Floats
 from fecm.printout import Printer
 from fecm.program import Act, Course, EndedError, hits, moves_only, number, tally
 from fecm.proportional import load_factor
-from fecm.recording.recorder import Recorder
+from fecm.recording.recorder import Recorder, part
 from fecm.results.schema import FORMAT, FORMAT_VERSION
 from fecm.results.sinks import Sink
 from fecm.slips import LISTING, NAMES, REPORT
@@ -203,15 +203,11 @@ class Simulation:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Take the state that another simulation of the same problem gave."""
-
-        def part(prefix: str) -> dict[str, Any]:
-            return {n.removeprefix(prefix): v for n, v in state.items() if n.startswith(prefix)}
-
         if self.impact is not None:
-            self.impact = ImpactState.from_arrays(part("state/"))
+            self.impact = ImpactState.from_arrays(part(state, "state/"))
             self.plate = self.impact.plate
         else:
-            self.plate = PlateState.from_arrays(part("state/"))
+            self.plate = PlateState.from_arrays(part(state, "state/"))
         self.dt, self.clock, self._state_clock = state["dt"], state["clock"], state["state_clock"]
         self.constant_factor, self.tolerance = state["constant_factor"], state["tolerance"]
         tables = self.checked.deck.tables
@@ -225,7 +221,7 @@ class Simulation:
         if self.setup.impact is not None:
             self.setup.impact.first_dt = state["first_dt"]
         self.printer.restore(state["printed"])
-        self._recorder.restore(part("recorder/"))
+        self._recorder.restore(part(state, "recorder/"))
         self._place = [(index, current) for index, current in state["place"]]
 
     def _bind(self, macro: Macro) -> Act:

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 import click
 
 from fecm.cli.apart import reads
-from fecm.cli.common import DECK_PATH, Refused, check_outputs
+from fecm.cli.common import DECK_PATH, Refused, check_outputs, writing
+from fecm.cli.tables import STANDARD_OUTPUT
 
 if TYPE_CHECKING:
     from fecm.results.file_reader import Contents
-
-STANDARD_OUTPUT = "-"
 
 
 @click.command()
@@ -40,7 +39,7 @@ def export(
     """
     if target == "vtkhdf" and dataset is not None:
         raise click.UsageError("--dataset is for --to csv; vtkhdf holds all fields")
-    if target == "vtkhdf" and str(output) == STANDARD_OUTPUT:
+    if target == "vtkhdf" and output == STANDARD_OUTPUT:
         raise click.UsageError("vtkhdf can't go to standard output")
     from fecm.export import ExportError
     from fecm.results.file_reader import read
@@ -50,7 +49,7 @@ def export(
     name = (dataset or ("cases" if contents.form == SWEEP else "history")).strip("/")
     ending = ".vtkhdf" if target == "vtkhdf" else f"-{name.replace('/', '-')}.csv"
     path = output or Path(f"{result.stem}{ending}")
-    if str(path) != STANDARD_OUTPUT:
+    if path != STANDARD_OUTPUT:
         check_outputs([path], overwrite)
         if path.exists() and path.samefile(result):
             raise Refused(f"{path} is the result itself")
@@ -61,7 +60,7 @@ def export(
             _write_table(contents, name, path)
     except ExportError as error:
         raise Refused(f"{result}: {error}") from None
-    if str(path) != STANDARD_OUTPUT:
+    if path != STANDARD_OUTPUT:
         click.echo(path)
 
 
@@ -80,7 +79,6 @@ def _write_fields(contents: Contents, path: Path) -> None:
 
 def _write_table(contents: Contents, name: str, path: Path) -> None:
     """Write a table of a run or of a sweep."""
-    from fecm.cli.common import writing
     from fecm.export import csv, sweep_csv
     from fecm.results.result import result_of
     from fecm.results.schema import SWEEP
@@ -90,7 +88,7 @@ def _write_table(contents: Contents, name: str, path: Path) -> None:
         lines = sweep_csv.lines(sweep_of(contents, history=name == sweep_csv.HISTORY), name)
     else:
         lines = csv.table(result_of(contents), name).lines()
-    if str(path) == STANDARD_OUTPUT:
+    if path == STANDARD_OUTPUT:
         sys.stdout.writelines(lines)
         return
     with writing(path) as file:

@@ -21,6 +21,11 @@ Floats = NDArray[np.float64]
 BUFFERED = ("tape3", "tape8", "stresses", "reactions", "modes")
 
 
+def part(state: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    """What a state holds under names that begin so, by the rest of them."""
+    return {n.removeprefix(prefix): v for n, v in state.items() if n.startswith(prefix)}
+
+
 class Recorder:
     """Stores what a run gives.
 
@@ -153,13 +158,9 @@ class Recorder:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Hold back again what :meth:`state` gave."""
-
-        def part(prefix: str) -> dict[str, Any]:
-            return {n.removeprefix(prefix): v for n, v in state.items() if n.startswith(prefix)}
-
-        self.steps.restore(part("steps/"))
+        self.steps.restore(part(state, "steps/"))
         for group, buffer in self._buffers.items():
-            buffer.restore(part(f"rows/{group}/"))
+            buffer.restore(part(state, f"rows/{group}/"))
 
     def finish(self) -> None:
         """Store all that is held back, and cut off the rows that never came.

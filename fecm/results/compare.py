@@ -18,16 +18,16 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.results.schema import DATASETS
+from fecm.deck.records import UNKNOWNS
+from fecm.results.schema import DATASETS, SCALES
 
 Array = NDArray[Any]
 
 # Bytes of a block of rows.
 BLOCK = 4_000_000
 
-# What an index is called along each size of a dataset (see the schema); rows are told by the clock.
-AXES = {"numnp": "node", "numel": "element", "npt": "point", "nen": "position", "ndm": "axis"}
-UNKNOWNS = ("u", "v", "w", "theta_x", "theta_y")
+# What an index is called along each size of a dataset; rows are told by the clock.
+AXES = {size: name for size, (name, _) in SCALES.items()} | {"nen": "position", "ndm": "axis"}
 
 
 @dataclass(frozen=True)
