@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +25,8 @@ TOLD = ("title", "mode", "slips", "fecm_version", "format", "format_version",
 # Of these, what a sweep has as well.
 IN_FRONT = ("title", "fecm_version", "format", "format_version")
 
+PERMANENT = "permanent_indentation"
+
 
 @click.command()
 @click.argument("result", type=FILE_PATH)
@@ -37,6 +40,8 @@ def info(result: Path, form: str) -> None:
 
     contents = read(result, FORMAT, SWEEP)
     about = _of_sweep(contents) if contents.form == SWEEP else _of_run(contents)
+    if about.get("still_in_contact") and PERMANENT in contents.groups["history"]:
+        contents.groups["history"][PERMANENT] = math.nan  # it depends on the end of the contact
     told = information(contents)
     if form == "json":
         click.echo(json.dumps(jsonable(_json(told, about))))
@@ -53,7 +58,12 @@ def _of_run(contents: Contents) -> dict[str, Any]:
     steps, span = 0, None
     if "history/time" in result and (steps := len(times := result["history/time"])):
         span = float(times[0]), float(times[-1])
-    return {"steps": steps, "time": span, "summary": summary_of_run(result)}
+    return {
+        "steps": steps,
+        "time": span,
+        "still_in_contact": result.still_in_contact,
+        "summary": summary_of_run(result),
+    }
 
 
 def _of_sweep(contents: Contents) -> dict[str, Any]:

@@ -166,7 +166,7 @@ def _run_one(
     from fecm.results import file_writer
     from fecm.results.journal import Journal
     from fecm.results.result import load
-    from fecm.results.summary import summary
+    from fecm.results.summary import OPEN_END, summary
     from fecm.simulation import Simulation
 
     sizes = estimate(problem.program)
@@ -191,8 +191,11 @@ def _run_one(
     checkpointer.clear()
     for note in simulation.notes:
         click.echo(f"fecm: note: {note}", err=True)
+    result = load(path)
+    if result.still_in_contact:
+        click.echo(f"fecm: note: {OPEN_END}", err=True)
     click.echo(problem.deck.title or "(no title)")
-    for line in summary(load(path)):
+    for line in summary(result):
         click.echo(f"  {line}")
     click.echo(f"  result            {path}")
     if printed is not None:

@@ -91,6 +91,11 @@ class Result:
         """Unit of a dimension such as ``"force/length"``; empty where the deck names no units."""
         return unit_of(dimension, declared_units(self.attributes))
 
+    @property
+    def still_in_contact(self) -> bool:
+        """Whether the run ended in contact, so that what depends on the end is not known."""
+        return f"{HISTORY}/force" in self and still_in_contact(self[f"{HISTORY}/force"])
+
     def to_dataframe(self) -> pandas.DataFrame:
         """The history as a pandas DataFrame: a row a step, by time; step is its first column.
 
@@ -208,6 +213,19 @@ def result_of(contents: Contents) -> Result:
     if found := misfit(arrays.shapes, kinds):
         raise ResultFileError(f"{contents.path}: {found}")
     return Result(arrays, contents.texts, {"": contents.attributes, **contents.groups})
+
+
+def still_in_contact(force: Array) -> bool:
+    """Whether a contact lasts to the end of a history.
+
+    The end of the contact, the permanent indentation and the energies after it are then unknown.
+
+    Parameters
+    ----------
+    force : ndarray (steps,)
+        Contact force.
+    """
+    return bool(len(force) and force[-1] > 0.0)
 
 
 def contact_intervals(force: Array, time: Array) -> list[tuple[float, float]]:

@@ -9,6 +9,11 @@ from fecm.results.result import Result, contact_intervals
 # Contacts that are listed one by one.
 LISTED = 6
 
+OPEN_END = (
+    "the run ends in contact: the end of the contact, the permanent indentation and the energies "
+    "after it are open; take more steps"
+)
+
 
 def summary(result: Result) -> list[str]:
     """Summarise a result: what it found, in the deck's own units."""
@@ -21,17 +26,22 @@ def summary(result: Result) -> list[str]:
             f"steps             {len(time)}, up to time {_quantity(result, time[-1], 'time')}"
         )
     if "history/force" not in result and "tape3/w" in result:
-        w = result["tape3/w"]
-        row, node = np.unravel_index(int(np.abs(w).argmax()), w.shape)
-        lines.append(
-            f"largest w         {_quantity(result, w[row, node], 'length')} at node {node + 1}"
-        )
+        lines += _deflection(result)
     if "modes/angular_frequency" in result:
         found = result["modes/angular_frequency"]
         texts = ", ".join(f"{omega:.6g}" for omega in found[:LISTED])
         more = f" and {len(found) - LISTED} more" if len(found) > LISTED else ""
         lines.append(f"frequencies       {texts}{more} {result.unit('1/time')}".rstrip())
     return lines or ["nothing was stored"]
+
+
+def _deflection(result: Result) -> list[str]:
+    """Largest deflection of a run without impact."""
+    w = result["tape3/w"]
+    if not w.any():
+        return ["largest w         0: nothing moved the plate"]
+    row, node = np.unravel_index(int(np.abs(w).argmax()), w.shape)
+    return [f"largest w         {_quantity(result, w[row, node], 'length')} at node {node + 1}"]
 
 
 def _quantity(result: Result, value: float, dimension: str) -> str:
@@ -58,15 +68,20 @@ def _impact(result: Result) -> list[str]:
     texts = [f"{begin:.6g} to {quantity(end, 'time')}" for begin, end in intervals[:LISTED]]
     if len(intervals) > LISTED:
         texts.append(f"and {len(intervals) - LISTED} more")
+    if result.still_in_contact:
+        if len(intervals) <= LISTED:
+            texts[-1] = f"from {quantity(intervals[-1][0], 'time')}"
+        texts[-1] += ", still in contact at the end"
     if texts:
         lines.append(f"contact           {', '.join(texts)}")
-    indentation = result["history/indentation"]
-    deepest = int(np.argmax(indentation))
-    permanent = float(result.history.attributes["permanent_indentation"])
-    lines.append(
-        f"largest indent    {quantity(indentation[deepest], 'length')} at time "
-        f"{quantity(time[deepest], 'time')}, permanent {quantity(permanent, 'length')}"
-    )
+        indentation = result["history/indentation"]
+        deepest = int(np.argmax(indentation))
+        permanent = float(result.history.attributes["permanent_indentation"])
+        left = "open" if result.still_in_contact else quantity(permanent, "length")
+        lines.append(
+            f"largest indent    {quantity(indentation[deepest], 'length')} at time "
+            f"{quantity(time[deepest], 'time')}, permanent {left}"
+        )
     initial = float(result.energy.attributes["initial"])
     worst = float(np.abs(result["energy/balance_error"]).max())
     share = f"{worst / initial:.2g} of the initial" if initial else f"{worst:.3g}, initially"
