@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fecm.check import Checked, check
+from fecm.check.listing import check_listing
 from fecm.check.memory import check_memory
 from fecm.check.run import UNSTABLE
 from fecm.choices import ENERGY_LIMIT, Choices
@@ -56,7 +57,8 @@ def prepare(path_or_text: str | Path | Deck, mode: str = REPORT) -> Prepared:
     path_or_text : str, Path or Deck
         A file's path, a deck's text, or a model made in Python.
     mode : str
-        In listing mode blanks inside numbers are zeros.
+        In listing mode blanks inside numbers are zeros, and what the printed program can't compute
+        is an error.
 
     Raises
     ------
@@ -70,6 +72,9 @@ def prepare(path_or_text: str | Path | Deck, mode: str = REPORT) -> Prepared:
     reader = Reader(text, blanks_are_zeros=mode == LISTING)
     checked = [check(problem, reader.findings) for problem in reader.problems()]
     problems = [problem for problem in checked if problem is not None]
+    if mode == LISTING and not reader.findings.errors:
+        for problem in problems:
+            check_listing(problem.deck, problem.mesh, reader.findings)
     return Prepared(source, problems, list(reader.findings))
 
 

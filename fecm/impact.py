@@ -124,6 +124,8 @@ class Contact:
         Whether the rod's du/dx start at the approach velocity (the slip ``rod-start``).
     keeps_first_step : bool
         Whether the rod keeps the constants of the first time step (the slip ``rod-dt``).
+    share : float
+        Part of the contact force that the plate feels; 1 but for the slip ``rod-force``.
     """
 
     row: int
@@ -131,6 +133,7 @@ class Contact:
     plate_moves: bool = True
     strains_start_moving: bool = False
     keeps_first_step: bool = False
+    share: float = 1.0
 
 
 class Impact:
@@ -188,11 +191,14 @@ class Impact:
         state = self.motion.start() if plate is None else plate
         return ImpactState(rod, self.law.start(), Point(0.0, 0.0), plate=state)
 
-    def point_force(self, state: ImpactState) -> PointForce:
-        """The contact force on the plate."""
-        return PointForce(self.contact.row, state.contact.force)
+    def point_force(self, state: ImpactState, force: float | None = None) -> PointForce:
+        """The force on the plate: the contact force, or another in its place."""
+        given = state.contact.force if force is None else force
+        return PointForce(self.contact.row, self.contact.share * given)
 
-    def advance(self, state: ImpactState, dt: float, factor: float = 1.0) -> None:
+    def advance(
+        self, state: ImpactState, dt: float, factor: float = 1.0, force: float | None = None
+    ) -> None:
         """Take one step.
 
         Parameters
@@ -203,13 +209,15 @@ class Impact:
             Time step.
         factor : float
             Load factor of FORC's values.
+        force : float, optional
+            Force that the plate feels in place of the contact force (the slip ``prop-contact``).
 
         Raises
         ------
         DivergenceError
             If a number is no longer finite.
         """
-        self.motion.advance(state.plate, dt, factor, self.point_force(state))
+        self.motion.advance(state.plate, dt, factor, self.point_force(state, force))
         step = state.plate.step
         try:
             self.move_projectile(state, dt)

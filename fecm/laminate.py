@@ -18,6 +18,11 @@ from fecm.deck.records import Ply
 
 Floats = NDArray[np.float64]
 
+# Entries of A, B and D that the slip ``small-stiffness`` sets to 0, and the rounding, as a part of
+# A h^n, that it leaves alone.
+LISTING_LEAST = 1.0e-6
+ROUNDING = 1.0e-12
+
 
 @dataclass(frozen=True)
 class Laminate:
@@ -51,7 +56,21 @@ class Laminate:
     def is_coupled(self) -> bool:
         """Whether stretching and bending are coupled (B is not zero beyond rounding)."""
         scale = np.abs(self.A).max() * self.thickness
-        return bool(np.abs(self.B).max() > 1e-12 * scale)
+        return bool(np.abs(self.B).max() > ROUNDING * scale)
+
+    def without_small_entries(self) -> Laminate:
+        """Set the entries of A, B and D below 1e-6 to 0, as the listing's CNPD does.
+
+        Rounding of entries that vanish by symmetry stays: it is no stiffness.
+        """
+        scale = ROUNDING * np.abs(self.A).max()
+
+        def cut(matrix: Floats, power: int) -> Floats:
+            size = np.abs(matrix)
+            small = (size < LISTING_LEAST) & (size > scale * self.thickness**power)
+            return np.where(small, 0.0, matrix)
+
+        return replace(self, A=cut(self.A, 0), B=cut(self.B, 1), D=cut(self.D, 2))
 
 
 def reduced_stiffness(ply: Ply) -> Floats:

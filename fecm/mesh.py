@@ -15,7 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.deck.findings import Findings, Place
-from fecm.deck.model import Boundary, Coordinates, Deck, Elements, Forces, Projectile
+from fecm.deck.model import (
+    Boundary,
+    Coordinates,
+    Deck,
+    Elements,
+    Forces,
+    Impact,
+    Projectile,
+)
 from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
 
 Floats = NDArray[np.float64]
@@ -66,7 +74,7 @@ class Mesh:
         return used[1:]
 
 
-def generate(deck: Deck, findings: Findings | None = None) -> Mesh:
+def generate(deck: Deck, findings: Findings | None = None, *, unit_force: bool = False) -> Mesh:
     """Generate nodes, elements, restraints and forces as the listing's GENVEC and PMESH do.
 
     Parameters
@@ -75,6 +83,9 @@ def generate(deck: Deck, findings: Findings | None = None) -> Mesh:
         The model.
     findings : Findings, optional
         Receives what can't be generated.
+    unit_force : bool
+        Set the force of ROD's unknown to 1 where ROD stands among the segments, so that it replaces
+        an earlier FORC's value and a later FORC's replaces it (the slip ``rod-force``).
 
     Returns
     -------
@@ -93,6 +104,8 @@ def generate(deck: Deck, findings: Findings | None = None) -> Mesh:
             _interpolate(coordinates, segment.records, noted)
         elif isinstance(segment, Forces):
             _interpolate(forces, segment.records, noted)
+        elif isinstance(segment, Impact) and unit_force:
+            forces[segment.node - 1, segment.dof - 1] = 1.0
         elif isinstance(segment, Boundary):
             _carry(codes, segment.records, noted)
         elif isinstance(segment, Elements):

@@ -6,7 +6,7 @@ and the transducer.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fecm.assembly import PlateModel, Rules, assemble
 from fecm.choices import Choices
@@ -20,7 +20,7 @@ from fecm.gages import Gages, gages
 from fecm.impact import Contact, Impact
 from fecm.indentation import Constants, CriticalConstants, Law, Measured, MemoryLaw, StickyLaw
 from fecm.laminate import laminate_of_deck
-from fecm.mesh import Mesh, rod_diameters
+from fecm.mesh import Mesh, generate, rod_diameters
 from fecm.plate import StrainField
 from fecm.projectile import (
     LISTING_DENSITY,
@@ -89,9 +89,12 @@ def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> 
     """Make the plate of a deck, with the slips that are on."""
     material = deck.need(Material)
     bending, shear, points = rules(material)
+    laminate = laminate_of_deck(deck, isotropic_g12="g12" in slips)
+    if "small-stiffness" in slips:
+        laminate = laminate.without_small_entries()
     return assemble(
         mesh,
-        laminate_of_deck(deck, isotropic_g12="g12" in slips),
+        laminate,
         Rules(
             bending=bending,
             shear=bending if "shear-order" in slips else shear,
@@ -149,8 +152,12 @@ def build_impact(
     rod: Projectile,
     slips: frozenset[str],
     integrator: str = WILSON,
+    share: float = 1.0,
 ) -> Impact:
-    """Make projectile, law and contact, with the slips that are on."""
+    """Make projectile, law and contact, with the slips that are on.
+
+    The plate feels the given share of the contact force.
+    """
     card = deck.need(ImpactCard)
     contact = Contact(
         row=motion.row(card.node - 1, card.dof - 1),
@@ -158,6 +165,7 @@ def build_impact(
         plate_moves="target" not in slips,
         strains_start_moving="rod-start" in slips,
         keeps_first_step="rod-dt" in slips,
+        share=share,
     )
     return Impact(motion, rod, build_law(deck, slips), contact, STEPS[integrator])
 
@@ -185,12 +193,18 @@ def set_up(
     """
     chosen = choices or Choices()
     slips, solver, method = chosen.slips, chosen.solver, chosen.rod_method
-    plate = build_plate(deck, mesh, slips)
     rod = build_projectile(deck, slips).with_mass(method.mass)
     hit = None
+    share = 1.0
     if hits:
         card = deck.need(ImpactCard)
         hit = (card.node - 1, card.dof - 1)
+        if "rod-force" in slips:
+            forces = generate(deck, unit_force=True).forces
+            share = float(forces[hit])
+            forces[hit] = 0.0
+            mesh = replace(mesh, forces=forces)
+    plate = build_plate(deck, mesh, slips)
     reduced = reduction(plate, hit) if moves_only and solver != CSR else None
     moving = plate.neq if reduced is None else reduced.count
     workers = Workers(chosen.threads or (available() if moving >= WORTH_SHARING else 1))
@@ -198,7 +212,7 @@ def set_up(
     return Setup(
         plate=plate,
         motion=motion,
-        impact=build_impact(deck, motion, rod, slips, method.integrator) if hits else None,
+        impact=build_impact(deck, motion, rod, slips, method.integrator, share) if hits else None,
         station=build_station(deck, rod, slips),
         strains=plate.strain_field(plate.rules.strains),
         stress_points=plate.strain_field(rules(deck.need(Material))[2]),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import difflib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fecm.deck.findings import Findings
 from fecm.deck.records import Macro
@@ -401,11 +401,23 @@ def _entry(body: Body, count: int) -> tuple[int, dict[str, int], dict[int, int]]
     return macros, passes, steps
 
 
-def tally(body: Body) -> Tally:
-    """Count exactly what a program does and stores; carries out its loops where it must."""
+def tally(body: Body, *, counts_anew: bool = False) -> Tally:
+    """Count exactly what a program does and stores; carries out its loops where it must.
+
+    Parameters
+    ----------
+    body : tuple
+        The program.
+    counts_anew : bool
+        Whether RODP counts the steps since the last output (the slip ``counter``): then
+        `contact_rows` is an upper bound where RODP cards differ.
+    """
     counted = estimate(body)
     if len({every(m) if m.word == "RODP" else 0 for m in flat(body) if m.word in STEPS}) <= 1:
         return counted
+    if counts_anew:
+        least = min(every(m) for m in flat(body) if m.word == "RODP")
+        return replace(counted, contact_rows=counted.steps // least)
     step = rows = 0
 
     def bind(macro: Macro) -> Act:

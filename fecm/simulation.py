@@ -88,6 +88,10 @@ class Simulation:
     _residual: Floats | None = field(default=None, init=False)
     _settled: bool = field(default=False, init=False)
     _state_clock: float = field(default=0.0, init=False)
+    # Under the slip `counter`, impact steps since the last output.
+    _counted: int = field(default=0, init=False)
+    # Under the slip `prop-contact`, what PROP has put in the place of the contact force.
+    _replaced: float | None = field(default=None, init=False)
     _place: list[tuple[int, int]] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
@@ -101,7 +105,9 @@ class Simulation:
         if self.setup.impact is not None:
             self.impact = self.setup.impact.start(self.plate)
         self.course = Course(program)
-        self._sizes = tally(program)
+        self._sizes = tally(program, counts_anew="counter" in self.slips)
+        if "prop-contact" in self.slips:
+            self._replaced = 1.0  # PROP's first value in the listing
         self._tables = list(deck.tables)
         self._tick = max(1, min(64, 100_000 // self.setup.plate.neq))
         self._header()
@@ -194,6 +200,7 @@ class Simulation:
             "tolerance": self.tolerance, "consistent": self.consistent, "notes": list(self.notes),
             "tangent": self._tangent is not None, "settled": self._settled,
             "residual": np.empty(0) if self._residual is None else self._residual,
+            "counted": self._counted, "replaced": self._replaced,
             "printed": self.printer.state(),
             "first_dt": None if self.setup.impact is None else self.setup.impact.first_dt,
         }  # fmt: skip
@@ -217,6 +224,7 @@ class Simulation:
         if state["tangent"]:
             self._tangent = Tangent(self.setup.plate)
         self._settled = state["settled"]
+        self._counted, self._replaced = state["counted"], state["replaced"]
         self._residual = state["residual"] if len(state["residual"]) else None
         if self.setup.impact is not None:
             self.setup.impact.first_dt = state["first_dt"]
@@ -242,7 +250,12 @@ class Simulation:
     def factor(self, clock: float | None = None) -> float:
         """Load factor of FORC's values at a time of the clock, now without one."""
         if "force-scale" in self.slips and self.impact is not None:
-            return float(self.impact.contact.force)
+            contact = float(self.impact.contact.force)
+            return contact if self._replaced is None else self._replaced
+        return self._load_factor(clock)
+
+    def _load_factor(self, clock: float | None = None) -> float:
+        """PROP's load factor at a time of the clock, now without one."""
         if self.table is None or "prop" in self.slips:
             return self.constant_factor
         return load_factor(self.table, self.clock if clock is None else clock)
@@ -258,6 +271,8 @@ class Simulation:
             self.constant_factor = 0.0
         elif self.table is not None:
             self.constant_factor = load_factor(self.table, 0.0)
+        if "prop-contact" in self.slips:
+            self._replaced = self._load_factor()
 
     def set_time_step(self, n: float, current: int) -> None:
         """DT; 0 takes a part of the critical time step."""
@@ -289,14 +304,27 @@ class Simulation:
             return
         self._before_step()
         plate = self.plate
-        stores = not (plate.step + 1) % n
+        if not plate.step:
+            self._replaced = None  # the listing's first impact step begins with PROP = 0
+        stores = self._stores(n)
         if stores and "tapes" in self.slips:
             self._recorder.strains(plate.step + 1, plate.time, self.field())
-        self.setup.impact.advance(self.impact, self.dt, self.factor())
+        self.setup.impact.advance(self.impact, self.dt, self.factor(), self._replaced)
+        self._replaced = None
         self._recorder.steps.step(plate, self.impact, self.factor(), contact_row=stores)
         if stores and "tapes" not in self.slips:
             self._recorder.strains(plate.step, plate.time, self.field())
         self._after_step()
+
+    def _stores(self, n: int) -> bool:
+        """Whether the impact step that begins stores contact and strains."""
+        if "counter" not in self.slips:
+            return not (self.plate.step + 1) % n
+        self._counted += 1
+        stores = self._counted == n
+        if self._counted >= n:
+            self._counted = 0
+        return stores
 
     def central_difference(self, n: float, current: int) -> None:
         """EXCD: one step of the plate alone, under the given loads."""

@@ -102,6 +102,31 @@ SLIPS = (
         "FORC has its proportional load; the contact force acts on the impact unknown alone.",
     ),
     Slip(
+        "rod-force",
+        "ROD writes the contact force's unit load into FORC's array: it replaces FORC's value of "
+        "the impact unknown, and a FORC segment after ROD replaces it. The plate feels the contact "
+        "force times what is left there.",
+        "The plate feels the contact force, and FORC's value as well, in whatever order the "
+        "segments stand.",
+    ),
+    Slip(
+        "prop-contact",
+        "PROP and the contact force share one variable: a PROP between two impact steps replaces "
+        "the contact force that the plate feels in the next step.",
+        "PROP scales FORC's values; the contact force acts as it is.",
+    ),
+    Slip(
+        "counter",
+        "RODP counts the steps since the last output, and compares them with the N of its own "
+        "card: where N changes, other rows are stored, or none.",
+        "RODP stores at every N-th impact step since the problem began.",
+    ),
+    Slip(
+        "small-stiffness",
+        "Every entry of A, B and D below 1e-6 is set to 0, whatever the units are.",
+        "A, B and D are what the layers give.",
+    ),
+    Slip(
         "rod-dt",
         "The rod's integration keeps the constants of the first DT for good.",
         "The rod's integration follows DT.",

@@ -97,7 +97,7 @@ def run(text: str, path: Path, stop: int = 0, *, resume: bool = False, slips: st
     return looks
 
 
-@pytest.mark.parametrize("slips", ["", "rod-dt tapes reload"])
+@pytest.mark.parametrize("slips", ["", "rod-dt tapes reload", "counter prop-contact rod-force"])
 def test_a_run_stopped_anywhere_goes_on_to_the_same_bytes(tmp_path: Path, slips: str) -> None:
     whole = tmp_path / "whole.h5"
     looks = run(deck(), whole, slips=slips)

@@ -240,7 +240,7 @@ def test_listing_mode_is_all_slips_and_report_mode_none() -> None:
     assert slips.active_slips("report") == frozenset()
     assert slips.active_slips("listing") == frozenset(slips.NAMES)
     assert slips.active_slips("report", ["target"]) == {"target"}
-    assert len(slips.NAMES) == len(set(slips.NAMES)) == 14
+    assert len(slips.NAMES) == len(set(slips.NAMES)) == 18
 
 
 @pytest.mark.parametrize(

@@ -69,7 +69,7 @@ def test_info_tells_the_run_its_summary_and_every_dataset(tmp_path: Path) -> Non
         "coordinates 609x2 float64 length 0 to 6",
     ):
         assert line in text
-    assert "slips check-end, density, force-scale" in text
+    assert "slips check-end, counter, density" in text
     for group in ("mesh", "laminate", "tape3", "tape8", "tape9", "history", "energy"):
         assert f"\n{group}: " in text
 

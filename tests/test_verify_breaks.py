@@ -235,7 +235,7 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
         {"infinite-plate": ("",), "report-impact": ("worst",)},
     ),
     "action without equal reaction": (
-        mutate(Impact.point_force, "state.contact.force)", "1.01 * state.contact.force)"),
+        mutate(Impact.point_force, "self.contact.share * given", "1.01 * given"),
         {"report-impact": ("worst",)},
     ),
     "work of the new force alone": (
