@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -14,6 +15,7 @@ import pytest
 
 import fecm
 from fecm.cli.apart import GB, limits_for
+from fecm.results.schema import ResultFileError
 from tests.calls import assert_unusable, call
 from tests.decks import small
 
@@ -41,6 +43,15 @@ def act(file, what):
     if what == "hang":  # in C, where no signal handler is carried out
         print("hanging", file=sys.stderr, flush=True)
         collections.deque(itertools.repeat(0), maxlen=0)
+    if what == "wait":  # in C, which takes a signal for nothing to stop at
+        import ctypes
+
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        print("hanging", file=sys.stderr, flush=True)
+        ctypes.PyDLL(None).sleep(600)
+    if what == "write":  # until somebody reads
+        for _ in range(20_000):
+            print("line", flush=True)
     if what == "swallow":
         bytearray(10**12)
     if what == "work":
@@ -49,6 +60,8 @@ def act(file, what):
         raise SystemExit(1)
     click.echo("done")
 
+if sys.argv[-1] in ("wait", "write"):
+    apart.WAIT, apart.WAIT_SHARE = 0.8, 0.0
 main()
 """
 
@@ -87,6 +100,32 @@ def test_a_call_that_never_comes_back_is_one_line(tmp_path: Path) -> None:
     assert told.count("\n") == 1
 
 
+def test_a_call_that_waits_for_ever_is_one_line(tmp_path: Path) -> None:
+    status, out, err = ended(tmp_path, "wait")
+    assert (status, out) == (2, "")
+    assert err == (
+        "hanging\nfecm: error: x.h5 can't be read: the system did not deliver it within 0.8 s, as happens with "
+        "a disk or network that hangs (FECM_PATIENCE=SECONDS gives it longer)\n"
+    )
+
+
+def test_waiting_for_a_reader_of_the_output_has_no_limit(tmp_path: Path) -> None:
+    program = start(tmp_path, "write")
+    with pytest.raises(subprocess.TimeoutExpired):
+        program.wait(timeout=1.6)
+    out, err = program.communicate(timeout=60)
+    assert (program.returncode, out.count("line"), err) == (0, 20_000, "")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the system does not kill it")
+def test_a_child_ends_with_its_parent(tmp_path: Path) -> None:
+    program = start(tmp_path, "wait")
+    assert program.stderr is not None
+    assert program.stderr.readline().startswith("hanging")
+    program.kill()
+    program.communicate(timeout=10)  # the child holds the other ends of both pipes
+
+
 def test_more_memory_than_is_free_is_one_line(tmp_path: Path) -> None:
     status, out, err = ended(tmp_path, "swallow")
     assert (status, out) == (2, "")
@@ -118,6 +157,7 @@ def test_limits_grow_with_the_files() -> None:
     few, many = limits_for(10**5, None), limits_for(10 * GB, None)
     assert (few.memory, round(few.call), round(few.whole)) == (4 * GB + 5 * 10**6, 10, 601)
     assert (many.memory, round(many.call), round(many.whole)) == (504 * GB, 510, 100_600)
+    assert (round(few.wait), round(many.wait)) == (60, 10_060)
     assert limits_for(10 * GB, 8 * GB).memory == 6 * GB
 
 
@@ -220,3 +260,81 @@ def test_elements_of_nodes_that_the_mesh_has_not_are_one_line(result: Path) -> N
         assert_unusable(done)
         assert "mesh/elements names nodes outside 1 to 25" in done.stderr
     assert [path.name for path in result.parent.iterdir()] == [result.name]
+
+
+def in_another_file(file: h5py.File) -> None:
+    secret = Path(file.filename).with_name("secret")
+    secret.write_text("top secret")
+    file.create_dataset("mesh/extra", (10,), "u1", external=[(str(secret), 0, 10)])
+
+
+def in_another_dataset(file: h5py.File) -> None:
+    layout = h5py.VirtualLayout((10,), "f8")
+    layout[...] = h5py.VirtualSource("other.h5", "history/force", (10,))
+    file.create_virtual_dataset("mesh/extra", layout)
+
+
+def soft_link(file: h5py.File) -> None:
+    file["mesh/extra"] = h5py.SoftLink("/history/force")
+
+
+def external_link(file: h5py.File) -> None:
+    file["mesh/extra"] = h5py.ExternalLink("other.h5", "history/force")
+
+
+def references(file: h5py.File) -> None:
+    file.create_dataset("mesh/extra", data=[file["history/force"].ref], dtype=h5py.ref_dtype)
+
+
+def regions(file: h5py.File) -> None:
+    region = file["history/force"].regionref[:2]
+    file.create_dataset("mesh/extra", data=[region], dtype=h5py.regionref_dtype)
+
+
+ELSEWHERE: dict[Callable[[h5py.File], None], str] = {
+    in_another_file: "has external storage",
+    in_another_dataset: "is a virtual dataset",
+    soft_link: "is a soft link",
+    external_link: "is an external link",
+    references: "holds references",
+    regions: "holds references",
+}
+
+
+@pytest.mark.parametrize("edit", ELSEWHERE, ids=lambda edit: edit.__name__)
+def test_what_leads_to_another_object_is_refused_by_name(
+    result: Path, edit: Callable[[h5py.File], None]
+) -> None:
+    with h5py.File(result, "r+") as file:
+        edit(file)
+    reason = f"{result}: mesh/extra {ELSEWHERE[edit]}"
+    for arguments in (
+        ["info", result],
+        ["diff", result, result],
+        ["tapes", result, "-d", result.parent],
+        ["export", result, "--to", "csv", "--dataset", "mesh/extra", "-o", "-"],
+        ["plot", result, "--kind", "mesh", "-o", result.with_name("x.png")],
+    ):
+        done = call(*arguments)
+        assert_unusable(done)
+        assert reason in done.stderr
+        assert done.stdout == ""
+    with pytest.raises(ResultFileError, match="mesh/extra"):
+        fecm.load(result)
+
+
+def test_a_sweep_whose_cases_are_in_another_file_is_refused_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "sweep.h5"
+    fecm.sweep(small(), {"velocity": [50.0, 100.0]}, output=path)
+    with h5py.File(path, "r+") as file:
+        del file["cases/velocity"]
+        file.create_dataset("cases/velocity", (2,), "f8", external=[("/dev/zero", 0, 16)])
+    with pytest.raises(ResultFileError, match="cases/velocity has external storage"):
+        fecm.load_sweep(path)
+
+
+def test_a_pipe_in_a_folder_of_tapes_is_refused(result: Path) -> None:
+    os.mkfifo(result.with_name("tape3"))
+    done = call("diff", result, result.parent)
+    assert_unusable(done)
+    assert "tape3: a tape is an ordinary file" in done.stderr

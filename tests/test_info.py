@@ -151,12 +151,6 @@ def test_a_title_can_not_command_the_terminal(changed: Callable[[Edit], Path]) -
     assert first == r"red \x1b[31m\nline"
 
 
-def link_to_nowhere(file: h5py.File) -> None:
-    del file["tape9/force"]
-    file["tape9/force"] = h5py.SoftLink("/nowhere")
-    file["tape9/other"] = h5py.ExternalLink("nowhere.h5", "/x")
-
-
 def foreign_attributes(file: h5py.File) -> None:
     file.attrs["reference"] = file["tape3"].ref
     file.attrs["region"] = file["tape3/w"].regionref[0, :2]
@@ -192,7 +186,7 @@ def named_type(file: h5py.File) -> None:
 
 @pytest.mark.parametrize(
     "edit",
-    [link_to_nowhere, foreign_attributes, without_energy, without_attributes, foreign_initial,
+    [foreign_attributes, without_energy, without_attributes, foreign_initial,
      loop_of_groups, named_type],
 )  # fmt: skip
 def test_a_result_with_foreign_or_missing_parts_is_still_told(

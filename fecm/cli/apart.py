@@ -11,10 +11,14 @@ Limits of the child:
 - processor time of one call of a library, in which no Python is carried out: ``PATIENCE`` seconds
   and one for every ``SPEED`` bytes of the files; the variable FECM_PATIENCE puts another number in
   the place of ``PATIENCE``;
-- processor time of the whole command: ``WHOLE`` seconds and one for every ``WHOLE_SPEED`` bytes.
+- processor time of the whole command: ``WHOLE`` seconds and one for every ``WHOLE_SPEED`` bytes;
+- waiting inside of one call of a library, without any processor time: ``WAIT`` seconds, or
+  ``WAIT_SHARE`` times the patience if that is longer, and one for every ``WAIT_SPEED`` bytes.
 
-Waiting (a slow disk, a busy or sleeping machine) takes no processor time and does not count.  Where
-the system has no fork, the command reads the files itself.
+A child that runs Python sends a byte through a pipe about once a second, also while Python waits
+for a reader of its output; the parent counts the time without such a byte.  A machine that is busy
+or asleep does not count.  The child is killed when its parent ends.  Where the system has no fork,
+the command reads the files itself.
 """
 
 from __future__ import annotations
@@ -24,6 +28,7 @@ import contextlib
 import functools
 import math
 import os
+import select
 import signal
 import sys
 import time
@@ -35,6 +40,7 @@ from typing import Any, NoReturn, TypeVar
 
 import click
 
+from fecm.children import die_with_parent
 from fecm.cli.common import INTERRUPTED, TERMINATED, Refused
 from fecm.files import clear_partials_of
 from fecm.memory import available, said
@@ -44,7 +50,11 @@ GB = 10**9
 ROOM, ROOM_A_BYTE = 4 * GB, 50
 PATIENCE, SPEED = 10.0, 20_000_000
 WHOLE, WHOLE_SPEED = 600.0, 100_000
+WAIT, WAIT_SHARE, WAIT_SPEED = 60.0, 6.0, 1_000_000
 FREE_SHARE = 0.75
+
+# Parts of the time that a child may wait; a stop of parent and child (Ctrl-Z) spoils one of them.
+PARTS = 4
 
 # Seconds that a child is given to end after a signal, first by itself, then when told.
 GRACE = 0.3, 2.0
@@ -71,11 +81,14 @@ class Limits:
         Bytes.
     call, whole : float
         Processor time of one call of a library, and of the command (s).
+    wait : float
+        Time that one call of a library may wait without processor time (s).
     """
 
     memory: int
     call: float
     whole: float
+    wait: float
 
 
 def limits_for(size: int, free: int | None) -> Limits:
@@ -90,7 +103,13 @@ def limits_for(size: int, free: int | None) -> Limits:
     memory = ROOM + ROOM_A_BYTE * size
     if free is not None:
         memory = min(memory, int(FREE_SHARE * free))
-    return Limits(memory, _patience() + size / SPEED, WHOLE + size / WHOLE_SPEED)
+    patience = _patience()
+    return Limits(
+        memory,
+        call=patience + size / SPEED,
+        whole=WHOLE + size / WHOLE_SPEED,
+        wait=max(WAIT, WAIT_SHARE * patience) + size / WAIT_SPEED,
+    )
 
 
 def _patience() -> float:
@@ -127,9 +146,15 @@ def reads(*names: str) -> Callable[[Command], Command]:
             told = printable(" or ".join(map(str, dict.fromkeys(files))))
             sys.stdout.flush()
             sys.stderr.flush()
+            parent = os.getpid()
+            beats, heart = os.pipe()
             if child := os.fork():
-                _end_like(child, _wait(child), told, limits, _folders(values))
-            _confine(limits)
+                os.close(heart)
+                ended = _wait(child, beats, limits)
+                _end_like(child, ended, told, limits, _folders(values))
+            os.close(beats)
+            die_with_parent(parent)
+            _confine(limits, heart)
             try:
                 function(**values)
             except MemoryError:
@@ -162,8 +187,11 @@ def _folders(values: dict[str, Any]) -> set[Path]:
 # The child --------------------------------------------------------------------------------------
 
 
-def _confine(limits: Limits) -> None:
-    """Put the limits on this process, and take the noise of libraries from standard error."""
+def _confine(limits: Limits, heart: int) -> None:
+    """Put the limits on this process, and take the noise of libraries from standard error.
+
+    The open pipe `heart` tells the parent that this process runs.
+    """
     import resource
 
     def limit(what: int, most: int) -> None:
@@ -177,14 +205,18 @@ def _confine(limits: Limits) -> None:
     limit(resource.RLIMIT_CPU, math.ceil(limits.whole))
     _quieten()
 
+    os.set_blocking(heart, False)
+
     def beat(number: int, frame: FrameType | None) -> None:
         signal.setitimer(signal.ITIMER_PROF, limits.call)
+        with contextlib.suppress(OSError):  # the pipe is full: the parent is stopped
+            os.write(heart, b".")
 
-    # Python carries out a handler between two of its own instructions: as long as it does, the
-    # timer that would end the process is wound up again.
+    # Python carries out a handler between two of its own instructions, and when a signal interrupts
+    # its own reading or writing: as long as it does, the timer that would end the process is wound
+    # up again.
     signal.signal(signal.SIGPROF, signal.SIG_DFL)
     signal.signal(signal.SIGALRM, beat)
-    signal.siginterrupt(signal.SIGALRM, False)
     every = min(1.0, limits.call / 4.0)
     signal.setitimer(signal.ITIMER_REAL, every, every)
     signal.setitimer(signal.ITIMER_PROF, limits.call)
@@ -224,11 +256,18 @@ def _noticing() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _wait(child: int) -> int:
-    """Exit status of a child, negative for a signal; ends it when a signal asks for that."""
+def _wait(child: int, beats: int, limits: Limits) -> int | None:
+    """Exit status of a child, negative for a signal, None for one that waited too long.
+
+    Ends the child when a signal asks for that.
+    """
     try:
         with _noticing():
-            return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+            waited = not _watch(child, beats, limits.wait)
+            if waited:
+                os.kill(child, signal.SIGKILL)
+            status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+            return None if waited and status == -signal.SIGKILL else status
     except _CameError as came:
         number = int(came.args[0])
         # Ctrl-C goes to the child as well, which may say so itself; a hanging one can't.
@@ -246,6 +285,30 @@ def _wait(child: int) -> int:
         return 128 + number
 
 
+def _watch(child: int, beats: int, wait: float) -> bool:
+    """Wait for the end of a child; False if it neither beats nor computes for too long."""
+    silent, before = 0, _processor_time(child)
+    while silent < PARTS:
+        silent += 1
+        if select.select([beats], [], [], wait / PARTS)[0]:
+            if not os.read(beats, 4096):
+                return True
+            silent = 0
+        now = _processor_time(child)
+        if now != before:
+            silent, before = 0, now
+    return False
+
+
+def _processor_time(child: int) -> tuple[bytes, ...]:
+    """Processor time of a child by proc(5); nothing where the system does not tell."""
+    try:
+        stat = Path(f"/proc/{child}/stat").read_bytes()
+    except OSError:
+        return ()
+    return tuple(stat.rpartition(b")")[2].split()[11:13])
+
+
 def _ended(child: int) -> bool:
     try:
         return os.waitpid(child, os.WNOHANG)[0] == child
@@ -253,10 +316,17 @@ def _ended(child: int) -> bool:
         return True
 
 
-def _end_like(child: int, status: int, told: str, limits: Limits, folders: set[Path]) -> NoReturn:
+def _end_like(
+    child: int, status: int | None, told: str, limits: Limits, folders: set[Path]
+) -> NoReturn:
     """End this program as the child has ended."""
-    if status < 0 or status in (INTERRUPTED, TERMINATED):
+    if status is None or status < 0 or status in (INTERRUPTED, TERMINATED):
         clear_partials_of(child, folders)
+    if status is None:
+        raise Refused(
+            f"{told} can't be read: the system did not deliver it within {limits.wait:.3g} s, as "
+            "happens with a disk or network that hangs (FECM_PATIENCE=SECONDS gives it longer)"
+        )
     if status >= 0:
         raise SystemExit(status)
     if status in (-signal.SIGINT, -signal.SIGTERM):

@@ -1,7 +1,8 @@
 """Reads result files, of runs and of sweeps: HDF5 that may come from anywhere.
 
-A file is looked through once (:func:`read`); its numbers are read when they are asked for.  Links
-are not followed, and whatever a damaged file raises inside of the library is one
+A file is looked through once (:func:`read`); its numbers are read when they are asked for.
+Whatever makes HDF5 read another file is refused before any dataset is read: links, virtual
+datasets, external storage.  Any error of the library on a damaged file becomes one
 :class:`~fecm.results.schema.ResultFileError`.
 """
 
@@ -183,6 +184,7 @@ def read(path: Path, *forms: str) -> Contents:
     with _troubles(path), h5py.File(path) as file:
         attributes = _attributes(file)
         _check_form(path, attributes, forms or (FORMAT,))
+        _check_links(path, file)
         contents = Contents(path, FileArrays(path), attributes=attributes)
         file.visititems(_Visitor(contents))
     return contents
@@ -203,6 +205,39 @@ def _check_form(path: Path, attributes: Mapping[str, Any], forms: tuple[str, ...
         )
 
 
+# What a link is that is no hard link, by HDF5's number of its kind.
+LINKS = {
+    h5py.h5l.TYPE_SOFT: "a soft link to another object",
+    h5py.h5l.TYPE_EXTERNAL: "an external link to another file",
+}
+
+
+def _check_links(path: Path, file: h5py.File) -> None:
+    """Refuse links that lead elsewhere; none is followed."""
+
+    def found(name: str | bytes, info: Any) -> tuple[str, int] | None:
+        return None if info.type == h5py.h5l.TYPE_HARD else (_text(name), info.type)
+
+    if link := file.id.links.visit(found, info=True):
+        what = LINKS.get(link[1], "a link of unknown kind")
+        raise ResultFileError(f"{path}: {link[0]} is {what}; links are not followed")
+
+
+def _check_storage(path: Path, name: str, item: h5py.Dataset) -> None:
+    """Refuse a dataset whose numbers are not in this file, before its shape is asked for."""
+    created = item.id.get_create_plist()
+    if created.get_layout() == h5py.h5d.VIRTUAL:
+        raise ResultFileError(
+            f"{path}: {name} is a virtual dataset, whose numbers are read from other datasets or "
+            "files; they are not read"
+        )
+    if created.get_external_count():
+        raise ResultFileError(
+            f"{path}: {name} has external storage: its numbers are in another file, which is not "
+            "read"
+        )
+
+
 class _Visitor:
     """Notes what stands in a file."""
 
@@ -217,9 +252,10 @@ class _Visitor:
             self._dataset(name, item)
 
     def _dataset(self, name: str, item: h5py.Dataset) -> None:
+        contents, path = self._contents, self._contents.path
+        _check_storage(path, name, item)
         if "/" not in name and item.is_scale:
             return  # it numbers an axis
-        contents, path = self._contents, self._contents.path
         if h5py.check_string_dtype(item.dtype) and item.shape == ():
             contents.texts[name] = str(_plain(item[()]))
         elif contents.form == SWEEP and h5py.check_string_dtype(item.dtype) and item.ndim == 1:
@@ -234,6 +270,8 @@ class _Visitor:
                 )
             contents.arrays.shapes[name] = shape
             contents.arrays.dtypes[name] = item.dtype.newbyteorder("=")
+        elif h5py.check_ref_dtype(item.dtype) is not None:
+            raise ResultFileError(f"{path}: {name} holds references; they are not followed")
         else:
             raise ResultFileError(f"{path}: {name} holds neither numbers nor one text")
 

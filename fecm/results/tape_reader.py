@@ -87,6 +87,8 @@ def read_tapes(folder: Path) -> TapeText:
             raise ResultFileError(f"{folder}: there is both a {name} and a {name}.txt")
         if not found:
             continue
+        if not found[0].is_file():
+            raise ResultFileError(f"{found[0]}: a tape is an ordinary file")
         text = _Lines(found[0])
         if not text.lines:
             continue  # the program opened this tape and wrote nothing

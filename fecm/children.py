@@ -1,0 +1,27 @@
+"""Child processes that do not outlive their parent."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+
+# prctl(2): signal of this process when its parent ends.
+PR_SET_PDEATHSIG = 1
+
+
+def die_with_parent(parent: int) -> None:
+    """Have the system kill this process when its parent ends; elsewhere than on Linux do nothing.
+
+    Parameters
+    ----------
+    parent : int
+        The parent's process id, taken before the fork: the parent may have ended since.
+    """
+    if sys.platform != "linux":
+        return
+    import ctypes
+
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), signal.SIGKILL)
