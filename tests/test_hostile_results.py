@@ -104,8 +104,8 @@ def test_a_call_that_waits_for_ever_is_one_line(tmp_path: Path) -> None:
     status, out, err = ended(tmp_path, "wait")
     assert (status, out) == (2, "")
     assert err == (
-        "hanging\nfecm: error: x.h5 can't be read: the system did not deliver it within 0.8 s, as happens with "
-        "a disk or network that hangs (FECM_PATIENCE=SECONDS gives it longer)\n"
+        "hanging\nfecm: error: x.h5 can't be read: the system did not deliver it within 0.8 s, as "
+        "happens with a disk or network that hangs (FECM_PATIENCE=SECONDS gives it longer)\n"
     )
 
 
