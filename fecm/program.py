@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from fecm.deck.findings import Findings
+from fecm.deck.numbers import parse_real
 from fecm.deck.records import Macro
 
 NESTING = 64
@@ -115,9 +116,12 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
     body: list[Macro | Loop] = []
     done: set[str] = set()
     for macro in macros:
-        word = WORDS.get(macro.word) or _unknown(macro, findings)
+        known = WORDS.get(macro.word)
+        word = known or _unknown(macro, findings)
         if word is None:
             continue
+        if known is not None:
+            _check_unused(known, macro, findings)
         _check_value(word, macro, findings)
         _check_order(word, macro, done, findings)
         if word.inside and not open_loops:
@@ -181,6 +185,35 @@ def _check_order(word: Word, macro: Macro, done: set[str], findings: Findings) -
             )
             done.add(choices[0])
     done.add(word.name)
+
+
+def _check_unused(word: Word, macro: Macro, findings: Findings) -> None:
+    """Report the first field that a word does not use and that is not blank."""
+    if macro.option:
+        is_number = word.value and not macro.value and parse_real(macro.option) is not None
+        example = f"{word.name},{macro.option}"
+        findings.add(
+            "E514",
+            f"{word.name} takes no second word, but `{macro.option}` stands there.",
+            macro.place("second word"),
+            f"the number stands in columns 11-15 or behind a comma: {example}"
+            if is_number
+            else "take it out",
+        )
+    elif macro.value and not word.value:
+        findings.add(
+            "E514",
+            f"{word.name} takes no number, but {macro.value:g} stands there.",
+            macro.place("value"),
+            "take it out",
+        )
+    elif macro.second:
+        findings.add(
+            "E514",
+            f"{word.name} takes no second number, but {macro.second:g} stands there.",
+            macro.place("second value"),
+            f"a number of more than five digits stands behind a comma: {word.name},123456",
+        )
 
 
 def _check_value(word: Word, macro: Macro, findings: Findings) -> None:

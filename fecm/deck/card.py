@@ -6,6 +6,7 @@ values separated by commas, in the same order; everything from ``!`` on is a com
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from collections.abc import Sequence
@@ -14,7 +15,7 @@ from functools import cache
 from itertools import pairwise
 
 from fecm.deck.findings import Findings, Place
-from fecm.deck.numbers import format_real, parse_integer, parse_real
+from fecm.deck.numbers import LONGEST, format_real, parse_integer, parse_real
 
 Value = int | float | str
 
@@ -76,8 +77,8 @@ class Card:
 
     @property
     def is_blank(self) -> bool:
-        """Whether the card holds nothing."""
-        return not self.data.strip()
+        """Whether every field of the card is blank."""
+        return not self.data.replace(",", "").strip()
 
     @property
     def is_keyword(self) -> bool:
@@ -161,46 +162,135 @@ def read_values(
             "write blanks instead of tabs",
         )
         return None
-    if fixed and not blanks_are_zeros and (straddle := _straddling(card, fields)):
-        first, last = straddle
-        findings.add(
-            "E105",
-            f"The number `{card.data[first - 1 : last]}` straddles two fields.",
-            Place(card.line, first, last, card.text, _neighbours(fields, first, last)),
-            "right-justify each number in its own columns",
-        )
+    if fixed and not _is_aligned(card, fields, findings, cut_is_meant=blanks_are_zeros):
         return None
     pieces = card.cut(fields)
-    _warn_of_rest(card, fields, pieces, findings)
+    if not _ends_with_fields(card, fields, pieces, findings):
+        return None
     texts = [text for _, text in pieces[: len(fields)]]
     texts += [""] * (len(fields) - len(texts))
     values: list[Value | None] = []
     for field, text in zip(fields, texts, strict=True):
         if field.kind == "A":
-            values.append(text.rstrip())
+            values.append(_word(field, text, source, findings))
         else:
             values.append(_number(field, text, source, findings, fixed and blanks_are_zeros))
     sound = [value for value in values if value is not None]
     return sound if len(sound) == len(values) else None
 
 
-def _warn_of_rest(
+def _is_aligned(card: Card, fields: Fields, findings: Findings, *, cut_is_meant: bool) -> bool:
+    """Whether no text crosses the end of its field; report the first one that does.
+
+    Adjacent numbers may fill their fields.  With `cut_is_meant` a number may be cut in two, as the
+    report's machine did.
+    """
+    data = card.data
+    for field, following in pairwise(fields):
+        gap = data[field.last : following.first - 1]
+        column = field.last + 1 + len(gap) - len(gap.lstrip())
+        first, last = _run_around(data, column) if gap.strip() else (0, 0)
+        if first and not data[first - 1 : last].isalpha():  # a word may have more than four letters
+            target = next(f for f in fields if f.first > column and f.kind != "A")
+            findings.add(
+                "E108",
+                f"Column {column} belongs to no field, but `{data[column - 1]}` stands in it.",
+                Place(card.line, first, last, card.text),
+                _remedy(card, fields, last - first + 1, target.width)
+                or f"cols {target.first}-{target.last} are the next field: {target.name}",
+            )
+            return False
+        if cut_is_meant or following.kind == "A" or following.first != field.last + 1:
+            continue
+        if data[field.last - 1 : following.first].count(" ") or len(data) < following.first:
+            continue
+        first, last = _run_around(data, field.last)
+        if last < following.last:
+            findings.add(
+                "E105",
+                f"The number `{data[first - 1 : last]}` straddles two fields.",
+                Place(card.line, first, last, card.text, _neighbours(fields, first, last)),
+                _remedy(card, fields, last - first + 1, max(field.width, following.width))
+                or "right-justify each number in its own columns",
+            )
+            return False
+    return cut_is_meant or _is_whole(card, fields[-1], fields, findings)
+
+
+def _is_whole(card: Card, field: Field, fields: Fields, findings: Findings) -> bool:
+    """Whether the number in the last field means the same without what crosses the field's end."""
+    data = card.data
+    if data[field.last - 1 : field.last + 1].count(" ") or len(data) <= field.last:
+        return True
+    first, last = _run_around(data, field.last)
+    if first < field.first or last - first >= LONGEST:
+        return True
+    whole = parse_real(data[first - 1 : last])
+    if whole is None or whole == parse_real(data[first - 1 : field.last]):
+        return True
+    findings.add(
+        "E105",
+        f"The number `{data[first - 1 : last]}` crosses the end of its field.",
+        Place(card.line, first, last, card.text, _neighbours(fields, first, last)),
+        _remedy(card, fields, last - first + 1, field.width)
+        or "right-justify each number in its own columns",
+    )
+    return False
+
+
+def _run_around(data: str, column: int) -> tuple[int, int]:
+    """First and last column of the text without blanks around a column."""
+    end = data.find(" ", column - 1)
+    return data.rfind(" ", 0, column) + 2, len(data) if end < 0 else end
+
+
+def _remedy(card: Card, fields: Fields, length: int, width: int) -> str:
+    """A hint for a number that is longer than its field; empty for one that fits."""
+    if length <= width:
+        return ""
+    too_long = f"the number has {length} characters and its field {width} columns"
+    runs = [(match.start() + 1, match[0]) for match in re.finditer(r"[^ ]+", card.data)]
+    texts: list[str] = []
+    begin = 0
+    for field in fields:
+        inside = [text for first, text in runs if begin < first <= field.last]
+        if len(inside) > 1:
+            return f"{too_long}: separate the values by commas"
+        texts += inside or [""]
+        begin = field.last
+    return f"{too_long}: with commas the card is `{','.join(texts).rstrip(',')}`"
+
+
+def _ends_with_fields(
     card: Card, fields: Fields, pieces: Sequence[tuple[int, str]], findings: Findings
-) -> None:
-    """Warn of what stands behind the last field."""
-    if "," in card.data:
-        rest = [piece for piece in pieces[len(fields) :] if piece[1]]
-        first = rest[0][0] if rest else 0
+) -> bool:
+    """Whether no value stands behind the last field; in fixed columns that is only a warning."""
+    data = card.data
+    if "," in data:
+        first = next((first for first, text in pieces[len(fields) :] if text), 0)
+        code, what = "E106", f"stands behind the last of the card's {len(fields)} values."
     else:
-        tail = card.data[fields[-1].last :]
-        first = len(card.data) - len(tail.lstrip()) + 1 if tail.strip() else 0
+        tail = data[fields[-1].last :]
+        first = len(data) - len(tail.lstrip()) + 1 if tail.strip() else 0
+        code, what = "W106", "stands beyond the last field of the card and is not read."
     if first:
-        extra = card.data[first - 1 :]
-        findings.add(
-            "W106",
-            f"`{extra}` stands beyond the last field of the card and is not read.",
-            Place(card.line, first, len(card.data), card.text),
-        )
+        place = Place(card.line, first, len(data), card.text)
+        findings.add(code, f"`{data[first - 1 :]}` {what}", place)
+    return not first or code == "W106"
+
+
+def _word(field: Field, text: str, source: Source, findings: Findings) -> str | None:
+    """A field's word, or None after noting that it is too long."""
+    word = text.rstrip()
+    if len(word) <= field.width:
+        return word
+    findings.add(
+        "E109",
+        f"`{word}` has {len(word)} characters; the field takes {field.width}.",
+        source.place(field.name),
+        "values are separated by commas",
+    )
+    return None
 
 
 def _number(
@@ -208,15 +298,24 @@ def _number(
 ) -> int | float | None:
     """A field's number, or None after noting what is wrong with it."""
     parse = parse_integer if field.kind == "I" else parse_real
-    squeezed = text.replace(" ", "")
-    if not squeezed:
+    written = text.strip()
+    if not written:
         return 0 if field.kind == "I" else 0.0
+    if len(written) > LONGEST:
+        findings.add(
+            "E109",
+            f"The number has {len(written)} characters; at most {LONGEST} are read.",
+            source.place(field.name),
+        )
+        return None
+    squeezed = text.replace(" ", "")
     plain = parse(squeezed)
-    padded = parse(text.lstrip().replace(" ", "0"))
-    place = source.place(field.name)
+    left = text.lstrip()
+    padded = parse(left.replace(" ", "0")) if " " in left else plain
     if plain is None and padded is None:
         kind = "whole number" if field.kind == "I" else "number"
-        findings.add("E101", f"`{text.strip()}` is not a {kind}.", place, _why(field, squeezed))
+        place = source.place(field.name)
+        findings.add("E101", f"`{written}` is not a {kind}.", place, _why(field, squeezed))
         return None
     value = padded if zeros else plain
     if plain != padded:
@@ -224,10 +323,12 @@ def _number(
             _refuse_blank(field, text, padded, source, findings)
             return None
         findings.add(
-            "W104", f"A blank inside `{text}` was read as a zero: the value is {value:g}.", place
+            "W104",
+            f"A blank inside `{text}` was read as a zero: the value is {value:g}.",
+            source.place(field.name),
         )
     if value is None or abs(value) > (LARGEST_INTEGER if field.kind == "I" else sys.float_info.max):
-        findings.add("E107", f"`{text.strip()}` is too large a number.", place)
+        findings.add("E107", f"`{written}` is too large a number.", source.place(field.name))
         return None
     return value
 
@@ -259,18 +360,6 @@ def _refuse_blank(
     )
 
 
-def _straddling(card: Card, fields: Fields) -> tuple[int, int] | None:
-    """Columns of the first run of digits that crosses a field's end without filling the next."""
-    ends = {field.last: following for field, following in pairwise(fields)}
-    for match in re.finditer(r"[^ ]+", card.data):
-        first, last = match.start() + 1, match.end()
-        for end, following in ends.items():
-            numeric = following.kind != "A"
-            if numeric and following.first == end + 1 and first <= end < last < following.last:
-                return first, last
-    return None
-
-
 def _neighbours(fields: Fields, first: int, last: int) -> str:
     """Describe the fields that the columns `first` to `last` touch."""
     touched = [f for f in fields if f.first <= last and f.last >= first]
@@ -289,15 +378,28 @@ def write_card(fields: Fields, values: Sequence[Value]) -> str:
     for field, value in zip(fields, values, strict=True):
         text = _written(field, value)
         if text is None:
-            return ", ".join(map(_free, values))
+            return _with_commas(values)
         line = line.ljust(field.first - 1)
         line += text.ljust(field.width) if field.kind == "A" else text.rjust(field.width)
     return line.rstrip()
 
 
+def _with_commas(values: Sequence[Value]) -> str:
+    """A card in free format, which has at least one comma."""
+    texts = [_free(value) for value in values]
+    if len(texts) == 1:
+        texts.append("")
+    return (", " if all(texts) else ",").join(texts)
+
+
 def _free(value: Value) -> str:
     """A value's text in free format; NumPy's numbers as Python's."""
-    return repr(float(value)) if isinstance(value, float) else str(value)
+    if not isinstance(value, float):
+        return str(value)
+    if not math.isfinite(value):
+        raise ValueError(f"{value} can't be written on a card")
+    digits, exponential, exponent = repr(float(value)).partition("e")
+    return f"{digits}E{int(exponent)}" if exponential else digits
 
 
 def _written(field: Field, value: Value) -> str | None:

@@ -46,7 +46,7 @@ def format_deck(text: str, source: str = "<text>") -> str:
         if number in read:
             fields, values = read[number]
             aligned = _aligned(card, fields, values)
-            if fields != above and "," not in aligned and fields != Macro.fields:
+            if fields != above and "," not in aligned and fields[0] != Macro.fields[0]:
                 written.append(ruler(fields))
             above = fields
             written.append(_with_comment(aligned, line))
@@ -54,7 +54,8 @@ def format_deck(text: str, source: str = "<text>") -> str:
             if not line.startswith("!"):
                 above = None
             keyword = card.is_keyword and (card.keyword in READERS or card.keyword == STOP)
-            known = card.keyword if keyword and len(card.data.split()) == 1 else card.data
+            words = card.data.replace(",", " ").split()
+            known = card.keyword if keyword and len(words) == 1 else card.data
             written.append(line.rstrip() if line.startswith("!") else _with_comment(known, line))
         if card.keyword == STOP and not line.startswith("!"):
             written += [rest.rstrip() for rest in lines[number:]]
@@ -76,9 +77,11 @@ def _aligned(card: Card, fields: Fields, values: list[Value]) -> str:
     texts = [text for _, text in card.cut(fields)][: len(fields)]
     count = max([n for n, text in enumerate(texts, start=1) if text.strip()], default=0)
     kept: list[Value] = list(values[:count])
-    if fields == Macro.fields:  # whole numbers of macros are counts
-        kept = [int(v) if isinstance(v, float) and v.is_integer() else v for v in kept]
+    if fields in (Macro.fields, Macro.short_fields):
         kept[:1] = [str(v).strip().upper() for v in kept[:1]]
+        if fields == Macro.short_fields:
+            kept[1:1] = [""]
+        return Macro.card(kept)
     return write_card(fields[:count], kept) if count else ""
 
 

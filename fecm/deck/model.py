@@ -252,13 +252,13 @@ class Projectile(Segment):
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
-        head = [self.elements, self.transducer, self.size]
-        if not self.elements:
-            yield "PROJ"
-            yield write_card(self.fields[: len(head)], head)
-            return
+        values: list[Value] = [self.elements, self.transducer, self.size]
+        if self.elements or self.modulus or self.density:
+            values += [self.modulus, self.density]
         yield "PROJ"
-        yield write_card(self.fields, [*head, self.modulus, self.density])
+        yield write_card(self.fields[: len(values)], values)
+        if not self.elements:
+            return
         for record in self.diameters:
             yield write_card(
                 RodDiameter.fields, [record.element, record.increment, record.diameter]

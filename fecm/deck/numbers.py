@@ -10,11 +10,16 @@ import re
 from collections.abc import Iterator
 from decimal import Decimal
 
-# Digits of the longest integer that is looked at.
-_LONGEST = 40
+# Characters of the longest number that is read.
+LONGEST = 100
+
+# Columns from which on an exponent may be written without its letter.
+_LETTERLESS = 10
+
+# No two parts of a pattern match the same characters, so that a mismatch takes linear time.
 _INTEGER = re.compile(r"[+-]?[0-9]+")
 _REAL = re.compile(
-    r"(?P<mantissa>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))"
+    r"(?P<mantissa>[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))"
     r"(?:[EeDd](?P<marked>[+-]?[0-9]+)|(?P<bare>[+-][0-9]+))?"
 )
 
@@ -22,16 +27,17 @@ _REAL = re.compile(
 def parse_integer(text: str) -> int | None:
     """Read an I field without blanks in it; None when it is no whole number.
 
-    Digits beyond what any count can have are cut off, so that their number takes no time.
+    The caller limits the length to :data:`LONGEST` characters.
     """
-    return int(text[:_LONGEST]) if _INTEGER.fullmatch(text) else None
+    return int(text) if _INTEGER.fullmatch(text) else None
 
 
 def parse_real(text: str) -> float | None:
     """Read an F field without blanks in it; None when it is no number.
 
     Understands every Fortran form: ``45.``, ``.2E-6``, ``1.5D+3``, ``1.5-3``.  A number beyond the
-    range of double precision is infinite.
+    range of double precision is infinite.  The caller limits the length to :data:`LONGEST`
+    characters.
     """
     match = _REAL.fullmatch(text)
     if match is None:
@@ -53,9 +59,11 @@ def format_real(value: float, width: int) -> str | None:
     Returns
     -------
     str or None
-        The most readable form that fits, not padded; None when none does.
+        The most readable form that fits, not padded; None when none does.  Only fields of ten
+        columns or more get an exponent without its letter: 2.5E-7 as ``25-8`` is hard to read.
     """
-    for forms in (list(_forms(value, "E")), list(_forms(value, ""))):
+    for letter in ("E", "") if width >= _LETTERLESS else ("E",):
+        forms = list(_forms(value, letter))
         for room in (width - 1, width):  # a blank between two numbers where it can be had
             for text in forms:
                 if len(text) <= room:

@@ -274,15 +274,16 @@ class Reader:
             if card.keyword in (STOP, TITLE):
                 self.stream.give_back()
                 break
-            row = self.stream.row(card, Macro.fields)
+            short = _leaves_out_second_word(card)
+            row = self.stream.row(card, Macro.short_fields if short else Macro.fields)
             if row is None:
                 self._unsound.add(MACROS)
             else:
-                (word, option, value, second), source = row
+                (word, *option, value, second), source = row
                 macros.append(
                     Macro(
                         str(word).strip().upper(),
-                        str(option).strip().upper(),
+                        "".join(map(str, option)).strip().upper(),
                         float(value),
                         float(second),
                         source=source,
@@ -321,6 +322,13 @@ class Reader:
                 )
             )  # fmt: skip
         return tables
+
+
+def _leaves_out_second_word(card: Card) -> bool:
+    """Whether a macro card in free format has a number where the second word belongs."""
+    _, comma, rest = card.data.partition(",")
+    text = rest.partition(",")[0].strip()
+    return bool(comma) and text[:1] in tuple("0123456789.+-")
 
 
 def _close(word: str, known: list[str]) -> list[str]:

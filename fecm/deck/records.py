@@ -6,6 +6,7 @@ compared.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -14,6 +15,8 @@ from fecm.deck.findings import Place
 
 # Least and greatest number of nodes an element.
 NODES_AN_ELEMENT = (3, 12)
+# Below this number every whole one is a float.
+EXACT = 2**53
 AXES = ("x", "y", "z")
 UNKNOWNS = ("u", "v", "w", "theta_x", "theta_y")
 
@@ -246,15 +249,24 @@ class Macro(Record):
     fields: ClassVar[Fields] = layout(
         "A4 macro", "X1", "A4 second word", "X1", "F5 value", "F5 second value"
     )
+    # With commas the second word may be left out where the value follows: LOOP,794.
+    short_fields: ClassVar[Fields] = (fields[0], *fields[2:])
 
     def text(self) -> str:
         """Text of the card; whole numbers stand without a point, zeros at its end not at all."""
-        values: list[Value] = [self.word, self.option]
-        for number in (self.value, self.second):
-            values.append(int(number) if number.is_integer() else number)
+        values: list[Value] = [self.word, self.option, self.value, self.second]
         while values and not values[-1]:
             values.pop()
-        return write_card(self.fields[: len(values)], values)
+        return self.card(values)
+
+    @classmethod
+    def card(cls, values: Sequence[Value]) -> str:
+        """Text of the card's first values; whole numbers stand without a point."""
+        plain = [
+            int(v) if isinstance(v, float) and v.is_integer() and abs(v) < EXACT else v
+            for v in values
+        ]
+        return write_card(cls.fields[: len(plain)], plain)
 
 
 @dataclass(frozen=True)

@@ -156,7 +156,7 @@ class SegmentReader:
         return Impact(int(node), int(dof), float(velocity), source=source)
 
     def _indentation(self, head: Card) -> Segment | None:
-        word = " ".join(head.data.split()[1:]).upper()
+        word = " ".join(head.data.replace(",", " ").split()[1:]).upper()
         if word and word != Indentation.ACR:
             self._stream.findings.add(
                 "W416",

@@ -1,0 +1,213 @@
+"""Macro cards: where their numbers stand, what is refused, and how cards are written."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from fecm.api import prepare
+from fecm.deck import Deck, DeckError, Finding, read_deck
+from fecm.deck.formatting import format_deck
+from fecm.deck.model import Impact, Indentation, Projectile, Segment, ShearCorrection
+from fecm.deck.records import Macro
+from fecm.program import WORDS, estimate
+from fecm.slips import MODES
+from tests.calls import call
+from tests.decks import DATA_CARDS, PROGRAM, ROOT, small
+
+BLANK_CARD = "   25    0    1    1    0    0    0\n\n"
+
+
+def read(text: str) -> Deck:
+    """The one problem of a sound deck."""
+    deck = read_deck(text)
+    assert isinstance(deck, Deck)
+    return deck
+
+
+def error_of(card: str, mode: str = "report") -> Finding:
+    """The one error of the small deck with a card in place of its RODP."""
+    program = PROGRAM.replace("RODP          5", card)
+    (finding,) = prepare(small(program), mode).errors()
+    return finding
+
+
+def marked(finding: Finding) -> str:
+    """The part of the card that the caret marks."""
+    assert finding.place is not None
+    return finding.place.text[finding.place.first - 1 : finding.place.last]
+
+
+# Where the number stands -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("card", "fixed"),
+    [
+        ("DT,5.0E-7", "DT        5.E-7"),
+        ("DT,,5.0E-7", "DT        5.E-7"),
+        ("DT , 5.0E-7 ! seconds", "DT        5.E-7"),
+        ("LOOP,794", "LOOP        794"),
+        ("RODP,3", "RODP          3"),
+        ("DT,.5E-6,", "DT        .5E-6"),
+        ("CHEC,,,", "CHEC"),
+    ],
+)
+def test_a_number_behind_the_word_is_the_macros_number(card: str, fixed: str) -> None:
+    assert read(small(card + "\n")).macros == read(small(fixed + "\n")).macros
+
+
+@pytest.mark.parametrize("comma", [",", ",,"])
+def test_comma_cards_take_the_steps_that_they_say(comma: str) -> None:
+    text = small(f"LMAS\nDT{comma}.5E-6\nLOOP{comma}7\nTIME\nRODP{comma}3\nNEXT\n")
+    tally = estimate(prepare(text).problems[0].program)
+    assert (tally.steps, tally.contact_rows) == (7, 2)
+
+
+def test_a_number_that_is_no_number_is_marked_where_it_stands() -> None:
+    finding = error_of("RODP,1O")
+    assert (finding.code, marked(finding)) == ("E101", "1O")
+
+
+# What is refused ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize(
+    ("card", "code", "mark", "hint"),
+    [
+        ("RODP 5", "E514", "5   ", "RODP,5"),
+        ("RODP   5", "E514", "  5 ", "RODP,5"),
+        ("RODP,AB,5", "E514", "AB", ""),
+        ("RODP AB       5", "E514", "AB  ", ""),
+        ("RODP          5    7", "E514", "    7", ""),
+        ("RODP          512345", "E514", "12345", "behind a comma"),
+        ("RODP,5,7", "E514", "7", ""),
+        ("TIME          3", "E514", "    3", ""),
+        ("TIME,3", "E514", "3", ""),
+        ("TIME AB", "E514", "AB  ", ""),
+        ("RODP,,5,0,7", "E106", "7", ""),
+        ("RODP5", "E108", "RODP5", "cols 11-15"),
+        ("RODP          5,", "E109", "RODP          5", "commas"),
+    ],
+)
+def test_what_no_macro_uses_is_an_error_at_its_place(
+    card: str, code: str, mark: str, hint: str, mode: str
+) -> None:
+    finding = error_of(card, mode)
+    assert (finding.code, marked(finding).ljust(len(mark))) == (code, mark)
+    assert hint in finding.hint
+
+
+@pytest.mark.parametrize("word", sorted(set(WORDS) - {"LOOP", "NEXT"}))
+def test_every_word_refuses_a_second_word_and_a_second_number(word: str) -> None:
+    for card in (f"{word:4} AB", f"{word:14}0    9", f"{word},,0,9"):
+        found = prepare(small(PROGRAM + card + "\n")).errors()
+        assert "E514" in [finding.code for finding in found], card
+
+
+def test_no_deck_of_the_project_has_a_field_that_no_macro_uses() -> None:
+    for path in sorted((ROOT / "decks").glob("*.inp")):
+        assert prepare(path).errors() == []
+        assert prepare(path, "listing").errors() == []
+
+
+def test_letters_behind_the_fourth_of_a_word_do_not_count() -> None:
+    assert read(small(PROGRAM.replace("DISP ", "DISPL"))) == read(small())
+
+
+# Numbers that are longer than their columns ------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "card", ["DT        2.5E-7", "DT       2.5E-7", "DT         2.5E-7", "DT      2.5E-7"]
+)
+def test_a_number_longer_than_its_columns_is_an_error_that_shows_the_comma_card(card: str) -> None:
+    with pytest.raises(DeckError) as caught:
+        read_deck(small(card + "\n"))
+    (finding,) = caught.value.findings
+    assert marked(finding) == "2.5E-7"
+    written = finding.hint.split("`")[1]
+    assert read(small(written + "\n")).macros[0].value == 2.5e-7
+
+
+def test_a_number_that_its_last_field_cuts_short_is_an_error_where_the_value_changes() -> None:
+    card = "   13    3     115.0"
+    with pytest.raises(DeckError) as caught:
+        read_deck(small(data=DATA_CARDS.replace(card, "   13    3 1.1512345E+2")))
+    (finding,) = caught.value.findings
+    assert (finding.code, marked(finding)) == ("E105", "1.1512345E+2")
+    assert "`13,3,1.1512345E+2`" in finding.hint
+    exact = read(small(data=DATA_CARDS.replace(card, "   13    3   115.00000")))
+    assert exact.need(Impact).velocity == 115.0
+
+
+def test_a_time_step_is_written_as_a_person_reads_it() -> None:
+    assert Macro("DT", value=2.5e-7).text() == "DT,,2.5E-7"
+    assert Macro("DT", value=5e-7).text() == "DT        5.E-7"
+    assert Macro("LOOP", value=123456.0).text() == "LOOP,,123456"
+    assert "DT,,2.5E-7\n" in format_deck(small("DT         25-8\n"))
+
+
+def test_a_new_deck_has_a_time_step_that_a_person_can_read() -> None:
+    made = call(
+        "new", "-", "--size", "100x100", "--mesh", "8x8", "--layup", "[0/90]s", "--units", "mm-N-s",
+        "--ply-thickness", 0.5, "--material", "AS/3501", "--support", "clamped", "--velocity", 1000,
+        "--law", "30000,0.01,0.1,2", "--projectile", "mass:1e-4", "--duration", 1e-4,
+        "--dt", "2.5e-7",
+    )  # fmt: skip
+    assert made.exit_code == 0, made.stderr
+    assert "\nDT,,2.5E-7\n" in made.stdout
+    assert Macro("DT", value=2.5e-7) in read(made.stdout).macros
+
+
+# Cards written and read again --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "segment",
+    [
+        ShearCorrection(0.8224670334241132),
+        Projectile(0, 0, 1e-4, 2.1e5, 7.8e-9),
+        Projectile(0, 0, 1e-4, 0.0, 7.8e-9),
+        Projectile(0, 0, 1e-4),
+        Indentation(30000.0, 0.01, 0.0, 2.5, "ACR"),
+    ],
+    ids=repr,
+)
+def test_a_segment_is_written_with_all_that_it_says(segment: Segment) -> None:
+    deck = read(small())
+    made = replace(deck, segments=(*deck.segments, segment), text="")
+    assert read(made.to_text()) == made
+    assert read(format_deck(made.to_text())) == made
+
+
+@pytest.mark.parametrize("value", [1e300, 1e-300, 5e-324, 2.0**53, -0.0, 1 / 3])
+def test_a_macros_number_is_written_exactly(value: float) -> None:
+    deck = replace(read(small()), macros=(Macro("DT", value=value),), text="")
+    assert read(deck.to_text()).macros[0].value == value
+    assert read(format_deck(deck.to_text())).macros[0].value == value
+
+
+def test_a_number_that_is_not_finite_is_written_in_no_form() -> None:
+    deck = read(small())
+    law = Indentation(0.1234567890123, float("inf"), 0.1, 2.0)
+    with pytest.raises(ValueError, match="inf"):
+        replace(deck, segments=(*deck.segments, law)).to_text()
+
+
+@pytest.mark.parametrize("blank", [",,", ",,,,,,", " , ,  ! the end"])
+def test_a_card_of_commas_alone_is_a_blank_card_before_and_after_formatting(blank: str) -> None:
+    text = small()
+    assert text.count(BLANK_CARD) == 1
+    commas = text.replace(BLANK_CARD, BLANK_CARD.replace("\n\n", f"\n{blank}\n"))
+    assert read(commas) == read(text)
+    assert read(format_deck(commas)) == read(text)
+
+
+@pytest.mark.parametrize("head", ["EXPE ACR", "EXPE,ACR", "EXPE, acr"])
+def test_a_keywords_second_word_may_stand_behind_a_comma(head: str) -> None:
+    text = small(data=DATA_CARDS.replace("EXPE\n", f"{head}\n").replace("0.094", "  0.0"))
+    assert read(text).need(Indentation).word == "ACR"
+    assert read(format_deck(text)) == read(text)
