@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.plot import KINDS, MISSING, Options, PlotError, draw, save
+from fecm.plot import KINDS, MISSING, Options, Picture, PlotError, draw, save
 from fecm.plot.data import patches, strain_points
 from fecm.plot.deflection import profile
 from fecm.plot.meshes import supports
 from fecm.plot.style import COLOURS, scale
 from fecm.results.result import Result
 from tests.builders import distorted_square
+from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, MESH, PROGRAM, small
 from tests.test_command_line import fecm as command
 
@@ -29,6 +33,10 @@ pytest.importorskip("matplotlib")
 OF_RUNS = [name for name, kind in KINDS.items() if not kind.sweep]
 
 NAMED = small(data=DATA_CARDS + "UNIT\nin lbf s\n")
+
+
+# As many steps as the contact lasts, and some more.
+LONG_PROGRAM = PROGRAM.replace(" 10\n", "330\n")
 
 
 def run(deck: str) -> Result:
@@ -371,3 +379,123 @@ def test_nothing_but_a_picture_imports_matplotlib(file: Path) -> None:
         )  # fmt: skip
         assert done.stdout.splitlines()[-1] == "[]"
     assert PROGRAM in fecm.load(file).deck
+
+
+# Open ends, and results without sense ----------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["force", "loop", "energy"])
+def test_pictures_of_a_contact_without_an_end_say_so(result: Result, kind: str) -> None:
+    closed = run(small(data=DATA_CARDS + "UNIT\nin lbf s\n", program=LONG_PROGRAM))
+
+    def marks(**results: Result) -> str:
+        return draw(kind, results).figure.axes[0].get_title(loc="right")
+
+    assert marks(a=result) == marks(a=result, b=result) == "still in contact at the end"
+    assert marks(a=closed) == marks(a=closed, b=closed) == ""
+    assert marks(a=closed, b=result) == "still in contact at the end (b)"
+
+
+def zero(file: h5py.File) -> None:
+    file["mesh/coordinates"][...] = 0.0
+
+
+def infinite(file: h5py.File) -> None:
+    file["tape3/w"][...] = np.inf
+    file["history/force"][...] = np.inf
+    file["energy/plate_kinetic"][...] = np.nan
+    file["tape8/kappa_x"][...] = np.inf
+
+
+def huge(file: h5py.File) -> None:
+    file["history/force"][...] = np.linspace(-0.8e308, 0.8e308, 10)
+    file["mesh/coordinates"][...] *= 0.5e308
+    file["tape3/w"][...] = 1e308
+
+
+def tiny(file: h5py.File) -> None:
+    for path in ("history/force", "history/time", "tape3/w", "tape3/time", "mesh/coordinates"):
+        file[path][...] *= 1e-310
+
+
+def without_rows(file: h5py.File) -> None:
+    for group in ("history", "energy", "tape3", "tape8"):
+        for name, dataset in list(file[group].items()):
+            del file[group][name]
+            file[group][name] = np.zeros((0, *dataset.shape[1:]), dataset.dtype)
+
+
+@pytest.mark.parametrize(
+    ("edit", "undrawn"),
+    [
+        (zero, "strain line contour surface mesh"),
+        (infinite, "force loop energy strain line contour surface"),
+        (huge, "force loop strain line contour surface mesh"),
+        (tiny, "contour"),
+        (without_rows, "force loop energy strain line contour surface"),
+    ],
+)
+def test_a_result_without_sense_is_drawn_or_is_one_line(
+    file: Path, edit: Callable[[h5py.File], None], undrawn: str
+) -> None:
+    with h5py.File(file, "r+") as stored:
+        edit(stored)
+    refused = []
+    for kind in ("force", "loop", "energy", "strain", "line", "contour", "surface", "mesh"):
+        picture = file.with_name(f"{kind}.png")
+        done = call("plot", file, "--kind", kind, "-o", picture)
+        if done.exit_code:
+            refused.append(kind)
+            assert_unusable(done)
+            assert not picture.exists()
+        else:
+            assert done.stderr == ""
+    assert refused == undrawn.split()
+
+
+def test_what_is_wrong_with_a_result_is_named(file: Path) -> None:
+    with h5py.File(file, "r+") as stored:
+        zero(stored)
+        infinite(stored)
+    assert "the mesh of small has no area" in call("plot", file, "--kind", "mesh").stderr
+    assert "history/force of small holds numbers beyond" in call("plot", file).stderr
+
+
+def test_units_and_names_are_shown_as_they_are(file: Path) -> None:
+    names = [r"_a$x$", r"$\sqrt{$"]
+    with h5py.File(file, "r+") as stored:
+        stored.attrs["unit_length"] = r"$\sqrt{$"
+    result = fecm.load(file)
+    for kind in ("loop", "energy", "line"):
+        figure = draw(kind, dict.fromkeys(names, result)).figure
+        save(Picture(figure), file.with_name("x.svg"))  # parses every text
+        assert [text for text in legend_of(figure) if text in names] == names
+        assert not any(text.get_parse_math() for text in figure.legends[0].get_texts())
+    (axes,) = draw("mesh", {"a": result}).figure.axes
+    assert axes.get_xlabel() == r"$x$ (\$\sqrt{\$)"
+
+
+def test_a_name_that_is_no_text_is_escaped(file: Path) -> None:
+    strange = file.with_name("b\udcff.h5")
+    shutil.copy(file, strange)
+    done = call("plot", file, strange, "-o", file.with_name("x.png"))
+    assert (done.exit_code, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("options", "name"),
+    [(["--times", "1e-6"], "times"), (["--at", "1,1"], "at"), (["--along", "y"], "along"),
+     (["--level", "3"], "level"), (["--face", "struck"], "face")],
+)  # fmt: skip
+def test_an_option_of_another_kind_is_refused(file: Path, options: list[str], name: str) -> None:
+    done = call("plot", file, "--kind", "force", *options, "-o", file.with_name("x.png"))
+    assert_unusable(done)
+    assert f"the option {name} is for the kind " in done.stderr
+
+
+def test_an_option_needs_one_kind_that_shows_it(result: Result, file: Path) -> None:
+    kinds = ["--kind", "force", "--kind", "line"]
+    done = call("plot", file, *kinds, "--times", "1e-6", "-o", file.parent)
+    assert done.exit_code == 0
+    with pytest.raises(PlotError, match="the option times is for"):
+        result.plot("force", times=(1e-6,))

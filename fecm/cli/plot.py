@@ -12,7 +12,18 @@ import click
 
 from fecm.cli.apart import reads
 from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, check_outputs
-from fecm.plot import KINDS, Options, Picture, PlotError, check_suffix, draw, save
+from fecm.plot import (
+    KINDS,
+    Options,
+    Picture,
+    PlotError,
+    PlotNote,
+    check_options,
+    check_suffix,
+    draw,
+    save,
+)
+from fecm.results.plain import printable
 
 if TYPE_CHECKING:
     from fecm.results.result import Result
@@ -119,6 +130,7 @@ def plot(
     try:
         named = _named(results)
         chosen = list(dict.fromkeys(kinds)) or [_usual(next(iter(named.values())))]
+        check_options(chosen, options)
         paths = _paths(results[0], chosen, output)
         check_outputs(list(paths.values()), overwrite)
         pictures = _draw(named, chosen, options)
@@ -153,9 +165,9 @@ def _usual(result: Result | SweepResult) -> str:
 
 def _named(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:
     """Results by the shortest names that tell them apart."""
-    names = [path.stem for path in paths]
+    names = [printable(path.stem) for path in paths]
     if len(set(names)) < len(names):
-        names = [str(path) for path in paths]
+        names = [printable(str(path)) for path in paths]
     if len(set(names)) < len(names):
         raise Refused("a result is given twice")
     return {name: _loaded(path) for name, path in zip(names, paths, strict=True)}
@@ -176,8 +188,9 @@ def _draw(
 ) -> dict[str, Picture]:
     """Draw all pictures, before any is written."""
     with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", UserWarning)
+        warnings.simplefilter("always")
         pictures = {kind: draw(kind, results, options) for kind in kinds}
-    for text in dict.fromkeys(str(one.message) for one in caught):
+    notes = [str(one.message) for one in caught if issubclass(one.category, PlotNote)]
+    for text in dict.fromkeys(notes):
         click.echo(f"fecm: note: {text}", err=True)
     return pictures

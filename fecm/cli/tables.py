@@ -91,10 +91,9 @@ class Targets:
         from fecm.plot import PlotError, save
 
         try:
-            picture = draw()
+            save(draw(), self.picture)
         except PlotError as error:
             raise Refused(str(error)) from None
-        save(picture, self.picture)
         click.echo(f"fecm: note: drew {self.picture}", err=True)
 
     def write(self, lines: Iterable[str]) -> None:

@@ -6,11 +6,15 @@ is a row of `KINDS`; its function takes named results and options and gives a :c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+import contextlib
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from fecm.results.schema import ResultFileError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,6 +28,10 @@ MISSING = "pictures need matplotlib: pip install 'fecm[plot]'"
 
 class PlotError(ValueError):
     """A result lacks what a picture needs, or the options don't fit it."""
+
+
+class PlotNote(UserWarning):
+    """What a user should know of a picture; all other warnings are those of libraries."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +70,17 @@ KINDS = {
     "mesh": Kind("meshes:mesh", "mesh, supports and impact point"),
     "animation": Kind("deflection:animation", "the moving plate", suffixes=(".gif",)),
     "map": Kind("maps:parameter_map", "a number of a sweep over what varies", sweep=True),
+}
+
+
+# Kinds that an option is for; the others are for all of them.
+KINDS_OF_OPTION = {
+    "at": ("strain", "mesh"),
+    "gages": ("strain",),
+    "face": ("strain",),
+    "times": ("line", "contour", "surface", "animation"),
+    "along": ("line",),
+    **dict.fromkeys(("quantity", "over", "where", "level"), ("map",)),
 }
 
 
@@ -127,6 +146,36 @@ def check_kind(kind: str, name: str, *, sweep: bool) -> None:
         )
 
 
+def check_options(kinds: Iterable[str], options: Options) -> None:
+    """Refuse an option that none of the kinds of picture shows.
+
+    Raises
+    ------
+    PlotError
+    """
+    usual = Options()
+    for option in fields(Options):
+        fit = KINDS_OF_OPTION.get(option.name, tuple(KINDS))
+        given = getattr(options, option.name) != getattr(usual, option.name)
+        if given and not set(fit) & set(kinds):
+            raise PlotError(
+                f"the option {option.name} is for the kind {' or '.join(fit)}, not for "
+                f"{' or '.join(kinds)}"
+            )
+
+
+@contextlib.contextmanager
+def _errors_as_one(what: str) -> Iterator[None]:
+    """Turn whatever numbers without sense raise inside of matplotlib into one PlotError."""
+    try:
+        yield
+    except (PlotError, ResultFileError, ImportError, OSError, MemoryError):
+        raise
+    except Exception as error:  # matplotlib says nowhere what it may raise
+        told = " ".join(str(error).split())
+        raise PlotError(f"{what} can't be drawn: {type(error).__name__}: {told}") from error
+
+
 def draw(
     kind: str, results: Mapping[str, Result | SweepResult], options: Options | None = None
 ) -> Picture:
@@ -162,7 +211,7 @@ def draw(
         check_kind(kind, name, sweep=not isinstance(result, Result))
     module, _, function = KINDS[kind].function.partition(":")
     drawn = getattr(import_module(f"fecm.plot.{module}"), function)
-    with matplotlib.rc_context(RC):
+    with matplotlib.rc_context(RC), _errors_as_one(f"{kind} of {' and '.join(results)}"):
         picture: Picture = drawn(results, options or Options())
     return picture
 
@@ -174,6 +223,7 @@ def figure(
     path: str | Path | None,
 ) -> Figure:
     """Draw a picture, and write it if there is a path; see :func:`draw` and :func:`save`."""
+    check_options([kind], options)
     if path is not None:
         check_suffix(kind, Path(path))
     picture = draw(kind, results, options)
@@ -199,6 +249,8 @@ def save(picture: Picture, path: Path) -> None:
 
     Raises
     ------
+    PlotError
+        If matplotlib can't draw it.
     OSError
         If the file can't be written; what stood there is then untouched.
     """
@@ -208,7 +260,12 @@ def save(picture: Picture, path: Path) -> None:
     from fecm.plot.style import RC, RESOLUTION, SCREEN, UNDATED
 
     suffix = path.suffix.lower()
-    with matplotlib.rc_context(RC), beside(path) as partial:
+    with (
+        _errors_as_one(str(path)),
+        warnings.catch_warnings(action="ignore"),
+        matplotlib.rc_context(RC),
+        beside(path) as partial,
+    ):
         if suffix != ".gif":
             picture.figure.savefig(
                 partial, format=suffix[1:], dpi=RESOLUTION, metadata=UNDATED[suffix]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.plot import Options, PlotError
+from fecm.plot import Options, PlotError, PlotNote
 from fecm.plot.style import Scale, scale
 from fecm.sweeps.cases import TEXTS
 from fecm.sweeps.cases import WHOLE as WHOLE_VALUES
@@ -194,9 +194,11 @@ def _quantity(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
     if np.isnan(values).all():
         raise PlotError(told or f"no case of {name} has a {quantity}: nothing was hit")
     if told:
-        warnings.warn(f"{told}; they are gaps in the picture", stacklevel=2)
+        warnings.warn(f"{told}; they are gaps in the picture", PlotNote, stacklevel=2)
     if lacking := int((np.isnan(values) & (status == FINE)).sum()):
-        warnings.warn(f"{lacking} cases of {name} without contact have no {quantity}", stacklevel=2)
+        warnings.warn(
+            f"{lacking} cases of {name} without contact have no {quantity}", PlotNote, stacklevel=2
+        )
     if quantity in WHOLE:
         return Axis(quantity, Scale(1.0, ""), values)
     shown = scale(float(np.nanmax(np.abs(values))), _unit(sweep, quantity))
@@ -229,6 +231,7 @@ def _levels(options: Options, shown: Axis) -> list[float]:
             warnings.warn(
                 f"the level {level:g} is outside of the picture's values, which reach from "
                 f"{low / shown.scale.factor:g} to {high / shown.scale.factor:g}",
+                PlotNote,
                 stacklevel=2,
             )
     return [shown.scale.factor * level for level in options.level]

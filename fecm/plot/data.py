@@ -24,6 +24,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Bools = NDArray[np.bool_]
 
+# Beyond these, axes and their numbers lose all sense long before they overflow.
+LARGEST = 1e100
+
 # Elements beyond which an element's inside is drawn by its nodes alone.
 MANY = 2000
 
@@ -34,14 +37,45 @@ def need(result: Result, name: str, *paths: str) -> list[Array]:
     Raises
     ------
     PlotError
-        If one is not there; the message names the macro that stores it.
+        If one is not there (the message names the macro that stores it), is empty, or holds
+        numbers that no axis can show.
     """
     for path in paths:
         if path not in result:
             macro = STORED_BY.get(path.partition("/")[0], "")
             remedy = f"; add {macro} to the deck's program and run it again" if macro else ""
             raise PlotError(f"{name} has no {path}{remedy}")
-    return [result[path] for path in paths]
+    return [_shown(name, path, result[path]) for path in paths]
+
+
+def _shown(name: str, path: str, values: Array) -> Array:
+    """Numbers that a picture can show, or a PlotError."""
+    if not values.size:
+        raise PlotError(f"{name} has no rows of {path}")
+    if not (np.abs(values) <= LARGEST).all():
+        raise PlotError(
+            f"{path} of {name} holds numbers beyond ±{LARGEST:g}, infinite ones or NaN; no picture "
+            "can show them"
+        )
+    return values
+
+
+def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:
+    """Elements, and x and y of all nodes (length).
+
+    Raises
+    ------
+    PlotError
+        If the nodes all lie on one line parallel to an axis.
+    """
+    elements, coordinates = need(result, name, "mesh/elements", "mesh/coordinates")
+    coordinates = coordinates[:, :2]
+    extent = np.ptp(coordinates, axis=0)
+    if not (extent > 1e-9 * np.abs(coordinates).max()).all():
+        raise PlotError(
+            f"the mesh of {name} has no area: it is {extent[0]:g} wide in x and {extent[1]:g} in y"
+        )
+    return elements, coordinates
 
 
 def deck_of(result: Result, name: str) -> Deck:
@@ -148,9 +182,9 @@ class Patches:
         return np.asarray(found[kept])
 
 
-def patches(result: Result, cuts: int) -> Patches:
+def patches(result: Result, cuts: int, name: str = "the result") -> Patches:
     """Cut every element into cuts × cuts quadrilaterals."""
-    elements, coordinates = result["mesh/elements"], result["mesh/coordinates"][:, :2]
+    elements, coordinates = mesh_of(result, name)
     cuts = min(cuts, 2) if len(elements) > MANY else cuts
     ticks = np.linspace(-1.0, 1.0, cuts + 1)
     eta, xi = (places.ravel() for places in np.meshgrid(ticks, ticks, indexing="ij"))
@@ -179,7 +213,7 @@ def strain_points(result: Result, name: str) -> Floats:
     """Coordinates of the points at which tape8 holds strains, (numel, npt, 2), length."""
     bending, _, points = rules(deck_of(result, name).need(Material))
     rule = bending if "tapes" in result.slips else points
-    elements, coordinates = result["mesh/elements"], result["mesh/coordinates"][:, :2]
+    elements, coordinates = mesh_of(result, name)
     found = np.empty((len(elements), len(rule.xi), 2))
     for family in families(elements, coordinates):
         N = local_shape_functions(family, rule)[0]

@@ -76,7 +76,7 @@ def profile(result: Result, name: str, along: str, rows: Array) -> tuple[Floats,
     extent = float(np.ptp(coordinates[:, axis]))
     on = np.flatnonzero(np.abs(coordinates[:, across] - level) <= 1e-6 * extent)
     on = on[np.argsort(coordinates[on, axis])]
-    cut = patches(result, 4)
+    cut = patches(result, 4, name)
     position = np.linspace(*_chord(cut, axis, level), SAMPLES)
     inside = coordinates[on, axis]
     sides = np.diff(inside).max() if len(on) > 2 else math.inf
@@ -163,7 +163,7 @@ def contour(results: Results, options: Options) -> Picture:
     ((name, result),) = results.items()
     need(result, name, "tape3/w")
     rows = stored_rows(result, name, options.times, 4)
-    cut, w = patches(result, 4), result["tape3/w"][rows]
+    cut, w = patches(result, 4, name), result["tape3/w"][rows]
     clock = scale_of(results, "time", [result["tape3/time"][rows]])
     length = scale_of(results, "length", [w])
     place = scale_of(results, "length", [cut.points])
@@ -272,8 +272,8 @@ def _plates(
     results: Results, options: Options, rows: Array, columns: int, count: int
 ) -> tuple[Figure, list[_Plate]]:
     """Axes for `count` plates, in the scale of all rows."""
-    (result,) = results.values()
-    cut, w = patches(result, 2), result["tape3/w"][rows]
+    ((name, result),) = results.items()
+    cut, w = patches(result, 2, name), result["tape3/w"][rows]
     place = scale_of(results, "length", [cut.points])
     length = scale_of(results, "length", [w])
     span = (float(w.min()), float(w.max()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 import warnings
 from collections.abc import Mapping
 
@@ -10,12 +11,25 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from fecm.deck.model import Material
-from fecm.plot import Options, Picture, PlotError
+from fecm.plot import Options, Picture, PlotError, PlotNote
 from fecm.plot.data import Array, deck_of, impact_point, nearest, need, strain_points
-from fecm.plot.style import COLOURS, RATIO, STYLES, legend, lines_legend, panels, scale, scale_of
+from fecm.plot.style import (
+    COLOURS,
+    RATIO,
+    STYLES,
+    WIDTHS,
+    legend,
+    lines_legend,
+    panels,
+    scale,
+    scale_of,
+)
 from fecm.results.result import Result
 
 Results = Mapping[str, Result]
+
+# Letters of a small text that an inch holds.
+LETTERS = 16
 
 ENERGIES = {
     "plate_kinetic": "plate, kinetic",
@@ -34,6 +48,16 @@ def _within(results: Results, most: int, what: str) -> None:
 def _time_axis(axes: Axes, label: str, times: list[Array], factor: float) -> None:
     axes.set_xlabel(label)
     axes.set_xlim(0.0, factor * max(float(array[-1]) for array in times))
+
+
+def _mark_open_ends(axes: Axes, results: Results, options: Options) -> None:
+    """Say above a graph that contacts last to the end; of which results, if not of all."""
+    named = [name for name, result in results.items() if result.still_in_contact]
+    if named:
+        which = f" ({', '.join(named)})" if len(named) < len(results) else ""
+        width = int(LETTERS * WIDTHS[options.width])
+        text = textwrap.fill(f"still in contact at the end{which}", width)
+        axes.set_title(text, loc="right", fontsize=7.0).set_parse_math(False)
 
 
 def force(results: Results, options: Options) -> Picture:
@@ -63,6 +87,7 @@ def force(results: Results, options: Options) -> Picture:
         for ax, label in zip(axes, ("Contact force", "Transducer"), strict=True):
             ax.set_ylabel(pound.label(label))
     _time_axis(axes[-1], clock.label("Time"), times, clock.factor)
+    _mark_open_ends(axes[0], results, options)
     lines_legend(figure, axes[0])
     return Picture(figure)
 
@@ -87,6 +112,7 @@ def loop(results: Results, options: Options) -> Picture:
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel(length.label("Indentation"))
     axes.set_ylabel(pound.label("Contact force"))
+    _mark_open_ends(axes, results, options)
     if len(data) > 1:
         lines_legend(figure, axes)
     return Picture(figure)
@@ -107,6 +133,7 @@ def energy(results: Results, options: Options) -> Picture:
         axes.plot(clock.factor * time, work.factor * np.sum(columns, axis=0), color="0.5", ls=style)
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel(work.label("Energy"))
+    _mark_open_ends(axes, results, options)
     _time_axis(axes, clock.label("Time"), times, clock.factor)
     handles = [Line2D([], [], color=c) for c in (*COLOURS[: len(ENERGIES)], "0.5")]
     labels = [*ENERGIES.values(), "sum"]
@@ -163,6 +190,7 @@ def _strains(result: Result, name: str, options: Options) -> dict[str, Array]:
             warnings.warn(
                 f"the midplane of {name} may stretch; its strains are not stored, and the "
                 "picture shows those of bending alone",
+                PlotNote,
                 stacklevel=2,
             )
     found: dict[str, Array] = {}

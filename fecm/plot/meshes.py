@@ -37,7 +37,7 @@ def mesh(results: Mapping[str, Result], options: Options) -> Picture:
     """Elements, nodes that are held, the impact point, and the points asked for."""
     ((name, result),) = results.items()
     coordinates, _ = need(result, name, "mesh/coordinates", "mesh/elements")
-    cut = patches(result, 4)
+    cut = patches(result, 4, name)
     place = scale_of(results, "length", [coordinates])
     low, high = place.factor * cut.points.min(axis=0), place.factor * cut.points.max(axis=0)
     height = float(np.clip((high - low)[1] / (high - low)[0], 0.3, 2.0))

@@ -12,7 +12,17 @@ from numpy.typing import NDArray
 
 from fecm.calibration import Calibration
 from fecm.plot import Picture
-from fecm.plot.style import COLOURS, RATIO, STYLES, legend, lines_legend, panels, scale, styled
+from fecm.plot.style import (
+    COLOURS,
+    RATIO,
+    STYLES,
+    legend,
+    lines_legend,
+    literal,
+    panels,
+    scale,
+    styled,
+)
 from fecm.rod import RodHistory
 from fecm.units import unit_of
 
@@ -108,7 +118,7 @@ def filter_picture(
         for (name, values), colour in zip(named.items(), COLOURS, strict=False)
     ]
     name = "Force" if dimension == "force" else next(reversed(list(named)[:-1])).capitalize()
-    _against_time(axes, time, lines, name, dimension, units or {})
+    _against_time(axes, time, lines, literal(name), dimension, units or {})
     lines_legend(figure, axes)
     return Picture(figure)
 
@@ -137,7 +147,7 @@ def calibration_picture(time: Floats, v_f: Floats, v_a: Floats, found: Calibrati
     right.set_xlabel(sizes["V_a"].label("$V_a$"))
     right.set_ylabel(sizes["V_F"].label("$V_F$"))
     labels = ["$V_F$", "$V_a$", "measured", f"slope {found.slope:.4g} ± {found.slope_error:.2g}"]
-    legend(figure, handles, labels)
+    legend(figure, handles, labels, mathematics=True)
     return Picture(figure)
 
 

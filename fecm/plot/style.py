@@ -14,6 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from fecm.plot import Picture, PlotError
+from fecm.results.plain import printable
 from fecm.results.result import Result
 
 # Width of a column and of a page (in); points an inch of pictures in print and on a screen.
@@ -84,6 +85,11 @@ def styled(function: Callable[Drawn, Picture]) -> Callable[Drawn, Picture]:
     return draw
 
 
+def literal(text: str) -> str:
+    """A text of a user or a file as matplotlib shows it letter by letter, without mathematics."""
+    return printable(text).replace("$", r"\$")
+
+
 @dataclass(frozen=True)
 class Scale:
     """How an axis shows a quantity: the factor of the numbers, and the unit's text."""
@@ -93,14 +99,14 @@ class Scale:
 
     def label(self, name: str) -> str:
         """Text of an axis."""
-        return f"{name} ({self.unit})" if self.unit else name
+        return f"{name} ({literal(self.unit)})" if self.unit else name
 
     def show(self, value: float) -> str:
         """A value with its unit, to four figures."""
         number = f"{self.factor * value:.4g}"
         if self.unit.startswith("10"):
-            return f"{number} × {self.unit}"
-        return f"{number} {self.unit}".rstrip()
+            return f"{number} × {literal(self.unit)}"
+        return f"{number} {literal(self.unit)}".rstrip()
 
 
 def scale(peak: float, unit: str) -> Scale:
@@ -110,7 +116,7 @@ def scale(peak: float, unit: str) -> Scale:
     """
     base, own = _PREFIXED.get(unit, ("", 0))
     power = 0
-    if peak > 0.0 and math.isfinite(peak) and not (1.0 if base else 0.1) <= peak < 1e4:
+    if 1e-100 < peak < math.inf and not (1.0 if base else 0.1) <= peak < 1e4:
         power = 3 * math.floor(math.log10(peak) / 3.0)
     if base and power + own in _PREFIXES:
         return Scale(10.0**-power, _PREFIXES[power + own] + base)
@@ -158,18 +164,32 @@ def panels(
     return figure, list(axes.ravel())
 
 
-def legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str], title: str = "") -> None:
-    """A legend above the axes, never over data."""
+def legend(
+    figure: Figure,
+    handles: Sequence[Any],
+    labels: Sequence[str],
+    title: str = "",
+    *,
+    mathematics: bool = False,
+) -> None:
+    """A legend above the axes, never over data; labels are shown as they are, or as mathematics."""
     letters = max(map(len, labels), default=0)
     room = figure.get_figwidth() - (0.08 * len(title) if title else 0.0)
     columns = max(1, min(len(labels), int(room / (0.062 * letters + 0.45))))
-    figure.legend(
+    drawn = figure.legend(
         handles, labels, loc="outside upper center", ncols=columns, title=title or None,
         title_fontsize=7.0,
     )  # fmt: skip
+    for text in drawn.get_texts():
+        text.set_parse_math(mathematics)
 
 
 def lines_legend(figure: Figure, axes: Axes, title: str = "") -> None:
     """The legend of an axes' labelled lines."""
-    handles, labels = axes.get_legend_handles_labels()
-    legend(figure, handles, labels, title)
+    handles = [line for line in axes.get_lines() if not _unlabelled(str(line.get_label()))]
+    legend(figure, handles, [str(line.get_label()) for line in handles], title)
+
+
+def _unlabelled(label: str) -> bool:
+    """Whether a line was drawn without a label for the legend."""
+    return label == "_" or label.startswith("_child")
