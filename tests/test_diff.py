@@ -287,3 +287,86 @@ def test_help_says_how_numbers_are_judged() -> None:
     assert "|a - b| <= T + R * max" in text
     assert "--rtol 1e-3" in text
     assert "largest absolute value" in text
+
+
+# What is judged by another measure than its own largest value -------------------------------------
+
+
+def test_a_residue_of_the_energies_is_judged_by_the_energies(
+    pair: tuple[Path, Callable[[Edit], Path]],
+) -> None:
+    sound, changed = pair
+    initial = 0.5 * 1.8096e-4 * 115.0**2
+
+    def residue(share: float) -> Edit:
+        return replaced("energy/balance_error", lambda file: np.full(10, share * initial))
+
+    assert diff(sound, changed(residue(0.9e-4)), "--rtol", "1e-4").exit_code == 0
+    done = diff(sound, changed(residue(1.2e-4)), "--rtol", "1e-4")
+    assert done.exit_code == 1
+    assert "of the largest energy 1.196" in done.stdout
+    done = diff(sound, changed(residue(2e-4)), "--only", "energy", "--format", "json")
+    said = json.loads(done.stdout)
+    entry = next(d for d in said["datasets"] if d["name"] == "energy/balance_error")
+    assert entry["scale"] == pytest.approx(initial, rel=1e-3)
+    assert entry["relative"] == pytest.approx(2e-4, rel=2e-3)
+
+
+def test_coupling_that_is_a_rounding_is_judged_by_stretching_and_bending(
+    pair: tuple[Path, Callable[[Edit], Path]], tmp_path: Path
+) -> None:
+    changed = pair[1]
+    symmetric = tmp_path / "symmetric.h5"
+    with h5py.File(pair[0]) as file:
+        scale = float((file["laminate/A"][()].max() * file["laminate/D"][()].max()) ** 0.5)
+
+    def coupled(share: float) -> Edit:
+        return replaced("laminate/B", lambda file: np.full((3, 3), share * scale))
+
+    shutil.copy(changed(coupled(1e-16)), symmetric)
+    assert diff(symmetric, changed(coupled(0.9e-6)), "--rtol", "1e-6").exit_code == 0
+    assert diff(symmetric, changed(coupled(1.1e-6)), "--rtol", "1e-6").exit_code == 1
+
+
+def test_free_flight_does_not_loosen_the_measure_of_the_indentation(
+    pair: tuple[Path, Callable[[Edit], Path]], tmp_path: Path
+) -> None:
+    changed = pair[1]
+    far = tmp_path / "far.h5"
+
+    def flight(file: h5py.File) -> None:
+        file["history/indentation"][0] = -1.0
+
+    def deeper(file: h5py.File) -> None:
+        flight(file)
+        file["history/indentation"][5] += 1e-5
+
+    shutil.copy(changed(flight), far)
+    with h5py.File(far) as file:
+        deepest = file["history/indentation"][()].max()
+    assert 0.0 < deepest < 1e-3
+    assert diff(far, changed(deeper), "--rtol", "1e-3").exit_code == 1
+    assert diff(far, changed(deeper), "--rtol", "3e-2").exit_code == 0
+
+
+def test_values_that_differ_are_shown_with_the_digits_that_differ(
+    pair: tuple[Path, Callable[[Edit], Path]], tmp_path: Path
+) -> None:
+    changed = pair[1]
+
+    def edit(file: h5py.File) -> None:
+        file["energy"].attrs["initial"] *= 1.0 + 1e-12
+        file.attrs["title"] = "small plate" + 80 * "-" + "a"
+
+    def other(file: h5py.File) -> None:
+        file.attrs["title"] = "small plate" + 80 * "-" + "b"
+
+    one = tmp_path / "one.h5"
+    shutil.copy(changed(other), one)
+    done = diff(one, changed(edit))
+    (listed,) = (line for line in done.stdout.splitlines() if "energy:initial" in line)
+    a, b = (float(text) for text in listed.split("`")[1::2])
+    assert b / a - 1.0 == pytest.approx(1e-12, rel=1e-2)
+    (listed,) = (line for line in done.stdout.splitlines() if " title" in line)
+    titles = listed.split("`")[1::2]
+    assert (titles[0][0], titles[1][0], titles[0][-1], titles[1][-1]) == ("…", "…", "b", "a")

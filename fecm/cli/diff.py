@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +11,7 @@ import click
 
 from fecm.cli.apart import reads
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, Refused
-from fecm.results.plain import jsonable, printable, shown
+from fecm.results.plain import jsonable, printable, told_apart
 
 if TYPE_CHECKING:
     from fecm.results.compare import Comparison, Place
@@ -52,10 +51,11 @@ def diff(
     A and B are result files or folders of tapes, or both results of sweeps.
 
     Two numbers are the same if |a - b| <= T + R * max, max being the largest absolute value of the
-    whole dataset.  NaN is the same as NaN, an infinity as the same infinity.  Whole numbers (steps,
-    node numbers) must be equal at any tolerance.  A dataset that only one side has, another shape
-    and another type are differences; title, mode, slips, other attributes and the deck are listed
-    where they differ, and not judged.
+    whole dataset; for energy/balance_error the largest energy, for laminate/B the root of the
+    largest A times the largest D, for indentation the largest one in contact.  NaN is the same as
+    NaN, an infinity as the same infinity.  Whole numbers (steps, node numbers) must be equal at any
+    tolerance.  A dataset that only one side has, another shape and another type are differences;
+    title, mode, slips, other attributes and the deck are listed where they differ, and not judged.
 
     A folder of tapes holds tape3, tape8 and tape9 (or tape3.txt and so on) as `fecm tapes` or the
     original program wrote them, in either order.  Only what tapes hold is then compared, and their
@@ -114,6 +114,8 @@ def _lines(found: Difference) -> list[str]:
 
 def _told(found: Comparison) -> str:
     """What there is to say about a dataset: sizes, then where, then since when."""
+    from fecm.results.compare import SCALE_NAMES
+
     a, b = found.layouts
     parts: list[str] = []
     if a.shape != b.shape:
@@ -125,7 +127,8 @@ def _told(found: Comparison) -> str:
         if math.isinf(found.largest):
             parts.append(f"{left} against {right}{_where(found.at)}")
         else:
-            share = f"{found.relative:.2g} of max {found.maximum:.6g}"
+            what = SCALE_NAMES.get(found.path, "") if found.scale != found.maximum else ""
+            share = f"{found.relative:.2g} of {what or 'max'} {found.scale:.6g}"
             parts.append(
                 f"largest {found.largest:.3g} ({share}), {left} against {right}{_where(found.at)}"
             )
@@ -137,10 +140,10 @@ def _told(found: Comparison) -> str:
     return "; ".join(parts)
 
 
-def _values(values: Sequence[float | str]) -> list[str]:
+def _values(values: tuple[float, float] | tuple[str, str]) -> list[str]:
     """Two values that differ, in as many digits as it takes to see it."""
     if any(isinstance(value, str) for value in values):
-        return [f"`{shown(value)}`" for value in values]
+        return [f"`{text}`" for text in told_apart(*values)]
     short = [f"{value:.6g}" for value in values]
     return short if short[0] != short[1] else list(map(repr, values))
 
@@ -162,7 +165,11 @@ def _where(place: Place) -> str:
 
 def _listed(item: Listed) -> str:
     """A line about what differs and is not judged."""
-    left, right = ("nothing" if v is None else f"`{shown(v)}`" for v in item.values)
+    texts = told_apart(*item.values)
+    left, right = (
+        "nothing" if value is None else f"`{text}`"
+        for value, text in zip(item.values, texts, strict=True)
+    )
     line = f" line {item.line}" if item.line else ""
     return f"listed     {printable(item.name)}{line}: {left} against {right}"
 
@@ -196,6 +203,7 @@ def _entry(found: Comparison) -> dict[str, Any]:
         "largest_difference": found.largest if finite else None,
         "relative": found.relative if finite else None,
         "maximum": found.maximum if numbers else None,
+        "scale": found.scale if numbers else None,
         "tolerance": found.tolerance if numbers else None,
         "differing": found.differing if found.comparable else None,
         "at": _place(found.at), "a": values[0], "b": values[1],

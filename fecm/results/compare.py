@@ -2,9 +2,11 @@
 
 Two numbers are the same where |a - b| <= atol + rtol*max, max being the largest finite absolute
 value of the whole dataset in both results together: a history's zero crossing is judged by the
-history's size, not by its own.  Whole numbers (steps, node and equation numbers) are names rather
-than quantities; they have to be equal.  NaN is the same as NaN, an infinity as the same infinity;
-either of them against anything else is a difference at any tolerance.  Texts have to be equal.
+history's size, not by its own.  A dataset whose own size says nothing has another measure
+(`SCALE_NAMES`): a residue of rounding is judged by what it is the residue of.  Whole numbers
+(steps, node and equation numbers) are names rather than quantities; they have to be equal.  NaN is
+the same as NaN, an infinity as the same infinity; either of them against anything else is a
+difference at any tolerance.  Texts have to be equal.
 
 Datasets are read in blocks of rows, so memory does not grow with the results.
 """
@@ -30,6 +32,23 @@ BLOCK = 4_000_000
 AXES = {size: name for size, (name, _) in SCALES.items()} | {"nen": "position", "ndm": "axis"}
 
 
+# Whose sum energy/balance_error is.
+ENERGIES = [
+    dataset.path
+    for dataset in DATASETS.values()
+    if dataset.group == "energy" and dataset.dimension == "force*length"
+    if dataset.name != "balance_error"
+]
+
+# What datasets are judged by that are not judged by their own largest value.
+SCALE_NAMES = {
+    "energy/balance_error": "the largest energy",
+    "laminate/B": "sqrt(max A * max D)",
+    "history/indentation": "the largest indentation in contact",
+    "tape9/indentation": "the largest indentation in contact",
+}
+
+
 @dataclass(frozen=True)
 class Tolerance:
     """How far apart two numbers may be.
@@ -37,7 +56,7 @@ class Tolerance:
     Attributes
     ----------
     relative : float
-        Share of the dataset's largest absolute value.
+        Share of the dataset's scale.
     absolute : float
         In the dataset's own unit.
     """
@@ -45,9 +64,9 @@ class Tolerance:
     relative: float = 0.0
     absolute: float = 0.0
 
-    def of(self, maximum: float) -> float:
-        """Largest difference that is none, for a dataset of this largest absolute value."""
-        return self.absolute + self.relative * maximum
+    def of(self, scale: float) -> float:
+        """Largest difference that is none, for a dataset of this scale."""
+        return self.absolute + self.relative * scale
 
 
 @dataclass(frozen=True)
@@ -127,8 +146,9 @@ class Comparison:
         In A and in B.
     comparable : bool
         Whether the shapes are equal, and both are numbers or both texts.
-    maximum, tolerance : float
-        Largest finite absolute value in both, and the largest difference that is none.
+    maximum, scale, tolerance : float
+        Largest finite absolute value in both, what differences are judged by (`maximum` but for
+        `SCALE_NAMES`), and the largest difference that is none.
     largest : float
         Largest difference; infinite where it is between a number and what is none.
     at : Place or None
@@ -143,6 +163,7 @@ class Comparison:
     layouts: tuple[Layout, Layout]
     comparable: bool = True
     maximum: float = 0.0
+    scale: float = 0.0
     tolerance: float = 0.0
     largest: float = 0.0
     at: Place | None = None
@@ -162,8 +183,8 @@ class Comparison:
 
     @property
     def relative(self) -> float:
-        """Largest difference over the largest absolute value."""
-        return self.largest / self.maximum if self.maximum else self.largest and np.inf
+        """Largest difference over the scale."""
+        return self.largest / self.scale if self.scale else self.largest and np.inf
 
 
 def compare(a: Side, b: Side, path: str, tolerance: Tolerance) -> Comparison:
@@ -191,12 +212,40 @@ def compare(a: Side, b: Side, path: str, tolerance: Tolerance) -> Comparison:
         return found
     index, lost = _measure(found, a, b)
     whole = all(layout.dtype.kind in "biu" for layout in layouts)
-    found.tolerance = 0.0 if whole else tolerance.of(found.maximum)
+    found.scale = _scale(found, a, b)
+    found.tolerance = 0.0 if whole else tolerance.of(found.scale)
     if index is not None:
         found.at = _place(a, b, path, index)
     if lost or found.largest > found.tolerance:
         _count(found, a, b)
     return found
+
+
+def _scale(found: Comparison, a: Side, b: Side) -> float:
+    """What the differences of a dataset are judged by; its maximum where nothing else is known."""
+
+    def largest(path: str, low: float = -np.inf) -> float:
+        values = [
+            block[np.isfinite(block) & (block > low)]
+            for side in (a, b)
+            if path in side.layouts and not side.layouts[path].holds_texts
+            for block in _rows(side, path)
+        ]
+        return max((float(np.abs(block).max(initial=0.0)) for block in values), default=0.0)
+
+    if found.path not in SCALE_NAMES:
+        return found.maximum
+    group = found.path.partition("/")[0]
+    if found.path == "energy/balance_error":
+        scale = max(map(largest, ENERGIES))
+    elif found.path == "laminate/B":
+        # Both are of the order of A h, h being the thickness.
+        scale = (largest("laminate/A") * largest("laminate/D")) ** 0.5
+    elif all(f"{group}/step" in side.layouts for side in (a, b)):
+        scale = largest(found.path, 0.0)
+    else:
+        scale = 0.0  # a tape has a few digits of every number, also of those in free flight
+    return scale or found.maximum
 
 
 def _compare_texts(found: Comparison, a: Side, b: Side) -> None:
@@ -245,12 +294,20 @@ def _count(found: Comparison, a: Side, b: Side) -> None:
 
 def _blocks(a: Side, b: Side, found: Comparison) -> Iterator[tuple[int, Array, Array]]:
     """Yield the first row, and the rows of A and B as at least one-dimensional arrays."""
-    layout = found.layouts[0]
+    pairs = zip(_rows(a, found.path), _rows(b, found.path), strict=True)
+    start = 0
+    for left, right in pairs:
+        yield start, left, right
+        start += len(left)
+
+
+def _rows(side: Side, path: str) -> Iterator[Array]:
+    """Blocks of rows of a dataset."""
+    layout = side.layouts[path]
     row_bytes = 8 * max(1, int(np.prod(layout.shape[1:], dtype=float)))
     step = max(1, BLOCK // row_bytes)
     for start in range(0, layout.rows, step):
-        stop = min(start + step, layout.rows)
-        yield start, a.rows(found.path, start, stop), b.rows(found.path, start, stop)
+        yield side.rows(path, start, min(start + step, layout.rows))
 
 
 def _differences(left: Array, right: Array) -> tuple[Array, Array]:

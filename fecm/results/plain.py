@@ -7,6 +7,7 @@ JSON knows no NaN and no infinity; they become the texts ``"NaN"``, ``"Infinity"
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,15 +17,28 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
-def shown(value: Any, width: int = 60) -> str:
-    """A value in one short line."""
+def shown(value: Any, width: int = 60, *, exact: bool = False) -> str:
+    """A value in one short line; numbers to six digits, or to all that they have."""
     if isinstance(value, list | tuple):
-        text = "[" + ", ".join(shown(item, width) for item in value) + "]"
+        text = "[" + ", ".join(shown(item, width, exact=exact) for item in value) + "]"
     elif isinstance(value, float):
-        text = f"{value:.6g}"
+        text = repr(value) if exact else f"{value:.6g}"
     else:
         text = printable(str(value))
     return text if len(text) <= width else text[: width - 1] + "…"
+
+
+def told_apart(one: Any, other: Any, width: int = 60) -> tuple[str, str]:
+    """Two values that differ, each in a short line that shows where."""
+    short = shown(one, width), shown(other, width)
+    if short[0] != short[1]:
+        return short
+    whole = [shown(value, sys.maxsize, exact=True) for value in (one, other)]
+    pairs = zip(*whole, strict=False)
+    same = next((n for n, (a, b) in enumerate(pairs) if a != b), min(map(len, whole)))
+    begin = max(0, same - width // 2)
+    texts = [("…" if begin else "") + text[begin:] for text in whole]
+    return shown(texts[0], width), shown(texts[1], width)
 
 
 def jsonable(value: Any) -> Any:
