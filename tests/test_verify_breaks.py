@@ -1,44 +1,61 @@
 """Physics broken on purpose, and the rows of ``fecm verify`` that have to see it."""
 
 from __future__ import annotations
-import __future__
 
 import inspect
-import textwrap
+import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import fecm
+from fecm import gages, plate, projectile, proportional, rod, stresses
+from fecm import impact as impacts
 from fecm import laminate as laminates
-from fecm import plate, projectile, rod, stresses
-from fecm.impact import Impact, meet
-from fecm.indentation import Constants, MemoryLaw
-from fecm.sweeps.responses import Convolution
-from fecm.verification import CASES, INDEPENDENT, carry_out, chosen
+from fecm.dynamics import PlateMotion
+from fecm.impact import Impact
+from fecm.indentation import UNLOADING, VIRGIN, Constants, CriticalConstants, MemoryLaw
+from fecm.recording.recorder import Recorder
+from fecm.sweeps.responses import BLOCK, Convolution
+from fecm.verification import AGAINST_CHANGE, CASES, carry_out, chosen
 from fecm.waves.fronts import Fronts
 from fecm.waves.medium import Medium
 
 Break = Callable[[pytest.MonkeyPatch], None]
 
 
-def mutate(function: Any, old: str, new: str) -> Break:
-    """Make a function compute something else: another text in the place of one in its source."""
-    function = getattr(function, "fget", function)  # of a property
+def instead(owner: Any, name: str, broken: Callable[..., Any]) -> Break:
+    """Make a function compute something else: `broken` gets the right function and its arguments.
+
+    A function of a module is replaced wherever it was imported.
+    """
 
     def apply(monkeypatch: pytest.MonkeyPatch) -> None:
-        source = textwrap.dedent(inspect.getsource(function))
-        assert source.count(old) == 1, f"`{old}` stands {source.count(old)} times"
-        source = source.replace("@property\n", "").replace(old, new)
-        space: dict[str, Any] = {}
-        flags = __future__.annotations.compiler_flag
-        exec(compile(source, "<broken>", "exec", flags), function.__globals__, space)
-        (broken,) = space.values()
-        monkeypatch.setattr(function, "__code__", broken.__code__)
+        found = inspect.getattr_static(owner, name)
+        right = found.fget if isinstance(found, property) else found
+
+        def wrapper(*args: Any, **kwargs: Any) -> Any:
+            return broken(right, *args, **kwargs)
+
+        if isinstance(owner, type):
+            monkeypatch.setattr(
+                owner, name, property(wrapper) if isinstance(found, property) else wrapper
+            )
+            return
+        for module in [m for n, m in sys.modules.items() if n.partition(".")[0] == "fecm"]:
+            for own, kept in list(vars(module).items()):
+                if kept is right:
+                    monkeypatch.setattr(module, own, wrapper)
 
     return apply
+
+
+def changed(owner: Any, name: str, change: Callable[[Any], Any]) -> Break:
+    """Make a function give another result: `change` of the right one."""
+    return instead(owner, name, lambda right, *args, **kwargs: change(right(*args, **kwargs)))
 
 
 def value(owner: Any, name: str, new: object) -> Break:
@@ -46,14 +63,177 @@ def value(owner: Any, name: str, new: object) -> Break:
     return lambda monkeypatch: monkeypatch.setattr(owner, name, new)
 
 
-LAMINATE = laminates.laminate
-STRAINS = plate.StrainField.evaluate
-TURNED = MemoryLaw._turned
+def entry(rows: Any, columns: Any, factor: float) -> Callable[[Any], Any]:
+    """Multiply an entry of a symmetric matrix."""
+
+    def change(matrix: Any) -> Any:
+        other = matrix.copy()
+        other[..., rows, columns] *= factor
+        if rows != columns:
+            other[..., columns, rows] *= factor
+        return other
+
+    return change
+
+
+def in_laminate(**changes: Callable[[Any], Any]) -> Break:
+    """Change parts of every laminate."""
+    return changed(
+        laminates, "laminate",
+        lambda made: replace(made, **{n: new(getattr(made, n)) for n, new in changes.items()}),
+    )  # fmt: skip
+
+
+def in_stiffness(**changes: Callable[[Any], Any]) -> Break:
+    """Change parts of the laminate that the elements' stiffness is made of, and nothing else."""
+
+    def broken(right: Any, family: Any, laminate: Any, *rules: Any, **kwargs: Any) -> Any:
+        other = {name: change(getattr(laminate, name)) for name, change in changes.items()}
+        return right(family, replace(laminate, **other), *rules, **kwargs)
+
+    return instead(plate, "stiffness", broken)
+
+
+def in_strains(component: int, unknown: int) -> Break:
+    """Change the sign of what an unknown adds to a component of the strains."""
+
+    def broken(right: Any, self: Any, displacement: Any) -> Any:
+        strains, other = right(self, displacement), displacement.copy()
+        other[..., unknown] *= -1.0
+        strains[component] = right(self, other)[component]
+        return strains
+
+    return instead(plate.StrainField, "evaluate", broken)
+
+
+def without_coupling(names: str) -> Break:
+    """Forget B in some of the stress resultants."""
+
+    def broken(right: Any, strains: Any, laminate: Any, field: Any) -> Any:
+        poor = right(strains, replace(laminate, B=0.0 * laminate.B), field)
+        rich = right(strains, laminate, field)
+        return rich | {name: found for name, found in poor.items() if name[0] == names}
+
+    return instead(stresses, "strains_and_resultants", broken)
+
+
+def of_q16(right: Any, q: Any, angle: float) -> Any:
+    m, n = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
+    made, second = right(q, angle), (q[0, 1] - q[1, 1] + 2.0 * q[2, 2]) * m * n**3
+    made[0, 2] -= 2.0 * second
+    made[2, 0] -= 2.0 * second
+    return made
+
+
+def plane_stress_of_strain(right: Any, ply: Any) -> Any:
+    made = right(ply)
+    made[:2, :2] *= 1.0 - ply.nu12**2 * ply.e2 / ply.e1
+    return made
+
+
+def moved_midplane(made: Any) -> Any:
+    d = made.thickness / 6.0
+    return replace(made, B=made.B + d * made.A, D=made.D + 2.0 * d * made.B + d**2 * made.A)
+
+
+def equal_shares(right: Any, *args: Any) -> Any:
+    lumped = right(*args)
+    return np.broadcast_to(lumped.mean(axis=1, keepdims=True), lumped.shape)
+
+
+def rotary_for_mass(right: Any, family: Any, *args: Any) -> Any:
+    ne, nn = family.nodes.shape
+    M = right(family, *args).reshape(ne, nn, 5, nn, 5)
+    M[:, :, 2, :, 2] = M[:, :, 3, :, 3]
+    return M.reshape(ne, 5 * nn, 5 * nn)
+
+
+def rotations_reversed(B: Any) -> Any:
+    parts = B.reshape(*B.shape[:-1], -1, 5)
+    parts[..., 3:] *= -1.0
+    return parts.reshape(B.shape)
+
+
+def ray_without_slope(right: Any, fronts: Any) -> Any:
+    return right(replace(fronts, slope=0.0 * fronts.slope))
+
+
+def quarter_of_mass(masses: Any) -> Any:
+    return masses * np.where(np.arange(len(masses)) % 2, 1.0, 0.5)
+
+
+def lighter_begin(right: Any, rod: Any) -> Any:
+    M = right(rod)
+    for element, area in enumerate(rod.areas):
+        M[2 * element, 2 * element] -= rod.density * area * rod.length / rod.elements * 16.0 / 420.0
+    return M
+
+
+def turned(of: Callable[[Any, Any], bool], **factors: float) -> Break:
+    """Multiply parts of the curve that the law turns to, given the memories before and after."""
+
+    def broken(right: Any, law: Any, before: Any, *args: Any) -> Any:
+        after = right(law, before, *args)
+        if after is before or not of(before, after):
+            return after
+        return replace(after, **{n: times * getattr(after, n) for n, times in factors.items()})
+
+    return instead(MemoryLaw, "_turned", broken)
+
+
+def standing_plate(right: Any, impact: Any, motion: Any, rod: Any, law: Any, contact: Any,
+                   *args: Any) -> None:  # fmt: skip
+    right(impact, motion, rod, law, replace(contact, plate_moves=False), *args)
+
+
+def work_of_the_new_force(right: Any, step: Any, law: Any, state: Any, w: Any) -> None:
+    last = state.contact
+    right(step, law, state, w)
+    force, indentation = state.contact
+    state.contact_work += (force - last.force) / 2.0 * (indentation - last.indentation)
+
+
+def half_given(right: Any, convolution: Any, values: Any) -> None:
+    right(convolution, values)
+    if row := convolution._step % BLOCK:
+        convolution._block[row:] -= 0.5 * convolution._near[: BLOCK - row] * values
+
+
+def exchanged_on_tape8(
+    right: Any, recorder: Any, group: str, step: Any, time: Any, columns: Any
+) -> None:
+    if group == "tape8":
+        other = ("kappa_y", "kappa_x", "kappa_xy", "gamma_xz", "gamma_yz")
+        columns = dict(zip(other, columns.values(), strict=True))
+    right(recorder, group, step, time, columns)
+
+
+def other_power(right: Any, constants: Any, *args: Any) -> None:
+    right(constants, *args)
+    object.__setattr__(constants, "q", 2.0)
+
+
+def resultants(**factors: float) -> Callable[[Any], Any]:
+    """Multiply some stress resultants."""
+    return lambda found: found | {name: times * found[name] for name, times in factors.items()}
+
+
+def halved(number: float) -> float:
+    return number / 2.0
+
+
+def negative(matrix: Any) -> Any:
+    return -matrix
+
+
+def nothing(matrix: Any) -> Any:
+    return 0.0 * matrix
+
 
 # What is broken, how, and the rows that have to see it: a case, and the beginnings of quantities.
 BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
     "Poisson's ratio forgotten in Q": (
-        mutate(laminates.reduced_stiffness, "full = 1.0 - nu12**2 * e2 / e1", "full = 1.0"),
+        instead(laminates, "reduced_stiffness", plane_stress_of_strain),
         {
             "isotropic-ply": ("A11", "A12", "A66", "A16", "D11", "D12", "D66"),
             "cross-ply": ("A11", "A12", "B11", "B22", "D11"),
@@ -64,109 +244,179 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
         },
     ),
     "half of G12": (
-        mutate(laminates.reduced_stiffness, "0.0, ply.g12]", "0.0, ply.g12 / 2.0]"),
+        changed(laminates, "reduced_stiffness", entry(2, 2, 0.5)),
         {
             "cross-ply": ("A66", "D66"), "wave-fronts": ("its ray", "in-plane", "twisting"),
             "angle-ply": ("A11", "A12", "D11"),
         },
     ),
     "sign of Q16's second part": (
-        mutate(laminates.transformed_stiffness, "a * m**3 * n + b * m * n**3",
-               "a * m**3 * n - b * m * n**3"),
-        {"angle-ply": ("B16",)},
+        instead(laminates, "transformed_stiffness", of_q16), {"angle-ply": ("B16",)},
     ),
     "-45 taken for +45": (
-        mutate(laminates.transformed_stiffness, "np.sin(np.deg2rad(angle))",
-               "np.sin(np.deg2rad(abs(angle)))"),
-        {"angle-ply": ("A16", "B16")},
+        instead(laminates, "transformed_stiffness", lambda right, q, angle: right(q, abs(angle))),
+        {"angle-ply": ("A16", "B16"), "angle-ply-plate": ("ω",)},
     ),
     "midplane not in the middle": (
-        mutate(LAMINATE, "faces -= faces[-1] / 2.0", "faces -= faces[-1] / 3.0"),
+        changed(laminates, "laminate", moved_midplane),
         {
             "isotropic-ply": ("A16", "D11", "D12", "D66"), "cross-ply": ("B11", "B22", "D66"),
             "angle-ply": ("B11", "D11", "D66"),
         },
     ),
     "factor 1/2 dropped in B": (
-        mutate(LAMINATE, ".sum(axis=0) / 2.0", ".sum(axis=0)"),
-        {"cross-ply": ("B11", "B22"), "angle-ply": ("B16",), "patch": ("M_x",)},
+        in_laminate(B=lambda B: 2.0 * B),
+        {
+            "cross-ply": ("B11", "B22"), "angle-ply": ("B16",), "patch": ("M_x",),
+            "cross-ply-plate": ("ω", "w", "u"), "angle-ply-plate": ("ω", "w", "u"),
+            "resultants": ("ε", "γ_xy", "κ"),
+        },
     ),
     "layers stacked from the other face": (
-        mutate(LAMINATE, "angle) for angle in angles])\n    shears",
-               "angle) for angle in angles[::-1]])\n    shears"),
+        instead(laminates, "laminate",
+                lambda right, ply, angles, *rest: right(ply, angles[::-1], *rest)),
         {"cross-ply": ("B11", "B22"), "angle-ply": ("B16",), "patch": ("M_x",)},
     ),
     "D with 1/2 for 1/3": (
-        mutate(LAMINATE, ".sum(axis=0) / 3.0", ".sum(axis=0) / 2.0"),
+        in_laminate(D=lambda D: 1.5 * D),
         {
             "isotropic-ply": ("D11", "D12", "D66"), "cross-ply": ("D11", "D66"),
             "angle-ply": ("D11", "D66"), "patch": ("M_x",), "static-bending": ("w",),
             "frequencies": ("ω11", "ω13", "ω33"), "time-step": ("θ_x",),
             "wave-fronts": ("bending", "twisting"), "dispersion": ("ω, wavelength",),
+            "cross-ply-plate": ("ω", "w"), "angle-ply-plate": ("ω", "w"),
+            "forced-plate": ("w", "strain"), "supported-plate": ("",),
         },
     ),
     "a shear correction of 5/6": (
-        mutate(LAMINATE, "shear=(shears * (upper - lower)).sum(axis=0)",
-               "shear=(shears * (upper - lower)).sum(axis=0) * 5.0 / 6.0"),
+        in_laminate(shear=lambda shear: shear * 5.0 / 6.0),
         {
             "isotropic-ply": ("A*55",), "cross-ply": ("A*55",), "angle-ply": ("A*45",),
-            "static-bending": ("w",), "frequencies": ("ω11", "ω13", "ω33", "cut-off"),
+            "static-bending": ("w at", "w in the middle, κ", "w in the middle, L2"),
+            "resultants": ("γ_xz", "γ_yz"),
+            "frequencies": ("ω11", "ω13", "ω33", "cut-off"),
             "time-step": ("w", "θ_x"), "wave-fronts": ("transverse",),
             "dispersion": ("ω, wavelength", "cut-off"),
+            "cross-ply-plate": ("ω", "w"), "angle-ply-plate": ("ω", "w"),
         },
     ),
     "sign of A*45, the report's own misprint": (
-        mutate(laminates.transformed_shear, "(g13 - g23)", "(g23 - g13)"),
-        {"angle-ply": ("A*45",)},
+        changed(laminates, "transformed_shear", entry(0, 1, -1.0)),
+        {"angle-ply": ("A*45",), "resultants": ("γ_xz", "γ_yz")},
     ),
     "mass without the thickness": (
-        mutate(LAMINATE, "mass=ply.density * h,", "mass=ply.density,"),
+        changed(laminates, "laminate", lambda made: replace(made, mass=made.mass / made.thickness)),
         {"isotropic-ply": ("mass",), "frequencies": ("ω11", "ω13", "ω33"),
-         "wave-fronts": ("extension", "in-plane", "transverse"), "infinite-plate": ("",)},
+         "wave-fronts": ("extension", "in-plane", "transverse")},
     ),
     "rotary inertia ten times too small": (
-        mutate(LAMINATE, "rotary_inertia=ply.density * h**3 / 12.0",
-               "rotary_inertia=ply.density * h**3 / 120.0"),
+        in_laminate(rotary_inertia=lambda inertia: inertia / 10.0),
         {
             "isotropic-ply": ("rotary",), "frequencies": ("ω11", "ω13", "ω33", "cut-off"),
             "time-step": ("θ_x",), "wave-fronts": ("bending", "twisting"),
-            "dispersion": ("ω, wavelength", "cut-off"),
+            "dispersion": ("ω, wavelength", "cut-off"), "cross-ply-plate": ("ω",),
         },
     ),
+    "sign of B in the stiffness": (
+        in_stiffness(B=negative),
+        {
+            "cross-ply-plate": ("u",), "angle-ply-plate": ("u",), "forced-plate": ("strain",),
+            "resultants": ("ε", "κ", "γ_xy"),
+        },
+    ),
+    "B dropped in the stiffness": (
+        in_stiffness(B=nothing),
+        {
+            "cross-ply-plate": ("ω", "w", "u"), "angle-ply-plate": ("ω", "w", "u"),
+            "forced-plate": ("w", "strain"), "resultants": ("ε", "κ", "γ_xy", "N", "M"),
+        },
+    ),
+    "sign of A16 in the stiffness": (
+        in_stiffness(A=entry(0, 2, -1.0)), {"resultants": ("ε_x", "γ_xy")},
+    ),
+    "sign of D16 in the stiffness": (
+        in_stiffness(D=entry(0, 2, -1.0)), {"resultants": ("κ_x ", "κ_xy")},
+    ),
+    "sign of A*45 in the stiffness": (
+        in_stiffness(shear=entry(0, 1, -1.0)), {"resultants": ("γ_xz", "γ_yz", "Q")},
+    ),
+    "xz taken for yz in the stiffness": (
+        in_stiffness(shear=lambda shear: shear[::-1, ::-1]), {"resultants": ("γ_xz", "γ_yz", "Q")},
+    ),
+    "membrane stiffness doubled": (
+        in_stiffness(A=lambda A: 2.0 * A),
+        {"resultants": ("ε", "γ_xy", "N"), "cross-ply-plate": ("ω11", "w", "u")},
+    ),
+    "SHEA ignored": (
+        instead(laminates, "laminate_of",
+                lambda right, material, factor, **kwargs: right(material, **kwargs)),
+        {"resultants": ("γ_xz", "γ_yz")},
+    ),
     "sign of the rotation in the stiffness of transverse shear": (
-        mutate(plate._transverse_shear, "= -at.N", "= at.N"),
+        changed(plate, "_transverse_shear", rotations_reversed),
         {"patch": ("κ", "γ_xz", "M_x")},
     ),
     "sign of the rotation in the strain of transverse shear": (
-        mutate(STRAINS, "dx[:, :, 0] - values[:, :, 1]", "dx[:, :, 0] + values[:, :, 1]"),
-        {"patch": ("γ_xz",)},
+        in_strains(4, 3), {"patch": ("γ_xz",), "tape8": ("γ_xz",)},
     ),
-    "sign of theta_x,y in the twist": (
-        mutate(STRAINS, "0.0 - dy[:, :, 1] - dx[:, :, 2]", "0.0 - dy[:, :, 1] + dx[:, :, 2]"),
-        {"patch": ("γ_xy", "κ_xy")},
+    "sign of theta_y,x in the twist": (
+        in_strains(2, 4), {"patch": ("γ_xy", "κ_xy"), "tape8": ("κ_xy",)},
+    ),
+    "strains of x and y exchanged on tape8": (
+        instead(Recorder, "row", exchanged_on_tape8),
+        {"tape8": ("κ_x ", "κ_y ", "γ_yz", "γ_xz")},
     ),
     "Jacobian transposed": (
-        mutate(plate.inverse_jacobian, "if transposed:", "if not transposed:"),
+        instead(plate, "inverse_jacobian",
+                lambda right, *args, transposed=False: right(*args, transposed=not transposed)),
         {"patch": ("ε_x", "ε_y", "γ_xy", "κ_x", "κ_y", "κ_xy", "γ_xz", "M_x")},
     ),
     "coupling of stretching to couples forgotten": (
-        mutate(stresses.strains_and_resultants, "M = np.tensordot(laminate.B, membrane, 1) + ",
-               "M = "),
-        {"patch": ("M_x",)},
+        without_coupling("M"), {"patch": ("M_x",), "resultants": ("M",)},
+    ),
+    "coupling of bending to forces forgotten": (without_coupling("N"), {"resultants": ("N",)}),
+    "transverse forces doubled": (
+        changed(stresses, "strains_and_resultants", resultants(Q_x=2.0, Q_y=2.0)),
+        {"resultants": ("Q_x", "Q_y")},
+    ),
+    "transverse forces exchanged": (
+        changed(stresses, "strains_and_resultants",
+                lambda found: found | {"Q_x": found["Q_y"], "Q_y": found["Q_x"]}),
+        {"resultants": ("Q_x", "Q_y")},
+    ),
+    "a gage on the other face": (
+        instead(gages, "_functional",
+                lambda right, f, gage, t: right(f, replace(gage, z=-gage.z), t)),
+        {"forced-plate": ("strain",)},
+    ),
+    "a gage turned the other way": (
+        instead(gages, "_functional",
+                lambda right, f, gage, t: right(f, replace(gage, direction=-gage.direction), t)),
+        {"forced-plate": ("strain",)},
+    ),
+    "the exponent of PROP ignored": (
+        instead(proportional, "load_factor",
+                lambda right, table, clock: right(replace(table, exponent=1), clock)),
+        {"forced-plate": ("w", "strain")},
+    ),
+    "half of the load in EXCD": (
+        instead(PlateMotion, "central_difference",
+                lambda right, motion, state, dt, factor: right(motion, state, dt, factor / 2.0)),
+        {"forced-plate": ("w", "strain")},
     ),
     "equal shares of the lumped mass": (
-        mutate(plate.lumped_mass, "values**2", "values**0"),
+        instead(plate, "lumped_mass", equal_shares),
         {"frequencies": ("ω11, lumped", "ω13, lumped"), "time-step": ("w", "θ_x")},
     ),
     "rotary inertia taken for mass in the consistent matrix": (
-        mutate(plate.consistent_mass, "(3, 2))", "(2, 3))"),
+        instead(plate, "consistent_mass", rotary_for_mass),
         {"frequencies": ("ω11, cons", "ω33, cons")},
     ),
     "normal velocity's slope forgotten in the ray": (
-        mutate(Fronts.ray, "c * sin + s * cos", "c * sin"), {"wave-fronts": ("its ray",)},
+        instead(Fronts, "ray", ray_without_slope), {"wave-fronts": ("its ray",)},
     ),
     "rotary inertia of one direction doubled": (
-        mutate(Medium.inertia, "[p, p, i, i, p]", "[p, p, 2.0 * i, i, p]"),
+        changed(Medium, "inertia", entry(2, 2, 2.0)),
         {"wave-fronts": ("bending",), "dispersion": ("ω, wavelength", )},
     ),
     "theta of Wilson's method dropped": (
@@ -177,12 +427,12 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
         value(projectile.WilsonStep, "theta", 4.0), {"rod-waves": ("wave", "peak")},
     ),
     "lumped mass of a quarter": (
-        mutate(projectile.Rod.lumped_mass, "[0.5,", "[0.25,"),
+        changed(projectile.Rod, "lumped_mass", quarter_of_mass),
         {"rod-pulse": ("the same", "velocity"),
          "rod-waves": ("wave", "first free frequency, lumped")},
     ),
     "consistent mass with 140 for 156": (
-        mutate(projectile.Rod.consistent_mass, "[156.0, 22.0", "[140.0, 22.0"),
+        instead(projectile.Rod, "consistent_mass", lighter_begin),
         {"rod-waves": ("first free frequency, cons",)},
     ),
     "the density that is misread in the listing": (
@@ -190,60 +440,64 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
         {"rod-pulse": ("mass",)},
     ),
     "force of the wrong station": (
-        mutate(rod.force_row, "3.0 * s**2 - 2.0 * s,", "3.0 * s**2 - 2.1 * s - 0.01,"),
+        instead(rod, "force_row", lambda right, bar, x: right(bar, x - 0.05 * bar.length)),
         {"rod-pulse": ("largest", "the same", "mean")},
     ),
     "k a^1.4": (
         value(fecm.indentation, "LOADING_POWER", 1.4),
         {
             "indentation": ("F(α_p)", "F at the peak", "F halfway down", "F back", "F halfway up",
-                            "work"),
-            "rigid-target": ("deepest", "largest", "contact"), "infinite-plate": ("",),
+                            "work", "ACR: F at the peak"),
+            "rigid-target": ("deepest", "largest", "contact"), "supported-plate": ("",),
         },
     ),
     "permanent indentation halved": (
-        mutate(Constants.permanent, "self.s_p * (peak", "0.5 * self.s_p * (peak"),
+        changed(Constants, "permanent", halved),
         {"indentation": ("F halfway down", "F at α₀", "work")},
     ),
+    "permanent indentation of ACR halved": (
+        changed(CriticalConstants, "permanent", halved),
+        {"indentation": ("ACR: F halfway", "ACR: F at α₀")},
+    ),
+    "the unloading power of ACR 2 for 5/2": (
+        instead(CriticalConstants, "__init__", other_power), {"indentation": ("ACR: F halfway",)},
+    ),
     "unloading from nine tenths of the force": (
-        mutate(TURNED, "begin = _select(leaves, peak_force",
-               "begin = _select(leaves, 0.9 * peak_force"),
+        turned(lambda before, after: bool(before.branch == VIRGIN), f=0.9),
         {"indentation": ("jump of F where unloading", "F halfway down", "work"),
          "rigid-target": ("velocity",)},
     ),
     "reloading always from the permanent indentation": (
-        mutate(MemoryLaw._reloading, "(last.force > 0.0) & (last.force < m.peak_force)",
-               "last.force > 1e300"),
+        instead(MemoryLaw, "_reloading",
+                lambda right, law, m, last: right(law, m, last._replace(force=0.0))),
         {"indentation": ("jump of F where reloading",)},
     ),
     "reloading to nine tenths of the peak": (
-        mutate(MemoryLaw._reloading, "RELOADING, _select(width > 0.0, m.peak_force",
-               "RELOADING, _select(width > 0.0, 0.9 * m.peak_force"),
+        changed(MemoryLaw, "_reloading", lambda curve: replace(curve, f=0.9 * curve.f)),
         {"indentation": ("F halfway up",)},
     ),
     "the first curve goes on at nine tenths": (
-        mutate(TURNED, "Memory(VIRGIN, c.k,", "Memory(VIRGIN, 0.9 * c.k,"),
+        turned(lambda before, after: bool(after.branch == VIRGIN), f=0.9),
         {"indentation": ("F back",)},
     ),
     "a steeper unloading": (
-        mutate(TURNED, "_select(width > 0.0, width, 1.0), c.q,",
-               "_select(width > 0.0, width, 1.0), c.q + 0.1,"),
+        turned(lambda before, after: bool(after.branch == UNLOADING), p=1.05),
         {"indentation": ("F halfway down", "work"), "rigid-target": ("velocity", "contact")},
     ),
     "a plate that does not move": (
-        mutate(Impact.move_projectile, "if self.contact.plate_moves else", "if False else"),
-        {"infinite-plate": ("",), "report-impact": ("worst",)},
+        instead(Impact, "__init__", standing_plate),
+        {"infinite-plate": ("",), "supported-plate": ("largest force",),
+         "report-impact": ("worst",)},
     ),
     "action without equal reaction": (
-        mutate(Impact.point_force, "self.contact.share * given", "1.01 * given"),
+        changed(Impact, "point_force", lambda point: point._replace(force=1.01 * point.force)),
         {"report-impact": ("worst",)},
     ),
     "work of the new force alone": (
-        mutate(meet, "(last.force + force) / 2.0", "force"), {"report-impact": ("worst",)},
+        instead(impacts, "meet", work_of_the_new_force), {"report-impact": ("worst",)},
     ),
     "half of the last step's force in the convolution": (
-        mutate(Convolution.give, "self._near[:left] * values", "0.5 * self._near[:left] * values"),
-        {"convolution": ("largest",)},
+        instead(Convolution, "give", half_given), {"convolution": ("largest",)},
     ),
 }  # fmt: skip
 
@@ -268,13 +522,14 @@ def test_broken_physics_is_seen(
         found = carry_out(one)
     for beginning in quantities:
         rows = [row for row in found if row.check.quantity.startswith(beginning)]
-        rows = [row for row in rows if row.check.label == INDEPENDENT]
         assert rows, f"no quantity of {case} begins with {beginning}"
         assert not [row.check.quantity for row in rows if row.within]
 
 
-def test_every_independent_row_has_a_break_that_it_sees() -> None:
-    rows = {(one.name, c.quantity) for one in CASES for c in one.checks if c.label == INDEPENDENT}
+def test_every_row_that_can_be_wrong_has_a_break_that_it_sees() -> None:
+    rows = {
+        (one.name, c.quantity) for one in CASES for c in one.checks if c.label != AGAINST_CHANGE
+    }
     covered = {
         (case, quantity)
         for _, case, beginnings in seen()

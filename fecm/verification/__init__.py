@@ -7,12 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from fecm.verification import impacts, indentations, laminates, plates, rods, waves
-from fecm.verification.case import AGAINST_CHANGE, INDEPENDENT, Case, Check, Row, carry_out
+from fecm.verification import coupled, impacts, indentations, laminates, plates, rods, waves
+from fecm.verification.case import (
+    AGAINST_CHANGE,
+    CONSISTENCY,
+    INDEPENDENT,
+    Case,
+    Check,
+    Row,
+    carry_out,
+)
 
 __all__ = [
     "AGAINST_CHANGE",
     "CASES",
+    "CONSISTENCY",
     "INDEPENDENT",
     "Case",
     "Check",
@@ -25,6 +34,7 @@ __all__ = [
 CASES: tuple[Case, ...] = (
     *laminates.CASES,
     *plates.CASES,
+    *coupled.CASES,
     *waves.CASES,
     *rods.CASES,
     *indentations.CASES,

@@ -2,7 +2,8 @@
 
 A case computes a few numbers; each of its checks says what one of them should be, where that figure
 comes from, how far off it may be, and why so far.  A check is independent if its figure is a closed
-form or comes from outside this program; otherwise it guards against change.
+form or comes from outside this program; it is one of consistency if two ways through this program
+have to agree; otherwise it guards against change.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-INDEPENDENT, AGAINST_CHANGE = "independent", "against change"
+INDEPENDENT, CONSISTENCY, AGAINST_CHANGE = "independent", "consistency", "against change"
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Check:
     why : str
         Why an error of that size is.
     label : str
-        `INDEPENDENT` or `AGAINST_CHANGE`.
+        `INDEPENDENT`, `CONSISTENCY` or `AGAINST_CHANGE`.
     scale : float or None
         What the error is relative to; None for the figure itself.
     """

@@ -56,11 +56,45 @@ def result_of(one: Deck, mode: str = "report") -> Result:
     return result
 
 
+# Restraints of a quarter of a plate: of every node, and of the nodes of its edges.  The first
+# restrains u and v; the others are those of Navier's solutions for antisymmetric laminates.
+Supports = tuple[tuple[int, ...], dict[str, tuple[int, ...]]]
+BENDING: Supports = (
+    (1, 1, 0, 0, 0),
+    {
+        "left": (0, 0, 0, 1, 0),
+        "bottom": (0, 0, 0, 0, 1),
+        "right": (0, 0, 1, 0, 1),
+        "top": (0, 0, 1, 1, 0),
+    },
+)
+CROSS_PLY: Supports = (
+    (0, 0, 0, 0, 0),
+    {
+        "left": (1, 0, 0, 1, 0),
+        "bottom": (0, 1, 0, 0, 1),
+        "right": (0, 1, 1, 0, 1),
+        "top": (1, 0, 1, 1, 0),
+    },
+)
+ANGLE_PLY: Supports = (
+    (0, 0, 0, 0, 0),
+    {
+        "left": (0, 1, 0, 1, 0),
+        "bottom": (1, 0, 0, 0, 1),
+        "right": (1, 0, 1, 0, 1),
+        "top": (0, 1, 1, 1, 0),
+    },
+)
+
+
 def quarter_plate(
     elements: int,
     plate: Material,
     macros: Iterable[Macro],
     load: float | None = None,
+    supports: Supports = BENDING,
+    others: Sequence[Segment] = (),
 ) -> Deck:
     """Make a quarter of a simply supported square plate of side 1.
 
@@ -74,20 +108,25 @@ def quarter_plate(
     macros : iterable of Macro
     load : float, optional
         Uniform load, force/area.
+    supports : Supports
+    others : sequence of Segment
+        Further segments: what hits the plate, gages.
     """
     grid = Grid(uniform(0.5, elements), uniform(0.5, elements))
-    boundary = grid.boundary(
-        (1, 1, 0, 0, 0),
-        {
-            "left": (0, 0, 0, 1, 0),
-            "bottom": (0, 0, 0, 0, 1),
-            "right": (0, 0, 1, 0, 1),
-            "top": (0, 0, 1, 1, 0),
-        },
-    )
+    boundary = grid.boundary(*supports)
     forces = None if load is None else uniform_load(grid, load)
-    segments = (grid.coordinates(), boundary, forces, plate)
+    segments = (grid.coordinates(), boundary, forces, plate, *others)
     return deck("quarter of a simply supported plate", grid, segments, macros)
+
+
+def weights(coordinates: Sequence[float]) -> list[float]:
+    """Simpson's weights of the lines of nodes: integrals of their shape functions."""
+    found = [0.0] * len(coordinates)
+    for first in range(0, len(coordinates) - 1, 2):
+        part = (coordinates[first + 2] - coordinates[first]) / 6.0
+        for place, times in enumerate((1.0, 4.0, 1.0)):
+            found[first + place] += times * part
+    return found
 
 
 def uniform_load(grid: Grid, load: float) -> Forces:
@@ -95,16 +134,7 @@ def uniform_load(grid: Grid, load: float) -> Forces:
 
     The last line in each direction is held, so that a value there would be a displacement.
     """
-
-    def weights(coordinates: list[float]) -> list[float]:
-        found = [0.0] * len(coordinates)
-        for first in range(0, len(coordinates) - 1, 2):
-            part = (coordinates[first + 2] - coordinates[first]) / 6.0
-            for place, times in enumerate((1.0, 4.0, 1.0)):
-                found[first + place] += times * part
-        return found[:-1]
-
-    xs, ys = weights(lines(grid.columns)), weights(lines(grid.rows))
+    xs, ys = weights(lines(grid.columns))[:-1], weights(lines(grid.rows))[:-1]
     return Forces(
         tuple(
             NodeValues(1 + i + j * grid.across, 0, (0.0, 0.0, load * x * y, 0.0, 0.0))
