@@ -1,13 +1,15 @@
-"""Tables that users measured: CSV with a line of names, read by name.
+"""Tables that users measured: text with a line of names, read by name.
 
-Commas separate columns, blank lines and those that begin with # are skipped.  What stands behind a
-name in brackets is its unit and counts for nothing; neither does the case of letters.
+Tabs, semicolons or commas separate columns; between tabs and semicolons numbers may have a decimal
+comma.  Blank lines and those that begin with # are skipped.  A unit stands behind a name in
+brackets, or in a line of its own below the names; the case of letters in names counts for nothing.
 """
 
 from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -19,12 +21,19 @@ Floats = NDArray[np.float64]
 
 Row = tuple[int, list[str]]
 
+# A number with a decimal comma.
+_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
+# A name with its unit in brackets behind it.
+_UNIT = re.compile(r"[^(\[]*[(\[]([^)\]]*)[)\]]")
+
 
 class TableError(ValueError):
     """A table can't be used; the message names the file, and the line where there is one."""
 
 
-def read_columns(path: Path, names: Sequence[str], *, increasing: str = "") -> Mapping[str, Floats]:
+def read_columns(
+    path: Path, names: Sequence[str], *, increasing: str = "", places: Sequence[int] = ()
+) -> Mapping[str, Floats]:
     """Read columns of a CSV file.
 
     Where the first line names none of the columns, or holds numbers already, they are the first
@@ -37,6 +46,8 @@ def read_columns(path: Path, names: Sequence[str], *, increasing: str = "") -> M
         Columns that are wanted.
     increasing : str
         The one of them whose values must increase from row to row.
+    places : sequence of int
+        Numbers of the columns from 0, whatever the first line calls them.
 
     Returns
     -------
@@ -51,13 +62,15 @@ def read_columns(path: Path, names: Sequence[str], *, increasing: str = "") -> M
         If it can't be read.
     """
     rows = _rows(path)
-    head = rows[0][1] if rows else []
-    places = list(range(len(names)))
-    if rows and any(_number(field) is None for field in head):
-        places = _places(path, rows.pop(0), names)
+    own = list(places or range(len(names)))
+    if _names_columns(rows):
+        head = rows.pop(0)
+        own = list(places) or _places(path, head, names)
+        if _names_units(rows):
+            del rows[0]
     if len(rows) < 2:
         raise TableError(f"{path}: the table has fewer than two rows of numbers")
-    values = np.array([_values(path, row, names, places) for row in rows])
+    values = np.array([_values(path, row, names, own) for row in rows])
     columns = dict(zip(names, values.T, strict=True))
     if increasing:
         for (_, before), (number, after) in pairwise(
@@ -81,10 +94,28 @@ def names_of(path: Path) -> list[str]:
         If it can't be read.
     """
     rows = _rows(path)
-    head = rows[0][1] if rows else []
-    if all(_number(field) is not None for field in head):
+    return [_without_unit(name) for name in rows[0][1]] if _names_columns(rows) else []
+
+
+def units_of(path: Path) -> list[str]:
+    """Units of the columns, by brackets behind their names or a line below; empty where none is.
+
+    Raises
+    ------
+    TableError
+        If the file is no text.
+    OSError
+        If it can't be read.
+    """
+    rows = _rows(path)
+    if not _names_columns(rows):
         return []
-    return [_without_unit(name) for name in head]
+    below = [field.strip("()[] ") for field in rows[1][1]] if _names_units(rows[1:]) else []
+    found = []
+    for place, name in enumerate(rows[0][1]):
+        behind = _UNIT.match(name)
+        found.append(behind[1].strip() if behind else below[place] if place < len(below) else "")
+    return found
 
 
 def same_name(one: str, other: str) -> bool:
@@ -92,21 +123,55 @@ def same_name(one: str, other: str) -> bool:
     return _plain(one) == _plain(other)
 
 
+def _names_columns(rows: Sequence[Row]) -> bool:
+    """Whether the first line names columns instead of holding numbers."""
+    return bool(rows) and any(_number(field) is None for field in rows[0][1])
+
+
+def _names_units(rows: Sequence[Row]) -> bool:
+    """Whether the line below the names holds units: no number, and numbers in the next line."""
+    return (
+        len(rows) > 1
+        and not any(_number(field) is not None for field in rows[0][1])
+        and any(_number(field) is not None for field in rows[1][1])
+    )
+
+
 def _rows(path: Path) -> list[Row]:
     """Fields of every line that holds any, with its number."""
+    data = path.read_bytes()
+    if b"\0" in data:
+        raise TableError(f"{path} is no text file")
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise TableError(f"{path} is no text file") from None
+        text = data.decode("latin-1")  # as older programs write µm and °
+    lines = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    last = lines[-1][1] if lines else ""
+    separator = next((mark for mark in "\t;" if mark in last), ",")
     found = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        if line.strip() and not line.lstrip().startswith("#"):
-            try:
-                fields = next(csv.reader([line], skipinitialspace=True))
-            except csv.Error as error:
-                raise TableError(f"{path}:{number}: {error}") from None
-            found.append((number, [field.strip() for field in fields]))
-    return found
+    for number, line in lines:
+        try:
+            fields = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+        except csv.Error as error:
+            raise TableError(f"{path}:{number}: {error}") from None
+        found.append((number, [field.strip() for field in fields]))
+    return found if separator == "," else _with_points(found)
+
+
+def _with_points(rows: list[Row]) -> list[Row]:
+    """Rows with points for decimal commas, unless numbers have points already."""
+    fields = [field for _, row in rows for field in row]
+    if any("." in field and _number(field) is not None for field in fields):
+        return rows  # a comma may then stand between thousands
+    return [
+        (line, [f.replace(",", ".") if _COMMA.fullmatch(f) else f for f in row])
+        for line, row in rows
+    ]
 
 
 def _without_unit(name: str) -> str:

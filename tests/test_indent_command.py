@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from fecm.fitting.constants import fit
+from fecm.fitting.table import read_test
 from tests.calls import assert_unusable, call
 from tests.decks import LONG
 from tests.indentation_tests import ALPHA_P, S_P, K, Q, make_test, noisy, written
@@ -68,7 +69,7 @@ def test_one_cycle_gives_no_card_but_one_of_alpha_cr(tmp_path: Path) -> None:
         ("", "fewer than two rows"),
         ("indentation,force\n", "fewer than two rows"),
         ("a,b\n1,2\n", "there must be one called indentation"),
-        ("indentation;force\n1;2\n", "there must be one called indentation"),
+        ("indentation;force\n1;2\n", "fewer than two rows"),
         ("force,force,indentation\n1,2,3\n", "there must be one called force"),
         ("indentation,force\n0,0\n1e-3,x1\n", ":3: force is 'x1'"),
         ("indentation,force\n0,0\n1e-3\n", ":3: force is nothing"),
@@ -151,3 +152,109 @@ def test_curves_and_rigidities_are_drawn(tmp_path: Path, options: tuple[str, ...
     assert "Indentation" in picture.read_text() or "indentation" in picture.read_text()
     again = call("indent", "curve", LONG, *options, "--plot", picture)
     assert_unusable(again)
+
+
+# Files of testing machines -----------------------------------------------------------------------
+
+
+def machine(path: Path, head: str, sizes: tuple[float, float], separator: str, mark: str) -> Path:
+    """A test as a machine writes it: in units of these sizes (in, lbf), with this decimal mark."""
+    rows = np.transpose(make_test())
+    lines = [
+        separator.join(
+            f"{value / size:.9e}".replace(".", mark) for value, size in zip(row, sizes, strict=True)
+        )
+        for row in rows
+    ]
+    path.write_bytes("\n".join([head, *lines]).encode("latin-1" if "µ" in head else "utf-8"))
+    return path
+
+
+MM, UM, NEWTON, KN = 1 / 25.4, 1e-3 / 25.4, 1 / 4.4482216152605, 1e3 / 4.4482216152605
+
+
+@pytest.mark.parametrize(
+    ("head", "sizes", "separator", "mark", "units"),
+    [
+        ("indentation,force", (1.0, 1.0), ",", ".", None),
+        ("Displacement,Load", (1.0, 1.0), ",", ".", None),
+        ("Displacement (mm);Load (kN)", (MM, KN), ";", ",", ("mm", "N")),
+        ("Stroke\tForce\n(µm)\t(N)", (UM, NEWTON), "\t", ".", ("mm", "N")),
+        ("Extension;Load\nin;lbf", (1.0, 1.0), ";", ",", ("in", "lbf")),
+        ("depth [mil],load [kip]", (1e-3, 1e3), ",", ".", ("in", "lbf")),
+        ("displacement (m),force (N)", (1000 * MM, NEWTON), ",", ".", ("m", "N")),
+    ],
+)
+def test_files_of_testing_machines_give_the_same_law(
+    tmp_path: Path,
+    head: str,
+    sizes: tuple[float, float],
+    separator: str,
+    mark: str,
+    units: tuple[str, str] | None,
+) -> None:
+    file = machine(tmp_path / "test.csv", head, sizes, separator, mark)
+    done = call("indent", "fit", file, "--format", "json")
+    assert done.exit_code == 0, done.stderr
+    found = json.loads(done.stdout)
+    length, force = {None: (1.0, 1.0), ("in", "lbf"): (1.0, 1.0), ("mm", "N"): (MM, NEWTON),
+                     ("m", "N"): (1000 * MM, NEWTON)}[units]  # fmt: skip
+    assert found["units"] == (dict(zip(("length", "force"), units, strict=True)) if units else None)
+    assert found["k"]["value"] == pytest.approx(K / force * length**1.5, rel=1e-6)
+    assert found["alpha_p"]["value"] == pytest.approx(ALPHA_P / length, rel=1e-3)
+
+
+def test_a_fit_states_the_units_of_its_card(tmp_path: Path) -> None:
+    file = machine(tmp_path / "test.csv", "Stroke (mm),Load (kN)", (MM, KN), ",", ".")
+    told = call("indent", "fit", file).stdout
+    assert "units           mm, N (the test: mm, kN)\nEXPE\n" in told
+    told = call("indent", "fit", file, "--unit", "in,lbf").stdout
+    assert "units           in, lbf (the test: mm, kN)\nEXPE\n 1330000.0" in told
+    plain = written(tmp_path / "plain.csv", *make_test())
+    told = call("indent", "fit", plain).stdout
+    assert "units           those of the test, which names none\nEXPE\n" in told
+
+
+@pytest.mark.parametrize("columns", ["3,2", "way,push", "WAY,2"])
+def test_columns_are_chosen_by_name_or_number(tmp_path: Path, columns: str) -> None:
+    a, f = make_test()
+    file = tmp_path / "test.csv"
+    rows = "".join(f"{n},{y},{x}\n" for n, (x, y) in enumerate(zip(a, f, strict=True)))
+    file.write_text(f"time,push,way\n{rows}")
+    assert call("indent", "fit", file).exit_code == 2
+    read = read_test(file, columns.split(","))
+    np.testing.assert_array_equal(read.indentation, a)
+    np.testing.assert_array_equal(read.force, f)
+    assert call("indent", "fit", file, "--columns", columns).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("head", "options", "what"),
+    [
+        ("displacement (furlong),load (N)", (), "`furlong` is no unit of length"),
+        ("displacement (mm),load (channel 2)", (), "`channel 2` is no unit of force"),
+        ("displacement (mm),load (mn)", (), "`mn` is no unit of force"),
+        ("displacement (N),load (mm)", (), "`N` is no unit of length"),
+        ("displacement (mm),load", (), "one column is in mm, and the other has no unit"),
+        ("displacement (mm),load (N)", ("--unit", "mm,furlong"), "`furlong` is no unit of force"),
+        ("displacement\n(mm)", (), "there must be one called force"),
+        ("displacement,load", ("--columns", "2,x"), "there must be one called x"),
+        ("displacement,load", ("--columns", "0,1"), "there must be one called 0"),
+        ("displacement,load", ("--columns", "1,7"), "force is nothing"),
+    ],
+)
+def test_units_and_columns_that_mean_nothing_are_refused(
+    tmp_path: Path, head: str, options: tuple[str, ...], what: str
+) -> None:
+    file = machine(tmp_path / "test.csv", head, (1.0, 1.0), ",", ".")
+    done = call("indent", "fit", file, *options)
+    assert_unusable(done)
+    assert what in done.stderr
+
+
+def test_numbers_with_points_and_commas_are_refused_between_semicolons(tmp_path: Path) -> None:
+    file = tmp_path / "test.csv"
+    file.write_text("displacement;load\n0.001;1,234\n0.002;2,345\n")
+    done = call("indent", "fit", file)
+    assert_unusable(done)
+    assert ":2: force is '1,234', which is no finite number" in done.stderr

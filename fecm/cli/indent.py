@@ -16,7 +16,7 @@ from fecm.cli.tables import OVERWRITE, PLOT, STANDARD_OUTPUT, Targets
 from fecm.fitting import LIMITS_Q
 
 if TYPE_CHECKING:
-    from fecm.fitting.curves import Floats
+    from fecm.fitting.table import Test
     from fecm.plot import Picture
 
 
@@ -40,7 +40,12 @@ indent.add_command(curve)
 @click.option("--turn", type=POSITIVE, metavar="LENGTH",
               help="How far the indentation goes back before a turn counts.  [default: 2 % of its "
                    "range, or 8 standard deviations of its noise]")  # fmt: skip
-@click.option("--unit", "units", metavar="LENGTH,FORCE", help="Names of units, for the picture.")
+@click.option("--columns", metavar="INDENTATION,FORCE",
+              help="Names or numbers (from 1) of the two columns.  [default: indentation, "
+                   "displacement, extension, stroke or depth; force or load]")  # fmt: skip
+@click.option("--unit", "units", metavar="LENGTH,FORCE",
+              help="Units of the card; a file that names its units is converted to them.  "
+                   "[default: in,lbf or mm,N or m,N, by those of the file]")  # fmt: skip
 @PLOT
 @OVERWRITE
 @FORMAT_OPTION
@@ -49,6 +54,7 @@ def fit(
     acr: bool,
     q: float | None,
     turn: float | None,
+    columns: str | None,
     units: str | None,
     picture: Path | None,
     overwrite: bool,
@@ -57,20 +63,23 @@ def fit(
     """Find the constants of the indentation law from a test, and print an EXPE card.
 
     TEST.csv has the columns indentation and force, its rows in the order of measurement:
-    first loading, unloading, reloading, as often as was done.
+    first loading, unloading, reloading, as often as was done.  Commas, semicolons or tabs separate
+    them.  Units stand in brackets behind the names, or in a line below.
     """
     from fecm.columns import TableError
     from fecm.fitting.constants import fit as fitted
     from fecm.fitting.cycles import NoTestError
     from fecm.fitting.report import card, lines, notes, plain
+    from fecm.fitting.table import read_test
 
     if acr and q not in (None, 2.5):
         raise click.UsageError("--acr takes q = 5/2, as equation 3-7 holds for no other")
-    names = _unit_names(units)
+    pair = _pair(units, "--unit", "units", "in,lbf")
+    chosen = _pair(columns, "--columns", "columns", "2,3")
     targets = Targets.checked(STANDARD_OUTPUT, picture, overwrite, test)
     try:
-        indentation, force = _test(test)
-        found = fitted(indentation, force, retreat=turn, q=q, acr=acr)
+        read = read_test(test, chosen or (), pair)
+        found = fitted(read.indentation, read.force, retreat=turn, q=q, acr=acr)
     except TableError as error:
         raise Refused(str(error)) from None
     except NoTestError as error:
@@ -79,43 +88,39 @@ def fit(
     def draw() -> Picture:
         from fecm.plot.indentation import fit_picture
 
-        return fit_picture(indentation, force, found, names)
+        names = {**read.units, "time": "s"} if read.units else {}
+        return fit_picture(read.indentation, read.force, found, names)
 
     targets.draw(draw)
     for note in notes(found):
         click.echo(f"fecm: note: {note}", err=True)
     if form == "json":
-        click.echo(json.dumps({"file": str(test), **plain(found)}))
+        click.echo(json.dumps({"file": str(test), "units": read.units or None, **plain(found)}))
         return
     click.echo("\n".join(lines(found)))
+    click.echo(_units_line(read))
     if text := card(found):
         click.echo(text)
 
 
-def _test(path: Path) -> tuple[Floats, Floats]:
-    """Indentation and force of a file; its first two columns where it names none."""
-    from fecm.columns import TableError, names_of, read_columns, same_name
-
-    wanted = ("indentation", "force")
-    present = names_of(path)
-    for name in wanted:
-        count = sum(same_name(name, one) for one in present)
-        if present and count != 1:
-            raise TableError(
-                f"{path}: the columns are {', '.join(present)[:80]}; there must be one called "
-                f"{name}"
-            )
-    table = read_columns(path, wanted)
-    return table["indentation"], table["force"]
+def _units_line(read: Test) -> str:
+    """Units of all values and of the card."""
+    if not read.units:
+        return "units           those of the test, which names none"
+    own = tuple(read.units.values())
+    told = "" if read.stated in (("", ""), own) else f" (the test: {', '.join(read.stated)})"
+    return f"units           {', '.join(own)}{told}"
 
 
-def _unit_names(text: str | None) -> dict[str, str]:
-    """Names of units for axes."""
-    names = [] if text is None else [part.strip() for part in text.split(",")]
-    if text is not None and (len(names) != 2 or not all(names)):
-        raise click.BadParameter("two names with a comma between them, as in in,lbf",
-                                 param_hint="--unit")  # fmt: skip
-    return dict(zip(("length", "force"), names, strict=False)) | ({"time": "s"} if names else {})
+def _pair(text: str | None, option: str, what: str, example: str) -> tuple[str, str] | None:
+    """Two texts with a comma between them."""
+    if text is None:
+        return None
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 2 or not all(parts):
+        raise click.BadParameter(f"two {what} with a comma between them, as in {example}",
+                                 param_hint=option)  # fmt: skip
+    return parts[0], parts[1]
 
 
 # hertz and contacts ------------------------------------------------------------------------------
