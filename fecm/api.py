@@ -9,6 +9,7 @@ from pathlib import Path
 from fecm.check import Checked, check
 from fecm.check.listing import check_listing
 from fecm.check.memory import check_memory
+from fecm.check.mesh import HOURGLASS
 from fecm.check.run import UNSTABLE
 from fecm.choices import ENERGY_LIMIT, Choices
 from fecm.deck.findings import DeckError, Finding
@@ -41,11 +42,11 @@ class Prepared:
     findings: list[Finding]
 
     def errors(self, force: bool = False) -> list[Finding]:
-        """Findings that make the deck unusable; with `force`, without an unstable time step."""
+        """Findings that make the deck unusable; with `force`, without unstable motions."""
         return [
             finding
             for finding in self.findings
-            if finding.severity == "error" and not (force and finding.code == UNSTABLE)
+            if finding.severity == "error" and not (force and finding.code in (UNSTABLE, HOURGLASS))
         ]
 
 
@@ -70,7 +71,8 @@ def prepare(path_or_text: str | Path | Deck, mode: str = REPORT) -> Prepared:
     else:
         text, source = load_text(path_or_text)
     reader = Reader(text, blanks_are_zeros=mode == LISTING)
-    checked = [check(problem, reader.findings) for problem in reader.problems()]
+    listing = mode == LISTING
+    checked = [check(problem, reader.findings, listing=listing) for problem in reader.problems()]
     problems = [problem for problem in checked if problem is not None]
     if mode == LISTING and not reader.findings.errors:
         for problem in problems:

@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.check import Checked
+from fecm.check.impact import resolution, said_error
 from fecm.check.run import output_bytes
 from fecm.memory import said
 from fecm.parts import build_plate, build_projectile
-from fecm.program import estimate, flat
+from fecm.program import estimate, flat, hits
 from fecm.solvers import SAFE
 from fecm.stability import critical_time_step
-from fecm.units import unit_names, unit_of
+from fecm.units import MASS, mass_in_si, unit_names, unit_of
 
 Floats = NDArray[np.float64]
 
@@ -30,11 +31,16 @@ class Overview:
     A, B, D, shear : ndarray
         Laminate stiffnesses.
     plate_mass, projectile_mass : float
+        Mass of the plate, and of the projectile whether it hits or not.
     critical_time_step : float
     time_steps : list of float
         Every DT of the program.
     output_bytes : int
         About what the result will take.
+    elements_per_wave : float or None
+        Elements at the impact node a bending wave of the contact's duration; None without impact.
+    mesh_error : float or None
+        Estimated error of the peak force from the mesh, of the peak.
     units : dict
         Names of the units; empty where the deck gives none.
     """
@@ -54,6 +60,8 @@ class Overview:
     critical_time_step: float
     time_steps: list[float]
     output_bytes: int
+    elements_per_wave: float | None
+    mesh_error: float | None
     units: dict[str, str]
 
     def to_dict(self) -> dict[str, object]:
@@ -79,16 +87,23 @@ class Overview:
         for name, dimension in (("A", "force/length"), ("B", "force"), ("D", "force*length")):
             lines += _matrix(name, getattr(self, name), unit_of(dimension, self.units))
         lines += _matrix("shear xz, yz", self.shear, unit_of("force/length", self.units))
-        mass = "force*time^2/length"
+
+        def mass(value: float) -> str:
+            known = mass_in_si(value, self.units)
+            return quantity(value, MASS) + (f" ({known})" if known else "")
+
         lines += [
-            f"  plate mass          {quantity(self.plate_mass, mass)}",
-            f"  projectile mass     {quantity(self.projectile_mass, mass)}",
+            f"  plate mass          {mass(self.plate_mass)}",
+            f"  projectile mass     {mass(self.projectile_mass)}",
             f"  critical time step  {quantity(self.critical_time_step, 'time')}",
         ]
         for dt in dict.fromkeys(self.time_steps):
             dt = dt or SAFE * self.critical_time_step
             share = dt / self.critical_time_step
             lines.append(f"  DT                  {quantity(dt, 'time')} ({share:.0%} of it)")
+        if self.elements_per_wave is not None:
+            error = "" if self.mesh_error is None else f" ({said_error(self.mesh_error)})"
+            lines.append(f"  elements a wave     {self.elements_per_wave:.1f}{error}")
         lines += [
             f"  impact steps        {self.steps}",
             f"  output              {said(self.output_bytes)}",
@@ -112,6 +127,7 @@ def overview(checked: Checked) -> Overview:
     plate = build_plate(deck, mesh)
     sizes = estimate(checked.program)
     laminate = plate.laminate
+    resolved = resolution(deck, mesh) if hits(checked.program) else None
     return Overview(
         title=deck.title,
         nodes=deck.control.numnp,
@@ -128,5 +144,7 @@ def overview(checked: Checked) -> Overview:
         critical_time_step=critical_time_step(plate),
         time_steps=[m.value for m in flat(checked.program) if m.word == "DT"],
         output_bytes=output_bytes(deck, sizes),
+        elements_per_wave=None if resolved is None else resolved.elements,
+        mesh_error=None if resolved is None else resolved.error,
         units=unit_names(deck),
     )

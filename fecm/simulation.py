@@ -28,6 +28,7 @@ from fecm.results.schema import FORMAT, FORMAT_VERSION
 from fecm.results.sinks import Sink
 from fecm.slips import LISTING, NAMES, REPORT
 from fecm.solvers import SAFE
+from fecm.contact_step import contact_step
 from fecm.stability import critical_time_step
 from fecm.statics import Tangent, reactions
 from fecm.stresses import strains_and_resultants
@@ -238,12 +239,30 @@ class Simulation:
 
     def _cause(self) -> str:
         """Why a run diverged, as far as the time step tells."""
+        deck, plate = self.checked.deck, self.setup.plate
         try:
-            critical = critical_time_step(self.setup.plate)
+            critical = critical_time_step(plate)
+            contact = None
+            if self.impact is not None:
+                contact = contact_step(deck, plate, self.dt)
         except UnsoundPlateError as error:
             return str(error)
-        where = "above" if self.dt > critical else "below"
-        return f"DT = {self.dt:.4g} is {where} the plate's critical time step {critical:.4g}"
+        above = self.dt > critical
+        cause = (
+            f"DT = {self.dt:.4g} is {'above' if above else 'below'} the plate's critical time "
+            f"step {critical:.4g}"
+        )
+        if above:
+            return cause
+        if contact is not None and self.dt >= contact.limit:
+            return (
+                f"{cause}, but not below {contact.limit:.4g}, the stable step with the contact's "
+                f"stiffness k_t of about {contact.stiffness:.3g} (the contact needs DT < "
+                f"2 (m/k_t)^(1/2), m = {contact.mass:.3g})"
+            )
+        if len({macro.value for macro in deck.macros if macro.word == "DT"}) > 1:
+            return f"{cause}, but DT changes: steps that alternate diverge below the critical one"
+        return cause
 
     # Loads ---------------------------------------------------------------------------------------
 

@@ -197,7 +197,7 @@ def test_shear_order_and_g12_change_the_stiffness_only_where_the_deck_lets_them(
     woven = DATA_CARDS.replace("  1150000.", " 17500000.")
 
     def force(data: str, *slips: str) -> float:
-        result = fecm.run(small(text, data=data), slips=slips)
+        result = fecm.run(small(text, data=data), slips=slips, force=True)
         assert isinstance(result, Result)
         return float(result.force[-1])
 

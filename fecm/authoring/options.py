@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 
 from fecm.authoring.contacts import CONTACTS
+from fecm.authoring.contacts import SYSTEM as REPORT_SYSTEM
 from fecm.authoring.grid import Grid, Section, graded, listed, uniform
 from fecm.authoring.layup import LayupError, parse_layup
 from fecm.authoring.materials import MATERIALS, SYSTEMS
@@ -86,11 +87,26 @@ def deck_of_options(
         every=every,
         units=None if system is None else Units(*SYSTEMS[system][0]),
     )
+    if projectile is None and (system or material_system(material)) not in (None, REPORT_SYSTEM):
+        raise OptionError(
+            f"give --projectile: without it the projectile is the report's steel rod, whose "
+            f"numbers are in {REPORT_SYSTEM}"
+        )
     notes: list[str] = []
     node, node_x, node_y = grid.nearest(x, y)
-    if math.hypot(node_x - x, node_y - y) > 1e-9 * grid.columns[-1].end:
-        notes.append(f"the nearest node to the impact point is {node} at {node_x:g}, {node_y:g}")
+    distance = math.hypot(node_x - x, node_y - y)
+    if distance > 1e-9 * grid.columns[-1].end:
+        asked = "the plate's middle" if at is None else "--at"
+        notes.append(
+            f"the impact point is moved by {distance:.4g}: from {asked} at {x:g}, {y:g} to the "
+            f"nearest node, {node} at {node_x:g}, {node_y:g}"
+        )
     return new_deck(spec), notes
+
+
+def material_system(name: str | None) -> str | None:
+    """System of units of a named ply; None without one."""
+    return None if name is None else MATERIALS[name].system
 
 
 def _numbers(option: str, text: str, count: int) -> list[float]:

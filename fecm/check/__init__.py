@@ -20,7 +20,12 @@ from fecm.check.impact import (
     warn_of_the_reports_rod,
 )
 from fecm.check.material import check_material
-from fecm.check.mesh import check_mesh
+from fecm.check.mesh import check_geometry, check_mesh
+from fecm.check.plausible import (
+    check_plausibility,
+    check_purpose,
+    check_time_step_of_contact,
+)
 from fecm.check.run import check_output, check_program, check_time_step
 from fecm.deck.findings import Findings
 from fecm.deck.model import (
@@ -39,7 +44,7 @@ from fecm.deck.model import (
 )
 from fecm.deck.reader import Problem
 from fecm.mesh import Mesh, generate
-from fecm.program import Body, compile_program, hits
+from fecm.program import STEPS, Body, compile_program, hits
 
 ALWAYS: tuple[type[Segment], ...] = (Coordinates, Elements, Material)
 IN_AN_IMPACT: tuple[type[Segment], ...] = (Impact, Indentation)
@@ -66,7 +71,7 @@ class Checked:
     program: Body
 
 
-def check(problem: Problem, findings: Findings) -> Checked | None:
+def check(problem: Problem, findings: Findings, *, listing: bool = False) -> Checked | None:
     """Check a problem.
 
     Parameters
@@ -75,6 +80,8 @@ def check(problem: Problem, findings: Findings) -> Checked | None:
         As the reader left it.
     findings : Findings
         Receives what is wrong.
+    listing : bool
+        Whether the deck is for listing mode.
 
     Returns
     -------
@@ -91,7 +98,7 @@ def check(problem: Problem, findings: Findings) -> Checked | None:
     mesh = generate(deck, findings)
     complete = len(findings.errors) == generated and not unsound & {"COOR", "ELEM"}
     if complete and deck.has(Coordinates) and deck.has(Elements):
-        check_mesh(deck, mesh, findings)
+        check_mesh(deck, mesh, findings, listing=listing)
     if (material := deck.last(Material)) is not None:
         check_material(material, findings)
     if (impact := deck.last(Impact)) is not None:
@@ -109,6 +116,12 @@ def check(problem: Problem, findings: Findings) -> Checked | None:
         with np.errstate(all="ignore"):  # numbers beyond all range end in a finding
             check_time_step(deck, mesh, findings)
             check_program(deck, program, findings)
+            check_purpose(deck, mesh, findings)
+            if len(findings.errors) == before:
+                check_geometry(deck, mesh, findings)
+                check_plausibility(deck, mesh, findings, hits=hits(program))
+                if STEPS.intersection(macro.word for macro in deck.macros):
+                    check_time_step_of_contact(deck, mesh, findings, hits=hits(program))
             if hits(program):
                 if not deck.has(Projectile):
                     warn_of_the_reports_rod(deck.need(Impact), findings)

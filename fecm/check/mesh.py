@@ -10,19 +10,32 @@ import numpy as np
 from fecm import plate
 from fecm.check import gather
 from fecm.deck.findings import Findings
-from fecm.deck.model import Coordinates, Deck, Elements, Material
+from fecm.deck.model import Boundary, Coordinates, Deck, Elements, Material
 from fecm.deck.records import Integration
 from fecm.elements import cubic, triangle
 from fecm.elements.quadrature import HIGHEST_ORDER, Rule
-from fecm.mesh import Mesh
+from fecm.mesh import Mesh, place_of_element
 from fecm.parts import rules
 
 TRIANGLE = triangle.SHAPE.corners
-W = 2
+W, THETA_X = 2, 3
+# Nodes with a force of their own, at the most; more are a pressure.
+FEW_LOADED = 4
+# Distance of a mid-side node from its place along the side, over the side's length.
+OFF_PLACE = 0.05
 
 
-def check_mesh(deck: Deck, mesh: Mesh, findings: Findings) -> None:
-    """Check nodes and elements, each only if what it stands on is sound."""
+def check_mesh(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool = False) -> None:
+    """Check nodes and elements, each only if what it stands on is sound.
+
+    Parameters
+    ----------
+    deck : Deck
+    mesh : Mesh
+    findings : Findings
+    listing : bool
+        Whether the deck is for listing mode, which takes L1 for L2.
+    """
     before = len(findings.errors)
     _check_elements(deck, mesh, findings)
     if len(findings.errors) > before:
@@ -39,7 +52,7 @@ def check_mesh(deck: Deck, mesh: Mesh, findings: Findings) -> None:
         findings.add("E311", "Every unknown of the plate is restrained.", deck.place())
     if not len(missing):
         _check_coincidence(deck, mesh, findings)
-        _check_shapes(deck, mesh, findings)
+        _check_shapes(deck, mesh, findings, listing=listing)
 
 
 def _check_elements(deck: Deck, mesh: Mesh, findings: Findings) -> None:
@@ -83,7 +96,67 @@ def _check_coincidence(deck: Deck, mesh: Mesh, findings: Findings) -> None:
         )
 
 
-def _check_shapes(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+def check_geometry(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+    """Warn of odd side nodes and supports of a mesh without errors."""
+    _check_side_nodes(deck, mesh, findings)
+    _check_support(deck, mesh, findings)
+
+
+def _check_side_nodes(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+    """Warn of nodes on sides that are off the middle or the third points, seen along the side."""
+    wrong: list[int] = []
+    for family in plate.families(mesh.elements, mesh.coordinates):
+        if family.shape is triangle.SHAPE:
+            continue
+        thirds = family.shape is cubic.SHAPE
+        for place in range(4, 12 if thirds else 8):
+            if not family.present[place]:
+                continue
+            start = place % 4 if place < 8 else (place - 1) % 4  # 9 to 12 stand before a corner
+            end = (start + 1) % 4
+            share = 0.5 if not thirds else 1.0 / 3.0 if place < 8 else 2.0 / 3.0
+            corners = mesh.coordinates[mesh.elements[family.rows][:, [start, end]] - 1]
+            node = mesh.coordinates[mesh.elements[family.rows, place] - 1]
+            side = corners[:, 1] - corners[:, 0]
+            with np.errstate(all="ignore"):
+                along = ((node - corners[:, 0]) * side).sum(axis=1) / np.square(side).sum(axis=1)
+            wrong += family.rows[np.abs(along - share) > OFF_PLACE].tolist()
+    if wrong:
+        rows = np.unique(wrong).astype(np.intp)
+        findings.add(
+            "W318",
+            f"Nodes on the sides of {gather.listed(rows)} are off their places by more than "
+            f"{OFF_PLACE:.0%} of the side.",
+            place_of_element(deck, int(rows[0]) + 1),
+            "they belong on the middle of the side, in cubic elements on its third points",
+        )
+
+
+def _check_support(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+    """Warn of a plate that one or two nodes support, unless symmetry holds its rotations."""
+    held = mesh.equations == 0
+    count = int(held[:, W].sum())
+    if 0 < count <= 2 and held[:, THETA_X:].any(axis=1).sum() <= 2:
+        segment = deck.last(Boundary)
+        findings.add(
+            "W319",
+            f"w is restrained at {count} node{'s' if count > 1 else ''} only.",
+            None if segment is None else segment.place(),
+            "an edge is held at each of its nodes; a free plate needs no support",
+        )
+
+
+def _loads_a_node(deck: Deck, mesh: Mesh, *, supported: bool) -> bool:
+    """Whether a force on single nodes excites their checkerboard: an impact's, or FORC's.
+
+    A support damps what a given load of some duration excites, not what an impact does.
+    """
+    words = {macro.word for macro in deck.macros}
+    loaded = int(np.count_nonzero(mesh.forces[:, W]))
+    return "RODP" in words or (not supported and "EXCD" in words and 0 < loaded <= FEW_LOADED)
+
+
+def _check_shapes(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool) -> None:
     """Jacobians at every point that is used, the lumped masses, motions without energy."""
     material = deck.last(Material)
     if material is None or not 1 <= abs(material.integration.points) <= HIGHEST_ORDER:
@@ -94,7 +167,9 @@ def _check_shapes(deck: Deck, mesh: Mesh, findings: Findings) -> None:
         _check_jacobians(deck, families, rules(material), findings)
         _check_masses(material, families, findings)
     supported = bool((mesh.equations[:, W] == 0).any())
-    _check_shear(material, families, supported, findings)
+    if not listing:
+        nodal = _loads_a_node(deck, mesh, supported=supported)
+        _check_shear(material, families, supported, nodal, findings)
 
 
 def _at_third_node(card: Integration, family: plate.Family) -> bool:
@@ -148,14 +223,28 @@ def _check_masses(material: Material, families: list[plate.Family], findings: Fi
 
 
 def _check_shear(
-    material: Material, families: list[plate.Family], supported: bool, findings: Findings
+    material: Material,
+    families: list[plate.Family],
+    supported: bool,
+    nodal: bool,
+    findings: Findings,
 ) -> None:
-    """Warn of motions that the transverse shear's points do not see."""
+    """Find motions that the transverse shear's points do not see, and elements that lock."""
     card, order = material.integration, math.isqrt(len(rules(material)[1].xi))
     weak: dict[int, list[str]] = {}
     for family in families:
         name, free, held = _orders_without_motions(family)
-        if order < (held if supported else free):
+        if name == FOUR_NODES and order >= free:
+            findings.add(
+                "W320",
+                f"4-node elements lock under the shear order L2 = {card.shear}: they are much too "
+                "stiff in a thin plate.",
+                card.place("shear order L2"),
+                "take L2 = 1 and support the plate, or elements with mid-side nodes",
+            )
+        if name == NINE_NODES and held <= order < free and nodal:
+            _report_hourglass(card, supported, findings)
+        elif order < (held if supported else free):
             weak.setdefault(free, []).append(name)
     if weak:
         names = dict.fromkeys(name for kind in weak.values() for name in kind)
@@ -166,6 +255,31 @@ def _check_shear(
             card.place("shear order L2"),
             f"take L2 = {max(weak)}",
         )
+
+
+def _report_hourglass(card: Integration, supported: bool, findings: Findings) -> None:
+    place = card.place("shear order L2")
+    if supported:
+        findings.add(
+            "W322",
+            f"Under the shear order L2 = {card.shear} a force on single nodes excites a "
+            "checkerboard motion of the 9-node elements, which only the supports resist.",
+            place,
+            "take L2 = 3",
+        )
+    else:
+        findings.add(
+            HOURGLASS,
+            f"Under the shear order L2 = {card.shear} a force on single nodes excites a "
+            "checkerboard motion of the 9-node elements, which nothing resists in a plate "
+            "without supports.",
+            place,
+            "take L2 = 3; --force runs the deck all the same",
+        )
+
+
+FOUR_NODES, NINE_NODES = "4-node elements", "9-node elements"
+HOURGLASS = "E321"
 
 
 def _orders_without_motions(family: plate.Family) -> tuple[str, int, int]:
@@ -179,7 +293,7 @@ def _orders_without_motions(family: plate.Family) -> tuple[str, int, int]:
     if family.shape is cubic.SHAPE:
         return "cubic elements", 3, 3
     if family.present[8]:
-        return "9-node elements", 3, 2
+        return NINE_NODES, 3, 2
     if family.present[4:].any():
         return "elements with mid-sides", 2, 2
-    return "4-node elements", 2, 1
+    return FOUR_NODES, 2, 1

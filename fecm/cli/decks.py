@@ -111,8 +111,8 @@ def fmt(deck: Path, output: Path | None, only_check: bool) -> None:
 @click.option("--contact", metavar="NAME",
               help="A named law instead; `fecm indent contacts` lists them.")  # fmt: skip
 @click.option("--projectile", metavar="WHAT",
-              help="mass:M, or rod:LENGTH,DIAMETER,E,DENSITY.  [default: the report's rod, in lb, "
-                   "in and s]")  # fmt: skip
+              help="mass:M, or rod:LENGTH,DIAMETER,E,DENSITY.  [default in lb, in and s: the "
+                   "report's rod]")  # fmt: skip
 @click.option("--duration", type=float, required=True, help="Time to run.")
 @click.option("--dt", type=float, help="Time step.  [default: 0.9 of the critical one]")
 @click.option("--every", type=click.IntRange(min=1),
@@ -132,12 +132,16 @@ def new(output: Path, overwrite: bool, **options: Any) -> None:
     from fecm.api import prepare
 
     text = format_deck(deck.to_text())
-    if errors := prepare(text).errors():
+    prepared = prepare(text)
+    if errors := prepared.errors():
         for finding in errors:
             click.echo(finding.render("the new deck"), err=True)
         raise Refused("these options make no sound deck; nothing was written")
     for note in notes:
         click.echo(f"fecm: note: {note}", err=True)
+    source = "the new deck" if str(output) == "-" else str(output)
+    for finding in prepared.findings:
+        click.echo(finding.render(source), err=True)
     if str(output) == "-":
         click.echo(text, nl=False)
     else:

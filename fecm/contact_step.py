@@ -1,0 +1,115 @@
+"""The time step that the contact asks for.
+
+The plate moves explicitly under the last step's contact force, so that the contact acts on it as a
+spring with the tangent stiffness of the indentation law.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fecm.assembly import PlateModel
+from fecm.deck.model import Deck, Impact, Indentation
+from fecm.laminate import Laminate
+from fecm.parts import build_constants, build_projectile
+from fecm.projectile import RigidMass
+from fecm.solvers import SAFE
+from fecm.stability import critical_time_step, safe_time_step
+
+# A clamped square plate under a central force has the stiffness D/(0.0056 a^2): Timoshenko and
+# Woinowsky-Krieger, Theory of Plates and Shells, Table 35.  In terms of the force 8 v (m D)^(1/2)
+# of a wave, that is this factor on the ratio of the masses.
+CLAMPED = 1.0 / (64.0 * 0.0056)
+
+
+def wave_impedance(laminate: Laminate) -> float:
+    """Force over velocity of a point of an infinite plate, 8 (m D*)^(1/2) (force*time/length).
+
+    D* is the effective bending stiffness of an orthotropic plate: R. Olsson, Impact response of
+    orthotropic composite plates predicted from a one-parameter differential equation, AIAA Journal
+    30 (1992) 1587-1596.
+    """
+    D = laminate.D
+    mean = math.sqrt(D[0, 0] * D[1, 1])
+    return 8.0 * math.sqrt(laminate.mass * (mean + D[0, 1] + 2.0 * D[2, 2]) / 2.0)
+
+
+def expected_peak(deck: Deck, plate: PlateModel) -> float:
+    """Estimate of the peak force, too high rather than too low.
+
+    The lesser of Hertz' contact on a rigid target, k^(2/5) (5 m v^2/4)^(3/5), and of the plate's
+    answer: the wave of a light projectile, the clamped plate's stiffness under a heavy one.
+    """
+    impact, law = deck.need(Impact), deck.need(Indentation)
+    mass, v = build_projectile(deck).total_mass, np.abs(np.float64(impact.velocity))
+    ratio = mass / (plate.area() * plate.laminate.mass)
+    rigid = law.k**0.4 * (1.25 * mass) ** 0.6 * v**1.2
+    return float(min(rigid, wave_impedance(plate.laminate) * v * np.sqrt(1.0 + CLAMPED * ratio)))
+
+
+def contact_stiffness(deck: Deck, plate: PlateModel) -> float:
+    """Tangent stiffness of the indentation law at the expected peak (force/length).
+
+    The greater one of loading (equation 3-1) and unloading (equation 3-3).
+    """
+    law = build_constants(deck.need(Indentation))
+    force = expected_peak(deck, plate)
+    peak = (force / law.k) ** (2.0 / 3.0)
+    if not peak > 0.0:
+        return 0.0
+    return float(force * max(1.5 / peak, law.q / (peak - law.permanent(peak))))
+
+
+@dataclass(frozen=True)
+class ContactStep:
+    """What the contact asks of the time step.
+
+    Attributes
+    ----------
+    stiffness : float
+        Tangent stiffness of the contact, force/length.
+    mass : float
+        The lesser of the plate's mass at the impact unknown and the projectile's at its tip.
+    limit : float
+        Largest stable time step; infinite where the time step is far from it.
+    """
+
+    stiffness: float
+    mass: float
+    limit: float
+
+
+def contact_step(deck: Deck, plate: PlateModel, dt: float) -> ContactStep:
+    """Largest time step at which plate and contact are stable together.
+
+    Parameters
+    ----------
+    deck : Deck
+        A sound deck with an impact.
+    plate : PlateModel
+    dt : float
+        Time step of the deck; 0 for a part of the critical one.  A step that a bound from the
+        elements shows to be stable is not compared any closer.
+    """
+    impact = deck.need(Impact)
+    row = int(plate.mesh.equations[impact.node - 1, impact.dof - 1]) - 1
+    stiffness = contact_stiffness(deck, plate)
+    projectile = build_projectile(deck)
+    rigid = isinstance(projectile, RigidMass)
+    tip = projectile.total_mass if rigid else float(projectile.mass()[0])
+    at_node = float(plate.mass[row])
+    mass = min(tip, at_node)
+    if not stiffness > 0.0:
+        return ContactStep(stiffness, mass, math.inf)
+    # The projectile's implicit step is iterated: a fixed point only below this (beta is 1/6).
+    iterated = math.sqrt(6.0 * tip / stiffness)
+    bound = safe_time_step(plate)
+    step = dt or SAFE * bound
+    if step < iterated and (step / bound) ** 2 + step**2 * stiffness / (4.0 * at_node) < 1.0:
+        return ContactStep(stiffness, mass, math.inf)
+    return ContactStep(
+        stiffness, mass, min(iterated, critical_time_step(plate, (row, stiffness)))
+    )
