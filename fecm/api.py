@@ -106,7 +106,8 @@ def run(
         Result file to write, in place of an earlier one; a second problem goes to ``-2.h5``, and so
         on.  Without it nothing is written.
     force : bool
-        Run with a time step above the critical one all the same.
+        Run with a time step above the critical one, or with a checkerboard motion (E321), all the
+        same.
     solver : str
         How K u is had: ``"auto"`` by what suits the mesh, ``"csr"`` by a sparse matrix.
     threads : int

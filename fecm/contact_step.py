@@ -1,7 +1,7 @@
-"""The time step that the contact asks for.
+"""The largest stable time step of plate and contact together.
 
-The plate moves explicitly under the last step's contact force, so that the contact acts on it as a
-spring with the tangent stiffness of the indentation law.
+The plate moves explicitly under the contact force of the last step, so that the contact acts on it
+as a spring with the tangent stiffness of the indentation law.
 """
 
 from __future__ import annotations
@@ -38,10 +38,11 @@ def wave_impedance(laminate: Laminate) -> float:
 
 
 def expected_peak(deck: Deck, plate: PlateModel) -> float:
-    """Estimate of the peak force, too high rather than too low.
+    """Estimate the peak force, rather too high than too low.
 
-    The lesser of Hertz' contact on a rigid target, k^(2/5) (5 m v^2/4)^(3/5), and of the plate's
-    answer: the wave of a light projectile, the clamped plate's stiffness under a heavy one.
+    The minimum of the Hertz contact on a rigid target, k^(2/5) (5 m v^2/4)^(3/5), and of the
+    response of the plate: the bending wave for a light projectile, the stiffness of a clamped plate
+    for a heavy one.
     """
     impact, law = deck.need(Impact), deck.need(Indentation)
     mass, v = build_projectile(deck).total_mass, np.abs(np.float64(impact.velocity))
@@ -53,7 +54,7 @@ def expected_peak(deck: Deck, plate: PlateModel) -> float:
 def contact_stiffness(deck: Deck, plate: PlateModel) -> float:
     """Tangent stiffness of the indentation law at the expected peak (force/length).
 
-    The greater one of loading (equation 3-1) and unloading (equation 3-3).
+    The maximum of loading (equation 3-1) and unloading (equation 3-3).
     """
     law = build_constants(deck.need(Indentation))
     force = expected_peak(deck, plate)
@@ -65,16 +66,16 @@ def contact_stiffness(deck: Deck, plate: PlateModel) -> float:
 
 @dataclass(frozen=True)
 class ContactStep:
-    """What the contact asks of the time step.
+    """Limit of the time step from the contact.
 
     Attributes
     ----------
     stiffness : float
         Tangent stiffness of the contact, force/length.
     mass : float
-        The lesser of the plate's mass at the impact unknown and the projectile's at its tip.
+        The smaller of the plate's mass at the impact unknown and the projectile's at its tip.
     limit : float
-        Largest stable time step; infinite where the time step is far from it.
+        Largest stable time step; infinite where the time step is certainly stable.
     """
 
     stiffness: float
@@ -91,8 +92,8 @@ def contact_step(deck: Deck, plate: PlateModel, dt: float) -> ContactStep:
         A sound deck with an impact.
     plate : PlateModel
     dt : float
-        Time step of the deck; 0 for a part of the critical one.  A step that a bound from the
-        elements shows to be stable is not compared any closer.
+        Time step of the deck; 0 for 0.9 of the critical one.  The limit is computed only where a
+        bound from the elements does not show that this step is stable.
     """
     impact = deck.need(Impact)
     row = int(plate.mesh.equations[impact.node - 1, impact.dof - 1]) - 1
@@ -110,6 +111,4 @@ def contact_step(deck: Deck, plate: PlateModel, dt: float) -> ContactStep:
     step = dt or SAFE * bound
     if step < iterated and (step / bound) ** 2 + step**2 * stiffness / (4.0 * at_node) < 1.0:
         return ContactStep(stiffness, mass, math.inf)
-    return ContactStep(
-        stiffness, mass, min(iterated, critical_time_step(plate, (row, stiffness)))
-    )
+    return ContactStep(stiffness, mass, min(iterated, critical_time_step(plate, (row, stiffness))))

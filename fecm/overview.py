@@ -38,9 +38,9 @@ class Overview:
     output_bytes : int
         About what the result will take.
     elements_per_wave : float or None
-        Elements at the impact node a bending wave of the contact's duration; None without impact.
+        Elements at the impact node per bending wave of the contact; None without impact.
     mesh_error : float or None
-        Estimated error of the peak force from the mesh, of the peak.
+        Estimated mesh error of the peak force, relative to it.
     units : dict
         Names of the units; empty where the deck gives none.
     """
@@ -103,7 +103,7 @@ class Overview:
             lines.append(f"  DT                  {quantity(dt, 'time')} ({share:.0%} of it)")
         if self.elements_per_wave is not None:
             error = "" if self.mesh_error is None else f" ({said_error(self.mesh_error)})"
-            lines.append(f"  elements a wave     {self.elements_per_wave:.1f}{error}")
+            lines.append(f"  elements per wave   {self.elements_per_wave:.1f}{error}")
         lines += [
             f"  impact steps        {self.steps}",
             f"  output              {said(self.output_bytes)}",

@@ -12,6 +12,7 @@ import numpy as np
 from fecm.assembly import UnsoundPlateError
 from fecm.check import Checked
 from fecm.choices import Choices
+from fecm.contact_step import contact_step
 from fecm.deck.model import Material
 from fecm.deck.records import LoadTable, Macro
 from fecm.dynamics import DivergenceError, PlateState
@@ -28,7 +29,6 @@ from fecm.results.schema import FORMAT, FORMAT_VERSION
 from fecm.results.sinks import Sink
 from fecm.slips import LISTING, NAMES, REPORT
 from fecm.solvers import SAFE
-from fecm.contact_step import contact_step
 from fecm.stability import critical_time_step
 from fecm.statics import Tangent, reactions
 from fecm.stresses import strains_and_resultants

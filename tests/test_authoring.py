@@ -34,7 +34,7 @@ REPORT = [
 PLATE = [
     "--size", "0.3x0.2", "--mesh", "6x4", "--layup", "[0/90]s", "--ply-thickness", "0.25e-3",
     "--material", "T300/5208", "--units", "m-N-s", "--velocity", "3", "--law", "1e9,1e-5,.1,2.5",
-    "--duration", "1e-4",
+    "--duration", "1e-4", "--projectile", "mass:0.05",
 ]  # fmt: skip
 
 
@@ -251,3 +251,40 @@ def test_what_is_no_projectile_is_refused(text: str) -> None:
     result = new(*PLATE, "--projectile", text)
     assert result.exit_code == 2
     assert result.stdout == ""
+
+
+def test_the_reports_rod_is_never_put_into_a_deck_of_other_units() -> None:
+    options = PLATE[: PLATE.index("--projectile")]
+    for units in (["--units", "m-N-s"], ["--units", "mm-N-s"], []):
+        chosen = [option for option in options if option not in ("--units", "m-N-s")]
+        refused = new(*chosen, *units)
+        assert refused.exit_code == 2
+        assert "give --projectile" in refused.stderr
+        assert refused.stdout == ""
+    assert new(*chosen, "--units", "in-lbf-s").exit_code == 0
+
+
+def test_a_moved_impact_point_is_named_with_both_points_and_their_distance() -> None:
+    moved = new(*PLATE, "--at", "0.103,0.11")
+    assert "moved by 0.01044: from --at at 0.103, 0.11 to the nearest node, 57 at 0.1, 0.1" in (
+        moved.stderr
+    )
+    assert "moved" not in new(*PLATE).stderr
+
+
+def test_a_new_deck_shows_the_warnings_that_check_shows(tmp_path: Path) -> None:
+    deck = tmp_path / "plate.inp"
+    made = call("new", str(deck), *PLATE, "--velocity", "3000")
+    assert made.exit_code == 0
+    shown = [f.render(str(deck)) for f in prepare(deck).findings]
+    assert {"W415", "W435"} <= {f.code for f in prepare(deck).findings}
+    assert all(text in made.stderr for text in shown)
+
+
+def test_numbers_of_another_system_of_units_are_named_for_the_units_declared() -> None:
+    si = "1580,.32,161e9,11.4e9,5.17e9,5.17e9,3.98e9"
+    cut = PLATE.index("--material")
+    options = [*PLATE[:cut], *PLATE[cut + 4 :], "--ply", si, "--units", "mm-N-s"]
+    made = new(*options)
+    assert "W435" in made.stderr
+    assert "mass density 1580 is 1.58e+15 kg/m^3" in made.stderr

@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from fecm.api import prepare
+from fecm.overview import overview
 from tests.calls import call
-from tests.decks import APPENDIX, DATA_CARDS, LONG, MESH, PROGRAM, small
+from tests.decks import APPENDIX, DATA, DATA_CARDS, LONG, MESH, PROGRAM, ROOT, small
 
 WRONG = sorted((Path(__file__).parent / "wrong").glob("*.inp"))
 
@@ -74,7 +75,7 @@ def test_the_summary_has_the_reports_critical_time_step_to_1_per_cent() -> None:
 def test_findings_and_summary_are_json_lines_for_programs() -> None:
     sound = call("check", str(LONG), "--format", "json")
     *findings, last = (json.loads(line) for line in sound.stdout.splitlines())
-    assert [f["code"] for f in findings] == ["W414"]
+    assert [f["code"] for f in findings] == ["W414", "W415"]
     assert last["kind"] == "summary"
     assert last["equations"] == 1827
     assert last["D"][0][0] == pytest.approx(1287.414844365, rel=1e-10)
@@ -154,7 +155,8 @@ def test_two_nodes_in_one_place_are_a_cut_in_the_plate() -> None:
 
 def test_a_mesh_too_coarse_for_the_impacts_waves_is_found() -> None:
     assert "W415" in [f.code for f in prepare(small()).findings]
-    assert "W415" not in [f.code for f in prepare(APPENDIX).findings]
+    fine = (DATA / "plate-100x100x2.inp").read_text().replace("    3000.0", "     100.0")
+    assert "W415" not in [f.code for f in prepare(fine).findings]
 
 
 def test_numbers_at_the_edge_of_their_range_end_in_findings_not_in_exceptions() -> None:
@@ -168,7 +170,7 @@ def test_a_clock_of_static_loads_has_no_critical_time_step() -> None:
     static = "DT         1.0\nTANG\nLOOP          3\nTIME\nFORM\nSOLV\nDISP\nNEXT\n"
     static_data = DATA_CARDS[DATA_CARDS.index("MATE") :]
     assert codes(small(static, data=static_data)) == []
-    assert codes(small(static + "LMAS\nEXCD\n")) == ["E508"]
+    assert codes(small(static + "LMAS\nEXCD\n", data=static_data)) == ["E508"]
 
 
 def test_control_characters_of_a_deck_never_reach_the_terminal() -> None:
@@ -205,3 +207,75 @@ def test_units_are_named_in_summary_and_result(tmp_path: Path) -> None:
 @pytest.mark.parametrize("card", ["in lbf", "in lbf s lb", ""])
 def test_units_need_three_names(card: str) -> None:
     assert codes(small(data=f"UNIT\n{card}\n" + DATA_CARDS)) == ["E010"]
+
+
+def test_masses_are_shown_in_tonnes_or_kilograms_beside_the_decks_unit() -> None:
+    # 100 mm x 100 mm x 2 mm at 1.6e-9 t/mm^3; the report's plate of 6 x 4 x 0.106 in is 65.9 g.
+    shown = call("check", str(DATA / "plate-100x100x2.inp")).stdout
+    assert "plate mass          3.2e-05 N*s^2/mm (3.2e-05 t)" in shown
+    named = re.sub("^COOR", "UNIT\nin lbf s\nCOOR", APPENDIX.read_text(), flags=re.M)
+    lines = overview(prepare(named).problems[0]).lines()
+    (line,) = (line for line in lines if "plate mass" in line)
+    assert float(re.search(r"\((\S+) kg\)", line)[1]) == pytest.approx(0.06594, rel=1e-3)
+
+
+def test_every_impact_has_its_elements_per_wave_in_the_summary() -> None:
+    # The report's mesh: its first peak of 78.7 lb goes down to 75.5 lb on one eight times as fine.
+    view = overview(prepare(APPENDIX).problems[0])
+    assert view.elements_per_wave == pytest.approx(6.83, abs=0.01)
+    assert view.mesh_error == pytest.approx(78.7 / 75.5 - 1.0, rel=0.5)
+    assert re.search(
+        r"elements per wave +6\.8 \(mesh error of the peak about", "\n".join(view.lines())
+    )
+    frequencies = overview(prepare(ROOT / "decks" / "natural-frequencies.inp").problems[0])
+    assert frequencies.elements_per_wave is None
+
+
+@pytest.mark.parametrize("velocity", ["    -115.0", "     -1E-9"])
+def test_a_velocity_away_from_the_plate_is_refused(velocity: str) -> None:
+    (error,) = prepare(with_data("     115.0", velocity)).errors()
+    assert (error.code, error.place.field if error.place else "") == (
+        "E411",
+        "cols 11-20: impact velocity",
+    )
+    assert "must be positive" in error.message
+
+
+def test_a_checkerboard_of_a_free_plate_runs_only_when_forced() -> None:
+    reduced = with_data("    3    3   -3", "    3    2   -3")
+    prepared = prepare(reduced)
+    assert [f.code for f in prepared.errors()] == ["E321"]
+    assert prepared.errors(force=True) == []
+    # The printed program takes L1 for L2, so that nothing is wrong there.
+    assert prepare(reduced, "listing").errors() == []
+
+
+@pytest.mark.parametrize(
+    ("cards", "code"),
+    [
+        ("    1    1   -1   -1    0    0    0\n    2    0    1    1    1    0    0", "W319"),
+        ("    1    1   -1   -1   -1    0    0\n    3    0    1    1    1    0    0\n"
+         "    4    1   -1   -1    0    0    0", ""),
+    ],
+    ids=["one", "three"],
+)  # fmt: skip
+def test_one_or_two_nodes_that_hold_w_are_no_support(cards: str, code: str) -> None:
+    start, end = MESH.index("BOUN\n"), MESH.index("   25    0    1    1")
+    mesh = f"{MESH[:start]}BOUN\n{cards}\n    5    1   -1   -1    0    0    0\n{MESH[end:]}"
+    assert codes(small(mesh=mesh)) == ([code] if code else [])
+
+
+def test_a_contact_too_stiff_for_the_time_step_is_found_before_the_run() -> None:
+    base = (DATA / "plate-100x100x2.inp").read_text()
+    for k, found in (("  100000.0", False), ("       4E6", False), ("       1E7", True)):
+        text = base.replace("  100000.0     0.017", f"{k}     0.017")
+        assert ("W517" in codes(text)) is found
+
+
+def test_impact_steps_beside_central_differences_are_warned_of() -> None:
+    assert codes(small(PROGRAM + "EXCD\n")) == ["W518"]
+
+
+def test_an_impact_deck_that_computes_only_modes_is_told_that_nothing_hits() -> None:
+    assert codes(small("LMAS\nEIGE          2\n")) == ["W520"]
+    assert codes(small("LMAS\nDT        .5E-6\nLOOP          3\nTIME\nDISP\nNEXT\n")) == ["E519"]

@@ -89,8 +89,8 @@ def deck_of_options(
     )
     if projectile is None and (system or material_system(material)) not in (None, REPORT_SYSTEM):
         raise OptionError(
-            f"give --projectile: without it the projectile is the report's steel rod, whose "
-            f"numbers are in {REPORT_SYSTEM}"
+            "give --projectile mass:M or rod:LENGTH,DIAMETER,E,DENSITY: without it the projectile "
+            f"is the report's steel rod, whose numbers are in {REPORT_SYSTEM}"
         )
     notes: list[str] = []
     node, node_x, node_y = grid.nearest(x, y)

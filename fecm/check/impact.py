@@ -28,11 +28,11 @@ from fecm.projectile import report_rod
 W = 3
 # A rod's step is a full matrix of three times as many rows and columns as it has unknowns.
 MOST_ROD_ELEMENTS = 500
-# Elements that a bending wave of the contact's duration needs at the least, and for a good peak.
-ELEMENTS_A_WAVE, ENOUGH_A_WAVE = 4, 8
-# Error of the peak from the mesh that is worth a warning, and the greatest that is estimated.
+# Elements per bending wave of the contact's duration: the minimum, and enough for a peak.
+LEAST_PER_WAVE, ENOUGH_PER_WAVE = 4, 8
+# Mesh error of the peak that is warned of, and the largest that is estimated.
 WORTH_SAYING, MOST_ERROR = 0.03, 0.5
-# Shear order that leaves 9-node elements no motion without energy.
+# Shear order under which 9-node elements have no motion without energy.
 FULL = 3
 
 
@@ -229,8 +229,8 @@ class Resolution:
     side : float
         Longest side of the elements at the impact node, length.
     error : float or None
-        Estimate of the peak force's error from the mesh, of the peak; None for elements without
-        mid-side nodes.
+        Estimated mesh error of the peak force, relative to it; None for elements without mid-side
+        nodes.
     """
 
     contact: float
@@ -240,17 +240,17 @@ class Resolution:
 
     @property
     def elements(self) -> float:
-        """Elements a bending wave."""
+        """Elements per bending wave."""
         return self.wave / self.side
 
 
 def resolution(deck: Deck, mesh: Mesh) -> Resolution | None:
-    """Compare the elements at the impact node with the waves that the impact sends out.
+    """Compare the elements at the impact node with the bending waves of the impact.
 
     Returns
     -------
     Resolution or None
-        None where nothing hits, or where a number is beyond all range.
+        None without an approach, or where a number overflows.
     """
     impact, law = deck.need(Impact), deck.need(Indentation)
     if impact.velocity <= 0.0:
@@ -275,46 +275,46 @@ def resolution(deck: Deck, mesh: Mesh) -> Resolution | None:
 
 
 def mesh_error(elements: float, slenderness: float, shear: int) -> float:
-    """Estimate of the peak force's error from the mesh, right within a factor of about two.
+    """Estimate the relative mesh error of the peak force, within a factor of about two.
 
-    Fitted to the peaks of 20 meshes of 8- or 9-node elements against one of 15 to 30 elements a
-    wave: AS/3501 plates of 100 x 100 x 1, 2 and 4 mm, and the report's plate.
+    Fitted to the peaks of 20 meshes of 8- or 9-node elements against one of 15 to 30 elements
+    per wave: AS/3501 plates of 100 x 100 x 1, 2 and 4 mm, and the report's plate.
 
     Parameters
     ----------
     elements : float
-        Elements a bending wave of the contact's duration.
+        Elements per bending wave of the contact's duration.
     slenderness : float
-        Side of an element over the thickness: under L2 = 3 the elements lock with it.
+        Side of an element over the thickness; under L2 = 3 a slender element locks.
     shear : int
         Shear order L2.
     """
     if shear < FULL:
-        return 0.045 * ENOUGH_A_WAVE / elements
-    return (0.031 + 0.0011 * slenderness**2) * (ENOUGH_A_WAVE / elements) ** 2
+        return 0.045 * ENOUGH_PER_WAVE / elements
+    return (0.031 + 0.0011 * slenderness**2) * (ENOUGH_PER_WAVE / elements) ** 2
 
 
 def said_error(error: float) -> str:
-    """Say an estimated error of the peak force from the mesh."""
+    """Text of an estimated mesh error of the peak force."""
     if error > MOST_ERROR:
         return f"mesh error of the peak above {MOST_ERROR:.0%}"
     return f"mesh error of the peak about {error:.1%}"
 
 
 def check_resolution(deck: Deck, mesh: Mesh, findings: Findings) -> None:
-    """Warn of elements at the impact node that are too large for the waves it sends out."""
+    """Warn of elements at the impact node that are too large for its bending waves."""
     found = resolution(deck, mesh)
-    if found is None or found.elements >= ENOUGH_A_WAVE:
+    if found is None or found.elements >= ENOUGH_PER_WAVE:
         return
-    coarse = found.elements < ELEMENTS_A_WAVE
+    coarse = found.elements < LEAST_PER_WAVE
     if not coarse and (found.error is None or found.error < WORTH_SAYING):
         return
     about = "" if found.error is None else f": {said_error(found.error)}"
     findings.add(
         "W415",
         f"The mesh is {'too coarse' if coarse else 'coarse'} at the impact node: "
-        f"{found.elements:.1f} elements of side {found.side:.3g} a bending wave of the contact's "
-        f"duration ({found.wave:.3g}){about}.",
+        f"{found.elements:.1f} elements of side {found.side:.3g} per bending wave of the contact's "
+        f"duration, which is {found.wave:.3g} long{about}.",
         deck.need(Impact).place("impact node"),
-        f"give a wave {ENOUGH_A_WAVE} elements: sides up to {found.wave / ENOUGH_A_WAVE:.2g}",
+        f"use {ENOUGH_PER_WAVE} elements per wave: sides up to {found.wave / ENOUGH_PER_WAVE:.2g}",
     )

@@ -19,7 +19,7 @@ from fecm.parts import rules
 
 TRIANGLE = triangle.SHAPE.corners
 W, THETA_X = 2, 3
-# Nodes with a force of their own, at the most; more are a pressure.
+# Loaded nodes up to this number are single forces, more are a pressure.
 FEW_LOADED = 4
 # Distance of a mid-side node from its place along the side, over the side's length.
 OFF_PLACE = 0.05
@@ -124,11 +124,11 @@ def _check_side_nodes(deck: Deck, mesh: Mesh, findings: Findings) -> None:
     if wrong:
         rows = np.unique(wrong).astype(np.intp)
         findings.add(
-            "W318",
-            f"Nodes on the sides of {gather.listed(rows)} are off their places by more than "
+            "W323",
+            f"Side nodes of {gather.listed(rows)} are away from their places by more than "
             f"{OFF_PLACE:.0%} of the side.",
             place_of_element(deck, int(rows[0]) + 1),
-            "they belong on the middle of the side, in cubic elements on its third points",
+            "put them at the middle of the side, in cubic elements at its third points",
         )
 
 
@@ -142,14 +142,14 @@ def _check_support(deck: Deck, mesh: Mesh, findings: Findings) -> None:
             "W319",
             f"w is restrained at {count} node{'s' if count > 1 else ''} only.",
             None if segment is None else segment.place(),
-            "an edge is held at each of its nodes; a free plate needs no support",
+            "restrain w at every node of a supported edge; a free plate needs no support",
         )
 
 
 def _loads_a_node(deck: Deck, mesh: Mesh, *, supported: bool) -> bool:
     """Whether a force on single nodes excites their checkerboard: an impact's, or FORC's.
 
-    A support damps what a given load of some duration excites, not what an impact does.
+    A supported plate is excited by the short waves of an impact only.
     """
     words = {macro.word for macro in deck.macros}
     loaded = int(np.count_nonzero(mesh.forces[:, W]))
@@ -240,7 +240,7 @@ def _check_shear(
                 f"4-node elements lock under the shear order L2 = {card.shear}: they are much too "
                 "stiff in a thin plate.",
                 card.place("shear order L2"),
-                "take L2 = 1 and support the plate, or elements with mid-side nodes",
+                "use L2 = 1 and support the plate, or elements with mid-side nodes",
             )
         if name == NINE_NODES and held <= order < free and nodal:
             _report_hourglass(card, supported, findings)

@@ -1,6 +1,6 @@
-"""Findings about values that are valid but that no real impact has: slips of units and of keys.
+"""Findings about valid values that no real impact has: wrong units, typing errors, wrong macros.
 
-All are warnings, but for a program that stores a plate nothing has moved.
+All are warnings, except that a program which cannot move the plate is an error.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ LEAST_POWER, GREATEST_POWER = 1.0, 5.0
 # Time step over the stable one.
 WASTEFUL = 0.01
 
-# What real materials and impacts have, in m, N and s, with about a decade to spare: dimension,
-# least and greatest value, and the unit.
+# Range of real materials and impacts in m, N and s, about a decade wider on each side: dimension,
+# smallest and largest value, unit.
 REAL = {
     "fibre modulus": ("force/length^2", 1e9, 2e12, "Pa"),
     "matrix modulus": ("force/length^2", 1e8, 2e12, "Pa"),
@@ -104,7 +104,7 @@ def _check_ply(ply: Ply, findings: Findings) -> None:
             f"Poisson's ratio NU12 = {nu:g} looks like NU21: NU12 would be NU21 E1/E2 = "
             f"{nu * ratio:.3g}.",
             place,
-            "NU12 is the contraction across the fibres under stress along them",
+            "NU12 is the contraction across the fibres under a stress along them",
         )
 
 
@@ -132,7 +132,7 @@ def _check_angles(layers: tuple[Layer, ...], findings: Findings) -> None:
 
 
 def _is_radian(angle: float) -> bool:
-    """Whether an angle is a multiple of 5 degrees up to 90, written in radians."""
+    """Whether an angle is a multiple of 5 degrees up to 90 in radians."""
     multiple = math.degrees(abs(angle)) / 5.0
     return 0.08 < abs(angle) <= 1.6 and abs(multiple - round(multiple)) < 0.08
 
@@ -144,8 +144,7 @@ def _check_thickness(material: Material, mesh: Mesh, findings: Findings) -> None
         findings.add(
             "W430",
             f"The thickness {thickness:g} is {thickness / side:.2g} of the plate's longer side "
-            f"{side:g}; plate theory wants less than {THICKEST:g}, and real plates have more than "
-            f"{THINNEST:g}.",
+            f"{side:g}, outside {THINNEST:g} to {THICKEST:g}.",
             material.integration.place("total thickness"),
             "thickness and coordinates must be in the same unit of length",
         )
@@ -158,7 +157,7 @@ def _check_law(deck: Deck, findings: Findings) -> None:
         findings.add(
             "W436",
             f"The {name} = {law.alpha_p:g} is more than the plate's thickness {thickness:g}: "
-            "nothing would ever remain.",
+            "no permanent indentation would occur.",
             law.place(name),
             "it is a length in the deck's unit",
         )
@@ -173,7 +172,7 @@ def _check_law(deck: Deck, findings: Findings) -> None:
 
 
 def _check_neighbours(impact: Impact, mesh: Mesh, findings: Findings) -> None:
-    """Warn of an impact node that no neighbour can follow, inner nodes being restrained too."""
+    """Warn where all neighbours of the impact node are restrained, nodes inside the plate too."""
     touching = mesh.elements[(mesh.elements == impact.node).any(axis=1)]
     around = np.setdiff1d(touching, [0, impact.node]) - 1
     places = mesh.coordinates
@@ -223,7 +222,7 @@ def _check_projectile(deck: Deck, plate: PlateModel, findings: Findings) -> None
 
 
 def _values(deck: Deck, *, hits: bool) -> Iterator[Value]:
-    """What :data:`REAL` has bounds for."""
+    """Values that :data:`REAL` has a range for."""
     material = deck.need(Material)
     ply = material.ply
     for kind, name, value in (
@@ -263,20 +262,18 @@ def _check_units(deck: Deck, findings: Findings, *, hits: bool) -> None:
         factor = in_si(dimension, names)
         if factor is not None and not least <= value.value * factor <= greatest:
             what = f"{value.name} {value.value:g} is {value.value * factor:.3g} {unit}"
-            wrong.append((value, f"{what} (real: {least:g} to {greatest:g})"))
+            wrong.append((value, f"{what}, outside {least:g} to {greatest:g}"))
     if wrong:
         findings.add(
             "W435",
-            f"Under UNIT {' '.join(names.values())} no real plate or impact has these values: "
-            f"{'; '.join(what for _, what in wrong)}.",
+            f"In the units of UNIT ({' '.join(names.values())}) the "
+            f"{'; the '.join(what for _, what in wrong)}.",
             wrong[0][0].place,
             "either the values or the names on UNIT are wrong; nothing is converted",
         )
 
 
-def check_time_step_of_contact(
-    deck: Deck, mesh: Mesh, findings: Findings, *, hits: bool
-) -> None:
+def check_time_step_of_contact(deck: Deck, mesh: Mesh, findings: Findings, *, hits: bool) -> None:
     """Warn of a DT that the contact makes unstable, and of one far below what is stable."""
     plate = build_plate(deck, mesh)
     bound = safe_time_step(plate)
@@ -300,8 +297,7 @@ def check_time_step_of_contact(
         if 0.0 < dt < WASTEFUL * stable:
             findings.add(
                 "W516",
-                f"DT = {dt:.3g} is {dt / stable:.2g} of the stable step {stable:.3g}: the run "
-                "takes that many more steps.",
+                f"DT = {dt:.3g} is only {dt / stable:.2g} of the stable step {stable:.3g}.",
                 macro.place("value"),
                 "DT is in the deck's unit of time",
             )
@@ -319,21 +315,20 @@ def check_purpose(deck: Deck, mesh: Mesh, findings: Findings) -> None:
     movers = MOVE & words.keys()
     segment = next((s for kind in OF_AN_IMPACT if (s := deck.last(kind)) is not None), None)
     if segment is not None and "RODP" not in movers:
-        what = f"The deck has a segment {segment.keyword}, but its program no RODP"
-        hint = "RODP takes an impact step; it stands in place of EXCD"
+        what = f"The deck has a {segment.keyword} segment, but its program has no RODP"
+        hint = "RODP takes an impact step; use it instead of EXCD"
         stored = next((macro for macro in deck.macros if macro.word in STORE | movers), None)
         if stored is not None and movers <= {"EXCD"} and not mesh.forces.any():
             findings.add(
-                "E514", f"{what}: the plate never moves, and all results would be 0.",
+                "E519", f"{what}: the plate never moves, and all results would be 0.",
                 stored.place("macro"), hint,
             )  # fmt: skip
         elif movers:
-            findings.add("W515", f"{what}: nothing hits the plate.", segment.place(), hint)
+            findings.add("W520", f"{what}: nothing hits the plate.", segment.place(), hint)
     if {"RODP", "EXCD"} <= movers:
         findings.add(
             "W518",
-            "EXCD moves the plate without the projectile, which RODP moves with it: their times "
-            "differ.",
+            "EXCD moves the plate but not the projectile, which stands still during the step.",
             words["EXCD"].place("macro"),
-            "RODP alone takes FORC's loads too",
+            "RODP applies the loads of FORC too",
         )
