@@ -255,13 +255,13 @@ def test_what_is_no_projectile_is_refused(text: str) -> None:
 
 def test_the_reports_rod_is_never_put_into_a_deck_of_other_units() -> None:
     options = PLATE[: PLATE.index("--projectile")]
+    options = [option for option in options if option not in ("--units", "m-N-s")]
     for units in (["--units", "m-N-s"], ["--units", "mm-N-s"], []):
-        chosen = [option for option in options if option not in ("--units", "m-N-s")]
-        refused = new(*chosen, *units)
+        refused = new(*options, *units)
         assert refused.exit_code == 2
         assert "give --projectile" in refused.stderr
         assert refused.stdout == ""
-    assert new(*chosen, "--units", "in-lbf-s").exit_code == 0
+    assert new(*options, "--units", "in-lbf-s").exit_code == 0
 
 
 def test_a_moved_impact_point_is_named_with_both_points_and_their_distance() -> None:

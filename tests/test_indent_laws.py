@@ -166,7 +166,8 @@ def test_a_new_deck_takes_a_named_contact_in_the_plys_units() -> None:
     deck = fecm.read_deck(done.stdout)
     assert isinstance(deck, Deck)
     assert deck.need(Indentation) == Indentation(9.694e5, 3.16e-3, 0.0, 2.5, "ACR")
-    metric = call(*PLATE, "--material", "report", "--units", "m-N-s", "--contact", "report-0.75")
+    metric = call(*PLATE, "--material", "report", "--units", "m-N-s", "--contact", "report-0.75",
+                  "--projectile", "mass:0.05")  # fmt: skip
     deck = fecm.read_deck(metric.stdout)
     assert isinstance(deck, Deck)
     assert deck.need(Indentation).alpha_p == pytest.approx(6.564e-4 * 0.0254, rel=1e-5)

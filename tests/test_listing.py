@@ -96,7 +96,7 @@ def test_rodp_counts_from_its_last_output_against_the_n_of_its_own_card() -> Non
 def test_stiffness_below_1e_6_is_lost_in_any_units() -> None:
     ply = "    3    3   -3      .01\n       1.0       0.3       1.0       1.0\n"
     ply = ply.replace("       1.0\n", "       1.0" + "  0.384615" * 3 + "\n")
-    data = f"{DATA_CARDS.partition('MATE')[0]}MATE\n{ply}    1   0.      0.01\n"
+    data = f"MATE\n{ply}    1   0.      0.01\n"
     text = small("LMAS\nLOOP\nDISP\nNEXT\n", data=data).replace(
         "   25    4    2    2", "   25    4    1    2"
     )
