@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fecm.fitting.constants import Fit, fit
 from fecm.fitting.cycles import divide
 from fecm.fitting.estimates import Estimate
+from fecm.fitting.report import notes
 from tests.indentation_tests import (
     ALPHA_P,
     PEAKS,
@@ -181,6 +184,16 @@ def test_permanent_indentations_off_the_line_enlarge_its_errors() -> None:
     found = fit(both[0], noisy(both[1], 0, 1e-4))
     assert found.line is not None
     assert found.line.scatter > 3.0
+
+
+@pytest.mark.parametrize(("share", "side"), [(0.5, "above"), (1.0, ""), (1.5, "below")])
+def test_a_line_on_one_side_of_all_its_points_is_noted(share: float, side: str) -> None:
+    a, f = make_test()
+    found = fit(a, noisy(f, 0))
+    assert found.line is not None
+    start = replace(found.line.alpha_p, value=share * found.line.alpha_p.value)
+    told = "; ".join(notes(replace(found, line=replace(found.line, alpha_p=start))))
+    assert (f"lies {side} all of its points" in told) is bool(side)
 
 
 def test_one_unloading_tells_alpha_cr() -> None:

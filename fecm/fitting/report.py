@@ -8,6 +8,7 @@ from fecm.deck.model import Indentation
 from fecm.fitting.constants import Cycle, Fit
 from fecm.fitting.cycles import FALLING, LOADING, RISING
 from fecm.fitting.estimates import Estimate
+from fecm.fitting.permanent import Line
 from fecm.indentation import Constants, CriticalConstants
 
 # Digits of the constants on the card.
@@ -60,6 +61,12 @@ def notes(fit: Fit) -> list[str]:
         if straight.elastic:
             which = ", ".join(str(n + 1) for n in straight.elastic)
             told.append(f"cycle {which} lies below alpha_p and leaves nothing")
+        if side := _one_side(fit.cycles, straight):
+            told.append(
+                f"the line of s_p and alpha_p lies {side} all of its points: the points share the "
+                "errors of k and q, and the test does not follow the law; compare n with 3/2, and "
+                "fit single cycles to compare their q"
+            )
     scatter = straight.scatter if straight else fit.critical.scatter if fit.critical else 1.0
     if scatter > 1.0:
         told.append(
@@ -67,6 +74,17 @@ def notes(fit: Fit) -> list[str]:
             "explains: the errors of their constants are larger by so much"
         )
     return told
+
+
+def _one_side(cycles: tuple[Cycle, ...], straight: Line) -> str:
+    """``"above"`` or ``"below"`` where the line is so of all its points, by an error or more."""
+    slope, start = straight.s_p.value, straight.alpha_p.value
+    points = [cycle for n, cycle in enumerate(cycles) if n not in straight.elastic]
+    off = [c.alpha_0.value - slope * (c.alpha_m.value - start) for c in points]
+    least = [max(c.alpha_0.error, 1e-6 * c.alpha_m.value) for c in points]
+    if len(off) < 3 or not any(abs(o) > e for o, e in zip(off, least, strict=True)):
+        return ""
+    return "above" if max(off) < 0.0 else "below" if min(off) > 0.0 else ""
 
 
 def _told(estimate: Estimate | None) -> str:
