@@ -10,10 +10,13 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
+from fecm.authoring.grid import Grid, Section
+from fecm.deck.model import Deck, Indentation, Material
 from fecm.dynamics import PlateMotion
 from fecm.impact import Impact, ImpactState
 from fecm.results.result import Result
 from fecm.results.tapes import tape_texts
+from fecm.verification.decks import result_of, struck_plate
 from tests.decks import APPENDIX, DATA, LONG, ready
 
 Floats = NDArray[np.float64]
@@ -130,6 +133,37 @@ def test_the_contacts_and_peaks_of_the_long_run_are_the_reports(
     listing = results["long", "listing"]
     assert listing.force.max() == pytest.approx(395.0, abs=0.5)
     assert listing.time[listing.force > 0].max() == pytest.approx(91e-6, abs=0.5e-6)
+
+
+def test_the_rod_rings_between_the_contacts_faster_than_a_wave_goes_there_and_back(
+    results: dict[tuple[str, str], Result],
+) -> None:
+    result = results["long", "report"]
+    free = (result.time > 445e-6) & (result.time < 563e-6)
+    time, ringing = result.time[free], result.transducer[free]
+    periods = np.linspace(4e-6, 12e-6, 1601)
+    turns = np.exp(-2j * np.pi * time / periods[:, None])
+    period = periods[np.abs(turns @ (ringing - ringing.mean())).argmax()]
+    assert period == pytest.approx(8.35e-6, abs=0.02e-6)
+    through = 1.0 / np.sqrt(30.0e6 / 0.0006875)  # 1 in of steel
+    assert through == pytest.approx(4.79e-6, abs=0.01e-6)
+    assert 1.7 * through < period < 0.9 * 2.0 * through
+
+
+def test_the_reports_mesh_has_not_converged(results: dict[tuple[str, str], Result]) -> None:
+    grid = Grid(
+        [Section(0.0, 1.5, 6), Section(1.5, 4.5, 16), Section(4.5, 6.0, 6)],
+        [Section(0.0, 0.5, 2), Section(0.5, 3.5, 16), Section(3.5, 4.0, 2)],
+    )
+    deck = fecm.read_deck(LONG)
+    assert isinstance(deck, Deck)
+    law = deck.need(Indentation)
+    finer = struck_plate(grid, deck.need(Material), None, 115.0, law, 1e-7, 600)
+    coarse = results["long", "report"]
+    first = coarse.force[coarse.time < 60e-6].max()
+    # 2.7 % of the first peak; with four times the elements a side it is 75.90 lb.
+    assert first == pytest.approx(78.69, abs=0.005)
+    assert result_of(finer).force.max() == pytest.approx(76.60, abs=0.005)
 
 
 def test_running_twice_gives_the_same_bytes(tmp_path: Path) -> None:

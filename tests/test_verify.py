@@ -191,6 +191,7 @@ def test_dalemberts_figures_are_the_sums_of_his_waves() -> None:
     # Its largest value lies just before a jump comes by.
     peak = middle(np.linspace(190e-6, 210e-6, 200_001), 200e-6).max()
     assert check_of("rod-pulse", "largest force").expected == pytest.approx(peak, rel=1e-6)
+    assert f"exact {peak:.2f} |" in (ROOT / "docs" / "rod.md").read_text()
     later = middle(np.array([250e-6]), 300e-6)[0]
     assert check_of("rod-pulse", "the same pulse").expected == pytest.approx(later, rel=1e-9)
 
