@@ -72,9 +72,13 @@ def prepare(path_or_text: str | Path | Deck, mode: str = REPORT) -> Prepared:
         text, source = load_text(path_or_text)
     reader = Reader(text, blanks_are_zeros=mode == LISTING)
     listing = mode == LISTING
-    checked = [check(problem, reader.findings, listing=listing) for problem in reader.problems()]
-    problems = [problem for problem in checked if problem is not None]
-    if mode == LISTING and not reader.findings.errors:
+    problems: list[Checked] = []
+    for read in reader.problems():
+        if reader.findings.closed:
+            break
+        if (checked := check(read, reader.findings, listing=listing)) is not None:
+            problems.append(checked)
+    if listing and not reader.findings.errors:
         for problem in problems:
             check_listing(problem.deck, problem.mesh, reader.findings)
     return Prepared(source, problems, list(reader.findings))

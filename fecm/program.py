@@ -16,6 +16,8 @@ from fecm.deck.numbers import parse_real
 from fecm.deck.records import Macro
 
 NESTING = 64
+# A program of more macros than this would run for days.
+MOST_MACROS = 10**9
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +118,8 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
     body: list[Macro | Loop] = []
     done: set[str] = set()
     for macro in macros:
+        if findings.closed:
+            return ()
         known = WORDS.get(macro.word)
         word = known or _unknown(macro, findings)
         if word is None:
@@ -222,6 +226,12 @@ def _check_value(word: Word, macro: Macro, findings: Findings) -> None:
         findings.add(
             "E505",
             f"{word.name} takes a whole number that is not negative, not {value:g}.",
+            macro.place("value"),
+        )
+    elif word.value in ("count", "every") and value > MOST_MACROS:
+        findings.add(
+            "E505",
+            f"{word.name} takes a whole number up to {MOST_MACROS:g}, not {value:g}.",
             macro.place("value"),
         )
     elif (word.value == "time step" and value < 0) or (word.value == "tolerance" and value <= 0):
@@ -363,7 +373,7 @@ class Tally:
     Attributes
     ----------
     macros : int
-        Macros carried out.
+        Macros carried out; each pass of a loop carries out its NEXT.
     steps : int
         Time steps, impact steps and central differences.
     contact_rows : int
@@ -414,7 +424,7 @@ def _entry(body: Body, count: int) -> tuple[int, dict[str, int], dict[int, int]]
     for item in body:
         if isinstance(item, Loop):
             inner, rows, taken = _entry(item.body, item.count)
-            macros += count * inner
+            macros += count * (inner + item.count)
             for word, more in rows.items():
                 passes[word] += count * more
             for n, more in taken.items():

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -174,11 +177,24 @@ def test_many_small_problems_with_large_counts_are_refused() -> None:
     )
 
 
+def _write_on(pipe: int) -> None:
+    """Write cards until nobody reads them any more."""
+    with contextlib.suppress(BrokenPipeError):
+        while True:
+            os.write(pipe, b"    1    0\n" * 1000)
+    os.close(pipe)
+
+
 def test_a_deck_that_never_ends_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fecm.deck.reader, "available", lambda: 80 * MEGABYTE)
-    done = call("check", "/dev/zero")
+    monkeypatch.setattr(fecm.deck.reader, "available", lambda: 12 * MEGABYTE)
+    endless, begin = os.pipe()
+    writer = threading.Thread(target=_write_on, args=(begin,))
+    writer.start()
+    done = call("check", f"/dev/fd/{endless}")
+    os.close(endless)
+    writer.join()
     assert_unusable(done)
-    assert "/dev/zero: the deck has more than 1 MB" in done.stderr
+    assert "a deck of more than 1 MB is not read" in done.stderr
 
 
 def test_free_memory_is_a_part_of_the_machines() -> None:

@@ -107,7 +107,7 @@ def test_the_tally_counts_what_the_run_stores() -> None:
     assert counted.steps == len(result.force) == 14
     assert counted.contact_rows == len(result.tape9.force) == 4
     assert counted.passes["DISP"] == len(result.tape3.w) == 6
-    assert counted.macros == 2 * (2 + 7 * 3)
+    assert counted.macros == 2 * (2 + 7 * 4)
 
 
 def test_rodp_counts_steps_across_loops_and_disp_the_passes_of_its_own_loop() -> None:

@@ -7,12 +7,18 @@ that it is the total.  Groups may stand inside groups.
 
 from __future__ import annotations
 
+import math
 import re
 
 # A layup of more plies than this is a slip of the pen.
 MOST_PLIES = 10_000
 
-_ANGLE = re.compile(r"(±|\+-|\+/-)?([+-]?(?:\d+\.?\d*|\.\d+))(?:_\{?(\d+)\}?)?")
+# Groups inside groups, at the most.
+NESTING = 32
+# Characters of a layup that a message quotes.
+QUOTED = 60
+
+_ANGLE = re.compile(r"(±|\+-|\+/-)?([+-]?(?:\d+(?:\.\d*)?|\.\d+))(?:_\{?(\d+)\}?)?")
 _SUFFIX = re.compile(r"_?\{?(\d*)([sST]?)\}?")
 
 
@@ -45,11 +51,19 @@ def parse_layup(text: str) -> list[float]:
 def _error(text: str, position: int) -> LayupError:
     rest = text[position : position + 10]
     what = f"at `{rest}`" if rest else "at its end"
-    return LayupError(f"the layup `{text}` can't be read {what}; write for example [0/45/-45/90]2s")
+    return LayupError(
+        f"the layup `{_quoted(text)}` can't be read {what}; write for example [0/45/-45/90]2s"
+    )
 
 
-def _group(text: str, start: int) -> tuple[list[float], int]:
+def _quoted(text: str) -> str:
+    return text if len(text) <= QUOTED else f"{text[:QUOTED]}..."
+
+
+def _group(text: str, start: int, depth: int = 1) -> tuple[list[float], int]:
     """Angles of the group that begins at `start`, and where it ends."""
+    if depth > NESTING:
+        raise LayupError(f"the layup `{_quoted(text)}` has groups nested deeper than {NESTING}")
     if text[start : start + 1] not in ("[", "("):
         raise _error(text, start)
     close = "]" if text[start] == "[" else ")"
@@ -57,13 +71,15 @@ def _group(text: str, start: int) -> tuple[list[float], int]:
     position = start + 1
     while True:
         if text[position : position + 1] in ("[", "("):
-            inner, position = _group(text, position)
+            inner, position = _group(text, position, depth + 1)
             angles += inner
         else:
             match = _ANGLE.match(text, position)
             if match is None:
                 raise _error(text, position)
             angle = float(match[2])
+            if not math.isfinite(angle):
+                raise _error(text, position)
             plies = [angle, -angle] if match[1] else [angle]
             angles += plies * _times(match[3] or "1", len(plies), text, position)
             position = match.end()
@@ -88,8 +104,8 @@ def _times(digits: str, plies: int, text: str, position: int) -> int:
     """A number of repeats that does not exhaust the memory."""
     if len(digits) > 5 or int(digits) * plies > MOST_PLIES or int(digits) < 1:
         raise LayupError(
-            f"the layup `{text}` repeats {digits} times at `{text[position : position + 10]}`; "
-            f"1 to {MOST_PLIES} plies can be made"
+            f"the layup `{_quoted(text)}` repeats {_quoted(digits)} times at "
+            f"`{text[position : position + 10]}`; 1 to {MOST_PLIES} plies can be made"
         )
     return int(digits)
 

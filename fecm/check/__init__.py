@@ -20,13 +20,13 @@ from fecm.check.impact import (
     warn_of_the_reports_rod,
 )
 from fecm.check.material import check_material
-from fecm.check.mesh import check_geometry, check_mesh
+from fecm.check.mesh import check_elements, check_geometry, check_mesh
 from fecm.check.plausible import (
     check_plausibility,
     check_purpose,
     check_time_step_of_contact,
 )
-from fecm.check.run import check_output, check_program, check_time_step
+from fecm.check.run import check_program, check_time_step
 from fecm.deck.findings import Findings
 from fecm.deck.model import (
     Boundary,
@@ -91,14 +91,17 @@ def check(problem: Problem, findings: Findings, *, listing: bool = False) -> Che
     deck, unsound = problem.deck, problem.unsound
     if deck is None:
         return None
-    before = len(findings.errors)
+    before = findings.error_count
     program = compile_program(deck.macros, findings)
     _check_segments(deck, unsound, findings)
-    generated = len(findings.errors)
+    generated, elements_generated = findings.error_count, _element_errors(findings)
     mesh = generate(deck, findings)
-    complete = len(findings.errors) == generated and not unsound & {"COOR", "ELEM"}
-    if complete and deck.has(Coordinates) and deck.has(Elements):
-        check_mesh(deck, mesh, findings, listing=listing)
+    complete = findings.error_count == generated and not unsound & {"COOR", "ELEM"}
+    given = _element_errors(findings) == elements_generated and "ELEM" not in unsound
+    if given and deck.has(Elements):
+        sound = check_elements(deck, mesh, findings)
+        if sound and complete and deck.has(Coordinates):
+            check_mesh(deck, mesh, findings, listing=listing)
     if (material := deck.last(Material)) is not None:
         check_material(material, findings)
     if (impact := deck.last(Impact)) is not None:
@@ -109,15 +112,15 @@ def check(problem: Problem, findings: Findings, *, listing: bool = False) -> Che
         check_projectile(projectile, findings)
     if (correction := deck.last(ShearCorrection)) is not None:
         check_shear_correction(correction, findings)
-    if (segment := deck.last(Gages)) is not None and len(findings.errors) == before and not unsound:
+    if (segment := deck.last(Gages)) is not None and findings.error_count == before and not unsound:
         check_gages(segment, mesh, deck, findings)
     checked = Checked(deck, mesh, program)
-    if len(findings.errors) == before and not unsound:
+    if findings.error_count == before and not unsound:
         with np.errstate(all="ignore"):  # numbers beyond all range end in a finding
             check_time_step(deck, mesh, findings)
             check_program(deck, program, findings)
             check_purpose(deck, mesh, findings)
-            if len(findings.errors) == before:
+            if findings.error_count == before:
                 check_geometry(deck, mesh, findings)
                 check_plausibility(deck, mesh, findings, hits=hits(program))
                 if STEPS.intersection(macro.word for macro in deck.macros):
@@ -126,8 +129,12 @@ def check(problem: Problem, findings: Findings, *, listing: bool = False) -> Che
                 if not deck.has(Projectile):
                     warn_of_the_reports_rod(deck.need(Impact), findings)
                 check_resolution(deck, mesh, findings)
-            check_output(deck, program, findings)
     return checked
+
+
+def _element_errors(findings: Findings) -> int:
+    """How many ELEM cards no elements can be generated from."""
+    return sum(findings.counts[code] for code in ("E303", "E304", "E305"))
 
 
 def _check_segments(deck: Deck, unsound: set[str], findings: Findings) -> None:

@@ -119,9 +119,9 @@ def check_projectile(projectile: Projectile, findings: Findings) -> None:
         f"The transducer node {projectile.transducer} does not exist; the rod has nodes 1 to "
         f"{count + 1}.", "transducer node", "blank is the middle",
     )  # fmt: skip
-    before = len(findings.errors)
+    before = findings.error_count
     diameters = rod_diameters(projectile, findings)
-    if len(findings.errors) > before:
+    if findings.error_count > before:
         return
     missing = np.flatnonzero(np.isnan(diameters))
     if len(missing):

@@ -26,7 +26,7 @@ OFF_PLACE = 0.05
 
 
 def check_mesh(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool = False) -> None:
-    """Check nodes and elements, each only if what it stands on is sound.
+    """Check nodes, and the shapes of elements whose node numbers are sound.
 
     Parameters
     ----------
@@ -36,10 +36,6 @@ def check_mesh(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool = Fa
     listing : bool
         Whether the deck is for listing mode, which takes L1 for L2.
     """
-    before = len(findings.errors)
-    _check_elements(deck, mesh, findings)
-    if len(findings.errors) > before:
-        return  # what an element lacks would be said again of its nodes
     missing = np.flatnonzero(~mesh.given)
     if len(missing):
         place = deck.need(Coordinates).place()
@@ -55,8 +51,10 @@ def check_mesh(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool = Fa
         _check_shapes(deck, mesh, findings, listing=listing)
 
 
-def _check_elements(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+def check_elements(deck: Deck, mesh: Mesh, findings: Findings) -> bool:
+    """Whether the node numbers of all elements are sound, whatever the coordinates are."""
     elements, numnp = mesh.elements, len(mesh.coordinates)
+    before = findings.error_count
 
     def report(code: str, wrong: Any, what: str, hint: str = "") -> None:
         gather.elements(findings, code, np.flatnonzero(wrong), deck, what, hint)
@@ -80,6 +78,7 @@ def _check_elements(deck: Deck, mesh: Mesh, findings: Findings) -> None:
     )  # fmt: skip
     report("E310", four_missing & ~pointed, "lacks one of its four corners")
     report("E312", repeated, "has a node twice")
+    return findings.error_count == before
 
 
 def _check_coincidence(deck: Deck, mesh: Mesh, findings: Findings) -> None:

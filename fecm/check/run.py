@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import math
+import sys
+from collections.abc import Sequence
+from decimal import Context, Decimal
+
 from fecm.assembly import UnsoundPlateError
 from fecm.deck.findings import Findings
 from fecm.deck.model import Deck, Gages, Material
+from fecm.deck.records import Macro
 from fecm.elements.quadrature import HIGHEST_ORDER
 from fecm.mesh import Mesh
 from fecm.parts import build_plate, rules
-from fecm.program import STEPS, Body, Tally, estimate, every, flat
+from fecm.program import MOST_MACROS, STEPS, Body, Tally, estimate, every, flat
 from fecm.stability import critical_time_step, safe_time_step
 
-# A program of more macros than this would run for days.
-MOST_MACROS = 10**9
 LARGE_OUTPUT = 10**9
+# Part of the critical time step below which a step's change, of its square, is lost by rounding.
+LEAST_STEP = math.sqrt(sys.float_info.epsilon)
 
 UNSTABLE = "E508"
 
@@ -22,12 +28,14 @@ def check_program(deck: Deck, program: Body, findings: Findings) -> None:
     """Check the length of a program, and that what it is asked to store ever comes up."""
     sizes = estimate(program)
     if sizes.macros > MOST_MACROS:
+        count = Decimal(sizes.macros).normalize(Context(prec=3))  # may be beyond all floats
         findings.add(
             "E509",
-            f"The program carries out {sizes.macros:.3g} macros, more than {MOST_MACROS:g}.",
+            f"The program carries out {count:g} macros, more than {MOST_MACROS:g}.",
             deck.macros[0].place("macro"),
             "nested LOOPs multiply",
         )
+        return
     for macro in flat(program):
         if macro.word == "RODP" and every(macro) > max(1, sizes.steps):
             findings.add(
@@ -46,6 +54,7 @@ def check_program(deck: Deck, program: Body, findings: Findings) -> None:
     if not sizes.steps and not any(sizes.passes.values()):
         place = deck.macros[0].place("macro") if deck.macros else None
         findings.add("W511", "The program takes no step and stores nothing.", place)
+    _check_output(deck, program, sizes, findings)
 
 
 def check_time_step(deck: Deck, mesh: Mesh, findings: Findings) -> None:
@@ -55,7 +64,9 @@ def check_time_step(deck: Deck, mesh: Mesh, findings: Findings) -> None:
         return
     plate = build_plate(deck, mesh)
     try:
-        if max(macro.value for macro in steps) < safe_time_step(plate):
+        safe = safe_time_step(plate)
+        _check_least_step(steps, safe, findings)
+        if max(macro.value for macro in steps) < safe:
             return
         critical = critical_time_step(plate)
     except UnsoundPlateError as error:
@@ -74,6 +85,19 @@ def check_time_step(deck: Deck, mesh: Mesh, findings: Findings) -> None:
                 f"{critical:.4g}: the motion would grow without bound.",
                 macro.place("value"),
                 f"take {_below(critical)} or less; --force runs the deck all the same",
+            )
+
+
+def _check_least_step(steps: Sequence[Macro], safe: float, findings: Findings) -> None:
+    """Report every DT that is so small that the motion is lost by rounding."""
+    for macro in steps:
+        if 0.0 < macro.value < LEAST_STEP * safe:
+            findings.add(
+                "E515",
+                f"DT = {macro.value:.4g} is so far below the plate's critical time step (about "
+                f"{safe:.4g}) that the motion is lost by rounding.",
+                macro.place("value"),
+                "look at the unit of time; DT without a number takes 0.9 of the critical step",
             )
 
 
@@ -98,9 +122,9 @@ def output_bytes(deck: Deck, sizes: Tally) -> int:
     )
 
 
-def check_output(deck: Deck, program: Body, findings: Findings) -> None:
+def _check_output(deck: Deck, program: Body, sizes: Tally, findings: Findings) -> None:
     """Warn of a large result."""
-    size = output_bytes(deck, estimate(program))
+    size = output_bytes(deck, sizes)
     if size > LARGE_OUTPUT:
         macro = next((m for m in flat(program) if m.word in ("RODP", "DISP")), None)
         findings.add(

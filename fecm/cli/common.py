@@ -66,7 +66,9 @@ def report(prepared: Prepared) -> None:
 
 def count_errors(errors: Sequence[Finding]) -> str:
     """Say how many errors a deck has."""
-    return f"the deck has {len(errors)} error{'s' if len(errors) != 1 else ''}"
+    count = sum(error.code != "E000" for error in errors)
+    more = " or more" if count < len(errors) else ""
+    return f"the deck has {count} error{'s' if count != 1 else ''}{more}"
 
 
 def check_outputs(paths: Sequence[Path], overwrite: bool) -> None:

@@ -64,9 +64,9 @@ def fmt(deck: Path, output: Path | None, only_check: bool) -> None:
     """
     from fecm.deck.findings import DeckError
     from fecm.deck.formatting import format_deck
-    from fecm.deck.reader import decode
+    from fecm.deck.reader import load_text
 
-    before = decode(deck.read_bytes())
+    before, _ = load_text(deck)
     try:
         after = format_deck(before, str(deck))
     except DeckError as error:

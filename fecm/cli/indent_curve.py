@@ -34,9 +34,9 @@ def _law(deck: Path) -> tuple[Deck, Indentation]:
     """The first problem of a deck that has an EXPE segment, and the segment."""
     from fecm.check.impact import check_law
     from fecm.deck.model import Indentation
-    from fecm.deck.reader import Reader, decode
+    from fecm.deck.reader import Reader, load_text
 
-    reader = Reader(decode(deck.read_bytes()))
+    reader = Reader(load_text(deck)[0])
     problems = [problem.deck for problem in reader.problems() if problem.deck is not None]
     laws = [(one, law) for one in problems if (law := one.last(Indentation)) is not None]
     if laws:

@@ -98,14 +98,15 @@ class Card:
     def cut(self, fields: Fields) -> list[tuple[int, str]]:
         """First column and text of every field, in fixed or in free format.
 
-        Free format gives the values without the blanks around them, as many as the card has.
+        Free format gives the values without the blanks around them, as many as the card has, and
+        as a last piece all that follows the fields.
         """
         data = self.data
         if "," not in data:
             return [(f.first, data[f.first - 1 : f.last].ljust(f.width)) for f in fields]
         pieces: list[tuple[int, str]] = []
         start = 1
-        for piece in data.split(","):
+        for piece in data.split(",", len(fields)):
             lead = len(piece) - len(piece.lstrip()) if piece.strip() else 0
             pieces.append((start + lead, piece.strip()))
             start += len(piece) + 1
@@ -223,11 +224,11 @@ def _is_whole(card: Card, field: Field, fields: Fields, findings: Findings) -> b
     if data[field.last - 1 : field.last + 1].count(" ") or len(data) <= field.last:
         return True
     first, last = _run_around(data, field.last)
-    if first < field.first or last - first >= LONGEST:
-        return True
-    whole = parse_real(data[first - 1 : last])
-    if whole is None or whole == parse_real(data[first - 1 : field.last]):
-        return True
+    first = max(first, field.first)
+    if last - first < LONGEST:
+        whole = parse_real(data[first - 1 : last])
+        if whole is None or whole == parse_real(data[first - 1 : field.last]):
+            return True
     findings.add(
         "E105",
         f"The number `{data[first - 1 : last]}` crosses the end of its field.",
@@ -267,7 +268,9 @@ def _ends_with_fields(
     """Whether no value stands behind the last field; in fixed columns that is only a warning."""
     data = card.data
     if "," in data:
-        first = next((first for first, text in pieces[len(fields) :] if text), 0)
+        start, rest = pieces[len(fields)] if len(pieces) > len(fields) else (0, "")
+        more = rest.lstrip(", ")
+        first = start + len(rest) - len(more) if more else 0
         code, what = "E106", f"stands behind the last of the card's {len(fields)} values."
     else:
         tail = data[fields[-1].last :]

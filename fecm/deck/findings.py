@@ -6,8 +6,17 @@ warning.  Lines and columns are counted from 1.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+
+# Errors and warnings of a file that are kept, of each kind.
+MOST = 1000
+# The code of the error that ends too many of them.
+TOO_MANY = "E000"
+# Characters of a card, and of a message, that are shown.
+WIDEST = 200
+LONGEST = 600
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,18 +94,33 @@ class Finding:
             place = self.place
             number = str(place.line)
             margin = " " * len(number)
-            width = max(1, place.last - place.first + 1)
-            mark = " " * (place.first - 1) + "^" * width
+            card, first, last = _excerpt(place)
+            mark = " " * (first - 1) + "^" * max(1, last - first + 1)
             if place.field:
                 mark += f" {place.field}"
             lines = [
                 f"{source}:{place.line}:{place.first}: {head}",
-                f" {number} | {place.text.rstrip()}",
+                f" {number} | {card}",
                 f" {margin} | {mark}",
             ]
         if self.hint:
             lines.append(f"   hint: {self.hint}")
         return "\n".join(map(_printable, lines))
+
+
+def _excerpt(place: Place) -> tuple[str, int, int]:
+    """The card, or of a long one the part around the place; first and last column in it."""
+    text = place.text.rstrip()
+    if len(text) <= WIDEST:
+        return text, place.first, place.last
+    begin = max(0, place.first - 1 - WIDEST // 2)
+    part = text[begin : begin + WIDEST]
+    return part, place.first - begin, min(place.last - begin, len(part))
+
+
+def _shortened(text: str) -> str:
+    """A text without its middle where it quotes too much."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
 
 
 def _printable(text: str) -> str:
@@ -105,26 +129,51 @@ def _printable(text: str) -> str:
 
 
 class Findings:
-    """A list of findings that grows while a deck is read and checked."""
+    """A list of findings that grows while a deck is read and checked.
+
+    Attributes
+    ----------
+    counts : Counter
+        How often each code was found, also of findings that are not kept.
+    error_count : int
+        How many errors were found.
+    closed : bool
+        Whether no more findings are kept, so that there is no use in reading on.
+    """
 
     def __init__(self) -> None:
         self._all: list[Finding] = []
+        self.counts: Counter[str] = Counter()
+        self.error_count = 0
+        self.closed = False
 
     def add(self, code: str, message: str, place: Place | None = None, hint: str = "") -> None:
-        """Note one more finding."""
-        self._all.append(Finding(code, message, place, hint))
+        """Note one more finding; after :data:`MOST` errors add that there are more, and close."""
+        is_error = code.startswith("E")
+        self.counts[code] += 1
+        self.error_count += is_error
+        if self.closed or (not is_error and len(self) - self.error_count > MOST):
+            return
+        self._all.append(Finding(code, _shortened(message), place, _shortened(hint)))
+        if self.error_count == MOST:
+            self.close()
+            message = f"There are {MOST} errors or more; the rest of the file is not checked."
+            self._all.append(Finding(TOO_MANY, message))
+
+    def close(self) -> None:
+        """Keep no more findings."""
+        self.closed = True
 
     def __iter__(self) -> Iterator[Finding]:
         """Iterate in the order of the deck; findings without a place come last."""
-        return iter(
-            sorted(
-                self._all,
-                key=lambda f: (f.place is None, f.place.line if f.place else 0),
-            )
-        )
+        more = len(self) - self.error_count - MOST
+        found = list(self._all)
+        if more > 0:
+            found.append(Finding("W000", f"{more} more warnings are not shown."))
+        return iter(sorted(found, key=lambda f: (f.place is None, f.place.line if f.place else 0)))
 
     def __len__(self) -> int:
-        return len(self._all)
+        return self.counts.total()
 
     @property
     def errors(self) -> list[Finding]:

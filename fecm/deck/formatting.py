@@ -31,7 +31,7 @@ def format_deck(text: str, source: str = "<text>") -> str:
     DeckError
         If the deck can't be read.
     """
-    reader = Reader(text)
+    reader = Reader(text, keeps_values=True)
     reader.problems()
     if reader.findings.errors:
         raise DeckError(list(reader.findings), source)

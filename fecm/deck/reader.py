@@ -16,7 +16,7 @@ from fecm.deck.model import STOP, TITLE, Deck, Segment
 from fecm.deck.records import NODES_AN_ELEMENT, UNKNOWNS, Control, LoadTable, Macro
 from fecm.deck.segments import READERS, SegmentReader
 from fecm.deck.stream import Stream
-from fecm.memory import NotEnoughMemoryError, available, said
+from fecm.memory import NotEnoughMemoryError, available, require, said
 
 MACROS = "MACR"
 END = "END"
@@ -24,9 +24,20 @@ END = "END"
 # What a card's count may be at the most: beyond it a deck is a slip of the pen.
 MOST = 1_000_000
 
-# Bytes of a file that no such deck needs, and bytes of memory that its cards take for each of them.
+# Problems of a file, and cards of a macro program, that are read.
+MOST_PROBLEMS = 1000
+MOST_MACRO_CARDS = 100_000
+
+# Bytes of a file that no such deck needs.
 LARGEST_FILE = 1_000_000_000
-BYTES_A_BYTE = 80
+# Bytes of memory that a deck takes at the most, measured at 10 MB: for each byte of text, and for
+# each line.
+BYTES_A_BYTE, BYTES_A_LINE = 12, 1100
+# What ends a line: see str.splitlines.  The last three are the last bytes of longer characters.
+LINE_ENDS = b"\n\r\x0b\x0c\x1c\x1d\x1e\x85\xa8\xa9"
+# Bytes by which a file that is no text is recognised.
+FIRST = 4096
+HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 @dataclass
@@ -55,10 +66,14 @@ class Reader:
         The whole file.
     blanks_are_zeros : bool
         Read blanks inside numbers as the zeros that they were on the report's machine.
+    keeps_values : bool
+        Keep the values of every card in the stream.
     """
 
-    def __init__(self, text: str, *, blanks_are_zeros: bool = False) -> None:
-        self.stream = Stream(text, blanks_are_zeros=blanks_are_zeros)
+    def __init__(
+        self, text: str, *, blanks_are_zeros: bool = False, keeps_values: bool = False
+    ) -> None:
+        self.stream = Stream(text, blanks_are_zeros=blanks_are_zeros, keeps_values=keeps_values)
         self._unsound: set[str] = set()
         self._counted = {"NUMNP": 0, "NUMEL": 0}
 
@@ -78,6 +93,9 @@ class Reader:
                 stopped = True
                 break
             if card.keyword == TITLE:
+                if len(problems) == MOST_PROBLEMS:
+                    self._end(f"The file holds more than {MOST_PROBLEMS} problems.", card)
+                    break
                 problems.append(self._problem(card))
             else:
                 self._stray(card, [TITLE, STOP])
@@ -86,9 +104,14 @@ class Reader:
             self.findings.add(
                 "E001", "The file holds no problem.", None, "a problem begins with a FECM card"
             )
-        elif last is not None and not stopped and "E004" not in {f.code for f in self.findings}:
+        elif last is not None and not stopped and not self.findings.counts["E004"]:
             self.findings.add("W002", "The deck does not end with a STOP card.", last.place)
         return problems
+
+    def _end(self, message: str, card: Card) -> None:
+        """Report that there is too much of something, and read no further."""
+        self.findings.add("E012", message, card.place, "write several files")
+        self.findings.close()
 
     def _problem(self, title: Card) -> Problem:
         """Read one problem, from its FECM card on."""
@@ -274,6 +297,9 @@ class Reader:
             if card.keyword in (STOP, TITLE):
                 self.stream.give_back()
                 break
+            if len(macros) == MOST_MACRO_CARDS:
+                self._end(f"The macro program has more than {MOST_MACRO_CARDS} cards.", card)
+                break
             short = _leaves_out_second_word(card)
             row = self.stream.row(card, Macro.short_fields if short else Macro.fields)
             if row is None:
@@ -324,16 +350,16 @@ class Reader:
         return tables
 
 
+def _close(word: str, known: list[str]) -> list[str]:
+    """The known word that a misspelt one most likely means, or nothing."""
+    return difflib.get_close_matches(word, known, 1, 0.6)
+
+
 def _leaves_out_second_word(card: Card) -> bool:
     """Whether a macro card in free format has a number where the second word belongs."""
     _, comma, rest = card.data.partition(",")
     text = rest.partition(",")[0].strip()
     return bool(comma) and text[:1] in tuple("0123456789.+-")
-
-
-def _close(word: str, known: list[str]) -> list[str]:
-    """The known word that a misspelt one most likely means, or nothing."""
-    return difflib.get_close_matches(word, known, 1, 0.6)
 
 
 def decode(data: bytes) -> str:
@@ -359,17 +385,21 @@ def _bytes(path: Path) -> bytes:
     NotEnoughMemoryError
         If its cards would take more memory than is free.
     OSError
-        If it can't be read.
+        If it can't be read, or is no text.
     """
     free = available()
     most = LARGEST_FILE if free is None else min(LARGEST_FILE, free // BYTES_A_BYTE)
     with path.open("rb") as file:
-        data = file.read(most + 1)
+        begin = file.read(FIRST)
+        if begin.startswith(HDF5):
+            raise OSError(f"{path} is an HDF5 file, not a deck; `fecm info {path}` shows a result")
+        if b"\0" in begin:
+            raise OSError(f"{path} is a binary file or UTF-16 text, not a deck in UTF-8 or Latin-1")
+        data = begin + file.read(most + 1 - len(begin))
     if len(data) > most:
-        raise NotEnoughMemoryError(
-            f"{path}: the deck has more than {said(most)}, and its cards take about {BYTES_A_BYTE} "
-            "times as much memory"
-        )
+        raise NotEnoughMemoryError(f"{path}: a deck of more than {said(most)} is not read")
+    lines = len(data) - len(data.translate(None, LINE_ENDS)) - data.count(b"\r\n")
+    require(BYTES_A_BYTE * len(data) + BYTES_A_LINE * lines, f"{path}: the deck")
     return data
 
 

@@ -15,6 +15,8 @@ class Stream:
         The whole file.
     blanks_are_zeros : bool
         Read blanks inside numbers as the zeros that they were on the report's machine.
+    keeps_values : bool
+        Keep the fields and values of every card in `read`.
 
     Attributes
     ----------
@@ -22,18 +24,18 @@ class Stream:
         Receives what is wrong.
     lines : list of str
         The file's lines.
+    position : int
+        Number of lines that were taken.
     read : dict
-        By line number, the fields and values of every card that was read.
+        By line number, the fields and values of every card that was read, if they are kept.
     """
 
-    def __init__(self, text: str, *, blanks_are_zeros: bool = False) -> None:
+    def __init__(
+        self, text: str, *, blanks_are_zeros: bool = False, keeps_values: bool = False
+    ) -> None:
         self.lines = text.removeprefix("\ufeff").splitlines()
-        self._cards = [
-            Card(number, line)
-            for number, line in enumerate(self.lines, start=1)
-            if not line.startswith("!")
-        ]
         self._blanks_are_zeros = blanks_are_zeros
+        self._keeps_values = keeps_values
         self.position = 0
         self.findings = Findings()
         self.read: dict[int, tuple[Fields, list[Value]]] = {}
@@ -41,19 +43,25 @@ class Stream:
     @property
     def at_end(self) -> bool:
         """Whether every card was taken."""
-        return self.position >= len(self._cards)
+        rest = range(self.position, len(self.lines))
+        return all(_is_comment(self.lines[number]) for number in rest)
 
     @property
     def last(self) -> Card | None:
         """The last card of the file; None of an empty one."""
-        return self._cards[-1] if self._cards else None
+        for number in range(len(self.lines), 0, -1):
+            if not _is_comment(self.lines[number - 1]):
+                return Card(number, self.lines[number - 1])
+        return None
 
     def take(self) -> Card | None:
-        """The next card, or None at the end of the file."""
-        if self.at_end:
-            return None
-        self.position += 1
-        return self._cards[self.position - 1]
+        """The next card, or None at the end of the file or of what is kept of findings."""
+        while self.position < len(self.lines) and not self.findings.closed:
+            self.position += 1
+            line = self.lines[self.position - 1]
+            if not _is_comment(line):
+                return Card(self.position, line)
+        return None
 
     def give_back(self) -> None:
         """Let the last card be taken again."""
@@ -61,7 +69,8 @@ class Stream:
 
     def text_since(self, position: int) -> str:
         """Text of the cards taken since a position."""
-        return "\n".join(card.text.rstrip() for card in self._cards[position : self.position])
+        taken = self.lines[position : self.position]
+        return "\n".join(line.rstrip() for line in taken if not _is_comment(line))
 
     def skip_data(self) -> None:
         """Pass over cards up to the next keyword."""
@@ -73,7 +82,7 @@ class Stream:
     def values(self, card: Card, fields: Fields) -> list[Value] | None:
         """Values of a card; None after an error, which is noted."""
         values = read_values(card, fields, self.findings, blanks_are_zeros=self._blanks_are_zeros)
-        if values is not None:
+        if values is not None and self._keeps_values:
             self.read[card.line] = (fields, values)
         return values
 
@@ -81,3 +90,8 @@ class Stream:
         """Values of a card and where they stand; None after an error."""
         values = self.values(card, fields)
         return None if values is None else (values, Source(card, fields))
+
+
+def _is_comment(line: str) -> bool:
+    """Whether a line is no card."""
+    return line.startswith("!")
