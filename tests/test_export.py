@@ -21,7 +21,7 @@ from fecm.export.csv import table
 from fecm.export.vtkhdf import write_vtkhdf
 from fecm.results.result import Result
 from tests.builders import SQUARE, one_element
-from tests.decks import PROGRAM, ROOT, small
+from tests.decks import DATA_CARDS, PROGRAM, ROOT, small
 from tests.test_command_line import fecm as command
 
 Array = NDArray[Any]
@@ -284,8 +284,10 @@ def test_an_unknown_name_is_answered_with_near_ones(result: Result, name: str, h
 
 
 def test_a_group_that_was_never_stored_names_its_macro() -> None:
+    idle = PROGRAM.replace("RODP          5\n", "")
+    result = run(small(idle, data=DATA_CARDS[DATA_CARDS.index("MATE") :]))
     with pytest.raises(ExportError, match="add RODP"):
-        table(run(small(PROGRAM.replace("RODP          5\n", ""))), "history")
+        table(result, "history")
 
 
 def test_the_command_writes_beside_the_user_and_keeps_what_is_there(file: Path) -> None:
