@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fecm.assembly import PlateModel
+from fecm.assembly import PlateModel, UnsoundPlateError
 from fecm.deck.model import Deck, Impact, Indentation
 from fecm.laminate import Laminate
 from fecm.parts import build_constants, build_projectile
@@ -57,7 +57,8 @@ def contact_stiffness(deck: Deck, plate: PlateModel) -> float:
     The maximum of loading (equation 3-1) and unloading (equation 3-3).
     """
     law = build_constants(deck.need(Indentation))
-    force = expected_peak(deck, plate)
+    with np.errstate(all="ignore"):
+        force = expected_peak(deck, plate)
     peak = (force / law.k) ** (2.0 / 3.0)
     if not peak > 0.0:
         return 0.0
@@ -111,4 +112,8 @@ def contact_step(deck: Deck, plate: PlateModel, dt: float) -> ContactStep:
     step = dt or SAFE * bound
     if step < iterated and (step / bound) ** 2 + step**2 * stiffness / (4.0 * at_node) < 1.0:
         return ContactStep(stiffness, mass, math.inf)
-    return ContactStep(stiffness, mass, min(iterated, critical_time_step(plate, (row, stiffness))))
+    try:
+        critical = critical_time_step(plate, (row, stiffness))
+    except UnsoundPlateError:  # the contact is stiffer than numbers reach
+        critical = iterated
+    return ContactStep(stiffness, mass, min(iterated, critical))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecm import plate
 from fecm.check import gather
@@ -23,7 +24,7 @@ from fecm.indentation import ACR_POWER
 from fecm.laminate import laminate_of_deck
 from fecm.mesh import Mesh, rod_diameters
 from fecm.parts import build_projectile
-from fecm.projectile import report_rod
+from fecm.projectile import Rod, report_rod
 
 W = 3
 # A rod's step is a full matrix of three times as many rows and columns as it has unknowns.
@@ -136,6 +137,24 @@ def check_projectile(projectile: Projectile, findings: Findings) -> None:
                 "E422", f"The diameter of rod element {record.element} is {record.diameter:g}; it "
                 "must be positive.", record.place("diameter"),
             )  # fmt: skip
+    if findings.error_count == before and not _is_computable(projectile, diameters):
+        findings.add(
+            "E429",
+            "The rod's mass or stiffness is beyond the range of numbers.",
+            projectile.place("length or mass"),
+            "look at the units of length, diameters, modulus and density",
+        )
+
+
+def _is_computable(projectile: Projectile, diameters: NDArray[np.float64]) -> bool:
+    """Whether mass and stiffness of every unknown of a rod are positive and finite."""
+    rod = Rod(projectile.size, tuple(diameters.tolist()), projectile.modulus, projectile.density)
+    try:
+        with np.errstate(all="ignore"):
+            values = np.concatenate([rod.lumped_mass(), rod.stiffness().diagonal()])
+    except OverflowError:
+        return False
+    return bool(((values > 0.0) & np.isfinite(values)).all())
 
 
 def check_gages(segment: Gages, mesh: Mesh, deck: Deck, findings: Findings) -> None:

@@ -275,25 +275,25 @@ def _check_units(deck: Deck, findings: Findings, *, hits: bool) -> None:
 
 def check_time_step_of_contact(deck: Deck, mesh: Mesh, findings: Findings, *, hits: bool) -> None:
     """Warn of a DT that the contact makes unstable, and of one far below what is stable."""
+    steps = [macro for macro in deck.macros if macro.word == "DT"]
+    if not steps:
+        return
     plate = build_plate(deck, mesh)
     bound = safe_time_step(plate)
-    for macro in deck.macros:
-        if macro.word != "DT":
-            continue
+    largest = max(macro.value or SAFE * bound for macro in steps)
+    contact = contact_step(deck, plate, largest) if hits else None
+    stable = bound if contact is None else min(bound, contact.limit)
+    for macro in steps:
         dt = macro.value
-        stable = bound
-        if hits:
-            contact = contact_step(deck, plate, dt)
-            stable = min(bound, contact.limit)
-            if (dt or SAFE * bound) >= contact.limit:
-                findings.add(
-                    "W517",
-                    f"DT = {dt or SAFE * bound:.3g} is not below {contact.limit:.3g}, the stable "
-                    f"step with the contact's stiffness of about {contact.stiffness:.3g} on a mass "
-                    f"of {contact.mass:.3g}: the contact may diverge.",
-                    macro.place("value"),
-                    f"look at k and the masses, or take a DT of {0.9 * contact.limit:.2g}",
-                )
+        if contact is not None and (dt or SAFE * bound) >= contact.limit:
+            findings.add(
+                "W517",
+                f"DT = {dt or SAFE * bound:.3g} is not below {contact.limit:.3g}, the stable "
+                f"step with the contact's stiffness of about {contact.stiffness:.3g} on a mass "
+                f"of {contact.mass:.3g}: the contact may diverge.",
+                macro.place("value"),
+                f"look at k and the masses, or take a DT of {0.9 * contact.limit:.2g}",
+            )
         if 0.0 < dt < WASTEFUL * stable:
             findings.add(
                 "W516",
