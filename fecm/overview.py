@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm.assembly import UnsoundPlateError
 from fecm.check import Checked
 from fecm.check.impact import resolution, said_error
 from fecm.check.run import output_bytes
@@ -127,6 +128,10 @@ def overview(checked: Checked) -> Overview:
     plate = build_plate(deck, mesh)
     sizes = estimate(checked.program)
     laminate = plate.laminate
+    try:
+        critical = critical_time_step(plate)
+    except UnsoundPlateError:  # found by the check wherever the program steps
+        critical = float("nan")
     resolved = resolution(deck, mesh) if hits(checked.program) else None
     return Overview(
         title=deck.title,
@@ -141,7 +146,7 @@ def overview(checked: Checked) -> Overview:
         shear=laminate.shear,
         plate_mass=plate.area() * laminate.mass,
         projectile_mass=build_projectile(deck).total_mass,
-        critical_time_step=critical_time_step(plate),
+        critical_time_step=critical,
         time_steps=[m.value for m in flat(checked.program) if m.word == "DT"],
         output_bytes=output_bytes(deck, sizes),
         elements_per_wave=None if resolved is None else resolved.elements,

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fecm.api import prepare
@@ -280,3 +281,10 @@ def test_impact_steps_beside_central_differences_are_warned_of() -> None:
 def test_an_impact_deck_that_computes_only_modes_is_told_that_nothing_hits() -> None:
     assert codes(small("LMAS\nEIGE          2\n")) == ["W520"]
     assert codes(small("LMAS\nDT        .5E-6\nLOOP          3\nTIME\nDISP\nNEXT\n")) == ["E519"]
+
+
+def test_a_stiffness_beyond_all_range_is_found_where_the_time_step_is_left_to_the_run() -> None:
+    text = with_data(" 17500000.", "   1.E+308").replace("DT        .5E-6", "DT          0.0")
+    assert codes(text) == ["E417"]
+    modes = text[: text.index("MACR")] + "MACR\nLMAS\nEIGE          1\nEND\nSTOP\n"
+    assert np.isnan(overview(prepare(modes).problems[0]).critical_time_step)
