@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -208,3 +209,13 @@ def laminate_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> Laminate:
     correction = deck.last(ShearCorrection)
     factor = 1.0 if correction is None else correction.factor
     return laminate_of(deck.need(Material), factor, isotropic_g12=isotropic_g12)
+
+
+@lru_cache(maxsize=256)
+def is_coupled(material: Material) -> bool:
+    """Whether B of a deck's laminate is not 0; False where the MATE segment is unsound."""
+    try:
+        with np.errstate(all="ignore"):
+            return laminate_of(material).is_coupled
+    except (ArithmeticError, ValueError):
+        return False

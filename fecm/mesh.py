@@ -96,7 +96,8 @@ def generate(deck: Deck, findings: Findings | None = None, *, unit_force: bool =
     control = deck.control
     coordinates = np.full((control.numnp, control.ndm), np.nan)
     elements = np.zeros((control.numel, control.nen), dtype=np.int32)
-    codes = np.zeros((control.numnp, control.ndf), dtype=np.int32)
+    boundaries = [segment for segment in deck.segments if isinstance(segment, Boundary)]
+    codes = restraint_codes(boundaries, control.numnp, control.ndf, noted)
     forces = np.zeros((control.numnp, control.ndf))
     for segment in deck.segments:
         if isinstance(segment, Coordinates):
@@ -106,13 +107,43 @@ def generate(deck: Deck, findings: Findings | None = None, *, unit_force: bool =
             _interpolate(forces, segment.records, noted)
         elif isinstance(segment, Impact) and unit_force:
             forces[segment.node - 1, segment.dof - 1] = 1.0
-        elif isinstance(segment, Boundary):
-            _carry(codes, segment.records, noted)
         elif isinstance(segment, Elements):
             _step(elements, segment.records, noted)
+    return Mesh(coordinates, elements, codes, forces, equation_numbers(codes))
+
+
+def equation_numbers(codes: Ints) -> Ints:
+    """Number the unknowns without a restraint code from 1, node by node; the others are 0."""
     free = codes.ravel() == 0
-    equations = np.where(free, np.cumsum(free), 0).astype(np.int32).reshape(codes.shape)
-    return Mesh(coordinates, elements, codes, forces, equations)
+    return np.where(free, np.cumsum(free), 0).astype(np.int32).reshape(codes.shape)
+
+
+def restraint_codes(
+    boundaries: Sequence[Boundary], nodes: int, unknowns: int, findings: Findings | None = None
+) -> Ints:
+    """Generate the restraint codes of BOUN segments.
+
+    Parameters
+    ----------
+    boundaries : sequence of Boundary
+    nodes, unknowns : int
+        Number of nodes, and of unknowns of a node.
+    findings : Findings, optional
+        Receives what cannot be generated.
+
+    Returns
+    -------
+    ndarray (nodes, unknowns)
+    """
+    codes = np.zeros((nodes, unknowns), dtype=np.int32)
+    for segment in boundaries:
+        _carry(codes, segment.records, Findings() if findings is None else findings)
+    return codes
+
+
+def holds_the_plane(codes: Ints) -> bool:
+    """Whether restraint codes, (numnp, 5), restrain u and v of every node."""
+    return bool((codes[:, :2] != 0).all())
 
 
 def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floats:

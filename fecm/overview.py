@@ -12,7 +12,7 @@ from fecm.check import Checked
 from fecm.check.impact import resolution, said_error
 from fecm.check.run import output_bytes
 from fecm.memory import said
-from fecm.parts import build_plate, build_projectile
+from fecm.parts import build_plate, build_projectile, moving_plate
 from fecm.program import estimate, flat, hits
 from fecm.solvers import SAFE
 from fecm.stability import critical_time_step
@@ -129,7 +129,7 @@ def overview(checked: Checked) -> Overview:
     sizes = estimate(checked.program)
     laminate = plate.laminate
     try:
-        critical = critical_time_step(plate)
+        critical = critical_time_step(moving_plate(deck, mesh, checked.program))
     except UnsoundPlateError:  # found by the check wherever the program steps
         critical = float("nan")
     resolved = resolution(deck, mesh) if hits(checked.program) else None

@@ -22,6 +22,7 @@ from fecm.indentation import Constants, CriticalConstants, Law, Measured, Memory
 from fecm.laminate import laminate_of_deck
 from fecm.mesh import Mesh, generate, rod_diameters
 from fecm.plate import StrainField
+from fecm.program import Body, hits, moves_only
 from fecm.projectile import (
     LISTING_DENSITY,
     REPORT_DENSITY,
@@ -32,7 +33,7 @@ from fecm.projectile import (
     Station,
     report_rod,
 )
-from fecm.reduction import reduction
+from fecm.reduction import moving, reduction
 from fecm.rod_method import WILSON
 from fecm.solvers import CSR
 from fecm.workers import Workers, available
@@ -49,7 +50,7 @@ class Setup:
     ----------
     plate : PlateModel
     motion : PlateMotion
-        The plate in time.
+        The plate in time; its own plate has only what moves free.
     impact : Impact or None
         Plate and projectile; None where nothing hits.
     station : Station
@@ -170,6 +171,21 @@ def build_impact(
     return Impact(motion, rod, build_law(deck, slips), contact, STEPS[integrator])
 
 
+def moving_plate(deck: Deck, mesh: Mesh, program: Body) -> PlateModel:
+    """Make the plate of a deck, of which only what a program moves is free.
+
+    Its critical time step is the one that limits the program.
+    """
+    plate = build_plate(deck, mesh)
+    return moving(plate, _hit(deck) if hits(program) else None) if moves_only(program) else plate
+
+
+def _hit(deck: Deck) -> tuple[int, int]:
+    """Row of the node that is hit, and which of its unknowns, from 0."""
+    card = deck.need(ImpactCard)
+    return card.node - 1, card.dof - 1
+
+
 def set_up(
     deck: Deck,
     mesh: Mesh,
@@ -194,21 +210,19 @@ def set_up(
     chosen = choices or Choices()
     slips, solver, method = chosen.slips, chosen.solver, chosen.rod_method
     rod = build_projectile(deck, slips).with_mass(method.mass)
-    hit = None
+    hit = _hit(deck) if hits else None
     share = 1.0
-    if hits:
-        card = deck.need(ImpactCard)
-        hit = (card.node - 1, card.dof - 1)
-        if "rod-force" in slips:
-            forces = generate(deck, unit_force=True).forces
-            share = float(forces[hit])
-            forces[hit] = 0.0
-            mesh = replace(mesh, forces=forces)
+    if hit is not None and "rod-force" in slips:
+        forces = generate(deck, unit_force=True).forces
+        share = float(forces[hit])
+        forces[hit] = 0.0
+        mesh = replace(mesh, forces=forces)
     plate = build_plate(deck, mesh, slips)
-    reduced = reduction(plate, hit) if moves_only and solver != CSR else None
-    moving = plate.neq if reduced is None else reduced.count
-    workers = Workers(chosen.threads or (available() if moving >= WORTH_SHARING else 1))
-    motion = PlateMotion(plate, solver, reduced, workers)
+    mobile = moving(plate, hit) if moves_only else plate
+    reduced = reduction(mobile, hit) if moves_only and solver != CSR else None
+    count = mobile.neq if reduced is None else reduced.count
+    workers = Workers(chosen.threads or (available() if count >= WORTH_SHARING else 1))
+    motion = PlateMotion(mobile, solver, reduced, workers)
     return Setup(
         plate=plate,
         motion=motion,

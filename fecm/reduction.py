@@ -8,12 +8,13 @@ are enough.  Any laminate is the same after half a turn; mesh, supports and load
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecm.assembly import PlateModel
+from fecm.mesh import equation_numbers
 from fecm.plate import Family
 
 Floats = NDArray[np.float64]
@@ -87,9 +88,7 @@ def reduction(plate: PlateModel, hit: tuple[int, int] | None) -> Reduction:
     hit : tuple of int, optional
         Row of the node that is hit, and which of its unknowns, from 0.
     """
-    free = plate.mesh.equations > 0
-    if _in_plane_rests(plate, hit):
-        free[:, :2] = False
+    free = moving(plate, hit).mesh.equations > 0
     places = np.arange(free.size).reshape(free.shape)
     sign, weights = free.astype(float), np.ones(len(plate.mesh.elements), dtype=int)
     images = _images(plate, free, hit)
@@ -103,6 +102,27 @@ def reduction(plate: PlateModel, hit: tuple[int, int] | None) -> Reduction:
         # In the middle itself an unknown that turns against its own motion has none.
         sign[nodes == np.arange(len(nodes))] *= TURNED > 0.0
     return _numbered(sign != 0.0, places, sign, weights)
+
+
+def moving(plate: PlateModel, hit: tuple[int, int] | None) -> PlateModel:
+    """Restrain the in-plane unknowns of a plate where they rest for ever.
+
+    Their modes are never excited, and their frequencies do not limit the time step.
+
+    Parameters
+    ----------
+    plate : PlateModel
+        Starts at rest.
+    hit : tuple of int, optional
+        Row of the node that is hit, and which of its unknowns, from 0.
+    """
+    mesh = plate.mesh
+    in_plane, others = mesh.equations[:, :2].any(), mesh.equations[:, 2:].any()
+    if not (in_plane and others) or not _in_plane_rests(plate, hit):
+        return plate
+    codes = mesh.codes.copy()
+    codes[:, :2] = 1
+    return replace(plate, mesh=replace(mesh, codes=codes, equations=equation_numbers(codes)))
 
 
 def _numbered(

@@ -29,7 +29,7 @@ from fecm.results.schema import FORMAT, FORMAT_VERSION
 from fecm.results.sinks import Sink
 from fecm.slips import LISTING, NAMES, REPORT
 from fecm.solvers import SAFE
-from fecm.stability import critical_time_step
+from fecm.stability import critical_time_step, taken_time_step
 from fecm.statics import Tangent, reactions
 from fecm.stresses import strains_and_resultants
 from fecm.units import unit_names
@@ -241,7 +241,7 @@ class Simulation:
         """Why a run diverged, as far as the time step tells."""
         deck, plate = self.checked.deck, self.setup.plate
         try:
-            critical = critical_time_step(plate)
+            critical = critical_time_step(self.setup.motion.plate)
             contact = None
             if self.impact is not None:
                 contact = contact_step(deck, plate, self.dt)
@@ -297,8 +297,8 @@ class Simulation:
         """DT; 0 takes a part of the critical time step."""
         self.dt = n
         if not self.dt:
-            critical = critical_time_step(self.setup.plate)
-            self.dt = float(f"{SAFE * critical:.3g}")
+            critical = critical_time_step(self.setup.motion.plate)
+            self.dt = taken_time_step(critical)
             self.notes.append(f"DT 0: took {self.dt:g}, {SAFE:g} of the critical {critical:.4g}")
 
     def advance_clock(self, n: float, current: int) -> None:

@@ -20,10 +20,12 @@ Floats = NDArray[np.float64]
 
 pytest.importorskip("matplotlib")
 
-STEPS = PROGRAM.replace("LOOP         10", "LOOP         60")
+STEPS = PROGRAM.replace("LOOP         10", "LOOP        800")
 NAMED = small(STEPS, data=DATA_CARDS + "UNIT\nin lbf s\n")
 VELOCITIES = [150.0, 50.0, 100.0]
 STIFFNESSES = [1e6, 2e6, 4e6, 3e6]
+# The contact at 50 in/s ends after 325 steps, those at 100 and 150 after 316 and 311.
+LONG_ENOUGH_FOR_TWO = small(PROGRAM.replace("LOOP         10", "LOOP        320"))
 LAYUPS = ["[0/90]", "[0/45]", "[30/-30]"]
 
 
@@ -203,11 +205,44 @@ def test_one_layup_a_row_with_a_point(layups: SweepResult) -> None:
     assert "lbf·s" in axes.get_xlabel()
 
 
-def test_points_are_not_joined_where_other_values_vary_too(plane: SweepResult) -> None:
-    (axes,) = plane.plot(over="velocity").axes
-    (line,) = axes.get_lines()
-    assert line.get_linestyle() == "None"
-    assert sorted(data_of(line)[1]) == sorted(plane["peak_force"])
+def test_points_have_colours_where_one_other_value_varies_too(plane: SweepResult) -> None:
+    axes, bar = plane.plot(over="velocity").axes
+    assert not axes.get_lines()
+    points: Any = axes.collections[0]
+    assert bar.get_xlabel() == "Contact coefficient $k$ (10⁶ lbf/in¹·⁵)"
+    drawn = sorted(zip(*np.asarray(points.get_offsets()).T, points.get_array(), strict=True))
+    cases = zip(plane["velocity"], plane["peak_force"], 1e-6 * plane["k"], strict=True)
+    np.testing.assert_allclose(drawn, sorted(cases))
+
+
+def test_one_value_of_three_is_not_drawn_without_the_others() -> None:
+    sweep = fecm.sweep(NAMED, {"velocity": [50.0, 60.0], "k": [1e6, 2e6], "q": [2.0, 2.5]})
+    with pytest.raises(PlotError, match="k and q vary too"):
+        sweep.plot(over="velocity")
+
+
+@pytest.mark.parametrize(
+    "vary", [{"velocity": VELOCITIES}, {"velocity": VELOCITIES, "k": [1.7e6, 2e6]}]
+)
+def test_cases_still_in_contact_are_crossed_and_counted(vary: dict[str, list[float]]) -> None:
+    sweep = fecm.sweep(LONG_ENOUGH_FOR_TWO, vary)
+    count = int(sweep.still.sum())
+    assert 0 < count < len(sweep)
+    with pytest.warns(UserWarning, match=f"{count} of {len(sweep)} cases of .* still in contact"):
+        figure = sweep.plot()
+    cross = figure.axes[0].get_lines()[-1]
+    assert cross.get_marker() == "x"
+    assert data_of(cross)[0].tolist() == sweep["velocity"][sweep.still].tolist()
+    told = f"still in contact at the end: {count} of {len(sweep)} cases"
+    assert figure.get_supxlabel() == f"\N{MULTIPLICATION SIGN} {told}"
+    with pytest.warns(UserWarning, match="they have no value in the picture"):
+        sweep.plot("impulse")
+
+
+def test_a_quantity_that_no_case_has_yet_is_refused() -> None:
+    sweep = fecm.sweep(small(), {"velocity": VELOCITIES})
+    with pytest.raises(PlotError, match=r"3 of 3 cases .* still in contact at the end"):
+        sweep.plot("impulse")
 
 
 def test_a_sweep_without_units_has_none_on_its_axes() -> None:

@@ -12,8 +12,7 @@ from fecm.deck.records import Control, Integration, Layer, Macro, Ply
 from fecm.laminate import laminate
 from fecm.mesh import generate
 from fecm.parts import build_plate
-from fecm.solvers import SAFE
-from fecm.stability import critical_time_step
+from fecm.stability import critical_time_step, rounded_time_step
 
 EDGES = ("left", "right", "bottom", "top")
 # Restraints of an edge: nothing; w and the rotation along the edge; everything out of the plane.
@@ -118,9 +117,7 @@ def new_deck(spec: Specification) -> Deck:
 
 def _safe_step(deck: Deck) -> float:
     """0.9 of the critical time step, rounded down to two digits."""
-    critical = SAFE * critical_time_step(build_plate(deck, generate(deck)))
-    unit = 10.0 ** (math.floor(math.log10(critical)) - 1)
-    return float(f"{math.floor(critical / unit) * unit:.1e}")
+    return rounded_time_step(critical_time_step(build_plate(deck, generate(deck))))
 
 
 def _program(spec: Specification, dt: float) -> tuple[Macro, ...]:

@@ -117,7 +117,7 @@ def check(problem: Problem, findings: Findings, *, listing: bool = False) -> Che
     checked = Checked(deck, mesh, program)
     if findings.error_count == before and not unsound:
         with np.errstate(all="ignore"):  # numbers beyond all range end in a finding
-            check_time_step(deck, mesh, findings)
+            check_time_step(deck, mesh, program, findings)
             check_program(deck, program, findings)
             check_purpose(deck, mesh, findings)
             if findings.error_count == before:

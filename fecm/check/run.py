@@ -13,7 +13,7 @@ from fecm.deck.model import Deck, Gages, Material
 from fecm.deck.records import Macro
 from fecm.elements.quadrature import HIGHEST_ORDER
 from fecm.mesh import Mesh
-from fecm.parts import build_plate, rules
+from fecm.parts import moving_plate, rules
 from fecm.program import MOST_MACROS, STEPS, Body, Tally, estimate, every, flat
 from fecm.stability import critical_time_step, safe_time_step
 
@@ -57,12 +57,12 @@ def check_program(deck: Deck, program: Body, findings: Findings) -> None:
     _check_output(deck, program, sizes, findings)
 
 
-def check_time_step(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+def check_time_step(deck: Deck, mesh: Mesh, program: Body, findings: Findings) -> None:
     """Compare every DT with the plate's critical time step, where the program steps at all."""
     steps = [macro for macro in deck.macros if macro.word == "DT"]
     if not steps or not STEPS.intersection(macro.word for macro in deck.macros):
         return
-    plate = build_plate(deck, mesh)
+    plate = moving_plate(deck, mesh, program)
     try:
         safe = safe_time_step(plate)
         _check_least_step(steps, safe, findings)

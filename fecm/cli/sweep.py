@@ -49,6 +49,7 @@ if TYPE_CHECKING:
               help="Worker processes on this machine.")  # fmt: skip
 @click.option("--scheduler", metavar="ADDRESS",
               help="A running Dask scheduler instead, as in tcp://host:8786.")  # fmt: skip
+@click.option("--allow-failed", is_flag=True, help="Exit with 0 although cases failed.")
 @click.option("--overwrite", is_flag=True, help="Replace results that exist.")
 def sweep(
     deck: Path,
@@ -59,17 +60,22 @@ def sweep(
     full: str,
     workers: int,
     scheduler: str | None,
+    allow_failed: bool,
     overwrite: bool,
 ) -> None:
     """Run DECK with other values, many times.
 
     Cases that differ in the projectile, its velocity or the indentation law alone share one run of
     the plate.  An interrupted sweep goes on where it was when the same command is given again.
+    The last line counts the cases that failed, whose exit status is 1, and those that ended while
+    the projectile was still on the plate.
     """
+    from fecm.files import clear_stale
     from fecm.sweeps.cases import CasesError
     from fecm.sweeps.memory import check_memory
     from fecm.sweeps.result import save
-    from fecm.sweeps.summary import summary
+    from fecm.sweeps.schedule import LOST
+    from fecm.sweeps.summary import summary, verdict
     from fecm.sweeps.tasks import plan
 
     path = output or Path(f"{deck.stem}-sweep.h5")
@@ -79,18 +85,25 @@ def sweep(
         fulls = {case: path.with_name(f"{path.stem}-{case}{path.suffix}") for case in chosen}
         check_outputs([path, *fulls.values()], overwrite)
         problem = _problem(deck)
+        clear_stale(path, *fulls.values())
         made = plan(problem, cases, history=history)
         check_memory(problem, made, 0 if scheduler is not None else workers)
         result = _carry_out(problem, made, path, workers, scheduler, overwrite=overwrite)
     except CasesError as error:
         raise Refused(str(error)) from None
     save(result, path)
-    _parts(made, path, restart=True).clear()
+    if lost := sum(status.startswith(LOST) for status in result["status"].tolist()):
+        _note(f"{lost} cases were lost with their workers; --overwrite runs them again")
+    else:
+        _parts(made, path, restart=True).clear()
     click.echo(result.title or "sweep")
     for line in summary(result):
         click.echo(f"  {line}")
     click.echo(f"  result            {path}")
     _run_in_full(made, fulls)
+    click.echo(verdict(result))
+    if not (allow_failed or result.fine.all()):
+        raise SystemExit(1)
 
 
 def _cases(varied: tuple[str, ...], table: Path | None) -> list[Case]:
@@ -152,7 +165,7 @@ def _carry_out(
         with signals.deferred(), _progress(len(made.cases)) as done:
             return carry_out(
                 problem, made, workers=workers, scheduler=scheduler, parts=parts, done=done,
-                idle=signals.heed,
+                idle=signals.heed, note=_note,
             )  # fmt: skip
     except SchedulerError as error:
         parts.clear()
@@ -160,6 +173,10 @@ def _carry_out(
     except (KeyboardInterrupt, SystemExit):
         click.echo("fecm: the same command goes on where this sweep was", err=True)
         raise
+
+
+def _note(text: str) -> None:
+    click.echo(f"fecm: note: {text}", err=True)
 
 
 @contextlib.contextmanager
@@ -192,11 +209,11 @@ def _run_in_full(made: Plan, fulls: dict[int, Path]) -> None:
     from fecm.results import file_writer
     from fecm.simulation import simulate
     from fecm.sweeps.cases import CasesError
-    from fecm.sweeps.variations import varied
+    from fecm.sweeps.run import deck_of
 
     for case, path in fulls.items():
         try:
-            prepared = prepare(varied(made.deck, made.cases[case]))
+            prepared = prepare(deck_of(made, case))
             if errors := prepared.errors(force=True):
                 raise CasesError(errors[0].message)
             with file_writer.writing(path) as sink:

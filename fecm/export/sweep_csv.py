@@ -1,7 +1,8 @@
 """CSV of a sweep: a row a case, or a row a step of each case.
 
 Cases count from 0, steps from 1.  Numbers are written as Python's repr, from which they can be read
-back to the last bit; texts are quoted where they have to be.
+back to the last bit; texts are quoted where they have to be.  An apostrophe precedes a text that a
+spreadsheet would take for a formula.
 """
 
 from __future__ import annotations
@@ -15,6 +16,9 @@ import numpy as np
 
 from fecm.export import ExportError
 from fecm.sweeps.result import SweepResult
+
+# First characters of a formula.
+FORMULA = ("=", "+", "-", "@")
 
 CASES, HISTORY = "cases", "history"
 
@@ -61,11 +65,19 @@ def _history(sweep: SweepResult) -> Iterator[Iterable[Any]]:
             yield case, step, time, force
 
 
+def _cell(value: Any) -> Any:
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, str) and (value[:1] in FORMULA or value[:1] < " "):
+        return f"'{value}" if value else value
+    return value
+
+
 def _written(rows: Iterable[Iterable[Any]]) -> Iterator[str]:
     line = io.StringIO()
     writer = csv.writer(line, lineterminator="\n")
     for row in rows:
-        writer.writerow(repr(cell) if isinstance(cell, float) else cell for cell in row)
+        writer.writerow(_cell(cell) for cell in row)
         yield line.getvalue()
         line.seek(0)
         line.truncate()

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.plot import Options, PlotError, PlotNote
-from fecm.plot.style import Scale, scale
+from fecm.plot.style import COLOURS, Scale, scale
 from fecm.sweeps.cases import TEXTS
 from fecm.sweeps.cases import WHOLE as WHOLE_VALUES
-from fecm.sweeps.outcome import FINE, SUMMARY
+from fecm.sweeps.outcome import RUN, STILL, SUMMARY
 from fecm.sweeps.outcome import WHOLE as WHOLE_NUMBERS
 from fecm.sweeps.result import SweepResult
 
@@ -24,6 +24,8 @@ Array = NDArray[Any]
 Ints = NDArray[np.intp]
 
 WHOLE = (*WHOLE_VALUES, *WHOLE_NUMBERS)
+# Texts that get a curve each; there are as many colours.
+CURVES = len(COLOURS)
 LABELS = {
     "velocity": "Impact velocity", "k": "Contact coefficient $k$", "alpha_p": r"$\alpha_p$",
     "s_p": "$s_p$", "q": "$q$", "rod_length": "Length of the rod",
@@ -79,15 +81,18 @@ class Choice:
         Values to mark, scaled.
     title : str
         What picks the cases; empty for all of them.
-    single : bool
-        Whether the cases differ in nothing else.
+    other : Axis or None
+        The one other value in which the cases of a map over one value differ.
+    still : ndarray (cases,) of bool
+        Which cases ended while the projectile was on the plate.
     """
 
     over: list[Axis]
     shown: Axis
     levels: list[float]
     title: str
-    single: bool
+    other: Axis | None
+    still: NDArray[np.bool_]
 
 
 def choose(sweep: SweepResult, name: str, options: Options) -> Choice:
@@ -104,8 +109,16 @@ def choose(sweep: SweepResult, name: str, options: Options) -> Choice:
         _check_crossings(sweep, rows, over)
     shown = _quantity(sweep, name, rows, options.quantity)
     told = (f"{other} {_text(sweep, other, rows[0])}" for other in options.where)
-    single = len(over) == len(_varying(sweep, rows))
-    return Choice(over, shown, _levels(options, shown), ", ".join(told), single)
+    others = [n for n in _varying(sweep, rows) if n not in [axis.name for axis in over]]
+    other = _axis(sweep, others[0], rows) if others and len(over) == 1 else None
+    if len(over) == 1 and (len(others) > 1 or (other is not None and len(other.ticks) > CURVES)):
+        raise PlotError(
+            f"{_told(others)} {'varies' if len(others) == 1 else 'vary'} too; --where "
+            f"{others[0]}=VALUE picks some of the cases, --over {over[0].name},{others[0]} draws "
+            "over both"
+        )
+    still = sweep["status"][rows] == STILL
+    return Choice(over, shown, _levels(options, shown), ", ".join(told), other, still)
 
 
 def _rows(sweep: SweepResult, name: str, where: Mapping[str, Any]) -> Ints:
@@ -184,18 +197,28 @@ def _quantity(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
     if quantity not in SUMMARY:
         raise PlotError(f"there is no quantity {quantity}; there is {_told(SUMMARY)}")
     status, values = sweep["status"][rows], sweep[quantity][rows].astype(float)
-    values = np.where(status == FINE, values, np.nan)
-    failed = Counter(status[status != FINE].tolist()).most_common()
+    run, still = np.isin(status, RUN), status == STILL
+    values = np.where(run, values, np.nan)
+    failed = Counter(status[~run].tolist()).most_common()
     told = ""
     if failed:
         more = f", and {len(failed) - 1} other reasons" if len(failed) > 1 else ""
         total = sum(count for _, count in failed)
         told = f"{total} of {len(rows)} cases of {name} failed ({failed[0][0]}{more})"
+    open_ends = (
+        f"{int(still.sum())} of {len(rows)} cases of {name} were still in contact at the end"
+    )
     if np.isnan(values).all():
-        raise PlotError(told or f"no case of {name} has a {quantity}: nothing was hit")
+        nothing = f"no case of {name} has a {quantity}"
+        if still.any():
+            raise PlotError(f"{nothing}: {open_ends}; a deck with a longer duration may show it")
+        raise PlotError(told or f"{nothing}: nothing was hit")
     if told:
         warnings.warn(f"{told}; they are gaps in the picture", PlotNote, stacklevel=2)
-    if lacking := int((np.isnan(values) & (status == FINE)).sum()):
+    if still.any():
+        gaps = "; they have no value in the picture" if np.isnan(values[still]).any() else ""
+        warnings.warn(f"{open_ends}{gaps}", stacklevel=2)
+    if lacking := int((np.isnan(values) & run & ~still).sum()):
         warnings.warn(
             f"{lacking} cases of {name} without contact have no {quantity}", PlotNote, stacklevel=2
         )

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from fecm.plot import Options, Picture
-from fecm.plot.cases import Axis, Choice, choose
+from fecm.plot.cases import CURVES, Axis, Choice, choose
 from fecm.plot.style import COLOURS, IN_ORDER, RATIO, lines_legend, panels
 from fecm.sweeps.result import SweepResult
 
@@ -58,14 +58,32 @@ def parameter_map(results: Mapping[str, SweepResult], options: Options) -> Pictu
     """
     ((name, sweep),) = results.items()
     choice = choose(sweep, name, options)
+    shown = choice.shown
     if len(choice.over) == 1:
+        (over,) = choice.over
         figure = _one(choice, options)
+        place = (shown, over) if over.ticks else (over, shown)
     else:
         first, second = choice.over
-        figure = _two(first, second, choice.shown, choice.levels, options)
+        figure = _two(first, second, shown, choice.levels, options)
+        first, second = (second, first) if first.ticks else (first, second)
+        place = (first, shown) if 0 < len(second.ticks) <= CURVES else (first, second)
+    _mark_still(figure, *place, choice.still)
     if choice.title:
         figure.axes[0].set_title(choice.title, loc="left")
     return Picture(figure)
+
+
+def _mark_still(figure: Figure, x: Axis, y: Axis, still: NDArray[np.bool_]) -> None:
+    """Cross the cases that ended in contact, and count them."""
+    if not still.any():
+        return
+    mark: Any = {"marker": "x", "color": "0.25", "markersize": 3.5, "linestyle": "none"}
+    figure.axes[0].plot(x.values[still], y.values[still], zorder=4, **mark)
+    text = (
+        f"\N{MULTIPLICATION SIGN} still in contact at the end: {still.sum()} of {len(still)} cases"
+    )
+    figure.supxlabel(text, fontsize=7.0, color="0.25")
 
 
 # One value ---------------------------------------------------------------------------------------
@@ -73,10 +91,16 @@ def parameter_map(results: Mapping[str, SweepResult], options: Options) -> Pictu
 
 def _one(choice: Choice, options: Options) -> Figure:
     """Points, joined where the cases differ in nothing else; texts stand as rows."""
-    (over,), shown, levels = choice.over, choice.shown, choice.levels
+    (over,), shown, levels, other = choice.over, choice.shown, choice.levels, choice.other
+    if other is not None and other.ticks and not over.ticks:
+        return _curves(over, other, shown, levels, options)
     if over.ticks:
         figure, axes = _text_rows(options, over)
-        axes.plot(shown.values, over.values, "o", color=COLOURS[0], markersize=3.5)
+        if other is None:
+            axes.plot(shown.values, over.values, "o", color=COLOURS[0], markersize=3.5)
+        else:
+            figure.set_figheight(figure.get_figheight() + 0.45)
+            _coloured(figure, axes, shown, over, other)
         _name_axes(axes, shown, None)
         if np.nanmin(shown.values) >= 0.0:
             axes.set_xlim(left=0.0)
@@ -86,13 +110,22 @@ def _one(choice: Choice, options: Options) -> Figure:
         axes.set_axisbelow(True)
         return figure
     figure, (axes,) = panels(options.width, ratio=RATIO[options.width])
-    order = np.argsort(over.values, kind="stable")
-    axes.plot(
-        over.values[order], shown.values[order], "o-" if choice.single else "o", color=COLOURS[0],
-        markersize=2.5,
-    )  # fmt: skip
+    if other is not None:
+        _coloured(figure, axes, over, shown, other)
+    else:
+        order = np.argsort(over.values, kind="stable")
+        axes.plot(over.values[order], shown.values[order], "o-", color=COLOURS[0], markersize=2.5)
     _finish_curves(axes, over, shown, levels)
     return figure
+
+
+def _coloured(figure: Figure, axes: Axes, x: Axis, y: Axis, other: Axis) -> None:
+    """Points whose colours show another value."""
+    drawn = axes.scatter(
+        x.values, y.values, c=other.values, s=9.0, cmap=IN_ORDER, norm=_colours(other),
+        linewidths=0.0,
+    )  # fmt: skip
+    _bar(figure, axes, drawn, other, [])
 
 
 def _finish_curves(axes: Axes, over: Axis, shown: Axis, levels: list[float]) -> None:
@@ -129,7 +162,7 @@ def _text_rows(options: Options, over: Axis) -> tuple[Figure, Axes]:
 def _two(first: Axis, second: Axis, shown: Axis, levels: list[float], options: Options) -> Figure:
     if first.ticks:
         first, second = second, first
-    if second.ticks and len(second.ticks) <= len(COLOURS):
+    if second.ticks and len(second.ticks) <= CURVES:
         return _curves(first, second, shown, levels, options)
     found = _grid(first, second, shown)
     if second.ticks:

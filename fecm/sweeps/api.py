@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,8 @@ from fecm.sweeps.memory import check_memory
 from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.result import SweepResult, result_of, save
 from fecm.sweeps.run import Task, joined
-from fecm.sweeps.schedule import Done, Idle, here, on_dask, on_workers
-from fecm.sweeps.store import Parts
+from fecm.sweeps.schedule import Done, Idle, here, lost, on_dask, on_workers
+from fecm.sweeps.store import DamagedPartError, Parts
 from fecm.sweeps.tasks import Plan, plan, tasks
 
 
@@ -47,6 +48,7 @@ def carry_out(
     parts: Parts | None = None,
     done: Done = lambda task, outcome: None,
     idle: Idle = lambda: None,
+    note: Callable[[str], None] = warnings.warn,
 ) -> SweepResult:
     """Run a plan.
 
@@ -65,6 +67,8 @@ def carry_out(
         Told of each task as it is finished, and of those that were before.
     idle : callable
         Called now and then.
+    note : callable
+        Given what the user should know.
 
     Raises
     ------
@@ -74,7 +78,11 @@ def carry_out(
     outcomes: list[Outcome] = []
     left: list[Task] = []
     for task in tasks(problem, made):
-        before = None if parts is None else parts.get(task)
+        before = None
+        try:
+            before = None if parts is None else parts.get(task)
+        except DamagedPartError as error:
+            note(f"{error}; its cases are run again")
         if before is None:
             left.append(task)
         else:
@@ -82,7 +90,7 @@ def carry_out(
             done(task, before)
 
     def keep(task: Task, outcome: Outcome) -> None:
-        if parts is not None:
+        if parts is not None and not lost(outcome):
             parts.put(task, outcome)
         outcomes.append(outcome)
         done(task, outcome)
@@ -148,9 +156,9 @@ def sweep(
 
     Examples
     --------
-    >>> found = sweep("decks/appendix.inp", {"velocity": [50.0, 100.0]})
+    >>> found = sweep("decks/impact-115.inp", {"velocity": [50.0, 115.0]})
     >>> [f"{force:.3f}" for force in found["peak_force"]]
-    ['1.820', '5.044']
+    ['36.058', '86.202']
     """
     if (vary is None) == (cases is None):
         raise CasesError("give either vary or cases")

@@ -53,7 +53,10 @@ def parse_vary(text: str) -> tuple[str, list[Value]]:
         count = int(parts[2])
         if count > MOST:
             raise CasesError(f"`{text}`: {count} values are more than {MOST}")
-        values = np.linspace(begin, end, count).tolist()
+        with np.errstate(all="ignore"):
+            values = np.linspace(begin, end, count).tolist()
+        if not all(map(math.isfinite, values)):
+            raise CasesError(f"`{text}`: the range is beyond the range of numbers")
         return name, [_value(name, repr(v)) for v in values]
     return name, [_value(name, part) for part in _split(given)]
 

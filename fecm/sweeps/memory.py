@@ -8,12 +8,11 @@ from fecm import memory
 from fecm.check import Checked
 from fecm.check.memory import needed_bytes
 from fecm.program import estimate
-from fecm.sweeps.run import quiet, shares_plate
+from fecm.sweeps.run import ADVANCED, quiet, shares_plate
 from fecm.sweeps.tasks import TOGETHER, Plan, tasks
 
-# Bytes a step of each case: while it is advanced with others, and where its history is kept.  Both
-# are more than was measured.
-ADVANCED, KEPT = 28, 24
+# Bytes a step of each case whose history is kept: more than was measured.
+KEPT = 24
 
 
 def check_memory(checked: Checked, made: Plan, workers: int) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,11 @@ SUMMARY = {
 }  # fmt: skip
 WHOLE = ("contacts",)
 FINE = "ok"
+# The run ends while the projectile is on the plate.
+STILL = "still in contact"
+RUN = (FINE, STILL)
+# Peaks, which stay where they lie before the end.
+PEAKS = ("peak_force", "time_of_peak", "max_indentation")
 
 
 @dataclass
@@ -41,9 +46,12 @@ class Outcome:
     numbers : list of int
         The cases, from 0.
     summary : dict of ndarray (cases,)
-        By the names of :data:`SUMMARY`; NaN where a case failed.
+        By the names of :data:`SUMMARY`; NaN where a case failed, or where a number is not known
+        because the projectile is still in contact.
     status : list of str
-        ``"ok"``, or why a case failed.
+        ``"ok"``, ``"still in contact"``, or why a case failed.
+    unsettled : ndarray (cases,)
+        Steps whose contact iteration did not converge.
     dt, steps : ndarray (cases,)
         Time step, and number of steps.
     force : ndarray (cases, steps) or None
@@ -55,7 +63,20 @@ class Outcome:
     status: list[str]
     dt: Floats
     steps: NDArray[np.int64]
+    unsettled: NDArray[np.int64]
     force: Floats | None = field(default=None, repr=False)
+
+    def of(self, rows: NDArray[np.intp]) -> Outcome:
+        """The same of some of the cases, given by their rows."""
+        return Outcome(
+            [self.numbers[row] for row in rows],
+            {name: values[rows] for name, values in self.summary.items()},
+            [self.status[row] for row in rows],
+            self.dt[rows],
+            self.steps[rows],
+            self.unsettled[rows],
+            None if self.force is None else self.force[rows],
+        )
 
     @classmethod
     def failed(cls, numbers: list[int], reasons: list[str]) -> Outcome:
@@ -63,13 +84,24 @@ class Outcome:
         none = np.full(len(numbers), np.nan)
         steps = np.zeros(len(numbers), dtype=np.int64)
         summary = {name: none.copy() for name in SUMMARY}
-        return cls(list(numbers), summary, list(reasons), none.copy(), steps)
+        return cls(list(numbers), summary, list(reasons), none.copy(), steps, steps.copy())
+
+
+class Indentation(NamedTuple):
+    """Largest and last indentation, and the permanent one, of cases (length)."""
+
+    largest: Floats
+    last: Floats
+    permanent: Floats
 
 
 def summarise(
-    force: Floats, times: Floats, deepest: Floats, permanent: Floats, mass: Any, velocity: Any
+    force: Floats, times: Floats, indentation: Indentation, mass: Any, velocity: Any
 ) -> dict[str, Floats]:
     """Numbers of many cases from their contact forces.
+
+    Where the last step is in contact, what depends on the rest of the contact is NaN: everything
+    but the peaks, and a peak at the last step.
 
     Parameters
     ----------
@@ -77,8 +109,7 @@ def summarise(
         After every step.
     times : ndarray (steps,)
         Of the steps.
-    deepest, permanent : ndarray (cases,)
-        Largest and permanent indentation.
+    indentation : Indentation
     mass, velocity : float or ndarray (cases,)
         Of the projectile; its approach.
 
@@ -97,15 +128,26 @@ def summarise(
     weights = 0.5 * (dt + np.append(dt[1:], 0.0))
     impulse = weights @ force
     rebound = impulse / mass - velocity
-    return {
+    found = {
         "peak_force": force.max(axis=0),
         "time_of_peak": np.where(met, times[peak], np.nan),
         "contacts": (touching & ~before).sum(axis=0).astype(float),
         "contact_time": dt @ touching,
         "last_contact": np.where(met, times[last], np.nan),
-        "max_indentation": deepest,
-        "permanent_indentation": permanent,
+        "max_indentation": indentation.largest,
+        "permanent_indentation": indentation.permanent,
         "impulse": impulse,
         "rebound_velocity": rebound,
         "energy_absorbed": 0.5 * mass * (velocity**2 - rebound**2),
     }
+    still = touching[-1]
+    rising = {name: still & (peak == len(times) - 1) for name in PEAKS}
+    rising["max_indentation"] = still & (indentation.last >= indentation.largest)
+    return {
+        name: np.where(rising.get(name, still), np.nan, values) for name, values in found.items()
+    }
+
+
+def status_of(force: Floats) -> list[str]:
+    """Status of cases that were run, from their contact forces (steps, cases)."""
+    return [STILL if still else FINE for still in force[-1] > 0.0]

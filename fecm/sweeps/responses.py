@@ -9,7 +9,7 @@ added as they come.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +24,8 @@ Floats = NDArray[np.float64]
 # Steps of a block, and steps and cases of a matrix product with those before it: so few that BLAS
 # uses one thread.
 BLOCK = 64
+# Multiplications of a matrix product for which BLAS uses one thread.
+SMALL = BLOCK**3
 
 
 def plate_response(motion: PlateMotion, row: int, dt: float, steps: int) -> Floats:
@@ -69,6 +71,13 @@ def tip_response(step: CollocationStep, steps: int) -> Floats:
     return response
 
 
+def _product(a: Floats, b: Floats) -> Floats:
+    """A matrix product in pieces so small that BLAS uses one thread."""
+    columns = max(1, SMALL // a.size)
+    pieces = [a @ b[:, i : i + columns] for i in range(0, b.shape[1], columns)]
+    return np.hstack(pieces)
+
+
 class Convolution:
     """Sums x_n = sum over m < n of r_(n-m) f_m of many cases, of which each f_n may need x_n.
 
@@ -111,6 +120,11 @@ class Convolution:
         left = BLOCK - row
         if row:
             self._block[row:] += self._near[:left] * values
+
+    @property
+    def given(self) -> Floats:
+        """f_1, f_2, ... up to the last one given, (steps, cases)."""
+        return self._given[1 : self._step + 1]
 
     def _begin_block(self) -> None:
         """What all steps before the block contribute to each of its steps."""
@@ -160,12 +174,45 @@ class TipSteps:
         self, steps: Sequence[CollocationStep], kinds: NDArray[np.intp], count: int
     ) -> None:
         first = steps[0]
+        self._steps, self._kinds = steps, kinds
         self.theta, self.weight, self.dt = first.theta, first.weight, first.dt
         self._begin = first.weights[0]
         self.gain: Floats = np.array([step.gain for step in steps])[kinds]
         # r_1 = gain comes with the force itself; the sum of earlier forces begins with r_2.
         responses = np.column_stack([tip_response(step, count + 1)[1:] for step in steps])
         self._carried = Convolution(responses, kinds)
+
+    def motions(self, kind: int, speed: Floats) -> Iterator[Floats]:
+        """Motion of whole projectiles of a kind, after every block of steps and after the last.
+
+        Parameters
+        ----------
+        kind : int
+        speed : ndarray (cases,)
+            Approach velocity of each case, of whatever kind.
+
+        Yields
+        ------
+        ndarray (3 n, cases of the kind)
+            As in :class:`~fecm.projectile.RodState`.
+        """
+        step, cases = self._steps[kind], np.flatnonzero(self._kinds == kind)
+        forces = self._carried.given[:, cases]
+        motion = np.zeros((3 * step.n, len(cases)))
+        motion[step.n : 2 * step.n : 2] = -speed[cases]
+        # T^1, T^2, T^4, ..., and in column j what a force does j steps after its own.
+        powers, reach = [step.T], step.h[:, None]
+        while reach.shape[1] < BLOCK:
+            reach = np.hstack([reach, _product(powers[-1], reach)])
+            powers.append(_product(powers[-1], powers[-1]))
+        for start in range(0, len(forces), BLOCK):
+            part = forces[start : start + BLOCK]
+            count = len(part)
+            for bit, power in enumerate(powers):
+                if count >> bit & 1:
+                    motion = _product(power, motion)
+            motion += _product(reach[:, :count][:, ::-1], part)
+            yield motion
 
     def begin(self, state: TipState) -> tuple[Floats, Floats, Floats, Floats]:
         """Free acceleration (twice), drift, and acceleration so far."""

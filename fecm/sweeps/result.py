@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.results.schema import FORMAT_VERSION, SWEEP, Dataset, ResultFileError, declared_units
-from fecm.sweeps.outcome import FINE, SUMMARY, Outcome
+from fecm.sweeps.outcome import RUN, STILL, SUMMARY, Outcome
 from fecm.sweeps.tasks import Plan
 from fecm.units import unit_names, unit_of
 from fecm.version import __version__
@@ -50,11 +50,15 @@ class SweepResult:
     cases : dict of ndarray (n,)
         Values of every case, by name.
     summary : dict of ndarray (n,)
-        Numbers of every case, and ``status``: ``"ok"``, or why a case failed.
+        Numbers of every case, and ``status``: ``"ok"``, ``"still in contact"``, or why a case
+        failed.
     dt, steps : ndarray (n,)
         Time step and number of steps of every case.
     force : ndarray (n, steps) or None
         Contact force after every step, NaN beyond a case's steps; None unless asked for.
+    unsettled : ndarray (n,) or None
+        Steps of every case whose contact iteration did not converge; None where the file does not
+        tell.
     deck : str
         The deck that was varied.
     title : str
@@ -68,6 +72,7 @@ class SweepResult:
     dt: Array
     steps: Array
     force: Array | None = None
+    unsettled: Array | None = None
     deck: str = ""
     title: str = ""
     units: dict[str, str] = field(default_factory=dict)
@@ -82,7 +87,12 @@ class SweepResult:
     @property
     def fine(self) -> NDArray[np.bool_]:
         """Which cases were run."""
-        return np.asarray(self.summary["status"] == FINE)
+        return np.isin(self.summary["status"], RUN)
+
+    @property
+    def still(self) -> NDArray[np.bool_]:
+        """Which cases were run, and ended while the projectile was on the plate."""
+        return np.asarray(self.summary["status"] == STILL)
 
     def unit(self, name: str) -> str:
         """Unit of a value or a number, as the deck names it; empty where it has none."""
@@ -143,7 +153,7 @@ def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
     summary["status"] = np.array(outcome.status)
     deck = plan.deck
     return SweepResult(
-        cases, summary, outcome.dt, outcome.steps, outcome.force,
+        cases, summary, outcome.dt, outcome.steps, outcome.force, outcome.unsettled,
         deck.text or deck.to_text(), deck.title, unit_names(deck),
     )  # fmt: skip
 
@@ -186,9 +196,16 @@ def save(result: SweepResult, path: Path) -> None:
             store(f"cases/{name}", values, f"{name} of every case", dimension)
         for name, (text, dimension) in SUMMARY.items():
             store(f"summary/{name}", result.summary[name], text, dimension)
-        store("summary/status", result.summary["status"], "ok, or why the case failed")
+        store(
+            "summary/status",
+            result.summary["status"],
+            "ok, still in contact, or why the case failed",
+        )
         store("history/dt", result.dt, "time step of every case", "time")
         store("history/steps", result.steps, "number of steps of every case")
+        if result.unsettled is not None:
+            text = "steps whose contact iteration did not converge"
+            store("history/unsettled_steps", result.unsettled, text)
         if result.force is not None and count:
             store("history/force", result.force, "contact force after every step", "force")
         for group, text in GROUPS.items():
@@ -239,6 +256,8 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     summary = {name: summary[name] for name in (*SUMMARY, "status")} | summary  # in their order
     count = np.shape(arrays["history/dt"])[:1]
     rows = (*cases.values(), *summary.values(), arrays["history/dt"], arrays["history/steps"])
+    unsettled = arrays.get("history/unsettled_steps")
+    rows += () if unsettled is None else (unsettled,)
     shape = arrays.shapes.get("history/force")
     kinds = {name: summary[name].dtype.kind for name in SUMMARY}
     if (
@@ -254,6 +273,7 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     return SweepResult(
         cases, summary, arrays["history/dt"], steps,
         arrays.get("history/force") if history else None,
+        unsettled,
         contents.texts.get("deck", ""), str(contents.attributes.get("title", "")),
         declared_units(contents.attributes),
     )  # fmt: skip

@@ -6,8 +6,9 @@ is then stepped once, under a unit force, and everything else follows from that 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,26 +16,36 @@ from numpy.typing import NDArray
 from fecm.assembly import PlateModel
 from fecm.check import Checked, check
 from fecm.check.impact import check_impact, check_law, check_projectile
+from fecm.check.run import check_program
 from fecm.deck.findings import Findings
-from fecm.deck.model import Deck, Impact, Indentation, Projectile
+from fecm.deck.model import Deck, Impact, Projectile
+from fecm.deck.model import Indentation as LawCards
 from fecm.deck.reader import Problem
 from fecm.dynamics import DivergenceError
 from fecm.impact import Encounter, meet
 from fecm.indentation import MemoryLaw, Point, stacked
+from fecm.memory import require
 from fecm.mesh import Mesh, generate
 from fecm.parts import build_law, build_projectile, set_up
-from fecm.program import Body, Loop, estimate, flat
+from fecm.program import Body, Loop, compile_program, estimate, flat
+from fecm.projectile import Projectile as ProjectileModel
 from fecm.projectile import WilsonStep
 from fecm.results.schema import Dataset
-from fecm.simulation import simulate
-from fecm.solvers import SAFE
-from fecm.stability import critical_time_step
+from fecm.simulation import ENERGY_WARNING, simulate
+from fecm.stability import critical_time_step, taken_time_step
 from fecm.sweeps.cases import Case, CasesError
-from fecm.sweeps.outcome import FINE, SUMMARY, Outcome, summarise
-from fecm.sweeps.responses import Convolution, TipState, TipSteps, plate_response
+from fecm.sweeps.clock import Clock, critical_of, with_time_step
+from fecm.sweeps.outcome import SUMMARY, Indentation, Outcome, status_of, summarise
+from fecm.sweeps.responses import BLOCK, Convolution, TipState, TipSteps, plate_response
 from fecm.sweeps.variations import varied
 
+if TYPE_CHECKING:
+    from fecm.sweeps.tasks import Plan
+
 Floats = NDArray[np.float64]
+
+# Bytes a step of each case that is advanced with others: more than was measured.
+ADVANCED = 28
 
 
 @dataclass(frozen=True)
@@ -53,6 +64,8 @@ class Task:
         Their values.
     history : bool
         Whether the forces are wanted.
+    clock : Clock or None
+        Rule by which the plate has its own time step; None where the deck's holds.
     """
 
     number: int
@@ -60,6 +73,7 @@ class Task:
     numbers: tuple[int, ...]
     cases: tuple[Case, ...]
     history: bool = False
+    clock: Clock | None = None
 
 
 def run(task: Task) -> Outcome:
@@ -75,18 +89,52 @@ def run(task: Task) -> Outcome:
     mesh = generate(good[0][1]) if good else None
     sound = [] if mesh is None else [pair for pair in good if not _refuse(*pair, mesh, lost)]
     if sound:
-        checked, reason = _checked(sound[0][1])
+        checked, decks, reason = _timed([deck for _, deck in sound], task.clock)
+        numbers = [number for number, _ in sound]
         if checked is None:
-            lost |= dict.fromkeys((number for number, _ in sound), reason)
+            lost |= dict.fromkeys(numbers, reason)
+        elif shares_plate(checked):
+            parts.append(_together(numbers, decks, checked))
         else:
-            if shares_plate(checked):
-                parts.append(_together([n for n, _ in sound], [d for _, d in sound], checked))
-            else:
-                parts += [_alone(number, replace(checked, deck=deck)) for number, deck in sound]
+            pairs = zip(numbers, decks, strict=True)
+            parts += [_alone(number, replace(checked, deck=deck)) for number, deck in pairs]
     if lost:
         parts.append(Outcome.failed(list(lost), list(lost.values())))
     outcome = joined(parts)
     return outcome if task.history else replace(outcome, force=None)
+
+
+def deck_of(plan: Plan, case: int) -> Deck:
+    """Make the deck of a case, with its own time step.
+
+    Raises
+    ------
+    CasesError
+        If the case cannot be run.
+    """
+    checked, (deck,), reason = _timed([varied(plan.deck, plan.cases[case])], plan.clock)
+    if checked is None:
+        raise CasesError(reason)
+    return deck
+
+
+def _timed(decks: list[Deck], clock: Clock | None) -> tuple[Checked | None, list[Deck], str]:
+    """Check the plate and the program that decks share, and give them the plate's time step."""
+    if clock is None:
+        checked, reason = _checked(decks[0])
+        return checked, decks, reason
+    # DT 0 is below the critical time step of any plate.
+    checked, reason = _checked(with_time_step(decks[0], 0.0))
+    if checked is None:
+        return None, decks, reason
+    dt = clock.time_step(critical_of(checked))
+    timed = [with_time_step(deck, dt, clock.dt) for deck in decks]
+    findings = Findings()
+    program = compile_program(timed[0].macros, findings)
+    check_program(timed[0], program, findings)
+    if findings.errors:
+        return None, decks, findings.errors[0].message
+    return Checked(timed[0], checked.mesh, program), timed, ""
 
 
 def _checked(deck: Deck) -> tuple[Checked | None, str]:
@@ -102,7 +150,7 @@ def _refuse(number: int, deck: Deck, mesh: Mesh, lost: dict[int, str]) -> bool:
     """Whether a case's own cards, the plate's apart, can't be used; note why."""
     findings = Findings()
     check_impact(deck.need(Impact), deck, mesh, findings)
-    check_law(deck.need(Indentation), findings)
+    check_law(deck.need(LawCards), findings)
     if (projectile := deck.last(Projectile)) is not None:
         check_projectile(projectile, findings)
     if findings.errors:
@@ -126,7 +174,7 @@ def shares_plate(checked: Checked) -> bool:
 def _time_step(checked: Checked, plate: PlateModel) -> float:
     """The program's time step; 0 is 0.9 of the critical one, as in a run."""
     dt = next(macro.value for macro in flat(checked.program) if macro.word == "DT")
-    return dt or float(f"{SAFE * critical_time_step(plate):.3g}")
+    return dt or taken_time_step(critical_time_step(plate))
 
 
 def _together(numbers: list[int], decks: list[Deck], checked: Checked) -> Outcome:
@@ -141,30 +189,69 @@ def _together(numbers: list[int], decks: list[Deck], checked: Checked) -> Outcom
     # Cases of a kind side by side.
     order = sorted(range(len(decks)), key=lambda case: kinds[projectiles[case]])
     kind = np.array([kinds[projectiles[case]] for case in order], dtype=np.intp)
+    require(ADVANCED * steps * len(decks), f"{len(decks)} cases of {steps} steps")
     with np.errstate(all="ignore"):
         response = plate_response(setup.motion, setup.impact.contact.row, dt, steps)
         rods = [WilsonStep(rod.stiffness(), rod.mass(), dt) for rod in kinds]
         law = MemoryLaw(stacked([build_law(decks[case]).constants for case in order]))
         speed = np.array([decks[case].need(Impact).velocity for case in order])
-        force, deepest, permanent = impacts(response, TipSteps(rods, kind, steps), law, speed)
+        node_mass = float(setup.motion.mass[setup.impact.contact.row])
+        tips = TipSteps(rods, kind, steps)
+        found = impacts(response, tips, law, speed, node_mass)
         times = np.add.accumulate(np.full(steps, dt))
         mass = np.array([projectiles[case].total_mass for case in order])
-        summary = summarise(force, times, deepest, permanent, mass, speed)
+        summary = summarise(found.force, times, found.indentation, mass, speed)
+        error = balance_errors(found, tips, list(kinds), kind, speed)
     back = np.argsort(order)
-    finite = np.isfinite(summary["impulse"])[back]
-    return Outcome(
+    force = np.ascontiguousarray(found.force.T[back])
+    outcome = Outcome(
         numbers,
-        {name: np.where(finite, values[back], np.nan) for name, values in summary.items()},
-        [FINE if sound else "the motion is no longer finite" for sound in finite],
+        {name: values[back] for name, values in summary.items()},
+        status_of(force.T),
         np.full(len(numbers), dt),
         np.full(len(numbers), steps, dtype=np.int64),
-        np.ascontiguousarray(force.T[back]),
+        found.unsettled[back],
+        force,
     )
+    doubtful = np.flatnonzero(~(error[back] < ENERGY_WARNING) | (outcome.unsettled > 0))
+    if not len(doubtful):
+        return outcome
+    rest = np.setdiff1d(np.arange(len(numbers)), doubtful)
+    # The run itself judges what is not well below its limits.
+    whole = [_alone(numbers[case], replace(checked, deck=decks[case])) for case in doubtful]
+    return joined([outcome.of(rest), *whole])
+
+
+@dataclass(frozen=True)
+class Impacts:
+    """Many impacts on a plate.
+
+    Attributes
+    ----------
+    force : ndarray (steps, cases)
+        Contact force after every step.
+    indentation : Indentation
+        Of each case.
+    unsettled : ndarray (cases,)
+        Steps whose contact iteration did not converge.
+    work : ndarray (blocks, cases)
+        Work that the contact force has done on plate and indentation, after every block of steps
+        and after the last step (force*length).
+    excess : ndarray (cases,)
+        Largest dt^2/8 m a^2 of the impact node (force*length): by so much the plate's energy is
+        above the work done on it, as far as the node tells.
+    """
+
+    force: Floats
+    indentation: Indentation
+    unsettled: NDArray[np.int64]
+    work: Floats
+    excess: Floats
 
 
 def impacts(
-    response: Floats, tips: TipSteps, law: MemoryLaw, speed: Floats
-) -> tuple[Floats, Floats, Floats]:
+    response: Floats, tips: TipSteps, law: MemoryLaw, speed: Floats, node_mass: float
+) -> Impacts:
     """Many impacts on a plate of which the response to a unit force is known.
 
     Parameters
@@ -177,27 +264,83 @@ def impacts(
         With arrays of constants.
     speed : ndarray (cases,)
         Approach velocities.
-
-    Returns
-    -------
-    force : ndarray (steps, cases)
-        Contact force after every step.
-    deepest, permanent : ndarray (cases,)
-        Largest and permanent indentation.
+    node_mass : float
+        Lumped mass of the impact node.
     """
     steps, cases = len(response), len(speed)
     none = np.zeros(cases)
     plate = Convolution(response, np.zeros(cases, dtype=np.intp))
     state = Encounter(
-        TipState(none, -speed, none), law.start(), Point(none, none), unsettled=none.astype(int)
-    )
+        TipState(none, -speed, none), law.start(), Point(none, none), none,
+        unsettled=np.zeros(cases, dtype=np.int64),
+    )  # fmt: skip
     force, deepest = np.empty((steps, cases)), none
+    plate_work, moved, sharpest = none, none, none
+    work: list[Floats] = []
     for step in range(steps):
-        meet(tips, law, state, plate.next())
+        last, w = state.contact.force, state.plate_w
+        meet(tips, law, state, plate.next().copy())
         plate.give(state.contact.force)
         force[step] = state.contact.force
         deepest = np.maximum(deepest, state.contact.indentation)
-    return force, deepest, law.permanent(state.memory, state.contact)
+        # Central differences keep what 1/2 (F + F') (w' - w) puts into the plate.
+        before, moved = moved, state.plate_w - w
+        plate_work = plate_work + 0.5 * (last + state.contact.force) * moved
+        sharpest = np.maximum(sharpest, np.abs(moved - before))
+        if not (step + 1) % BLOCK or step + 1 == steps:
+            work.append(state.contact_work + plate_work)
+    permanent = law.permanent(state.memory, state.contact)
+    return Impacts(
+        force,
+        Indentation(deepest, state.contact.indentation, permanent),
+        state.unsettled,
+        np.array(work),
+        node_mass * sharpest**2 / (8.0 * tips.dt**2),
+    )
+
+
+def balance_errors(
+    found: Impacts,
+    tips: TipSteps,
+    kinds: Sequence[ProjectileModel],
+    kind: NDArray[np.intp],
+    speed: Floats,
+) -> Floats:
+    """Estimate the error of the energy balance, as a part of the initial energy.
+
+    What the projectile holds, after every block of steps and after the last, and the work done on
+    plate and indentation must add up to the initial energy.  The central differences keep
+    1/2 v(-)' M v(+) + 1/2 u' K u, with the velocities half a step before and after: the work done
+    on the plate.  The energy that a run reports is dt^2/8 a' M a above it, of which only the impact
+    node's part is known here.
+
+    Parameters
+    ----------
+    found : Impacts
+    tips : TipSteps
+    kinds : sequence of Projectile
+    kind : ndarray (cases,) of int
+        The kind of each case.
+    speed : ndarray (cases,)
+        Approach velocities.
+
+    Returns
+    -------
+    ndarray (cases,)
+        0 without any energy; not finite where the motion is not.
+    """
+    worst = np.zeros(len(speed))
+    for number, projectile in enumerate(kinds):
+        cases = np.flatnonzero(kind == number)
+        initial = 0.5 * projectile.total_mass * speed[cases] ** 2
+        lost = np.zeros(len(cases))
+        for work, motion in zip(found.work, tips.motions(number, speed), strict=True):
+            deformation, velocity, _ = motion.reshape(3, -1, len(cases)).swapaxes(1, 2)
+            deformation[:, 0] = 0.0
+            held = projectile.kinetic_energy(velocity) + projectile.strain_energy(deformation)
+            lost = np.maximum(lost, np.abs(held + work[cases] - initial))
+        worst[cases] = (lost + found.excess[cases]) / np.where(initial > 0.0, initial, 1.0)
+    return worst
 
 
 class _HistorySink:
@@ -208,9 +351,11 @@ class _HistorySink:
     def __init__(self) -> None:
         self.arrays: dict[str, Floats] = {}
         self.permanent = 0.0
+        self.unsettled = 0
 
     def attributes(self, group: str, values: Any) -> None:
         self.permanent = values.get("permanent_indentation", self.permanent)
+        self.unsettled = values.get("unsettled_steps", self.unsettled)
 
     def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
         if dataset.path in self.KEPT:
@@ -236,14 +381,21 @@ def _alone(number: int, checked: Checked) -> Outcome:
     except (DivergenceError, ArithmeticError) as error:
         return Outcome.failed([number], [str(error)])
     force, times = sink.arrays["history/force"], sink.arrays["history/time"]
-    deepest = np.maximum(sink.arrays["history/indentation"].max(keepdims=True), 0.0)
+    indentation = sink.arrays["history/indentation"]
+    largest = np.maximum(indentation.max(keepdims=True), 0.0)
     mass = build_projectile(checked.deck).total_mass
     speed = checked.deck.need(Impact).velocity
-    summary = summarise(
-        force[:, None], times, deepest, np.array([sink.permanent]), mass, np.array([speed])
+    found = Indentation(largest, indentation[-1:], np.array([sink.permanent]))
+    summary = summarise(force[:, None], times, found, mass, np.array([speed]))
+    return Outcome(
+        [number],
+        summary,
+        status_of(force[:, None]),
+        np.array([simulation.dt]),
+        np.array([len(force)], dtype=np.int64),
+        np.array([sink.unsettled], dtype=np.int64),
+        force[None],
     )
-    steps = np.array([len(force)], dtype=np.int64)
-    return Outcome([number], summary, [FINE], np.array([simulation.dt]), steps, force[None])
 
 
 def quiet(body: Body) -> Body:
@@ -277,5 +429,6 @@ def joined(parts: list[Outcome]) -> Outcome:
         [status[i] for i in order],
         np.concatenate([part.dt for part in parts])[order],
         np.concatenate([part.steps for part in parts])[order],
+        np.concatenate([part.unsettled for part in parts])[order],
         force[order],
     )

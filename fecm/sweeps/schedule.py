@@ -7,10 +7,15 @@ as it is done, so that an interrupted sweep has lost no more than what was under
 from __future__ import annotations
 
 import multiprocessing
+import os
+import socket
+import threading
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
+from urllib.parse import urlsplit
 
 from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.run import Task, run
@@ -26,6 +31,11 @@ LOOK = 0.5
 # How long a scheduler may take to answer.
 PATIENCE = "5s"
 LOST = "the worker that ran this case died, again and again"
+
+
+def lost(outcome: Outcome) -> bool:
+    """Whether the worker of a task died, so that its cases may be run again."""
+    return any(text.startswith(LOST) for text in outcome.status)
 
 
 class SchedulerError(RuntimeError):
@@ -48,13 +58,26 @@ def here(tasks: Sequence[Task], done: Done, idle: Idle) -> None:
         done(task, attempt(task))
 
 
+def _end_with(parent: int) -> None:
+    """End this worker process soon after the process that started it."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(LOOK)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
 def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> None:
     """Run tasks in worker processes; those of a worker that died are run again."""
     left = {task.number: task for task in tasks}
     deaths = 0
     while left and deaths < DEATHS:
         before = len(left)
-        pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"))
+        pool = ProcessPoolExecutor(
+            count, multiprocessing.get_context("spawn"), _end_with, (os.getpid(),)
+        )
         try:
             running: dict[Future[Outcome], Task] = {
                 pool.submit(attempt, task): task for task in left.values()
@@ -74,6 +97,24 @@ def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> Non
         done(task, Outcome.failed(list(task.numbers), [LOST] * len(task.numbers)))
 
 
+def _check_address(address: str) -> None:
+    """Refuse an address that is none, or where nothing listens, before a client is made for it."""
+    place = urlsplit(address if "://" in address else f"tcp://{address}")
+    try:
+        host, port = place.hostname, place.port
+    except ValueError:
+        host = port = None
+    if not (host and port):
+        raise SchedulerError(
+            f"`{address}` is not the address of a Dask scheduler, as in tcp://host:8786"
+        )
+    if place.scheme in ("tcp", "tls"):
+        try:
+            socket.create_connection((host, port), float(PATIENCE.rstrip("s"))).close()
+        except OSError as error:
+            raise SchedulerError(f"no Dask scheduler answers at {address} ({error})") from None
+
+
 def on_dask(tasks: Sequence[Task], address: str, done: Done, idle: Idle) -> None:
     """Run tasks on a Dask cluster, which runs those of a dead worker again.
 
@@ -88,6 +129,7 @@ def on_dask(tasks: Sequence[Task], address: str, done: Done, idle: Idle) -> None
         raise SchedulerError(
             "--scheduler needs dask.distributed: pip install 'fecm[sweep]'"
         ) from None
+    _check_address(address)
     try:
         module: Any = distributed
         client = module.Client(address, timeout=PATIENCE, set_as_default=False)

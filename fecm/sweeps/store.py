@@ -1,14 +1,16 @@
 """Where a sweep's outcomes are kept until all are there: a folder beside the result.
 
-One file a task, each written beside its name and renamed, so that whatever ends a sweep leaves
-whole files behind.
+One file for each task, written beside its name, synchronised and renamed, so that whatever ends a
+sweep leaves whole files behind.  A checksum at the end of each file tells a damaged one.
 """
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
+import os
 import shutil
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +21,16 @@ from fecm.sweeps.outcome import SUMMARY, Outcome
 from fecm.sweeps.run import Task
 
 MARK = "sweep.json"
+# Bytes of the checksum behind the arrays of a part.
+CHECKSUM = hashlib.sha256().digest_size
 
 
 class OtherSweepError(ValueError):
     """The folder holds what another sweep has finished."""
+
+
+class DamagedPartError(ValueError):
+    """A file of the folder is not as it was written."""
 
 
 class Parts:
@@ -63,22 +71,35 @@ class Parts:
         return self.folder / f"task-{task.number:06d}.npz"
 
     def get(self, task: Task) -> Outcome | None:
-        """Outcome of a task that was finished before; None if it was not, or can't be read."""
+        """Outcome of a task that was finished before; None if it was not.
+
+        Raises
+        ------
+        DamagedPartError
+            If the file is not as it was written.
+        """
         path = self._path(task)
-        if not path.exists():
-            return None
         try:
-            with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
-                return Outcome(
-                    arrays["numbers"].tolist(),
-                    {name: arrays[name] for name in SUMMARY},
-                    arrays["status"].tolist(),
-                    arrays["dt"],
-                    arrays["steps"],
-                    arrays.get("force", None),
-                )
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile):
+            data = path.read_bytes()
+        except FileNotFoundError:
             return None
+        except OSError as error:
+            raise DamagedPartError(f"{path}: {error.strerror}") from None
+        packed_arrays, checksum = data[:-CHECKSUM], data[-CHECKSUM:]
+        if hashlib.sha256(packed_arrays).digest() != checksum:
+            raise DamagedPartError(f"{path} is damaged")
+        with np.load(io.BytesIO(packed_arrays), allow_pickle=False) as arrays:
+            if arrays["numbers"].tolist() != list(task.numbers):
+                raise DamagedPartError(f"{path} holds other cases")
+            return Outcome(
+                arrays["numbers"].tolist(),
+                {name: arrays[name] for name in SUMMARY},
+                arrays["status"].tolist(),
+                arrays["dt"],
+                arrays["steps"],
+                arrays["unsettled"],
+                arrays.get("force", None),
+            )
 
     def put(self, task: Task, outcome: Outcome) -> None:
         """Keep the outcome of a task."""
@@ -88,11 +109,16 @@ class Parts:
             "status": np.array(outcome.status, dtype=np.str_),
             "dt": outcome.dt,
             "steps": outcome.steps,
+            "unsettled": outcome.unsettled,
         }
         if outcome.force is not None:
             arrays["force"] = outcome.force
-        with beside(self._path(task)) as partial:
-            partial.write_bytes(packed(arrays))
+        data = packed(arrays)
+        with beside(self._path(task)) as partial, partial.open("wb") as file:
+            file.write(data)
+            file.write(hashlib.sha256(data).digest())
+            file.flush()
+            os.fsync(file.fileno())
 
     def clear(self) -> None:
         """Throw everything away."""

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 from fecm.check import Checked
 from fecm.deck.model import Deck
-from fecm.sweeps.cases import PLATE, Case, CasesError
+from fecm.sweeps.cases import CONTACT, PLATE, Case, CasesError
+from fecm.sweeps.clock import Clock, clock_of
 from fecm.sweeps.run import Task, shares_plate
 from fecm.version import __version__
 
@@ -29,11 +30,14 @@ class Plan:
         Values of every case.
     history : bool
         Whether forces are stored.
+    clock : Clock or None
+        Rule by which each plate has its own time step; None where the deck's holds for all.
     """
 
     deck: Deck
     cases: tuple[Case, ...]
     history: bool = False
+    clock: Clock | None = None
 
     def fingerprint(self) -> str:
         """What tells this sweep from another one."""
@@ -53,7 +57,9 @@ def plan(checked: Checked, cases: Sequence[Case], *, history: bool = False) -> P
         raise CasesError("the deck takes no impact step (RODP): there is nothing to sweep")
     if not cases:
         raise CasesError("there are no cases")
-    return Plan(checked.deck, tuple(cases), history)
+    own = "dt" not in cases[0] and not {"impact_node", *CONTACT}.issuperset(cases[0])
+    clock = clock_of(checked) if own else None
+    return Plan(checked.deck, tuple(cases), history, clock)
 
 
 def tasks(checked: Checked, made: Plan) -> list[Task]:
@@ -68,5 +74,5 @@ def tasks(checked: Checked, made: Plan) -> list[Task]:
         for start in range(0, len(numbers), together):
             some = tuple(numbers[start : start + together])
             cases = tuple(made.cases[n] for n in some)
-            cut.append(Task(len(cut), made.deck, some, cases, made.history))
+            cut.append(Task(len(cut), made.deck, some, cases, made.history, made.clock))
     return cut

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 from fecm.authoring.layup import LayupError, parse_layup
-from fecm.deck.model import Deck, Impact, Indentation, Material, Projectile, Segment
-from fecm.deck.records import Layer, Ply, RodDiameter
+from fecm.check import check
+from fecm.deck.findings import Findings
+from fecm.deck.model import Boundary, Deck, Impact, Indentation, Material, Projectile, Segment
+from fecm.deck.reader import Problem
+from fecm.deck.records import Layer, NodeCodes, Ply, RodDiameter
+from fecm.laminate import is_coupled
+from fecm.mesh import holds_the_plane, restraint_codes
 from fecm.parts import build_projectile
 from fecm.projectile import RigidMass
+from fecm.stability import taken_time_step
 from fecm.sweeps.cases import NAMES, Case, CasesError, Value
+from fecm.sweeps.clock import critical_of, with_time_step
 
 # Fields of a ply's card by their names in a sweep.
 PLY = ("density", "nu12", "e1", "e2", "g12", "g13", "g23")
@@ -23,6 +31,11 @@ def varied(deck: Deck, case: Case) -> Deck:
     A layup takes the deck's ply thickness, so that more plies make a thicker plate; a thickness
     scales every layer.  A mass scales a rod's density.
 
+    A deck with B = 0 may restrain u and v at every node, as they rest in any case.  Where B of the
+    case is not 0 they do not rest: they are then held at the nodes that hold w, and free elsewhere,
+    as in a deck of ``fecm new``.  A time step changes the number of steps, so that the duration
+    stays.
+
     Raises
     ------
     CasesError
@@ -33,8 +46,39 @@ def varied(deck: Deck, case: Case) -> Deck:
     made = deck
     # The layup before the whole laminate's thickness, the mass behind what else the rod is made of.
     for name in sorted(case, key=lambda name: (name != "layup", NAMES.index(name))):
-        made = _SETTERS[name](made, name, case[name])
+        if name != "dt":
+            made = _SETTERS[name](made, name, case[name])
+    if "dt" in case:
+        made = with_time_step(made, float(case["dt"]), _taken_time_step(deck))
+    material = deck.last(Material)
+    if material is not None and not is_coupled(material) and is_coupled(made.need(Material)):
+        made = _free_in_plane(made)
     return replace(made, text="")
+
+
+@lru_cache(maxsize=8)
+def _holds_the_plane(boundaries: tuple[Boundary, ...], nodes: int, unknowns: int) -> bool:
+    return holds_the_plane(restraint_codes(boundaries, nodes, unknowns))
+
+
+def _free_in_plane(deck: Deck) -> Deck:
+    """Hold u and v only where w is held, if the deck restrains them at every node."""
+    boundaries = tuple(deck.all(Boundary))
+    if not _holds_the_plane(boundaries, deck.control.numnp, deck.control.ndf):
+        return deck
+
+    # Codes of one unknown carry on independently of the others, so that copies of w's do as w's.
+    def freed(record: NodeCodes) -> NodeCodes:
+        w = record.codes[2]
+        return replace(record, codes=(w, w, *record.codes[2:]), source=None)
+
+    segments = tuple(
+        replace(s, records=tuple(map(freed, s.records)), source=None)
+        if isinstance(s, Boundary)
+        else s
+        for s in deck.segments
+    )
+    return replace(deck, segments=segments)
 
 
 def _swap(deck: Deck, old: Segment, new: Segment) -> Deck:
@@ -117,12 +161,13 @@ def _layup(deck: Deck, name: str, value: Value) -> Deck:
     return replace(made, control=control)
 
 
-def _dt(deck: Deck, name: str, value: Value) -> Deck:
-    """Change every time step; the program keeps its number of steps."""
-    macros = tuple(
-        replace(m, value=float(value), source=None) if m.word == "DT" else m for m in deck.macros
-    )
-    return replace(deck, macros=macros)
+@lru_cache(maxsize=8)
+def _taken_time_step(deck: Deck) -> float:
+    """What DT 0 takes in a deck; 0 where no DT is 0."""
+    if all(macro.value for macro in deck.macros if macro.word == "DT"):
+        return 0.0
+    checked = check(Problem(deck), Findings())
+    return 0.0 if checked is None else taken_time_step(critical_of(checked))
 
 
 _SETTERS: dict[str, Callable[[Deck, str, Value], Deck]] = {
@@ -133,5 +178,4 @@ _SETTERS: dict[str, Callable[[Deck, str, Value], Deck]] = {
     **dict.fromkeys(PLY, _ply),
     "thickness": _thickness,
     "layup": _layup,
-    "dt": _dt,
 }

@@ -1,0 +1,111 @@
+"""Sweeps in which the plate varies: its supports and time step follow the laminate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm.api import prepare
+from fecm.deck import Deck
+from fecm.deck.model import Boundary
+from fecm.laminate import is_coupled
+from fecm.mesh import generate
+from fecm.sweeps.variations import varied
+from tests.calls import call
+from tests.decks import LONG, MESH, small
+
+LAYUPS = ("[0/90]2s", "[0_4/90_4]", "[45/-45]4")
+
+
+def new(layup: str, *options: str) -> str:
+    """Deck that ``fecm new`` writes for a layup."""
+    made = call(
+        "new", "-", "--size", "100x100", "--mesh", "4x4", "--layup", layup,
+        "--ply-thickness", ".25", "--material", "T300/5208", "--units", "mm-N-s",
+        "--velocity", "3000", "--law", "45000,.016,.094,2.5", "--projectile", "mass:2e-5",
+        "--duration", "2e-4", *options,
+    )  # fmt: skip
+    assert made.exit_code == 0
+    return made.stdout
+
+
+def model(text: str | Path) -> Deck:
+    """Model of a deck of one problem."""
+    deck = fecm.read_deck(text)
+    assert isinstance(deck, Deck)
+    return deck
+
+
+@pytest.mark.parametrize("support", ["free", "simple", "clamped"])
+@pytest.mark.parametrize("base", LAYUPS[:2])
+def test_a_sweep_of_layups_is_new_and_run_of_each(base: str, support: str) -> None:
+    found = fecm.sweep(new(base, "--support", support), {"layup": LAYUPS}, history=True)
+    assert found.force is not None
+    for case, layup in enumerate(LAYUPS):
+        result = fecm.run(new(layup, "--support", support))
+        assert isinstance(result, fecm.Result)
+        assert found.dt[case] == pytest.approx(result.time[0], rel=1e-12)
+        steps = min(len(result.force), int(found.steps[case]))
+        assert steps >= len(result.force) - 1
+        difference = np.abs(found.force[case, :steps] - result.force[:steps]).max()
+        assert difference < 1e-9 * result.force.max()
+
+
+def test_an_unsymmetric_laminate_is_the_softer_one() -> None:
+    deck = new(LAYUPS[0], "--support", "clamped", "--duration", "1e-3")
+    found = fecm.sweep(deck, {"layup": LAYUPS[:2]})
+    symmetric, unsymmetric = found["peak_force"]
+    assert unsymmetric < 0.97 * symmetric
+
+
+def test_u_and_v_are_free_where_b_is_not_zero_and_w_is_free() -> None:
+    deck = model(new("[0/90]s", "--edge", "left=simple", "--edge", "top=clamped"))
+    assert (generate(deck).codes[:, :2] != 0).all()
+    codes = generate(varied(deck, {"layup": "[0/90]"})).codes != 0
+    assert codes[:, 2].sum() == 9 + 9 - 1
+    assert (codes[:, 0] == codes[:, 2]).all()
+    assert (codes[:, 1] == codes[:, 2]).all()
+    kept = varied(deck, {"layup": "[90/0]s"})
+    assert kept.all(Boundary) == deck.all(Boundary)
+
+
+def test_supports_in_the_plane_that_hold_some_nodes_only_are_kept() -> None:
+    mesh = MESH.replace(
+        "    1    1   -1   -1    0    0    0\n", "    3    1   -1   -1    0    0    0\n"
+    )
+    deck = varied(model(small(mesh=mesh)), {"layup": "[0/90/0]"})
+    made = varied(deck, {"layup": "[0/90]"})
+    assert made.all(Boundary) == deck.all(Boundary)
+
+
+def test_in_plane_unknowns_that_rest_do_not_limit_the_time_step() -> None:
+    # Stiff plies at the faces: the plate is faster in its plane than in bending.
+    held = model(LONG)
+    assert not is_coupled(held.need(fecm.deck.model.Material))
+    free = Deck(
+        held.title, held.control,
+        tuple(s for s in held.segments if not isinstance(s, Boundary)), held.macros,
+    )  # fmt: skip
+    steps = [f"{line}" for deck in (held, free) for line in _critical(deck)]
+    assert steps[0] == steps[1]
+    force = [_run(deck).force for deck in (held, free)]
+    np.testing.assert_array_equal(force[0], force[1])
+    sparse = fecm.run(free, solver="csr")
+    assert isinstance(sparse, fecm.Result)
+    assert np.abs(sparse.force - force[0]).max() < 1e-9 * force[0].max()
+
+
+def _critical(deck: Deck) -> list[str]:
+    from fecm.overview import overview
+
+    made = overview(prepare(deck).problems[0])
+    return [line for line in made.lines() if "critical" in line]
+
+
+def _run(deck: Deck) -> fecm.Result:
+    result = fecm.run(deck)
+    assert isinstance(result, fecm.Result)
+    return result
