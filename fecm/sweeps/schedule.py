@@ -99,15 +99,14 @@ def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> Non
 
 def _check_address(address: str) -> None:
     """Refuse an address that is none, or where nothing listens, before a client is made for it."""
-    place = urlsplit(address if "://" in address else f"tcp://{address}")
+    none = f"`{address}` is not the address of a Dask scheduler, as in tcp://host:8786"
     try:
+        place = urlsplit(address if "://" in address else f"tcp://{address}")
         host, port = place.hostname, place.port
     except ValueError:
-        host = port = None
+        raise SchedulerError(none) from None
     if not (host and port):
-        raise SchedulerError(
-            f"`{address}` is not the address of a Dask scheduler, as in tcp://host:8786"
-        )
+        raise SchedulerError(none)
     if place.scheme in ("tcp", "tls"):
         try:
             socket.create_connection((host, port), float(PATIENCE.rstrip("s"))).close()

@@ -1,0 +1,82 @@
+"""What a sweep has finished: damage is found, and what was lost with a worker is not finished."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fecm.sweeps import schedule
+from fecm.sweeps.api import carry_out, problem_of
+from fecm.sweeps.cases import grid
+from fecm.sweeps.clock import with_time_step
+from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.run import Task, run
+from fecm.sweeps.schedule import LOST
+from fecm.sweeps.store import DamagedPartError, Parts
+from fecm.sweeps.tasks import Plan, plan, tasks
+from tests.calls import call
+from tests.decks import small
+from tests.test_sweep import model
+
+
+@pytest.fixture
+def made() -> Plan:
+    """Two plates."""
+    return plan(problem_of(model(small())), grid([("layup", ["[0/90]", "[90/0]"])]), history=True)
+
+
+def test_a_part_with_any_byte_changed_or_cut_off_is_damaged(made: Plan, tmp_path: Path) -> None:
+    parts = Parts(tmp_path / "s.h5", made.fingerprint())
+    task = tasks(problem_of(made.deck), made)[0]
+    parts.put(task, run(task))
+    (path,) = parts.folder.glob("task-*.npz")
+    data = path.read_bytes()
+    found = parts.get(task)
+    assert found is not None
+    assert found.force is not None
+    random = np.random.default_rng(3)
+    for at in random.integers(len(data), size=100).tolist():
+        path.write_bytes(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
+        with pytest.raises(DamagedPartError):
+            parts.get(task)
+        path.write_bytes(data[:at])
+        with pytest.raises(DamagedPartError):
+            parts.get(task)
+
+
+def test_cases_lost_with_their_workers_are_not_stored_as_finished(
+    made: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def attempt(task: Task) -> Outcome:
+        return run(task) if task.number else Outcome.failed(list(task.numbers), [LOST])
+
+    monkeypatch.setattr(schedule, "attempt", attempt)
+    parts = Parts(tmp_path / "s.h5", made.fingerprint())
+    problem = problem_of(made.deck)
+    found = carry_out(problem, made, parts=parts)
+    assert found.fine.tolist() == [False, True]
+    assert [parts.get(task) is None for task in tasks(problem, made)] == [True, False]
+
+
+@pytest.mark.parametrize("address", ["blah", "tcp://blah", "tcp://127.0.0.1:0", "tcp://[::1:1"])
+def test_an_address_that_is_none_is_refused_in_one_line(address: str, tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    deck = tmp_path / "plate.inp"
+    deck.write_text(small())
+    done = call("sweep", deck, "--vary", "k=1e6", "--scheduler", address, "-o", tmp_path / "s.h5")
+    assert done.exit_code == 2
+    (line,) = [line for line in done.stderr.splitlines() if line.startswith("fecm: error")]
+    assert address in line
+    assert "Traceback" not in done.stderr
+
+
+def test_another_time_step_keeps_duration_and_rows() -> None:
+    deck = model(small())  # 10 steps of 5e-7, stored every 5
+    made = with_time_step(deck, 1e-7)
+    values = {macro.word: macro.value for macro in made.macros}
+    assert (values["DT"], values["LOOP"], values["RODP"], values["DISP"]) == (1e-7, 50, 25, 25)
+    longer = with_time_step(deck, 3e-7)
+    values = {macro.word: macro.value for macro in longer.macros}
+    assert values["LOOP"] == 17  # 5e-6 / 3e-7 = 16.7, rounded up
