@@ -1,5 +1,58 @@
-"""``python -m fecm``."""
+"""The command ``fecm``, also as ``python -m fecm``."""
 
-from fecm.cli import main
+from __future__ import annotations
 
-main(prog_name="fecm")
+import contextlib
+import os
+import signal
+from types import FrameType
+from typing import NoReturn
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    """End the program while it loads its parts, when there is nothing to tidy up."""
+    os._exit(128 + number)
+
+
+# Address space with which NumPy and SciPy load.  With less, OpenBLAS may not come back.
+LEAST_SPACE = 600_000_000
+
+
+def _refuse(message: str) -> NoReturn:
+    """End the program before it has loaded what it needs for more."""
+    with contextlib.suppress(OSError):
+        os.write(2, f"fecm: error: {message}\n".encode())
+    os._exit(2)
+
+
+def _address_space() -> int | None:
+    """Bytes of address space that the process may have (``ulimit -v``); None without a limit."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    return None if limit == resource.RLIM_INFINITY else limit
+
+
+def main() -> NoReturn:
+    """Run the command line and leave with its exit status."""
+    with contextlib.suppress(ValueError):  # only the main thread may do so
+        signal.signal(signal.SIGINT, _leave)
+        signal.signal(signal.SIGTERM, _leave)
+    space = _address_space()
+    if space is not None and space < LEAST_SPACE:
+        _refuse(
+            f"the process may have {space / 1e6:.0f} MB of address space (ulimit -v), and "
+            f"{LEAST_SPACE / 1e6:.0f} MB are needed"
+        )
+    try:
+        from fecm.cli import main as run
+    except (ImportError, MemoryError) as error:
+        line = str(error).partition("\n")[0] or "there is not enough memory"
+        _refuse(f"a part of the program can't be loaded: {line}")
+    run()
+
+
+if __name__ == "__main__":
+    main()

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.files import packed, partial_of
+from fecm.files import beside, naming, open_ordinary, packed
 from fecm.results.journal import Journal, Part
 from fecm.simulation import Simulation
 from fecm.version import __version__
@@ -99,21 +99,17 @@ class Checkpointer:
         OSError
             If it can't be written; the one before is then untouched.
         """
-        with self._spool.open("r+b" if self._journal.spooled.length else "w+b") as spool:
+        flags = os.O_RDWR
+        if not self._journal.spooled.length:
+            self._spool.unlink(missing_ok=True)
+            flags |= os.O_CREAT | os.O_EXCL
+        with naming(self._spool), open_ordinary(self._spool, flags) as spool:
             part = self._journal.spool(spool)
         values, arrays = _split(simulation.state())
         about = {"identity": identity(simulation), "spool": vars(part), "values": values}
-        partial = partial_of(self._checkpoint)
-        try:
-            with partial.open("wb") as file:
-                told = np.frombuffer(json.dumps(about).encode(), np.uint8)
-                file.write(packed({"about": told, **arrays}))
-                file.flush()
-                os.fsync(file.fileno())
-            partial.replace(self._checkpoint)
-        finally:
-            partial.unlink(missing_ok=True)
-        _sync(self._checkpoint.parent)
+        told = np.frombuffer(json.dumps(about).encode(), np.uint8)
+        with beside(self._checkpoint, follow=False) as partial:
+            partial.write_bytes(packed({"about": told, **arrays}))
         self._journal.keep(part)
         self._written = time.monotonic()
 
@@ -137,13 +133,24 @@ class Checkpointer:
             part = Part(**about["spool"])
         self._journal.replay(self._spool, part)
         with self._reading():
+            for name, own in _split(simulation.state())[1].items():
+                theirs = arrays[name]
+                fits = own.shape == theirs.shape or not name.startswith("state/")
+                if own.dtype != theirs.dtype or own.ndim != theirs.ndim or not fits:
+                    raise ValueError(f"{name} has another shape or type")
             simulation.restore({**about["values"], **arrays})
 
     def _read(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         """What a checkpoint says in JSON, and its arrays."""
         if not self._checkpoint.exists():
             raise CheckpointError(f"there is no checkpoint {self._checkpoint}")
-        with self._checkpoint.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+        with (
+            naming(self._checkpoint),
+            open_ordinary(self._checkpoint) as file,
+            np.load(file, allow_pickle=False) as stored,
+        ):
+            if any(member.compress_type != zipfile.ZIP_STORED for member in stored.zip.infolist()):
+                raise ValueError("it is compressed")
             arrays = {name: stored[name] for name in stored.files}
         return json.loads(arrays.pop("about").tobytes()), arrays
 
@@ -152,10 +159,9 @@ class Checkpointer:
         """Say of whatever does not fit together that the checkpoint is damaged."""
         try:
             yield
-        except CheckpointError:
+        except (CheckpointError, OSError):
             raise
-        except (ValueError, LookupError, TypeError, AttributeError, zipfile.BadZipFile,
-                EOFError) as error:  # fmt: skip
+        except Exception as error:  # whatever a file can do to zipfile, json and NumPy
             raise CheckpointError(f"{self._checkpoint} is damaged ({error})") from None
 
     def clear(self) -> None:
@@ -168,15 +174,3 @@ def _split(state: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, NDArray[
     """Values that JSON knows, and arrays, of a state."""
     arrays = {name: value for name, value in state.items() if isinstance(value, np.ndarray)}
     return {name: value for name, value in state.items() if name not in arrays}, arrays
-
-
-def _sync(folder: Path) -> None:
-    """Bring a folder's names to the disk, where folders can be opened."""
-    try:
-        handle = os.open(folder, os.O_RDONLY)
-    except OSError:
-        return
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

@@ -1,37 +1,315 @@
-"""Files that are whole or not there: written beside their final name and renamed."""
+"""Output files: each is complete under its name, or what was there before is untouched.
+
+A file is written beside its final name, synced, and renamed when it is complete.  The partial file
+is locked while it is written, so that two processes never write the same output at a time; one
+without a lock was left by a process that has ended, and is removed.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import os
-from collections.abc import Iterable, Iterator, Mapping
+import stat
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
+
+# Windows has neither.
+NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
+NO_WAIT = getattr(os, "O_NONBLOCK", 0)
+
+# Errors of os.link on file systems without hard links.
+NO_LINKS = {errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK}
+
+# Attempts to create a partial file while others remove it.
+ATTEMPTS = 10
+
+
+class OutputError(OSError):
+    """An output can't be written where it was asked for; the message says why."""
+
+
+def check_outputs(
+    paths: Sequence[Path],
+    overwrite: bool,
+    inputs: Iterable[Path] = (),
+    own: Iterable[Path] = (),
+) -> None:
+    """Refuse outputs that clash, exist, or can't be written, before anything is computed.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        All outputs of a command.
+    overwrite : bool
+        Whether files that exist may be replaced.
+    inputs : iterable of Path
+        What the command reads; never replaced.
+    own : iterable of Path
+        What the command writes besides, as checkpoints; no output may have such a name.
+
+    Raises
+    ------
+    OutputError
+    """
+    read = {key for path in inputs for key in _keys(path)}
+    taken = {key for path in own for key in _keys(path)}
+    for path in paths:
+        keys = _keys(path)
+        if read & keys:
+            raise OutputError(f"{path} is an input of this command; give the output another name")
+        if taken & keys:
+            raise OutputError(f"{path} is named for two outputs; give each a name of its own")
+        taken |= keys
+    for path in paths:
+        _check(path, overwrite)
+
+
+def _keys(path: Path) -> set[object]:
+    """What two paths of one file have in common: its real path, and its identity if it exists."""
+    keys: set[object] = {os.path.realpath(path)}
+    with contextlib.suppress(OSError):
+        found = path.stat()
+        keys.add((found.st_dev, found.st_ino))
+    return keys
+
+
+def _check(path: Path, overwrite: bool) -> None:
+    """Refuse one output."""
+    mode = _mode(path)
+    _refuse_special(path, mode)
+    target = final(path)
+    if not target.parent.is_dir():
+        raise OutputError(f"{path}: there is no folder {target.parent}")
+    if mode is not None and not overwrite:
+        raise OutputError(f"{path} exists already; --overwrite replaces it")
+    if path.is_symlink() and not overwrite:
+        raise OutputError(
+            f"{path} is a link to {target}, which does not exist; --overwrite makes it"
+        )
+    if not _discard(partial_of(target)):
+        raise OutputError(f"{path} is being written by another process")
+
+
+def _mode(path: Path) -> int | None:
+    """Kind and permissions of what a path leads to; None if there is nothing."""
+    try:
+        return path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+
+
+def _refuse_special(path: Path, mode: int | None) -> None:
+    """Refuse to replace folders, devices, FIFOs and sockets."""
+    if mode is not None and stat.S_ISDIR(mode):
+        raise OutputError(f"{path} is a folder")
+    if mode is not None and not stat.S_ISREG(mode):
+        raise OutputError(f"{path} is not an ordinary file")
+
+
+def final(path: Path) -> Path:
+    """The file that a path leads to: of a symbolic link its target, which need not exist.
+
+    Raises
+    ------
+    OutputError
+        If links lead back to themselves.
+    """
+    if not path.is_symlink():
+        return path
+    target = Path(os.path.realpath(path))
+    if target.is_symlink():
+        raise OutputError(f"{path} is a link that leads back to itself")
+    return target
 
 
 def partial_of(path: Path) -> Path:
-    """Where this process writes a file before it gets its name."""
-    return path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
+    """Where a file is written before it gets its name."""
+    return path.with_name(f".{path.stem}.partial{path.suffix}")
 
 
 @contextlib.contextmanager
-def beside(path: Path) -> Iterator[Path]:
-    """Give the path of a partial file that takes the final name if the block ends well.
+def beside(path: Path, *, overwrite: bool = True, follow: bool = True) -> Iterator[Path]:
+    """Give the path of an empty partial file that takes the final name if the block ends well.
 
-    It has the final name's suffix, by which some writers choose their format.
+    It has the final name's suffix, by which some writers choose their format.  A file that is
+    replaced keeps its permissions, and where the user may set them its owner and group; other hard
+    links to it keep the old contents.
+
+    Parameters
+    ----------
+    path : Path
+    overwrite : bool
+        Replace a file that exists, even one that was made meanwhile.
+    follow : bool
+        Of a symbolic link replace the target and keep the link, instead of the other way round.
 
     Raises
     ------
     OSError
-        If the file can't be written; what stood under the final name is then untouched.
+        If the file can't be written; what was under the final name is then untouched.
     """
-    partial = partial_of(path)
+    target = final(path) if follow else path
+    partial = partial_of(target)
+    with naming(path, partial):
+        mode = _mode(target)
+        if follow:
+            _refuse_special(path, mode)
+        handle = _create(path, partial, 0o666 if mode is None else 0o600)
+        try:
+            yield partial
+            _finish(handle, partial, target, overwrite)
+        finally:
+            if _is(handle, partial):
+                with contextlib.suppress(PermissionError):  # Windows removes no open file
+                    partial.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                os.close(handle)
+
+
+@contextlib.contextmanager
+def naming(path: Path, partial: Path | None = None) -> Iterator[None]:
+    """Name a file in errors of the system that name nothing, or its partial file."""
     try:
-        yield partial
-        partial.replace(path)
+        yield
+    except OSError as error:
+        if error.errno is not None and error.filename in (None, str(partial)):
+            error.filename, error.filename2 = str(path), None
+        raise
+
+
+def _create(path: Path, partial: Path, mode: int) -> int:
+    """Create and lock a partial file."""
+    for _ in range(ATTEMPTS):
+        try:
+            handle = os.open(partial, os.O_RDWR | os.O_CREAT | os.O_EXCL | NO_FOLLOW, mode)
+        except FileExistsError:
+            if not _discard(partial):
+                break
+            continue
+        _lock(handle, wait=True)
+        if _is(handle, partial):
+            return handle
+        os.close(handle)  # taken for an abandoned one before it was locked
+    raise OutputError(f"{path} is being written by another process")
+
+
+def _discard(partial: Path) -> bool:
+    """Remove a partial file unless somebody is writing it; tell whether it is gone."""
+    try:
+        handle = os.open(partial, os.O_RDONLY | NO_FOLLOW | NO_WAIT)
+    except FileNotFoundError:
+        return True
+    except PermissionError:
+        return False
+    except OSError as error:
+        if error.errno != errno.ELOOP:
+            raise
+        partial.unlink(missing_ok=True)  # a link
+        return True
+    try:
+        if not _lock(handle):
+            return False
+        if _is(handle, partial):
+            partial.unlink(missing_ok=True)
+        return True
     finally:
-        partial.unlink(missing_ok=True)
+        os.close(handle)
+
+
+def _lock(handle: int, *, wait: bool = False) -> bool:
+    """Lock a file; False if another process holds it.  Some systems have no locks."""
+    try:
+        import fcntl
+
+        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except BlockingIOError:
+        return False
+    except (ImportError, OSError):
+        return True
+    return True
+
+
+def _is(handle: int, path: Path) -> bool:
+    """Whether a path still leads to an open file."""
+    try:
+        return os.path.samestat(os.fstat(handle), path.lstat())
+    except OSError:
+        return False
+
+
+def _finish(handle: int, partial: Path, target: Path, overwrite: bool) -> None:
+    """Bring a partial file to the disk and give it its final name."""
+    if not _is(handle, partial):
+        raise OutputError(f"{target}: its partial file {partial} was removed while it was written")
+    sync(handle)
+    if overwrite:
+        with contextlib.suppress(FileNotFoundError):
+            _keep_permissions(handle, target.lstat())
+        if os.name == "nt":
+            os.close(handle)  # Windows renames no open file
+        partial.replace(target)
+    else:
+        _rename_exclusively(partial, target)
+    with contextlib.suppress(OSError):  # not every system opens or syncs folders
+        folder = os.open(target.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+
+
+def sync(handle: int) -> None:
+    """Bring an open file to the disk, as far as its file system can."""
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS):
+            raise
+
+
+def _keep_permissions(handle: int, old: os.stat_result) -> None:
+    """Give an open file the owner, group and permissions of another one, as far as possible."""
+    if not stat.S_ISREG(old.st_mode):
+        return
+    for owner, group in ((old.st_uid, -1), (-1, old.st_gid)):
+        with contextlib.suppress(OSError, AttributeError):
+            os.fchown(handle, owner, group)
+    with contextlib.suppress(OSError, AttributeError):
+        os.fchmod(handle, stat.S_IMODE(old.st_mode) & 0o777)
+
+
+def _rename_exclusively(partial: Path, target: Path) -> None:
+    """Rename a file, but never onto one that exists."""
+    try:
+        try:
+            os.link(partial, target)
+        except OSError as error:
+            if error.errno not in NO_LINKS:
+                raise
+            os.close(os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL | NO_FOLLOW))
+            partial.replace(target)
+    except FileExistsError:
+        raise OutputError(
+            f"{target} was made by another program meanwhile and is not replaced"
+        ) from None
+
+
+def open_ordinary(path: Path, flags: int = os.O_RDONLY) -> BinaryIO:
+    """Open an ordinary file that the program itself has named; never through a link.
+
+    Raises
+    ------
+    OSError
+        If it can't be opened, or is a link, a device or a FIFO.
+    """
+    handle = os.open(path, flags | NO_FOLLOW | NO_WAIT, 0o666)
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise OutputError(f"{path} is not an ordinary file")
+    return os.fdopen(handle, "rb" if flags == os.O_RDONLY else "r+b")
 
 
 def packed(arrays: Mapping[str, Any]) -> memoryview:
@@ -47,29 +325,9 @@ def packed(arrays: Mapping[str, Any]) -> memoryview:
     return buffer.getbuffer()
 
 
-def clear_stale(*paths: Path) -> None:
-    """Remove partial files that processes have left which are no more."""
-    for path in paths:
-        for partial in path.parent.glob(f".{path.stem}.*.partial{path.suffix}"):
-            process = partial.name.removeprefix(f".{path.stem}.").partition(".")[0]
-            if process.isdigit() and not _alive(int(process)):
-                partial.unlink(missing_ok=True)
-
-
-def _alive(process: int) -> bool:
-    """Whether a process is still there, as far as this one may know."""
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
-    return True
-
-
-def clear_partials_of(process: int, folders: Iterable[Path]) -> None:
-    """Remove the partial files that a process which is no more has left in some folders."""
+def clear_partials(folders: Iterable[Path]) -> None:
+    """Remove the partial files in some folders that nobody is writing."""
     for folder in folders:
-        for partial in folder.glob(f".*.{process}.partial*"):
+        for partial in folder.glob(".*.partial*"):
             with contextlib.suppress(OSError):
-                partial.unlink()
+                _discard(partial)

@@ -309,7 +309,12 @@ class Course:
         self._body = body
         self._goal: list[tuple[int, int]] = []
 
-    def run(self, bind: Bind, after: Sequence[tuple[int, int]] = ()) -> None:
+    def run(
+        self,
+        bind: Bind,
+        after: Sequence[tuple[int, int]] = (),
+        between: Callable[[], object] = lambda: None,
+    ) -> None:
         """Carry the program out.
 
         Parameters
@@ -319,15 +324,17 @@ class Course:
             its course without holding on to itself.
         after : sequence of (int, int)
             Begin behind the macro at this place.
+        between : callable
+            Called behind each macro and each pass of a loop, when `place` tells where to go on.
         """
         self._goal = [(int(index), int(current)) for index, current in after]
         with contextlib.suppress(EndedError):
-            self._bound(self._body, bind, 0)(1)
+            self._bound(self._body, bind, between, 0)(1)
 
-    def _bound(self, body: Body, bind: Bind, depth: int) -> Act:
+    def _bound(self, body: Body, bind: Bind, between: Callable[[], object], depth: int) -> Act:
         """Bind a program's macros to what they do, so that a pass only has to call them."""
         acts = [
-            self._repeated(item, bind, depth + 1) if isinstance(item, Loop) else bind(item)
+            self._repeated(item, bind, between, depth + 1) if isinstance(item, Loop) else bind(item)
             for item in body
         ]
         self.place += [(0, 0)] * (depth + 1 - len(self.place))
@@ -338,19 +345,23 @@ class Course:
                 place[depth] = index, current
                 if acts[index](current):
                     return True
+                between()
             return False
 
         return carry_out
 
-    def _repeated(self, loop: Loop, bind: Bind, depth: int) -> Act:
+    def _repeated(self, loop: Loop, bind: Bind, between: Callable[[], object], depth: int) -> Act:
         """Bind a loop, whose body is at a depth."""
-        carry_out = self._bound(loop.body, bind, depth)
+        carry_out = self._bound(loop.body, bind, between, depth)
+        empty = not loop.body
 
         def repeat(_: int) -> None:
             first = self._goal[depth][1] if self._goal else 1
             for current in range(first, loop.count + 1):
                 if carry_out(current):
                     break
+                if empty:
+                    between()  # an empty body has no place: the loop counts as done
             self.place[depth:] = [(0, 0)] * (len(self.place) - depth)
 
         return repeat
@@ -444,13 +455,17 @@ def _entry(body: Body, count: int) -> tuple[int, dict[str, int], dict[int, int]]
     return macros, passes, steps
 
 
-def tally(body: Body, *, counts_anew: bool = False) -> Tally:
+def tally(
+    body: Body, between: Callable[[], object] = lambda: None, *, counts_anew: bool = False
+) -> Tally:
     """Count exactly what a program does and stores; carries out its loops where it must.
 
     Parameters
     ----------
     body : tuple
         The program.
+    between : callable
+        Called between two macros; may raise.
     counts_anew : bool
         Whether RODP counts the steps since the last output (the slip ``counter``): then
         `contact_rows` is an upper bound where RODP cards differ.
@@ -473,5 +488,5 @@ def tally(body: Body, *, counts_anew: bool = False) -> Tally:
 
         return act
 
-    Course(body).run(bind)
+    Course(body).run(bind, between=between)
     return Tally(counted.macros, counted.steps, rows, counted.passes)

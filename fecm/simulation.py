@@ -63,6 +63,8 @@ class Simulation:
         Writes the printed output.
     look : callable
         Called between two steps, as often as `progress`; may write a checkpoint, or end the run.
+    urgent : callable
+        Asked between two macros whether to call `look` at once; may raise before the run begins.
     notes : list of str
         What the user should know of the run.
     """
@@ -73,6 +75,7 @@ class Simulation:
     progress: Progress = lambda done, steps: None
     printer: Printer = field(default_factory=Printer)
     look: Look = lambda simulation: None
+    urgent: Callable[[], bool] = lambda: False
     notes: list[str] = field(default_factory=list, init=False)
     slips: frozenset[str] = field(init=False)
     setup: Setup = field(init=False)
@@ -106,7 +109,7 @@ class Simulation:
         if self.setup.impact is not None:
             self.impact = self.setup.impact.start(self.plate)
         self.course = Course(program)
-        self._sizes = tally(program, counts_anew="counter" in self.slips)
+        self._sizes = tally(program, self.urgent, counts_anew="counter" in self.slips)
         if "prop-contact" in self.slips:
             self._replaced = 1.0  # PROP's first value in the listing
         self._tables = list(deck.tables)
@@ -169,7 +172,7 @@ class Simulation:
             self.printer.problem(self.checked.deck, self.checked.mesh, self.setup.plate)
         try:
             with np.errstate(all="ignore"):  # an overflow is found, and said better, below
-                self.course.run(self._bind, self._place)
+                self.course.run(self._bind, self._place, self._between)
                 self._recorder.finish()
             self._footer()
             self._judge()
@@ -232,6 +235,10 @@ class Simulation:
         self.printer.restore(state["printed"])
         self._recorder.restore(part(state, "recorder/"))
         self._place = [(index, current) for index, current in state["place"]]
+
+    def _between(self) -> None:
+        if self.urgent():
+            self.look(self)
 
     def _bind(self, macro: Macro) -> Act:
         """What a macro does, given the pass."""

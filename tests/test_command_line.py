@@ -273,7 +273,7 @@ def test_a_full_output_ends_in_one_line(tmp_path: Path) -> None:
             stdout=full, stderr=subprocess.PIPE, text=True, check=False, cwd=tmp_path,
         )  # fmt: skip
     assert done.returncode == 2
-    assert done.stderr == "fecm: error: No space left on device\n"
+    assert done.stderr == "fecm: error: standard output: No space left on device\n"
 
 
 @pytest.mark.parametrize("option", ["--energy-limit", "--checkpoint"])

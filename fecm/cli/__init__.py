@@ -7,16 +7,13 @@ by the command that needs them.
 
 from __future__ import annotations
 
-import contextlib
-import os
-import sys
-from collections.abc import Iterator, Sequence
-from typing import Any, NoReturn
+from collections.abc import Sequence
+from typing import NoReturn
 
 import click
 
-from fecm.cli import apart
-from fecm.cli.common import INTERRUPTED, UNUSABLE, signals
+from fecm.cli import apart, streams
+from fecm.cli.common import INTERRUPTED, SIGNALLED, UNUSABLE, echo, signals
 from fecm.cli.decks import check, fmt, materials, new
 from fecm.cli.diff import diff
 from fecm.cli.export import export
@@ -35,35 +32,7 @@ from fecm.results.schema import ResultFileError
 from fecm.version import __version__
 
 
-@contextlib.contextmanager
-def _unread() -> Iterator[None]:
-    """End with 2 when the reader of the output has left; click itself would answer 1."""
-    try:
-        yield
-        sys.stdout.flush()
-    except BrokenPipeError:
-        # What is still buffered would be complained of when the program ends.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        raise SystemExit(UNUSABLE) from None
-
-
-class _Program(click.Group):
-    """The program."""
-
-    def make_context(self, *arguments: Any, **extra: Any) -> click.Context:
-        """Read the command line; tell the help or the version."""
-        with _unread():
-            return super().make_context(*arguments, **extra)
-
-    def invoke(self, ctx: click.Context) -> Any:
-        """Carry out a command."""
-        with _unread():
-            return super().invoke(ctx)
-
-
-@click.group(
-    cls=_Program, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
-)
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="fecm")
 def cli() -> None:
     """Impact on laminated composite plates, from the punched-card decks of NASA CR-168057."""
@@ -79,31 +48,47 @@ for _command in (
 def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoReturn:
     """Run the command line and leave with its exit status."""
     signals.install()
+    streams.prepare()
     apart.switch.on = arguments is None
+    status = _status(arguments, prog_name)
+    if (error := streams.failure()) is not None and status not in SIGNALLED:
+        status = UNUSABLE
+        if not streams.is_of_reader(error):
+            echo(f"fecm: error: standard output: {error.strerror}", err=True)
+    signals.ignore()
+    raise SystemExit(status)
+
+
+def _status(arguments: Sequence[str] | None, prog_name: str) -> int:
+    """Carry out a command; its exit status."""
     try:
         cli.main(arguments, prog_name=prog_name, standalone_mode=False)
+    except SystemExit as left:
+        return left.code if isinstance(left.code, int) else 0
     except click.ClickException as error:
         error.show()
-        raise SystemExit(error.exit_code) from None
+        return error.exit_code
     except (KeyboardInterrupt, click.Abort):
-        click.echo("fecm: interrupted", err=True)
-        raise SystemExit(INTERRUPTED) from None
-    except (OSError, MemoryError) as error:
-        click.echo(f"fecm: error: {printable(_told(error))}", err=True)
-        raise SystemExit(UNUSABLE) from None
-    except ResultFileError as error:
-        click.echo(f"fecm: error: {printable(str(error))}", err=True)
-        raise SystemExit(UNUSABLE) from None
-    raise SystemExit(0)
+        echo("fecm: interrupted", err=True)
+        return INTERRUPTED
+    except (OSError, MemoryError, ImportError, ResultFileError) as error:
+        if error is not streams.failure():
+            echo(f"fecm: error: {_told(error)}", err=True)
+        return UNUSABLE
+    return 0
 
 
 def _told(error: Exception) -> str:
-    """One line about an error of the operating system."""
-    if isinstance(error, NotEnoughMemoryError):
-        return str(error)
-    if isinstance(error, MemoryError):
+    """One line about an error of the operating system, or of a file."""
+    if isinstance(error, MemoryError) and not isinstance(error, NotEnoughMemoryError):
         return "there is not enough memory"
     if isinstance(error, OSError) and error.strerror:
         name = error.filename2 or error.filename  # of a renaming its target
-        return f"{name}: {error.strerror}" if name else error.strerror
-    return str(error)
+        told = error.strerror if isinstance(name, int) or not name else f"{name}: {error.strerror}"
+        return printable(told)
+    if isinstance(error, ImportError):
+        while isinstance(error.__cause__, ImportError):  # NumPy wraps the error in advice
+            error = error.__cause__
+        line = str(error).partition("\n")[0]
+        return printable(f"a part of the program can't be loaded: {line}")
+    return printable(str(error))

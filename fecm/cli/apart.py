@@ -38,11 +38,10 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn, TypeVar
 
-import click
-
 from fecm.children import die_with_parent
-from fecm.cli.common import INTERRUPTED, TERMINATED, Refused
-from fecm.files import clear_partials_of
+from fecm.cli import streams
+from fecm.cli.common import SIGNALLED, SIGNALS, Refused, echo
+from fecm.files import clear_partials
 from fecm.memory import available, said
 from fecm.results.plain import printable
 
@@ -231,7 +230,7 @@ def _quieten() -> None:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, old.fileno())
         os.close(nowhere)
-        sys.stderr = os.fdopen(own, "w", 1, encoding=old.encoding, errors="backslashreplace")
+        sys.stderr = streams.standard_error(own, old)
 
 
 # The parent -------------------------------------------------------------------------------------
@@ -243,12 +242,12 @@ class _CameError(Exception):
 
 @contextlib.contextmanager
 def _noticing() -> Iterator[None]:
-    """Turn SIGINT and SIGTERM into an exception."""
+    """Turn signals that end the program into an exception."""
 
     def came(number: int, frame: FrameType | None) -> None:
         raise _CameError(number)
 
-    old = {number: signal.signal(number, came) for number in (signal.SIGINT, signal.SIGTERM)}
+    old = {number: signal.signal(number, came) for number in SIGNALS}
     try:
         yield
     finally:
@@ -281,7 +280,7 @@ def _wait(child: int, beats: int, limits: Limits) -> int | None:
                 os.kill(child, then)
         with contextlib.suppress(ChildProcessError):
             os.waitpid(child, 0)
-        click.echo("fecm: interrupted", err=True)
+        echo("fecm: interrupted", err=True)
         return 128 + number
 
 
@@ -320,8 +319,8 @@ def _end_like(
     child: int, status: int | None, told: str, limits: Limits, folders: set[Path]
 ) -> NoReturn:
     """End this program as the child has ended."""
-    if status is None or status < 0 or status in (INTERRUPTED, TERMINATED):
-        clear_partials_of(child, folders)
+    if status is None or status < 0 or status in SIGNALLED:
+        clear_partials(folders)
     if status is None:
         raise Refused(
             f"{told} can't be read: the system did not deliver it within {limits.wait:.3g} s, as "
@@ -329,7 +328,7 @@ def _end_like(
         )
     if status >= 0:
         raise SystemExit(status)
-    if status in (-signal.SIGINT, -signal.SIGTERM):
+    if -status in SIGNALS:
         raise SystemExit(128 - status)
     raise Refused(f"{told} can't be read: {_death(-status, limits)}")
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import signal
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, TextIO
@@ -20,6 +21,14 @@ if TYPE_CHECKING:
     from fecm.deck.findings import Finding
 
 NO, UNUSABLE, INTERRUPTED, TERMINATED = 1, 2, 130, 143
+
+# Signals that end a run in good order; Windows has no SIGHUP.
+SIGNALS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+)
+
+# Exit status after each of them.
+SIGNALLED = tuple(128 + number for number in SIGNALS)
 
 DECK_PATH = click.Path(exists=True, dir_okay=False, path_type=Path)
 FILE_PATH = click.Path(path_type=Path)
@@ -49,7 +58,7 @@ class Refused(click.ClickException):
 
     def show(self, file: object = None) -> None:
         """Print the message on standard error."""
-        click.echo(f"fecm: error: {printable(self.message)}", err=True)
+        echo(f"fecm: error: {printable(self.message)}", err=True)
 
 
 class AnswerIsNo(Refused):
@@ -61,7 +70,7 @@ class AnswerIsNo(Refused):
 def report(prepared: Prepared) -> None:
     """Print the findings of a deck on standard error."""
     for finding in prepared.findings:
-        click.echo(finding.render(prepared.source), err=True)
+        echo(finding.render(prepared.source), err=True)
 
 
 def count_errors(errors: Sequence[Finding]) -> str:
@@ -71,48 +80,76 @@ def count_errors(errors: Sequence[Finding]) -> str:
     return f"the deck has {count} error{'s' if count != 1 else ''}{more}"
 
 
-def check_outputs(paths: Sequence[Path], overwrite: bool) -> None:
-    """Refuse outputs that exist or can't be written, before the first run."""
-    for path in paths:
-        if path.is_dir():
-            raise Refused(f"{path} is a folder")
-        if path.exists() and not path.is_file():
-            raise Refused(f"{path} is no ordinary file")  # a device would be replaced
-        if not path.parent.is_dir():
-            raise Refused(f"{path}: there is no folder {path.parent}")
-        if path.exists() and not overwrite:
-            raise Refused(f"{path} exists already; --overwrite replaces it")
+def echo(text: object = "", *, err: bool = False) -> None:
+    """Print lines to the terminal, with control characters escaped.
+
+    An error of standard output does not end the command: the exit status tells of it.
+    """
+    with contextlib.suppress(OSError):
+        click.echo("\n".join(map(printable, str(text).split("\n"))), err=err)
+
+
+def echo_file(text: str) -> None:
+    """Print a file as it is, or on a terminal with control characters escaped."""
+    if sys.stdout.isatty():
+        echo(text.removesuffix("\n"))
+    else:
+        click.echo(text, nl=False)
 
 
 @contextlib.contextmanager
-def writing(path: Path) -> Iterator[TextIO]:
+def progress(label: str, length: int) -> Iterator[Callable[[int], object]]:
+    """Show a progress bar where standard error is a terminal; gives what moves it on."""
+    if length < 2 or not sys.stderr.isatty():
+        yield lambda steps: None
+        return
+    with click.progressbar(length=length, label=label, file=sys.stderr) as bar:
+        yield bar.update
+
+
+@contextlib.contextmanager
+def writing(path: Path, *, overwrite: bool) -> Iterator[TextIO]:
     """Open a text file that gets its final name only when all went well."""
-    with beside(path) as partial, partial.open("w", encoding="utf-8", newline="\n") as file:
+    with (
+        beside(path, overwrite=overwrite) as partial,
+        partial.open("w", encoding="utf-8", newline="\n") as file,
+    ):
         yield file
 
 
-def write_text(path: Path, text: str) -> None:
+def write_text(path: Path, text: str, *, overwrite: bool) -> None:
     """Write a text file whole, or leave what is there."""
-    with writing(path) as file:
+    with writing(path, overwrite=overwrite) as file:
         file.write(text)
 
 
 class Signals:
-    """Ends the program at SIGINT and SIGTERM.
+    """Ends the program at SIGINT, SIGTERM and SIGHUP.
 
-    A run looks for a signal now and then and ends in good order; an exception that a handler raised
-    in the middle of it could be lost in a finaliser.  A second signal ends the program at once.
+    A run looks for a signal between two macros and ends in good order; an exception that a handler
+    raised in the middle of it could be lost in a finaliser.  A second signal ends the program at
+    once.
     """
 
     def __init__(self) -> None:
         self._received = 0
         self._deferred = False
+        self._installed = False
 
     def install(self) -> None:
-        """Handle the signals from now on."""
+        """Handle the signals from now on; a SIGHUP that nohup has switched off stays so."""
         with contextlib.suppress(ValueError):  # only the main thread may do so
-            signal.signal(signal.SIGTERM, self._handle)
-            signal.signal(signal.SIGINT, self._handle)
+            for number in SIGNALS:
+                ignored = signal.getsignal(number) == signal.SIG_IGN
+                if number in (signal.SIGINT, signal.SIGTERM) or not ignored:
+                    signal.signal(number, self._handle)
+            self._installed = True
+
+    def ignore(self) -> None:
+        """Ignore the signals while the program ends: its exit status is known."""
+        if self._installed:
+            for number in SIGNALS:
+                signal.signal(number, signal.SIG_IGN)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         again, self._received = bool(self._received), number
@@ -129,7 +166,6 @@ class Signals:
             self._deferred = False
         self.heed()
 
-    @property
     def came(self) -> bool:
         """Whether a signal came that asks for the program's end."""
         return bool(self._received)
@@ -137,14 +173,14 @@ class Signals:
     @property
     def status(self) -> int:
         """Exit status of a program that a signal has ended."""
-        return TERMINATED if self._received == signal.SIGTERM else INTERRUPTED
+        return 128 + self._received
 
     def heed(self) -> None:
         """End the program if a signal came."""
-        if self._received == signal.SIGTERM:
-            raise SystemExit(self.status)
-        if self._received:
+        if self._received == signal.SIGINT:
             raise KeyboardInterrupt
+        if self._received:
+            raise SystemExit(self.status)
 
 
 signals = Signals()

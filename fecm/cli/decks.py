@@ -14,14 +14,16 @@ from fecm.cli.common import (
     MODE_OPTION,
     AnswerIsNo,
     Refused,
-    check_outputs,
     count_errors,
+    echo,
+    echo_file,
     write_text,
 )
 from fecm.cli.numbers import Finite
+from fecm.files import check_outputs
 
 
-@click.command()
+@click.command(short_help="Check DECK without running it, and summarise it.")
 @click.argument("deck", type=DECK_PATH)
 @MODE_OPTION
 @FORMAT_OPTION
@@ -44,20 +46,21 @@ def check(deck: Path, mode: str, form: str) -> None:
             click.echo(json.dumps({"kind": "summary", **view.to_dict()}))
     else:
         for finding in prepared.findings:
-            click.echo(finding.render(str(deck)))
+            echo(finding.render(str(deck)))
         for view in views:
-            click.echo("\n".join(view.lines()))
+            echo("\n".join(view.lines()))
     if errors:
         raise AnswerIsNo(count_errors(errors))
 
 
-@click.command()
+@click.command(short_help="Align the columns of DECK.")
 @click.argument("deck", type=DECK_PATH)
 @click.option("-o", "--output", type=click.Path(path_type=Path, allow_dash=True), metavar="FILE",
               help="Where to write; - is standard output.  [default: DECK itself]")  # fmt: skip
 @click.option("--check", "only_check", is_flag=True,
               help="Write nothing; exit with 1 if the deck would change.")  # fmt: skip
-def fmt(deck: Path, output: Path | None, only_check: bool) -> None:
+@click.option("--overwrite", is_flag=True, help="Replace another FILE that exists.")
+def fmt(deck: Path, output: Path | None, only_check: bool, overwrite: bool) -> None:
     """Align the columns of DECK and put a ruler above each kind of card.
 
     The model, comments and blank cards stay as they are.
@@ -66,22 +69,31 @@ def fmt(deck: Path, output: Path | None, only_check: bool) -> None:
     from fecm.deck.formatting import format_deck
     from fecm.deck.reader import load_text
 
+    target = deck if output is None or _same(output, deck) else output
+    in_place = target is deck
+    if not only_check and str(target) != "-":
+        check_outputs([target], overwrite or in_place, [] if in_place else [deck])
     before, _ = load_text(deck)
     try:
         after = format_deck(before, str(deck))
     except DeckError as error:
-        click.echo(str(error), err=True)
+        echo(error, err=True)
         raise Refused("the deck can't be read; nothing was written") from None
     if only_check:
         if after != before:
             raise AnswerIsNo(f"{deck} would change")
-    elif str(output) == "-":
-        click.echo(after, nl=False)
+    elif str(target) == "-":
+        echo_file(after)
     else:
-        write_text(output or deck, after)
+        write_text(target, after, overwrite=overwrite or in_place)
 
 
-@click.command()
+def _same(one: Path, other: Path) -> bool:
+    """Whether two paths lead to one file."""
+    return one.exists() and one.samefile(other)
+
+
+@click.command(short_help="Write a deck from plate, layup, supports and impact.")
 @click.argument("output", type=click.Path(path_type=Path, allow_dash=True), metavar="DECK")
 @click.option("--title", default="", help="Title of the deck.")
 @click.option("--size", metavar="LXxLY", help="Size of the plate, as in 6x4.")
@@ -135,18 +147,18 @@ def new(output: Path, overwrite: bool, **options: Any) -> None:
     prepared = prepare(text)
     if errors := prepared.errors():
         for finding in errors:
-            click.echo(finding.render("the new deck"), err=True)
+            echo(finding.render("the new deck"), err=True)
         raise Refused("these options make no sound deck; nothing was written")
     for note in notes:
-        click.echo(f"fecm: note: {note}", err=True)
+        echo(f"fecm: note: {note}", err=True)
     source = "the new deck" if str(output) == "-" else str(output)
     for finding in prepared.findings:
-        click.echo(finding.render(source), err=True)
+        echo(finding.render(source), err=True)
     if str(output) == "-":
-        click.echo(text, nl=False)
+        echo_file(text)
     else:
-        write_text(output, text)
-        click.echo(output)
+        write_text(output, text, overwrite=overwrite)
+        echo(output)
 
 
 @click.command()

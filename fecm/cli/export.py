@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING
 import click
 
 from fecm.cli.apart import reads
-from fecm.cli.common import DECK_PATH, Refused, check_outputs, writing
+from fecm.cli.common import DECK_PATH, Refused, echo, writing
 from fecm.cli.tables import STANDARD_OUTPUT
+from fecm.files import check_outputs
 
 if TYPE_CHECKING:
     from fecm.results.file_reader import Contents
 
 
-@click.command()
+@click.command(short_help="Write RESULT for ParaView or a spreadsheet.")
 @click.argument("result", type=DECK_PATH)
 @click.option("--to", "target", type=click.Choice(["vtkhdf", "csv"]), required=True,
               help="vtkhdf for ParaView and VTK, csv for spreadsheets.")  # fmt: skip
@@ -50,21 +51,19 @@ def export(
     ending = ".vtkhdf" if target == "vtkhdf" else f"-{name.replace('/', '-')}.csv"
     path = output or Path(f"{result.stem}{ending}")
     if path != STANDARD_OUTPUT:
-        check_outputs([path], overwrite)
-        if path.exists() and path.samefile(result):
-            raise Refused(f"{path} is the result itself")
+        check_outputs([path], overwrite, [result])
     try:
         if target == "vtkhdf":
-            _write_fields(contents, path)
+            _write_fields(contents, path, overwrite=overwrite)
         else:
-            _write_table(contents, name, path)
+            _write_table(contents, name, path, overwrite=overwrite)
     except ExportError as error:
         raise Refused(f"{result}: {error}") from None
     if path != STANDARD_OUTPUT:
-        click.echo(path)
+        echo(path)
 
 
-def _write_fields(contents: Contents, path: Path) -> None:
+def _write_fields(contents: Contents, path: Path, *, overwrite: bool) -> None:
     """Write the fields of a run for ParaView."""
     from fecm.export import ExportError
     from fecm.export.vtkhdf import write_vtkhdf
@@ -74,10 +73,14 @@ def _write_fields(contents: Contents, path: Path) -> None:
     if contents.form == SWEEP:
         raise ExportError("a sweep has no fields; --to csv writes its cases")
     result = result_of(contents)
-    write_vtkhdf(result, path, lambda text: click.echo(f"fecm: note: {text}", err=True))
+
+    def note(text: str) -> None:
+        echo(f"fecm: note: {text}", err=True)
+
+    write_vtkhdf(result, path, note, overwrite=overwrite)
 
 
-def _write_table(contents: Contents, name: str, path: Path) -> None:
+def _write_table(contents: Contents, name: str, path: Path, *, overwrite: bool) -> None:
     """Write a table of a run or of a sweep."""
     from fecm.export import csv, sweep_csv
     from fecm.results.result import result_of
@@ -91,5 +94,5 @@ def _write_table(contents: Contents, name: str, path: Path) -> None:
     if path == STANDARD_OUTPUT:
         sys.stdout.writelines(lines)
         return
-    with writing(path) as file:
+    with writing(path, overwrite=overwrite) as file:
         file.writelines(lines)

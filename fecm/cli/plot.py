@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fecm.cli.apart import reads
-from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, check_outputs
+from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, echo, progress
+from fecm.files import check_outputs
 from fecm.plot import (
     KINDS,
     Options,
@@ -75,7 +76,7 @@ def _pairs(
     return pairs
 
 
-@click.command()
+@click.command(short_help="Draw the report's figures, or the map of a sweep.")
 @click.argument("results", type=DECK_PATH, nargs=-1, required=True, metavar="RESULT...")
 @click.option("--kind", "kinds", type=click.Choice(list(KINDS)), multiple=True,
               metavar="KIND",
@@ -132,11 +133,17 @@ def plot(
         chosen = list(dict.fromkeys(kinds)) or [_usual(next(iter(named.values())))]
         check_options(chosen, options)
         paths = _paths(results[0], chosen, output)
-        check_outputs(list(paths.values()), overwrite)
-        pictures = _draw(named, chosen, options)
+        folder = output if output is not None and output not in paths.values() else None
+        if folder is None or folder.is_dir():
+            check_outputs(list(paths.values()), overwrite, results)
+        with progress("fecm", len(chosen)) as advance:
+            pictures = _draw(named, chosen, options, advance)
+        if folder is not None:
+            folder.mkdir(parents=True, exist_ok=True)
         for kind, path in paths.items():
-            save(pictures[kind], path)
-            click.echo(path)
+            with progress(kind, len(pictures[kind].frames)) as advance:
+                save(pictures[kind], path, overwrite=overwrite, advance=advance)
+            echo(path)
     except PlotError as error:
         raise Refused(str(error)) from None
     except ImportError as error:
@@ -147,12 +154,13 @@ def plot(
 
 def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path]:
     """Where each picture goes."""
-    folder = output if output and output.is_dir() else Path()
-    if output and not output.is_dir():
+    is_folder = output is None or output.is_dir() or not (output.exists() or output.suffix)
+    if output is not None and not is_folder:
         if len(kinds) > 1:
-            raise Refused(f"{output} is no folder, and {len(kinds)} pictures were asked for")
+            raise Refused(f"{output} is not a folder, and {len(kinds)} pictures were asked for")
         check_suffix(kinds[0], output)
         return {kinds[0]: output}
+    folder = output or Path()
     return {kind: folder / f"{first.stem}-{kind}{KINDS[kind].suffixes[0]}" for kind in kinds}
 
 
@@ -184,13 +192,19 @@ def _loaded(path: Path) -> Result | SweepResult:
 
 
 def _draw(
-    results: dict[str, Result | SweepResult], kinds: list[str], options: Options
+    results: dict[str, Result | SweepResult],
+    kinds: list[str],
+    options: Options,
+    advance: Callable[[int], object],
 ) -> dict[str, Picture]:
     """Draw all pictures, before any is written."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        pictures = {kind: draw(kind, results, options) for kind in kinds}
+        pictures = {}
+        for kind in kinds:
+            pictures[kind] = draw(kind, results, options)
+            advance(1)
     notes = [str(one.message) for one in caught if issubclass(one.category, PlotNote)]
     for text in dict.fromkeys(notes):
-        click.echo(f"fecm: note: {text}", err=True)
+        echo(f"fecm: note: {text}", err=True)
     return pictures

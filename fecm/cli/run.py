@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,22 +17,21 @@ from fecm.cli.common import (
     MODE_OPTION,
     AnswerIsNo,
     Refused,
-    check_outputs,
     count_errors,
+    echo,
+    progress,
     report,
     signals,
     writing,
 )
 from fecm.cli.numbers import POSITIVE, Finite
-from fecm.files import clear_stale
+from fecm.files import check_outputs
 from fecm.memory import said
 from fecm.rod_method import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
 from fecm.slips import NAMES, active_slips
 from fecm.solvers import AUTO, SOLVERS
 
 if TYPE_CHECKING:
-    from click._termui_impl import ProgressBar
-
     from fecm.check import Checked
     from fecm.checkpoint import Checkpointer
     from fecm.simulation import Simulation
@@ -114,7 +112,7 @@ def run(
     except ValueError as error:
         raise click.UsageError(str(error)) from None
     from fecm.api import numbered, prepare
-    from fecm.checkpoint import checkpoint_of
+    from fecm.checkpoint import checkpoint_of, spool_of
 
     prepared = prepare(deck, mode)
     report(prepared)
@@ -123,14 +121,16 @@ def run(
     first = output or Path(f"{deck.stem}.h5")
     paths = [numbered(first, n) for n in range(1, len(prepared.problems) + 1)]
     prints = [None if printed is None else numbered(printed, n + 1) for n in range(len(paths))]
-    check_outputs([p for p in (*paths, *prints) if p is not None], overwrite=True)
+    outputs = [p for p in (*paths, *prints) if p is not None]
+    beside = [p for path in paths if path.name for p in (checkpoint_of(path), spool_of(path))]
+    check_outputs(outputs, True, [deck], beside)
     left = next((n for n, path in enumerate(paths) if checkpoint_of(path).exists()), None)
     if resume and left is None:
         raise Refused(f"there is no checkpoint {checkpoint_of(paths[0])} to go on from")
     if left is not None and not (resume or overwrite):
         raise Refused(
             f"{checkpoint_of(paths[left])} is what an interrupted run has left: --resume goes on "
-            "from it, --overwrite begins anew"
+            "from it, --overwrite starts again"
         )
     # The interrupted run had got this far; what stands beyond is not its own.
     own = left + 1 if resume and left is not None else 0
@@ -140,12 +140,12 @@ def run(
     )  # fmt: skip
     for number, path in enumerate(paths):
         if number:
-            click.echo()
+            echo()
         if number < own - 1 and path.exists():
-            click.echo(f"fecm: note: {path} is whole already", err=True)
+            echo(f"fecm: note: {path} is complete", err=True)
             continue
         _run_one(prepared.problems[number], path, prints[number], choices, every,
-                 resumes=number == own - 1)  # fmt: skip
+                 resumes=number == own - 1, overwrite=overwrite or number < own)  # fmt: skip
 
 
 def _run_one(
@@ -156,11 +156,12 @@ def _run_one(
     every: float | None,
     *,
     resumes: bool,
+    overwrite: bool,
 ) -> None:
     """Run one problem of a deck into a file and say what came out."""
     from fecm.check.memory import check_memory
     from fecm.check.run import output_bytes
-    from fecm.checkpoint import Checkpointer, checkpoint_of
+    from fecm.checkpoint import Checkpointer
     from fecm.printout import Printer
     from fecm.program import estimate
     from fecm.results import file_writer
@@ -172,40 +173,42 @@ def _run_one(
     sizes = estimate(problem.program)
     _check_room(path, output_bytes(problem.deck, sizes))
     check_memory(problem, solver=choices.solver)
-    clear_stale(path, checkpoint_of(path), *([] if printed is None else [printed]))
     with contextlib.ExitStack() as stack:
         stack.enter_context(signals.deferred())
-        stack.enter_context(_ends(path))
-        journal = Journal(stack.enter_context(file_writer.writing(path)), muted=resumes)
+        stack.enter_context(_ends(path, resumes=resumes))
+        sink = stack.enter_context(file_writer.writing(path, overwrite=overwrite))
+        journal = Journal(sink, muted=resumes)
         checkpointer = Checkpointer(path, journal)
-        printer = Printer() if printed is None else Printer(stack.enter_context(writing(printed)))
-        advance = stack.enter_context(_progress(sizes.steps))
-        simulation = Simulation(
-            problem, journal, choices, advance, printer, _Look(checkpointer, every)
-        )
+        printer = Printer()
+        if printed is not None:
+            printer = Printer(stack.enter_context(writing(printed, overwrite=overwrite)))
+        advance = _Advance(stack.enter_context(progress("fecm", sizes.steps)))
+        look = _Look(checkpointer, every)
+        simulation = Simulation(problem, journal, choices, advance, printer, look, look.urgent)
         if resumes:
             checkpointer.restore(simulation)
             step = simulation.plate.step
-            click.echo(f"fecm: note: {path} goes on behind step {step}", err=True)
+            echo(f"fecm: note: {path} goes on behind step {step}", err=True)
+        look.started = True
         simulation.run()
     checkpointer.clear()
     for note in simulation.notes:
-        click.echo(f"fecm: note: {note}", err=True)
+        echo(f"fecm: note: {note}", err=True)
     result = load(path)
     if result.still_in_contact:
-        click.echo(f"fecm: note: {OPEN_END}", err=True)
-    click.echo(problem.deck.title or "(no title)")
+        echo(f"fecm: note: {OPEN_END}", err=True)
+    echo(problem.deck.title or "(no title)")
     for line in summary(result):
-        click.echo(f"  {line}")
-    click.echo(f"  result            {path}")
+        echo(f"  {line}")
+    echo(f"  result            {path}")
     if printed is not None:
-        click.echo(f"  printed           {printed}")
+        echo(f"  printed           {printed}")
 
 
 @contextlib.contextmanager
-def _ends(path: Path) -> Iterator[None]:
+def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
     """Say how a run ended that did not end well."""
-    from fecm.checkpoint import CheckpointError
+    from fecm.checkpoint import CheckpointError, checkpoint_of
     from fecm.dynamics import DivergenceError
     from fecm.results.journal import SpoolError
     from fecm.statics import SingularStiffnessError
@@ -222,14 +225,26 @@ def _ends(path: Path) -> Iterator[None]:
             f"the run diverged at step {diverged.step}: {diverged.reason}; {path} was not written"
         ) from None
     except (CheckpointError, SpoolError) as error:
-        raise Refused(f"{error}; run the deck anew, without --resume") from None
+        raise Refused(
+            f"{error}; --overwrite without --resume discards the checkpoint and starts again"
+        ) from None
     except _StoppedError as stopped:
-        click.echo(
+        echo(
             f"fecm: stopped behind step {stopped.step}; the same command with --resume goes on to "
             f"{path}",
             err=True,
         )
         raise SystemExit(signals.status) from None
+    except Exception as error:
+        # h5py's own errors are OSErrors without a number.
+        of_disk = isinstance(error, OSError) and (error.errno or type(error) is not OSError)
+        if not resumes or of_disk or isinstance(error, MemoryError):
+            raise
+        # The state of a checkpoint that was made up can fail anywhere.
+        raise Refused(
+            f"the run can't go on from {checkpoint_of(path)} ({error}); --overwrite without "
+            "--resume discards it and starts again"
+        ) from None
 
 
 class _StoppedError(Exception):
@@ -241,7 +256,7 @@ class _StoppedError(Exception):
 
 
 class _Look:
-    """Looks for signals between two steps, and writes checkpoints.
+    """Ends a run after a signal, and writes checkpoints.
 
     Parameters
     ----------
@@ -253,9 +268,16 @@ class _Look:
     def __init__(self, checkpointer: Checkpointer, every: float | None) -> None:
         self._checkpointer = checkpointer
         self._every = every
+        self.started = False
+
+    def urgent(self) -> bool:
+        """Whether a signal came; before the run has started there is nothing to keep."""
+        if not self.started:
+            signals.heed()
+        return signals.came()
 
     def __call__(self, simulation: Simulation) -> None:
-        if signals.came:
+        if signals.came():
             self._checkpointer.write(simulation)
             raise _StoppedError(simulation.plate.step)
         if self._every is not None and self._checkpointer.age >= self._every:
@@ -271,27 +293,13 @@ def _check_room(path: Path, size: int) -> None:
         )
 
 
-@contextlib.contextmanager
-def _progress(steps: int) -> Iterator[_Advance]:
-    """Show a progress bar where standard error is a terminal."""
-    advance = _Advance()
-    if not sys.stderr.isatty():
-        yield advance
-        return
-    with click.progressbar(length=steps, label="fecm", file=sys.stderr) as bar:
-        advance.bar = bar
-        yield advance
-        bar.update(steps - advance.done)
-
-
 class _Advance:
-    """Moves a progress bar to the step that a run has reached."""
+    """Tells a progress bar of the steps that a run has taken since it was told last."""
 
-    def __init__(self) -> None:
-        self.bar: ProgressBar[int] | None = None
-        self.done = 0
+    def __init__(self, move: Callable[[int], object]) -> None:
+        self._move = move
+        self._done = 0
 
     def __call__(self, done: int, steps: int) -> None:
-        if self.bar is not None:
-            self.bar.update(done - self.done)
-        self.done = done
+        self._move(done - self._done)
+        self._done = done

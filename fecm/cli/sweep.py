@@ -15,10 +15,11 @@ from fecm.cli.common import (
     DECK_PATH,
     FILE_PATH,
     Refused,
-    check_outputs,
     count_errors,
+    echo,
     signals,
 )
+from fecm.files import check_outputs
 
 if TYPE_CHECKING:
     from fecm.check import Checked
@@ -70,7 +71,6 @@ def sweep(
     The last line counts the cases that failed, whose exit status is 1, and those that ended while
     the projectile was still on the plate.
     """
-    from fecm.files import clear_stale
     from fecm.sweeps.cases import CasesError
     from fecm.sweeps.memory import check_memory
     from fecm.sweeps.result import save
@@ -83,25 +83,25 @@ def sweep(
         cases = _cases(varied, table)
         chosen = _chosen(full, len(cases))
         fulls = {case: path.with_name(f"{path.stem}-{case}{path.suffix}") for case in chosen}
-        check_outputs([path, *fulls.values()], overwrite)
+        inputs = [deck] if table is None else [deck, table]
+        check_outputs([path, *fulls.values()], overwrite, inputs)
         problem = _problem(deck)
-        clear_stale(path, *fulls.values())
         made = plan(problem, cases, history=history)
         check_memory(problem, made, 0 if scheduler is not None else workers)
         result = _carry_out(problem, made, path, workers, scheduler, overwrite=overwrite)
     except CasesError as error:
         raise Refused(str(error)) from None
-    save(result, path)
+    save(result, path, overwrite=overwrite)
     if lost := sum(status.startswith(LOST) for status in result["status"].tolist()):
         _note(f"{lost} cases were lost with their workers; --overwrite runs them again")
     else:
         _parts(made, path, restart=True).clear()
-    click.echo(result.title or "sweep")
+    echo(result.title or "sweep")
     for line in summary(result):
-        click.echo(f"  {line}")
-    click.echo(f"  result            {path}")
-    _run_in_full(made, fulls)
-    click.echo(verdict(result))
+        echo(f"  {line}")
+    echo(f"  result            {path}")
+    _run_in_full(made, fulls, overwrite=overwrite)
+    echo(verdict(result))
     if not (allow_failed or result.fine.all()):
         raise SystemExit(1)
 
@@ -133,7 +133,7 @@ def _problem(deck: Path) -> Checked:
     try:
         return problem_of(deck)
     except DeckError as error:
-        click.echo(str(error), err=True)
+        echo(error, err=True)
         errors = [finding for finding in error.findings if finding.severity == "error"]
         raise Refused(f"{count_errors(errors)}; nothing was run") from None
 
@@ -171,12 +171,12 @@ def _carry_out(
         parts.clear()
         raise Refused(str(error)) from None
     except (KeyboardInterrupt, SystemExit):
-        click.echo("fecm: the same command goes on where this sweep was", err=True)
+        echo("fecm: the same command goes on where this sweep was", err=True)
         raise
 
 
 def _note(text: str) -> None:
-    click.echo(f"fecm: note: {text}", err=True)
+    echo(f"fecm: note: {text}", err=True)
 
 
 @contextlib.contextmanager
@@ -203,7 +203,7 @@ def _progress(count: int) -> Iterator[Callable[[Task, Outcome], None]]:
         yield done
 
 
-def _run_in_full(made: Plan, fulls: dict[int, Path]) -> None:
+def _run_in_full(made: Plan, fulls: dict[int, Path], *, overwrite: bool) -> None:
     """Run chosen cases with everything that their deck stores."""
     from fecm.api import prepare
     from fecm.results import file_writer
@@ -216,9 +216,9 @@ def _run_in_full(made: Plan, fulls: dict[int, Path]) -> None:
             prepared = prepare(deck_of(made, case))
             if errors := prepared.errors(force=True):
                 raise CasesError(errors[0].message)
-            with file_writer.writing(path) as sink:
+            with file_writer.writing(path, overwrite=overwrite) as sink:
                 simulate(prepared.problems[0], sink)
         except (CasesError, ArithmeticError) as error:
-            click.echo(f"fecm: note: case {case} was not run in full: {error}", err=True)
+            echo(f"fecm: note: case {case} was not run in full: {error}", err=True)
             continue
-        click.echo(f"  case {case:<12} {path}")
+        echo(f"  case {case:<12} {path}")

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fecm.cli.common import FILE_PATH, Refused, check_outputs, writing
+from fecm.cli.common import FILE_PATH, Refused, echo, writing
+from fecm.files import check_outputs
 
 if TYPE_CHECKING:
     from fecm.plot import Picture
@@ -39,10 +40,13 @@ class Targets:
         None is standard output.
     picture : Path or None
         None if there is none to draw.
+    overwrite : bool
+        Whether files that exist may be replaced.
     """
 
     table: Path | None
     picture: Path | None
+    overwrite: bool
 
     @classmethod
     def checked(
@@ -63,18 +67,14 @@ class Targets:
         Raises
         ------
         Refused
+        OutputError
         """
         if picture is not None:
             _check_picture(picture)
         target = None if table == STANDARD_OUTPUT else table
         paths = [path for path in (target, picture) if path is not None]
-        check_outputs(paths, overwrite)
-        resolved = {path.resolve() for path in paths}
-        if len(resolved) < len(paths):
-            raise Refused(f"{picture} can't be both the table and the picture")
-        if source is not None and source.resolve() in resolved:
-            raise Refused(f"{source} would be replaced by what comes out of it")
-        return cls(target, picture)
+        check_outputs(paths, overwrite, [] if source is None else [source])
+        return cls(target, picture, overwrite)
 
     def draw(self, draw: Callable[[], Picture]) -> None:
         """Draw the picture, if one is asked for.
@@ -91,10 +91,10 @@ class Targets:
         from fecm.plot import PlotError, save
 
         try:
-            save(draw(), self.picture)
+            save(draw(), self.picture, overwrite=self.overwrite)
         except PlotError as error:
             raise Refused(str(error)) from None
-        click.echo(f"fecm: note: drew {self.picture}", err=True)
+        echo(f"fecm: note: drew {self.picture}", err=True)
 
     def write(self, lines: Iterable[str]) -> None:
         """Write the table, of lines with their ends.
@@ -107,9 +107,9 @@ class Targets:
         if self.table is None:
             sys.stdout.writelines(lines)
             return
-        with writing(self.table) as file:
+        with writing(self.table, overwrite=self.overwrite) as file:
             file.writelines(lines)
-        click.echo(f"fecm: note: wrote {self.table}", err=True)
+        echo(f"fecm: note: wrote {self.table}", err=True)
 
 
 def _check_picture(path: Path) -> None:

@@ -395,7 +395,7 @@ def _bytes(path: Path) -> bytes:
             raise OSError(f"{path} is an HDF5 file, not a deck; `fecm info {path}` shows a result")
         if b"\0" in begin:
             raise OSError(f"{path} is a binary file or UTF-16 text, not a deck in UTF-8 or Latin-1")
-        data = begin + file.read(most + 1 - len(begin))
+        data = begin + file.read(max(0, most + 1 - len(begin)))
     if len(data) > most:
         raise NotEnoughMemoryError(f"{path}: a deck of more than {said(most)} is not read")
     lines = len(data) - len(data.translate(None, LINE_ENDS)) - data.count(b"\r\n")

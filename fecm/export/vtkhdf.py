@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.export import ExportError
-from fecm.files import beside
 from fecm.plate import STRAINS
+from fecm.results.file_writer import new_hdf5
 from fecm.results.result import Result
 
 Array = NDArray[Any]
@@ -35,16 +35,19 @@ CONTACT = ("force", "indentation", "transducer")
 BLOCK = 4_000_000
 
 
-def write_vtkhdf(result: Result, path: Path, note: Note = lambda text: None) -> None:
+def write_vtkhdf(
+    result: Result, path: Path, note: Note = lambda text: None, *, overwrite: bool = True
+) -> None:
     """Write a result as VTKHDF, a time step a row of tape3.
 
     Parameters
     ----------
     result : Result
     path : Path
-        Replaced if it is there.
     note : callable
         Receives a sentence about whatever could not be exported in full.
+    overwrite : bool
+        Replace a file that exists.
 
     Raises
     ------
@@ -61,7 +64,7 @@ def write_vtkhdf(result: Result, path: Path, note: Note = lambda text: None) -> 
     # A state that was stored twice is one time step.
     steps, rows = np.unique(result["tape3/step"], return_index=True)
     cells = _cells(result["mesh/elements"])
-    with beside(path) as partial, h5py.File(partial, "w") as file:
+    with new_hdf5(path, overwrite=overwrite) as (file, _):
         root = file.create_group("VTKHDF")
         root.attrs["Version"] = np.array(VERSION, dtype="i8")
         root.attrs.create("Type", np.bytes_(b"UnstructuredGrid"))

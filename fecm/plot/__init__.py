@@ -244,15 +244,30 @@ def check_suffix(kind: str, path: Path) -> None:
         raise PlotError(f"{path}: the kind {kind} is written as {' or '.join(suffixes)}")
 
 
-def save(picture: Picture, path: Path) -> None:
+def save(
+    picture: Picture,
+    path: Path,
+    *,
+    overwrite: bool = True,
+    advance: Callable[[int], object] = lambda frames: None,
+) -> None:
     """Write a picture in the format that its name's suffix says; the same picture, the same bytes.
+
+    Parameters
+    ----------
+    picture : Picture
+    path : Path
+    overwrite : bool
+        Replace a file that exists.
+    advance : callable
+        Told of each frame that is written.
 
     Raises
     ------
     PlotError
         If matplotlib can't draw it.
     OSError
-        If the file can't be written; what stood there is then untouched.
+        If the file can't be written; what was there is then untouched.
     """
     import matplotlib
 
@@ -264,7 +279,7 @@ def save(picture: Picture, path: Path) -> None:
         _errors_as_one(str(path)),
         warnings.catch_warnings(action="ignore"),
         matplotlib.rc_context(RC),
-        beside(path) as partial,
+        beside(path, overwrite=overwrite) as partial,
     ):
         if suffix != ".gif":
             picture.figure.savefig(
@@ -278,3 +293,4 @@ def save(picture: Picture, path: Path) -> None:
             for frame in picture.frames:
                 frame()
                 writer.grab_frame()
+                advance(1)

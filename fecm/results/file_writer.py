@@ -157,25 +157,41 @@ class FileSink:
 
 
 @contextlib.contextmanager
-def writing(path: Path) -> Iterator[FileSink]:
+def writing(path: Path, *, overwrite: bool = True) -> Iterator[FileSink]:
     """Open a result for writing; it gets its final name only when all went well.
+
+    Parameters
+    ----------
+    path : Path
+    overwrite : bool
+        Replace a file that exists.
 
     Raises
     ------
     ResultWriteError
-        If the file can't be written; what stood under the final name is then untouched.
+        If the file can't be written; what was under the final name is then untouched.
     """
-    with beside(path) as partial, partial.open("w+b", buffering=0) as raw:
+    with new_hdf5(path, overwrite=overwrite) as (file, guarded):
+        sink = FileSink(file, guarded)
+        yield sink
+        sink.label_axes()
+
+
+@contextlib.contextmanager
+def new_hdf5(path: Path, *, overwrite: bool = True) -> Iterator[tuple[h5py.File, _Guarded]]:
+    """Open an HDF5 file for writing; see :func:`writing`."""
+    with (
+        beside(path, overwrite=overwrite) as partial,
+        partial.open("w+b", buffering=0) as raw,
+    ):
         guarded = _Guarded(raw)
         with h5py.File(guarded, "w") as file:
-            sink = FileSink(file, guarded)
             try:
-                yield sink
+                yield file, guarded
             except OSError as error:
                 if error is guarded.error:
                     raise _unwritten(path, error) from None
                 raise
-            sink.label_axes()
         if guarded.error is not None:
             raise _unwritten(path, guarded.error)
 

@@ -8,7 +8,6 @@ same bytes.
 from __future__ import annotations
 
 import json
-import os
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm.files import naming, open_ordinary, sync
 from fecm.results.file_writer import FileSink
 from fecm.results.schema import DATASETS, Dataset
 
@@ -111,7 +111,7 @@ class Journal:
                 file.write(data)
                 checksum = zlib.crc32(data, checksum)
         file.flush()
-        os.fsync(file.fileno())
+        sync(file.fileno())
         return Part(file.tell(), checksum)
 
     def _data(self, told: dict[str, Any]) -> list[bytes | memoryview]:
@@ -137,14 +137,15 @@ class Journal:
         OSError
             If it can't be read, or the result can't be written.
         """
-        with path.open("rb") as file:
+        with naming(path), open_ordinary(path) as file:
             if _checksum(file, part.length) != part.checksum:
                 raise SpoolError(f"{path} is damaged, or was written by another run")
             file.seek(0)
             while file.tell() < part.length:
                 try:
                     self._do(json.loads(file.readline()), file)
-                except (ValueError, KeyError, TypeError) as error:
+                except Exception as error:  # whatever a file can do to json, NumPy and h5py
+                    self._sink.check()
                     raise SpoolError(f"{path} is damaged ({error})") from None
         self.spooled = part
         self.muted = False

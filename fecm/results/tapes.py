@@ -7,12 +7,14 @@ columns.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm.files import beside
 from fecm.results.result import Result
 from fecm.results.schema import ResultFileError
 
@@ -88,8 +90,15 @@ def _need(result: Result, paths: Iterable[str]) -> None:
             raise ResultFileError(f"the result lacks {path}, which a tape needs")
 
 
-def write_tapes(result: Result, folder: Path) -> list[Path]:
-    """Write the tapes into a folder, which is made if it is not there.
+def write_tapes(result: Result, folder: Path, *, overwrite: bool = True) -> list[Path]:
+    """Write the tapes into a folder, which is made if it is not there: all of them, or none.
+
+    Parameters
+    ----------
+    result : Result
+    folder : Path
+    overwrite : bool
+        Replace tapes that exist.
 
     Returns
     -------
@@ -102,10 +111,10 @@ def write_tapes(result: Result, folder: Path) -> list[Path]:
         If a file can't be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    written: list[Path] = []
-    for name, lines in tape_texts(result).items():
-        path = folder / name
-        with path.open("w", encoding="ascii", newline="\n") as file:
-            file.writelines(f"{line}\n" for line in lines)
-        written.append(path)
-    return written
+    texts = {folder / name: lines for name, lines in tape_texts(result).items()}
+    with contextlib.ExitStack() as stack:
+        for path, lines in texts.items():
+            partial = stack.enter_context(beside(path, overwrite=overwrite))
+            with partial.open("w", encoding="ascii", newline="\n") as file:
+                file.writelines(f"{line}\n" for line in lines)
+    return list(texts)

@@ -158,8 +158,15 @@ def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
     )  # fmt: skip
 
 
-def save(result: SweepResult, path: Path) -> None:
+def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
     """Write a sweep's result.
+
+    Parameters
+    ----------
+    result : SweepResult
+    path : Path
+    overwrite : bool
+        Replace a file that exists.
 
     Raises
     ------
@@ -169,7 +176,7 @@ def save(result: SweepResult, path: Path) -> None:
     from fecm.results.file_writer import writing
 
     count = len(result)
-    with writing(path) as sink:
+    with writing(path, overwrite=overwrite) as sink:
         sink.attributes(
             "",
             {

@@ -1,0 +1,94 @@
+"""Standard output and standard error that are closed, full, broken, or know few characters.
+
+Nothing that happens to standard error disturbs a command.  Standard output raises its first error,
+remembers it, and drops what follows: the command's exit status then says that something was not
+printed.  Characters that an encoding lacks are escaped.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import io
+import os
+import sys
+from typing import TextIO
+
+
+class _Guarded(io.FileIO):
+    """A stream that remembers its first error of writing and drops what follows."""
+
+    def __init__(self, number: int, *, raises: bool) -> None:
+        super().__init__(number, "w", closefd=False)
+        self.error: OSError | None = None
+        self._raises = raises
+
+    def write(self, data: object) -> int:
+        """Write bytes; tell how many."""
+        view = memoryview(data)  # type: ignore[arg-type]
+        if self.error is None:
+            try:
+                return super().write(view)
+            except OSError as error:
+                self.error = error
+                if self._raises:
+                    raise
+        return view.nbytes
+
+
+class _Kept:
+    """The guarded standard output, once there is one."""
+
+    output: _Guarded | None = None
+
+
+def prepare() -> None:
+    """Guard the standard streams of this process; streams that a caller has put there stay."""
+    # In order, as each takes the lowest free number.  No other file may get such a number, or what
+    # is printed would go there.  A write to what is open for reading fails.
+    for number, flags in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, flags)
+    if _is_own(sys.stdout, 1):
+        raw = _Kept.output = _Guarded(1, raises=True)
+        sys.stdout = _text(raw, sys.stdout)
+    if _is_own(sys.stderr, 2):
+        sys.stderr = standard_error(2, sys.stderr)
+
+
+def standard_error(number: int, like: TextIO | None) -> TextIO:
+    """A guarded text stream to an open file, in the encoding of another stream."""
+    return _text(_Guarded(number, raises=False), like, line_buffering=True)
+
+
+def _is_own(stream: TextIO | None, number: int) -> bool:
+    """Whether a stream is the process's own, or was closed before the process began."""
+    if stream is None:
+        return True
+    try:
+        return isinstance(stream, io.TextIOWrapper) and stream.fileno() == number
+    except (OSError, ValueError):
+        return False
+
+
+def _text(raw: _Guarded, like: TextIO | None, *, line_buffering: bool = False) -> TextIO:
+    encoding = "utf-8" if like is None else like.encoding
+    through = isinstance(like, io.TextIOWrapper) and (like.line_buffering or like.write_through)
+    return io.TextIOWrapper(
+        io.BufferedWriter(raw), encoding, "backslashreplace",
+        line_buffering=line_buffering or through,
+    )  # fmt: skip
+
+
+def failure() -> OSError | None:
+    """Print what is still buffered; the first error of standard output, if there was one."""
+    with contextlib.suppress(OSError, ValueError):
+        sys.stdout.flush()
+    return None if _Kept.output is None else _Kept.output.error
+
+
+def is_of_reader(error: OSError) -> bool:
+    """Whether the reader of the output has left, who needs no message."""
+    return error.errno == errno.EPIPE

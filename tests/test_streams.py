@@ -1,0 +1,215 @@
+"""Streams that are closed, full or of few characters, and signals at any time."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import pytest
+
+from tests.calls import call
+from tests.decks import small
+
+FECM = f"{sys.executable} -m fecm"
+
+
+def shell(command: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a command line of the shell; ``F`` is the program."""
+    return subprocess.run(
+        ["bash", "-c", f'F="{FECM}"; {command}'], cwd=folder, capture_output=True, text=True,
+        check=False, env={**os.environ, **environment},
+    )  # fmt: skip
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with a deck."""
+    (tmp_path / "d.inp").write_text(small())
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("streams", "status"),
+    [(">&-", 2), ("2>&-", 0), (">&- 2>&-", 2), ("<&- >&- 2>&-", 2), (">/dev/full", 2),
+     ("2>/dev/full", 0), (">/dev/full 2>/dev/full", 2), ("| true", 2)],
+)  # fmt: skip
+def test_a_run_is_done_whatever_becomes_of_its_streams(
+    folder: Path, streams: str, status: int
+) -> None:
+    (folder / "d.inp").write_text(small(stop=False) + small())  # the second one prints as well
+    done = shell(f"$F run d.inp {streams}; exit ${{PIPESTATUS[0]}}", folder)
+    assert done.returncode == status
+    assert "Traceback" not in done.stderr
+    assert all(h5py.is_hdf5(folder / name) for name in ("d.h5", "d-2.h5"))
+    assert sorted(p.name for p in folder.iterdir()) == ["d-2.h5", "d.h5", "d.inp"]
+    if "2>" not in streams and streams != "| true":
+        assert done.stderr.splitlines()[-1].startswith("fecm: error: standard output: ")
+
+
+@pytest.mark.parametrize("command", ["info d.h5", "check d.inp", "tapes d.h5 -d t", "--help"])
+def test_other_commands_end_with_2_when_they_can_not_print(folder: Path, command: str) -> None:
+    assert call("run", folder / "d.inp", "-o", folder / "d.h5").exit_code == 0
+    for streams, status in ((">&-", 2), ("2>&-", 0)):
+        done = shell(f"$F {command} {streams}", folder)
+        assert (done.returncode, "Traceback" in done.stderr) == (status, False), streams
+        if "tapes" in command:
+            assert len(list((folder / "t").iterdir())) == 3
+            shell("rm -r t", folder)
+
+
+@pytest.mark.parametrize("streams", ["2>&-", "2>/dev/full", "2>&1 | true"])
+def test_a_message_that_nobody_reads_changes_no_exit_status(folder: Path, streams: str) -> None:
+    assert shell(f"$F run none.inp {streams}; exit ${{PIPESTATUS[0]}}", folder).returncode == 2
+    assert shell(f"$F info none.h5 {streams}; exit ${{PIPESTATUS[0]}}", folder).returncode == 2
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "ascii"])
+def test_characters_that_a_stream_lacks_are_escaped(folder: Path, encoding: str) -> None:
+    text = small().replace("FECM small plate", "FECM plate α")
+    (folder / "d.inp").write_text(text)
+    done = shell("$F run d.inp", folder, PYTHONIOENCODING=encoding)
+    assert done.returncode == 0
+    # click writes UTF-8 where a stream claims to know no more than ASCII.
+    assert done.stdout.splitlines()[0] in ("plate \\u03b1", *["plate α"] * (encoding == "ascii"))
+
+
+def test_control_characters_of_a_title_and_a_name_reach_no_terminal(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    Path("\x1b[31m.inp").write_text(small().replace("FECM small", "FECM \x1b[2J\x9b31m"))
+    for arguments in (
+        ("check", "\x1b[31m.inp"),
+        ("run", "\x1b[31m.inp"),
+        ("sweep", "\x1b[31m.inp", "--vary", "velocity=90,91"),
+        ("info", "\x1b[31m.h5"),
+        ("tapes", "\x1b[31m.h5", "-d", "\x1b[31m"),
+        ("export", "\x1b[31m.h5", "--to", "csv"),
+        ("fmt", "\x1b[31m.inp", "-o", "\x1b[31m.out"),
+        ("run", "\x1b[31m.inp"),
+    ):
+        done = call(*arguments)
+        assert done.exit_code == (2 if "exists" in done.stderr else 0), done.stderr
+        shown = done.stdout + done.stderr
+        assert [c for c in shown if c != "\n" and not c.isprintable()] == []
+        assert (
+            "\\x1b[2J\\x9b31m" in done.stdout
+            or arguments[0] not in ("run", "check", "sweep")
+            or (done.exit_code == 2)
+        )
+
+
+def test_names_that_are_not_utf_8_work_in_every_command(folder: Path) -> None:
+    commands = """
+        cp d.inp $'\\xff.inp'
+        $F check $'\\xff.inp' && $F run $'\\xff.inp' -o $'\\xff1.h5' --print $'\\xff.txt' &&
+        $F run $'\\xff.inp' -o $'\\xff2.h5' && $F info $'\\xff1.h5' &&
+        $F diff $'\\xff1.h5' $'\\xff2.h5' && $F tapes $'\\xff1.h5' -d $'\\xff' &&
+        $F export $'\\xff1.h5' --to csv && $F export $'\\xff1.h5' --to vtkhdf &&
+        $F fmt $'\\xff.inp'
+    """
+    done = shell(commands, folder)
+    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
+    assert "\\udcff1.h5" in done.stdout
+
+
+def test_two_results_whose_names_are_not_utf_8_are_drawn(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(folder)
+    assert call("run", "d.inp", "-o", "\udcff1.h5").exit_code == 0
+    assert call("run", "d.inp", "-o", "\udcff2.h5").exit_code == 0
+    assert call("plot", "\udcff1.h5", "\udcff2.h5", "-o", "out.svg").exit_code == 0
+    assert "udcff1" in Path("out.svg").read_text()
+
+
+# Signals -----------------------------------------------------------------------------------------
+
+STATIC = "TANG\nLOOP,,3000000\nFORM\nSOLV\nNEXT\n"
+EMPTY = "LMAS\nLOOP,,30000\nLOOP,,30000\nNEXT\nNEXT\n"
+LAST = "   25    0    1    1    0    0    0\n"
+HELD = LAST + "".join(f"{node:5d}    0    1    1    1    0    0\n" for node in (1, 5, 21, 25))
+
+
+@pytest.mark.parametrize(
+    ("program", "number"),
+    [(STATIC, signal.SIGTERM), (STATIC, signal.SIGHUP), (EMPTY, signal.SIGINT)],
+)
+def test_the_first_signal_ends_a_loop_without_time_steps(
+    folder: Path, program: str, number: signal.Signals
+) -> None:
+    text = small(program)
+    (folder / "d.inp").write_text(text.replace(LAST, HELD))
+    command = [sys.executable, "-m", "fecm", "run", "d.inp"]
+    with subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True) as process:
+        until = time.monotonic() + 20.0
+        while not list(folder.glob(".d.partial.h5")) and time.monotonic() < until:
+            time.sleep(0.01)
+        time.sleep(0.2)
+        process.send_signal(number)
+        _, said = process.communicate(timeout=20)
+    assert process.returncode == 128 + number
+    assert "the same command with --resume goes on to d.h5" in said
+    assert sorted(p.name for p in folder.iterdir()) == ["d.h5.checkpoint", "d.h5.spool", "d.inp"]
+
+
+def python(code: str, **options: object) -> subprocess.CompletedProcess[str]:
+    """Run Python code."""
+    done: subprocess.CompletedProcess[str] = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, **options
+    )  # type: ignore[call-overload]
+    return done
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_the_program_starts_gives_its_exit_status(number: signal.Signals) -> None:
+    done = python(
+        "import os, fecm.cli, fecm.__main__\n"
+        f"fecm.cli.main = lambda: os.kill(os.getpid(), {int(number)})\n"
+        "fecm.__main__.main()"
+    )
+    assert (done.returncode, done.stderr) == (128 + number, "")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_while_the_program_ends_changes_no_exit_status(number: signal.Signals) -> None:
+    done = python(
+        "import atexit, os, sys, fecm.__main__\n"
+        f"atexit.register(os.kill, os.getpid(), {int(number)})\n"
+        "sys.argv = ['fecm', '--version']\n"
+        "fecm.__main__.main()"
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("fecm, version ")
+
+
+def test_nohup_keeps_a_run_from_ending_at_a_hangup() -> None:
+    code = (
+        "import os, signal, sys, fecm.cli.common as common\n"
+        "signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
+        "common.signals.install()\n"
+        "os.kill(os.getpid(), signal.SIGHUP)\n"
+        "print(common.signals.came())"
+    )
+    assert python(code).stdout == "False\n"
+
+
+@pytest.mark.parametrize("megabytes", [60, 200, 250])
+def test_too_little_address_space_ends_in_one_line(folder: Path, megabytes: int) -> None:
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (megabytes * 10**6, megabytes * 10**6))
+
+    done = subprocess.run(
+        [sys.executable, "-m", "fecm", "run", "d.inp"], cwd=folder, capture_output=True,
+        text=True, check=False, preexec_fn=limit, timeout=20,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.startswith("fecm: error: ")
+    assert done.stderr.count("\n") == 1
