@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from fecm.plot import Picture
 
 
-@click.group()
+@click.group(short_help="Indentation tests and the law of contact.")
 def indent() -> None:
     """Indentation tests and the law of contact (the report's chapter 3)."""
 

@@ -28,7 +28,7 @@ IN_FRONT = ("title", "fecm_version", "format", "format_version")
 PERMANENT = "permanent_indentation"
 
 
-@click.command()
+@click.command(short_help="Show what is in RESULT.")
 @click.argument("result", type=FILE_PATH)
 @FORMAT_OPTION
 @reads("result")

@@ -172,7 +172,7 @@ def _normals(step: float) -> list[float]:
 # Commands ----------------------------------------------------------------------------------------
 
 
-@click.group()
+@click.group(short_help="Waves in a laminate.")
 def waves() -> None:
     """Waves in the laminate of a DECK, or of a layup: the report's chapter 2, for any laminate."""
 
