@@ -33,7 +33,7 @@ class _PulseGroup(click.Group):
         return super().parse_args(ctx, args)
 
 
-@click.group(cls=_PulseGroup)
+@click.group(cls=_PulseGroup, short_help="The rod of the projectile by itself.")
 def rod() -> None:
     """The projectile's rod by itself: a pulse on its end, its transducer.
 
