@@ -13,10 +13,19 @@ import pytest
 
 from fecm.api import prepare
 from fecm.overview import overview
+from tests import decks
 from tests.calls import call
-from tests.decks import APPENDIX, DATA, DATA_CARDS, LONG, MESH, PROGRAM, ROOT, small
+from tests.decks import APPENDIX, DATA, LONG, MESH, PROGRAM, ROOT
 
 WRONG = sorted((Path(__file__).parent / "wrong").glob("*.inp"))
+
+# The small plate with a symmetric laminate, whose supports hold it in its plane at every node.
+DATA_CARDS = decks.DATA_CARDS.replace("    2  90. ", "    2   0. ")
+
+
+def small(program: str = PROGRAM, *, mesh: str = MESH, data: str = DATA_CARDS) -> str:
+    """A deck of the small plate with a symmetric laminate."""
+    return decks.small(program, mesh=mesh, data=data)
 
 
 ENDLESS = PROGRAM.replace("         10", "      99999").replace("          5", "")
@@ -288,3 +297,10 @@ def test_a_stiffness_beyond_all_range_is_found_where_the_time_step_is_left_to_th
     assert codes(text) == ["E417"]
     modes = text[: text.index("MACR")] + "MACR\nLMAS\nEIGE          1\nEND\nSTOP\n"
     assert np.isnan(overview(prepare(modes).problems[0]).critical_time_step)
+
+
+def test_a_coupled_laminate_held_in_its_plane_at_every_node_is_a_finding() -> None:
+    coupled = decks.small()
+    assert "W318" in codes(coupled)
+    assert "W318" not in codes(small())
+    assert "W318" not in codes(coupled.replace(MESH[MESH.index("BOUN") :], ""))

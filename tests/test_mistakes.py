@@ -149,3 +149,16 @@ def test_a_spring_far_stiffer_than_the_plate_leaves_a_mass_on_a_spring() -> None
     # A corner node has 1/9 of an element's mass: 1.6e-9 * 2 * (100/12)^2.
     mass = 1.6e-9 * 2.0 * (100.0 / 12.0) ** 2 / 9.0
     assert critical_time_step(plate, (row, 1e9)) == pytest.approx(2.0 * (mass / 1e9) ** 0.5, 1e-3)
+
+
+def half_laminate() -> str:
+    """The deck with the first half of its symmetric laminate."""
+    cut = BASE.index("    9 90.0     0.125")
+    text = BASE[:cut] + BASE[BASE.index("END\nMACR") :]
+    return text.replace("  625  144   16", "  625  144    8").replace(
+        "-3       2.0", "-3       1.0"
+    )
+
+
+def test_half_of_a_symmetric_laminate_is_named_for_its_coupling() -> None:
+    assert "W318" in codes(half_laminate().replace(*ANY_TIME_STEP))

@@ -348,7 +348,7 @@ def test_the_command_writes_every_kind_and_keeps_what_is_there(file: Path) -> No
     [
         (("-o", "picture.jpg"), ".png or .svg or .pdf"),
         (("--kind", "animation", "-o", "plate.png"), ".gif"),
-        (("--kind", "force", "--kind", "loop", "-o", "both.png"), "no folder"),
+        (("--kind", "force", "--kind", "loop", "-o", "both.png"), "is not a folder"),
         (("--kind", "contour", "--times", "1"), "at time 1"),
         (("--times", "soon"), "T,T"),
         (("--at", "1"), "X,Y"),

@@ -20,7 +20,12 @@ from fecm.check.impact import (
     warn_of_the_reports_rod,
 )
 from fecm.check.material import check_material
-from fecm.check.mesh import check_elements, check_geometry, check_mesh
+from fecm.check.mesh import (
+    check_elements,
+    check_geometry,
+    check_in_plane_supports,
+    check_mesh,
+)
 from fecm.check.plausible import (
     check_plausibility,
     check_purpose,
@@ -122,6 +127,7 @@ def check(problem: Problem, findings: Findings, *, listing: bool = False) -> Che
             check_purpose(deck, mesh, findings)
             if findings.error_count == before:
                 check_geometry(deck, mesh, findings)
+                check_in_plane_supports(deck, mesh, findings)
                 check_plausibility(deck, mesh, findings, hits=hits(program))
                 if STEPS.intersection(macro.word for macro in deck.macros):
                     check_time_step_of_contact(deck, mesh, findings, hits=hits(program))

@@ -14,7 +14,8 @@ from fecm.deck.model import Boundary, Coordinates, Deck, Elements, Material
 from fecm.deck.records import Integration
 from fecm.elements import cubic, triangle
 from fecm.elements.quadrature import HIGHEST_ORDER, Rule
-from fecm.mesh import Mesh, place_of_element
+from fecm.laminate import is_coupled
+from fecm.mesh import Mesh, holds_the_plane, place_of_element
 from fecm.parts import rules
 
 TRIANGLE = triangle.SHAPE.corners
@@ -92,6 +93,19 @@ def _check_coincidence(deck: Deck, mesh: Mesh, findings: Findings) -> None:
             "W314",
             f"{gather.nodes(rows)} in the place of another node: the plate is cut there.",
             deck.need(Coordinates).place(),
+        )
+
+
+def check_in_plane_supports(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+    """Warn of in-plane restraints at every node of a laminate whose B is not zero."""
+    if holds_the_plane(mesh.codes) and is_coupled(deck.need(Material)):
+        boundary = deck.last(Boundary)
+        findings.add(
+            "W318",
+            "B is not zero, and u and v are restrained at every node: the plate is stiffer than "
+            "its laminate.",
+            boundary.place() if boundary else None,
+            "restrain u and v only where a support holds them",
         )
 
 

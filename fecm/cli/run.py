@@ -78,7 +78,12 @@ if TYPE_CHECKING:
               show_default=True, metavar="PART",
               help="Error of the energy balance, as a part of what was given, that ends a run "
                    "without slips.")  # fmt: skip
-@click.option("--force", is_flag=True, help="Run with a time step above the critical one.")
+@click.option(
+    "--force",
+    is_flag=True,
+    help="Run in spite of a time step above the critical one (E508) or of L2 = 2 in a free plate "
+    "(E321).",
+)
 @click.option(
     "--print",
     "printed",
