@@ -14,6 +14,7 @@ import subprocess
 import sys
 import time
 import zlib
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,7 @@ from fecm.simulation import Simulation, simulate
 from fecm.slips import active_slips
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, small
-from tests.kill_runs import trial
+from tests.kill_runs import SWEEP, SWEPT, sweep_trial, trial
 
 # Two problems' worth of words in one: nested loops, loads, a change of the time step, gages.
 WORDS = """\
@@ -377,6 +378,16 @@ def fecm_in(folder: Path, *arguments: str, **options: object) -> subprocess.Comp
 @pytest.mark.parametrize("seed", range(4))
 def test_a_killed_run_resumes_to_the_same_bytes(whole: Path, seed: int) -> None:
     assert trial(whole, whole / "whole.h5", 1.2, seed).startswith("same")
+
+
+@pytest.mark.long
+def test_killed_sweeps_with_damaged_parts_end_in_the_same_bytes(tmp_path: Path) -> None:
+    (tmp_path / "sweep.inp").write_text(SWEPT)
+    subprocess.run([*SWEEP, "whole.h5"], cwd=tmp_path, check=True, capture_output=True)
+    trials = (sweep_trial(tmp_path, tmp_path / "whole.h5", 2.0, seed) for seed in range(4))
+    counts: Counter[str] = sum(trials, Counter())
+    assert counts["kills"] > 0
+    assert counts["same"] == 4
 
 
 def test_an_interrupted_command_says_how_to_go_on_and_does(whole: Path) -> None:
