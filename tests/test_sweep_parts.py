@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import signal
+import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +23,7 @@ from fecm.sweeps.store import DamagedPartError, Parts
 from fecm.sweeps.tasks import Plan, plan, tasks
 from tests.calls import call
 from tests.decks import small
+from tests.kill_runs import SWEEP, SWEPT
 from tests.test_sweep import model
 
 
@@ -58,6 +64,77 @@ def test_cases_lost_with_their_workers_are_not_stored_as_finished(
     found = carry_out(problem, made, parts=parts)
     assert found.fine.tolist() == [False, True]
     assert [parts.get(task) is None for task in tasks(problem, made)] == [True, False]
+
+
+def workers_of(pid: int) -> list[int]:
+    """Worker processes that a process has started."""
+    try:
+        found = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    except OSError:
+        return []
+    return [int(child) for child in found if b"spawn_main" in arguments_of(int(child))]
+
+
+def arguments_of(pid: int) -> bytes:
+    """Command line of a process; empty where the process has ended."""
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return b""
+
+
+def parts_in(folder: Path) -> list[str]:
+    """Names of the parts of the sweep into ``s.h5``."""
+    return sorted(path.name for path in (folder / ".s.h5.parts").glob("task-*.npz"))
+
+
+def begun(folder: Path) -> subprocess.Popen[str]:
+    """Start a sweep with two workers and wait until one of its eight plates is finished."""
+    (folder / "sweep.inp").write_text(SWEPT.replace("LOOP        500", "LOOP       4000"))
+    command = [*SWEEP, "s.h5", "--workers", "2"]
+    process = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + 60.0
+    while not parts_in(folder) and time.monotonic() < until:
+        time.sleep(0.02)
+    return process
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs /proc")
+def test_the_workers_of_a_killed_sweep_end_too(tmp_path: Path) -> None:
+    process = begun(tmp_path)
+    workers = workers_of(process.pid)
+    assert len(workers) == 2
+    process.kill()
+    process.wait()
+    until = time.monotonic() + 30.0
+    while (left := list(filter(arguments_of, workers))) and time.monotonic() < until:
+        time.sleep(0.1)
+    for worker in left:
+        os.kill(worker, signal.SIGKILL)
+    process.communicate()
+    assert not left
+    assert 1 <= len(parts_in(tmp_path)) < 8
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs /proc")
+def test_a_sweep_whose_workers_are_all_killed_keeps_its_parts_for_the_next(tmp_path: Path) -> None:
+    process = begun(tmp_path)
+    while process.poll() is None:
+        for worker in workers_of(process.pid):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(worker, signal.SIGKILL)
+        time.sleep(0.02)
+    _, said = process.communicate()
+    assert process.returncode == 1
+    assert "cases were lost with their workers; --overwrite runs them again" in said
+    assert "Traceback" not in said
+    assert 1 <= len(parts_in(tmp_path)) < 8
+    subprocess.run([*SWEEP, "s.h5", "--overwrite"], cwd=tmp_path, check=True, capture_output=True)
+    assert not parts_in(tmp_path)
+    subprocess.run([*SWEEP, "whole.h5"], cwd=tmp_path, check=True, capture_output=True)
+    assert (tmp_path / "s.h5").read_bytes() == (tmp_path / "whole.h5").read_bytes()
 
 
 @pytest.mark.parametrize("address", ["blah", "tcp://blah", "tcp://127.0.0.1:0", "tcp://[::1:1"])
