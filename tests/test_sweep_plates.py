@@ -72,6 +72,20 @@ def test_u_and_v_are_free_where_b_is_not_zero_and_w_is_free() -> None:
     assert kept.all(Boundary) == deck.all(Boundary)
 
 
+def test_a_note_counts_the_cases_whose_u_and_v_are_set_free(tmp_path: Path) -> None:
+    deck = tmp_path / "plate.inp"
+    deck.write_text(new("[0/90]s"))
+    vary = ("--vary", "velocity=100,200", "--vary", "layup=[0/90]s,[0/90],[45/-45],[90/0]s")
+    done = call("sweep", deck, *vary, "-o", tmp_path / "s.h5")
+    assert done.exit_code == 0
+    assert done.stderr == (
+        "fecm: note: B is not zero in 4 cases: u and v, which the deck restrains at every node, "
+        "are free there except where w is held\n"
+    )
+    deck.write_text(new("[0/90]"))
+    assert call("sweep", deck, *vary, "-o", tmp_path / "t.h5").stderr == ""
+
+
 def test_supports_in_the_plane_that_hold_some_nodes_only_are_kept() -> None:
     mesh = MESH.replace(
         "    1    1   -1   -1    0    0    0\n", "    3    1   -1   -1    0    0    0\n"

@@ -76,7 +76,7 @@ def sweep(
     from fecm.sweeps.result import save
     from fecm.sweeps.schedule import LOST
     from fecm.sweeps.summary import summary, verdict
-    from fecm.sweeps.tasks import plan
+    from fecm.sweeps.tasks import freed, plan, tasks
 
     path = output or Path(f"{deck.stem}-sweep.h5")
     try:
@@ -88,6 +88,11 @@ def sweep(
         problem = _problem(deck)
         made = plan(problem, cases, history=history)
         check_memory(problem, made, 0 if scheduler is not None else workers)
+        if count := freed(tasks(problem, made)):
+            _note(
+                f"B is not zero in {count} case{'' if count == 1 else 's'}: u and v, which the "
+                "deck restrains at every node, are free there except where w is held"
+            )
         result = _carry_out(problem, made, path, workers, scheduler, overwrite=overwrite)
     except CasesError as error:
         raise Refused(str(error)) from None

@@ -5,13 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 from fecm.check import Checked
-from fecm.deck.model import Deck
+from fecm.deck.model import Boundary, Deck
 from fecm.sweeps.cases import CONTACT, PLATE, Case, CasesError
 from fecm.sweeps.clock import Clock, clock_of
 from fecm.sweeps.run import Task, shares_plate
+from fecm.sweeps.variations import varied
 from fecm.version import __version__
 
 # Cases that are advanced together; fixed, as sums depend on it in their last digit.
@@ -76,3 +78,14 @@ def tasks(checked: Checked, made: Plan) -> list[Task]:
             cases = tuple(made.cases[n] for n in some)
             cut.append(Task(len(cut), made.deck, some, cases, made.history, made.clock))
     return cut
+
+
+def freed(some: Sequence[Task]) -> int:
+    """Count the cases with B != 0 in which u and v, restrained at every node, are set free."""
+    count = 0
+    for task in some:
+        plate = {name: value for name, value in task.cases[0].items() if name in PLATE}
+        with suppress(CasesError):
+            if varied(task.deck, plate).all(Boundary) != task.deck.all(Boundary):
+                count += len(task.numbers)
+    return count
