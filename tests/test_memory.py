@@ -20,7 +20,8 @@ from fecm.check.memory import needed_bytes
 from fecm.memory import NotEnoughMemoryError, available
 from fecm.parts import build_plate
 from fecm.stability import critical_time_step
-from fecm.sweeps.memory import ADVANCED, KEPT
+from fecm.sweeps.memory import KEPT
+from fecm.sweeps.run import ADVANCED
 from tests.calls import assert_unusable, call
 from tests.decks import small
 

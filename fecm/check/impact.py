@@ -297,7 +297,8 @@ def mesh_error(elements: float, slenderness: float, shear: int) -> float:
     """Estimate the relative mesh error of the peak force, within a factor of about two.
 
     Fitted to the peaks of 14 meshes of 8- or 9-node elements with L2 = 3, and compared with 18
-    with L2 = 2, each against a mesh of 15 to 30 elements per wave: AS/3501 plates of 100 x 100 x 1, 2 and 4 mm, and the report's plate.
+    with L2 = 2, each against a mesh of 15 to 30 elements per wave: AS/3501 plates of
+    100 x 100 x 1, 2 and 4 mm, and the report's plate.
 
     Parameters
     ----------
