@@ -57,6 +57,11 @@ NEXT
 """
 
 
+# Findings that the small plate has: its coupled laminate is held in its plane at every node, it has
+# no projectile of its own, and its mesh is coarse.
+OWN_FINDINGS = ("W318", "W414", "W415")
+
+
 def ready(deck: str | Path) -> Setup:
     """Parts of a deck's first problem."""
     problem = prepare(deck).problems[0]

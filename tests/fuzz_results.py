@@ -36,7 +36,7 @@ import numpy as np
 from fecm.api import run
 from fecm.cli import main as fecm
 from fecm.sweeps.api import sweep
-from tests.decks import small
+from tests.decks import PROGRAM, small
 
 # Seconds of the clock after which a command hangs.
 HANGS = 60.0
@@ -253,7 +253,8 @@ def work(first: int, count: int, step: int, commands: Sequence[str]) -> Tally:
         folder = Path(name)
         sound = folder / (f"{SWEEP}.h5" if "plot map" in commands else "run.h5")
         if sound.stem == SWEEP:
-            sweep(small(), {"velocity": [50.0, 100.0, 150.0], "alpha_p": [0.0005, 0.0007]},
+            text = small(PROGRAM.replace("         10", "        400"))  # every contact ends
+            sweep(text, {"velocity": [50.0, 100.0, 150.0], "alpha_p": [0.0005, 0.0007]},
                   history=True, output=sound)  # fmt: skip
         else:
             run(small(), output=sound)

@@ -18,14 +18,14 @@ from fecm.deck.reader import MOST_PROBLEMS, load_text
 from fecm.memory import NotEnoughMemoryError
 from fecm.program import estimate
 from tests.calls import assert_unusable, call
-from tests.decks import DATA_CARDS, MESH, PROGRAM, small
+from tests.decks import DATA_CARDS, MESH, OWN_FINDINGS, PROGRAM, small
 
 TINY_PROBLEM = "FECM\n1,1,1,2,5,3\nEND\nMACR\nEND\n"
 
 
 def codes(text: str) -> list[str]:
-    """Codes of a text's findings, without those on the projectile and the mesh's fineness."""
-    return [f.code for f in prepare(text).findings if f.code not in ("W414", "W415")]
+    """Codes of a text's findings, without those of the small plate."""
+    return [f.code for f in prepare(text).findings if f.code not in OWN_FINDINGS]
 
 
 # Numbers -----------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from fecm.mesh import generate
 from fecm.parts import build_plate, build_projectile
 from fecm.projectile import RigidMass, Rod, report_rod
 from fecm.results.result import Result
-from tests.decks import DATA_CARDS, LONG, MESH, small
+from tests.decks import DATA_CARDS, LONG, MESH, OWN_FINDINGS, small
 
 Floats = NDArray[np.float64]
 
@@ -46,8 +46,10 @@ def with_segment(segment: str, mesh: str = MESH) -> str:
 
 
 def codes(text: str) -> list[str]:
-    """Codes of a deck's findings, but for the mesh's coarseness."""
-    return [f.code for f in prepare(text).findings if f.code != "W415"]
+    """Codes of a deck's findings: those of the small plate only where they concern the projectile."""
+    return [
+        f.code for f in prepare(text).findings if f.code == "W414" or f.code not in OWN_FINDINGS
+    ]
 
 
 def result_of(text: str | Deck) -> Result:
