@@ -196,7 +196,7 @@ def work_of_the_new_force(right: Any, step: Any, law: Any, state: Any, w: Any) -
 def partly_given(right: Any, convolution: Any, values: Any) -> None:
     right(convolution, values)
     if row := convolution._step % BLOCK:
-        convolution._block[row:] -= 0.002 * convolution._near[: BLOCK - row] * values
+        convolution._block[row:] -= 1e-6 * convolution._near[: BLOCK - row] * values
 
 
 def exchanged_on_tape8(
@@ -496,7 +496,7 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
     "work of the new force alone": (
         instead(impacts, "meet", work_of_the_new_force), {"report-impact": ("worst",)},
     ),
-    "a part of the last step's force missing in the convolution": (
+    "a millionth of a step's force missing in the convolution": (
         instead(Convolution, "give", partly_given), {"convolution": ("largest",)},
     ),
 }  # fmt: skip
