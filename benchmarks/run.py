@@ -28,18 +28,18 @@ import numpy as np
 from figures import keep
 
 import fecm
-from fecm.authoring.grid import Grid, Section
-from fecm.check import Checked
-from fecm.choices import Choices
 from fecm.deck import Deck
+from fecm.deck.grid import Grid, Section
+from fecm.deck.macros import compile_program
 from fecm.deck.model import Boundary, Coordinates, Elements, Impact
 from fecm.deck.records import Control, NodeValues
-from fecm.mesh import generate
-from fecm.parts import set_up
-from fecm.program import compile_program
-from fecm.results import file_writer
-from fecm.simulation import Simulation
-from fecm.workers import available
+from fecm.mechanics.stiffness_product import available
+from fecm.problem.build import build_model
+from fecm.problem.generate import generate
+from fecm.problem.options import RunOptions
+from fecm.problem.problem import Problem
+from fecm.results import hdf5_writer
+from fecm.simulation.simulation import Simulation
 
 HERE = Path(__file__).parent
 ROUNDS = 5
@@ -77,7 +77,7 @@ def refined(times: int) -> Deck:
 def off_centre() -> Deck:
     """The mesh refined 10 times, hit where no symmetry halves it."""
     deck = refined(10)
-    hit = deck.need(Impact)
+    hit = deck.require(Impact)
     aside = replace(hit, node=hit.node + 20)
     segments = tuple(aside if segment is hit else segment for segment in deck.segments)
     return replace(deck, segments=segments, text="")
@@ -110,29 +110,29 @@ def time_step(deck: Deck) -> float:
     return float(DT / np.sqrt(deck.control.numel / 140))
 
 
-def checked(deck: Deck, steps: int) -> Checked:
+def checked(deck: Deck, steps: int) -> Problem:
     """A problem of so many steps, which stores a row of each kind at every twentieth."""
     values = {"LOOP": float(steps), "DT": time_step(deck)}
     macros = tuple(replace(m, value=values.get(m.word, m.value)) for m in deck.macros)
     cut = replace(deck, macros=macros)
-    return Checked(cut, generate(cut), compile_program(macros, fecm.deck.Findings()))
+    return Problem(cut, generate(cut), compile_program(macros, fecm.deck.Findings()))
 
 
-def full(problem: Checked, folder: str, threads: int = 1) -> float:
+def full(problem: Problem, folder: str, threads: int = 1) -> float:
     """Seconds of a run's own loop, from its first macro to its closed file."""
     begin = 0.0
     path = Path(folder) / "run.h5"
     path.unlink(missing_ok=True)
-    with file_writer.writing(path) as sink:
-        simulation = Simulation(problem, sink, Choices(threads=threads))
+    with hdf5_writer.writing(path) as sink:
+        simulation = Simulation(problem, sink, RunOptions(threads=threads))
         begin = time.perf_counter()
         simulation.run()
     return time.perf_counter() - begin
 
 
-def plain(problem: Checked, steps: int) -> float:
+def plain(problem: Problem, steps: int) -> float:
     """Seconds of the plain loop."""
-    setup = set_up(problem.deck, problem.mesh)
+    setup = build_model(problem.deck, problem.mesh)
     impact, K, m = setup.impact, setup.plate.stiffness, setup.plate.mass
     if impact is None:
         raise ValueError("nothing hits in this deck")

@@ -26,7 +26,7 @@ from run import HERE, ROUNDS, checked, plain, report
 
 import fecm
 from fecm.sweeps.cases import Case
-from fecm.sweeps.variations import varied
+from fecm.sweeps.vary import apply_case
 
 DECK = HERE.parent / "decks" / "impact-115.inp"
 VARY = ("--vary", "velocity=50:300:40", "--vary", "k=1e6:3e6:25")
@@ -45,7 +45,7 @@ def process(output: Path, *options: str) -> float:
 def full(case: Case) -> tuple[fecm.Result, float]:
     """A case's full run, and its seconds."""
     begin = time.perf_counter()
-    result = fecm.run(varied(report(), case))
+    result = fecm.run(apply_case(report(), case))
     if not isinstance(result, fecm.Result):
         raise TypeError("the deck holds several problems")
     return result, time.perf_counter() - begin

@@ -11,13 +11,13 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from fecm.version import __version__
+from fecm._version import __version__
 
 if TYPE_CHECKING:
     from fecm.api import run
     from fecm.deck.findings import DeckError
     from fecm.deck.reader import read_deck
-    from fecm.dynamics import DivergenceError
+    from fecm.mechanics.plate_motion import DivergenceError
     from fecm.results.result import Result, load
     from fecm.sweeps.api import sweep
     from fecm.sweeps.result import SweepResult
@@ -40,7 +40,7 @@ _HOMES = {
     "run": "fecm.api",
     "DeckError": "fecm.deck.findings",
     "read_deck": "fecm.deck.reader",
-    "DivergenceError": "fecm.dynamics",
+    "DivergenceError": "fecm.mechanics.plate_motion",
     "Result": "fecm.results.result",
     "load": "fecm.results.result",
     "sweep": "fecm.sweeps.api",

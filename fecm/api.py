@@ -6,39 +6,39 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from fecm.check import Checked, check
-from fecm.check.listing import check_listing
-from fecm.check.memory import check_memory
-from fecm.check.mesh import HOURGLASS
-from fecm.check.run import UNSTABLE
-from fecm.choices import ENERGY_LIMIT, Choices
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, load_text
+from fecm.mechanics.rod_integrators import LUMPED, WILSON, RodMethod
+from fecm.mechanics.stiffness_product import AUTO
+from fecm.problem.check_listing import check_listing
+from fecm.problem.check_mesh import HOURGLASS
+from fecm.problem.check_program import UNSTABLE
+from fecm.problem.memory import check_memory
+from fecm.problem.options import ENERGY_LIMIT, RunOptions
+from fecm.problem.problem import Problem, check
+from fecm.problem.slips import LISTING, REPORT, active_slips
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
-from fecm.rod_method import LUMPED, WILSON, RodMethod
-from fecm.simulation import simulate
-from fecm.slips import LISTING, REPORT, active_slips
-from fecm.solvers import AUTO
+from fecm.simulation.simulation import simulate
 
 
 @dataclass(frozen=True)
-class Prepared:
+class LoadedDeck:
     """A file that was read and checked.
 
     Attributes
     ----------
     source : str
         Its name.
-    problems : list of Checked
+    problems : list of Problem
         The problems that could be read.
     findings : list of Finding
         Everything that was found, in the deck's order.
     """
 
     source: str
-    problems: list[Checked]
+    problems: list[Problem]
     findings: list[Finding]
 
     def errors(self, force: bool = False) -> list[Finding]:
@@ -50,7 +50,7 @@ class Prepared:
         ]
 
 
-def prepare(path_or_text: str | Path | Deck, mode: str = REPORT) -> Prepared:
+def load_deck(path_or_text: str | Path | Deck, mode: str = REPORT) -> LoadedDeck:
     """Read and check a deck without running it.
 
     Parameters
@@ -72,7 +72,7 @@ def prepare(path_or_text: str | Path | Deck, mode: str = REPORT) -> Prepared:
         text, source = load_text(path_or_text)
     reader = Reader(text, blanks_are_zeros=mode == LISTING)
     listing = mode == LISTING
-    problems: list[Checked] = []
+    problems: list[Problem] = []
     for read in reader.problems():
         if reader.findings.closed:
             break
@@ -81,7 +81,7 @@ def prepare(path_or_text: str | Path | Deck, mode: str = REPORT) -> Prepared:
     if listing and not reader.findings.errors:
         for problem in problems:
             check_listing(problem.deck, problem.mesh, reader.findings)
-    return Prepared(source, problems, list(reader.findings))
+    return LoadedDeck(source, problems, list(reader.findings))
 
 
 def run(
@@ -150,11 +150,11 @@ def run(
     >>> print(f"{result.force.max():.2f} lb")
     6.19 lb
     """
-    choices = Choices(
+    choices = RunOptions(
         active_slips(mode, slips), solver, threads, RodMethod(rod_mass, rod_integrator),
         energy_limit,
     )  # fmt: skip
-    prepared = prepare(deck, mode)
+    prepared = load_deck(deck, mode)
     if prepared.errors(force):
         raise DeckError(prepared.findings, prepared.source)
     results: list[Result] = []
@@ -165,13 +165,13 @@ def run(
     return results[0] if len(results) == 1 else results
 
 
-def _run_one(problem: Checked, choices: Choices, path: Path | None) -> Result:
+def _run_one(problem: Problem, choices: RunOptions, path: Path | None) -> Result:
     """Run one problem, into a file if there is a path."""
     if path is None:
         memory = MemorySink()
         simulate(problem, memory, choices)
         return Result(memory.arrays, memory.texts, memory.groups)
-    from fecm.results.file_writer import writing
+    from fecm.results.hdf5_writer import writing
     from fecm.results.result import load
 
     with writing(path) as sink:

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.assembly import Rules
 from fecm.deck.records import Ply
-from fecm.elements.quadrature import gauss
-from fecm.laminate import Laminate, laminate
-from fecm.mesh import Mesh
+from fecm.mechanics.elements.quadrature import gauss
+from fecm.mechanics.laminate import Laminate, laminate
+from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.plate import IntegrationRules
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -266,9 +266,13 @@ def simple_support(coordinates: Floats) -> Bools:
     return restrained
 
 
-def rules(bending: int = 3, shear: int = 3, *, transposed: bool = False) -> Rules:
+def rules(
+    bending: int = 3, shear: int = 3, *, transposed_jacobian: bool = False
+) -> IntegrationRules:
     """Gauss rules of the given orders; strains are stored at those of the bending rule."""
-    return Rules(gauss(bending), gauss(shear), gauss(bending), transposed=transposed)
+    return IntegrationRules(
+        gauss(bending), gauss(shear), gauss(bending), transposed_jacobian=transposed_jacobian
+    )
 
 
 def mixed(nx: int, ny: int, kind: int) -> tuple[Floats, Ints]:

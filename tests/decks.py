@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fecm.api import prepare
-from fecm.parts import Setup, set_up
+from fecm.api import load_deck
+from fecm.problem.build import ImpactModel, build_model
 
 ROOT = Path(__file__).parent.parent
 DATA = Path(__file__).parent / "data"
@@ -62,10 +62,10 @@ NEXT
 OWN_FINDINGS = ("W318", "W414", "W415")
 
 
-def ready(deck: str | Path) -> Setup:
+def ready(deck: str | Path) -> ImpactModel:
     """Parts of a deck's first problem."""
-    problem = prepare(deck).problems[0]
-    return set_up(problem.deck, problem.mesh)
+    problem = load_deck(deck).problems[0]
+    return build_model(problem.deck, problem.mesh)
 
 
 def small(

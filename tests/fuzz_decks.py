@@ -17,8 +17,8 @@ import time
 from collections import Counter
 from types import FrameType
 
-from fecm.api import prepare
-from fecm.deck.formatting import format_deck
+from fecm.api import load_deck
+from fecm.deck.format import format_deck
 from fecm.deck.reader import Reader
 from tests.decks import APPENDIX, small
 
@@ -73,7 +73,7 @@ def mutate(text: str, random: random.Random) -> str:
 
 def examine(text: str) -> str:
     """Read, check, write and format a deck; what became of it in a word."""
-    prepared = prepare(text + "\n")
+    prepared = load_deck(text + "\n")
     if prepared.errors():
         return "errors"
     for problem in Reader(text).problems():

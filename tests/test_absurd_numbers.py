@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import prepare
+from fecm.api import load_deck
 from fecm.deck import DeckError
 from tests.decks import PROGRAM, small
 from tests.fuzz_decks import FORC, OWN
@@ -51,12 +51,12 @@ def test_an_absurd_number_in_any_field_runs_or_is_refused_in_words(
 def test_a_time_step_that_rounding_would_swallow_is_an_error_at_its_place(
     dt: str, code: str
 ) -> None:
-    found = prepare(small(PROGRAM.replace("DT        .5E-6", f"DT,{dt}"))).errors()
+    found = load_deck(small(PROGRAM.replace("DT        .5E-6", f"DT,{dt}"))).errors()
     assert [finding.code for finding in found] == ([code] if code else [])
     assert all(f.place is not None and f.place.field.endswith("value") for f in found)
 
 
 @pytest.mark.parametrize("card", ["3,0,1E-300,3.E7,.0006875", "3,0,1E300,3.E7,.0006875"])
 def test_a_rod_beyond_the_range_of_numbers_is_an_error(card: str) -> None:
-    found = prepare(DECK.replace("    3    0       1.0     30.E6 .0006875", card)).errors()
+    found = load_deck(DECK.replace("    3    0       1.0     30.E6 .0006875", card)).errors()
     assert [finding.code for finding in found] == ["E429"]

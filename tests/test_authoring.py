@@ -10,17 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import fecm
-from fecm.api import prepare
-from fecm.authoring.grid import Grid, graded, lines, listed, uniform
-from fecm.authoring.layup import LayupError, parse_layup
-from fecm.authoring.materials import MATERIALS
+from fecm.api import load_deck
 from fecm.deck import Deck
-from fecm.deck.formatting import format_deck
+from fecm.deck.catalogue import MATERIALS
+from fecm.deck.format import format_deck
+from fecm.deck.grid import Grid, graded, lines, listed, uniform
+from fecm.deck.layup import LayupError, parse_layup
 from fecm.deck.model import Impact, Material, Projectile
 from fecm.deck.records import Control
-from fecm.mesh import generate
-from fecm.parts import build_projectile
-from fecm.stability import critical_time_step
+from fecm.mechanics.time_step import critical_time_step
+from fecm.problem.build import build_projectile
+from fecm.problem.generate import generate
 from tests.calls import Done, call
 from tests.decks import APPENDIX, LONG, small
 
@@ -76,17 +76,17 @@ def test_the_reports_numbers_give_the_reports_deck() -> None:
 def test_a_new_deck_is_sound_and_declares_its_units() -> None:
     made = new(*PLATE)
     assert made.exit_code == 0
-    prepared = prepare(made.stdout)
+    prepared = load_deck(made.stdout)
     assert prepared.errors() == []
     deck = prepared.problems[0].deck
     assert deck.control == Control(117, 24, 4, 2, 5, 9)
-    material = deck.need(Material)
+    material = deck.require(Material)
     assert material.ply.e1 == 181e9
     assert material.integration.thickness == 1e-3
-    assert deck.need(Impact).node == 59  # the middle of 13 x 9 nodes
+    assert deck.require(Impact).node == 59  # the middle of 13 x 9 nodes
     dt = next(m.value for m in deck.macros if m.word == "DT")
-    critical = prepare(made.stdout).problems[0]
-    from fecm.parts import build_plate
+    critical = load_deck(made.stdout).problems[0]
+    from fecm.problem.build import build_plate
 
     ratio = dt / critical_time_step(build_plate(critical.deck, critical.mesh))
     assert 0.8 < ratio <= 0.9
@@ -147,7 +147,7 @@ def test_a_new_deck_never_replaces_an_old_one_unasked(tmp_path: Path) -> None:
     assert refused.exit_code == 2
     assert target.read_text() == "precious"
     assert call("new", str(target), *PLATE, "--overwrite").exit_code == 0
-    assert prepare(target).errors() == []
+    assert load_deck(target).errors() == []
 
 
 @given(st.floats(0.1, 100.0), st.integers(2, 30), st.floats(0.1, 0.9), st.floats(1.0, 20.0))
@@ -236,10 +236,10 @@ def test_fmt_check_answers_whether_a_deck_would_change(tmp_path: Path) -> None:
 def test_a_new_deck_carries_its_own_projectile_in_its_own_units() -> None:
     rigid = new(*PLATE, "--projectile", "mass:0.05")
     assert rigid.exit_code == 0
-    assert "W414" not in [f.code for f in prepare(rigid.stdout).findings]
+    assert "W414" not in [f.code for f in load_deck(rigid.stdout).findings]
     deck = fecm.read_deck(rigid.stdout)
     assert isinstance(deck, Deck)
-    assert deck.need(Projectile) == Projectile(0, 0, 0.05)
+    assert deck.require(Projectile) == Projectile(0, 0, 0.05)
     rod = fecm.read_deck(new(*PLATE, "--projectile", "rod:.02,.016,210e9,7800").stdout)
     assert isinstance(rod, Deck)
     mass = 7800 * 0.02 * np.pi * 0.008**2
@@ -276,8 +276,8 @@ def test_a_new_deck_shows_the_warnings_that_check_shows(tmp_path: Path) -> None:
     deck = tmp_path / "plate.inp"
     made = call("new", str(deck), *PLATE, "--velocity", "3000")
     assert made.exit_code == 0
-    shown = [f.render(str(deck)) for f in prepare(deck).findings]
-    assert {"W415", "W435"} <= {f.code for f in prepare(deck).findings}
+    shown = [f.render(str(deck)) for f in load_deck(deck).findings]
+    assert {"W415", "W435"} <= {f.code for f in load_deck(deck).findings}
     assert all(text in made.stderr for text in shown)
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fecm.api import prepare
-from fecm.overview import overview
+from fecm.api import load_deck
+from fecm.problem.summary import summarise
 from tests import decks
 from tests.calls import call
 from tests.decks import APPENDIX, DATA, LONG, MESH, PROGRAM, ROOT
@@ -33,7 +33,7 @@ ENDLESS = PROGRAM.replace("         10", "      99999").replace("          5", "
 
 def codes(text: str) -> list[str]:
     """Codes of a deck's findings, without the projectile that small decks never give."""
-    return [f.code for f in prepare(text).findings if f.code not in ("W414", "W415")]
+    return [f.code for f in load_deck(text).findings if f.code not in ("W414", "W415")]
 
 
 def with_data(old: str, new: str) -> str:
@@ -64,7 +64,7 @@ def test_there_are_twenty_wrong_decks_and_more() -> None:
 
 def test_five_independent_errors_are_five_findings_in_one_run() -> None:
     deck = next(path for path in WRONG if path.stem == "five-errors")
-    assert [f.code for f in prepare(deck).findings] == ["E005", "E408", "E101", "E403", "E501"]
+    assert [f.code for f in load_deck(deck).findings] == ["E005", "E408", "E101", "E403", "E501"]
 
 
 def test_the_summary_has_the_reports_critical_time_step_to_1_per_cent() -> None:
@@ -107,7 +107,7 @@ def test_check_runs_nothing_and_writes_nothing(tmp_path: Path) -> None:
 
 
 def test_a_sound_deck_has_no_findings_but_the_projectile() -> None:
-    assert [f.code for f in prepare(APPENDIX).findings] == ["W414", "W415"]
+    assert [f.code for f in load_deck(APPENDIX).findings] == ["W414", "W415"]
     assert codes(small()) == []
 
 
@@ -164,16 +164,16 @@ def test_two_nodes_in_one_place_are_a_cut_in_the_plate() -> None:
 
 
 def test_a_mesh_too_coarse_for_the_impacts_waves_is_found() -> None:
-    assert "W415" in [f.code for f in prepare(small()).findings]
+    assert "W415" in [f.code for f in load_deck(small()).findings]
     fine = (DATA / "plate-100x100x2.inp").read_text().replace("    3000.0", "     100.0")
-    assert "W415" not in [f.code for f in prepare(fine).findings]
+    assert "W415" not in [f.code for f in load_deck(fine).findings]
 
 
 def test_numbers_at_the_edge_of_their_range_end_in_findings_not_in_exceptions() -> None:
     # Velocities whose square is no number any more.
     for velocity in ("    1.E-300", "    1.E-200", "    1.E+300"):
         text = small(data=DATA_CARDS.replace("     115.0", velocity[1:]))
-        assert prepare(text).errors() == []
+        assert load_deck(text).errors() == []
 
 
 def test_a_clock_of_static_loads_has_no_critical_time_step() -> None:
@@ -184,7 +184,7 @@ def test_a_clock_of_static_loads_has_no_critical_time_step() -> None:
 
 
 def test_control_characters_of_a_deck_never_reach_the_terminal() -> None:
-    prepared = prepare(small(data=DATA_CARDS.replace("     115.0", "  \x1b[31m\t5")))
+    prepared = load_deck(small(data=DATA_CARDS.replace("     115.0", "  \x1b[31m\t5")))
     shown = "\n".join(finding.render("deck\x07.inp") for finding in prepared.findings)
     assert "E103" in shown
     assert shown.replace("\n", "").isprintable()
@@ -194,7 +194,7 @@ def test_control_characters_of_a_deck_never_reach_the_terminal() -> None:
 
 def test_loops_that_would_run_for_years_are_found_at_once() -> None:
     years = "LMAS\nDT        .5E-6\n" + "LOOP      99999\n" * 9 + "TIME\nRODP\n" + "NEXT\n" * 9
-    (finding,) = [f for f in prepare(small(years)).findings if f.code.startswith("E")]
+    (finding,) = [f for f in load_deck(small(years)).findings if f.code.startswith("E")]
     assert finding.code == "E509"
 
 
@@ -224,7 +224,7 @@ def test_masses_are_shown_in_tonnes_or_kilograms_beside_the_decks_unit() -> None
     shown = call("check", str(DATA / "plate-100x100x2.inp")).stdout
     assert "plate mass          3.2e-05 N*s^2/mm (3.2e-05 t)" in shown
     named = re.sub("^COOR", "UNIT\nin lbf s\nCOOR", APPENDIX.read_text(), flags=re.M)
-    lines = overview(prepare(named).problems[0]).lines()
+    lines = summarise(load_deck(named).problems[0]).lines()
     (line,) = (line for line in lines if "plate mass" in line)
     assert float(line.split("(")[1].split()[0]) == pytest.approx(0.06594, rel=1e-3)
     assert line.endswith(" kg)")
@@ -232,19 +232,19 @@ def test_masses_are_shown_in_tonnes_or_kilograms_beside_the_decks_unit() -> None
 
 def test_every_impact_has_its_elements_per_wave_in_the_summary() -> None:
     # The report's mesh: its first peak of 78.7 lb goes down to 75.5 lb on one eight times as fine.
-    view = overview(prepare(APPENDIX).problems[0])
+    view = summarise(load_deck(APPENDIX).problems[0])
     assert view.elements_per_wave == pytest.approx(6.83, abs=0.01)
     assert view.mesh_error == pytest.approx(78.7 / 75.5 - 1.0, rel=0.5)
     assert re.search(
         r"elements per wave +6\.8 \(mesh error of the peak about", "\n".join(view.lines())
     )
-    frequencies = overview(prepare(ROOT / "decks" / "natural-frequencies.inp").problems[0])
+    frequencies = summarise(load_deck(ROOT / "decks" / "natural-frequencies.inp").problems[0])
     assert frequencies.elements_per_wave is None
 
 
 @pytest.mark.parametrize("velocity", ["    -115.0", "     -1E-9"])
 def test_a_velocity_away_from_the_plate_is_refused(velocity: str) -> None:
-    (error,) = prepare(with_data("     115.0", velocity)).errors()
+    (error,) = load_deck(with_data("     115.0", velocity)).errors()
     assert (error.code, error.place.field if error.place else "") == (
         "E411",
         "cols 11-20: impact velocity",
@@ -254,11 +254,11 @@ def test_a_velocity_away_from_the_plate_is_refused(velocity: str) -> None:
 
 def test_a_checkerboard_of_a_free_plate_runs_only_when_forced() -> None:
     reduced = with_data("    3    3   -3", "    3    2   -3")
-    prepared = prepare(reduced)
+    prepared = load_deck(reduced)
     assert [f.code for f in prepared.errors()] == ["E321"]
     assert prepared.errors(force=True) == []
     # The printed program takes L1 for L2, so that nothing is wrong there.
-    assert prepare(reduced, "listing").errors() == []
+    assert load_deck(reduced, "listing").errors() == []
 
 
 @pytest.mark.parametrize(
@@ -296,7 +296,7 @@ def test_a_stiffness_beyond_all_range_is_found_where_the_time_step_is_left_to_th
     text = with_data(" 17500000.", "   1.E+308").replace("DT        .5E-6", "DT          0.0")
     assert codes(text) == ["E417"]
     modes = text[: text.index("MACR")] + "MACR\nLMAS\nEIGE          1\nEND\nSTOP\n"
-    assert np.isnan(overview(prepare(modes).problems[0]).critical_time_step)
+    assert np.isnan(summarise(load_deck(modes).problems[0]).critical_time_step)
 
 
 def test_a_coupled_laminate_held_in_its_plane_at_every_node_is_a_finding() -> None:

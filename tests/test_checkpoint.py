@@ -24,15 +24,15 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import prepare
-from fecm.check import Checked
-from fecm.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
-from fecm.choices import Choices
-from fecm.results import file_writer
-from fecm.results.journal import Journal, SpoolError
+from fecm.api import load_deck
+from fecm.problem.options import RunOptions
+from fecm.problem.problem import Problem
+from fecm.problem.slips import active_slips
+from fecm.results import hdf5_writer
 from fecm.results.sinks import MemorySink, RowBuffer
-from fecm.simulation import Simulation, simulate
-from fecm.slips import active_slips
+from fecm.simulation.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
+from fecm.simulation.simulation import Simulation, simulate
+from fecm.simulation.spool import Journal, SpoolError
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, small
 from tests.kill_runs import SWEEP, SWEPT, sweep_trial, trial
@@ -100,14 +100,14 @@ def run(
             checkpointer.write(simulation)
             raise StoppedError
 
-    problem = prepare(text).problems[0]
+    problem = load_deck(text).problems[0]
     names = frozenset(slips.split())
-    with file_writer.writing(path) as sink:
+    with hdf5_writer.writing(path) as sink:
         journal = Journal(sink, muted=resume)
         checkpointer = Checkpointer(path, journal)
         started = False
         simulation = Simulation(
-            problem, journal, Choices(names), look=look, urgent=lambda: macros and started
+            problem, journal, RunOptions(names), look=look, urgent=lambda: macros and started
         )
         started = True
         simulation._tick = 10**9 if macros else 1
@@ -279,7 +279,7 @@ def test_a_checkpoint_that_was_made_up_is_refused_in_one_line(
     monkeypatch.chdir(tmp_path)
     text = deck()
     Path("d.inp").write_text(text)
-    problem = prepare(text).problems[0]
+    problem = load_deck(text).problems[0]
     with pytest.raises(StoppedError):
         stop_at_once(problem, Path("d.h5"))
     altered(Path("d.h5"), change)
@@ -336,10 +336,10 @@ def test_a_checkpoint_that_can_not_be_written_leaves_the_one_before_in_force(
         if len(looks) == 70:
             raise StoppedError
 
-    with contextlib.suppress(StoppedError), file_writer.writing(path) as sink:
+    with contextlib.suppress(StoppedError), hdf5_writer.writing(path) as sink:
         journal = Journal(sink)
         checkpointer = Checkpointer(path, journal)
-        simulation = Simulation(prepare(deck()).problems[0], journal, look=look)
+        simulation = Simulation(load_deck(deck()).problems[0], journal, look=look)
         simulation._tick = 1
         simulation.run()
     assert len(looks) == 70
@@ -353,7 +353,7 @@ def test_a_checkpoint_of_another_version_is_refused(
     path = tmp_path / "run.h5"
     with pytest.raises(StoppedError):
         run(deck(), path, 5)
-    monkeypatch.setattr("fecm.checkpoint.__version__", "99.0")
+    monkeypatch.setattr("fecm.simulation.checkpoint.__version__", "99.0")
     with pytest.raises(CheckpointError, match="another version"):
         run(deck(), path, resume=True)
 
@@ -442,7 +442,7 @@ def test_a_second_signal_stops_at_once(tmp_path: Path) -> None:
 
 
 def test_what_an_interrupted_run_has_left_is_not_thrown_away_unasked(whole: Path) -> None:
-    problem = prepare(LONG).problems[0]
+    problem = load_deck(LONG).problems[0]
     with pytest.raises(StoppedError):
         stop_at_once(problem, whole / "l.h5")
     left = checkpoint_of(whole / "l.h5").read_bytes()
@@ -462,9 +462,9 @@ def test_resuming_without_a_checkpoint_is_refused(tmp_path: Path) -> None:
     assert "there is no checkpoint d.h5.checkpoint" in done.stderr
 
 
-def stop_at_once(problem: Checked, path: Path) -> None:
+def stop_at_once(problem: Problem, path: Path) -> None:
     """Stop a run with a checkpoint, as soon as it looks up."""
-    with file_writer.writing(path) as sink:
+    with hdf5_writer.writing(path) as sink:
         journal = Journal(sink)
         checkpointer = Checkpointer(path, journal)
 
@@ -482,7 +482,7 @@ def test_of_two_problems_the_finished_one_is_left_alone(tmp_path: Path) -> None:
     assert fecm_in(tmp_path, "run", "d.inp").returncode == 0
     first, second = (tmp_path / "d.h5").read_bytes(), (tmp_path / "d-2.h5").read_bytes()
     (tmp_path / "d-2.h5").unlink()
-    problem = prepare((tmp_path / "d.inp").read_text()).problems[1]
+    problem = load_deck((tmp_path / "d.inp").read_text()).problems[1]
     with pytest.raises(StoppedError):
         stop_at_once(problem, tmp_path / "d-2.h5")
     done = fecm_in(tmp_path, "run", "d.inp", "--resume")
@@ -495,7 +495,7 @@ def test_of_two_problems_the_finished_one_is_left_alone(tmp_path: Path) -> None:
 def test_what_stands_beyond_the_interrupted_problem_is_not_taken_for_done(tmp_path: Path) -> None:
     longer = PROGRAM.replace("     10", "     90")
     (tmp_path / "d.inp").write_text(small(longer, stop=False) + small(longer))
-    problem = prepare((tmp_path / "d.inp").read_text()).problems[0]
+    problem = load_deck((tmp_path / "d.inp").read_text()).problems[0]
     with pytest.raises(StoppedError):
         stop_at_once(problem, tmp_path / "d.h5")
     (tmp_path / "d-2.h5").write_text("of last week")
@@ -620,8 +620,8 @@ def test_a_run_that_passes_its_energy_limit_exits_1_and_leaves_no_file(tmp_path:
 
 
 def test_the_listings_rigid_target_is_warned_of_and_not_judged() -> None:
-    problem = prepare(LONG, "listing").problems[0]
-    simulation = simulate(problem, MemorySink(), Choices(active_slips("listing")))
+    problem = load_deck(LONG, "listing").problems[0]
+    simulation = simulate(problem, MemorySink(), RunOptions(active_slips("listing")))
     assert len([note for note in simulation.notes if "slips are on: it is not judged" in note]) == 1
-    sound = simulate(prepare(LONG).problems[0], MemorySink())
+    sound = simulate(load_deck(LONG).problems[0], MemorySink())
     assert sound.notes == []

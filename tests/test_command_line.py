@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
-from fecm import slips
+from fecm.problem import slips
 from tests.decks import APPENDIX, DATA_CARDS, ROOT, small
 
 

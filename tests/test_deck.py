@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import fecm
 from fecm.deck import Deck, DeckError, Reader
+from fecm.deck.card import format_real, parse_real
 from fecm.deck.model import (
     Boundary,
     Coordinates,
@@ -23,7 +24,6 @@ from fecm.deck.model import (
     Page,
     PrintOption,
 )
-from fecm.deck.numbers import format_real, parse_real
 from fecm.deck.records import Control, Macro, NodeValues
 from tests.decks import APPENDIX, DATA_CARDS, LONG, MESH, small
 
@@ -47,9 +47,9 @@ def test_the_reports_deck_is_what_the_report_says() -> None:
     assert isinstance(deck, Deck)
     assert deck.title == "**LOW VELOCITY IMPACT OF LAMINATED PLATE**"
     assert deck.control == Control(609, 140, 20, 2, 5, 9)
-    assert deck.need(Impact) == Impact(305, 3, 115.0)
-    assert deck.need(Indentation) == Indentation(1912000.0, 0.0006564, 0.094, 2.0)
-    material = deck.need(Material)
+    assert deck.require(Impact) == Impact(305, 3, 115.0)
+    assert deck.require(Indentation) == Indentation(1912000.0, 0.0006564, 0.094, 2.0)
+    material = deck.require(Material)
     assert (material.integration.bending, material.integration.points) == (3, -3)
     assert material.ply.e1 == 17.5e6
     # [0/45/0/-45/0]2s
@@ -99,7 +99,7 @@ def test_whatever_ten_columns_held_can_be_written_into_ten_columns(text: str) ->
 
 def test_an_all_blank_field_is_zero() -> None:
     deck = read(small(data=DATA_CARDS.replace("      .106", "      .106          ")))
-    assert deck.need(Material).integration.width == 0.0
+    assert deck.require(Material).integration.width == 0.0
     assert deck.macros[0] == Macro("LMAS")
 
 
@@ -114,8 +114,8 @@ def test_every_segment_of_the_listing_is_read() -> None:
     extra += "    3    0       3.0       2.0       3.0       4.0       5.0\n\nPRIN\n"
     deck = read(small(data=DATA_CARDS + extra))
     assert [o.on for o in deck.all(PrintOption)] == [False, True]
-    assert deck.need(Page).carriage_control == "0"
-    forces = deck.need(Forces).records
+    assert deck.require(Page).carriage_control == "0"
+    forces = deck.require(Forces).records
     assert [(f.node, f.increment) for f in forces] == [(1, 1), (3, 0)]
     assert forces[0].values == (1.0, 2.0, 3.0, 4.0, 5.0)
     assert {type(s) for s in deck.segments} >= {Coordinates, Elements, Boundary, Material}
@@ -145,12 +145,12 @@ def test_values_too_long_for_their_columns_are_written_in_free_format() -> None:
     precise = Impact(13, 3, 115.12345678901)
     segments = tuple(precise if isinstance(s, Impact) else s for s in deck.segments)
     again = read(Deck(deck.title, deck.control, segments, deck.macros).to_text())
-    assert again.need(Impact) == precise
+    assert again.require(Impact) == precise
 
 
 def test_a_value_knows_its_line_and_columns() -> None:
     text = small()
-    impact = read(text).need(Impact)
+    impact = read(text).require(Impact)
     place = impact.place("impact velocity")
     assert place is not None
     assert text.splitlines()[place.line - 1][place.first - 1 : place.last] == "     115.0"
@@ -179,7 +179,7 @@ def test_listing_mode_reads_blanks_as_the_zeros_they_were() -> None:
     (problem,) = reader.problems()
     assert [f.code for f in reader.findings] == ["W104"]
     assert problem.deck is not None
-    assert problem.deck.need(Impact).velocity == 105.0
+    assert problem.deck.require(Impact).velocity == 105.0
 
 
 def test_blanks_that_change_nothing_are_no_findings() -> None:

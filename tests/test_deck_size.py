@@ -8,15 +8,15 @@ from pathlib import Path
 import h5py
 import pytest
 
-from fecm import memory
-from fecm.api import prepare
-from fecm.authoring.layup import LayupError, parse_layup
+from fecm import _memory
+from fecm._memory import NotEnoughMemoryError
+from fecm.api import load_deck
 from fecm.deck import Finding, reader
+from fecm.deck.card import parse_integer
 from fecm.deck.findings import MOST, Findings
-from fecm.deck.numbers import parse_integer
+from fecm.deck.layup import LayupError, parse_layup
+from fecm.deck.macros import estimate_work
 from fecm.deck.reader import MOST_PROBLEMS, load_text
-from fecm.memory import NotEnoughMemoryError
-from fecm.program import estimate
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, MESH, OWN_FINDINGS, PROGRAM, small
 
@@ -25,7 +25,7 @@ TINY_PROBLEM = "FECM\n1,1,1,2,5,3\nEND\nMACR\nEND\n"
 
 def codes(text: str) -> list[str]:
     """Codes of a text's findings, without those of the small plate."""
-    return [f.code for f in prepare(text).findings if f.code not in OWN_FINDINGS]
+    return [f.code for f in load_deck(text).findings if f.code not in OWN_FINDINGS]
 
 
 # Numbers -----------------------------------------------------------------------------------------
@@ -37,7 +37,7 @@ def codes(text: str) -> list[str]:
 )
 def test_a_number_of_too_many_characters_is_an_error_in_few_words(card: str, number: str) -> None:
     text = small(data=DATA_CARDS.replace("   13    3     115.0", card.format(number)))
-    (finding,) = prepare(text).errors()
+    (finding,) = load_deck(text).errors()
     assert finding.code in ("E105", "E109")
     assert len(finding.render("deck")) < 3000
 
@@ -71,7 +71,7 @@ def test_checking_goes_through_the_findings_no_more_often_with_more_problems(
     taken = []
     for count in (2, 40):
         passes = 0
-        assert prepare(TINY_PROBLEM * count + "STOP\n").errors()
+        assert load_deck(TINY_PROBLEM * count + "STOP\n").errors()
         taken.append(passes)
     assert taken[0] == taken[1]
 
@@ -122,13 +122,13 @@ def test_counting_errors_does_not_take_longer_with_their_number() -> None:
 def test_empty_loops_count_toward_the_length_of_a_program() -> None:
     empty = "LOOP,,1.E9\nLOOP,,1.E9\nNEXT\nNEXT\n"
     assert codes(small(PROGRAM + empty)) == ["E509"]
-    program = prepare(small("LOOP,10\nLOOP,7\nNEXT\nNEXT\n")).problems[0].program
-    assert estimate(program).macros == 10 * 7 + 10
+    program = load_deck(small("LOOP,10\nLOOP,7\nNEXT\nNEXT\n")).problems[0].program
+    assert estimate_work(program).macros == 10 * 7 + 10
 
 
 def test_a_program_longer_than_any_float_is_an_error_with_its_length() -> None:
     text = small("LMAS\nDT,,.5E-6\n" + "LOOP,99999\n" * 63 + "TIME\nRODP\n" + "NEXT\n" * 63)
-    (finding,) = prepare(text).errors()
+    (finding,) = load_deck(text).errors()
     assert finding.code == "E509"
     # 99999^63 passes of TIME, RODP and the innermost NEXT
     assert "3e+315 macros" in finding.message
@@ -136,7 +136,7 @@ def test_a_program_longer_than_any_float_is_an_error_with_its_length() -> None:
 
 @pytest.mark.parametrize("card", ["LOOP,1e300", "RODP,1e300", "EIGE,2e9", "DISP,1e18"])
 def test_a_count_beyond_any_program_is_an_error(card: str) -> None:
-    found = prepare(small(PROGRAM + card + "\n")).errors()
+    found = load_deck(small(PROGRAM + card + "\n")).errors()
     assert "E505" in [finding.code for finding in found]
     assert max(len(finding.message) for finding in found) < 100
 
@@ -170,7 +170,7 @@ def test_a_deck_whose_cards_exceed_the_free_memory_is_not_read(
     deck = tmp_path / "deck.inp"
     deck.write_text("1\n" * 400_000)
     monkeypatch.setattr(reader, "available", lambda: 300_000_000)
-    monkeypatch.setattr(memory, "available", lambda: 300_000_000)
+    monkeypatch.setattr(_memory, "available", lambda: 300_000_000)
     with pytest.raises(NotEnoughMemoryError, match=r"deck\.inp: the deck takes about .* free"):
         load_text(deck)
     deck.write_text("! a comment of some length\n" + "1" * 800_000)

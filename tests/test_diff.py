@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.results import compare
 from fecm.results.result import load
 from tests.calls import Done, assert_unusable, diff, told
 from tests.decks import small
@@ -256,7 +255,7 @@ def test_json_tells_all_that_the_text_does(runs: Path) -> None:
 
 def test_small_blocks_of_rows_find_the_same(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = diff(runs / "report.h5", runs / "listing.h5").stdout
-    monkeypatch.setattr(compare, "BLOCK", 1)
+    monkeypatch.setattr(diff, "BLOCK", 1)
     assert diff(runs / "report.h5", runs / "listing.h5").stdout == whole
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm import plate
-from fecm.api import prepare
+from fecm.api import load_deck
+from fecm.mechanics import element_groups
 from fecm.results.result import Result
 from tests.builders import (
     Floats,
@@ -81,7 +81,7 @@ def findings(text: str) -> list[tuple[str, str, str]]:
     """Code, message and hint of a deck's findings, without those of the small plate."""
     return [
         (found.code, found.message, found.hint)
-        for found in prepare(text).findings
+        for found in load_deck(text).findings
         if found.code not in OWN_FINDINGS
     ]
 
@@ -141,8 +141,8 @@ def test_an_element_without_one_of_its_corners_is_refused(
 def test_a_4_node_element_without_its_fourth_node_is_a_triangle() -> None:
     coordinates, elements = square(2, 2, 4)
     elements[3, 3] = 0
-    problem = prepare(deck((coordinates, elements), (2, 2, 2))).problems[0]
-    found = plate.families(problem.mesh.elements, problem.mesh.coordinates)
+    problem = load_deck(deck((coordinates, elements), (2, 2, 2))).problems[0]
+    found = element_groups.element_blocks(problem.mesh.elements, problem.mesh.coordinates)
     names = {tuple(family.rows.tolist()): family.shape.name for family in found}
     assert names == {(0, 1, 2): "quadrilateral", (3,): "triangle"}
 
@@ -177,5 +177,5 @@ def test_a_triangle_s_missing_corner_is_no_side_of_it() -> None:
 def test_elements_have_3_to_12_nodes(nodes: int, right: bool) -> None:
     lines = deck(square(1, 1, 4), (2, 2, 2)).splitlines()
     lines[1] = f"4,1,2,2,5,{nodes}"
-    messages = [found.message for found in prepare("\n".join(lines) + "\n").findings]
+    messages = [found.message for found in load_deck("\n".join(lines) + "\n").findings]
     assert (f"NEN is {nodes}; it must be 3 to 12." in messages) is not right

@@ -9,9 +9,9 @@ import pytest
 from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
-from fecm import plate
-from fecm.assembly import PlateModel, assemble
-from fecm.elements.quadrature import gauss
+from fecm.mechanics import element_groups, element_matrices
+from fecm.mechanics.elements.quadrature import gauss
+from fecm.mechanics.plate import PlateModel, assemble
 from tests.builders import (
     GENERAL_LAYERS,
     GENERAL_PLY,
@@ -83,8 +83,8 @@ def test_mass_is_shared_as_the_squares_of_the_shape_functions(
     kind: int, order: int, shares: list[float]
 ) -> None:
     coordinates, elements = one_element(SQUARE, kind)
-    (family,) = plate.families(elements, coordinates)
-    lumped = plate.lumped_mass(family, isotropic_plate(0.2), gauss(order))[0]
+    (family,) = element_groups.element_blocks(elements, coordinates)
+    lumped = element_matrices.lumped_mass(family, isotropic_plate(0.2), gauss(order))[0]
     area = area_of(SQUARE[:3] if kind == 3 else SQUARE)
     inertia = area * np.array([0.2, 0.2, 0.2, 0.2**3 / 12.0, 0.2**3 / 12.0])
     np.testing.assert_allclose(lumped, np.outer(shares, inertia), rtol=1e-12)
@@ -126,8 +126,8 @@ def test_consistent_mass_of_small_elements_is_that_of_textbooks(
     kind: int, corners: Corners, table: list[list[int]], divisor: float
 ) -> None:
     coordinates, elements = one_element(corners, kind)
-    (family,) = plate.families(elements, coordinates)
-    M = plate.consistent_mass(family, isotropic_plate(0.2), gauss(2))
+    (family,) = element_groups.element_blocks(elements, coordinates)
+    M = element_matrices.consistent_mass(family, isotropic_plate(0.2), gauss(2))
     assert M.shape == (1, 5 * kind, 5 * kind)
     shared = area_of(corners) * np.array(table) / divisor
     found = M.reshape(kind, 5, kind, 5)
@@ -209,8 +209,8 @@ def test_bending_converges_on_ever_finer_distorted_meshes_of_triangles_and_cubic
     errors = []
     for n in (4, 8, 16):
         coordinates, elements = mesh = distorted_square(n, n, kind)
-        (family,) = plate.families(elements, coordinates)
-        at = plate.interpolate(family, gauss(3))
+        (family,) = element_groups.element_blocks(elements, coordinates)
+        at = element_matrices.interpolate(family, gauss(3))
         loads = summed(family.nodes, at.area @ at.N, len(coordinates))
         errors.append(1.0 - deflections(mesh, loads, 0.1, orders)[0] / exact)
     assert errors[0] > errors[1] > errors[2] > 0.0  # too stiff, less and less

@@ -9,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fecm import plate
-from fecm.assembly import assemble
-from fecm.elements.quadrature import Rule, gauss, nodal
-from fecm.products import product_of
+from fecm.mechanics import element_groups, element_matrices
+from fecm.mechanics.elements.quadrature import Quadrature, gauss, nodal
+from fecm.mechanics.plate import assemble
+from fecm.mechanics.stiffness_product import stiffness_operator
+from fecm.mechanics.strains import StrainField
 from tests.builders import (
     SKEWED,
     SQUARE,
@@ -124,7 +125,7 @@ def test_a_transition_element_in_a_patch_reproduces_constant_membrane_strain(
 
 def test_triangles_quadrilaterals_and_cubic_elements_in_one_mesh_pass_the_patch_test() -> None:
     coordinates, elements = mesh = three_families()
-    names = [family.shape.name for family in plate.families(elements, coordinates)]
+    names = [family.shape.name for family in element_groups.element_blocks(elements, coordinates)]
     assert set(names) == {"triangle", "quadrilateral", "cubic quadrilateral"}
     exact_on(mesh, stretched(coordinates, STRAIN))
 
@@ -149,7 +150,7 @@ def test_elsewhere_constant_curvature_is_not_in_the_elements_fields(
 
 @pytest.mark.parametrize("rule", [gauss(2), gauss(4), nodal(3), nodal(4)])
 def test_strains_of_linear_curvature_are_exact_in_12_node_parallelograms(
-    rule: Rule,
+    rule: Quadrature,
 ) -> None:
     coordinates, elements = parallelograms(2, 3, 12)
     (x, y), (a, b, c, d) = coordinates.T, (0.3, -0.7, 0.4, 0.9)
@@ -157,9 +158,9 @@ def test_strains_of_linear_curvature_are_exact_in_12_node_parallelograms(
     field[:, 2] = a * x**3 + b * x**2 * y + c * x * y**2 + d * y**3
     field[:, 3] = 3 * a * x**2 + 2 * b * x * y + c * y**2
     field[:, 4] = b * x**2 + 2 * c * x * y + 3 * d * y**2
-    strains = plate.StrainField(elements, coordinates, rule).evaluate(field)
-    (family,) = plate.families(elements, coordinates)
-    values, _ = plate.local_shape_functions(family, rule)
+    strains = StrainField(elements, coordinates, rule).evaluate(field)
+    (family,) = element_groups.element_blocks(elements, coordinates)
+    values, _ = element_matrices.local_shape_functions(family, rule)
     px, py = np.einsum("pn,enk->kep", values, family.coordinates)
     expected = [-6 * a * px - 2 * b * py, -2 * c * px - 6 * d * py, -4 * (b * px + c * py)]
     np.testing.assert_allclose(strains[:3], expected, atol=1e-12)
@@ -184,7 +185,7 @@ def rigid(mesh: Mesh) -> None:
     field = stretched(coordinates, none) + bent(coordinates, none)
     K = free_stiffness(mesh)
     assert np.abs(K @ field.ravel()).max() < 1e-14 * (np.abs(K) @ np.abs(field.ravel())).max()
-    strains = plate.StrainField(elements, coordinates, gauss(3)).evaluate(field)
+    strains = StrainField(elements, coordinates, gauss(3)).evaluate(field)
     np.testing.assert_allclose(strains, 0.0, atol=1e-12)
 
 
@@ -220,5 +221,5 @@ def test_every_way_to_multiply_by_the_stiffness_gives_the_same_forces(kind: int)
     u = np.random.default_rng(2).standard_normal(mesh.number_of_equations)
     expected = model.stiffness.toarray() @ u
     for solver in ("", "csr"):
-        found = product_of(model, solver)(u)
+        found = stiffness_operator(model, solver)(u)
         np.testing.assert_allclose(found, expected, atol=1e-13 * np.abs(expected).max())

@@ -8,11 +8,11 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fecm import plate
-from fecm.elements import cubic, quadrilateral, triangle
-from fecm.elements.catalogue import SHAPES, shape_of
-from fecm.elements.quadrature import Rule
-from fecm.elements.shape import ElementShape
+from fecm.mechanics import element_groups, element_matrices
+from fecm.mechanics.element_groups import SHAPES, shape_of
+from fecm.mechanics.elements import cubic, quadrilateral, triangle
+from fecm.mechanics.elements.quadrature import Quadrature
+from fecm.mechanics.elements.shape import ElementShape
 from tests.builders import Bools, Floats
 
 TRIANGLE, QUADRILATERAL, CUBIC = triangle.SHAPE, quadrilateral.SHAPE, cubic.SHAPE
@@ -290,13 +290,13 @@ def test_there_is_no_family_with_a_thirteenth_node() -> None:
         shape_of(np.ones(13, dtype=bool))
 
 
-def sorted_elements(*rows: list[int]) -> list[plate.Family]:
+def sorted_elements(*rows: list[int]) -> list[element_groups.ElementBlock]:
     """Families of elements with twelve columns over nodes on a line of no meaning."""
     elements = np.zeros((len(rows), 12), dtype=np.int32)
     for row, nodes in zip(elements, rows, strict=True):
         row[: len(nodes)] = nodes
     coordinates = np.random.default_rng(0).uniform(size=(30, 2))
-    return plate.families(elements, coordinates)
+    return element_groups.element_blocks(elements, coordinates)
 
 
 def test_elements_are_sorted_by_their_nodes_and_keep_their_rows() -> None:
@@ -333,8 +333,8 @@ def test_an_element_without_one_of_its_corners_is_named(nodes: list[int], messag
 
 
 def test_shape_functions_of_a_family_come_for_the_nodes_it_has() -> None:
-    rule = Rule(np.array([0.1, 0.3]), np.array([-0.2, 0.5]), np.ones(2))
+    rule = Quadrature(np.array([0.1, 0.3]), np.array([-0.2, 0.5]), np.ones(2))
     (family,) = sorted_elements([1, 2, 3, 4, 5, 0, 0, 0, 0, 10])
-    values, local = plate.local_shape_functions(family, rule)
+    values, local = element_matrices.local_shape_functions(family, rule)
     assert (values.shape, local.shape) == ((2, 6), (2, 2, 6))
     np.testing.assert_allclose(values.sum(axis=1), 1.0, atol=1e-14)

@@ -16,10 +16,10 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.export import ExportError
-from fecm.export.csv import table
-from fecm.export.vtkhdf import write_vtkhdf
+from fecm.results.csv import table
 from fecm.results.result import Result
+from fecm.results.schema import ExportError
+from fecm.results.vtkhdf import write_vtkhdf
 from tests.builders import SQUARE, one_element
 from tests.decks import DATA_CARDS, PROGRAM, ROOT, small
 from tests.test_command_line import fecm as command

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from fecm import files
-from fecm.checkpoint import checkpoint_of
-from fecm.files import OutputError, beside, check_outputs, partial_of
+from fecm import _files
+from fecm._files import OutputError, beside, check_outputs, partial_of
+from fecm.simulation.checkpoint import checkpoint_of
 from tests.calls import assert_unusable, call
 from tests.decks import small
 
@@ -190,14 +190,14 @@ def test_commands_without_overwrite_rename_exclusively(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert call("run", "d.inp").exit_code == 0
-    finish = files._finish
+    finish = _files._finish
 
     def late(handle: int, partial: Path, target: Path, overwrite: bool) -> None:
         if not target.name.endswith((".checkpoint", ".json", ".npz")):
             target.write_text("theirs")
         finish(handle, partial, target, overwrite)
 
-    monkeypatch.setattr(files, "_finish", late)
+    monkeypatch.setattr(_files, "_finish", late)
     for arguments, name in (
         (("run", "d.inp", "-o", "a.h5"), "a.h5"),
         (("export", "d.h5", "--to", "csv", "-o", "a.csv"), "a.csv"),
@@ -228,10 +228,10 @@ def test_what_a_killed_process_has_left_is_removed_and_no_link_is_followed(folde
     assert victim.read_text() == "precious"
     assert names(folder) == ["d.inp", "two.inp", "victim", "x.h5"]
     partial.write_text("half of it")
-    files.clear_partials([folder])
+    _files.clear_partials([folder])
     assert not partial.exists()
     with beside(Path("x.h5")) as own:
-        files.clear_partials([folder])
+        _files.clear_partials([folder])
         assert own.exists()
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from fecm.filters import FIRST_ORDER, KINDS, MOVING_AVERAGE, Filter, filter_of
+from fecm.studies.rod_test.filters import FIRST_ORDER, KINDS, MOVING_AVERAGE, Filter, filter_of
 
 RISE = 10e-6
 JUMP = 1e-13  # width of what stands for a step

@@ -7,7 +7,7 @@ import random
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fecm.api import prepare
+from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.model import (
     Boundary,
@@ -98,12 +98,12 @@ def test_printing_and_reading_a_model_gives_it_back(deck: Deck) -> None:
 
 @given(st.text(max_size=400))
 def test_any_text_gives_findings(text: str) -> None:
-    assert prepare(text + "\n").findings
+    assert load_deck(text + "\n").findings
 
 
 @given(st.text("FECM COOR\n0123456789.-+ED,! \t", max_size=600))
 def test_any_text_of_a_decks_own_letters_gives_findings(text: str) -> None:
-    assert prepare("FECM x\n" + text + "\n").findings
+    assert load_deck("FECM x\n" + text + "\n").findings
 
 
 @settings(max_examples=150)

@@ -14,7 +14,7 @@ import h5py
 import pytest
 
 import fecm
-from fecm.cli.apart import GB, limits_for
+from fecm.cli.isolation import GB, limits_for
 from fecm.results.schema import ResultFileError
 from tests.calls import assert_unusable, call
 from tests.decks import small
@@ -34,7 +34,7 @@ def spin(seconds):
 @cli.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.argument("what")
-@apart.reads("file")
+@isolation.reads("file")
 def act(file, what):
     if what == "crash":
         partial_of(Path("out.h5")).write_text("half")

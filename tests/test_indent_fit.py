@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fecm.fitting.constants import Fit, fit
-from fecm.fitting.cycles import divide
-from fecm.fitting.estimates import Estimate
-from fecm.fitting.report import notes
+from fecm.studies.indentation_test.constants import Fit, fit
+from fecm.studies.indentation_test.curves import Estimate
+from fecm.studies.indentation_test.cycles import divide
+from fecm.studies.indentation_test.report import notes
 from tests.indentation_tests import (
     ALPHA_P,
     PEAKS,

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import prepare
-from fecm.authoring.contacts import CONTACTS
+from fecm.api import load_deck
 from fecm.deck import Deck
-from fecm.deck.formatting import format_deck
+from fecm.deck.catalogue import CONTACTS
+from fecm.deck.format import format_deck
 from fecm.deck.model import Indentation
-from fecm.indentation import CriticalConstants, hertz_coefficient
+from fecm.mechanics.contact_law import YangSunPermanent, hertz_coefficient
 from fecm.results.result import Result
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, small
@@ -64,7 +64,7 @@ def test_hertz_is_the_sphere_on_a_half_space() -> None:
 
 
 def test_the_alpha_cr_law_unloads_with_one_rigidity() -> None:
-    law = CriticalConstants(K, ALPHA_CR)
+    law = YangSunPermanent(K, ALPHA_CR)
     assert law.permanent(3.1e-3) == 0.0
     assert law.permanent(0.0) == law.permanent(-1.0) == 0.0
     peaks = np.array([3.2e-3, 4e-3, 8e-3])
@@ -86,7 +86,7 @@ def acr_deck(card: str, word: str = "ACR", program: str = "") -> str:
 def test_expe_acr_is_read_written_and_aligned() -> None:
     deck = fecm.read_deck(acr_deck("  1912000.   0.00316"))
     assert isinstance(deck, Deck)
-    law = deck.need(Indentation)
+    law = deck.require(Indentation)
     assert (law.k, law.alpha_p, law.word) == (1.912e6, 0.00316, "ACR")
     assert fecm.read_deck(deck.to_text()) == deck
     aligned = format_deck(acr_deck("1912000., 0.00316"))
@@ -123,16 +123,16 @@ def test_a_run_of_expe_acr_leaves_what_equation_3_7_says() -> None:
     ],
 )
 def test_expe_acr_with_a_wrong_constant_is_an_error(card: str, what: str) -> None:
-    (error,) = prepare(acr_deck(card)).errors()
+    (error,) = load_deck(acr_deck(card)).errors()
     assert error.code == "E412"
     assert what in error.message
 
 
 def test_another_word_behind_expe_is_warned_of_and_not_read() -> None:
-    prepared = prepare(acr_deck(LAW_CARD.rstrip(), "ARC"))
+    prepared = load_deck(acr_deck(LAW_CARD.rstrip(), "ARC"))
     assert prepared.errors() == []
     assert "W416" in {finding.code for finding in prepared.findings}
-    assert prepared.problems[0].deck.need(Indentation).word == ""
+    assert prepared.problems[0].deck.require(Indentation).word == ""
 
 
 # Named contacts ----------------------------------------------------------------------------------
@@ -165,12 +165,12 @@ def test_a_new_deck_takes_a_named_contact_in_the_plys_units() -> None:
     done = call(*PLATE, "--material", "report", "--contact", "yang-0.5")
     deck = fecm.read_deck(done.stdout)
     assert isinstance(deck, Deck)
-    assert deck.need(Indentation) == Indentation(9.694e5, 3.16e-3, 0.0, 2.5, "ACR")
+    assert deck.require(Indentation) == Indentation(9.694e5, 3.16e-3, 0.0, 2.5, "ACR")
     metric = call(*PLATE, "--material", "report", "--units", "m-N-s", "--contact", "report-0.75",
                   "--projectile", "mass:0.05")  # fmt: skip
     deck = fecm.read_deck(metric.stdout)
     assert isinstance(deck, Deck)
-    assert deck.need(Indentation).alpha_p == pytest.approx(6.564e-4 * 0.0254, rel=1e-5)
+    assert deck.require(Indentation).alpha_p == pytest.approx(6.564e-4 * 0.0254, rel=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -7,13 +7,13 @@ import pytest
 
 from fecm.deck.model import Material
 from fecm.deck.records import Integration, Layer, Ply
-from fecm.laminate import (
+from fecm.mechanics.laminate import (
     laminate,
-    laminate_of,
     reduced_stiffness,
     transformed_shear,
     transformed_stiffness,
 )
+from fecm.problem.build import laminate_of
 from tests.builders import (
     GENERAL_PLY,
     REPORT_ANGLES,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import prepare
+from fecm.api import load_deck
 from fecm.deck.findings import DeckError
 from fecm.results.result import Result
 from tests.calls import call
@@ -153,7 +153,7 @@ def test_a_forced_edge_stands_at_its_whole_value_until_the_first_impact_step() -
 
 
 def test_a_mesh_of_two_kinds_of_elements_is_refused_with_the_reason() -> None:
-    assert prepare(MIXED).errors() == []
+    assert load_deck(MIXED).errors() == []
     with pytest.raises(DeckError, match=r"E601.*Element 2 has other nodes than element 1 \(8 ag"):
         fecm.run(MIXED, mode="listing")
 
@@ -164,9 +164,9 @@ def test_more_layers_than_the_arrays_hold_are_refused_with_the_reason() -> None:
         cards = "".join(f"{n:5}   0.     0.005\n" for n in range(1, count + 1))
         return small(data=head + cards).replace("4    2    2    5", f"4   {count}    2    5")
 
-    assert prepare(layered(25), "listing").errors() == []
-    assert prepare(layered(26)).errors() == []
-    (found,) = prepare(layered(26), "listing").errors()
+    assert load_deck(layered(25), "listing").errors() == []
+    assert load_deck(layered(26)).errors() == []
+    (found,) = load_deck(layered(26), "listing").errors()
     assert (found.code, "26 layers are more than the 25" in found.message) == ("E602", True)
     assert found.place is not None
     assert found.place.text.startswith("   26")

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from fecm.api import prepare
+from fecm.api import load_deck
 from fecm.deck import Deck, DeckError, Finding, read_deck
-from fecm.deck.formatting import format_deck
+from fecm.deck.format import format_deck
+from fecm.deck.macros import WORDS, estimate_work
 from fecm.deck.model import Impact, Indentation, Projectile, Segment, ShearCorrection
 from fecm.deck.records import Macro
-from fecm.program import WORDS, estimate
-from fecm.slips import MODES
+from fecm.problem.slips import MODES
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, ROOT, small
 
@@ -29,7 +29,7 @@ def read(text: str) -> Deck:
 def error_of(card: str, mode: str = "report") -> Finding:
     """The one error of the small deck with a card in place of its RODP."""
     program = PROGRAM.replace("RODP          5", card)
-    (finding,) = prepare(small(program), mode).errors()
+    (finding,) = load_deck(small(program), mode).errors()
     return finding
 
 
@@ -61,7 +61,7 @@ def test_a_number_behind_the_word_is_the_macros_number(card: str, fixed: str) ->
 @pytest.mark.parametrize("comma", [",", ",,"])
 def test_comma_cards_take_the_steps_that_they_say(comma: str) -> None:
     text = small(f"LMAS\nDT{comma}.5E-6\nLOOP{comma}7\nTIME\nRODP{comma}3\nNEXT\n")
-    tally = estimate(prepare(text).problems[0].program)
+    tally = estimate_work(load_deck(text).problems[0].program)
     assert (tally.steps, tally.contact_rows) == (7, 2)
 
 
@@ -103,14 +103,14 @@ def test_what_no_macro_uses_is_an_error_at_its_place(
 @pytest.mark.parametrize("word", sorted(set(WORDS) - {"LOOP", "NEXT"}))
 def test_every_word_refuses_a_second_word_and_a_second_number(word: str) -> None:
     for card in (f"{word:4} AB", f"{word:14}0    9", f"{word},,0,9"):
-        found = prepare(small(PROGRAM + card + "\n")).errors()
+        found = load_deck(small(PROGRAM + card + "\n")).errors()
         assert "E514" in [finding.code for finding in found], card
 
 
 def test_no_deck_of_the_project_has_a_field_that_no_macro_uses() -> None:
     for path in sorted((ROOT / "decks").glob("*.inp")):
-        assert prepare(path).errors() == []
-        assert prepare(path, "listing").errors() == []
+        assert load_deck(path).errors() == []
+        assert load_deck(path, "listing").errors() == []
 
 
 def test_letters_behind_the_fourth_of_a_word_do_not_count() -> None:
@@ -140,7 +140,7 @@ def test_a_number_that_its_last_field_cuts_short_is_an_error_where_the_value_cha
     assert (finding.code, marked(finding)) == ("E105", "1.1512345E+2")
     assert "`13,3,1.1512345E+2`" in finding.hint
     exact = read(small(data=DATA_CARDS.replace(card, "   13    3   115.00000")))
-    assert exact.need(Impact).velocity == 115.0
+    assert exact.require(Impact).velocity == 115.0
 
 
 def test_a_time_step_is_written_as_a_person_reads_it() -> None:
@@ -209,5 +209,5 @@ def test_a_card_of_commas_alone_is_a_blank_card_before_and_after_formatting(blan
 @pytest.mark.parametrize("head", ["EXPE ACR", "EXPE,ACR", "EXPE, acr"])
 def test_a_keywords_second_word_may_stand_behind_a_comma(head: str) -> None:
     text = small(data=DATA_CARDS.replace("EXPE\n", f"{head}\n").replace("0.094", "  0.0"))
-    assert read(text).need(Indentation).word == "ACR"
+    assert read(text).require(Indentation).word == "ACR"
     assert read(format_deck(text)) == read(text)

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import prepare
-from fecm.deck.records import LoadTable
-from fecm.modes import modes
-from fecm.parts import build_plate
-from fecm.proportional import load_factor
+from fecm.api import load_deck
+from fecm.deck.records import LoadTable, load_factor
+from fecm.mechanics.natural_modes import modes
+from fecm.problem.build import build_plate
 from fecm.results.result import Result
 from tests.calls import call
 from tests.decks import DATA, DATA_CARDS, MESH, PROGRAM, ROOT, small
@@ -65,7 +64,7 @@ def test_reactions_balance_the_loads() -> None:
     # A quarter of the plate carries a quarter of the unit load, less what FORC leaves to the
     # supported nodes themselves: 5/12 h^2 for each of two edges' elements and corners.
     text = STATIC.read_text()
-    prepared = prepare(text).problems[0]
+    prepared = load_deck(text).problems[0]
     applied = prepared.mesh.forces[:, 2][prepared.mesh.equations[:, 2] > 0].sum()
     assert force[:, 2].sum() == pytest.approx(-applied, rel=1e-10)
     free = prepared.mesh.equations > 0
@@ -191,7 +190,7 @@ def test_a_free_plate_has_six_rigid_modes() -> None:
 
 
 def test_modes_are_orthonormal_in_the_mass() -> None:
-    problem = prepare(MODES).problems[0]
+    problem = load_deck(MODES).problems[0]
     plate = build_plate(problem.deck, problem.mesh)
     for consistent in (False, True):
         found = modes(plate, 6, consistent=consistent)
@@ -203,7 +202,7 @@ def test_modes_are_orthonormal_in_the_mass() -> None:
 
 def test_a_pulse_gives_the_response_that_the_modes_give() -> None:
     result = run(PULSE)
-    problem = prepare(PULSE).problems[0]
+    problem = load_deck(PULSE).problems[0]
     plate = build_plate(problem.deck, problem.mesh)
     found = modes(plate, plate.neq, consistent=False)
     row = int(problem.mesh.equations[40, 2]) - 1
@@ -267,7 +266,7 @@ def test_a_missing_load_table_is_found() -> None:
     lines = [
         line for line in PULSE.read_text().splitlines() if not line.startswith("1, 1, 0.0, 2.0")
     ]
-    assert [f.code for f in prepare("\n".join(lines) + "\n").findings] == ["E011"]
+    assert [f.code for f in load_deck("\n".join(lines) + "\n").findings] == ["E011"]
 
 
 def test_check_ends_the_program_only_under_its_slip() -> None:

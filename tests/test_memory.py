@@ -12,16 +12,16 @@ from pathlib import Path
 import pytest
 
 import fecm
-import fecm.check.memory
+import fecm._memory
 import fecm.deck.reader
-import fecm.memory
-from fecm.api import prepare
-from fecm.check.memory import needed_bytes
-from fecm.memory import NotEnoughMemoryError, available
-from fecm.parts import build_plate
-from fecm.stability import critical_time_step
-from fecm.sweeps.memory import KEPT
-from fecm.sweeps.run import ADVANCED
+import fecm.problem.memory
+from fecm._memory import NotEnoughMemoryError, available
+from fecm.api import load_deck
+from fecm.mechanics.time_step import critical_time_step
+from fecm.problem.build import build_plate
+from fecm.problem.memory import needed_bytes
+from fecm.sweeps.batch import ADVANCED
+from fecm.sweeps.plan import KEPT
 from tests.calls import assert_unusable, call
 from tests.decks import small
 
@@ -72,7 +72,7 @@ def test_the_estimate_bounds_what_is_measured(
     tmp_path: Path, macros: str, options: tuple[str, ...]
 ) -> None:
     deck = plate(tmp_path, 40, macros, *options)
-    problem = prepare(deck).problems[0]
+    problem = load_deck(deck).problems[0]
     head = small().partition("MACR")[0]
     program = OWN + PEAK.format(small=small(), static=f"{head}MACR\nLMAS\nEIGE\nEND\nSTOP\n")
     done = subprocess.run(
@@ -86,7 +86,7 @@ def test_the_estimate_bounds_what_is_measured(
 def test_a_run_that_needs_more_than_is_free_is_refused_with_both_numbers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fecm.memory, "available", lambda: 2 * MEGABYTE)
+    monkeypatch.setattr(fecm._memory, "available", lambda: 2 * MEGABYTE)
     deck, output = tmp_path / "small.inp", tmp_path / "small.h5"
     deck.write_text(small().replace("DISP          5", "DISP"))
     done = call("run", deck, "-o", output)
@@ -98,9 +98,9 @@ def test_a_run_that_needs_more_than_is_free_is_refused_with_both_numbers(
 
 
 def test_a_result_in_memory_counts_with_all_its_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fecm.memory, "available", lambda: 100 * MEGABYTE)
+    monkeypatch.setattr(fecm._memory, "available", lambda: 100 * MEGABYTE)
     many = small().replace("LOOP         10", "LOOP      99999").replace("DISP          5", "DISP")
-    problem = prepare(many).problems[0]
+    problem = load_deck(many).problems[0]
     # w and five unknowns of 25 nodes in each of the rows.
     assert needed_bytes(problem, in_memory=True) > 99999 * 25 * 6 * 8
     with pytest.raises(NotEnoughMemoryError, match=r"takes about 1\d\d MB .* store fewer rows"):
@@ -141,7 +141,7 @@ def test_a_sweep_that_needs_more_than_is_free_is_refused_with_both_numbers(
     free: int,
     remedy: str,
 ) -> None:
-    monkeypatch.setattr(fecm.memory, "available", lambda: free * MEGABYTE)
+    monkeypatch.setattr(fecm._memory, "available", lambda: free * MEGABYTE)
     deck = tmp_path / "small.inp"
     deck.write_text(small().replace("LOOP         10", "LOOP       9000"))
     vary = ("--vary", "velocity=50:100:3000", "-o", tmp_path / "s.h5")
@@ -157,9 +157,9 @@ def test_a_sweep_that_needs_more_than_is_free_is_refused_with_both_numbers(
 def test_matrices_that_do_not_fit_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    problem = prepare(plate(tmp_path, 60, IMPACT)).problems[0]
+    problem = load_deck(plate(tmp_path, 60, IMPACT)).problems[0]
     model = build_plate(problem.deck, problem.mesh)
-    monkeypatch.setattr(fecm.memory, "available", lambda: 120 * MEGABYTE)
+    monkeypatch.setattr(fecm._memory, "available", lambda: 120 * MEGABYTE)
     # 24 bytes for each of the 45 x 45 entries of 3600 matrices.
     told = "assemble the plate's matrices takes about 175 MB of memory, and 120 MB are free"
     with pytest.raises(NotEnoughMemoryError, match=told):
@@ -169,7 +169,7 @@ def test_matrices_that_do_not_fit_are_refused(
 
 def test_many_small_problems_with_large_counts_are_refused() -> None:
     one = "FECM x\n999999999,1,1,2,5,4\nEND\nMACR\nEND\n".replace("999999999", "900000")
-    prepared = prepare(one * 50 + "STOP\n")
+    prepared = load_deck(one * 50 + "STOP\n")
     assert len(prepared.problems) == 1
     told = [f.message for f in prepared.findings if "together" in f.message]
     assert len(told) == 49

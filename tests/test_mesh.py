@@ -8,7 +8,8 @@ import pytest
 from fecm.deck import Deck, Findings
 from fecm.deck.model import Boundary, Coordinates, Elements, Forces, Segment
 from fecm.deck.records import Control, ElementNodes, NodeCodes, NodeValues
-from fecm.mesh import Mesh, generate
+from fecm.mechanics.mesh import Mesh
+from fecm.problem.generate import generate
 
 
 def mesh(*segments: Segment, numnp: int = 9, numel: int = 4, nen: int = 4) -> Mesh:

@@ -7,11 +7,11 @@ import re
 import pytest
 
 import fecm
-from fecm.api import prepare
-from fecm.dynamics import DivergenceError
-from fecm.parts import build_plate
+from fecm.api import load_deck
+from fecm.mechanics.plate_motion import DivergenceError
+from fecm.mechanics.time_step import critical_time_step
+from fecm.problem.build import build_plate
 from fecm.results.result import Result
-from fecm.stability import critical_time_step
 from tests.decks import DATA
 
 BASE = (DATA / "plate-100x100x2.inp").read_text()
@@ -38,7 +38,7 @@ def run_one(text: str) -> Result:
 
 def codes(text: str) -> set[str]:
     """Codes of a deck's findings, but for that of its mesh."""
-    return {finding.code for finding in prepare(text).findings} - {COARSE}
+    return {finding.code for finding in load_deck(text).findings} - {COARSE}
 
 
 def scaled_coordinates(factor: float) -> str:
@@ -143,7 +143,7 @@ def test_steps_that_alternate_are_named_where_they_diverge() -> None:
 
 
 def test_a_spring_far_stiffer_than_the_plate_leaves_a_mass_on_a_spring() -> None:
-    problem = prepare(BASE).problems[0]
+    problem = load_deck(BASE).problems[0]
     plate = build_plate(problem.deck, problem.mesh)
     row = int(problem.mesh.equations[312, 2]) - 1
     # A corner node has 1/9 of an element's mass: 1.6e-9 * 2 * (100/12)^2.

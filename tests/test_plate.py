@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from fecm import assembly, plate
-from fecm.assembly import PlateModel, assemble
-from fecm.elements import quadrilateral
-from fecm.elements.quadrature import HIGHEST_ORDER, Rule, gauss, nodal
-from fecm.elements.quadrilateral import ETA, XI
-from fecm.products import product_of
+from fecm.mechanics import element_groups, element_matrices, plate
+from fecm.mechanics.elements import quadrilateral
+from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
+from fecm.mechanics.elements.quadrilateral import ETA, XI
+from fecm.mechanics.plate import PlateModel, assemble
+from fecm.mechanics.stiffness_product import stiffness_operator
+from fecm.mechanics.strains import StrainField
 from tests.builders import (
     GENERAL_ANGLES,
     GENERAL_LAYERS,
@@ -81,7 +82,7 @@ def equilibrium(model: PlateModel) -> Floats:
 
 
 def patch(
-    mesh: tuple[Floats, Ints], field: Floats, shear: int = 3, *, transposed: bool = False
+    mesh: tuple[Floats, Ints], field: Floats, shear: int = 3, *, transposed_jacobian: bool = False
 ) -> PlateModel:
     """Prescribe a field on a patch's boundary."""
     held = boundary(*mesh)
@@ -89,15 +90,17 @@ def patch(
     model = assemble(
         with_restraints(*mesh, held, values),
         general_plate(),
-        rules(3, shear, transposed=transposed),
+        rules(3, shear, transposed_jacobian=transposed_jacobian),
     )
     assert model.mesh.number_of_equations > 0
     return model
 
 
-def residual(mesh: tuple[Floats, Ints], field: Floats, *, transposed: bool = False) -> float:
+def residual(
+    mesh: tuple[Floats, Ints], field: Floats, *, transposed_jacobian: bool = False
+) -> float:
     """Largest force left on an inner node by a field, over the largest that its parts exert."""
-    model = patch(mesh, field, transposed=transposed)
+    model = patch(mesh, field, transposed_jacobian=transposed_jacobian)
     inside = model.mesh.equations > 0
     left = model.stiffness @ field[inside] + model.support @ field[~inside]
     parts = abs(model.stiffness) @ abs(field[inside]) + abs(model.support) @ abs(field[~inside])
@@ -166,10 +169,10 @@ def test_a_patch_of_distorted_9_or_parallel_8_node_elements_reproduces_constant_
 @pytest.mark.parametrize("rule", [*map(gauss, ORDERS), *map(nodal, ORDERS)])
 @pytest.mark.parametrize(("maker", "kind"), BENT_PATCHES)
 def test_strains_of_constant_curvature_are_exact_at_gauss_and_at_nodal_points(
-    maker: MeshMaker, kind: int, rule: Rule
+    maker: MeshMaker, kind: int, rule: Quadrature
 ) -> None:
     coordinates, elements = maker(3, 4, kind)
-    found = plate.StrainField(elements, coordinates, rule).evaluate(bent(coordinates, CURVATURE))
+    found = StrainField(elements, coordinates, rule).evaluate(bent(coordinates, CURVATURE))
     assert found.shape == (5, 12, len(rule.xi))
     expected = np.array([*CURVATURE, 0.0, 0.0])[:, None, None]
     np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), atol=1e-12)
@@ -178,12 +181,12 @@ def test_strains_of_constant_curvature_are_exact_at_gauss_and_at_nodal_points(
 @pytest.mark.parametrize("rule", [*map(gauss, ORDERS), *map(nodal, ORDERS)])
 @pytest.mark.parametrize(("maker", "kind"), STRETCHED_PATCHES)
 def test_a_tilted_midplane_with_upright_normals_is_sheared_by_its_slope(
-    maker: MeshMaker, kind: int, rule: Rule
+    maker: MeshMaker, kind: int, rule: Quadrature
 ) -> None:
     coordinates, elements = maker(3, 4, kind)
     field = np.zeros((len(coordinates), 5))
     field[:, 2] = coordinates @ [0.3, -0.7]  # gamma_xz, gamma_yz
-    found = plate.StrainField(elements, coordinates, rule).evaluate(field)
+    found = StrainField(elements, coordinates, rule).evaluate(field)
     expected = np.array([0.0, 0.0, 0.0, -0.7, 0.3])[:, None, None]
     np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), atol=1e-12)
 
@@ -191,7 +194,7 @@ def test_a_tilted_midplane_with_upright_normals_is_sheared_by_its_slope(
 def test_strains_do_not_depend_on_displacements_in_the_plane() -> None:
     coordinates, elements = distorted_square(3, 4)
     field = bent(coordinates, CURVATURE)
-    strains = plate.StrainField(elements, coordinates, gauss(3))
+    strains = StrainField(elements, coordinates, gauss(3))
     alone = strains.evaluate(field)
     assert np.array_equal(strains.evaluate(field + stretched(coordinates, STRAIN)), alone)
 
@@ -235,7 +238,7 @@ def test_rigid_motions_cause_neither_strains_nor_forces(kind: int) -> None:
     K = free_stiffness(mesh)
     forces = K @ field.ravel()
     assert np.abs(forces).max() < 1e-14 * (np.abs(K) @ np.abs(field.ravel())).max()
-    strains = plate.StrainField(elements, coordinates, gauss(3)).evaluate(field)
+    strains = StrainField(elements, coordinates, gauss(3)).evaluate(field)
     np.testing.assert_allclose(strains, 0.0, atol=1e-13)
 
 
@@ -277,8 +280,8 @@ def test_turning_a_plate_with_its_fibres_changes_no_eigenvalue(turn: float) -> N
     turned = coordinates @ np.array([[c, s], [-s, c]])
 
     def eigenvalues(at: Floats, fibres: float) -> Floats:
-        (family,) = plate.families(elements, at)
-        K = plate.stiffness(family, general_plate(fibres), gauss(3), gauss(3))[0]
+        (family,) = element_groups.element_blocks(elements, at)
+        K = element_matrices.stiffness(family, general_plate(fibres), gauss(3), gauss(3))[0]
         return np.asarray(np.linalg.eigvalsh(K))
 
     expected = eigenvalues(coordinates, 0.0)
@@ -305,7 +308,7 @@ def test_assembling_in_blocks_changes_nothing(
         return [model.stiffness.toarray(), model.support.toarray(), model.mass]
 
     whole = assembled()
-    monkeypatch.setattr(assembly, "BLOCK", 2)
+    monkeypatch.setattr(plate, "BLOCK", 2)
     for cut, expected in zip(assembled(), whole, strict=True):
         assert np.abs(cut - expected).max() < 1e-14 * np.abs(expected).max()
 
@@ -316,8 +319,10 @@ def test_the_assembled_stiffness_is_the_sum_of_the_elements() -> None:
     coordinates[elements[4, 0] - 1] += 1e-6
     expected = np.zeros((len(coordinates), 5, len(coordinates), 5))
     for element in elements:
-        (family,) = plate.families(element[None], coordinates)
-        K = plate.stiffness(family, general_plate(), gauss(3), gauss(3)).reshape(9, 5, 9, 5)
+        (family,) = element_groups.element_blocks(element[None], coordinates)
+        K = element_matrices.stiffness(family, general_plate(), gauss(3), gauss(3)).reshape(
+            9, 5, 9, 5
+        )
         for a, b in product(range(9), repeat=2):
             expected[element[a] - 1, :, element[b] - 1] += K[a, :, b]
     found = free_stiffness((coordinates, elements))
@@ -335,31 +340,33 @@ def test_every_way_to_multiply_by_the_stiffness_gives_the_same_forces(
     u = np.random.default_rng(2).standard_normal(mesh.number_of_equations)
     expected = model.stiffness.toarray() @ u
     for solver in ("", "csr"):
-        found = product_of(model, solver)(u)
+        found = stiffness_operator(model, solver)(u)
         np.testing.assert_allclose(found, expected, atol=1e-13 * np.abs(expected).max())
 
 
 # The transposed Jacobian -------------------------------------------------------------------------
 
 
-def stiffness_of(corners: Corners, *, transposed: bool) -> Floats:
+def stiffness_of(corners: Corners, *, transposed_jacobian: bool) -> Floats:
     """Stiffness of one element of the general laminate."""
     coordinates, elements = one_element(corners)
-    (family,) = plate.families(elements, coordinates)
-    return plate.stiffness(family, general_plate(), gauss(3), gauss(3), transposed=transposed)
+    (family,) = element_groups.element_blocks(elements, coordinates)
+    return element_matrices.stiffness(
+        family, general_plate(), gauss(3), gauss(3), transposed_jacobian=transposed_jacobian
+    )
 
 
 def test_the_transposed_jacobian_does_no_harm_on_rectangles_along_the_axes() -> None:
     upright = ((0.5, 0.2), (2.5, 0.2), (2.5, 0.9), (0.5, 0.9))
-    proper = stiffness_of(upright, transposed=False)
+    proper = stiffness_of(upright, transposed_jacobian=False)
     np.testing.assert_allclose(
-        stiffness_of(upright, transposed=True), proper, atol=1e-14 * np.abs(proper).max()
+        stiffness_of(upright, transposed_jacobian=True), proper, atol=1e-14 * np.abs(proper).max()
     )
 
 
 def test_the_transposed_jacobian_spoils_a_skewed_element() -> None:
     proper, spoilt = (
-        stiffness_of(SKEWED, transposed=slip).reshape(9, 5, 9, 5) for slip in (False, True)
+        stiffness_of(SKEWED, transposed_jacobian=slip).reshape(9, 5, 9, 5) for slip in (False, True)
     )
     for unknown in (0, 2):  # in the plane, and by transverse shear alone
         difference = np.abs(spoilt - proper)[:, unknown, :, unknown]
@@ -369,10 +376,10 @@ def test_the_transposed_jacobian_spoils_a_skewed_element() -> None:
 def test_the_transposed_jacobian_fails_the_patch_tests() -> None:
     coordinates, elements = mesh = distorted_square(3, 4)
     for field in (stretched(coordinates, STRAIN), bent(coordinates, CURVATURE)):
-        assert residual(mesh, field, transposed=True) > 1e-3
-        found = equilibrium(patch(mesh, field, transposed=True))
+        assert residual(mesh, field, transposed_jacobian=True) > 1e-3
+        found = equilibrium(patch(mesh, field, transposed_jacobian=True))
         assert np.abs(found - field).max() > 1e-3
-    strains = plate.StrainField(elements, coordinates, gauss(3), transposed=True)
+    strains = StrainField(elements, coordinates, gauss(3), transposed_jacobian=True)
     found = strains.evaluate(bent(coordinates, CURVATURE))
     assert np.abs(found[:3] - CURVATURE[:, None, None]).max() > 0.05
     assert np.abs(found[3:]).max() > 0.01
@@ -380,7 +387,7 @@ def test_the_transposed_jacobian_fails_the_patch_tests() -> None:
 
 def test_a_family_holds_the_elements_that_have_the_same_nodes() -> None:
     coordinates, elements = mixed(3, 4, 9)
-    found = plate.families(elements, coordinates)
+    found = element_groups.element_blocks(elements, coordinates)
     assert sorted(row for family in found for row in family.rows) == list(range(12))
     for family in found:
         assert len(family.present) == quadrilateral.NODES

@@ -11,10 +11,10 @@ from scipy import sparse
 from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh, spsolve
 
-from fecm import plate
-from fecm.assembly import PlateModel, assemble
-from fecm.elements.quadrature import gauss
-from fecm.stability import critical_time_step
+from fecm.mechanics import element_groups, element_matrices
+from fecm.mechanics.elements.quadrature import gauss
+from fecm.mechanics.plate import PlateModel, assemble
+from fecm.mechanics.time_step import critical_time_step
 from tests.builders import (
     GENERAL_LAYERS,
     GENERAL_PLY,
@@ -85,8 +85,8 @@ def test_a_square_s_mass_is_shared_as_the_squares_of_its_shape_functions(
     kind: int, order: int, shares: list[float]
 ) -> None:
     coordinates, elements = one_element(SQUARE, kind)
-    (family,) = plate.families(elements, coordinates)
-    lumped = plate.lumped_mass(family, isotropic_plate(0.2), gauss(order))[0]
+    (family,) = element_groups.element_blocks(elements, coordinates)
+    lumped = element_matrices.lumped_mass(family, isotropic_plate(0.2), gauss(order))[0]
     inertia = np.array([0.2, 0.2, 0.2, 0.2**3 / 12.0, 0.2**3 / 12.0])
     np.testing.assert_allclose(lumped, np.outer(shares, inertia), rtol=1e-13)
 
@@ -295,8 +295,8 @@ def test_bending_converges_on_ever_finer_distorted_meshes(
     errors = []
     for n in (4, 8, 16):
         coordinates, elements = mesh = distorted_square(n, n, kind)
-        (family,) = plate.families(elements, coordinates)
-        at = plate.interpolate(family, gauss(3))
+        (family,) = element_groups.element_blocks(elements, coordinates)
+        at = element_matrices.interpolate(family, gauss(3))
         loads = summed(family.nodes, at.area @ at.N, len(coordinates))
         errors.append(abs(deflections(mesh, loads, 0.1, orders)[0] / expected - 1.0))
     assert errors[2] < errors[1] / 2.0 < errors[0] / 4.0

@@ -15,11 +15,11 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.plot import KINDS, MISSING, Options, Picture, PlotError, draw, save
 from fecm.plot.data import patches, strain_points
 from fecm.plot.deflection import profile
 from fecm.plot.meshes import supports
-from fecm.plot.style import COLOURS, scale
+from fecm.plot.pictures import KINDS, MISSING, Options, draw, save
+from fecm.plot.style import COLOURS, Picture, PlotError, scale
 from fecm.results.result import Result
 from tests.builders import distorted_square
 from tests.calls import assert_unusable, call
@@ -367,7 +367,7 @@ def test_a_call_that_makes_no_picture_is_refused_in_words(
 
 def test_nothing_but_a_picture_imports_matplotlib(file: Path) -> None:
     program = (
-        "import sys, fecm, fecm.cli, fecm.plot, fecm.cli.plot\n"
+        "import sys, fecm, fecm.cli, fecm.plot.pictures, fecm.cli.plot\n"
         "try: fecm.cli.main(sys.argv[1:])\n"
         "except SystemExit as end: assert not end.code\n"
         "print([n for n in ('matplotlib', 'pandas', 'vtk') if n in sys.modules])\n"

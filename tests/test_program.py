@@ -10,15 +10,16 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import prepare
-from fecm.choices import Choices
+from fecm.api import load_deck
 from fecm.deck import Findings
+from fecm.deck.macros import compile_program
 from fecm.deck.records import Macro
-from fecm.program import Act, Course, compile_program, tally
+from fecm.mechanics.time_step import critical_time_step
+from fecm.problem.options import RunOptions
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
-from fecm.simulation import simulate
-from fecm.stability import critical_time_step
+from fecm.simulation.interpreter import Act, Course, tally
+from fecm.simulation.simulation import simulate
 from tests.decks import DATA_CARDS, PROGRAM, ready, small
 
 
@@ -93,7 +94,7 @@ def test_a_program_that_cannot_be_meant_is_found(cards: tuple[str, ...], code: s
 
 def test_an_unknown_macro_is_an_error_at_its_place() -> None:
     text = small("LMAS\nDT        .5E-6\nRODD\n")
-    (finding,) = prepare(text).findings
+    (finding,) = load_deck(text).findings
     assert finding.code == "E501"
     assert finding.place is not None
     assert text.splitlines()[finding.place.line - 1] == "RODD"
@@ -103,7 +104,7 @@ def test_an_unknown_macro_is_an_error_at_its_place() -> None:
 def test_the_tally_counts_what_the_run_stores() -> None:
     text = "LMAS\nDT        .5E-6\nLOOP          7\nTIME\nRODP          3\nDISP          2\nNEXT\n"
     result = run(text + text)
-    counted = tally(prepare(small(text + text)).problems[0].program)
+    counted = tally(load_deck(small(text + text)).problems[0].program)
     assert counted.steps == len(result.force) == 14
     assert counted.contact_rows == len(result.tape9.force) == 4
     assert counted.passes["DISP"] == len(result.tape3.w) == 6
@@ -246,8 +247,8 @@ def test_a_prescribed_displacement_is_followed_and_loads_the_free_unknowns() -> 
 
 def test_dt_0_takes_nine_tenths_of_the_critical_time_step_and_says_so() -> None:
     text = small(PROGRAM.replace("DT        .5E-6", "DT"))
-    assert prepare(text).errors() == []
-    problem = prepare(text).problems[0]
+    assert load_deck(text).errors() == []
+    problem = load_deck(text).problems[0]
     sink = MemorySink()
     simulation = simulate(problem, sink)
     critical = critical_time_step(simulation.setup.plate)
@@ -286,7 +287,9 @@ def test_a_finished_run_goes_with_its_plate_at_once(threads: int) -> None:
     gc.collect()
     gc.disable()
     try:
-        simulation = simulate(prepare(small()).problems[0], MemorySink(), Choices(threads=threads))
+        simulation = simulate(
+            load_deck(small()).problems[0], MemorySink(), RunOptions(threads=threads)
+        )
         parts = [
             simulation,
             simulation.setup.motion,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fecm.projectile import Rod, RodState, WilsonStep, report_rod, rigid_approach
+from fecm.mechanics.projectile import Rod, report_rod, rigid_approach
+from fecm.mechanics.rod_integrators import RodState, WilsonStep
 
 
 def test_the_reports_rod_weighs_what_page_81_says() -> None:

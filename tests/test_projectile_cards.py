@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import fecm
-from fecm.api import prepare
-from fecm.authoring.grid import Grid, Section
+from fecm.api import load_deck
 from fecm.deck import Deck
+from fecm.deck.grid import Grid, Section
 from fecm.deck.model import Impact, Indentation, Material, Projectile
 from fecm.deck.records import Control, Integration, Layer, Macro, Ply
-from fecm.export.csv import table
-from fecm.gages import gages
-from fecm.mesh import generate
-from fecm.parts import build_plate, build_projectile
-from fecm.projectile import RigidMass, Rod, report_rod
+from fecm.mechanics.gages import gages
+from fecm.mechanics.projectile import RigidMass, Rod, report_rod
+from fecm.problem.build import build_plate, build_projectile
+from fecm.problem.generate import generate
+from fecm.results.csv import table
 from fecm.results.result import Result
 from tests.decks import DATA_CARDS, LONG, MESH, OWN_FINDINGS, small
 
@@ -48,7 +48,7 @@ def with_segment(segment: str, mesh: str = MESH) -> str:
 def codes(text: str) -> list[str]:
     """Codes of a deck's findings; of the small plate's own ones only that of the projectile."""
     return [
-        f.code for f in prepare(text).findings if f.code == "W414" or f.code not in OWN_FINDINGS
+        f.code for f in load_deck(text).findings if f.code == "W414" or f.code not in OWN_FINDINGS
     ]
 
 
@@ -234,7 +234,7 @@ def test_a_gage_reads_a_constant_strain_in_its_direction_and_depth(
     x, y = point
     deck = model(with_segment(f"GAGE\n7, {x}, {y}, 0.05, {direction}\n\n"))
     mesh = generate(deck)
-    made = gages(mesh, deck.need(fecm.deck.model.Gages).records)
+    made = gages(mesh, deck.require(fecm.deck.model.Gages).records)
     strain = (made.weights * bent(mesh.coordinates).ravel()[made.places]).sum(axis=1)
     assert strain == pytest.approx([expected], rel=1e-12)
 
@@ -261,7 +261,7 @@ def test_gages_of_a_triangle_and_of_a_turned_quadrilateral_are_found() -> None:
     )
     assert mesh != MESH
     text = with_segment("GAGE\n1, 0.2, 1.3, 0., 0.\n\n", mesh=mesh)
-    findings = [f.code for f in prepare(text).findings]
+    findings = [f.code for f in load_deck(text).findings]
     assert "E424" not in findings
 
 

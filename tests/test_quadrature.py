@@ -8,8 +8,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fecm.elements.quadrature import HIGHEST_ORDER, Rule, gauss, nodal
-from fecm.elements.quadrilateral import ETA, XI, shape_functions
+from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
+from fecm.mechanics.elements.quadrilateral import ETA, XI, shape_functions
 from tests.builders import (
     Bools,
     Floats,
@@ -42,7 +42,7 @@ def test_a_gauss_rule_of_n_points_integrates_powers_below_2n_in_each_direction(o
 @pytest.mark.parametrize("order", [2, 3])
 @pytest.mark.parametrize("rule_of", [gauss, nodal])
 def test_points_come_as_corners_from_lower_left_then_mid_sides_then_the_centre(
-    order: int, rule_of: Callable[[int], Rule]
+    order: int, rule_of: Callable[[int], Quadrature]
 ) -> None:
     rule = rule_of(order)
     counter_clockwise = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
@@ -62,7 +62,7 @@ def test_the_only_point_of_order_1_is_the_centre() -> None:
     (nodal, 1.0 / 3.0, 1.0),
 ])  # fmt: skip
 def test_order_4_takes_four_rectangles_in_the_printed_program_s_order(
-    rule_of: Callable[[int], Rule], inner: float, outer: float
+    rule_of: Callable[[int], Quadrature], inner: float, outer: float
 ) -> None:
     rule = rule_of(4)
     expected = [
@@ -83,7 +83,9 @@ def test_nodal_points_of_order_3_are_the_element_s_nodes() -> None:
 
 @pytest.mark.parametrize("order", [-3, 0, 5])
 @pytest.mark.parametrize("rule_of", [gauss, nodal])
-def test_orders_outside_1_to_4_are_refused(order: int, rule_of: Callable[[int], Rule]) -> None:
+def test_orders_outside_1_to_4_are_refused(
+    order: int, rule_of: Callable[[int], Quadrature]
+) -> None:
     with pytest.raises(ValueError):  # noqa: PT011
         rule_of(order)
 

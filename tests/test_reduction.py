@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm import products
 from fecm.deck import Deck
 from fecm.deck.model import Forces, Impact
 from fecm.deck.records import NodeValues
-from fecm.parts import build_plate
-from fecm.products import ElementProduct, product_of
-from fecm.reduction import Reduction, reduction
+from fecm.mechanics import stiffness_product
+from fecm.mechanics.stiffness_product import ElementProduct, Workers, stiffness_operator
+from fecm.mechanics.symmetry import SymmetryReduction, symmetry_reduction
+from fecm.problem.build import build_plate
 from fecm.results.result import Result
-from fecm.workers import Workers
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, small
 
 # The middle node of the small plate, hit in w.
@@ -36,11 +35,11 @@ FREE_IN_PLANE = MESH[: MESH.index("BOUN")] + (
 SYMMETRIC = DATA_CARDS.replace("    2  90. ", "    2   0. ")
 
 
-def found(text: str, hit: tuple[int, int] = MIDDLE) -> Reduction:
+def found(text: str, hit: tuple[int, int] = MIDDLE) -> SymmetryReduction:
     """Reduction of a small deck."""
     deck = fecm.read_deck(text)
     assert isinstance(deck, Deck)
-    return reduction(build_plate(deck, fecm.mesh.generate(deck)), hit)
+    return symmetry_reduction(build_plate(deck, fecm.problem.generate.generate(deck)), hit)
 
 
 def worst(a: Result, b: Result) -> float:
@@ -107,8 +106,8 @@ def test_a_load_on_one_side_needs_the_whole_plate() -> None:
     where = next(i for i, s in enumerate(segments) if isinstance(s, Impact))
     aside = Forces((NodeValues(8, 0, (0.0, 0.0, 1.0, 0.0, 0.0)),))
     loaded = replace(deck, segments=(*segments[:where], aside, *segments[where:]), text="")
-    plate = build_plate(loaded, fecm.mesh.generate(loaded))
-    assert reduction(plate, MIDDLE).weights.tolist() == [1, 1, 1, 1]
+    plate = build_plate(loaded, fecm.problem.generate.generate(loaded))
+    assert symmetry_reduction(plate, MIDDLE).weights.tolist() == [1, 1, 1, 1]
     assert worst(*both(loaded)) < 1e-11
 
 
@@ -137,7 +136,7 @@ def test_the_long_deck_agrees_with_the_sparse_matrix_in_every_dataset() -> None:
 def test_rounding_of_a_symmetric_layup_counts_as_no_coupling() -> None:
     deck = fecm.read_deck(LONG)
     assert isinstance(deck, Deck)
-    plate = build_plate(deck, fecm.mesh.generate(deck))
+    plate = build_plate(deck, fecm.problem.generate.generate(deck))
     assert np.abs(plate.laminate.B).max() > 0.0
     assert not plate.laminate.is_coupled
     tilted = replace(plate.laminate, B=plate.laminate.B + 1e-9 * plate.laminate.A)
@@ -150,12 +149,12 @@ def test_any_number_of_threads_gives_the_same_forces_to_the_last_bit(
 ) -> None:
     deck = fecm.read_deck(LONG)
     assert isinstance(deck, Deck)
-    plate = build_plate(deck, fecm.mesh.generate(deck))
-    monkeypatch.setattr(products, "BATCH", 500)
-    monkeypatch.setattr(products, "PIECE", 100)
+    plate = build_plate(deck, fecm.problem.generate.generate(deck))
+    monkeypatch.setattr(stiffness_product, "BATCH", 500)
+    monkeypatch.setattr(stiffness_product, "PIECE", 100)
     u = np.random.default_rng(3).standard_normal(plate.neq)
-    alone = product_of(plate)
-    shared = product_of(plate, workers=Workers(threads))
+    alone = stiffness_operator(plate)
+    shared = stiffness_operator(plate, workers=Workers(threads))
     assert isinstance(alone, ElementProduct)
     assert len(alone._domains) == 8
     np.testing.assert_array_equal(shared(u), alone(u))

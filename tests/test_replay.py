@@ -10,10 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.authoring.grid import Grid, Section
+from fecm.deck.grid import Grid, Section
 from fecm.deck.model import Deck, Indentation, Material
-from fecm.dynamics import PlateMotion
-from fecm.impact import Impact, ImpactState
+from fecm.mechanics.impact import ImpactState, ImpactSystem
+from fecm.mechanics.plate_motion import PlateMotion
 from fecm.results.result import Result
 from fecm.results.tapes import tape_texts
 from fecm.verification.decks import result_of, struck_plate
@@ -157,8 +157,8 @@ def test_the_reports_mesh_has_not_converged(results: dict[tuple[str, str], Resul
     )
     deck = fecm.read_deck(LONG)
     assert isinstance(deck, Deck)
-    law = deck.need(Indentation)
-    finer = struck_plate(grid, deck.need(Material), None, 115.0, law, 1e-7, 600)
+    law = deck.require(Indentation)
+    finer = struck_plate(grid, deck.require(Material), None, 115.0, law, 1e-7, 600)
     coarse = results["long", "report"]
     first = coarse.force[coarse.time < 60e-6].max()
     # 2.7 % of the first peak; with four times the elements a side it is 75.90 lb.
@@ -199,7 +199,7 @@ def test_the_listing_stores_contact_at_every_step_and_strains_one_step_old(
 def test_both_products_give_the_same_history(solver: str) -> None:
     made = impact_of(APPENDIX)
     motion = PlateMotion(made.plate, solver)
-    impact = Impact(motion, made.rod, made.law, made.contact)
+    impact = ImpactSystem(motion, made.rod, made.law, made.contact)
     state = impact.start()
     for _ in range(10):
         impact.advance(state, 2e-7)
@@ -222,7 +222,7 @@ def test_a_stored_state_goes_on_as_if_nothing_had_happened() -> None:
         np.testing.assert_array_equal(again.to_arrays()[name], array)
 
 
-def impact_of(deck: Path) -> Impact:
+def impact_of(deck: Path) -> ImpactSystem:
     """Plate and projectile of a deck."""
     impact = ready(deck).impact
     assert impact is not None

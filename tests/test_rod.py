@@ -12,11 +12,16 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.filters import Filter
-from fecm.projectile import Rod, report_rod
-from fecm.pulses import GaussPulse, Pulse, SinePulse, TablePulse, pulse_of
-from fecm.rod import RodHistory, default_time_step, force_row, strike
-from fecm.rod_method import AVERAGE, CONSISTENT
+from fecm.mechanics.projectile import Rod, report_rod
+from fecm.mechanics.rod_integrators import AVERAGE, CONSISTENT
+from fecm.studies.rod_test.filters import Filter
+from fecm.studies.rod_test.pulse_test import (
+    RodHistory,
+    default_time_step,
+    force_row,
+    simulate_pulse,
+)
+from fecm.studies.rod_test.pulses import GaussPulse, Pulse, SinePulse, TablePulse, pulse_of
 from tests.builders import table
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, small
@@ -53,7 +58,7 @@ def waves(pulse: Pulse, time: Floats, x: float, density: float = STEEL) -> Float
 def test_equation_4_5_gives_the_exact_force_at_the_middle(density: float) -> None:
     rows = table("rod_midforce_gauss_eq4-5.csv")
     exact = np.array([float(row[f"Fmid_lb_rho{density * 1e4:g}e-4"]) for row in rows])
-    found = strike(rod(density), GAUSS, 2e-7, 600e-6, (0.5,))
+    found = simulate_pulse(rod(density), GAUSS, 2e-7, 600e-6, (0.5,))
     assert found.time[::10] == pytest.approx(np.array([float(row["t_s"]) for row in rows]))
     assert found.applied[::10] == pytest.approx(np.array([float(row["F_lb"]) for row in rows]))
     force = found.forces[:, 0]
@@ -67,7 +72,7 @@ def test_the_light_rod_needs_half_the_time_step() -> None:
     exact = np.array([float(row["Fmid_lb_rho3.225e-4"]) for row in rows])
     errors = []
     for dt, every in ((2e-7, 10), (1e-7, 20)):
-        force = strike(rod(3.225e-4), GAUSS, dt, 600e-6, (0.5,)).forces[:, 0]
+        force = simulate_pulse(rod(3.225e-4), GAUSS, dt, 600e-6, (0.5,)).forces[:, 0]
         assert force.max() == pytest.approx(501.1, abs=0.5)
         errors.append(float(np.sqrt(np.mean((force[::every] - exact) ** 2))))
     assert errors[0] == pytest.approx(1.26, abs=0.01)
@@ -76,26 +81,26 @@ def test_the_light_rod_needs_half_the_time_step() -> None:
 
 def test_the_mean_ratio_is_the_reports() -> None:
     for pulse in (GAUSS, SINE):
-        found = strike(rod(), pulse, 2e-7, pulse.duration, (0.5,))
+        found = simulate_pulse(rod(), pulse, 2e-7, pulse.duration, (0.5,))
         assert found.mean_ratios[0] == pytest.approx(0.498, abs=5e-4)
 
 
 @pytest.mark.parametrize("x", [0.25, 0.5, 0.731])
 def test_a_sine_pulse_runs_as_its_waves_do_and_is_over_after_b(x: float) -> None:
-    found = strike(rod(elements=40), SINE, 5e-8, 600e-6, (x,), AVERAGE)
+    found = simulate_pulse(rod(elements=40), SINE, 5e-8, 600e-6, (x,), AVERAGE)
     exact = waves(SINE, found.time, x)
     assert np.abs(found.forces[:, 0] - exact).max() < 3.0  # of 1000
     assert (found.applied[found.time > 400e-6] == 0.0).all()
 
 
 def test_force_at_the_ends_is_the_applied_one_and_none_with_the_consistent_mass() -> None:
-    found = strike(rod().with_mass(CONSISTENT), SINE, 2e-7, 600e-6, (0.0, 1.0))
+    found = simulate_pulse(rod().with_mass(CONSISTENT), SINE, 2e-7, 600e-6, (0.0, 1.0))
     assert np.abs(found.forces[:, 0] - found.applied).max() < 2.0
     assert np.abs(found.forces[:, 1]).max() < 2.0
 
 
 def test_the_whole_rod_gets_the_pulses_impulse_at_every_point() -> None:
-    found = strike(rod(), GAUSS, 2e-7, 600e-6, ())
+    found = simulate_pulse(rod(), GAUSS, 2e-7, 600e-6, ())
     impulse = found.applied.sum() * 2e-7
     gained = found.accelerations.sum(axis=0) * 2e-7 * rod().total_mass
     assert gained == pytest.approx([impulse] * 3, rel=1e-3)
@@ -105,7 +110,7 @@ def test_the_whole_rod_gets_the_pulses_impulse_at_every_point() -> None:
 
 
 def test_a_rod_of_odd_elements_has_its_middle_inside_one() -> None:
-    odd, even = (strike(rod(elements=n), GAUSS, 1e-7, 600e-6, (0.5,)) for n in (21, 40))
+    odd, even = (simulate_pulse(rod(elements=n), GAUSS, 1e-7, 600e-6, (0.5,)) for n in (21, 40))
     assert np.abs(odd.forces - even.forces).max() < 3.0
     middle = [history.accelerations[:, 1] for history in (odd, even)]
     late = odd.time > 50e-6
@@ -124,7 +129,7 @@ def test_a_station_on_a_node_of_a_stepped_rod_takes_the_section_behind_it() -> N
 def test_a_pulse_by_its_table_is_the_pulse() -> None:
     time = np.arange(0.0, 600.1e-6, 2e-7)
     tabulated, exact = (
-        strike(rod(), pulse, 2e-7, 600e-6, (0.5,)).forces
+        simulate_pulse(rod(), pulse, 2e-7, 600e-6, (0.5,)).forces
         for pulse in (TablePulse(time, GAUSS.force(time)), GAUSS)
     )
     np.testing.assert_allclose(tabulated, exact, rtol=0, atol=1e-6)
@@ -168,7 +173,7 @@ def test_the_command_prints_what_the_rod_does() -> None:
     done = call("rod", *SHAPE, *PUSH, "--station", 0.5, "--station", 0.25)
     assert done.exit_code == 0
     assert done.stderr == ""
-    found, expected = columns(done.stdout), strike(rod(), GAUSS, 2e-7, 600e-6, (0.5, 0.25))
+    found, expected = columns(done.stdout), simulate_pulse(rod(), GAUSS, 2e-7, 600e-6, (0.5, 0.25))
     assert list(found) == [
         "time", "force", "force_at_0.5", "force_at_0.25", "ratio_at_0.5", "ratio_at_0.25",
         "acceleration_struck_end", "acceleration_middle", "acceleration_far_end",
@@ -196,7 +201,7 @@ def test_a_deck_gives_its_rod_and_its_time_step(tmp_path: Path) -> None:
     deck = tmp_path / "small.inp"
     deck.write_text(small())
     done = call("rod", deck, "--pulse", "sine:1000,400e-6")
-    found, expected = columns(done.stdout), strike(report_rod(), SINE, 5e-7, 600e-6, (0.5,))
+    found, expected = columns(done.stdout), simulate_pulse(report_rod(), SINE, 5e-7, 600e-6, (0.5,))
     np.testing.assert_array_equal(found["time"], expected.time)
     np.testing.assert_array_equal(found["force_at_0.5"], expected.forces[:, 0])
     twice = call("rod", deck, "--pulse", "sine:1000,400e-6", "--length", 2)
@@ -207,7 +212,7 @@ def test_a_deck_gives_its_rod_and_its_time_step(tmp_path: Path) -> None:
 def test_mass_and_integrator_are_the_users_choice() -> None:
     options = ("--mass-matrix", CONSISTENT, "--integrator", AVERAGE)
     found = columns(call("rod", *SHAPE, *PUSH, *options).stdout)
-    expected = strike(rod().with_mass(CONSISTENT), GAUSS, 2e-7, 600e-6, (0.5,), AVERAGE)
+    expected = simulate_pulse(rod().with_mass(CONSISTENT), GAUSS, 2e-7, 600e-6, (0.5,), AVERAGE)
     np.testing.assert_array_equal(found["force_at_0.5"], expected.forces[:, 0])
 
 
@@ -329,7 +334,7 @@ def test_the_picture_of_a_pulse_shows_its_forces_and_accelerations() -> None:
     pytest.importorskip("matplotlib")
     from fecm.plot.rod import pulse_picture
 
-    history = strike(rod(), GAUSS, 2e-7, 600e-6, (0.5,))
+    history = simulate_pulse(rod(), GAUSS, 2e-7, 600e-6, (0.5,))
     units = {"length": "in", "force": "lbf", "time": "s"}
     above, below = pulse_picture(history, None, units).figure.axes
     assert (above.get_ylabel(), below.get_xlabel()) == ("Force (lbf)", "Time (µs)")

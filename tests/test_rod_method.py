@@ -10,9 +10,19 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 import fecm
-from fecm.projectile import STEPS, CollocationStep, Rod, RodState, report_rod
+from fecm.mechanics.projectile import Rod, report_rod
+from fecm.mechanics.rod_integrators import (
+    AVERAGE,
+    CONSISTENT,
+    INTEGRATORS,
+    LUMPED,
+    MASSES,
+    STEPS,
+    WILSON,
+    RodIntegrator,
+    RodState,
+)
 from fecm.results.result import Result
-from fecm.rod_method import AVERAGE, CONSISTENT, INTEGRATORS, LUMPED, MASSES, WILSON
 from tests.calls import call
 from tests.decks import DATA_CARDS, small
 
@@ -115,7 +125,7 @@ def test_a_constant_push_gives_exactly_its_impulse(mass: str, integrator: str) -
     assert rigid @ M @ state.velocity == pytest.approx(10.0 * 400 * 2e-7, rel=1e-9)
 
 
-def energies(step: CollocationStep, rod: Rod, steps: int) -> Floats:
+def energies(step: RodIntegrator, rod: Rod, steps: int) -> Floats:
     """Energy of a rod that was let go out of a jagged shape, after every step."""
     u = np.random.default_rng(9).normal(size=step.n)
     start: Floats = np.asarray(np.linalg.solve(matrix(rod), -rod.stiffness() @ u), dtype=np.float64)

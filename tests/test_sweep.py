@@ -19,21 +19,21 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm.deck import Deck
-from fecm.dynamics import PointForce
-from fecm.indentation import Constants, MemoryLaw, Point, stacked
-from fecm.mesh import generate
-from fecm.parts import build_law, build_projectile, set_up
+from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, LinearPermanent, stacked
+from fecm.mechanics.plate_motion import PointForce
+from fecm.problem.build import build_law, build_model, build_projectile
+from fecm.problem.generate import generate
 from fecm.sweeps import schedule
 from fecm.sweeps.api import carry_out, problem_of
+from fecm.sweeps.batch import Task, shares_plate
 from fecm.sweeps.cases import Case, CasesError, grid, parse_vary, read_cases
 from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.plan import plan, tasks
 from fecm.sweeps.responses import Convolution, plate_response
 from fecm.sweeps.result import SweepResult
-from fecm.sweeps.run import Task, shares_plate
 from fecm.sweeps.schedule import LOST, on_workers
-from fecm.sweeps.store import OtherSweepError, Parts
-from fecm.sweeps.tasks import plan, tasks
-from fecm.sweeps.variations import varied
+from fecm.sweeps.store import OtherSweepError, PartialResults
+from fecm.sweeps.vary import apply_case
 from tests.calls import Done, call
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, small
 
@@ -76,7 +76,7 @@ def test_a_plates_displacement_is_the_sum_of_its_impulse_responses() -> None:
     data = DATA_CARDS.replace("    2  90. ", "    2  30. ").replace("   13    3", "    8    3")
     corner = MESH[: MESH.index("BOUN")] + "BOUN\n    1    0    1    1    1    1    1\n\n"
     deck = model(small(mesh=corner, data=data))
-    motion = set_up(deck, generate(deck), moves_only=True).motion
+    motion = build_model(deck, generate(deck), moves_only=True).motion
     row, dt, steps = motion.row(7, 2), 2e-7, 300
     force = np.random.default_rng(5).standard_normal(steps)
     state, direct = motion.start(), np.empty(steps)
@@ -98,25 +98,25 @@ def test_a_plates_displacement_is_the_sum_of_its_impulse_responses() -> None:
 def test_the_law_of_many_cases_is_the_law_of_each() -> None:
     random = np.random.default_rng(11)
     measured = [
-        Constants(k, a, s, q)
+        LinearPermanent(k, a, s, q)
         for k, a, s, q in zip(
             random.uniform(1e6, 3e6, 40), random.uniform(0, 1e-3, 40), random.uniform(0, 0.2, 40),
             random.uniform(1.5, 2.5, 40), strict=True,
         )
     ]  # fmt: skip
-    together = MemoryLaw(stacked(measured))
-    memory, last = together.start(), Point(np.zeros(40), np.zeros(40))
-    alone = [(MemoryLaw(c), MemoryLaw(c).start(), Point(0.0, 0.0)) for c in measured]
+    together = HystereticLaw(stacked(measured))
+    memory, last = together.start(), ContactPoint(np.zeros(40), np.zeros(40))
+    alone = [(HystereticLaw(c), HystereticLaw(c).start(), ContactPoint(0.0, 0.0)) for c in measured]
     a = np.zeros(40)
     for _ in range(300):
         a = np.maximum(a + random.normal(0.0, 2e-4, 40), -1e-4)
         force, _ = together.trial(memory, last, a)
-        memory, last = together.accept(memory, last, a), Point(a, force)
+        memory, last = together.accept(memory, last, a), ContactPoint(a, force)
         for case, (law, own, point) in enumerate(alone):
             value = float(a[case])
             single, _ = law.trial(own, point, value)
             assert force[case] == pytest.approx(single, rel=1e-12, abs=1e-9)
-            alone[case] = (law, law.accept(own, point, value), Point(value, single))
+            alone[case] = (law, law.accept(own, point, value), ContactPoint(value, single))
     assert len(set(memory.branch.tolist())) == 3
 
 
@@ -133,7 +133,7 @@ def test_cases_on_the_reports_plate_equal_their_full_runs() -> None:
     assert found.force is not None
     assert found["status"].tolist() == ["ok"] * 3
     for number, case in enumerate(cases):
-        result = full(varied(model(LONG), case))
+        result = full(apply_case(model(LONG), case))
         peak = result.force.max()
         assert np.abs(found.force[number] - result.force).max() < 1e-9 * peak
         assert found["peak_force"][number] == pytest.approx(peak, rel=1e-9)
@@ -172,7 +172,7 @@ def test_whatever_varies_the_case_is_the_changed_decks_run(case: Case) -> None:
     found = fecm.sweep(deck, cases=[case], history=True)
     assert found["status"].tolist() == ["ok"]
     assert found.force is not None
-    result, plain = full(varied(deck, case)), full(deck)
+    result, plain = full(apply_case(deck, case)), full(deck)
     difference = np.abs(found.force[0] - result.force).max()
     assert difference < 1e-9 * result.force.max()
     assert abs(result.force.max() / plain.force.max() - 1.0) > 1e-5
@@ -180,11 +180,11 @@ def test_whatever_varies_the_case_is_the_changed_decks_run(case: Case) -> None:
 
 def test_a_layup_keeps_the_plys_thickness_and_a_thickness_scales_all() -> None:
     deck = model(small())
-    made = varied(deck, {"thickness": 0.3, "layup": "[0/45/90]"})
-    material = made.need(fecm.deck.model.Material)
+    made = apply_case(deck, {"thickness": 0.3, "layup": "[0/45/90]"})
+    material = made.require(fecm.deck.model.Material)
     assert [layer.thickness for layer in material.layers] == pytest.approx([0.1] * 3)
     assert made.control.layers == 3
-    thin = varied(deck, {"layup": "[0/45/90]"}).need(fecm.deck.model.Material)
+    thin = apply_case(deck, {"layup": "[0/45/90]"}).require(fecm.deck.model.Material)
     assert thin.integration.thickness == pytest.approx(3 * 0.053)
 
 
@@ -195,7 +195,7 @@ def test_a_plate_with_other_loads_is_run_whole() -> None:
     assert not shares_plate(problem)
     found = fecm.sweep(deck, {"velocity": [50.0, 100.0]}, history=True)
     assert found.force is not None
-    result = full(varied(deck, {"velocity": 100.0}))
+    result = full(apply_case(deck, {"velocity": 100.0}))
     np.testing.assert_array_equal(found.force[1], result.force)
 
 
@@ -387,8 +387,8 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        carry_out(problem, made, parts=Parts(path, made.fingerprint()), done=stop)
-    again = Parts(path, made.fingerprint())
+        carry_out(problem, made, parts=PartialResults(path, made.fingerprint()), done=stop)
+    again = PartialResults(path, made.fingerprint())
     before = [task.number for task in tasks(problem, made) if again.get(task) is not None]
     assert before == begun
     # A part that is not whole is run again.
@@ -398,7 +398,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
     assert len(notes) == 1
     assert "task-000002.npz is damaged; its cases are run again" in notes[0]
     with pytest.raises(OtherSweepError):
-        Parts(path, "another one")
+        PartialResults(path, "another one")
 
 
 def test_a_sweep_that_is_interrupted_from_outside_ends_in_the_same_file(tmp_path: Path) -> None:

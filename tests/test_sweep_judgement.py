@@ -11,10 +11,10 @@ import pytest
 
 import fecm
 from fecm.deck import Deck
-from fecm.dynamics import DivergenceError
+from fecm.mechanics.plate_motion import DivergenceError
+from fecm.sweeps.batch import impacts
 from fecm.sweeps.outcome import PEAKS, STILL, SUMMARY
-from fecm.sweeps.run import impacts
-from fecm.sweeps.variations import varied
+from fecm.sweeps.vary import apply_case
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, PROGRAM, small
 
@@ -55,7 +55,7 @@ def test_a_case_that_a_run_rejects_fails_with_the_runs_reason(
 ) -> None:
     deck = model(small(STEPS, data=data))
     with pytest.raises(DivergenceError) as rejected:
-        fecm.run(varied(deck, dict(case)))
+        fecm.run(apply_case(deck, dict(case)))
     (name,) = case
     usual = {"k": 2e6, "rod_mass": 1.8e-4, "velocity": 100.0}[name]
     found = fecm.sweep(deck, {name: [case[name], usual]})
@@ -66,35 +66,36 @@ def test_a_case_that_a_run_rejects_fails_with_the_runs_reason(
 def test_cases_together_keep_the_energy_as_well_as_their_runs_do(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from fecm.sweeps import run
+    from fecm.sweeps import batch
 
     seen: list[float] = []
-    errors = run.balance_errors
+    errors = batch.balance_errors
 
     def watched(*arguments: object) -> object:
         made = errors(*arguments)  # type: ignore[arg-type]
         seen.extend(made.tolist())
         return made
 
-    monkeypatch.setattr(run, "balance_errors", watched)
+    monkeypatch.setattr(batch, "balance_errors", watched)
     deck = model(small(STEPS))
     stiffnesses = [2e6, 1e8, 1e9]
     assert fecm.sweep(deck, {"k": stiffnesses}).fine.all()
     for k, error in zip(stiffnesses, seen, strict=True):
-        exact = balance(varied(deck, {"k": k}))
+        exact = balance(apply_case(deck, {"k": k}))
         assert 0.2 * exact < error < 5.0 * exact + 1e-5
     assert seen[-1] > 100.0 * seen[0]
 
 
 def test_a_force_with_no_projectile_behind_it_is_an_error_of_the_balance() -> None:
-    from fecm.indentation import Constants, MemoryLaw, stacked
-    from fecm.projectile import RigidMass, WilsonStep
+    from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent, stacked
+    from fecm.mechanics.projectile import RigidMass
+    from fecm.mechanics.rod_integrators import WilsonStep
+    from fecm.sweeps.batch import balance_errors
     from fecm.sweeps.responses import TipSteps
-    from fecm.sweeps.run import balance_errors
 
     mass, dt, steps = RigidMass(1.8e-4), 5e-7, 400
     kind = np.zeros(1, dtype=np.intp)
-    law = MemoryLaw(stacked([Constants(1.9e6, 1.0, 0.0, 2.0)]))
+    law = HystereticLaw(stacked([LinearPermanent(1.9e6, 1.0, 0.0, 2.0)]))
     tips = TipSteps([WilsonStep(mass.stiffness(), mass.mass(), dt)], kind, steps)
     rigid = np.full(steps, 0.0)
     speed = np.array([100.0])

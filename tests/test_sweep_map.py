@@ -11,7 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.plot import KINDS, Options, PlotError, draw
+from fecm.plot.pictures import KINDS, Options, draw
+from fecm.plot.style import PlotError
 from fecm.sweeps.result import SweepResult, save
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM, small

@@ -14,13 +14,13 @@ import pytest
 
 from fecm.sweeps import schedule
 from fecm.sweeps.api import carry_out, problem_of
+from fecm.sweeps.batch import Task, run
 from fecm.sweeps.cases import grid
 from fecm.sweeps.clock import with_time_step
 from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.run import Task, run
+from fecm.sweeps.plan import Plan, plan, tasks
 from fecm.sweeps.schedule import LOST
-from fecm.sweeps.store import DamagedPartError, Parts
-from fecm.sweeps.tasks import Plan, plan, tasks
+from fecm.sweeps.store import DamagedPartError, PartialResults
 from tests.calls import call
 from tests.decks import small
 from tests.kill_runs import SWEEP, SWEPT
@@ -34,7 +34,7 @@ def made() -> Plan:
 
 
 def test_a_part_with_any_byte_changed_or_cut_off_is_damaged(made: Plan, tmp_path: Path) -> None:
-    parts = Parts(tmp_path / "s.h5", made.fingerprint())
+    parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
     task = tasks(problem_of(made.deck), made)[0]
     parts.put(task, run(task))
     (path,) = parts.folder.glob("task-*.npz")
@@ -59,7 +59,7 @@ def test_cases_lost_with_their_workers_are_not_stored_as_finished(
         return run(task) if task.number else Outcome.failed(list(task.numbers), [LOST])
 
     monkeypatch.setattr(schedule, "attempt", attempt)
-    parts = Parts(tmp_path / "s.h5", made.fingerprint())
+    parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
     problem = problem_of(made.deck)
     found = carry_out(problem, made, parts=parts)
     assert found.fine.tolist() == [False, True]

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import prepare
+from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.model import Boundary
-from fecm.laminate import is_coupled
-from fecm.mesh import generate
-from fecm.sweeps.variations import varied
+from fecm.problem.build import is_coupled
+from fecm.problem.generate import generate
+from fecm.sweeps.vary import apply_case
 from tests.calls import call
 from tests.decks import LONG, MESH, small
 
@@ -64,11 +64,11 @@ def test_an_unsymmetric_laminate_is_the_softer_one() -> None:
 def test_u_and_v_are_free_where_b_is_not_zero_and_w_is_free() -> None:
     deck = model(new("[0/90]s", "--edge", "left=simple", "--edge", "top=clamped"))
     assert (generate(deck).codes[:, :2] != 0).all()
-    codes = generate(varied(deck, {"layup": "[0/90]"})).codes != 0
+    codes = generate(apply_case(deck, {"layup": "[0/90]"})).codes != 0
     assert codes[:, 2].sum() == 9 + 9 - 1
     assert (codes[:, 0] == codes[:, 2]).all()
     assert (codes[:, 1] == codes[:, 2]).all()
-    kept = varied(deck, {"layup": "[90/0]s"})
+    kept = apply_case(deck, {"layup": "[90/0]s"})
     assert kept.all(Boundary) == deck.all(Boundary)
 
 
@@ -90,15 +90,15 @@ def test_supports_in_the_plane_that_hold_some_nodes_only_are_kept() -> None:
     mesh = MESH.replace(
         "    1    1   -1   -1    0    0    0\n", "    3    1   -1   -1    0    0    0\n"
     )
-    deck = varied(model(small(mesh=mesh)), {"layup": "[0/90/0]"})
-    made = varied(deck, {"layup": "[0/90]"})
+    deck = apply_case(model(small(mesh=mesh)), {"layup": "[0/90/0]"})
+    made = apply_case(deck, {"layup": "[0/90]"})
     assert made.all(Boundary) == deck.all(Boundary)
 
 
 def test_in_plane_unknowns_that_rest_do_not_limit_the_time_step() -> None:
     # Stiff plies at the faces: the plate is faster in its plane than in bending.
     held = model(LONG)
-    assert not is_coupled(held.need(fecm.deck.model.Material))
+    assert not is_coupled(held.require(fecm.deck.model.Material))
     free = Deck(
         held.title, held.control,
         tuple(s for s in held.segments if not isinstance(s, Boundary)), held.macros,
@@ -113,9 +113,9 @@ def test_in_plane_unknowns_that_rest_do_not_limit_the_time_step() -> None:
 
 
 def _critical(deck: Deck) -> list[str]:
-    from fecm.overview import overview
+    from fecm.problem.summary import summarise
 
-    made = overview(prepare(deck).problems[0])
+    made = summarise(load_deck(deck).problems[0])
     return [line for line in made.lines() if "critical" in line]
 
 

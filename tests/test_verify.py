@@ -11,20 +11,12 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import fecm
-from fecm import laminate as laminates
-from fecm import plate
 from fecm.deck.model import Deck, Material
-from fecm.indentation import Constants
-from fecm.mesh import generate
-from fecm.verification import (
-    AGAINST_CHANGE,
-    CASES,
-    CONSISTENCY,
-    carry_out,
-    chosen,
-    series,
-    table,
-)
+from fecm.mechanics import element_matrices
+from fecm.mechanics import laminate as laminates
+from fecm.mechanics.contact_law import LinearPermanent
+from fecm.problem.generate import generate
+from fecm.verification import AGAINST_CHANGE, CASES, CONSISTENCY, carry_out, chosen, series, table
 from fecm.verification.case import Case, Check, Row
 from fecm.verification.decks import report_impact
 from tests.builders import table as reference
@@ -85,7 +77,7 @@ def test_programs_get_every_number_and_what_could_not_be_computed_is_null(
     first = told["rows"][0]
     assert first["expected"] == 22.4
     assert first["error"] == pytest.approx(first["got"] / 22.4 - 1.0)
-    monkeypatch.setattr(Constants, "loading", None)
+    monkeypatch.setattr(LinearPermanent, "loading", None)
     done = call("verify", "indentation", "--format", "json")
     told = json.loads(done.stdout)
     assert (done.exit_code, told["ok"], told["rows"][0]["got"]) == (1, False, None)
@@ -108,7 +100,7 @@ def test_a_row_beyond_its_tolerance_is_told_and_the_answer_is_no(
 def test_a_case_that_can_not_be_computed_says_why_and_fails(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(plate, "stiffness", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr(element_matrices, "stiffness", lambda *_, **__: 1 / 0)
     done = call("verify", "static-bending")
     assert done.exit_code == 1
     assert "\n  ZeroDivisionError: division by zero\n" in done.stdout
@@ -149,7 +141,7 @@ def test_the_deck_made_in_python_is_the_reports() -> None:
     ours, theirs = generate(made), generate(given)
     for name in ("coordinates", "elements", "codes", "equations"):
         np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name))
-    assert made.need(Material) == given.need(Material)
+    assert made.require(Material) == given.require(Material)
     (dt,) = [macro.value for macro in made.macros if macro.word == "DT"]
     assert dt == 2e-7
 

@@ -11,8 +11,8 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from fecm.deck.records import Ply
-from fecm.laminate import Laminate, laminate
-from fecm.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
+from fecm.mechanics.laminate import Laminate, laminate
+from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from tests.builders import (
     GENERAL_PLY,
     REPORT_PLY,

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fecm.authoring.laminates import laminate_of_options
-from fecm.authoring.options import OptionError
-from fecm.plot import PlotError
-from fecm.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
+from fecm.cli.laminate_options import laminate_of_options
+from fecm.cli.new import OptionError
+from fecm.plot.style import PlotError
+from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from tests.builders import general_plate, report_plate, table
 from tests.calls import Done, assert_unusable, call
 from tests.decks import DATA_CARDS, LONG, small

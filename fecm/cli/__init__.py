@@ -12,24 +12,22 @@ from typing import NoReturn
 
 import click
 
-from fecm.cli import apart, streams
+from fecm._memory import NotEnoughMemoryError
+from fecm._version import __version__
+from fecm.cli import isolation, streams
 from fecm.cli.common import INTERRUPTED, SIGNALLED, UNUSABLE, echo, signals
 from fecm.cli.decks import check, fmt, materials, new
 from fecm.cli.diff import diff
-from fecm.cli.export import export
+from fecm.cli.export import export, tapes
 from fecm.cli.indent import indent
 from fecm.cli.info import info
 from fecm.cli.plot import plot
-from fecm.cli.results import tapes
 from fecm.cli.rod import rod
 from fecm.cli.run import run
 from fecm.cli.sweep import sweep
 from fecm.cli.verify import verify
 from fecm.cli.waves import waves
-from fecm.memory import NotEnoughMemoryError
-from fecm.results.plain import printable
-from fecm.results.schema import ResultFileError
-from fecm.version import __version__
+from fecm.results.schema import ResultFileError, printable
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -49,7 +47,7 @@ def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoR
     """Run the command line and leave with its exit status."""
     signals.install()
     streams.prepare()
-    apart.switch.on = arguments is None
+    isolation.switch.on = arguments is None
     status = _status(arguments, prog_name)
     if (error := streams.failure()) is not None and status not in SIGNALLED:
         status = UNUSABLE

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, TextIO
 
 import click
 
-from fecm.files import beside
-from fecm.results.plain import printable
-from fecm.slips import MODES, REPORT
+from fecm._files import beside
+from fecm.problem.slips import MODES, REPORT
+from fecm.results.schema import printable
 
 if TYPE_CHECKING:
-    from fecm.api import Prepared
+    from fecm.api import LoadedDeck
     from fecm.deck.findings import Finding
 
 NO, UNUSABLE, INTERRUPTED, TERMINATED = 1, 2, 130, 143
@@ -61,13 +61,13 @@ class Refused(click.ClickException):
         echo(f"fecm: error: {printable(self.message)}", err=True)
 
 
-class AnswerIsNo(Refused):
+class CheckFailed(Refused):
     """Everything was understood, and the answer is no."""
 
     exit_code = NO
 
 
-def report(prepared: Prepared) -> None:
+def report(prepared: LoadedDeck) -> None:
     """Print the findings of a deck on standard error."""
     for finding in prepared.findings:
         echo(finding.render(prepared.source), err=True)

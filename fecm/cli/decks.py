@@ -8,19 +8,19 @@ from typing import Any
 
 import click
 
+from fecm._files import check_outputs
 from fecm.cli.common import (
     DECK_PATH,
     FORMAT_OPTION,
     MODE_OPTION,
-    AnswerIsNo,
+    CheckFailed,
     Refused,
     count_errors,
     echo,
     echo_file,
     write_text,
 )
-from fecm.cli.numbers import Finite
-from fecm.files import check_outputs
+from fecm.cli.types import Finite
 
 
 @click.command(short_help="Check DECK without running it, and summarise it.")
@@ -33,12 +33,12 @@ def check(deck: Path, mode: str, form: str) -> None:
     With --format json, one JSON object a finding and one a problem, a line each.  Exit status 1 if
     the deck has errors.
     """
-    from fecm.api import prepare
-    from fecm.overview import overview
+    from fecm.api import load_deck
+    from fecm.problem.summary import summarise
 
-    prepared = prepare(deck, mode)
+    prepared = load_deck(deck, mode)
     errors = prepared.errors()
-    views = [] if errors else [overview(problem) for problem in prepared.problems]
+    views = [] if errors else [summarise(problem) for problem in prepared.problems]
     if form == "json":
         for finding in prepared.findings:
             click.echo(json.dumps(finding.to_dict(str(deck))))
@@ -50,7 +50,7 @@ def check(deck: Path, mode: str, form: str) -> None:
         for view in views:
             echo("\n".join(view.lines()))
     if errors:
-        raise AnswerIsNo(count_errors(errors))
+        raise CheckFailed(count_errors(errors))
 
 
 @click.command(short_help="Align the columns of DECK.")
@@ -66,7 +66,7 @@ def fmt(deck: Path, output: Path | None, only_check: bool, overwrite: bool) -> N
     The model, comments and blank cards stay as they are.
     """
     from fecm.deck.findings import DeckError
-    from fecm.deck.formatting import format_deck
+    from fecm.deck.format import format_deck
     from fecm.deck.reader import load_text
 
     target = deck if output is None or _same(output, deck) else output
@@ -81,7 +81,7 @@ def fmt(deck: Path, output: Path | None, only_check: bool, overwrite: bool) -> N
         raise Refused("the deck can't be read; nothing was written") from None
     if only_check:
         if after != before:
-            raise AnswerIsNo(f"{deck} would change")
+            raise CheckFailed(f"{deck} would change")
     elif str(target) == "-":
         echo_file(after)
     else:
@@ -132,8 +132,8 @@ def _same(one: Path, other: Path) -> bool:
 @click.option("--overwrite", is_flag=True, help="Replace a deck that exists.")
 def new(output: Path, overwrite: bool, **options: Any) -> None:
     """Write a ready deck from plate, layup, supports and impact; - is standard output."""
-    from fecm.authoring.options import OptionError, deck_of_options
-    from fecm.deck.formatting import format_deck
+    from fecm.cli.new import OptionError, deck_of_options
+    from fecm.deck.format import format_deck
 
     if str(output) != "-":
         check_outputs([output], overwrite)
@@ -141,10 +141,10 @@ def new(output: Path, overwrite: bool, **options: Any) -> None:
         deck, notes = deck_of_options(**options)
     except OptionError as error:
         raise click.UsageError(str(error)) from None
-    from fecm.api import prepare
+    from fecm.api import load_deck
 
     text = format_deck(deck.to_text())
-    prepared = prepare(text)
+    prepared = load_deck(text)
     if errors := prepared.errors():
         for finding in errors:
             echo(finding.render("the new deck"), err=True)
@@ -164,7 +164,7 @@ def new(output: Path, overwrite: bool, **options: Any) -> None:
 @click.command()
 def materials() -> None:
     """List the named plies of `fecm new`, with their sources."""
-    from fecm.authoring.materials import MATERIALS
+    from fecm.deck.catalogue import MATERIALS
 
     for material in MATERIALS.values():
         ply = material.ply

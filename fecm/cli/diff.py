@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fecm.cli.apart import reads
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, Refused
-from fecm.results.plain import jsonable, printable, told_apart
+from fecm.cli.isolation import reads
+from fecm.results.schema import jsonable, printable, told_apart
 
 if TYPE_CHECKING:
-    from fecm.results.compare import Comparison, Place
-    from fecm.results.sides import Difference, Listed
+    from fecm.results.diff import Comparison, Difference, Listed, Place
 
 
 def _tolerance(_: click.Context, option: click.Parameter, value: str) -> float:
@@ -63,8 +62,7 @@ def diff(
 
     Exit status: 0 the same, 1 different, 2 a file or the call can't be used.
     """
-    from fecm.results.compare import Tolerance
-    from fecm.results.sides import IncomparableError, difference, opened
+    from fecm.results.diff import IncomparableError, Tolerance, difference, opened
 
     try:
         with opened(a) as left, opened(b) as right:
@@ -114,7 +112,7 @@ def _lines(found: Difference) -> list[str]:
 
 def _told(found: Comparison) -> str:
     """What there is to say about a dataset: sizes, then where, then since when."""
-    from fecm.results.compare import SCALE_NAMES
+    from fecm.results.diff import SCALE_NAMES
 
     a, b = found.layouts
     parts: list[str] = []

@@ -8,13 +8,33 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fecm.cli.apart import reads
-from fecm.cli.common import DECK_PATH, Refused, echo, writing
-from fecm.cli.tables import STANDARD_OUTPUT
-from fecm.files import check_outputs
+from fecm._files import check_outputs
+from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, echo, writing
+from fecm.cli.isolation import reads
+from fecm.cli.outputs import STANDARD_OUTPUT
 
 if TYPE_CHECKING:
-    from fecm.results.file_reader import Contents
+    from fecm.results.hdf5_reader import Contents
+
+
+@click.command(short_help="Write tape3, tape8 and tape9 as text.")
+@click.argument("result", type=DECK_PATH)
+@click.option("-d", "--directory", type=FILE_PATH, default=Path(), metavar="DIR",
+              help="Folder for the tapes.  [default: this folder]")  # fmt: skip
+@click.option("--overwrite", is_flag=True, help="Replace tapes that exist.")
+@reads("result")
+def tapes(result: Path, directory: Path, overwrite: bool) -> None:
+    """Write tape3, tape8 and tape9 of RESULT as text, in the original program's formats."""
+    from fecm.results.result import load
+    from fecm.results.tapes import tape_texts, write_tapes
+
+    loaded = load(result)
+    if directory.is_dir():
+        check_outputs([directory / name for name in tape_texts(loaded)], overwrite, [result])
+    elif directory.exists():
+        raise Refused(f"{directory} is not a folder")
+    for path in write_tapes(loaded, directory, overwrite=overwrite):
+        echo(path)
 
 
 @click.command(short_help="Write RESULT for ParaView or a spreadsheet.")
@@ -42,9 +62,8 @@ def export(
         raise click.UsageError("--dataset is for --to csv; vtkhdf holds all fields")
     if target == "vtkhdf" and output == STANDARD_OUTPUT:
         raise click.UsageError("vtkhdf can't go to standard output")
-    from fecm.export import ExportError
-    from fecm.results.file_reader import read
-    from fecm.results.schema import FORMAT, SWEEP
+    from fecm.results.hdf5_reader import read
+    from fecm.results.schema import FORMAT, SWEEP, ExportError
 
     contents = read(result, FORMAT, SWEEP)
     name = (dataset or ("cases" if contents.form == SWEEP else "history")).strip("/")
@@ -65,10 +84,9 @@ def export(
 
 def _write_fields(contents: Contents, path: Path, *, overwrite: bool) -> None:
     """Write the fields of a run for ParaView."""
-    from fecm.export import ExportError
-    from fecm.export.vtkhdf import write_vtkhdf
     from fecm.results.result import result_of
-    from fecm.results.schema import SWEEP
+    from fecm.results.schema import SWEEP, ExportError
+    from fecm.results.vtkhdf import write_vtkhdf
 
     if contents.form == SWEEP:
         raise ExportError("a sweep has no fields; --to csv writes its cases")
@@ -82,9 +100,10 @@ def _write_fields(contents: Contents, path: Path, *, overwrite: bool) -> None:
 
 def _write_table(contents: Contents, name: str, path: Path, *, overwrite: bool) -> None:
     """Write a table of a run or of a sweep."""
-    from fecm.export import csv, sweep_csv
+    from fecm.results import csv
     from fecm.results.result import result_of
     from fecm.results.schema import SWEEP
+    from fecm.sweeps import csv as sweep_csv
     from fecm.sweeps.result import sweep_of
 
     if contents.form == SWEEP:

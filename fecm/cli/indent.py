@@ -11,13 +11,13 @@ import click
 
 from fecm.cli.common import DECK_PATH, FORMAT_OPTION, Refused
 from fecm.cli.indent_curve import curve
-from fecm.cli.numbers import POSITIVE, Finite
-from fecm.cli.tables import OVERWRITE, PLOT, STANDARD_OUTPUT, Targets
-from fecm.fitting import LIMITS_Q
+from fecm.cli.outputs import OVERWRITE, PLOT, STANDARD_OUTPUT, OutputPaths
+from fecm.cli.types import POSITIVE, Finite
+from fecm.studies.indentation_test import LIMITS_Q
 
 if TYPE_CHECKING:
-    from fecm.fitting.table import Test
-    from fecm.plot import Picture
+    from fecm.plot.style import Picture
+    from fecm.studies.indentation_test.table import Test
 
 
 @click.group(short_help="Indentation tests and the law of contact.")
@@ -66,17 +66,17 @@ def fit(
     first loading, unloading, reloading, as often as was done.  Commas, semicolons or tabs separate
     them.  Units stand in brackets behind the names, or in a line below.
     """
-    from fecm.columns import TableError
-    from fecm.fitting.constants import fit as fitted
-    from fecm.fitting.cycles import NoTestError
-    from fecm.fitting.report import card, lines, notes, plain
-    from fecm.fitting.table import read_test
+    from fecm.studies.indentation_test.constants import fit as fitted
+    from fecm.studies.indentation_test.cycles import NoTestError
+    from fecm.studies.indentation_test.report import card, lines, notes, plain
+    from fecm.studies.indentation_test.table import read_test
+    from fecm.studies.tables import TableError
 
     if acr and q not in (None, 2.5):
         raise click.UsageError("--acr takes q = 5/2, as equation 3-7 holds for no other")
     pair = _pair(units, "--unit", "units", "in,lbf")
     chosen = _pair(columns, "--columns", "columns", "2,3")
-    targets = Targets.checked(STANDARD_OUTPUT, picture, overwrite, test)
+    targets = OutputPaths.checked(STANDARD_OUTPUT, picture, overwrite, test)
     try:
         read = read_test(test, chosen or (), pair)
         found = fitted(read.indentation, read.force, retreat=turn, q=q, acr=acr)
@@ -154,7 +154,7 @@ def hertz(
     All in one system of units.  Without further options it is elastic: nothing remains.
     """
     from fecm.deck.model import Indentation
-    from fecm.indentation import hertz_coefficient
+    from fecm.mechanics.contact_law import hertz_coefficient
 
     try:
         k = hertz_coefficient(radius, e_s, nu_s, e_t)
@@ -176,7 +176,7 @@ def hertz(
 @FORMAT_OPTION
 def contacts(name: str | None, units: str, form: str) -> None:
     """List the named contacts of `fecm new --contact`, or print the EXPE card of one."""
-    from fecm.authoring.contacts import CONTACTS
+    from fecm.deck.catalogue import CONTACTS
 
     if name is not None and name not in CONTACTS:
         raise click.BadParameter(f"there is {', '.join(CONTACTS)}, not `{name}`",

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fecm.cli.common import DECK_PATH, Refused
-from fecm.cli.numbers import POSITIVE
-from fecm.cli.tables import OUTPUT, OVERWRITE, PLOT, Targets
+from fecm.cli.outputs import OUTPUT, OVERWRITE, PLOT, OutputPaths
+from fecm.cli.types import POSITIVE
 
 if TYPE_CHECKING:
     from fecm.deck.model import Deck, Indentation
-    from fecm.indentation import Measured
-    from fecm.plot import Picture
+    from fecm.mechanics.contact_law import ContactParameters
+    from fecm.plot.style import Picture
 
 
 def _path(text: str | None) -> list[float]:
@@ -32,9 +32,9 @@ def _path(text: str | None) -> list[float]:
 
 def _law(deck: Path) -> tuple[Deck, Indentation]:
     """The first problem of a deck that has an EXPE segment, and the segment."""
-    from fecm.check.impact import check_law
     from fecm.deck.model import Indentation
     from fecm.deck.reader import Reader, load_text
+    from fecm.problem.check_impact import check_law
 
     reader = Reader(load_text(deck)[0])
     problems = [problem.deck for problem in reader.problems() if problem.deck is not None]
@@ -86,7 +86,7 @@ def curve(
     s_3_7.
     """
     path = _path(corners)
-    targets = Targets.checked(output, picture, overwrite, deck)
+    targets = OutputPaths.checked(output, picture, overwrite, deck)
     if not rigidity:
         if not path:
             raise click.UsageError("--path is missing: indentations with commas between them")
@@ -111,12 +111,12 @@ def _forces(
     """Indentation, force and branch along a path, and how they are drawn."""
     import numpy as np
 
-    from fecm.indentation import MemoryLaw, follow
-    from fecm.parts import build_constants
-    from fecm.units import unit_names
+    from fecm.deck.units import unit_names
+    from fecm.mechanics.contact_law import HystereticLaw, follow
+    from fecm.problem.build import build_constants
 
     problem, card = _law(deck)
-    law = MemoryLaw(build_constants(card))
+    law = HystereticLaw(build_constants(card))
     try:
         walk = list(follow(law, path, points))
     except OverflowError:
@@ -149,17 +149,17 @@ def _rigidities(
     """Largest indentation and rigidities by both equations, and how they are drawn."""
     import numpy as np
 
-    from fecm.indentation import ACR_POWER, Constants, CriticalConstants
-    from fecm.parts import build_constants
-    from fecm.units import unit_names
+    from fecm.deck.units import unit_names
+    from fecm.mechanics.contact_law import ACR_POWER, LinearPermanent, YangSunPermanent
+    from fecm.problem.build import build_constants
 
     if path and (len(path) != 2 or not 0.0 <= path[0] < path[1]):
         raise click.BadParameter("with --rigidity the range FROM,TO", param_hint="--path")
     problem, card = _law(deck)
     own = build_constants(card)
     alpha_p, s_p = _line(problem, own, line)
-    critical = CriticalConstants(card.k, _alpha_cr(problem, own, alpha_cr))
-    slope = Constants(card.k, alpha_p, s_p, own.q if q is None else q)
+    critical = YangSunPermanent(card.k, _alpha_cr(problem, own, alpha_cr))
+    slope = LinearPermanent(card.k, alpha_p, s_p, own.q if q is None else q)
     if slope.q != ACR_POWER and draws:
         raise Refused(
             f"s of 3-9 is force/length^{slope.q:g} here, that of 3-7 force/length^2.5: they can't "
@@ -192,9 +192,8 @@ def _rigidities(
 
 def _report_length(deck: Deck, value: float, what: str, option: str) -> float:
     """A length of the report in a deck's unit; without a unit the report's, and a note of it."""
-    from fecm.authoring.contacts import SYSTEM, lengths
-    from fecm.authoring.materials import SYSTEMS
-    from fecm.units import unit_names
+    from fecm.deck.catalogue import SYSTEM, SYSTEMS, lengths
+    from fecm.deck.units import unit_names
 
     name = unit_names(deck).get("length", "in")
     system = {names[0]: key for key, (names, _) in SYSTEMS.items()}.get(name)
@@ -204,27 +203,27 @@ def _report_length(deck: Deck, value: float, what: str, option: str) -> float:
     return value * (1.0 if system == SYSTEM else lengths(system))
 
 
-def _alpha_cr(deck: Deck, own: Measured, given: float | None) -> float:
-    from fecm.authoring.contacts import ALPHA_CR
-    from fecm.indentation import CriticalConstants
+def _alpha_cr(deck: Deck, own: ContactParameters, given: float | None) -> float:
+    from fecm.deck.catalogue import ALPHA_CR
+    from fecm.mechanics.contact_law import YangSunPermanent
 
     if given is not None:
         return given
-    if isinstance(own, CriticalConstants):
+    if isinstance(own, YangSunPermanent):
         return float(own.alpha_cr)
     return _report_length(deck, ALPHA_CR, "alpha_cr", "--alpha-cr")
 
 
-def _line(deck: Deck, own: Measured, given: str | None) -> tuple[float, float]:
+def _line(deck: Deck, own: ContactParameters, given: str | None) -> tuple[float, float]:
     """alpha_p and s_p."""
-    from fecm.authoring.contacts import ALPHA_P, S_P
-    from fecm.indentation import Constants
+    from fecm.deck.catalogue import ALPHA_P, S_P
+    from fecm.mechanics.contact_law import LinearPermanent
 
     if given is not None:
         values = _path(given)
         if len(values) != 2 or values[0] < 0.0 or not 0.0 <= values[1] < 1.0:
             raise click.BadParameter("alpha_p and s_p, s_p below 1", param_hint="--line")
         return values[0], values[1]
-    if isinstance(own, Constants):
+    if isinstance(own, LinearPermanent):
         return float(own.alpha_p), float(own.s_p)
     return _report_length(deck, ALPHA_P, "alpha_p", "--line"), S_P

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fecm.cli.apart import reads
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION
-from fecm.results.plain import jsonable, printable, shown
+from fecm.cli.isolation import reads
+from fecm.results.schema import jsonable, printable, shown
 
 if TYPE_CHECKING:
-    from fecm.results.file_reader import Contents
-    from fecm.results.information import DatasetInformation, GroupInformation, Information
+    from fecm.results.hdf5_reader import Contents
+    from fecm.results.info import DatasetInformation, GroupInformation, Information
 
 # Attributes of the file that have lines of their own.
 TOLD = ("title", "mode", "slips", "fecm_version", "format", "format_version",
@@ -34,8 +34,8 @@ PERMANENT = "permanent_indentation"
 @reads("result")
 def info(result: Path, form: str) -> None:
     """Tell what is in RESULT, of a run or of a sweep: its units, its summary, every dataset."""
-    from fecm.results.file_reader import read
-    from fecm.results.information import information
+    from fecm.results.hdf5_reader import read
+    from fecm.results.info import information
     from fecm.results.schema import FORMAT, SWEEP
 
     contents = read(result, FORMAT, SWEEP)
@@ -51,7 +51,7 @@ def info(result: Path, form: str) -> None:
 
 def _of_run(contents: Contents) -> dict[str, Any]:
     """Steps, first and last time, and summary of a run."""
-    from fecm.results.information import summary_of_run
+    from fecm.results.info import summary_of_run
     from fecm.results.result import result_of
 
     result = result_of(contents)
@@ -68,8 +68,7 @@ def _of_run(contents: Contents) -> dict[str, Any]:
 
 def _of_sweep(contents: Contents) -> dict[str, Any]:
     """Cases, failed ones among them, and summary of a sweep."""
-    from fecm.sweeps.result import sweep_of
-    from fecm.sweeps.summary import summary
+    from fecm.sweeps.result import summary, sweep_of
 
     result = sweep_of(contents, history=False)
     failed = len(result) - int(result.fine.sum())

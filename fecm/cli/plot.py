@@ -10,21 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fecm.cli.apart import reads
+from fecm._files import check_outputs
 from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, echo, progress
-from fecm.files import check_outputs
-from fecm.plot import (
-    KINDS,
-    Options,
-    Picture,
-    PlotError,
-    PlotNote,
-    check_options,
-    check_suffix,
-    draw,
-    save,
-)
-from fecm.results.plain import printable
+from fecm.cli.isolation import reads
+from fecm.plot.pictures import KINDS, Options, PlotNote, check_options, check_suffix, draw, save
+from fecm.plot.style import Picture, PlotError
+from fecm.results.schema import printable
 
 if TYPE_CHECKING:
     from fecm.results.result import Result
@@ -182,7 +173,7 @@ def _named(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:
 
 
 def _loaded(path: Path) -> Result | SweepResult:
-    from fecm.results.file_reader import read
+    from fecm.results.hdf5_reader import read
     from fecm.results.result import result_of
     from fecm.results.schema import FORMAT, SWEEP
     from fecm.sweeps.result import sweep_of

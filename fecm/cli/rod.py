@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fecm.cli.common import DECK_PATH, FORMAT_OPTION, Refused, count_errors, report
-from fecm.cli.numbers import POSITIVE, Finite
-from fecm.cli.tables import OUTPUT, OVERWRITE, PLOT, STANDARD_OUTPUT, Targets
-from fecm.rod_method import INTEGRATORS, LUMPED, MASSES, WILSON
+from fecm.cli.outputs import OUTPUT, OVERWRITE, PLOT, STANDARD_OUTPUT, OutputPaths
+from fecm.cli.types import POSITIVE, Finite
+from fecm.mechanics.rod_integrators import INTEGRATORS, LUMPED, MASSES, WILSON
 
 if TYPE_CHECKING:
-    from fecm.plot import Picture
-    from fecm.projectile import Rod
-    from fecm.rod import RodHistory
+    from fecm.mechanics.projectile import Rod
+    from fecm.plot.style import Picture
+    from fecm.studies.rod_test.pulse_test import RodHistory
 
 FILTER_HELP = ("first-order:RISE or moving-average:RISE; RISE is the time from 10 to 90 % of the "
                "answer to a step.")  # fmt: skip
@@ -89,11 +89,11 @@ def pulse(
     The rod is the projectile of DECK, or uniform by --length, --modulus, --density and --diameter.
     Force is positive in compression.
     """
-    targets = Targets.checked(output, picture, overwrite)
+    targets = OutputPaths.checked(output, picture, overwrite)
     _check_shape(deck, shape)
-    from fecm.filters import filter_of
-    from fecm.pulses import pulse_of
-    from fecm.rod import default_time_step, strike, table
+    from fecm.studies.rod_test.filters import filter_of
+    from fecm.studies.rod_test.pulse_test import default_time_step, simulate_pulse, table
+    from fecm.studies.rod_test.pulses import pulse_of
 
     units: Mapping[str, str] = {}
     deck_dt = None
@@ -106,7 +106,7 @@ def pulse(
     try:
         push = pulse_of(pulse_text)
         slow = None if filter_text is None else filter_of(filter_text)
-        history = strike(
+        history = simulate_pulse(
             struck,
             push,
             dt or deck_dt or default_time_step(struck),
@@ -142,7 +142,7 @@ def _check_shape(deck: Path | None, shape: Mapping[str, float | int | None]) -> 
 
 def _uniform(shape: Mapping[str, Any]) -> Rod:
     """The rod of the options."""
-    from fecm.projectile import REPORT_ELEMENTS, Rod
+    from fecm.mechanics.projectile import REPORT_ELEMENTS, Rod
 
     diameters = (shape["diameter"],) * (shape["elements"] or REPORT_ELEMENTS)
     return Rod(shape["length"], diameters, shape["modulus"], shape["density"])
@@ -150,12 +150,12 @@ def _uniform(shape: Mapping[str, Any]) -> Rod:
 
 def _of_deck(deck: Path) -> tuple[Rod, float, float | None, Mapping[str, str]]:
     """The projectile of a deck's first problem, its transducer's x, its first DT, its units."""
-    from fecm.api import prepare
-    from fecm.parts import build_projectile, build_station
-    from fecm.projectile import RigidMass
-    from fecm.units import unit_names
+    from fecm.api import load_deck
+    from fecm.deck.units import unit_names
+    from fecm.mechanics.projectile import RigidMass
+    from fecm.problem.build import build_projectile, build_station
 
-    prepared = prepare(deck)
+    prepared = load_deck(deck)
     report(prepared)
     if errors := prepared.errors(force=True):
         raise Refused(count_errors(errors))
@@ -213,9 +213,9 @@ def filter_(
     RESULT is what `fecm run` wrote, or a CSV with a column of times; the CSV that comes out has the
     columns time, the history, and filtered.
     """
-    targets = Targets.checked(output, picture, overwrite, history)
-    from fecm.filters import filter_of
-    from fecm.recorded import recorded
+    targets = OutputPaths.checked(output, picture, overwrite, history)
+    from fecm.studies.rod_test.filters import filter_of
+    from fecm.studies.rod_test.history import recorded
 
     try:
         slow = filter_of(filter_text)
@@ -263,9 +263,9 @@ def calibrate(
     TEST.csv has the columns time, V_F and V_a: outputs of the transducer on the projectile and of
     the accelerometer on a free target.  The slope of V_F over V_a gives c_F = (c_a / m) V_F / V_a.
     """
-    targets = Targets.checked(STANDARD_OUTPUT, picture, overwrite)
-    from fecm import calibration
-    from fecm.columns import read_columns
+    targets = OutputPaths.checked(STANDARD_OUTPUT, picture, overwrite)
+    from fecm.studies.rod_test import calibration
+    from fecm.studies.tables import read_columns
 
     try:
         columns = read_columns(test, ("time", "V_F", "V_a"), increasing="time")

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fecm.choices import ENERGY_LIMIT, Choices
+from fecm._files import check_outputs
+from fecm._memory import format_bytes
 from fecm.cli.common import (
     DECK_PATH,
     FILE_PATH,
     MODE_OPTION,
-    AnswerIsNo,
+    CheckFailed,
     Refused,
     count_errors,
     echo,
@@ -24,17 +25,16 @@ from fecm.cli.common import (
     signals,
     writing,
 )
-from fecm.cli.numbers import POSITIVE, Finite
-from fecm.files import check_outputs
-from fecm.memory import said
-from fecm.rod_method import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
-from fecm.slips import NAMES, active_slips
-from fecm.solvers import AUTO, SOLVERS
+from fecm.cli.types import POSITIVE, Finite
+from fecm.mechanics.rod_integrators import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
+from fecm.mechanics.stiffness_product import AUTO, SOLVERS
+from fecm.problem.options import ENERGY_LIMIT, RunOptions
+from fecm.problem.slips import NAMES, active_slips
 
 if TYPE_CHECKING:
-    from fecm.check import Checked
-    from fecm.checkpoint import Checkpointer
-    from fecm.simulation import Simulation
+    from fecm.problem.problem import Problem
+    from fecm.simulation.checkpoint import Checkpointer
+    from fecm.simulation.simulation import Simulation
 
 
 @click.command()
@@ -116,10 +116,10 @@ def run(
         active = active_slips(mode, slips)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
-    from fecm.api import numbered, prepare
-    from fecm.checkpoint import checkpoint_of, spool_of
+    from fecm.api import load_deck, numbered
+    from fecm.simulation.checkpoint import checkpoint_of, spool_of
 
-    prepared = prepare(deck, mode)
+    prepared = load_deck(deck, mode)
     report(prepared)
     if errors := prepared.errors(force):
         raise Refused(f"{count_errors(errors)}; nothing was run")
@@ -140,7 +140,7 @@ def run(
     # The interrupted run had got this far; what stands beyond is not its own.
     own = left + 1 if resume and left is not None else 0
     check_outputs([p for p in (*paths[own:], *prints[own:]) if p is not None], overwrite)
-    choices = Choices(
+    choices = RunOptions(
         active, solver, threads, RodMethod(rod_mass, rod_integrator), energy_limit
     )  # fmt: skip
     for number, path in enumerate(paths):
@@ -154,34 +154,34 @@ def run(
 
 
 def _run_one(
-    problem: Checked,
+    problem: Problem,
     path: Path,
     printed: Path | None,
-    choices: Choices,
+    choices: RunOptions,
     every: float | None,
     *,
     resumes: bool,
     overwrite: bool,
 ) -> None:
     """Run one problem of a deck into a file and say what came out."""
-    from fecm.check.memory import check_memory
-    from fecm.check.run import output_bytes
-    from fecm.checkpoint import Checkpointer
-    from fecm.printout import Printer
-    from fecm.program import estimate
-    from fecm.results import file_writer
-    from fecm.results.journal import Journal
+    from fecm.deck.macros import estimate_work
+    from fecm.problem.check_program import output_bytes
+    from fecm.problem.memory import check_memory
+    from fecm.results import hdf5_writer
     from fecm.results.result import load
     from fecm.results.summary import OPEN_END, summary
-    from fecm.simulation import Simulation
+    from fecm.simulation.checkpoint import Checkpointer
+    from fecm.simulation.printout import Printer
+    from fecm.simulation.simulation import Simulation
+    from fecm.simulation.spool import Journal
 
-    sizes = estimate(problem.program)
+    sizes = estimate_work(problem.program)
     _check_room(path, output_bytes(problem.deck, sizes))
     check_memory(problem, solver=choices.solver)
     with contextlib.ExitStack() as stack:
         stack.enter_context(signals.deferred())
         stack.enter_context(_ends(path, resumes=resumes))
-        sink = stack.enter_context(file_writer.writing(path, overwrite=overwrite))
+        sink = stack.enter_context(hdf5_writer.writing(path, overwrite=overwrite))
         journal = Journal(sink, muted=resumes)
         checkpointer = Checkpointer(path, journal)
         printer = Printer()
@@ -213,10 +213,10 @@ def _run_one(
 @contextlib.contextmanager
 def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
     """Say how a run ended that did not end well."""
-    from fecm.checkpoint import CheckpointError, checkpoint_of
-    from fecm.dynamics import DivergenceError
-    from fecm.results.journal import SpoolError
-    from fecm.statics import SingularStiffnessError
+    from fecm.mechanics.plate_motion import DivergenceError
+    from fecm.mechanics.statics import SingularStiffnessError
+    from fecm.simulation.checkpoint import CheckpointError, checkpoint_of
+    from fecm.simulation.spool import SpoolError
 
     try:
         yield
@@ -226,7 +226,7 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
             f"it with BOUN; {path} was not written"
         ) from None
     except DivergenceError as diverged:
-        raise AnswerIsNo(
+        raise CheckFailed(
             f"the run diverged at step {diverged.step}: {diverged.reason}; {path} was not written"
         ) from None
     except (CheckpointError, SpoolError) as error:
@@ -294,7 +294,8 @@ def _check_room(path: Path, size: int) -> None:
     free = shutil.disk_usage(path.parent).free
     if size > free:
         raise Refused(
-            f"{path}: the result takes about {said(size)}, and the disk has {said(free)} left"
+            f"{path}: the result takes about {format_bytes(size)}, and the disk has "
+            f"{format_bytes(free)} left"
         )
 
 

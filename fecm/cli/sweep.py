@@ -11,24 +11,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fecm.cli.common import (
-    DECK_PATH,
-    FILE_PATH,
-    Refused,
-    count_errors,
-    echo,
-    signals,
-)
-from fecm.files import check_outputs
+from fecm._files import check_outputs
+from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, count_errors, echo, signals
 
 if TYPE_CHECKING:
-    from fecm.check import Checked
+    from fecm.problem.problem import Problem
+    from fecm.sweeps.batch import Task
     from fecm.sweeps.cases import Case
     from fecm.sweeps.outcome import Outcome
+    from fecm.sweeps.plan import Plan
     from fecm.sweeps.result import SweepResult
-    from fecm.sweeps.run import Task
-    from fecm.sweeps.store import Parts
-    from fecm.sweeps.tasks import Plan
+    from fecm.sweeps.store import PartialResults
 
 
 @click.command()
@@ -72,11 +65,9 @@ def sweep(
     the projectile was still on the plate.
     """
     from fecm.sweeps.cases import CasesError
-    from fecm.sweeps.memory import check_memory
-    from fecm.sweeps.result import save
+    from fecm.sweeps.plan import check_memory, freed, plan, tasks
+    from fecm.sweeps.result import save, summary, verdict
     from fecm.sweeps.schedule import LOST
-    from fecm.sweeps.summary import summary, verdict
-    from fecm.sweeps.tasks import freed, plan, tasks
 
     path = output or Path(f"{deck.stem}-sweep.h5")
     try:
@@ -131,7 +122,7 @@ def _chosen(text: str, count: int) -> list[int]:
     return list(dict.fromkeys(numbers))
 
 
-def _problem(deck: Path) -> Checked:
+def _problem(deck: Path) -> Problem:
     from fecm.deck.findings import DeckError
     from fecm.sweeps.api import problem_of
 
@@ -143,17 +134,17 @@ def _problem(deck: Path) -> Checked:
         raise Refused(f"{count_errors(errors)}; nothing was run") from None
 
 
-def _parts(made: Plan, path: Path, *, restart: bool) -> Parts:
-    from fecm.sweeps.store import OtherSweepError, Parts
+def _parts(made: Plan, path: Path, *, restart: bool) -> PartialResults:
+    from fecm.sweeps.store import OtherSweepError, PartialResults
 
     try:
-        return Parts(path, made.fingerprint(), restart=restart)
+        return PartialResults(path, made.fingerprint(), restart=restart)
     except OtherSweepError as error:
         raise Refused(str(error)) from None
 
 
 def _carry_out(
-    problem: Checked,
+    problem: Problem,
     made: Plan,
     path: Path,
     workers: int,
@@ -210,18 +201,18 @@ def _progress(count: int) -> Iterator[Callable[[Task, Outcome], None]]:
 
 def _run_in_full(made: Plan, fulls: dict[int, Path], *, overwrite: bool) -> None:
     """Run chosen cases with everything that their deck stores."""
-    from fecm.api import prepare
-    from fecm.results import file_writer
-    from fecm.simulation import simulate
+    from fecm.api import load_deck
+    from fecm.results import hdf5_writer
+    from fecm.simulation.simulation import simulate
+    from fecm.sweeps.batch import deck_of
     from fecm.sweeps.cases import CasesError
-    from fecm.sweeps.run import deck_of
 
     for case, path in fulls.items():
         try:
-            prepared = prepare(deck_of(made, case))
+            prepared = load_deck(deck_of(made, case))
             if errors := prepared.errors(force=True):
                 raise CasesError(errors[0].message)
-            with file_writer.writing(path, overwrite=overwrite) as sink:
+            with hdf5_writer.writing(path, overwrite=overwrite) as sink:
                 simulate(prepared.problems[0], sink)
         except (CasesError, ArithmeticError) as error:
             echo(f"fecm: note: case {case} was not run in full: {error}", err=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fecm.cli.common import FORMAT_OPTION, AnswerIsNo, Refused
+from fecm.cli.common import FORMAT_OPTION, CheckFailed, Refused
 
 if TYPE_CHECKING:
     from fecm.verification import Case, Row
@@ -39,7 +39,7 @@ def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: str) -> 
     bad = sum(not row.within for row in rows)
     count = f"{len(rows)} row{'s' * (len(rows) != 1)}"
     if bad:
-        raise AnswerIsNo(f"{bad} of {count} {'is' if bad == 1 else 'are'} beyond tolerance")
+        raise CheckFailed(f"{bad} of {count} {'is' if bad == 1 else 'are'} beyond tolerance")
     if form == "text" and not markdown:
         click.echo(f"{count}, all within tolerance")
 

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fecm.cli.common import DECK_PATH, Refused, count_errors
-from fecm.cli.numbers import ListCommand, number
-from fecm.cli.tables import OUTPUT, OVERWRITE, PLOT, Targets
+from fecm.cli.outputs import OUTPUT, OVERWRITE, PLOT, OutputPaths
+from fecm.cli.types import ListCommand, number
 
 if TYPE_CHECKING:
-    from fecm.laminate import Laminate
-    from fecm.plot import Picture
-    from fecm.waves import Medium, WaveSurfaces
+    from fecm.mechanics.laminate import Laminate
+    from fecm.plot.style import Picture
+    from fecm.studies.waves import Medium, WaveSurfaces
 
 # Rows of a table beyond which a slip of the pen is more likely than a wish.
 MOST = 1_000_000
@@ -81,7 +81,7 @@ class _Job:
 
     medium: Medium
     units: dict[str, str]
-    targets: Targets
+    targets: OutputPaths
 
     def finish(
         self,
@@ -111,9 +111,9 @@ def _job(
     """Check the outputs and make the laminate."""
     from dataclasses import replace
 
-    from fecm.waves import Medium
+    from fecm.studies.waves import Medium
 
-    targets = Targets.checked(output, picture, overwrite, deck)
+    targets = OutputPaths.checked(output, picture, overwrite, deck)
     laminate, units = _laminate(deck, layup, constants)
     try:
         medium = Medium(replace(laminate, shear=shear_factor * laminate.shear))
@@ -134,8 +134,8 @@ def _laminate(
         raise Refused(f"--{option.replace('_', '-')} stands for a deck; {deck} is one already")
     if deck is not None:
         return _laminate_of_deck(deck)
-    from fecm.authoring.laminates import laminate_of_options
-    from fecm.authoring.options import OptionError
+    from fecm.cli.laminate_options import laminate_of_options
+    from fecm.cli.new import OptionError
 
     try:
         return laminate_of_options(layup or "", **constants)
@@ -144,11 +144,11 @@ def _laminate(
 
 
 def _laminate_of_deck(path: Path) -> tuple[Laminate, dict[str, str]]:
-    from fecm.api import prepare
-    from fecm.laminate import laminate_of_deck
-    from fecm.units import unit_names
+    from fecm.api import load_deck
+    from fecm.deck.units import unit_names
+    from fecm.problem.build import laminate_of_deck
 
-    prepared = prepare(path)
+    prepared = load_deck(path)
     if errors := prepared.errors(force=True):
         for finding in errors:
             click.echo(finding.render(prepared.source), err=True)
@@ -187,8 +187,8 @@ def waves() -> None:
 @_shared
 def dispersion(angles: tuple[float, ...], wavelengths: tuple[float, ...], **shared: Any) -> None:
     """Phase velocity and frequency of all modes against wavelength (figures 2.4, 2.5)."""
-    from fecm.waves import MODES
-    from fecm.waves import dispersion as compute
+    from fecm.studies.waves import MODES
+    from fecm.studies.waves import dispersion as compute
 
     _bound(5 * len(angles) * len(wavelengths))
     job = _job(**shared)
@@ -222,7 +222,7 @@ def dispersion(angles: tuple[float, ...], wavelengths: tuple[float, ...], **shar
 @_shared
 def speeds(step: float, **shared: Any) -> None:
     """Normal velocities of the five wave fronts (figures 2.7, 2.8)."""
-    from fecm.waves import FRONTS
+    from fecm.studies.waves import FRONTS
 
     _bound(360.0 / step)
     job = _job(**shared)
@@ -252,7 +252,7 @@ def speeds(step: float, **shared: Any) -> None:
 @_shared
 def fronts(times: tuple[float, ...], radius: float | None, step: float, **shared: Any) -> None:
     """Front positions and rays (figures 2.9 to 2.12); cusps go to standard error."""
-    from fecm.waves import FRONTS
+    from fecm.studies.waves import FRONTS
 
     _bound(5 * len(times) * 360.0 / step)
     job = _job(**shared)
@@ -285,7 +285,7 @@ def _bound(rows: float) -> None:
 
 
 def _surfaces(medium: Medium) -> WaveSurfaces:
-    from fecm.waves import WaveSurfaces
+    from fecm.studies.waves import WaveSurfaces
 
     try:
         return WaveSurfaces(medium)
@@ -304,7 +304,7 @@ def _notes_of_names(surfaces: WaveSurfaces) -> list[str]:
 
 def _notes_of_cusps(surfaces: WaveSurfaces, times: Sequence[float], radius: float) -> list[str]:
     """Where the fronts have cusps: a line for each time and mode."""
-    from fecm.waves import FRONTS
+    from fecm.studies.waves import FRONTS
 
     notes = []
     for time in times:

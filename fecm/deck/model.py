@@ -2,7 +2,7 @@
 
 A :class:`Deck` is one problem of a file: its control card, its segments in the deck's order, its
 macro program.  It keeps the cards' values as they were given; nodes and elements that the cards
-only imply are generated from it by :mod:`fecm.mesh`.
+only imply are generated from it by :mod:`fecm.mechanics.mesh`.
 """
 
 from __future__ import annotations
@@ -388,7 +388,7 @@ class Deck(Record):
         found = self.all(kind)
         return found[-1] if found else None
 
-    def need(self, kind: type[_S]) -> _S:
+    def require(self, kind: type[_S]) -> _S:
         """The segment of one kind that counts.
 
         Raises

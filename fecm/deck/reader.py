@@ -10,13 +10,12 @@ import difflib
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from fecm._memory import NotEnoughMemoryError, available, format_bytes, require
 from fecm.deck.card import Card, Source
 from fecm.deck.findings import DeckError, Findings, Place
 from fecm.deck.model import STOP, TITLE, Deck, Segment
-from fecm.deck.records import NODES_AN_ELEMENT, UNKNOWNS, Control, LoadTable, Macro
-from fecm.deck.segments import READERS, SegmentReader
-from fecm.deck.stream import Stream
-from fecm.memory import NotEnoughMemoryError, available, require, said
+from fecm.deck.records import DOF_NAMES, NODES_AN_ELEMENT, Control, LoadTable, Macro
+from fecm.deck.segments import READERS, SegmentReader, Stream
 
 MACROS = "MACR"
 END = "END"
@@ -41,7 +40,7 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 @dataclass
-class Problem:
+class ParsedProblem:
     """A problem as far as it could be read.
 
     Attributes
@@ -82,9 +81,9 @@ class Reader:
         """What is wrong with the file."""
         return self.stream.findings
 
-    def problems(self) -> list[Problem]:
+    def problems(self) -> list[ParsedProblem]:
         """Read every problem of the file."""
-        problems: list[Problem] = []
+        problems: list[ParsedProblem] = []
         stopped = False
         while (card := self.stream.take()) is not None:
             if card.is_blank:
@@ -113,7 +112,7 @@ class Reader:
         self.findings.add("E012", message, card.place, "write several files")
         self.findings.close()
 
-    def _problem(self, title: Card) -> Problem:
+    def _problem(self, title: Card) -> ParsedProblem:
         """Read one problem, from its FECM card on."""
         first = self.stream.position - 1
         self._unsound = set()
@@ -121,7 +120,7 @@ class Reader:
         segments = self._mesh_and_data(title, control)
         macros = [] if self.stream.at_end else self._program(title)
         if control is None:
-            return Problem(None, self._unsound)
+            return ParsedProblem(None, self._unsound)
         deck = Deck(
             title.data[4:].strip(),
             control,
@@ -131,7 +130,7 @@ class Reader:
             f"{self.stream.text_since(first)}\n{STOP}\n",
             source=Source(title, ()),
         )
-        return Problem(deck, self._unsound)
+        return ParsedProblem(deck, self._unsound)
 
     # Control card --------------------------------------------------------------------------------
 
@@ -174,7 +173,7 @@ class Reader:
             ("NUMEL", control.numel, 1, MOST, ""),
             ("LAYER", control.layers, 1, MOST, ""),
             ("NDM", control.ndm, 2, 2, "the plate lies in 2 dimensions"),
-            ("NDF", control.ndf, 5, 5, f"a node has the unknowns {', '.join(UNKNOWNS)}"),
+            ("NDF", control.ndf, 5, 5, f"a node has the unknowns {', '.join(DOF_NAMES)}"),
             ("NEN", control.nen, low, high, "nodes an element"),
         ):
             if not least <= value <= most:
@@ -397,7 +396,7 @@ def _bytes(path: Path) -> bytes:
             raise OSError(f"{path} is a binary file or UTF-16 text, not a deck in UTF-8 or Latin-1")
         data = begin + file.read(max(0, most + 1 - len(begin)))
     if len(data) > most:
-        raise NotEnoughMemoryError(f"{path}: a deck of more than {said(most)} is not read")
+        raise NotEnoughMemoryError(f"{path}: a deck of more than {format_bytes(most)} is not read")
     lines = len(data) - len(data.translate(None, LINE_ENDS)) - data.count(b"\r\n")
     require(BYTES_A_BYTE * len(data) + BYTES_A_LINE * lines, f"{path}: the deck")
     return data

@@ -6,6 +6,7 @@ compared.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -13,12 +14,33 @@ from typing import ClassVar
 from fecm.deck.card import Fields, Source, Value, layout, write_card
 from fecm.deck.findings import Place
 
+
+def load_factor(table: LoadTable, clock: float) -> float:
+    """A1 + A2 t + A3 sin(A4 t + A5)^L between t_min and t_max, 0 outside.
+
+    Parameters
+    ----------
+    table : LoadTable
+        The card's values; an exponent L below 1 counts as 1.
+    clock : float
+        Time of the TIME macro.
+    """
+    if not table.begin <= clock <= table.end:
+        return 0.0
+    a1, a2, a3, a4, a5 = table.constants
+    wave = math.sin(a4 * clock + a5)
+    return a1 + a2 * clock + a3 * wave ** max(table.exponent, 1)
+
+
 # Least and greatest number of nodes an element.
 NODES_AN_ELEMENT = (3, 12)
+
 # Below this number every whole one is a float.
 EXACT = 2**53
+
 AXES = ("x", "y", "z")
-UNKNOWNS = ("u", "v", "w", "theta_x", "theta_y")
+
+DOF_NAMES = ("u", "v", "w", "theta_x", "theta_y")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._typing import Bools, Floats
 from fecm.deck.model import Deck, Impact, Material
 from fecm.deck.reader import Reader
-from fecm.elements.quadrature import Rule
-from fecm.parts import rules
-from fecm.plate import Family, families, local_shape_functions
-from fecm.plot import PlotError
+from fecm.mechanics.element_groups import ElementBlock, element_blocks
+from fecm.mechanics.element_matrices import local_shape_functions
+from fecm.mechanics.elements.quadrature import Quadrature
+from fecm.plot.style import PlotError
+from fecm.problem.build import rules
+from fecm.problem.slips import LISTING
 from fecm.results.result import Result
 from fecm.results.schema import STORED_BY
-from fecm.slips import LISTING
 
 Array = NDArray[Any]
-Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-Bools = NDArray[np.bool_]
 
 # Beyond these, axes and their numbers lose all sense long before they overflow.
 LARGEST = 1e100
@@ -31,7 +31,7 @@ LARGEST = 1e100
 MANY = 2000
 
 
-def need(result: Result, name: str, *paths: str) -> list[Array]:
+def require(result: Result, name: str, *paths: str) -> list[Array]:
     """Datasets of a result.
 
     Raises
@@ -68,7 +68,7 @@ def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:
     PlotError
         If the nodes all lie on one line parallel to an axis.
     """
-    elements, coordinates = need(result, name, "mesh/elements", "mesh/coordinates")
+    elements, coordinates = require(result, name, "mesh/elements", "mesh/coordinates")
     coordinates = coordinates[:, :2]
     extent = np.ptp(coordinates, axis=0)
     if not (extent > 1e-9 * np.abs(coordinates).max()).all():
@@ -131,7 +131,7 @@ def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -
     PlotError
         If there are no rows, or a time is outside them.
     """
-    (stored,) = need(result, name, "tape3/time")
+    (stored,) = require(result, name, "tape3/time")
     if not len(stored):
         raise PlotError(f"{name} has no rows of displacements")
     if not times:
@@ -159,14 +159,14 @@ class Patches:
         Rows of their corners.
     edges : list of ndarray (k,)
         Rows of the points around each element, the first again at the end.
-    parts : list of (Family, ndarray)
+    parts : list of (ElementBlock, ndarray)
         Elements, and their shape functions at their points.
     """
 
     points: Floats
     quads: Ints
     edges: list[Ints]
-    parts: list[tuple[Family, Floats]]
+    parts: list[tuple[ElementBlock, Floats]]
 
     def values(self, nodal: Array) -> Floats:
         """Values at the points from values at the nodes, by the elements' own shape functions."""
@@ -188,7 +188,7 @@ def patches(result: Result, cuts: int, name: str = "the result") -> Patches:
     cuts = min(cuts, 2) if len(elements) > MANY else cuts
     ticks = np.linspace(-1.0, 1.0, cuts + 1)
     eta, xi = (places.ravel() for places in np.meshgrid(ticks, ticks, indexing="ij"))
-    grid = Rule(xi, eta, np.zeros(len(xi)))  # points alone; nothing is integrated
+    grid = Quadrature(xi, eta, np.zeros(len(xi)))  # points alone; nothing is integrated
     number = np.arange(len(xi)).reshape(cuts + 1, cuts + 1)
     quad = np.stack(
         [a.ravel() for a in (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1])],
@@ -198,7 +198,7 @@ def patches(result: Result, cuts: int, name: str = "the result") -> Patches:
         [number[0, :-1], number[:-1, -1], number[-1, :0:-1], number[:0:-1, 0], number[0, :1]]
     )
     points, quads, edges, parts, start = [], [], [], [], 0
-    for family in families(elements, coordinates):
+    for family in element_blocks(elements, coordinates):
         N = local_shape_functions(family, grid)[0]
         parts.append((family, N))
         points.append(np.einsum("pn,eni->epi", N, family.coordinates).reshape(-1, 2))
@@ -211,11 +211,11 @@ def patches(result: Result, cuts: int, name: str = "the result") -> Patches:
 
 def strain_points(result: Result, name: str) -> Floats:
     """Coordinates of the points at which tape8 holds strains, (numel, npt, 2), length."""
-    bending, _, points = rules(deck_of(result, name).need(Material))
+    bending, _, points = rules(deck_of(result, name).require(Material))
     rule = bending if "tapes" in result.slips else points
     elements, coordinates = mesh_of(result, name)
     found = np.empty((len(elements), len(rule.xi), 2))
-    for family in families(elements, coordinates):
+    for family in element_blocks(elements, coordinates):
         N = local_shape_functions(family, rule)[0]
         found[family.rows] = np.einsum("pn,eni->epi", N, family.coordinates)
     return found

@@ -13,23 +13,17 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
-from fecm.plot import Options, Picture, PlotError
-from fecm.plot.data import (
-    Array,
-    Floats,
-    Patches,
-    impact_point,
-    need,
-    patches,
-    stored_rows,
-    struck,
-)
+from fecm._typing import Floats
+from fecm.plot.data import Array, Patches, impact_point, patches, require, stored_rows, struck
+from fecm.plot.pictures import Options
 from fecm.plot.style import (
     COLOURS,
     IN_ORDER,
     RATIO,
     SIGNED,
     WIDTHS,
+    Picture,
+    PlotError,
     Scale,
     lines_legend,
     panels,
@@ -110,7 +104,7 @@ def line(results: Results, options: Options) -> Picture:
     """Deflection along a line at several times; of several results, an axes a time."""
     data = {}
     for name, result in results.items():
-        need(result, name, "tape3/w")
+        require(result, name, "tape3/w")
         rows = stored_rows(result, name, options.times, 6 if len(results) == 1 else 3)
         data[name] = (result["tape3/time"][rows], *profile(result, name, options.along, rows))
     if len({len(times) for times, _, _ in data.values()}) > 1 or len(data) > len(COLOURS):
@@ -161,7 +155,7 @@ def _lines_by_time(
 def contour(results: Results, options: Options) -> Picture:
     """Deflection of the plate at given times, seen from above, in one scale of colours."""
     ((name, result),) = results.items()
-    need(result, name, "tape3/w")
+    require(result, name, "tape3/w")
     rows = stored_rows(result, name, options.times, 4)
     cut, w = patches(result, 4, name), result["tape3/w"][rows]
     clock = scale_of(results, "time", [result["tape3/time"][rows]])
@@ -255,7 +249,7 @@ class _Plate:
 def surface(results: Results, options: Options) -> Picture:
     """The deflected plate; without times at the instant when it is bent most."""
     ((name, result),) = results.items()
-    (w,) = need(result, name, "tape3/w")
+    (w,) = require(result, name, "tape3/w")
     if options.times:
         rows = stored_rows(result, name, options.times, 1)
     else:
@@ -290,7 +284,7 @@ def _plates(
 def animation(results: Results, options: Options) -> Picture:
     """The deflected plate, frame by frame; the figure shows the last frame."""
     ((name, result),) = results.items()
-    (w,) = need(result, name, "tape3/w")
+    (w,) = require(result, name, "tape3/w")
     rows = stored_rows(result, name, options.times, FRAMES)
     figure, (plate, *_) = _plates(results, options, rows, 1, 1)
     clock = scale_of(results, "time", [result["tape3/time"][rows]])

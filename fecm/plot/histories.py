@@ -11,13 +11,15 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from fecm.deck.model import Material
-from fecm.plot import Options, Picture, PlotError, PlotNote
-from fecm.plot.data import Array, deck_of, impact_point, nearest, need, strain_points
+from fecm.plot.data import Array, deck_of, impact_point, nearest, require, strain_points
+from fecm.plot.pictures import Options, PlotNote
 from fecm.plot.style import (
     COLOURS,
     RATIO,
     STYLES,
     WIDTHS,
+    Picture,
+    PlotError,
     legend,
     lines_legend,
     panels,
@@ -64,7 +66,7 @@ def force(results: Results, options: Options) -> Picture:
     """Contact force and transducer against time; of several results, one above the other."""
     _within(results, len(COLOURS), "forces")
     paths = ("history/time", "history/force", "history/transducer")
-    data = {name: need(result, name, *paths) for name, result in results.items()}
+    data = {name: require(result, name, *paths) for name, result in results.items()}
     times = [columns[0] for columns in data.values()]
     clock = scale_of(results, "time", times)
     pound = scale_of(results, "force", [c for columns in data.values() for c in columns[1:]])
@@ -97,7 +99,7 @@ def loop(results: Results, options: Options) -> Picture:
     _within(results, len(COLOURS), "loops")
     paths = ("history/indentation", "history/force")
     data = {
-        name: [np.concatenate(([0.0], column)) for column in need(result, name, *paths)]
+        name: [np.concatenate(([0.0], column)) for column in require(result, name, *paths)]
         for name, result in results.items()
     }
     length = scale_of(results, "length", [a.clip(min=0.0) for a, _ in data.values()])
@@ -122,7 +124,7 @@ def energy(results: Results, options: Options) -> Picture:
     """Energies of plate, projectile and indentation, and their sum; a line style a result."""
     _within(results, len(STYLES), "energies")
     paths = ("energy/time", *(f"energy/{column}" for column in ENERGIES))
-    data = {name: need(result, name, *paths) for name, result in results.items()}
+    data = {name: require(result, name, *paths) for name, result in results.items()}
     times = [columns[0] for columns in data.values()]
     clock = scale_of(results, "time", times)
     work = scale_of(results, "force*length", [c for columns in data.values() for c in columns[1:]])
@@ -155,7 +157,7 @@ def strain(results: Results, options: Options) -> Picture:
     for name, result in results.items():
         for label, values in _strains(result, name, options).items():
             text = f"{name}, {label}" if several else label
-            lines[text] = (need(result, name, "tape8/time")[0], values)
+            lines[text] = (require(result, name, "tape8/time")[0], values)
     if len(lines) > len(COLOURS):
         raise PlotError(
             f"{len(lines)} lines can't be told apart in one picture; ask for fewer points, "
@@ -179,12 +181,12 @@ def strain(results: Results, options: Options) -> Picture:
 
 def _strains(result: Result, name: str, options: Options) -> dict[str, Array]:
     """Histories of one result, by point and direction."""
-    columns = need(result, name, "tape8/kappa_x", "tape8/kappa_y", "tape8/kappa_xy")
+    columns = require(result, name, "tape8/kappa_x", "tape8/kappa_y", "tape8/kappa_xy")
     points = strain_points(result, name)
     places = [np.array(at) for at in options.at] or [impact_point(result, name)[:2]]
     height = 1.0
     if options.face != "curvature":
-        thickness = sum(a.thickness for a in deck_of(result, name).need(Material).layers)
+        thickness = sum(a.thickness for a in deck_of(result, name).require(Material).layers)
         height = thickness / 2.0 if options.face == "far" else -thickness / 2.0
         if result["mesh/equations"][:, :2].any():
             warnings.warn(

@@ -6,15 +6,22 @@ from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
-from fecm.fitting.constants import Fit
-from fecm.fitting.cycles import FALLING, LOADING, RISING
-from fecm.plot import Picture
-from fecm.plot.style import COLOURS, RATIO, STYLES, Scale, lines_legend, panels, scale, styled
-from fecm.units import unit_of
-
-Floats = NDArray[np.float64]
+from fecm._typing import Floats
+from fecm.deck.units import unit_of
+from fecm.plot.style import (
+    COLOURS,
+    RATIO,
+    STYLES,
+    Picture,
+    Scale,
+    lines_legend,
+    panels,
+    scale,
+    styled,
+)
+from fecm.studies.indentation_test.constants import Fit
+from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING
 
 LOOKS = {
     LOADING: (COLOURS[0], "first loading"),

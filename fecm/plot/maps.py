@@ -13,12 +13,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from fecm.plot import Options, Picture
-from fecm.plot.cases import CURVES, Axis, Choice, choose
-from fecm.plot.style import COLOURS, IN_ORDER, RATIO, lines_legend, panels
+from fecm._typing import Floats
+from fecm.plot.map_data import CURVES, Axis, Choice, choose
+from fecm.plot.pictures import Options
+from fecm.plot.style import COLOURS, IN_ORDER, RATIO, Picture, lines_legend, panels
 from fecm.sweeps.result import SweepResult
-
-Floats = NDArray[np.float64]
 
 # Cells and points beyond which a drawing of lines holds them as an image.
 MANY = 10_000
@@ -33,7 +32,7 @@ MARKERS = "osD^vP*"
 
 
 @dataclass(frozen=True)
-class Grid:
+class MapGrid:
     """A number on every crossing of two values' rows.
 
     Attributes
@@ -214,7 +213,7 @@ def _bar(figure: Figure, axes: Axes, drawn: Any, shown: Axis, levels: list[float
 
 
 def _cells(
-    figure: Figure, axes: Axes, grid: Grid, shown: Axis, levels: list[float], *, rows: bool
+    figure: Figure, axes: Axes, grid: MapGrid, shown: Axis, levels: list[float], *, rows: bool
 ) -> None:
     """A cell a case, with lines of equal value; between rows of texts there are none."""
     many = grid.values.size > MANY
@@ -241,7 +240,7 @@ def _cells(
         axes.clabel(marked, fontsize=6.0, inline_spacing=2, colors="white")
 
 
-def _crossings(axes: Axes, grid: Grid, level: float) -> None:
+def _crossings(axes: Axes, grid: MapGrid, level: float) -> None:
     """Mark where a row passes a level, between two cases by a straight line."""
     for row, values in zip(grid.y, grid.values.filled(np.nan) - level, strict=True):
         before, after = values[:-1], values[1:]
@@ -268,7 +267,7 @@ def _points(
     _bar(figure, axes, drawn, shown, levels)
 
 
-def _grid(first: Axis, second: Axis, shown: Axis) -> Grid | None:
+def _grid(first: Axis, second: Axis, shown: Axis) -> MapGrid | None:
     """The cases as a full grid; None where they are none."""
     x, column = np.unique(first.values, return_inverse=True)
     y, row = np.unique(second.values, return_inverse=True)
@@ -280,4 +279,4 @@ def _grid(first: Axis, second: Axis, shown: Axis) -> Grid | None:
         return None
     values = np.empty(filled.shape)
     values[row, column] = shown.values
-    return Grid(x, y, np.ma.masked_invalid(values))
+    return MapGrid(x, y, np.ma.masked_invalid(values))

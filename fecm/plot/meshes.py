@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from matplotlib.collections import LineCollection
 
-from fecm.plot import Options, Picture
-from fecm.plot.data import Bools, need, patches, struck
-from fecm.plot.style import COLOURS, WIDTHS, legend, panels, scale_of
+from fecm._typing import Bools
+from fecm.plot.data import patches, require, struck
+from fecm.plot.pictures import Options
+from fecm.plot.style import COLOURS, WIDTHS, Picture, legend, panels, scale_of
 from fecm.results.result import Result
 
 # Marks of the supports: how they are called, and how they look.
@@ -36,7 +37,7 @@ def supports(result: Result) -> dict[str, Bools]:
 def mesh(results: Mapping[str, Result], options: Options) -> Picture:
     """Elements, nodes that are held, the impact point, and the points asked for."""
     ((name, result),) = results.items()
-    coordinates, _ = need(result, name, "mesh/coordinates", "mesh/elements")
+    coordinates, _ = require(result, name, "mesh/coordinates", "mesh/elements")
     cut = patches(result, 4, name)
     place = scale_of(results, "length", [coordinates])
     low, high = place.factor * cut.points.min(axis=0), place.factor * cut.points.max(axis=0)

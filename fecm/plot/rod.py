@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
-from fecm.calibration import Calibration
-from fecm.plot import Picture
+from fecm._typing import Floats
+from fecm.deck.units import unit_of
 from fecm.plot.style import (
     COLOURS,
     RATIO,
     STYLES,
+    Picture,
     legend,
     lines_legend,
     literal,
@@ -23,10 +23,8 @@ from fecm.plot.style import (
     scale,
     styled,
 )
-from fecm.rod import RodHistory
-from fecm.units import unit_of
-
-Floats = NDArray[np.float64]
+from fecm.studies.rod_test.calibration import Calibration
+from fecm.studies.rod_test.pulse_test import RodHistory
 
 WIDTH = "column"
 MOST_LINES = len(COLOURS) - 1

@@ -6,26 +6,34 @@ import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ParamSpec
+from typing import TYPE_CHECKING, Any, ParamSpec
 
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from fecm.plot import Picture, PlotError
-from fecm.results.plain import printable
 from fecm.results.result import Result
+from fecm.results.schema import printable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 # Width of a column and of a page (in); points an inch of pictures in print and on a screen.
 WIDTHS = {"column": 3.5, "full": 7.2}
+
 RATIO = {"column": 0.68, "full": 0.45}  # height over width of a graph
+
 RESOLUTION, SCREEN = 300, 150
 
 # Okabe and Ito's colours, without the yellow that is lost on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+
 STYLES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))
+
 IN_ORDER = "viridis"  # quantities that grow
+
 SIGNED = "RdBu_r"  # quantities about zero
 
 # Any, as the names that matplotlib types differ from version to version.
@@ -55,6 +63,7 @@ RC: Any = {
     "pdf.fonttype": 42,
     "svg.hashsalt": "fecm",
 }
+
 UNDATED: dict[str, dict[str, Any]] = {
     ".png": {"Software": None},
     ".svg": {"Date": None, "Creator": None},
@@ -67,9 +76,10 @@ _PREFIXED = {
     "m": ("m", 0), "mm": ("m", -3), "N": ("N", 0), "kN": ("N", 3), "J": ("J", 0),
     "N*m": ("J", 0), "N*mm": ("J", -3), "kN*mm": ("J", 0), "kN*m": ("J", 3),
 }  # fmt: skip
-_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
+_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 Drawn = ParamSpec("Drawn")
 
@@ -193,3 +203,15 @@ def lines_legend(figure: Figure, axes: Axes, title: str = "") -> None:
 def _unlabelled(label: str) -> bool:
     """Whether a line was drawn without a label for the legend."""
     return label == "_" or label.startswith("_child")
+
+
+class PlotError(ValueError):
+    """A result lacks what a picture needs, or the options don't fit it."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure, and what changes it from frame to frame if it moves."""
+
+    figure: Figure
+    frames: Sequence[Callable[[], Any]] = ()

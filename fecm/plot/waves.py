@@ -8,14 +8,10 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
-from fecm.plot import Picture, PlotError
-from fecm.plot.style import COLOURS, panels, scale, styled
-from fecm.units import unit_of
-from fecm.waves import FRONTS, MODES, Cusp, Dispersion, Medium, WaveSurfaces
-
-Floats = NDArray[np.float64]
+from fecm.deck.units import unit_of
+from fecm.plot.style import COLOURS, Picture, PlotError, panels, scale, styled
+from fecm.studies.waves import FRONTS, MODES, Cusp, Dispersion, Medium, WaveSurfaces
 
 AROUND = np.arange(1441) / 4.0  # normals of the points of a curve, degrees
 RAYS = 45.0  # degrees between the normals whose rays are drawn
@@ -73,7 +69,7 @@ def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
     ----------
     surfaces : WaveSurfaces
     units : mapping of str to str
-        As :func:`fecm.units.unit_names` gives them.
+        As :func:`fecm.deck.units.unit_names` gives them.
     """
     fronts = surfaces.fronts(AROUND)
     speed = scale(float(fronts.velocity.max()), unit_of("length/time", dict(units)))

@@ -9,14 +9,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.results.schema import DATASETS, NotStoredError, ResultFileError, declared_units, misfit
-from fecm.units import unit_of
+from fecm.deck.units import unit_of
+from fecm.results.schema import (
+    DATASETS,
+    NotStoredError,
+    ResultFileError,
+    declared_units,
+    shape_error,
+)
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
-    from fecm.results.file_reader import Contents
+    from fecm.results.hdf5_reader import Contents
 
 Array = NDArray[Any]
 HISTORY = "history"
@@ -124,11 +130,11 @@ class Result:
         Parameters
         ----------
         kind : str
-            One of :data:`fecm.plot.KINDS`.
+            One of :data:`fecm.plot.pictures.KINDS`.
         path : str or Path, optional
             Where to write it, in place of what is there; its suffix is the format.
         **options
-            Fields of :class:`fecm.plot.Options`.
+            Fields of :class:`fecm.plot.pictures.Options`.
 
         Returns
         -------
@@ -141,7 +147,7 @@ class Result:
         ImportError
             If matplotlib is not installed.
         """
-        from fecm.plot import Options, figure
+        from fecm.plot.pictures import Options, figure
 
         return figure(kind, {self.title or "the result": self}, Options(**options), path)
 
@@ -195,7 +201,7 @@ def load(path: str | Path) -> Result:
     >>> float(result.force.max())  # doctest: +SKIP
     6.19
     """
-    from fecm.results.file_reader import read
+    from fecm.results.hdf5_reader import read
 
     return result_of(read(Path(path)))
 
@@ -210,7 +216,7 @@ def result_of(contents: Contents) -> Result:
     """
     arrays = contents.arrays
     kinds = {name: dtype.kind for name, dtype in arrays.dtypes.items()}
-    if found := misfit(arrays.shapes, kinds):
+    if found := shape_error(arrays.shapes, kinds):
         raise ResultFileError(f"{contents.path}: {found}")
     return Result(arrays, contents.texts, {"": contents.attributes, **contents.groups})
 

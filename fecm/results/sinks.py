@@ -1,7 +1,7 @@
 """Sinks: where a run's rows go, behind one small interface.
 
 A sink is given every dataset once with its full shape, then its rows in order.  The memory sink
-keeps arrays, the file sink (:mod:`fecm.results.file_writer`) writes them as they come.
+keeps arrays, the file sink (:mod:`fecm.results.hdf5_writer`) writes them as they come.
 """
 
 from __future__ import annotations

@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._typing import Floats
 from fecm.results.schema import ResultFileError
 from fecm.results.tapes import CONTACT, CURVATURES
 
-Floats = NDArray[np.float64]
 Array = NDArray[Any]
 
 NAMES = ("tape3", "tape8", "tape9")

@@ -12,13 +12,11 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fecm.files import beside
+from fecm._files import beside
+from fecm._typing import Floats
 from fecm.results.result import Result
 from fecm.results.schema import ResultFileError
-
-Floats = NDArray[np.float64]
 
 CURVATURES = ("kappa_x", "kappa_y", "kappa_xy")
 CONTACT = ("force", "indentation", "transducer", "displacement", "velocity", "acceleration")

@@ -7,21 +7,20 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fecm.api import prepare
-from fecm.check import Checked
+from fecm.api import load_deck
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
+from fecm.problem.problem import Problem
+from fecm.sweeps.batch import Task, merge
 from fecm.sweeps.cases import Case, CasesError, checked, grid
-from fecm.sweeps.memory import check_memory
 from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.plan import Plan, check_memory, plan, tasks
 from fecm.sweeps.result import SweepResult, result_of, save
-from fecm.sweeps.run import Task, joined
-from fecm.sweeps.schedule import Done, Idle, here, lost, on_dask, on_workers
-from fecm.sweeps.store import DamagedPartError, Parts
-from fecm.sweeps.tasks import Plan, plan, tasks
+from fecm.sweeps.schedule import Done, Idle, lost, on_dask, on_workers, run_serial
+from fecm.sweeps.store import DamagedPartError, PartialResults
 
 
-def problem_of(deck: str | Path | Deck) -> Checked:
+def problem_of(deck: str | Path | Deck) -> Problem:
     """The one problem of a deck, checked.
 
     Raises
@@ -31,7 +30,7 @@ def problem_of(deck: str | Path | Deck) -> Checked:
     CasesError
         If it holds several problems.
     """
-    prepared = prepare(deck)
+    prepared = load_deck(deck)
     if prepared.errors(force=True):
         raise DeckError(prepared.findings, prepared.source)
     if len(prepared.problems) != 1:
@@ -40,12 +39,12 @@ def problem_of(deck: str | Path | Deck) -> Checked:
 
 
 def carry_out(
-    problem: Checked,
+    problem: Problem,
     made: Plan,
     *,
     workers: int = 1,
     scheduler: str | None = None,
-    parts: Parts | None = None,
+    parts: PartialResults | None = None,
     done: Done = lambda task, outcome: None,
     idle: Idle = lambda: None,
     note: Callable[[str], None] = warnings.warn,
@@ -54,14 +53,14 @@ def carry_out(
 
     Parameters
     ----------
-    problem : Checked
+    problem : Problem
         The deck that is varied.
     made : Plan
     workers : int
         Worker processes on this machine; 1 runs everything in this process.
     scheduler : str, optional
         Address of a Dask scheduler, whose workers run everything instead.
-    parts : Parts, optional
+    parts : PartialResults, optional
         What was finished before, and where to keep what is.
     done : callable
         Told of each task as it is finished, and of those that were before.
@@ -100,8 +99,8 @@ def carry_out(
     elif workers > 1 and len(left) > 1:
         on_workers(left, workers, keep, idle)
     else:
-        here(left, keep, idle)
-    outcome = joined(outcomes)
+        run_serial(left, keep, idle)
+    outcome = merge(outcomes)
     if not made.history:
         outcome.force = None
     return result_of(made, outcome)

@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from fecm.check import Checked
+from fecm.deck.macros import STEPS, every, flat
 from fecm.deck.model import Deck
 from fecm.deck.records import Macro
-from fecm.parts import moving_plate
-from fecm.program import STEPS, every, flat
-from fecm.stability import critical_time_step, rounded_time_step, taken_time_step
+from fecm.mechanics.time_step import critical_time_step, rounded_time_step, taken_time_step
+from fecm.problem.build import moving_plate
+from fecm.problem.problem import Problem
 
 # No loop is made longer than this; the checks refuse a program that is shorter.
 LONGEST = 1e15
@@ -42,7 +42,7 @@ class Clock:
         return rounded_time_step(critical) if self.rounded else taken_time_step(critical)
 
 
-def clock_of(checked: Checked) -> Clock | None:
+def clock_of(checked: Problem) -> Clock | None:
     """Find the rule of a deck; None where its DT holds for every case."""
     sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
     if len(sizes) != 1:
@@ -54,7 +54,7 @@ def clock_of(checked: Checked) -> Clock | None:
     return Clock(dt, rounded=True) if dt == rounded_time_step(critical) else None
 
 
-def critical_of(checked: Checked) -> float:
+def critical_of(checked: Problem) -> float:
     """Critical time step of a problem (time)."""
     return critical_time_step(moving_plate(checked.deck, checked.mesh, checked.program))
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from fecm._typing import Floats
 
 # Name, description and dimension of every number of a case.
 SUMMARY = {
@@ -63,7 +63,7 @@ class Outcome:
     status: list[str]
     dt: Floats
     steps: NDArray[np.int64]
-    unsettled: NDArray[np.int64]
+    unconverged_steps: NDArray[np.int64]
     force: Floats | None = field(default=None, repr=False)
 
     def of(self, rows: NDArray[np.intp]) -> Outcome:
@@ -74,7 +74,7 @@ class Outcome:
             [self.status[row] for row in rows],
             self.dt[rows],
             self.steps[rows],
-            self.unsettled[rows],
+            self.unconverged_steps[rows],
             None if self.force is None else self.force[rows],
         )
 

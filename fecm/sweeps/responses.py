@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.dynamics import PlateMotion, PointForce
-from fecm.projectile import CollocationStep, RodState
-
-Floats = NDArray[np.float64]
+from fecm._typing import Floats
+from fecm.mechanics.plate_motion import PlateMotion, PointForce
+from fecm.mechanics.rod_integrators import RodIntegrator, RodState
 
 # Steps of a block, and steps and cases of a matrix product with those before it: so few that BLAS
 # uses one thread.
@@ -54,7 +53,7 @@ def plate_response(motion: PlateMotion, row: int, dt: float, steps: int) -> Floa
     return response
 
 
-def tip_response(step: CollocationStep, steps: int) -> Floats:
+def tip_response(step: RodIntegrator, steps: int) -> Floats:
     """Acceleration of a projectile's tip after 1 to `steps` steps, the first under a unit force.
 
     Returns
@@ -162,7 +161,7 @@ class TipSteps:
 
     Parameters
     ----------
-    steps : sequence of CollocationStep
+    steps : sequence of RodIntegrator
         One a kind of projectile, of the same time step and method.
     kinds : ndarray (cases,) of int
         The kind of each case; cases of a kind stand side by side.
@@ -170,9 +169,7 @@ class TipSteps:
         Number of time steps.
     """
 
-    def __init__(
-        self, steps: Sequence[CollocationStep], kinds: NDArray[np.intp], count: int
-    ) -> None:
+    def __init__(self, steps: Sequence[RodIntegrator], kinds: NDArray[np.intp], count: int) -> None:
         first = steps[0]
         self._steps, self._kinds = steps, kinds
         self.theta, self.weight, self.dt = first.theta, first.weight, first.dt
@@ -194,7 +191,7 @@ class TipSteps:
         Yields
         ------
         ndarray (3 n, cases of the kind)
-            As in :class:`~fecm.projectile.RodState`.
+            As in :class:`~fecm.mechanics.rod_integrators.RodState`.
         """
         step, cases = self._steps[kind], np.flatnonzero(self._kinds == kind)
         forces = self._carried.given[:, cases]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,17 +11,56 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._version import __version__
+from fecm.deck.units import unit_names, unit_of
 from fecm.results.schema import FORMAT_VERSION, SWEEP, Dataset, ResultFileError, declared_units
 from fecm.sweeps.outcome import RUN, STILL, SUMMARY, Outcome
-from fecm.sweeps.tasks import Plan
-from fecm.units import unit_names, unit_of
-from fecm.version import __version__
+from fecm.sweeps.plan import Plan
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
-    from fecm.results.file_reader import Contents
+    from fecm.results.hdf5_reader import Contents
+
+
+# Reasons of failed cases that are told one by one.
+TOLD = 5
+
+
+def summary(result: SweepResult) -> list[str]:
+    """Summarise a sweep: its cases, the smallest and the largest peak force, why cases failed."""
+    fine = result.fine
+    lines = [f"cases             {len(result)}"]
+    force = np.where(fine, result["peak_force"], np.nan)
+    if np.isfinite(force).any():
+        for word, case in (("smallest", np.nanargmin(force)), ("largest", np.nanargmax(force))):
+            values = ", ".join(f"{name} {values[case]}" for name, values in result.cases.items())
+            peak = f"{force[case]:.6g} {result.unit('peak_force')}".rstrip()
+            lines.append(f"{word + ' peak':17} {peak} ({values})")
+    reasons = Counter(result["status"][~fine].tolist())
+    for reason, times in reasons.most_common(TOLD):
+        lines.append(f"failed            {times}: {reason}")
+    if len(reasons) > TOLD:
+        lines.append(f"failed            for {len(reasons) - TOLD} other reasons")
+    return lines
+
+
+def verdict(result: SweepResult) -> str:
+    """Count the cases, those that failed, and those whose numbers are in doubt."""
+    unconverged_steps = (
+        0
+        if result.unconverged_steps is None
+        else int((result.unconverged_steps > 0)[result.fine].sum())
+    )
+    counts = (
+        (int(result.still.sum()), "still in contact at the end"),
+        (unconverged_steps, "with a contact iteration that did not converge"),
+        (int((~result.fine).sum()), "failed"),
+    )
+    told = ", ".join(f"{count} {what}" for count, what in counts if count)
+    return f"{len(result)} case{'' if len(result) == 1 else 's'}: {told or 'all ok'}"
+
 
 Array = NDArray[Any]
 
@@ -72,7 +112,7 @@ class SweepResult:
     dt: Array
     steps: Array
     force: Array | None = None
-    unsettled: Array | None = None
+    unconverged_steps: Array | None = None
     deck: str = ""
     title: str = ""
     units: dict[str, str] = field(default_factory=dict)
@@ -125,7 +165,7 @@ class SweepResult:
         path : str or Path, optional
             Where to write it, in place of what is there; its suffix is the format.
         **options
-            Other fields of :class:`fecm.plot.Options`: ``where``, ``level``, ``width``.
+            Other fields of :class:`fecm.plot.pictures.Options`: ``where``, ``level``, ``width``.
 
         Returns
         -------
@@ -138,7 +178,7 @@ class SweepResult:
         ImportError
             If matplotlib is not installed.
         """
-        from fecm.plot import Options, figure
+        from fecm.plot.pictures import Options, figure
 
         names = (over,) if isinstance(over, str) else tuple(over)
         chosen = Options(quantity=quantity, over=names, **options)
@@ -153,7 +193,7 @@ def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
     summary["status"] = np.array(outcome.status)
     deck = plan.deck
     return SweepResult(
-        cases, summary, outcome.dt, outcome.steps, outcome.force, outcome.unsettled,
+        cases, summary, outcome.dt, outcome.steps, outcome.force, outcome.unconverged_steps,
         deck.text or deck.to_text(), deck.title, unit_names(deck),
     )  # fmt: skip
 
@@ -173,7 +213,7 @@ def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
     ResultWriteError
         If the file can't be written; what stood under the name is then untouched.
     """
-    from fecm.results.file_writer import writing
+    from fecm.results.hdf5_writer import writing
 
     count = len(result)
     with writing(path, overwrite=overwrite) as sink:
@@ -210,9 +250,9 @@ def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
         )
         store("history/dt", result.dt, "time step of every case", "time")
         store("history/steps", result.steps, "number of steps of every case")
-        if result.unsettled is not None:
+        if result.unconverged_steps is not None:
             text = "steps whose contact iteration did not converge"
-            store("history/unsettled_steps", result.unsettled, text)
+            store("history/unsettled_steps", result.unconverged_steps, text)
         if result.force is not None and count:
             store("history/force", result.force, "contact force after every step", "force")
         for group, text in GROUPS.items():
@@ -229,7 +269,7 @@ def load(path: Path) -> SweepResult:
     OSError
         If it can't be opened.
     """
-    from fecm.results.file_reader import read
+    from fecm.results.hdf5_reader import read
 
     return sweep_of(read(path, SWEEP))
 
@@ -263,8 +303,8 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     summary = {name: summary[name] for name in (*SUMMARY, "status")} | summary  # in their order
     count = np.shape(arrays["history/dt"])[:1]
     rows = (*cases.values(), *summary.values(), arrays["history/dt"], arrays["history/steps"])
-    unsettled = arrays.get("history/unsettled_steps")
-    rows += () if unsettled is None else (unsettled,)
+    unconverged_steps = arrays.get("history/unsettled_steps")
+    rows += () if unconverged_steps is None else (unconverged_steps,)
     shape = arrays.shapes.get("history/force")
     kinds = {name: summary[name].dtype.kind for name in SUMMARY}
     if (
@@ -280,7 +320,7 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     return SweepResult(
         cases, summary, arrays["history/dt"], steps,
         arrays.get("history/force") if history else None,
-        unsettled,
+        unconverged_steps,
         contents.texts.get("deck", ""), str(contents.attributes.get("title", "")),
         declared_units(contents.attributes),
     )  # fmt: skip

@@ -17,8 +17,8 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 from urllib.parse import urlsplit
 
+from fecm.sweeps.batch import Task, run
 from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.run import Task, run
 
 Done = Callable[[Task, Outcome], None]
 # Given now and then while others work, so that a signal can be heeded.
@@ -51,7 +51,7 @@ def attempt(task: Task) -> Outcome:
         return Outcome.failed(list(task.numbers), [reason] * len(task.numbers))
 
 
-def here(tasks: Sequence[Task], done: Done, idle: Idle) -> None:
+def run_serial(tasks: Sequence[Task], done: Done, idle: Idle) -> None:
     """Run tasks one after the other."""
     for task in tasks:
         idle()

@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from fecm.files import beside, packed
+from fecm._files import beside, packed
+from fecm.sweeps.batch import Task
 from fecm.sweeps.outcome import SUMMARY, Outcome
-from fecm.sweeps.run import Task
 
 MARK = "sweep.json"
 # Bytes of the checksum behind the arrays of a part.
@@ -33,7 +33,7 @@ class DamagedPartError(ValueError):
     """A file of the folder is not as it was written."""
 
 
-class Parts:
+class PartialResults:
     """The outcomes that a sweep has finished.
 
     Parameters
@@ -109,7 +109,7 @@ class Parts:
             "status": np.array(outcome.status, dtype=np.str_),
             "dt": outcome.dt,
             "steps": outcome.steps,
-            "unsettled": outcome.unsettled,
+            "unsettled": outcome.unconverged_steps,
         }
         if outcome.force is not None:
             arrays["force"] = outcome.force

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fecm.authoring.grid import Grid, Section, lines, uniform
+from fecm._typing import Floats
+from fecm.deck.grid import Grid, Section, lines, uniform
 from fecm.deck.model import (
     Boundary,
     Deck,
@@ -36,8 +36,6 @@ from fecm.verification.decks import (
 from fecm.verification.laminates import THICK
 from fecm.verification.plates import EXACT, IN_FIELD, STATICS
 from fecm.verification.series import PLY, TwoLayers, angle_ply, cross_ply, off_axis, terms
-
-Floats = NDArray[np.float64]
 
 # Resultants -------------------------------------------------------------------------------------
 

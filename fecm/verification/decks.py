@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from fecm.api import run
-from fecm.authoring.grid import Grid, Section, lines, uniform
+from fecm.deck.grid import Grid, Section, lines, uniform
 from fecm.deck.model import Deck, Forces, Impact, Indentation, Material, Projectile, Segment
 from fecm.deck.records import Control, Integration, Layer, Macro, NodeValues, Ply
 from fecm.results.result import Result

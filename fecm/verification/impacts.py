@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fecm.authoring.grid import Grid, uniform
+from fecm._typing import Floats
+from fecm.deck.grid import Grid, uniform
 from fecm.deck.model import Deck, Impact, Indentation, Projectile
 from fecm.deck.records import Ply
 from fecm.results.result import Result
@@ -24,8 +24,6 @@ from fecm.verification.decks import (
     result_of,
     struck_plate,
 )
-
-Floats = NDArray[np.float64]
 
 M, V, K = 2.0e-4, 100.0, 1.0e6
 DEEPEST, LARGEST, DURATION = hertz(M, V, K)

@@ -5,13 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from fecm.indentation import Constants, CriticalConstants, MemoryLaw, Point, follow
+from fecm.mechanics.contact_law import (
+    ContactPoint,
+    HystereticLaw,
+    LinearPermanent,
+    YangSunPermanent,
+    follow,
+)
 from fecm.verification.case import AGAINST_CHANGE, Check, case
 
 # The report's laminate with the 0.5 in indenter, and with the 0.75 in one (lb, in).
-HALF_INCH = Constants(k=1.330e6, alpha_p=6.564e-4, s_p=0.094, q=2.5)
+HALF_INCH = LinearPermanent(k=1.330e6, alpha_p=6.564e-4, s_p=0.094, q=2.5)
 K, ALPHA_P, S_P, Q = 1.912e6, 6.564e-4, 0.094, 2.0
-LAW = MemoryLaw(Constants(K, ALPHA_P, S_P, Q))
+LAW = HystereticLaw(LinearPermanent(K, ALPHA_P, S_P, Q))
 
 PEAK = 2e-3
 FORCE = K * PEAK**1.5
@@ -27,7 +33,9 @@ ALPHA_CR = 1.2e-3
 ACR_REMAINS = PEAK - ALPHA_CR**0.4 * PEAK**0.6
 
 
-def _forces(corners: Sequence[float], points: int = 1, law: MemoryLaw = LAW) -> list[Point]:
+def _forces(
+    corners: Sequence[float], points: int = 1, law: HystereticLaw = LAW
+) -> list[ContactPoint]:
     return [point for point, _ in follow(law, corners, points)]
 
 
@@ -61,7 +69,7 @@ def indentation() -> Sequence[float]:
     turn = _forces((PEAK, HALFWAY, HALFWAY + step))
     up = _forces((PEAK, -PEAK, HALFWAY, PEAK))
     loop = _forces((PEAK, 0.0), POINTS)
-    law = MemoryLaw(CriticalConstants(K, ALPHA_CR))
+    law = HystereticLaw(YangSunPermanent(K, ALPHA_CR))
     acr = _forces((PEAK, (PEAK + ACR_REMAINS) / 2.0, ACR_REMAINS), law=law)
     work = sum((b.indentation - a.indentation) * (a.force + b.force) / 2.0
                for a, b in pairwise(loop))  # fmt: skip

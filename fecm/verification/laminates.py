@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fecm.deck.records import Ply
-from fecm.laminate import laminate
+from fecm.mechanics.laminate import laminate
 from fecm.verification.case import Check, case
 
 ROUNDING = "rounding"

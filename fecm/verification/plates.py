@@ -7,25 +7,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fecm.authoring.grid import Grid, uniform
+from fecm._typing import Floats
+from fecm.deck.grid import Grid, uniform
 from fecm.deck.model import Coordinates, Deck, Forces
 from fecm.deck.records import Macro, NodeValues
-from fecm.mesh import Mesh, generate
-from fecm.parts import build_plate
-from fecm.stability import critical_time_step
+from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.time_step import critical_time_step
+from fecm.problem.build import build_plate
+from fecm.problem.generate import generate
 from fecm.verification.case import Check, case, farthest
-from fecm.verification.decks import (
-    deck,
-    isotropic,
-    material,
-    quarter_plate,
-    result_of,
-)
+from fecm.verification.decks import deck, isotropic, material, quarter_plate, result_of
 from fecm.verification.laminates import FIBRES, Q11, Q12, Q22, THICK
-
-Floats = NDArray[np.float64]
 
 STATICS = (Macro("TANG"), Macro("FORM"), Macro("SOLV"))
 

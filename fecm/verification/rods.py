@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import eigh
 
-from fecm.projectile import Rod, report_rod
-from fecm.pulses import GaussPulse, SinePulse
-from fecm.rod import strike
-from fecm.rod_method import CONSISTENT
+from fecm.mechanics.projectile import Rod, report_rod
+from fecm.mechanics.rod_integrators import CONSISTENT
+from fecm.studies.rod_test.pulse_test import simulate_pulse
+from fecm.studies.rod_test.pulses import GaussPulse, SinePulse
 from fecm.verification.case import AGAINST_CHANGE, Check, case
 
 # The report's steel bar of section 4.2, and its pulse (lb, in, s).
@@ -49,8 +49,8 @@ JUMP = "the pulse starts with a jump of 1.93 lb, which 20 elements can't follow"
 )  # fmt: skip
 def rod_pulse() -> Sequence[float]:
     """Forces in the middle, final velocity, mass."""
-    found = strike(BAR, PULSE, DT, DURATION, (0.5,))
-    later = strike(BAR, LATER, DT, 300e-6, (0.5,))
+    found = simulate_pulse(BAR, PULSE, DT, DURATION, (0.5,))
+    later = simulate_pulse(BAR, LATER, DT, 300e-6, (0.5,))
     at = float(np.interp(250e-6, later.time, later.forces[:, 0]))
     velocity = float(found.accelerations[:, 2].sum()) * DT
     ratio = float(found.mean_ratios[0])
@@ -79,7 +79,7 @@ FAST = "a pulse over 32 elements; falls with the square of element and step"
 def rod_waves() -> Sequence[float]:
     """Speed of the pulse's centroid between two stations; frequencies."""
     ends = (1.0, 4.0)
-    found = strike(LONG, SHORT, DT / 2.0, 29e-6, ends)
+    found = simulate_pulse(LONG, SHORT, DT / 2.0, 29e-6, ends)
     centroids = (found.time @ found.forces) / found.forces.sum(axis=0)
     speed = (ends[1] - ends[0]) / float(centroids[1] - centroids[0])
     rods = (BAR, BAR.with_mass(CONSISTENT))

@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fecm._typing import Floats
 from fecm.verification.laminates import (
     BAR11,
     BAR12,
@@ -27,9 +27,7 @@ from fecm.verification.laminates import (
     Q22,
     Q66,
     RHO,
-)  # fmt: skip
-
-Floats = NDArray[np.float64]
+)
 
 # Plane stress of a layer at 0, 90, 45 and -45 degrees, closed forms.
 AT_0 = np.array([[Q11, Q12, 0.0], [Q12, Q22, 0.0], [0.0, 0.0, Q66]])

@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 
 from fecm.deck.records import Ply
-from fecm.laminate import Laminate, laminate
+from fecm.mechanics.laminate import Laminate, laminate
+from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from fecm.verification.case import Check, case
-from fecm.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 
 CLOSED = "closed form; digits that are given"
 

@@ -1,0 +1,113 @@
+"""Memory that is free, as far as the system tells."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+MEMINFO = Path("/proc/meminfo")
+CGROUP = Path("/proc/self/cgroup")
+CGROUPS = Path("/sys/fs/cgroup")
+
+
+# Bytes that may be taken without a look at what is free.
+UNNOTICED = 100_000_000
+
+
+class NotEnoughMemoryError(MemoryError):
+    """Something takes more memory than is free; the message says how much."""
+
+
+def available() -> int | None:
+    """Bytes that can be taken without swapping; None where the system does not tell.
+
+    The least of what the kernel estimates (MemAvailable, proc(5)) and what the limits of the own
+    control group leave, as those of a container or a batch job (memory.max, cgroups(7)).
+    """
+    known = [count for count in (_of_machine(), *_of_groups()) if count is not None]
+    return max(0, min(known)) if known else None
+
+
+def require(count: int, what: str) -> None:
+    """Refuse to take more memory than is free.
+
+    Raises
+    ------
+    NotEnoughMemoryError
+        With both numbers.
+    """
+    if count < UNNOTICED:
+        return
+    free = available()
+    if free is not None and count > free:
+        raise NotEnoughMemoryError(
+            f"{what} takes about {format_bytes(count)} of memory, and {format_bytes(free)} are free"
+        )
+
+
+def check(what: str, needed: Callable[[bool], int], remedy: Callable[[int], str]) -> None:
+    """Refuse to begin something that takes more memory than is free.
+
+    Parameters
+    ----------
+    what : str
+        What it is.
+    needed : callable
+        Gives the bytes that it takes: a quick bound for False, asked for first, or all that is
+        known for True.
+    remedy : callable
+        Given the bytes that are free, what to do about it.
+
+    Raises
+    ------
+    NotEnoughMemoryError
+        With both numbers.
+    """
+    free = available()
+    if free is None:
+        return
+    count = 0
+    for exact in (False, True):
+        count = needed(exact)
+        if count <= free:
+            return
+    raise NotEnoughMemoryError(
+        f"{what} takes about {format_bytes(count)} of memory, and {format_bytes(free)} are free; "
+        f"{remedy(free)}"
+    )
+
+
+def _of_machine() -> int | None:
+    with contextlib.suppress(OSError, ValueError, IndexError):
+        for line in MEMINFO.read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return 1024 * int(line.split()[1])
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        pages = os.sysconf("SC_AVPHYS_PAGES")
+        if pages > 0:
+            return pages * os.sysconf("SC_PAGE_SIZE")
+    return None
+
+
+def _of_groups() -> list[int]:
+    """What the own control group and those around it leave."""
+    left: list[int] = []
+    with contextlib.suppress(OSError, ValueError, IndexError):
+        (own,) = [line[3:] for line in CGROUP.read_text().splitlines() if line.startswith("0::")]
+        folder = CGROUPS / own.strip("/")
+        while folder != CGROUPS.parent:
+            with contextlib.suppress(OSError, ValueError):
+                most = int((folder / "memory.max").read_text())  # "max" is no number
+                left.append(most - int((folder / "memory.current").read_text()))
+            folder = folder.parent
+    return left
+
+
+def format_bytes(count: float) -> str:
+    """A number of bytes as a person says it."""
+    for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= size:
+            return f"{count / size:.3g} {unit}"
+    return f"{count:g} bytes"

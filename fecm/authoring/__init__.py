@@ -1,1 +1,0 @@
-"""Decks made from what an engineer knows."""

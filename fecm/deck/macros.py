@@ -1,0 +1,360 @@
+"""The macro program: words, loops, the order in which macros are carried out.
+
+A pass is the number of times that the innermost loop has been entered at its head, from 1; outside
+any loop it is 1.  LOOP 0 runs once.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from fecm.deck.card import parse_real
+from fecm.deck.findings import Findings
+from fecm.deck.records import Macro
+
+NESTING = 64
+
+# A program of more macros than this would run for days.
+MOST_MACROS = 10**9
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A word of the macro language.
+
+    Attributes
+    ----------
+    name : str
+        Up to four letters.
+    meaning : str
+        What it does, in one sentence.
+    value : str
+        What its number is: ``"count"`` (whole, not negative), ``"every"`` (the same, 0 or blank
+        counting as 1), ``"time step"`` or ``"tolerance"`` (positive; 0 is a time step by itself),
+        or empty where it takes none.
+    needs : tuple of str
+        Words that must have been carried out before; ``"LMAS|CMAS"`` is one or the other.
+    inside : bool
+        Whether it belongs inside a loop.
+    """
+
+    name: str
+    meaning: str
+    value: str = ""
+    needs: tuple[str, ...] = ()
+    inside: bool = False
+
+
+WORDS = {
+    word.name: word
+    for word in (
+        Word("LOOP", "Carries out N times what stands before its NEXT.", "count"),
+        Word("NEXT", "Ends a loop."),
+        Word("DT", "Sets the time step; 0 takes 0.9 of the critical one.", "time step"),
+        Word("TIME", "Advances the clock by DT."),
+        Word(
+            "PROP", "Reads a proportional load from a card behind END, or takes it anew.", "count"
+        ),
+        Word("LMAS", "Forms the lumped mass."),
+        Word("CMAS", "Forms the consistent mass."),
+        Word("TANG", "Forms and factorises the stiffness."),
+        Word("FORM", "Forms what is out of balance: the loads less the internal forces."),
+        Word("SOLV", "Solves for the displacement that balances it.", "", ("TANG", "FORM")),
+        Word("TOL", "Sets the tolerance of CONV.", "tolerance"),
+        Word("CONV", "Leaves the loop once the solution stands still.", "", ("SOLV",), True),
+        Word("REAC", "Stores and prints the reactions.", "", ("SOLV|EXCD|RODP",)),
+        Word("EIGE", "Finds the N lowest natural modes.", "every", ("LMAS|CMAS",)),
+        Word("EXCD", "Takes one step of central differences.", "", ("LMAS", "DT")),
+        Word(
+            "RODP",
+            "Takes one impact step; stores contact and strains at every N-th.",
+            "every",
+            ("LMAS", "DT"),
+        ),
+        Word("DISP", "Stores displacements at every N-th pass of the loop.", "every"),
+        Word(
+            "STRE", "Stores and prints strains and stress resultants at every N-th pass.", "every"
+        ),
+        Word("CHEC", "Reports mesh and storage."),
+    )
+}
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A loop: its LOOP card, how often it runs, and what it carries out."""
+
+    macro: Macro
+    count: int
+    body: tuple[Macro | Loop, ...]
+
+
+Body = tuple[Macro | Loop, ...]
+
+
+def every(macro: Macro) -> int:
+    """N of a macro that acts at every N-th step or pass; 1 where it is blank."""
+    return max(1, int(macro.value))
+
+
+def number(macro: Macro) -> float:
+    """What a macro's number means: its N where it has one, otherwise what stands on the card."""
+    return every(macro) if WORDS[macro.word].value == "every" else macro.value
+
+
+def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
+    """Nest a macro program's loops and check its words.
+
+    Parameters
+    ----------
+    macros : tuple of Macro
+        The cards.
+    findings : Findings
+        Receives what is wrong with them.
+    """
+    open_loops: list[tuple[Macro, list[Macro | Loop]]] = []
+    body: list[Macro | Loop] = []
+    done: set[str] = set()
+    for macro in macros:
+        if findings.closed:
+            return ()
+        known = WORDS.get(macro.word)
+        word = known or _unknown(macro, findings)
+        if word is None:
+            continue
+        if known is not None:
+            _check_unused(known, macro, findings)
+        _check_value(word, macro, findings)
+        _check_order(word, macro, done, findings)
+        if word.inside and not open_loops:
+            findings.add(
+                "E513", f"{word.name} stands outside any loop.", macro.place("macro"),
+                "put it between LOOP and NEXT",
+            )  # fmt: skip
+        if word.name == "LOOP":
+            open_loops.append((macro, body))
+            body = []
+            if len(open_loops) > NESTING:
+                findings.add(
+                    "E506", f"Loops are nested deeper than {NESTING}.", macro.place("macro")
+                )
+                return ()
+        elif word.name == "NEXT":
+            if not open_loops:
+                findings.add("E503", "NEXT stands without a LOOP.", macro.place("macro"))
+                continue
+            head, outer = open_loops.pop()
+            count = max(1, int(head.value)) if head.value >= 0 else 1
+            outer.append(Loop(head, count, tuple(body)))
+            body = outer
+        else:
+            body.append(macro)
+    for head, _ in open_loops:
+        findings.add(
+            "E502", "The LOOP is not closed by a NEXT.", head.place("macro"),
+            "put a NEXT card behind the loop's last macro",
+        )  # fmt: skip
+    if open_loops:
+        return ()
+    program = tuple(body)
+    _warn_of_standing_clock(program, findings)
+    return program
+
+
+def _unknown(macro: Macro, findings: Findings) -> Word | None:
+    """Report an unknown word; the word that it most likely means, so that loops stay whole."""
+    near = difflib.get_close_matches(macro.word, WORDS, 1, 0.5)
+    findings.add(
+        "E501",
+        f"`{macro.word}` is no macro.",
+        macro.place("macro"),
+        f"did you mean {near[0]}?" if near else f"known are {', '.join(WORDS)}, END",
+    )
+    return WORDS[near[0]] if near else None
+
+
+def _check_order(word: Word, macro: Macro, done: set[str], findings: Findings) -> None:
+    """Report the words that must have been carried out before this one, each once."""
+    for require in word.needs:
+        choices = require.split("|")
+        if not done.intersection(choices):
+            names = " or ".join(choices)
+            findings.add(
+                "E504",
+                f"{word.name} needs {names}, which does not stand before it.",
+                macro.place("macro"),
+                f"put {names} before it",
+            )
+            done.add(choices[0])
+    done.add(word.name)
+
+
+def _check_unused(word: Word, macro: Macro, findings: Findings) -> None:
+    """Report the first field that a word does not use and that is not blank."""
+    if macro.option:
+        is_number = word.value and not macro.value and parse_real(macro.option) is not None
+        example = f"{word.name},{macro.option}"
+        findings.add(
+            "E514",
+            f"{word.name} takes no second word, but `{macro.option}` stands there.",
+            macro.place("second word"),
+            f"the number stands in columns 11-15 or behind a comma: {example}"
+            if is_number
+            else "take it out",
+        )
+    elif macro.value and not word.value:
+        findings.add(
+            "E514",
+            f"{word.name} takes no number, but {macro.value:g} stands there.",
+            macro.place("value"),
+            "take it out",
+        )
+    elif macro.second:
+        findings.add(
+            "E514",
+            f"{word.name} takes no second number, but {macro.second:g} stands there.",
+            macro.place("second value"),
+            f"a number of more than five digits stands behind a comma: {word.name},123456",
+        )
+
+
+def _check_value(word: Word, macro: Macro, findings: Findings) -> None:
+    value = macro.value
+    if word.value in ("count", "every") and (value < 0 or not value.is_integer()):
+        findings.add(
+            "E505",
+            f"{word.name} takes a whole number that is not negative, not {value:g}.",
+            macro.place("value"),
+        )
+    elif word.value in ("count", "every") and value > MOST_MACROS:
+        findings.add(
+            "E505",
+            f"{word.name} takes a whole number up to {MOST_MACROS:g}, not {value:g}.",
+            macro.place("value"),
+        )
+    elif (word.value == "time step" and value < 0) or (word.value == "tolerance" and value <= 0):
+        findings.add(
+            "E505", f"{word.name} takes a positive {word.value}, not {value:g}.",
+            macro.place("value"),
+        )  # fmt: skip
+
+
+def _warn_of_standing_clock(body: Body, findings: Findings) -> None:
+    """Warn of the loops that step without TIME."""
+    for item in body:
+        if isinstance(item, Loop):
+            words = {m.word for m in flat(item.body)}
+            if words & STEPS and "TIME" not in words:
+                findings.add(
+                    "W507",
+                    "The loop steps without TIME, so that the clock of time-dependent loads "
+                    "stands still.",
+                    item.macro.place("macro"),
+                    "put TIME before the step",
+                )
+            else:
+                _warn_of_standing_clock(item.body, findings)
+
+
+def flat(body: Body) -> Iterator[Macro]:
+    """Every macro once, in the order of the cards, without LOOP and NEXT."""
+    for item in body:
+        if isinstance(item, Loop):
+            yield from flat(item.body)
+        else:
+            yield item
+
+
+def hits(body: Body) -> bool:
+    """Whether a program takes impact steps."""
+    return any(macro.word == "RODP" for macro in flat(body))
+
+
+def moves_only(body: Body) -> bool:
+    """Whether a program moves the plate from rest, and finds no static solution."""
+    return all(macro.word not in ("TANG", "FORM", "SOLV") for macro in flat(body))
+
+
+# Words that take a time step.
+STEPS = {"RODP", "EXCD"}
+
+
+@dataclass(frozen=True, slots=True)
+class WorkEstimate:
+    """How much a program does and stores; the most of it where CONV may leave loops early.
+
+    Attributes
+    ----------
+    macros : int
+        Macros carried out; each pass of a loop carries out its NEXT.
+    steps : int
+        Time steps, impact steps and central differences.
+    contact_rows : int
+        Steps at which contact and strains are stored.
+    passes : dict of str to int
+        Times that DISP, STRE, REAC and EIGE store something, by word.
+    """
+
+    macros: int
+    steps: int
+    contact_rows: int
+    passes: dict[str, int]
+
+
+# Words that store a row at every N-th pass, and at every one.
+_EVERY = ("DISP", "STRE")
+
+_ALWAYS = ("REAC", "EIGE")
+
+
+def estimate_work(body: Body) -> WorkEstimate:
+    """Count what a program does without carrying out its loops.
+
+    Exact, but for `contact_rows` where RODP cards differ in their number, or EXCD stands among
+    them: then an upper bound.
+    """
+    macros, passes, steps = _entry(body, 1)
+    total = sum(steps.values())
+    impact = {n: count for n, count in steps.items() if n}
+    if len(steps) == 1 and impact:
+        contact = total // next(iter(steps))
+    else:
+        contact = sum(min(count, total // n) for n, count in impact.items())
+    return WorkEstimate(macros, total, contact, passes)
+
+
+def _entry(body: Body, count: int) -> tuple[int, dict[str, int], dict[int, int]]:
+    """Macros, stored rows by word, and steps by RODP's number, of a body run `count` times on end.
+
+    Steps of EXCD stand under 0.
+    """
+    macros = 0
+    passes = dict.fromkeys((*_EVERY, *_ALWAYS), 0)
+    steps: dict[int, int] = {}
+
+    def step(n: int, more: int) -> None:
+        steps[n] = steps.get(n, 0) + more
+
+    for item in body:
+        if isinstance(item, Loop):
+            inner, rows, taken = _entry(item.body, item.count)
+            macros += count * (inner + item.count)
+            for word, more in rows.items():
+                passes[word] += count * more
+            for n, more in taken.items():
+                step(n, count * more)
+            continue
+        macros += count
+        if item.word in _EVERY:
+            passes[item.word] += count // every(item)
+        elif item.word == "REAC":
+            passes["REAC"] += count
+        elif item.word == "EIGE":
+            passes["EIGE"] += count * every(item)
+        elif item.word == "RODP":
+            step(every(item), count)
+        elif item.word == "EXCD":
+            step(0, count)
+    return macros, passes, steps

@@ -1,0 +1,1 @@
+"""Numerics of plate, projectile and contact."""

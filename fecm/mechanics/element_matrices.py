@@ -1,0 +1,216 @@
+"""Plate elements: geometry, stiffness, lumped mass and strains of many elements at once.
+
+Conventions: the unknowns of a node are u, v, w, theta_x, theta_y; an element's unknowns run node by
+node.  Rotations have the listing's sign, opposite to the report's phi: transverse shear is
+gamma_xz = w,x - theta_x and gamma_yz = w,y - theta_y, curvature kappa_x = -theta_x,x and
+kappa_y = -theta_y,y.  Arrays over elements have the element first, then the quadrature point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.mechanics.element_groups import ElementBlock
+from fecm.mechanics.elements.quadrature import Quadrature
+from fecm.mechanics.laminate import Laminate
+
+NDOF = 5
+
+
+@dataclass(frozen=True)
+class Interpolation:
+    """Shape functions of a family at the points of a rule.
+
+    Attributes
+    ----------
+    N : ndarray (npt, nn)
+        Values.
+    dN : ndarray (ne, npt, 2, nn)
+        Derivatives with respect to x and y, 1/length.
+    area : ndarray (ne, npt)
+        Area that belongs to each point: Jacobian determinant times weight.
+    """
+
+    N: Floats
+    dN: Floats
+    area: Floats
+
+
+def local_shape_functions(family: ElementBlock, rule: Quadrature) -> tuple[Floats, Floats]:
+    """Shape functions of a family's nodes: values (npt, nn), d/dxi and d/deta (npt, 2, nn)."""
+    values, local = family.shape.shape_functions(rule.xi, rule.eta, family.present)
+    return values[:, family.present], local[:, :, family.present]
+
+
+def inverse_jacobian(
+    family: ElementBlock, local: Floats, *, transposed_jacobian: bool = False
+) -> tuple[Floats, Floats]:
+    """Inverse of the Jacobian, and its determinant.
+
+    Parameters
+    ----------
+    family : ElementBlock
+        The elements.
+    local : ndarray (npt, 2, nn)
+        Derivatives of the shape functions with respect to xi and eta.
+    transposed : bool
+        Give the inverse transposed (the slip ``jacobian``).
+
+    Returns
+    -------
+    inverse : ndarray (ne, npt, 2, 2)
+        dxi_a/dx_i in row i and column a, 1/length.
+    determinant : ndarray (ne, npt)
+        Length squared.
+    """
+    jacobian = np.einsum("pan,eni->epai", local, family.coordinates)  # dx_i/dxi_a
+    inverse = np.linalg.inv(jacobian)
+    if transposed_jacobian:
+        inverse = inverse.swapaxes(-1, -2)
+    return inverse, np.linalg.det(jacobian)
+
+
+def jacobian_determinants(family: ElementBlock, rule: Quadrature) -> Floats:
+    """Determinant of the Jacobian at the points of a rule, (ne, npt), length squared."""
+    _, local = local_shape_functions(family, rule)
+    return np.asarray(np.linalg.det(np.einsum("pan,eni->epai", local, family.coordinates)))
+
+
+def interpolate(
+    family: ElementBlock, rule: Quadrature, *, transposed_jacobian: bool = False
+) -> Interpolation:
+    """Evaluate shape functions and their derivatives in x and y.
+
+    Parameters
+    ----------
+    family : ElementBlock
+        The elements.
+    rule : Quadrature
+        The points.
+    transposed : bool
+        Use the inverse Jacobian transposed (the slip ``jacobian``).
+    """
+    values, local = local_shape_functions(family, rule)
+    inverse, determinant = inverse_jacobian(family, local, transposed_jacobian=transposed_jacobian)
+    derivatives = np.einsum("epia,pan->epin", inverse, local)
+    return Interpolation(values, derivatives, determinant * rule.weights)
+
+
+def _membrane_and_bending(at: Interpolation) -> Floats:
+    """Matrix of midplane strains xx, yy, xy and curvatures xx, yy, xy: (ne, npt, 6, 5 nn)."""
+    ne, npt, _, nn = at.dN.shape
+    B = np.zeros((ne, npt, 6, nn, NDOF))
+    x, y = at.dN[:, :, 0], at.dN[:, :, 1]
+    B[:, :, 0, :, 0] = x
+    B[:, :, 1, :, 1] = y
+    B[:, :, 2, :, 0], B[:, :, 2, :, 1] = y, x
+    B[:, :, 3, :, 3] = -x
+    B[:, :, 4, :, 4] = -y
+    B[:, :, 5, :, 3], B[:, :, 5, :, 4] = -y, -x
+    return B.reshape(ne, npt, 6, nn * NDOF)
+
+
+def _transverse_shear(at: Interpolation) -> Floats:
+    """Matrix of transverse shear strains xz, yz: (ne, npt, 2, 5 nn)."""
+    ne, npt, _, nn = at.dN.shape
+    B = np.zeros((ne, npt, 2, nn, NDOF))
+    for row in (0, 1):
+        B[:, :, row, :, 2] = at.dN[:, :, row]
+        B[:, :, row, :, 3 + row] = -at.N
+    return B.reshape(ne, npt, 2, nn * NDOF)
+
+
+def _integrate(B: Floats, C: Floats, area: Floats) -> Floats:
+    """Sum of B' C B over the points, (ne, n, n); exactly symmetric."""
+    ne, npt, rows, n = B.shape
+    flat = B.reshape(ne, npt * rows, n)
+    weighted = (area[:, :, None, None] * (C @ B)).reshape(ne, npt * rows, n)
+    product = flat.swapaxes(1, 2) @ weighted
+    return np.asarray((product + product.swapaxes(1, 2)) / 2.0)
+
+
+def stiffness(
+    family: ElementBlock,
+    laminate: Laminate,
+    bending: Quadrature,
+    shear: Quadrature,
+    *,
+    transposed_jacobian: bool = False,
+) -> Floats:
+    """Stiffness matrices of a family's elements.
+
+    Parameters
+    ----------
+    family : ElementBlock
+        The elements.
+    laminate : Laminate
+        Stiffness per area.
+    bending, shear : Quadrature
+        Quadrature of the membrane and bending energy, and of the transverse shear energy.
+    transposed : bool
+        See :func:`interpolate`.
+
+    Returns
+    -------
+    ndarray (ne, 5 nn, 5 nn)
+    """
+    ABD = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
+    at = interpolate(family, bending, transposed_jacobian=transposed_jacobian)
+    K = _integrate(_membrane_and_bending(at), ABD, at.area)
+    at = interpolate(family, shear, transposed_jacobian=transposed_jacobian)
+    return K + _integrate(_transverse_shear(at), laminate.shear, at.area)
+
+
+def lumped_mass(family: ElementBlock, laminate: Laminate, rule: Quadrature) -> Floats:
+    """Lumped masses of a family's elements: the consistent matrix' diagonal, scaled to the whole.
+
+    The listing's MASS01.  The scaling keeps the element's mass; every entry is positive unless the
+    rule has all its points on a node's zero line, as order 1 has for mid-sides and corners.
+
+    Returns
+    -------
+    ndarray (ne, nn, 5)
+        Mass for u, v, w; mass times length squared for the rotations.
+    """
+    values, _ = local_shape_functions(family, rule)
+    area = jacobian_determinants(family, rule) * rule.weights
+    diagonal = np.einsum("ep,pn->en", area, values**2)
+    share = diagonal * (area.sum(axis=1) / diagonal.sum(axis=1))[:, None]
+    inertia = np.repeat([laminate.mass, laminate.rotary_inertia], (3, 2))
+    return np.asarray(share[:, :, None] * inertia)
+
+
+def consistent_mass(family: ElementBlock, laminate: Laminate, rule: Quadrature) -> Floats:
+    """Consistent mass matrices of a family's elements (the listing's MASS01).
+
+    Two nodes share the integral of N_i N_j, with the mass per area rho h for u, v and w, and with
+    the rotary inertia rho h^3 / 12 for the rotations; different unknowns share nothing.
+
+    Parameters
+    ----------
+    family : ElementBlock
+        The elements.
+    laminate : Laminate
+        Mass and rotary inertia per area.
+    rule : Quadrature
+        Quadrature; the 4-node element takes order 2, those with mid-sides order 3, the cubic one
+        order 4 to be exact on parallelograms.
+
+    Returns
+    -------
+    ndarray (ne, 5 nn, 5 nn)
+        Mass for u, v, w; mass times length squared for the rotations.  Exactly symmetric.
+    """
+    values, _ = local_shape_functions(family, rule)
+    area = jacobian_determinants(family, rule) * rule.weights
+    product = np.einsum("ep,pi,pj->eij", area, values, values, optimize=True)
+    shared = (product + product.swapaxes(1, 2)) / 2.0
+    inertia = np.repeat([laminate.mass, laminate.rotary_inertia], (3, 2))
+    ne, nn = family.nodes.shape
+    M = np.zeros((ne, nn, NDOF, nn, NDOF))
+    for unknown in range(NDOF):
+        M[:, :, unknown, :, unknown] = inertia[unknown] * shared
+    return M.reshape(ne, nn * NDOF, nn * NDOF)

@@ -1,0 +1,90 @@
+"""Points and weights on the square -1 <= xi, eta <= 1.
+
+Points are in the report's order: corners counter-clockwise from (-1, -1), mid-sides from eta = -1
+on, centre.  Order 4 takes the corners of the large square, of the tall and the wide rectangle, and
+of the small square.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fecm._typing import Floats
+
+HIGHEST_ORDER = 4
+
+# Signs of xi and eta at corners, mid-sides and centre.
+_XI = np.array([-1, 1, 1, -1, 0, 1, 0, -1, 0])
+_ETA = np.array([-1, -1, 1, 1, -1, 0, 1, 0, 0])
+
+
+@dataclass(frozen=True)
+class Quadrature:
+    """Points of a quadrature rule, or of the nodes' grid.
+
+    Attributes
+    ----------
+    xi, eta : ndarray (n,)
+        Local coordinates.
+    weights : ndarray (n,)
+        They add up to 4, the square's area.
+    """
+
+    xi: Floats
+    eta: Floats
+    weights: Floats
+
+
+def gauss(order: int) -> Quadrature:
+    """Gauss rule with `order` points in each direction (1 to 4).
+
+    Raises
+    ------
+    ValueError
+        If the order is outside 1 to 4.
+    """
+    return _rule(order, *np.polynomial.legendre.leggauss(_known(order)))
+
+
+def nodal(order: int) -> Quadrature:
+    """Grid of `order` equally spaced points in each direction, the outer ones on the edges.
+
+    Order 3 gives the nodes of the 9-node element.  Weights are those of the Gauss rule of the same
+    order and serve no integration.
+
+    Raises
+    ------
+    ValueError
+        If the order is outside 1 to 4.
+    """
+    points = np.linspace(-1.0, 1.0, order) if _known(order) > 1 else np.zeros(1)
+    return _rule(order, points, np.polynomial.legendre.leggauss(order)[1])
+
+
+def _known(order: int) -> int:
+    if not 1 <= order <= HIGHEST_ORDER:
+        raise ValueError(f"quadrature order {order} is outside 1 to {HIGHEST_ORDER}")
+    return order
+
+
+def _rule(order: int, points: Floats, weights: Floats) -> Quadrature:
+    """Take a rule's tensor product in the report's order, from ascending points in 1D."""
+    if order <= 3:
+        # Indices of the points at -1, 0 and +1: with two points there is no middle one.
+        index = {-1: 0, 0: order // 2, 1: order - 1}
+        first = 8 if order == 1 else 0
+        pairs = [
+            (index[a], index[b])
+            for a, b in zip(
+                _XI[first : first + order**2], _ETA[first : first + order**2], strict=True
+            )
+        ]
+    else:
+        pairs = []
+        for a, b in ((0, 0), (1, 0), (0, 1), (1, 1)):  # distance from the edge in xi and in eta
+            ends = {-1: (a, b), 1: (order - 1 - a, order - 1 - b)}
+            pairs += [(ends[s][0], ends[t][1]) for s, t in zip(_XI[:4], _ETA[:4], strict=True)]
+    i, j = np.array(pairs).T
+    return Quadrature(points[i], points[j], weights[i] * weights[j])

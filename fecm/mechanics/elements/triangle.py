@@ -1,0 +1,53 @@
+"""Triangle with 3 nodes: the 4-node quadrilateral whose corners 3 and 4 are one.
+
+Corners run counter-clockwise; the square's side eta = 1 is the point of node 3.  There the Jacobian
+is zero, so that strains exist inside the element only.  They are constant: in x and y the shape
+functions are the area coordinates.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fecm._typing import Bools, Floats
+from fecm.mechanics.elements.shape import ElementShape
+
+# Local coordinates of the nodes; node 3 takes the whole side eta = 1, and stands in its middle.
+XI = np.array([-1.0, 1.0, 0.0])
+ETA = np.array([-1.0, -1.0, 1.0])
+
+
+def shape_functions(xi: Floats, eta: Floats, present: Bools) -> tuple[Floats, Floats]:
+    """Shape functions and their derivatives (the listing's SHAPE with NEL = 3).
+
+    Parameters
+    ----------
+    xi, eta : ndarray (n,)
+        Points.
+    present : ndarray (3,) of bool
+        All true: a triangle has its corners.
+
+    Returns
+    -------
+    N : ndarray (n, 3)
+        Values.
+    dN : ndarray (n, 2, 3)
+        Derivatives with respect to xi and eta.
+    """
+    xi, eta = np.asarray(xi, dtype=float), np.asarray(eta, dtype=float)
+    zero, half = np.zeros_like(xi), np.full_like(xi, 0.5)
+    values = [(1.0 - xi) * (1.0 - eta) / 4.0, (1.0 + xi) * (1.0 - eta) / 4.0, (1.0 + eta) / 2.0]
+    along_xi = [-(1.0 - eta) / 4.0, (1.0 - eta) / 4.0, zero]
+    along_eta = [-(1.0 - xi) / 4.0, -(1.0 + xi) / 4.0, half]
+    N, dN = np.array(values), np.array([along_xi, along_eta])
+    return N.T.copy(), dN.transpose(2, 0, 1).copy()
+
+
+SHAPE = ElementShape(
+    name="triangle",
+    xi=XI,
+    eta=ETA,
+    corners=3,
+    numbering="corners run counter-clockwise",
+    shape_functions=shape_functions,
+)

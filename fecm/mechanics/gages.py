@@ -1,0 +1,160 @@
+"""Strain gages: the normal strain at a point of the plate, in a direction and at a depth.
+
+z runs from the mid-plane towards the face away from the projectile.  A normal line stays straight,
+u(z) = u - z theta, so that the strain at z is the midplane strain plus z times the curvature.
+Strains jump from element to element: a gage on a common edge or node reads the mean of all elements
+that meet there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._typing import Floats
+from fecm.mechanics import element_groups, element_matrices
+from fecm.mechanics.element_groups import ElementBlock
+from fecm.mechanics.element_matrices import NDOF
+from fecm.mechanics.elements.quadrature import Quadrature
+from fecm.mechanics.mesh import Mesh
+
+Indices = NDArray[np.intp]
+
+# How far outside of an element, in local coordinates, a point still belongs to it.
+MARGIN = 1.0e-6
+# Triangles have no strain in the very point of node 3.
+INSIDE = 1.0 - 1.0e-9
+PASSES = 50
+
+
+class OutsideError(ValueError):
+    """A point lies outside of the plate."""
+
+
+class GagePlace(Protocol):
+    """Number, position (length) and direction (degrees from the x-axis) of a gage."""
+
+    @property
+    def number(self) -> int: ...  # noqa: D102
+    @property
+    def x(self) -> float: ...  # noqa: D102
+    @property
+    def y(self) -> float: ...  # noqa: D102
+    @property
+    def z(self) -> float: ...  # noqa: D102
+    @property
+    def direction(self) -> float: ...  # noqa: D102
+
+
+@dataclass(frozen=True)
+class GageArray:
+    """Strains of gages as sums over unknowns.
+
+    Attributes
+    ----------
+    numbers : ndarray (gages,)
+    places : ndarray (gages, m)
+        Places of unknowns in a field laid out flat.
+    weights : ndarray (gages, m)
+        Strain per unknown.
+    """
+
+    numbers: NDArray[np.int32]
+    places: Indices
+    weights: Floats
+
+
+def gages(
+    mesh: Mesh, records: Sequence[GagePlace], *, transposed_jacobian: bool = False
+) -> GageArray:
+    """Find the gages' elements, and how their strains follow from the unknowns.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    records : sequence of GagePlace
+    transposed : bool
+        See :func:`fecm.mechanics.element_matrices.interpolate`.
+
+    Raises
+    ------
+    OutsideError
+        If a gage is not on the plate.
+    """
+    families = element_groups.element_blocks(mesh.elements, mesh.coordinates)
+    rows = [_functional(families, record, transposed_jacobian) for record in records]
+    most = max(len(places) for places, _ in rows)
+    places = np.zeros((len(rows), most), dtype=np.intp)
+    weights = np.zeros((len(rows), most))
+    for number, (unknowns, values) in enumerate(rows):
+        places[number, : len(unknowns)] = unknowns
+        weights[number, : len(values)] = values
+    return GageArray(np.array([record.number for record in records], np.int32), places, weights)
+
+
+def locate(
+    families: Sequence[ElementBlock], x: float, y: float
+) -> list[tuple[ElementBlock, float, float]]:
+    """Elements that a point belongs to, each as a family of one, with its local coordinates."""
+    found: list[tuple[ElementBlock, float, float]] = []
+    point = np.array([x, y])
+    for family in families:
+        low, high = family.coordinates.min(axis=1), family.coordinates.max(axis=1)
+        margin = 0.1 * (high - low).max(axis=1, keepdims=True)  # sides may bulge
+        near = ((low - margin <= point) & (point <= high + margin)).all(axis=1)
+        for member in np.flatnonzero(near):
+            one = family.take(np.array([member]))
+            local = _local(one, point)
+            if local is not None:
+                found.append((one, *local))
+    return found
+
+
+def _local(element: ElementBlock, point: Floats) -> tuple[float, float] | None:
+    """Local coordinates of a point, by Newton's method; None where it lies outside."""
+    xi = np.zeros(2)
+    for _ in range(PASSES):
+        rule = _at(xi)
+        values, local = element_matrices.local_shape_functions(element, rule)
+        miss = point - values[0] @ element.coordinates[0]
+        jacobian = np.einsum("an,ni->ia", local[0], element.coordinates[0])
+        step = np.linalg.solve(jacobian, miss)
+        xi = np.clip(xi + step, -2.0, [2.0, INSIDE if element.shape.corners == 3 else 2.0])
+        if np.abs(step).max() < 1e-13:
+            break
+    if np.abs(xi).max() > 1.0 + MARGIN:
+        return None
+    size = np.ptp(element.coordinates[0], axis=0).max()
+    values, _ = element_matrices.local_shape_functions(element, _at(xi))
+    miss = np.abs(point - values[0] @ element.coordinates[0]).max()
+    return (float(xi[0]), float(xi[1])) if miss <= MARGIN * size else None
+
+
+def _at(xi: Floats) -> Quadrature:
+    return Quadrature(xi[:1], xi[1:], np.ones(1))
+
+
+def _functional(
+    families: Sequence[ElementBlock], gage: GagePlace, transposed_jacobian: bool
+) -> tuple[Indices, Floats]:
+    """Unknowns that a gage's strain depends on, and how."""
+    found = locate(families, gage.x, gage.y)
+    if not found:
+        raise OutsideError(f"gage {gage.number} at ({gage.x:g}, {gage.y:g}) is not on the plate")
+    c, s = np.cos(np.deg2rad(gage.direction)), np.sin(np.deg2rad(gage.direction))
+    places: list[Indices] = []
+    weights: list[Floats] = []
+    for element, xi, eta in found:
+        at = element_matrices.interpolate(
+            element, _at(np.array([xi, eta])), transposed_jacobian=transposed_jacobian
+        )
+        along = c * at.dN[0, 0, 0] + s * at.dN[0, 0, 1]  # derivative in the gage's direction
+        nodes = element.nodes[0] * NDOF
+        for unknown, factor in ((0, c), (1, s), (3, -gage.z * c), (4, -gage.z * s)):
+            places.append(nodes + unknown)
+            weights.append(factor * along / len(found))
+    return np.concatenate(places), np.concatenate(weights)

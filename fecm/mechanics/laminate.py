@@ -1,0 +1,191 @@
+"""Laminate stiffness: classical lamination with transverse shear, report section 2.1.
+
+Conventions: layer 1 is the struck face at z = -h/2, the last layer lies at z = +h/2; fibre angles
+are counter-clockwise from the x-axis.  In-plane components are in the order xx, yy, xy (engineering
+shear), transverse shear in the order xz, yz.  No shear correction factor is applied.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from fecm._typing import Floats
+
+# Entries of A, B and D that the slip ``small-stiffness`` sets to 0, and the rounding, as a part of
+# A h^n, that it leaves alone.
+LISTING_LEAST = 1.0e-6
+
+ROUNDING = 1.0e-12
+
+
+class PlyConstants(Protocol):
+    """Density (mass/volume), Poisson's ratio and moduli (force/area) of a ply."""
+
+    @property
+    def density(self) -> float: ...  # noqa: D102
+    @property
+    def nu12(self) -> float: ...  # noqa: D102
+    @property
+    def e1(self) -> float: ...  # noqa: D102
+    @property
+    def e2(self) -> float: ...  # noqa: D102
+    @property
+    def g12(self) -> float: ...  # noqa: D102
+    @property
+    def g13(self) -> float: ...  # noqa: D102
+    @property
+    def g23(self) -> float: ...  # noqa: D102
+
+
+@dataclass(frozen=True)
+class Laminate:
+    """Stiffness and inertia of a laminate, per area.
+
+    Attributes
+    ----------
+    A, B, D : ndarray (3, 3)
+        Extensional, coupling and bending stiffness (equation 2-18): force/length, force,
+        force*length.
+    shear : ndarray (2, 2)
+        Transverse shear stiffness (equation 2-19), force/length, order xz, yz: A*55, A*45; A*45,
+        A*44.
+    mass : float
+        P of equation 2-24: density times thickness.
+    rotary_inertia : float
+        I of equation 2-24: density times thickness cubed over 12.
+    thickness : float
+        Total thickness.
+    """
+
+    A: Floats
+    B: Floats
+    D: Floats
+    shear: Floats
+    mass: float
+    rotary_inertia: float
+    thickness: float
+
+    @property
+    def is_coupled(self) -> bool:
+        """Whether stretching and bending are coupled (B is not zero beyond rounding)."""
+        scale = np.abs(self.A).max() * self.thickness
+        return bool(np.abs(self.B).max() > ROUNDING * scale)
+
+    def without_small_entries(self) -> Laminate:
+        """Set the entries of A, B and D below 1e-6 to 0, as the listing's CNPD does.
+
+        Rounding of entries that vanish by symmetry stays: it is no stiffness.
+        """
+        scale = ROUNDING * np.abs(self.A).max()
+
+        def cut(matrix: Floats, power: int) -> Floats:
+            size = np.abs(matrix)
+            small = (size < LISTING_LEAST) & (size > scale * self.thickness**power)
+            return np.where(small, 0.0, matrix)
+
+        return replace(self, A=cut(self.A, 0), B=cut(self.B, 1), D=cut(self.D, 2))
+
+
+def reduced_stiffness(ply: PlyConstants) -> Floats:
+    """Plane-stress stiffness of a ply in its own axes, equation 2-3.
+
+    Parameters
+    ----------
+    ply : PlyConstants
+        Elastic constants.
+
+    Returns
+    -------
+    ndarray (3, 3)
+        Q, force/area.
+    """
+    e1, e2, nu12 = ply.e1, ply.e2, ply.nu12
+    full = 1.0 - nu12**2 * e2 / e1
+    q12 = nu12 * e2 / full
+    return np.array([[e1 / full, q12, 0.0], [q12, e2 / full, 0.0], [0.0, 0.0, ply.g12]])
+
+
+def transformed_stiffness(q: Floats, angle: float) -> Floats:
+    """Turn a ply's plane-stress stiffness into the laminate's axes, equation 2-5.
+
+    Parameters
+    ----------
+    q : ndarray (3, 3)
+        Stiffness in the ply's axes.
+    angle : float
+        Fibre angle in degrees.
+
+    Returns
+    -------
+    ndarray (3, 3)
+    """
+    m, n = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
+    q11, q22, q12, q66 = q[0, 0], q[1, 1], q[0, 1], q[2, 2]
+    a, b = q11 - q12 - 2.0 * q66, q12 - q22 + 2.0 * q66
+    bar11 = q11 * m**4 + 2.0 * (q12 + 2.0 * q66) * m**2 * n**2 + q22 * n**4
+    bar22 = q11 * n**4 + 2.0 * (q12 + 2.0 * q66) * m**2 * n**2 + q22 * m**4
+    bar12 = (q11 + q22 - 4.0 * q66) * m**2 * n**2 + q12 * (m**4 + n**4)
+    bar16 = a * m**3 * n + b * m * n**3
+    bar26 = a * m * n**3 + b * m**3 * n
+    bar66 = (q11 + q22 - 2.0 * q12 - 2.0 * q66) * m**2 * n**2 + q66 * (m**4 + n**4)
+    return np.array([[bar11, bar12, bar16], [bar12, bar22, bar26], [bar16, bar26, bar66]])
+
+
+def transformed_shear(g13: float, g23: float, angle: float) -> Floats:
+    """Turn a ply's transverse shear stiffness into the laminate's axes, equation 2-5.
+
+    The sign of Q45 is that of the rotation itself; the report's (2-5) has it the wrong way round.
+
+    Returns
+    -------
+    ndarray (2, 2)
+        Force/area, order xz, yz.
+    """
+    m, n = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
+    coupling = (g13 - g23) * m * n
+    return np.array([[g13 * m**2 + g23 * n**2, coupling], [coupling, g13 * n**2 + g23 * m**2]])
+
+
+def laminate(
+    ply: PlyConstants,
+    angles: Sequence[float],
+    thicknesses: Sequence[float],
+    total: float | None = None,
+) -> Laminate:
+    """Stack plies, equations 2-18, 2-19 and 2-24.
+
+    Parameters
+    ----------
+    ply : PlyConstants
+        Constants of every layer.
+    angles : sequence of float
+        Fibre angles in degrees, from the struck face at z = -h/2 on.
+    thicknesses : sequence of float
+        Layer thicknesses.
+    total : float, optional
+        Thickness that the inertia is taken with; the sum of the layers without it.
+
+    Returns
+    -------
+    Laminate
+    """
+    faces = np.concatenate(([0.0], np.cumsum(thicknesses)))
+    faces -= faces[-1] / 2.0
+    lower, upper = faces[:-1, None, None], faces[1:, None, None]
+    q = reduced_stiffness(ply)
+    bars = np.array([transformed_stiffness(q, angle) for angle in angles])
+    shears = np.array([transformed_shear(ply.g13, ply.g23, angle) for angle in angles])
+    h = float(faces[-1] - faces[0]) if total is None else total
+    return Laminate(
+        A=(bars * (upper - lower)).sum(axis=0),
+        B=(bars * (upper**2 - lower**2)).sum(axis=0) / 2.0,
+        D=(bars * (upper**3 - lower**3)).sum(axis=0) / 3.0,
+        shear=(shears * (upper - lower)).sum(axis=0),
+        mass=ply.density * h,
+        rotary_inertia=ply.density * h**3 / 12.0,
+        thickness=h,
+    )

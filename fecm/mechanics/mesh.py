@@ -1,0 +1,70 @@
+"""The mesh that a deck's cards stand for: generation by increment, and equation numbers.
+
+Nodes, elements and equations are numbered from 1 as on the cards; row n - 1 of an array belongs to
+node or element n.  An absent node of an element, and the equation of a restrained unknown, is 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._typing import Bools, Floats
+
+Ints = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Nodes, elements, restraints and nodal forces of a problem.
+
+    Attributes
+    ----------
+    coordinates : ndarray (numnp, 2)
+        Length; NaN where no card gives the node.
+    elements : ndarray (numel, nen)
+        Node numbers, 0 where absent.
+    codes : ndarray (numnp, 5)
+        Restraint codes; an unknown with a code other than 0 is restrained.
+    forces : ndarray (numnp, 5)
+        Nodal force, or displacement of a restrained unknown.
+    equations : ndarray (numnp, 5)
+        Equation numbers in the order of nodes and their unknowns, 0 where restrained.
+    """
+
+    coordinates: Floats
+    elements: Ints
+    codes: Ints
+    forces: Floats
+    equations: Ints
+
+    @property
+    def number_of_equations(self) -> int:
+        """Number of unknowns that are not restrained."""
+        return int(np.count_nonzero(self.equations))
+
+    @property
+    def given(self) -> Bools:
+        """Which nodes have coordinates."""
+        return ~np.isnan(self.coordinates[:, 0])
+
+    @property
+    def used(self) -> Bools:
+        """Which nodes belong to an element."""
+        used = np.zeros(len(self.coordinates) + 1, dtype=bool)
+        inside = (self.elements >= 0) & (self.elements <= len(self.coordinates))
+        used[np.where(inside, self.elements, 0)] = True
+        return used[1:]
+
+
+def equation_numbers(codes: Ints) -> Ints:
+    """Number the unknowns without a restraint code from 1, node by node; the others are 0."""
+    free = codes.ravel() == 0
+    return np.where(free, np.cumsum(free), 0).astype(np.int32).reshape(codes.shape)
+
+
+def holds_the_plane(codes: Ints) -> bool:
+    """Whether restraint codes, (numnp, 5), restrain u and v of every node."""
+    return bool((codes[:, :2] != 0).all())

@@ -1,0 +1,60 @@
+"""Natural frequencies and modes: K x = omega^2 M x."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg, sparse
+from scipy.sparse.linalg import eigsh
+
+from fecm._typing import Floats
+from fecm.mechanics.plate import PlateModel
+
+# Fewer equations than this are solved as a dense problem.
+DENSE = 60
+# Part of the largest eigenvalue that the spectrum is shifted by, so that a plate without supports
+# has a regular matrix; half the digits of a double.
+SHIFT = 1.0e-9
+
+
+@dataclass(frozen=True)
+class Modes:
+    """The lowest modes of a plate.
+
+    Attributes
+    ----------
+    angular_frequency : ndarray (n,)
+        Ascending; rigid motions are 0 (1/time).
+    shapes : ndarray (n, neq)
+        Of unit modal mass; the largest entry is positive.
+    """
+
+    angular_frequency: Floats
+    shapes: Floats
+
+
+def modes(plate: PlateModel, count: int, *, consistent: bool) -> Modes:
+    """Find the lowest modes.
+
+    Parameters
+    ----------
+    plate : PlateModel
+    count : int
+        How many; at most as many as there are equations.
+    consistent : bool
+        Take the consistent mass instead of the lumped one.
+    """
+    K = plate.stiffness
+    M = plate.consistent_mass if consistent else sparse.diags_array(plate.mass, format="csr")
+    count = min(count, plate.neq)
+    if plate.neq < DENSE or count >= plate.neq // 2:
+        values, vectors = linalg.eigh(K.toarray(), M.toarray(), subset_by_index=[0, count - 1])
+    else:
+        shift = -SHIFT * float((K.diagonal() / M.diagonal()).max())
+        start = np.random.default_rng(0).standard_normal(plate.neq)
+        values, vectors = eigsh(K, count, M, sigma=shift, which="LM", v0=start)
+        order = np.argsort(values)
+        values, vectors = values[order], vectors[:, order]
+    largest = vectors[np.abs(vectors).argmax(axis=0), np.arange(count)]
+    return Modes(np.sqrt(np.maximum(values, 0.0)), (vectors * np.sign(largest)).T)

@@ -1,0 +1,217 @@
+"""The projectile: a rigid mass, or an elastic rod of two-unknown elements, report section 4.3.2.
+
+Conventions: unknowns of a node are u and du/dx, node by node; x runs from the impacted end (node 1)
+into the rod.  Displacement, velocity and acceleration are positive away from the plate, so that an
+approach is negative, and the contact force pushes u at node 1 in the positive direction.  The rod
+knows nothing of the plate or the law.  Every state array has the unknowns first; more axes, one
+column a case, may follow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.mechanics.rod_integrators import CONSISTENT, RodState
+
+# The report's steel rod, in lb, in and s: a spherical cap of five steps, then the cylinder.
+REPORT_CAP = (0.22, 0.36, 0.43, 0.48, 0.50)
+
+REPORT_DIAMETER = 0.625
+
+REPORT_ELEMENTS = 20
+
+REPORT_LENGTH = 1.0
+
+REPORT_MODULUS = 30.0e6
+
+REPORT_DENSITY = 0.0006875
+
+LISTING_DENSITY = 0.0003225
+
+
+@dataclass(frozen=True)
+class Rod:
+    """A straight elastic rod of equal elements.
+
+    Attributes
+    ----------
+    length : float
+        Whole length.
+    diameters : tuple of float
+        Diameter of each element, from the impacted end on.
+    modulus : float
+        Young's modulus, force/area.
+    density : float
+        Mass per volume.
+    consistent : bool
+        Whether the mass matrix is the consistent one, equation 4-24, instead of the lumped one.
+    """
+
+    length: float
+    diameters: tuple[float, ...]
+    modulus: float
+    density: float
+    consistent: bool = False
+
+    @property
+    def elements(self) -> int:
+        """Number of elements."""
+        return len(self.diameters)
+
+    @property
+    def areas(self) -> Floats:
+        """Cross-section of each element, length squared."""
+        return np.pi * np.array(self.diameters) ** 2 / 4.0
+
+    @property
+    def total_mass(self) -> float:
+        """Mass of the whole rod."""
+        return float(self.density * self.areas.sum() * self.length / self.elements)
+
+    def stiffness(self) -> Floats:
+        """Stiffness matrix of the whole rod, equation 4-23: (n, n)."""
+        L = self.length / self.elements
+        shape = np.array(
+            [
+                [36.0, 3.0 * L, -36.0, 3.0 * L],
+                [3.0 * L, 4.0 * L**2, -3.0 * L, -(L**2)],
+                [-36.0, -3.0 * L, 36.0, -3.0 * L],
+                [3.0 * L, -(L**2), -3.0 * L, 4.0 * L**2],
+            ]
+        )
+        K = np.zeros((2 * self.elements + 2, 2 * self.elements + 2))
+        for element, area in enumerate(self.areas):
+            unknowns = slice(2 * element, 2 * element + 4)
+            K[unknowns, unknowns] += self.modulus * area / (30.0 * L) * shape
+        return K
+
+    def with_mass(self, mass: str) -> Rod:
+        """The same rod with another mass matrix, ``"lumped"`` or ``"consistent"``."""
+        return replace(self, consistent=mass == CONSISTENT)
+
+    def mass(self) -> Floats:
+        """The mass in use: lumped, (n,), or consistent, (n, n)."""
+        return self.consistent_mass() if self.consistent else self.lumped_mass()
+
+    def consistent_mass(self) -> Floats:
+        """Consistent mass matrix of the whole rod, equation 4-24: (n, n)."""
+        L = self.length / self.elements
+        shape = np.array(
+            [
+                [156.0, 22.0 * L, 54.0, -13.0 * L],
+                [22.0 * L, 4.0 * L**2, 13.0 * L, -3.0 * L**2],
+                [54.0, 13.0 * L, 156.0, -22.0 * L],
+                [-13.0 * L, -3.0 * L**2, -22.0 * L, 4.0 * L**2],
+            ]
+        )
+        M = np.zeros((2 * self.elements + 2, 2 * self.elements + 2))
+        for element, area in enumerate(self.areas):
+            unknowns = slice(2 * element, 2 * element + 4)
+            M[unknowns, unknowns] += self.density * area * L / 420.0 * shape
+        return M
+
+    def lumped_mass(self) -> Floats:
+        """Lumped mass of each unknown, (n,): rho A L/2 for u and rho A L^3/420 for du/dx."""
+        L = self.length / self.elements
+        m = np.zeros(2 * self.elements + 2)
+        for element, area in enumerate(self.areas):
+            share = self.density * area * L * np.array([0.5, L**2 / 420.0])
+            m[2 * element : 2 * element + 4] += np.tile(share, 2)
+        return m
+
+    def kinetic_energy(self, velocity: Floats) -> Floats:
+        """Kinetic energy of velocities (rows, n) (force*length)."""
+        return _energy(self.mass(), velocity)
+
+    def strain_energy(self, deformation: Floats) -> Floats:
+        """Strain energy of displacements (rows, n) relative to the tip (force*length)."""
+        return _energy(self.stiffness(), deformation)
+
+
+def _energy(matrix: Floats, x: Floats) -> Floats:
+    """Half of x' A x for each row of x (rows, n), where A is diagonal, (n,), or the rod's band."""
+    if matrix.ndim == 1:
+        return np.asarray(0.5 * np.einsum("ri,ri,i->r", x, x, matrix))
+    # Diagonal by diagonal, of which there are few, and in an order of its own.
+    energy = 0.5 * np.einsum("ri,ri,i->r", x, x, np.diagonal(matrix))
+    for off in range(1, 4):
+        energy += np.einsum("ri,ri,i->r", x[:, :-off], x[:, off:], np.diagonal(matrix, off))
+    return np.asarray(energy)
+
+
+@dataclass(frozen=True)
+class RigidMass:
+    """A projectile that does not deform: a rod of one unknown.
+
+    Attributes
+    ----------
+    total_mass : float
+        Mass.
+    """
+
+    total_mass: float
+
+    def with_mass(self, mass: str) -> RigidMass:
+        """The same mass, whatever the matrix."""
+        return self
+
+    def stiffness(self) -> Floats:
+        """Stiffness matrix, (1, 1): none."""
+        return np.zeros((1, 1))
+
+    def mass(self) -> Floats:
+        """Mass of the unknown, (1,)."""
+        return np.array([self.total_mass])
+
+    def kinetic_energy(self, velocity: Floats) -> Floats:
+        """Kinetic energy of velocities (rows, 1) (force*length)."""
+        return np.asarray(0.5 * self.total_mass * velocity[:, 0] ** 2)
+
+    def strain_energy(self, deformation: Floats) -> Floats:
+        """Strain energy of displacements (rows, 1) relative to the tip: none."""
+        return np.zeros(len(deformation))
+
+
+Projectile = Rod | RigidMass
+
+
+@dataclass(frozen=True)
+class Transducer:
+    """Where and how the transducer measures.
+
+    Attributes
+    ----------
+    node : int
+        Node of the rod, from 1; 0 for the contact force itself.
+    sign : float
+        -1 for a force that is positive in compression, +1 in tension.
+    """
+
+    node: int
+    sign: float = -1.0
+
+
+def report_rod(density: float = REPORT_DENSITY) -> Rod:
+    """Build the rod that stands in the report's program (lb, in, s)."""
+    rest = REPORT_ELEMENTS - len(REPORT_CAP)
+    diameters = REPORT_CAP + (REPORT_DIAMETER,) * rest
+    return Rod(REPORT_LENGTH, diameters, REPORT_MODULUS, density)
+
+
+def rigid_approach(rod: Projectile, velocity: float, *, derivatives_too: bool = False) -> RodState:
+    """State of a projectile that approaches the plate as a rigid body.
+
+    Parameters
+    ----------
+    rod : Rod or RigidMass
+    velocity : float
+        Approach velocity, positive towards the plate, length/time.
+    derivatives_too : bool
+        Start du/dx at the same velocity (the slip ``rod-start``).
+    """
+    motion = np.zeros((3, len(rod.mass())))
+    motion[1, :: 1 if derivatives_too else 2] = -velocity
+    return RodState(motion)

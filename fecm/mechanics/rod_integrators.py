@@ -1,0 +1,264 @@
+"""Choices of the rod's mass matrix and integration, named without importing anything else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from fecm._typing import Floats
+
+# The report's program lumps the mass; its text has the consistent one (equation 4-24).
+LUMPED, CONSISTENT = "lumped", "consistent"
+
+MASSES = (LUMPED, CONSISTENT)
+
+WILSON, AVERAGE = "wilson", "average-acceleration"
+
+INTEGRATORS = (WILSON, AVERAGE)
+
+
+@dataclass(frozen=True)
+class RodMethod:
+    """How a rod is made to move; the default is the report's program.
+
+    Attributes
+    ----------
+    mass : str
+        One of `MASSES`.
+    integrator : str
+        One of `INTEGRATORS`.
+
+    Raises
+    ------
+    ValueError
+        If one of them is unknown.
+    """
+
+    mass: str = LUMPED
+    integrator: str = WILSON
+
+    def __post_init__(self) -> None:
+        for what, value, known in (
+            ("mass", self.mass, MASSES),
+            ("integrator", self.integrator, INTEGRATORS),
+        ):
+            if value not in known:
+                raise ValueError(f"unknown rod {what} {value!r}; known are {', '.join(known)}")
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """What a result tells of it: nothing of what is the default."""
+        default = RodMethod()
+        told = {"rod_mass": self.mass, "rod_integrator": self.integrator}
+        usual = {"rod_mass": default.mass, "rod_integrator": default.integrator}
+        return {name: value for name, value in told.items() if value != usual[name]}
+
+
+WILSON_THETA = 1.4
+
+
+@dataclass(slots=True)
+class RodState:
+    """State of a rod.
+
+    Displacements are kept relative to the tip: a projectile flies far, and what is strain in them
+    would drown in the rounding of the flight.
+
+    Attributes
+    ----------
+    motion : ndarray (3, n, ...)
+        Displacement relative to the tip, velocity and acceleration of every unknown; in the place
+        of the tip's own displacement stands what the last step added to it.
+    tip : float or ndarray (...)
+        Displacement of the tip.
+    """
+
+    motion: Floats
+    tip: Any = 0.0
+
+    @classmethod
+    def of(cls, displacement: Floats, velocity: Floats, acceleration: Floats) -> RodState:
+        """Make a state of the displacement, velocity and acceleration of every unknown."""
+        motion = np.array([displacement, velocity, acceleration])
+        motion[0, ::2] -= displacement[0]
+        return cls(motion, displacement[0])
+
+    @property
+    def deformation(self) -> Floats:
+        """Displacement of every unknown relative to the tip, (n, ...)."""
+        deformation = self.motion[0].copy()
+        deformation[0] = 0.0
+        return np.asarray(deformation)
+
+    @property
+    def displacement(self) -> Floats:
+        """Displacement of every unknown, (n, ...)."""
+        displacement = self.deformation
+        displacement[::2] += self.tip
+        return displacement
+
+    @property
+    def velocity(self) -> Floats:
+        """Velocity of every unknown, (n, ...)."""
+        return np.asarray(self.motion[1])
+
+    @property
+    def acceleration(self) -> Floats:
+        """Acceleration of every unknown, (n, ...)."""
+        return np.asarray(self.motion[2])
+
+
+class TipStep(Protocol):
+    """What the contact iteration needs of a projectile's step; see :class:`RodIntegrator`."""
+
+    @property
+    def theta(self) -> float:
+        """Where in the step equilibrium is met."""
+        ...
+
+    @property
+    def gain(self) -> Any:
+        """The tip's acceleration per force."""
+        ...
+
+    @property
+    def weight(self) -> Any:
+        """The tip's displacement per new acceleration."""
+        ...
+
+    def begin(self, state: Any) -> tuple[Any, Any, Any, Any]:
+        """Free motion, and of the tip: acceleration in it, drift, acceleration so far."""
+        ...
+
+    def end(self, state: Any, motion: Any, force: Any) -> Any:
+        """State after the step, with the displacement `tip`."""
+        ...
+
+
+class RodIntegrator:
+    r"""One step of an implicit method as a linear map, for a rod and a time step.
+
+    Equilibrium is met at :math:`t + \theta \Delta t`, the acceleration running linearly from
+    :math:`a` to :math:`a'` over the step; displacements are those of Newmark's method,
+    :math:`u' = u + \Delta t v + \Delta t^2 ((1/2 - \beta) a + \beta a')`, velocities
+    :math:`v' = v + \Delta t (a + a') / 2`.  With :math:`y` the motion of :class:`RodState` and
+    :math:`f` the force on the tip at :math:`t + \theta \Delta t`, the new motion is
+    :math:`y' = T y + h f`.
+
+    Parameters
+    ----------
+    K : ndarray (n, n)
+        Stiffness.
+    m : ndarray (n,) or (n, n)
+        Lumped mass, or mass matrix.
+    dt : float
+        Time step.
+    constants_dt : float, optional
+        Time step that the method's constants are made for, if not `dt` (the slip ``rod-dt``).
+
+    Attributes
+    ----------
+    theta : float
+        Where in the step equilibrium is met.
+    inverse_beta : float
+        1/beta, above 2.
+    T : ndarray (3 n, 3 n)
+    h : ndarray (3 n,)
+    gain : float
+        The tip's acceleration per force, of `h`.
+    weights : (float, float)
+        The tip's displacement per acceleration at the step's begin and at its end.
+    weight : float
+        The latter.
+    n : int
+        Number of the rod's unknowns.
+    """
+
+    theta: ClassVar[float]
+    inverse_beta: ClassVar[float]
+
+    def __init__(self, K: Floats, m: Floats, dt: float, constants_dt: float | None = None) -> None:
+        theta, tau, r = self.theta, dt if constants_dt is None else constants_dt, self.inverse_beta
+        self.dt = dt
+        self.n = n = len(m)
+        # Divisors of dt^2: 1/begin = 1/2 - beta, 1/end = beta.
+        begin, end = 2.0 * r / (r - 2.0), r
+        self.weights = (dt**2 / begin, dt**2 / end)
+        self.weight = self.weights[1]
+        a0 = r / (theta * tau) ** 2
+        a2 = r / (theta * tau)
+        a4 = a0 / theta
+        one, none = np.eye(n), np.zeros((n, n))
+        lumped = m.ndim == 1
+        effective = np.linalg.inv(K + a0 * (np.diag(m) if lumped else m))
+
+        def on_mass(factor: float) -> Floats:
+            weighed = factor * effective
+            return np.asarray(weighed * m if lumped else weighed @ m)
+
+        # Written for the increment from u, so that the rigid motion does not cancel against it.
+        acceleration = np.hstack(
+            [
+                -a4 * effective @ K,
+                on_mass(a4 * a2) - a2 / theta * one,
+                on_mass((r / 2.0 - 1.0) * a4) + (1.0 - r / 2.0 / theta) * one,
+            ]
+        )
+        # Rigid displacements cause no force, and displacements are relative to the tip.
+        acceleration[:, 0] = 0.0
+        kept, relative = one.copy(), one.copy()
+        kept[0, 0] = 0.0
+        relative[2::2, 0] = -1.0
+        velocity = np.hstack([none, one, tau / 2.0 * one]) + tau / 2.0 * acceleration
+        moved = np.hstack([none, dt * one, tau**2 / begin * one]) + tau**2 / end * acceleration
+        displacement = np.hstack([kept, none, none]) + relative @ moved
+        self.T = np.vstack([displacement, velocity, acceleration])
+        gain = a4 * effective[:, 0]
+        self.h = np.concatenate([tau**2 / end * relative @ gain, tau / 2.0 * gain, gain])
+        self.gain = float(gain[0])
+
+    def begin(self, state: RodState) -> tuple[Floats, Any, Any, Any]:
+        """Begin a step.
+
+        Returns
+        -------
+        motion : ndarray (3 n, ...)
+            New motion if no force acted on the tip.
+        base, drift, acceleration : float or ndarray (...)
+            The tip's acceleration in it; its displacement but for what the new acceleration adds,
+            `weight` times it; its acceleration so far.
+        """
+        motion = np.dot(self.T, state.motion.reshape(3 * self.n, *state.motion.shape[2:]))
+        _, v, a = state.motion[:, 0].tolist() if motion.ndim == 1 else state.motion[:, 0]
+        base = motion.item(2 * self.n) if motion.ndim == 1 else motion[2 * self.n]
+        return motion, base, state.tip + self.dt * v + self.weights[0] * a, a
+
+    def end(self, state: RodState, motion: Floats, force: Any) -> RodState:
+        """End a step that began with `motion`, under a force on the tip at t + theta dt."""
+        h = self.h if motion.ndim == 1 else self.h[:, None]
+        motion += h * force
+        moved = motion.item(0) if motion.ndim == 1 else motion[0]
+        return RodState(motion.reshape(3, self.n, *motion.shape[1:]), state.tip + moved)
+
+    def advance(self, state: RodState, force: Any = 0.0) -> RodState:
+        """State after a whole step under a force on the tip at t + theta dt."""
+        return self.end(state, self.begin(state)[0], force)
+
+
+class WilsonStep(RodIntegrator):
+    """Wilson's theta method: the report's program."""
+
+    theta = WILSON_THETA
+    inverse_beta = 6.0
+
+
+class AverageAccelerationStep(RodIntegrator):
+    """Newmark's average acceleration, which keeps the energy of free motion."""
+
+    theta = 1.0
+    inverse_beta = 4.0
+
+
+STEPS: dict[str, type[RodIntegrator]] = {WILSON: WilsonStep, AVERAGE: AverageAccelerationStep}

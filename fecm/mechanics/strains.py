@@ -1,0 +1,145 @@
+"""Strains and stress resultants at the points of every element (the listing's STRE)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._typing import Floats
+from fecm.mechanics.element_groups import ElementBlock, Ints, element_blocks
+from fecm.mechanics.element_matrices import NDOF, inverse_jacobian, local_shape_functions
+from fecm.mechanics.elements.quadrature import Quadrature
+from fecm.mechanics.laminate import Laminate
+
+GENERALISED_STRAINS = (
+    "eps_xx", "eps_yy", "gamma_xy", "kappa_x", "kappa_y", "kappa_xy", "gamma_xz", "gamma_yz",
+)  # fmt: skip
+
+RESULTANTS = ("N_x", "N_y", "N_xy", "M_x", "M_y", "M_xy", "Q_x", "Q_y")
+
+
+def strains_and_resultants(
+    strains: StrainField, laminate: Laminate, field: Floats
+) -> dict[str, Floats]:
+    """Midplane strains, curvatures, transverse shear strains, and what they cause (equation 2-20).
+
+    Parameters
+    ----------
+    strains : StrainField
+        The points.
+    laminate : Laminate
+    field : ndarray (numnp, 5)
+        Every unknown of every node.
+
+    Returns
+    -------
+    dict of ndarray (numel, npt)
+        By the names of :data:`GENERALISED_STRAINS` and :data:`RESULTANTS`.
+    """
+    bending = strains.evaluate(field)
+    # The curvature of rotations (-u, -v) is the midplane strain of u and v.
+    in_plane = np.zeros_like(field)
+    in_plane[:, 3:] = -field[:, :2]
+    membrane = strains.evaluate(in_plane)[:3]
+    curvature, shear = bending[:3], bending[[4, 3]]
+    N = np.tensordot(laminate.A, membrane, 1) + np.tensordot(laminate.B, curvature, 1)
+    M = np.tensordot(laminate.B, membrane, 1) + np.tensordot(laminate.D, curvature, 1)
+    Q = np.tensordot(laminate.shear, shear, 1)
+    values = np.concatenate([membrane, curvature, shear, N, M, Q])
+    return dict(zip((*GENERALISED_STRAINS, *RESULTANTS), values, strict=True))
+
+
+STRAINS = ("kappa_x", "kappa_y", "kappa_xy", "gamma_yz", "gamma_xz")
+
+# Elements whose strains are found at once: so few that BLAS uses one thread.
+STRAIN_BLOCK = 256
+
+
+class StrainField:
+    """Curvatures and transverse shear strains at the same points of every element.
+
+    Parameters
+    ----------
+    elements : ndarray (numel, nen)
+        Node numbers from 1, 0 where absent.
+    coordinates : ndarray (numnp, 2)
+        Length.
+    rule : Quadrature
+        The points.
+    transposed : bool
+        See :func:`interpolate`.
+    """
+
+    def __init__(
+        self,
+        elements: Ints,
+        coordinates: Floats,
+        rule: Quadrature,
+        *,
+        transposed_jacobian: bool = False,
+    ) -> None:
+        self.shape = (len(elements), len(rule.xi))
+        self._families: list[tuple[ElementBlock, Floats]] = []
+        self._blocks: list[tuple[NDArray[np.intp], NDArray[np.intp], Floats, Floats]] = []
+        for family in element_blocks(elements, coordinates):
+            values, local = local_shape_functions(family, rule)
+            self._families.append((family, values))
+            # Rows: d/dxi, d/deta and value at every point, so that one product gives them all.
+            table = np.concatenate([local[:, 0], local[:, 1], values])
+            inverse = inverse_jacobian(family, local, transposed_jacobian=transposed_jacobian)[0]
+            for start in range(0, len(family.rows), STRAIN_BLOCK):
+                cut = slice(start, start + STRAIN_BLOCK)
+                places = family.nodes[cut].T[:, None] * NDOF + np.array([2, 3, 4])[:, None]
+                self._blocks.append(
+                    (
+                        family.rows[cut],
+                        places,
+                        table,
+                        inverse[cut].transpose(2, 3, 1, 0)[:, :, :, None].copy(),
+                    )
+                )
+
+    def places(self, coordinates: Floats) -> tuple[Floats, Floats]:
+        """Where the points are: x and y, (numel, npt)."""
+        x, y = np.empty((2, *self.shape))
+        for family, values in self._families:
+            place = np.einsum("eni,pn->iep", coordinates[family.nodes], values)
+            x[family.rows], y[family.rows] = place
+        return x, y
+
+    def evaluate(self, displacement: Floats) -> Floats:
+        """Strains of a displacement field, or of several.
+
+        Parameters
+        ----------
+        displacement : ndarray (numnp, 5) or (rows, numnp, 5)
+            All unknowns of all nodes.
+
+        Returns
+        -------
+        ndarray (5, numel, npt) or (5, rows, numel, npt)
+            kappa_x, kappa_y, kappa_xy (1/length), gamma_yz, gamma_xz.
+        """
+        leading = displacement.shape[:-2]
+        fields = displacement.reshape(math.prod(leading), -1)
+        strains = np.empty((len(STRAINS), len(fields), *self.shape))
+        npt = self.shape[1]
+        for rows, places, table, inverse in self._blocks:
+            q = fields.take(places, axis=1).reshape(len(fields), len(places), -1)
+            at = (table @ q).reshape(len(fields), 3, npt, 3, len(rows))
+            xi, eta, values = at.swapaxes(0, 1)  # each: field, point, unknown, element
+            dx = inverse[0, 0] * xi + inverse[0, 1] * eta
+            dy = inverse[1, 0] * xi + inverse[1, 1] * eta
+            # 0.0 - a, so that a plate at rest has no negative zeros.
+            parts = (
+                0.0 - dx[:, :, 1],
+                0.0 - dy[:, :, 2],
+                0.0 - dy[:, :, 1] - dx[:, :, 2],
+                dy[:, :, 0] - values[:, :, 2],
+                dx[:, :, 0] - values[:, :, 1],
+            )
+            for component, part in enumerate(parts):
+                strains[component][:, rows] = part.swapaxes(1, 2)
+        return strains.reshape(len(STRAINS), *leading, *self.shape)

@@ -1,0 +1,105 @@
+"""Time steps below which the central differences are stable.
+
+They are stable below 2 over the largest angular frequency of the plate with its lumped mass.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.mechanics import element_matrices
+from fecm.mechanics.element_groups import congruence
+from fecm.mechanics.plate import BLOCK, PlateModel, UnsoundPlateError
+from fecm.mechanics.stiffness_product import SAFE, stiffness_operator
+
+# Residual of the highest mode over its eigenvalue, at the most; no eigenvalue is farther off.
+TOLERANCE = 1.0e-4
+# Equations below which all eigenvalues are as quick to find.
+FEW = 20
+
+BEYOND = "the stiffness is beyond the range of numbers"
+
+
+def safe_time_step(model: PlateModel) -> float:
+    """A lower bound of the critical time step, from the elements alone.
+
+    No mode of the plate is faster than the fastest of its unsupported elements (Irons and
+    Treharne's theorem).  A few per cent below the critical step, and far cheaper to have.
+
+    Raises
+    ------
+    UnsoundPlateError
+        If an element's numbers are beyond all range.
+    """
+    fastest = 0.0
+    for family in model.families:
+        same = congruence(family)
+        for block in family.take(same.representatives).blocks(BLOCK):
+            mass = element_matrices.lumped_mass(block, model.laminate, model.rules.bending)
+            scale = 1.0 / np.sqrt(mass.reshape(len(block.rows), -1))
+            with np.errstate(all="ignore"):
+                scaled = model.stiffness_of(block) * scale[:, :, None] * scale[:, None, :]
+            if not np.isfinite(scaled).all():
+                raise UnsoundPlateError(BEYOND)
+            fastest = max(fastest, float(np.linalg.eigvalsh(scaled)[:, -1].max()))
+    return 2.0 / float(np.sqrt(fastest))
+
+
+def taken_time_step(critical: float) -> float:
+    """Time step that DT 0 takes below a critical one: 0.9 of it, in three digits."""
+    return float(f"{SAFE * critical:.3g}")
+
+
+def rounded_time_step(critical: float) -> float:
+    """Time step that ``fecm new`` writes: 0.9 of the critical one, rounded down to two digits."""
+    limit = SAFE * critical
+    unit = 10.0 ** (math.floor(math.log10(limit)) - 1)
+    return float(f"{math.floor(limit / unit) * unit:.1e}")
+
+
+def critical_time_step(model: PlateModel, spring: tuple[int, float] | None = None) -> float:
+    """Largest stable step of the central differences: 2 over the largest angular frequency.
+
+    The time integrated by v += dt a, u += dt v is stable below it.  Found by Lanczos iteration,
+    without a matrix of the whole plate, to a relative accuracy of 5e-5 at the least.
+
+    Parameters
+    ----------
+    model : PlateModel
+    spring : (int, float), optional
+        Row of an equation, from 0, and the stiffness (force/length) of a spring to ground on it.
+
+    Raises
+    ------
+    UnsoundPlateError
+        If the iteration fails, as it does where numbers are beyond all range.
+    """
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+
+    product = stiffness_operator(model)
+    with np.errstate(all="ignore"):
+        scale = 1.0 / np.sqrt(model.mass)
+
+    def scaled(x: Floats) -> Floats:
+        with np.errstate(all="ignore"):
+            y = np.asarray(scale * product(scale * x.ravel()))
+            if spring is not None:
+                row, stiffness = spring
+                y[row] += stiffness * scale[row] ** 2 * x.ravel()[row]
+            return y
+
+    start = np.random.default_rng(0).standard_normal(model.neq)
+    if not np.isfinite(scaled(start)).all():
+        raise UnsoundPlateError(BEYOND)
+    if model.neq < FEW:
+        matrix = np.column_stack([scaled(column) for column in np.eye(model.neq)])
+        return 2.0 / float(np.sqrt(np.linalg.eigvalsh(matrix)[-1]))
+    operator = LinearOperator((model.neq, model.neq), matvec=scaled, dtype=np.float64)
+    try:
+        found = eigsh(operator, k=1, which="LA", v0=start, tol=TOLERANCE, return_eigenvectors=False)
+    except ArpackError as error:
+        raise UnsoundPlateError(f"no largest frequency was found ({error})") from None
+    return 2.0 / float(np.sqrt(found[0]))

@@ -1,0 +1,1 @@
+"""A deck checked, meshed and built."""

@@ -1,0 +1,293 @@
+"""From a deck to the parts of a run.
+
+Here, and only here, the slips that are on become parameters of the plate, the projectile, the law
+and the transducer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from fecm.deck.macros import Body, hits, moves_only
+from fecm.deck.model import Deck, Indentation, Material, ShearCorrection
+from fecm.deck.model import Gages as GageCards
+from fecm.deck.model import Impact as ImpactCard
+from fecm.deck.model import Projectile as ProjectileCard
+from fecm.deck.records import Ply
+from fecm.mechanics.contact_law import (
+    ContactParameters,
+    HystereticLaw,
+    Law,
+    LinearPermanent,
+    ListingLaw,
+    YangSunPermanent,
+)
+from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
+from fecm.mechanics.gages import GageArray, gages
+from fecm.mechanics.impact import ImpactConditions, ImpactSystem
+from fecm.mechanics.laminate import Laminate, laminate
+from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.plate import IntegrationRules, PlateModel, assemble
+from fecm.mechanics.plate_motion import PlateMotion
+from fecm.mechanics.projectile import (
+    LISTING_DENSITY,
+    REPORT_DENSITY,
+    Projectile,
+    RigidMass,
+    Rod,
+    Transducer,
+    report_rod,
+)
+from fecm.mechanics.rod_integrators import STEPS, WILSON
+from fecm.mechanics.stiffness_product import CSR, Workers, available
+from fecm.mechanics.strains import StrainField
+from fecm.mechanics.symmetry import moving, symmetry_reduction
+from fecm.problem.generate import generate, rod_diameters
+from fecm.problem.options import RunOptions
+
+# Moving unknowns from which on threads save more than they cost.
+WORTH_SHARING = 100_000
+
+
+@dataclass(frozen=True)
+class ImpactModel:
+    """A problem's parts, ready to run.
+
+    Attributes
+    ----------
+    plate : PlateModel
+    motion : PlateMotion
+        The plate in time; its own plate has only what moves free.
+    impact : ImpactSystem or None
+        Plate and projectile; None where nothing hits.
+    station : Transducer
+        The transducer.
+    strains, stress_points : StrainField
+        Points of tape8, and of the stresses.
+    gages : GageArray or None
+        Strain gages.
+    """
+
+    plate: PlateModel
+    motion: PlateMotion
+    impact: ImpactSystem | None
+    station: Transducer
+    strains: StrainField
+    stress_points: StrainField
+    gages: GageArray | None
+
+
+def rules(material: Material) -> tuple[Quadrature, Quadrature, Quadrature]:
+    """Quadrature of a MATE card: bending (L1), transverse shear (L2), stored strains (K).
+
+    L1 and L2 outside 1 to 4 count as the nearest of these, as in the listing.
+
+    Raises
+    ------
+    ValueError
+        If K is 0 or beyond 4.
+    """
+    card = material.integration
+    bending, shear = (min(HIGHEST_ORDER, max(1, n)) for n in (card.bending, card.shear))
+    points = gauss(card.points) if card.points > 0 else nodal(-card.points)
+    return gauss(bending), gauss(shear), points
+
+
+def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> PlateModel:
+    """Make the plate of a deck, with the slips that are on."""
+    material = deck.require(Material)
+    bending, shear, points = rules(material)
+    laminate = laminate_of_deck(deck, isotropic_g12="g12" in slips)
+    if "small-stiffness" in slips:
+        laminate = laminate.without_small_entries()
+    return assemble(
+        mesh,
+        laminate,
+        IntegrationRules(
+            bending=bending,
+            shear=bending if "shear-order" in slips else shear,
+            strains=bending if "tapes" in slips else points,
+            transposed_jacobian="jacobian" in slips,
+        ),
+    )
+
+
+def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> Projectile:
+    """Make the projectile of a deck; without a PROJ segment the report's, with the slips on."""
+    card = deck.last(ProjectileCard)
+    if card is None:
+        return report_rod(LISTING_DENSITY if "density" in slips else REPORT_DENSITY)
+    if not card.elements:
+        return RigidMass(card.size)
+    diameters = tuple(rod_diameters(card).tolist())
+    return Rod(card.size, diameters, card.modulus, card.density)
+
+
+def build_constants(measured: Indentation) -> ContactParameters:
+    """Make what an EXPE segment says of the indentation law."""
+    if measured.word == Indentation.ACR:
+        return YangSunPermanent(measured.k, measured.alpha_p)
+    return LinearPermanent(*measured.values())
+
+
+def build_station(deck: Deck, projectile: Projectile, slips: frozenset[str]) -> Transducer:
+    """Make the transducer: PROJ's node, or the rod's middle (one node on under its slip)."""
+    sign = 1.0 if "station" in slips else -1.0
+    if isinstance(projectile, RigidMass):
+        return Transducer(0, sign)
+    card = deck.last(ProjectileCard)
+    middle = projectile.elements // 2 + (2 if "station" in slips else 1)
+    return Transducer(middle if card is None or not card.transducer else card.transducer, sign)
+
+
+def build_gages(deck: Deck, mesh: Mesh, plate: PlateModel) -> GageArray | None:
+    """Make the strain gages of a deck; None without a GAGE segment."""
+    segment = deck.last(GageCards)
+    if segment is None:
+        return None
+    return gages(mesh, segment.records, transposed_jacobian=plate.rules.transposed_jacobian)
+
+
+def build_law(deck: Deck, slips: frozenset[str] = frozenset()) -> Law:
+    """Make the indentation law of a deck, with the slips that are on."""
+    constants = build_constants(deck.require(Indentation))
+    return ListingLaw(constants) if "reload" in slips else HystereticLaw(constants)
+
+
+def build_impact(
+    deck: Deck,
+    motion: PlateMotion,
+    rod: Projectile,
+    slips: frozenset[str],
+    integrator: str = WILSON,
+    share: float = 1.0,
+) -> ImpactSystem:
+    """Make projectile, law and contact, with the slips that are on.
+
+    The plate feels the given share of the contact force.
+    """
+    card = deck.require(ImpactCard)
+    contact = ImpactConditions(
+        row=motion.row(card.node - 1, card.dof - 1),
+        velocity=card.velocity,
+        plate_moves="target" not in slips,
+        strains_start_moving="rod-start" in slips,
+        keeps_first_step="rod-dt" in slips,
+        share=share,
+    )
+    return ImpactSystem(motion, rod, build_law(deck, slips), contact, STEPS[integrator])
+
+
+def moving_plate(deck: Deck, mesh: Mesh, program: Body) -> PlateModel:
+    """Make the plate of a deck, of which only what a program moves is free.
+
+    Its critical time step is the one that limits the program.
+    """
+    plate = build_plate(deck, mesh)
+    return moving(plate, _hit(deck) if hits(program) else None) if moves_only(program) else plate
+
+
+def _hit(deck: Deck) -> tuple[int, int]:
+    """Row of the node that is hit, and which of its unknowns, from 0."""
+    card = deck.require(ImpactCard)
+    return card.node - 1, card.dof - 1
+
+
+def build_model(
+    deck: Deck,
+    mesh: Mesh,
+    choices: RunOptions | None = None,
+    *,
+    hits: bool = True,
+    moves_only: bool = False,
+) -> ImpactModel:
+    """Make the parts of a checked problem, as it is to be run.
+
+    Parameters
+    ----------
+    deck : Deck
+    mesh : Mesh
+    choices : RunOptions, optional
+        The report's way without it.
+    hits : bool
+        Whether there is a projectile.
+    moves_only : bool
+        Whether the plate only moves from rest, so that what provably stays at rest can be left out.
+    """
+    chosen = choices or RunOptions()
+    slips, solver, method = chosen.slips, chosen.solver, chosen.rod_method
+    rod = build_projectile(deck, slips).with_mass(method.mass)
+    hit = _hit(deck) if hits else None
+    share = 1.0
+    if hit is not None and "rod-force" in slips:
+        forces = generate(deck, unit_force=True).forces
+        share = float(forces[hit])
+        forces[hit] = 0.0
+        mesh = replace(mesh, forces=forces)
+    plate = build_plate(deck, mesh, slips)
+    mobile = moving(plate, hit) if moves_only else plate
+    reduced = symmetry_reduction(mobile, hit) if moves_only and solver != CSR else None
+    count = mobile.neq if reduced is None else reduced.count
+    workers = Workers(chosen.threads or (available() if count >= WORTH_SHARING else 1))
+    motion = PlateMotion(mobile, solver, reduced, workers)
+    return ImpactModel(
+        plate=plate,
+        motion=motion,
+        impact=build_impact(deck, motion, rod, slips, method.integrator, share) if hits else None,
+        station=build_station(deck, rod, slips),
+        strains=plate.strain_field(plate.rules.strains),
+        stress_points=plate.strain_field(rules(deck.require(Material))[2]),
+        gages=build_gages(deck, mesh, plate),
+    )
+
+
+def laminate_of(
+    material: Material, shear_factor: float = 1.0, *, isotropic_g12: bool = False
+) -> Laminate:
+    """Laminate of a deck's MATE segment; its inertia uses the card's total thickness.
+
+    Parameters
+    ----------
+    material : Material
+        The segment.
+    shear_factor : float
+        Shear correction factor, on the transverse shear stiffness.
+    isotropic_g12 : bool
+        Replace G12 by E1/2(1+nu12) where E1 = E2 (the slip ``g12``).
+    """
+    ply = material.ply
+    if isotropic_g12 and ply.e1 == ply.e2:
+        ply = Ply(
+            ply.density, ply.nu12, ply.e1, ply.e2, ply.e1 / (2.0 * (1.0 + ply.nu12)),
+            ply.g13, ply.g23,
+        )  # fmt: skip
+    angles = [layer.angle for layer in material.layers]
+    thicknesses = [layer.thickness for layer in material.layers]
+    made = laminate(ply, angles, thicknesses, material.integration.thickness)
+    return replace(made, shear=shear_factor * made.shear)
+
+
+def laminate_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> Laminate:
+    """Laminate of a deck, with the shear correction factor of its SHEA segment.
+
+    Raises
+    ------
+    LookupError
+        If the deck has no MATE segment.
+    """
+    correction = deck.last(ShearCorrection)
+    factor = 1.0 if correction is None else correction.factor
+    return laminate_of(deck.require(Material), factor, isotropic_g12=isotropic_g12)
+
+
+@lru_cache(maxsize=256)
+def is_coupled(material: Material) -> bool:
+    """Whether B of a deck's laminate is not 0; False where the MATE segment is unsound."""
+    try:
+        with np.errstate(all="ignore"):
+            return laminate_of(material).is_coupled
+    except (ArithmeticError, ValueError):
+        return False

@@ -1,0 +1,332 @@
+"""Checks of ROD, EXPE, PROJ, SHEA and GAGE, and whether the mesh resolves the impact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.deck.findings import Findings
+from fecm.deck.model import Deck, Gages, Impact, Indentation, Material, Projectile, ShearCorrection
+from fecm.mechanics import element_groups
+from fecm.mechanics.contact_law import ACR_POWER
+from fecm.mechanics.gages import locate
+from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.projectile import Rod, report_rod
+from fecm.problem import check_mesh
+from fecm.problem.build import build_projectile, laminate_of_deck
+from fecm.problem.generate import rod_diameters
+
+W = 3
+# A rod's step is a full matrix of three times as many rows and columns as it has unknowns.
+MOST_ROD_ELEMENTS = 500
+# Elements per bending wave of the contact's duration: the minimum, and enough for a peak.
+LEAST_PER_WAVE, ENOUGH_PER_WAVE = 4, 8
+# Mesh error of the peak that is warned of, and the largest that is estimated.
+WORTH_SAYING, MOST_ERROR = 0.03, 0.5
+# Shear order under which 9-node elements have no motion without energy.
+FULL = 3
+
+
+def check_impact(impact: Impact, deck: Deck, mesh: Mesh, findings: Findings) -> None:
+    """Check a ROD segment."""
+    known = 1 <= impact.node <= deck.control.numnp
+    if not known:
+        findings.add(
+            "E408",
+            f"The impact node {impact.node} does not exist; the deck has nodes 1 to "
+            f"{deck.control.numnp}.",
+            impact.place("impact node"),
+        )
+    if not 1 <= impact.dof <= deck.control.ndf:
+        findings.add(
+            "E409",
+            f"The impact unknown is {impact.dof}; it must be 1 to {deck.control.ndf}.",
+            impact.place("impact unknown"),
+            "3 is w",
+        )
+    elif known and mesh.equations[impact.node - 1, impact.dof - 1] == 0:
+        findings.add(
+            "E410",
+            f"Unknown {impact.dof} of the impact node {impact.node} is restrained.",
+            impact.place("impact node"),
+            "a BOUN card restrains it",
+        )
+    elif impact.dof > W:
+        findings.add(
+            "E413",
+            f"The impact unknown {impact.dof} is a rotation: a projectile pushes a displacement.",
+            impact.place("impact unknown"),
+            "3 is w",
+        )
+    elif impact.dof != W:
+        findings.add(
+            "W413",
+            f"The impact unknown is {impact.dof}, not 3: the projectile does not push w.",
+            impact.place("impact unknown"),
+        )
+    if impact.velocity < 0.0:
+        findings.add(
+            "E411",
+            f"The impact velocity is {impact.velocity:g}; it must be positive.",
+            impact.place("impact velocity"),
+            "an approach is positive on this card",
+        )
+    elif impact.velocity == 0.0:
+        findings.add(
+            "W411",
+            "The impact velocity is 0: the projectile rests on the plate, which only FORC's loads "
+            "can move.",
+            impact.place("impact velocity"),
+        )
+
+
+def check_projectile(projectile: Projectile, findings: Findings) -> None:
+    """Check a PROJ segment."""
+
+    def needs(code: str, sound: bool, what: str, name: str, hint: str = "") -> None:
+        if not sound:
+            findings.add(code, what, projectile.place(name), hint)
+
+    count = projectile.elements
+    needs(
+        "E418", 0 <= count <= MOST_ROD_ELEMENTS,
+        f"The projectile has {count} rod elements; it must have 0 (a rigid mass) to "
+        f"{MOST_ROD_ELEMENTS}.", "number of rod elements",
+    )  # fmt: skip
+    if not 0 <= count <= MOST_ROD_ELEMENTS:
+        return
+    what = "length" if count else "mass"
+    needs(
+        "E419", projectile.size > 0.0,
+        f"The projectile's {what} is {projectile.size:g}; it must be positive.", "length or mass",
+    )  # fmt: skip
+    if not count:
+        return
+    for name, value in (("modulus", projectile.modulus), ("density", projectile.density)):
+        field = "rod's Young's modulus" if name == "modulus" else "rod's density"
+        needs("E419", value > 0.0, f"The rod's {name} is {value:g}; it must be positive.", field)
+    needs(
+        "E423", 0 <= projectile.transducer <= count + 1,
+        f"The transducer node {projectile.transducer} does not exist; the rod has nodes 1 to "
+        f"{count + 1}.", "transducer node", "blank is the middle",
+    )  # fmt: skip
+    before = findings.error_count
+    diameters = rod_diameters(projectile, findings)
+    if findings.error_count > before:
+        return
+    missing = np.flatnonzero(np.isnan(diameters))
+    if len(missing):
+        findings.add(
+            "E422", f"Rod elements {check_mesh.ranges(missing + 1)} have no diameter.",
+            projectile.place("number of rod elements"),
+            "give the first and the last element, with an increment of 1 on the first card",
+        )  # fmt: skip
+    for record in projectile.diameters:
+        if not record.diameter > 0.0:
+            findings.add(
+                "E422", f"The diameter of rod element {record.element} is {record.diameter:g}; it "
+                "must be positive.", record.place("diameter"),
+            )  # fmt: skip
+    if findings.error_count == before and not _is_computable(projectile, diameters):
+        findings.add(
+            "E429",
+            "The rod's mass or stiffness is beyond the range of numbers.",
+            projectile.place("length or mass"),
+            "look at the units of length, diameters, modulus and density",
+        )
+
+
+def _is_computable(projectile: Projectile, diameters: NDArray[np.float64]) -> bool:
+    """Whether mass and stiffness of every unknown of a rod are positive and finite."""
+    rod = Rod(projectile.size, tuple(diameters.tolist()), projectile.modulus, projectile.density)
+    try:
+        with np.errstate(all="ignore"):
+            values = np.concatenate([rod.lumped_mass(), rod.stiffness().diagonal()])
+    except OverflowError:
+        return False
+    return bool(((values > 0.0) & np.isfinite(values)).all())
+
+
+def check_gages(segment: Gages, mesh: Mesh, deck: Deck, findings: Findings) -> None:
+    """Check a GAGE segment on a sound mesh."""
+    families = element_groups.element_blocks(mesh.elements, mesh.coordinates)
+    seen: set[int] = set()
+    for record in segment.records:
+        if record.number in seen:
+            findings.add(
+                "E425", f"Gage {record.number} is given twice.", record.place("gage"),
+                "give each gage a number of its own",
+            )  # fmt: skip
+        seen.add(record.number)
+        if not locate(families, record.x, record.y):
+            findings.add(
+                "E424",
+                f"Gage {record.number} at ({record.x:g}, {record.y:g}) is not on the plate.",
+                record.place("gage's x"),
+            )
+        material = deck.last(Material)
+        half = 0.0 if material is None else material.integration.thickness / 2.0
+        if material is not None and abs(record.z) > half * (1.0 + 1e-9):
+            findings.add(
+                "W426",
+                f"Gage {record.number} at z = {record.z:g} is outside of the laminate, whose faces "
+                f"are at {half:g} from the mid-plane.", record.place("gage's z"),
+            )  # fmt: skip
+
+
+def check_shear_correction(segment: ShearCorrection, findings: Findings) -> None:
+    """Check a SHEA segment."""
+    if not segment.factor > 0.0:
+        findings.add(
+            "E427", f"The shear correction factor is {segment.factor:g}; it must be positive.",
+            segment.place("shear correction factor"), "1 as in the report, or pi^2/12 = 0.822467",
+        )  # fmt: skip
+    elif segment.factor > 1.0:
+        findings.add(
+            "W428", f"The shear correction factor is {segment.factor:g}, more than 1.",
+            segment.place("shear correction factor"),
+        )  # fmt: skip
+
+
+def warn_of_the_reports_rod(impact: Impact, findings: Findings) -> None:
+    """Warn that the report's rod is assumed, in the report's units."""
+    rod = report_rod()
+    findings.add(
+        "W414",
+        f"No projectile is given: the report's steel rod is assumed, in lb, in and s whatever the "
+        f"deck's units (length {rod.length:g}, diameter {rod.diameters[-1]:g}, E {rod.modulus:g}, "
+        f"density {rod.density:g}, mass {rod.total_mass:.5g}).",
+        impact.place("impact node"),
+        "give the projectile by a PROJ segment",
+    )
+
+
+def check_law(law: Indentation, findings: Findings) -> None:
+    """Check an EXPE segment."""
+    if law.word == Indentation.ACR:
+        rules = (
+            (law.k > 0.0, "positive"),
+            (law.alpha_p > 0.0, "positive"),
+            (law.s_p == 0.0, "blank or 0 with ACR, whose equation 3-7 has no such constant"),
+            (
+                law.q in (0.0, ACR_POWER),
+                "blank or 2.5 with ACR, as equation 3-7 holds for no other",
+            ),
+        )
+    else:
+        rules = (
+            (law.k > 0.0, "positive"),
+            (law.alpha_p >= 0.0, "0 or more"),
+            (0.0 <= law.s_p < 1.0, "at least 0 and below 1"),
+            (law.q > 0.0, "positive"),
+        )
+    for name, value, (sound, rule) in zip(law.names(), law.values(), rules, strict=True):
+        if not sound:
+            findings.add("E412", f"The {name} is {value:g}; it must be {rule}.", law.place(name))
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """How the mesh resolves an impact.
+
+    Attributes
+    ----------
+    contact : float
+        Duration of a Hertz contact on a rigid target, 2.94 (5 m v^2/4 k)^(2/5)/v.
+    wave : float
+        Length of the bending wave whose half period that is.
+    side : float
+        Longest side of the elements at the impact node, length.
+    error : float or None
+        Estimated mesh error of the peak force, relative to it; None for elements without mid-side
+        nodes.
+    """
+
+    contact: float
+    wave: float
+    side: float
+    error: float | None
+
+    @property
+    def elements(self) -> float:
+        """Elements per bending wave."""
+        return self.wave / self.side
+
+
+def resolution(deck: Deck, mesh: Mesh) -> Resolution | None:
+    """Compare the elements at the impact node with the bending waves of the impact.
+
+    Returns
+    -------
+    Resolution or None
+        None without an approach, or where a number overflows.
+    """
+    impact, law = deck.require(Impact), deck.require(Indentation)
+    if impact.velocity <= 0.0:
+        return None
+    laminate, mass = laminate_of_deck(deck), build_projectile(deck).total_mass
+    v = np.float64(impact.velocity)  # a division by zero is then infinite, not an error
+    contact = 2.94 * (5.0 * mass * v**2 / (4.0 * law.k)) ** 0.4 / v
+    rigidity = float(min(laminate.D[0, 0], laminate.D[1, 1]))
+    wave = 2.0 * np.pi * (rigidity / (laminate.mass * (np.pi / contact) ** 2)) ** 0.25
+    touching = (mesh.elements == impact.node).any(axis=1)
+    nodes = mesh.elements[touching, :4]
+    nodes = np.where(nodes == 0, nodes[:, :1], nodes)  # a triangle returns to its first corner
+    corners = mesh.coordinates[nodes - 1]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    side = float(sides.max())
+    if not np.isfinite(wave):
+        return None
+    quadratic = bool((mesh.elements[touching, 4:8] > 0).all()) and mesh.elements.shape[1] <= 9
+    shear = deck.require(Material).integration.shear
+    error = mesh_error(wave / side, side / laminate.thickness, shear) if quadratic else None
+    return Resolution(float(contact), float(wave), side, error)
+
+
+def mesh_error(elements: float, slenderness: float, shear: int) -> float:
+    """Estimate the relative mesh error of the peak force, within a factor of about two.
+
+    Fitted to the peaks of 14 meshes of 8- or 9-node elements with L2 = 3, and compared with 18
+    with L2 = 2, each against a mesh of 15 to 30 elements per wave: AS/3501 plates of
+    100 x 100 x 1, 2 and 4 mm, and the report's plate.
+
+    Parameters
+    ----------
+    elements : float
+        Elements per bending wave of the contact's duration.
+    slenderness : float
+        Side of an element over the thickness; under L2 = 3 a slender element locks.
+    shear : int
+        Shear order L2.
+    """
+    if shear < FULL:
+        return 0.045 * ENOUGH_PER_WAVE / elements
+    return (0.031 + 0.0011 * slenderness**2) * (ENOUGH_PER_WAVE / elements) ** 2
+
+
+def said_error(error: float) -> str:
+    """Text of an estimated mesh error of the peak force."""
+    if error > MOST_ERROR:
+        return f"mesh error of the peak above {MOST_ERROR:.0%}"
+    return f"mesh error of the peak about {error:.1%}"
+
+
+def check_resolution(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+    """Warn of elements at the impact node that are too large for its bending waves."""
+    found = resolution(deck, mesh)
+    if found is None or found.elements >= ENOUGH_PER_WAVE:
+        return
+    coarse = found.elements < LEAST_PER_WAVE
+    if not coarse and (found.error is None or found.error < WORTH_SAYING):
+        return
+    about = "" if found.error is None else f": {said_error(found.error)}"
+    findings.add(
+        "W415",
+        f"The mesh is {'too coarse' if coarse else 'coarse'} at the impact node: "
+        f"{found.elements:.1f} elements of side {found.side:.3g} per bending wave of the contact's "
+        f"duration, which is {found.wave:.3g} long{about}.",
+        deck.require(Impact).place("impact node"),
+        f"use {ENOUGH_PER_WAVE} elements per wave: sides up to {found.wave / ENOUGH_PER_WAVE:.2g}",
+    )

@@ -1,0 +1,85 @@
+"""Checks of MATE: quadrature, ply constants, layers."""
+
+from __future__ import annotations
+
+from fecm.deck.findings import Findings
+from fecm.deck.model import Material
+from fecm.deck.records import Integration, Ply
+from fecm.mechanics.elements.quadrature import HIGHEST_ORDER
+
+THICKNESS_TOLERANCE = 1.0e-6
+
+
+def check_material(material: Material, findings: Findings) -> None:
+    """Check a MATE segment."""
+    _check_orders(material.integration, findings)
+    _check_ply(material.ply, findings)
+    _check_layers(material, findings)
+
+
+def _check_orders(card: Integration, findings: Findings) -> None:
+    for name, order in (("bending order L1", card.bending), ("shear order L2", card.shear)):
+        if not 1 <= order <= HIGHEST_ORDER:
+            used = min(HIGHEST_ORDER, max(1, order))
+            findings.add("W401", f"The {name} is {order} and is taken as {used}.", card.place(name))
+    if not 1 <= abs(card.points) <= HIGHEST_ORDER:
+        findings.add(
+            "E402",
+            f"The stress-point order K is {card.points}; it must be 1 to 4 (Gauss points) or "
+            "-1 to -4 (nodal points).",
+            card.place("stress-point order K"),
+        )
+
+
+def _check_ply(ply: Ply, findings: Findings) -> None:
+    sound = True
+    for name, value in (
+        ("mass density", ply.density),
+        ("Young's modulus E1", ply.e1),
+        ("Young's modulus E2", ply.e2),
+        ("shear modulus G12", ply.g12),
+        ("shear modulus G13", ply.g13),
+        ("shear modulus G23", ply.g23),
+    ):
+        if value <= 0.0:
+            sound = False
+            findings.add("E403", f"The {name} is {value:g}; it must be positive.", ply.place(name))
+    # The square of nu12 against E1/E2, written so that no number overflows.
+    if sound and abs(ply.nu12) >= (ply.e1 / ply.e2) ** 0.5:
+        findings.add(
+            "E404",
+            f"Poisson's ratio NU12 = {ply.nu12:g} is too large: its square must stay below "
+            f"E1/E2 = {ply.e1 / ply.e2:g}.",
+            ply.place("Poisson's ratio NU12"),
+        )
+
+
+def _check_layers(material: Material, findings: Findings) -> None:
+    thick = True
+    for position, layer in enumerate(material.layers, start=1):
+        if layer.thickness <= 0.0:
+            thick = False
+            findings.add(
+                "E405",
+                f"Layer {position} has the thickness {layer.thickness:g}; it must be positive.",
+                layer.place("layer thickness"),
+            )
+        if layer.number != position:
+            findings.add(
+                "W408",
+                f"Layer number {layer.number} stands in place {position}: layers lie in the order "
+                "of their cards, whatever their numbers.",
+                layer.place("layer"),
+            )
+    total = sum(layer.thickness for layer in material.layers)
+    given = material.integration.thickness
+    place = material.integration.place("total thickness")
+    if given <= 0.0:
+        findings.add("E406", f"The total thickness is {given:g}; it must be positive.", place)
+    elif thick and abs(total - given) > THICKNESS_TOLERANCE * given:
+        findings.add(
+            "E407",
+            f"The layers are {total:g} thick together, the MATE card says {given:g}.",
+            place,
+            "stiffness follows the layers, inertia the card: they must agree",
+        )

@@ -1,0 +1,374 @@
+"""Checks of the generated mesh: nodes, elements, their shape, their mass."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.deck.findings import Findings, Place
+from fecm.deck.model import Boundary, Coordinates, Deck, Elements, Material
+from fecm.deck.records import Integration
+from fecm.mechanics import element_groups, element_matrices
+from fecm.mechanics.elements import cubic, triangle
+from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature
+from fecm.mechanics.mesh import Mesh, holds_the_plane
+from fecm.problem.build import is_coupled, rules
+from fecm.problem.generate import place_of_element
+
+# Findings of one kind about elements are gathered beyond this number of cards.
+SHOWN = 4
+
+# Runs of numbers that are written out.
+RUNS = 8
+
+
+def ranges(numbers: Sequence[int] | NDArray[np.int_]) -> str:
+    """Write ascending numbers shortly: ``3, 7-9, 12``."""
+    array = np.asarray(numbers)
+    runs = np.split(array, np.flatnonzero(np.diff(array) != 1) + 1)
+    parts = [str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs[:RUNS]]
+    return ", ".join([*parts, "..."] if len(runs) > RUNS else parts)
+
+
+def describe_nodes(rows: NDArray[np.intp]) -> str:
+    """Begin a sentence about nodes, given by their rows: ``Nodes 3, 7-9 are``."""
+    return f"Node {rows[0] + 1} is" if len(rows) == 1 else f"Nodes {ranges(rows + 1)} are"
+
+
+def describe_elements(rows: NDArray[np.intp]) -> str:
+    """Name elements by their rows, how many and which: ``3 elements (1, 4-5)``."""
+    count = len(rows)
+    return f"{count} element{'' if count == 1 else 's'} ({ranges(rows + 1)})"
+
+
+def report_elements(
+    findings: Findings, code: str, rows: NDArray[np.intp], deck: Deck, what: str, hint: str = ""
+) -> None:
+    """Report what is wrong with elements, given by their rows: one finding a card that gives them.
+
+    Beyond :data:`SHOWN` cards a single finding tells of all.
+    """
+    by_card: dict[Place | None, list[int]] = {}
+    for row in rows[: 100 * SHOWN].tolist():
+        by_card.setdefault(place_of_element(deck, row + 1), []).append(row + 1)
+    if len(by_card) > SHOWN or len(rows) > 100 * SHOWN:
+        place = place_of_element(deck, int(rows[0]) + 1)
+        findings.add(code, f"{len(rows)} elements ({ranges(rows + 1)}): each {what}.", place, hint)
+        return
+    for place, numbers in by_card.items():
+        if len(numbers) == 1:
+            findings.add(code, f"Element {numbers[0]} {what}.", place, hint)
+        else:
+            findings.add(code, f"Elements {ranges(numbers)}: each {what}.", place, hint)
+
+
+TRIANGLE = triangle.SHAPE.corners
+
+W, THETA_X = 2, 3
+
+# Loaded nodes up to this number are single forces, more are a pressure.
+FEW_LOADED = 4
+
+# Distance of a mid-side node from its place along the side, over the side's length.
+OFF_PLACE = 0.05
+
+
+def check_mesh(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool = False) -> None:
+    """Check nodes, and the shapes of elements whose node numbers are sound.
+
+    Parameters
+    ----------
+    deck : Deck
+    mesh : Mesh
+    findings : Findings
+    listing : bool
+        Whether the deck is for listing mode, which takes L1 for L2.
+    """
+    missing = np.flatnonzero(~mesh.given)
+    if len(missing):
+        place = deck.require(Coordinates).place()
+        findings.add("E306", f"{describe_nodes(missing)} without coordinates.", place)
+    unused = np.flatnonzero(mesh.given & ~mesh.used)
+    if len(unused):
+        place = deck.require(Elements).place()
+        findings.add("E307", f"{describe_nodes(unused)} in no element.", place)
+    if not mesh.number_of_equations:
+        findings.add("E311", "Every unknown of the plate is restrained.", deck.place())
+    if not len(missing):
+        _check_coincidence(deck, mesh, findings)
+        _check_shapes(deck, mesh, findings, listing=listing)
+
+
+def check_elements(deck: Deck, mesh: Mesh, findings: Findings) -> bool:
+    """Whether the node numbers of all elements are sound, whatever the coordinates are."""
+    elements, numnp = mesh.elements, len(mesh.coordinates)
+    before = findings.error_count
+
+    def report(code: str, wrong: Any, what: str, hint: str = "") -> None:
+        report_elements(findings, code, np.flatnonzero(wrong), deck, what, hint)
+
+    empty = ~(elements != 0).any(axis=1)
+    unknown = (elements < 0) | (elements > numnp)
+    # Nodes behind the third make a quadrilateral, which has a fourth corner.
+    pointed = ~(elements[:, TRIANGLE:] != 0).any(axis=1)
+    three_missing = (elements[:, :TRIANGLE] == 0).any(axis=1)
+    four_missing = (elements[:, : TRIANGLE + 1] == 0).any(axis=1)
+    ordered = np.sort(elements, axis=1)
+    repeated = ((ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] != 0)).any(axis=1)
+    report("E308", empty, "has no nodes")
+    report(
+        "E309", unknown.any(axis=1), f"has a node outside 1 to {numnp}",
+        "its own card or the increment of the card before it is wrong",
+    )  # fmt: skip
+    report(
+        "E310", three_missing & pointed & ~empty, "lacks one of its three corners",
+        "an element that ends with its third node is a triangle, any other has four corners",
+    )  # fmt: skip
+    report("E310", four_missing & ~pointed, "lacks one of its four corners")
+    report("E312", repeated, "has a node twice")
+    return findings.error_count == before
+
+
+def _check_coincidence(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+    """Warn of nodes in the same place: the plate is cut there."""
+    order = np.lexsort(mesh.coordinates.T)
+    sorted_places = mesh.coordinates[order]
+    same = (sorted_places[1:] == sorted_places[:-1]).all(axis=1)
+    if same.any():
+        rows = np.unique(np.concatenate([order[1:][same], order[:-1][same]]))
+        findings.add(
+            "W314",
+            f"{describe_nodes(rows)} in the place of another node: the plate is cut there.",
+            deck.require(Coordinates).place(),
+        )
+
+
+def check_in_plane_supports(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+    """Warn of in-plane restraints at every node of a laminate whose B is not zero."""
+    if holds_the_plane(mesh.codes) and is_coupled(deck.require(Material)):
+        boundary = deck.last(Boundary)
+        findings.add(
+            "W318",
+            "B is not zero, and u and v are restrained at every node: the plate is stiffer than "
+            "its laminate.",
+            boundary.place() if boundary else None,
+            "restrain u and v only where a support holds them",
+        )
+
+
+def check_geometry(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+    """Warn of odd side nodes and supports of a mesh without errors."""
+    _check_side_nodes(deck, mesh, findings)
+    _check_support(deck, mesh, findings)
+
+
+def _check_side_nodes(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+    """Warn of nodes on sides that are off the middle or the third points, seen along the side."""
+    wrong: list[int] = []
+    for family in element_groups.element_blocks(mesh.elements, mesh.coordinates):
+        if family.shape is triangle.SHAPE:
+            continue
+        thirds = family.shape is cubic.SHAPE
+        for place in range(4, 12 if thirds else 8):
+            if not family.present[place]:
+                continue
+            start = place % 4 if place < 8 else (place - 1) % 4  # 9 to 12 stand before a corner
+            end = (start + 1) % 4
+            share = 0.5 if not thirds else 1.0 / 3.0 if place < 8 else 2.0 / 3.0
+            corners = mesh.coordinates[mesh.elements[family.rows][:, [start, end]] - 1]
+            node = mesh.coordinates[mesh.elements[family.rows, place] - 1]
+            side = corners[:, 1] - corners[:, 0]
+            with np.errstate(all="ignore"):
+                along = ((node - corners[:, 0]) * side).sum(axis=1) / np.square(side).sum(axis=1)
+            wrong += family.rows[np.abs(along - share) > OFF_PLACE].tolist()
+    if wrong:
+        rows = np.unique(wrong).astype(np.intp)
+        findings.add(
+            "W323",
+            f"Side nodes of {describe_elements(rows)} are away from their places by more than "
+            f"{OFF_PLACE:.0%} of the side.",
+            place_of_element(deck, int(rows[0]) + 1),
+            "put them at the middle of the side, in cubic elements at its third points",
+        )
+
+
+def _check_support(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+    """Warn of a plate that one or two nodes support, unless symmetry holds its rotations."""
+    held = mesh.equations == 0
+    count = int(held[:, W].sum())
+    if 0 < count <= 2 and held[:, THETA_X:].any(axis=1).sum() <= 2:
+        segment = deck.last(Boundary)
+        findings.add(
+            "W319",
+            f"w is restrained at {count} node{'s' if count > 1 else ''} only.",
+            None if segment is None else segment.place(),
+            "restrain w at every node of a supported edge; a free plate needs no support",
+        )
+
+
+def _loads_a_node(deck: Deck, mesh: Mesh, *, supported: bool) -> bool:
+    """Whether a force on single nodes excites their checkerboard: an impact's, or FORC's.
+
+    A supported plate is excited by the short waves of an impact only.
+    """
+    words = {macro.word for macro in deck.macros}
+    loaded = int(np.count_nonzero(mesh.forces[:, W]))
+    return "RODP" in words or (not supported and "EXCD" in words and 0 < loaded <= FEW_LOADED)
+
+
+def _check_shapes(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool) -> None:
+    """Jacobians at every point that is used, the lumped masses, motions without energy."""
+    material = deck.last(Material)
+    if material is None or not 1 <= abs(material.integration.points) <= HIGHEST_ORDER:
+        return
+    families = element_groups.element_blocks(mesh.elements, mesh.coordinates)
+    _check_triangles(material.integration, families, findings)
+    with np.errstate(all="ignore"):
+        _check_jacobians(deck, families, rules(material), findings)
+        _check_masses(material, families, findings)
+    supported = bool((mesh.equations[:, W] == 0).any())
+    if not listing:
+        nodal = _loads_a_node(deck, mesh, supported=supported)
+        _check_shear(material, families, supported, nodal, findings)
+
+
+def _at_third_node(card: Integration, family: element_groups.ElementBlock) -> bool:
+    """Whether strains are stored where a triangle's Jacobian is zero: on the side eta = 1."""
+    return family.shape is triangle.SHAPE and card.points < -1
+
+
+def _check_triangles(
+    card: Integration, families: list[element_groups.ElementBlock], findings: Findings
+) -> None:
+    for family in families:
+        if _at_third_node(card, family):
+            findings.add(
+                "E317",
+                f"Strains at nodal points (K = {card.points}) do not exist in triangles, whose "
+                f"Jacobian is zero at the third node: {describe_elements(family.rows)}.",
+                card.place("stress-point order K"),
+                f"take Gauss points: K = {-card.points}",
+            )
+
+
+def _check_jacobians(
+    deck: Deck,
+    families: list[element_groups.ElementBlock],
+    used: tuple[Quadrature, ...],
+    findings: Findings,
+) -> None:
+    card = deck.require(Material).integration
+    folded: dict[str, list[int]] = {}
+    for family in families:
+        for block in family.blocks(4096):
+            for rule in used[:2] if _at_third_node(card, family) else used:
+                found = element_matrices.jacobian_determinants(block, rule)
+                rows = block.rows[~(found > 0.0).all(axis=1)]
+                folded.setdefault(family.shape.numbering, []).extend(rows.tolist())
+    for numbering, wrong in folded.items():
+        what = "has a Jacobian that is zero or negative"
+        report_elements(findings, "E313", np.unique(wrong).astype(np.intp), deck, what, numbering)
+
+
+def _check_masses(
+    material: Material, families: list[element_groups.ElementBlock], findings: Findings
+) -> None:
+    card, bending = material.integration, rules(material)[0]
+    massless = [
+        family.rows
+        for family in families
+        if (
+            np.square(element_matrices.local_shape_functions(family, bending)[0]).sum(axis=0)
+            < 1e-12
+        ).any()
+    ]
+    if massless:
+        findings.add(
+            "E315",
+            f"Under the bending order L1 = {card.bending} nodes of "
+            f"{describe_elements(np.sort(np.concatenate(massless)))} have no mass.",
+            card.place("bending order L1"),
+            "elements with mid-side nodes take L1 = 2 or more",
+        )
+
+
+def _check_shear(
+    material: Material,
+    families: list[element_groups.ElementBlock],
+    supported: bool,
+    nodal: bool,
+    findings: Findings,
+) -> None:
+    """Find motions that the transverse shear's points do not see, and elements that lock."""
+    card, order = material.integration, math.isqrt(len(rules(material)[1].xi))
+    weak: dict[int, list[str]] = {}
+    for family in families:
+        name, free, held = _orders_without_motions(family)
+        if name == FOUR_NODES and order >= free:
+            findings.add(
+                "W320",
+                f"4-node elements lock under the shear order L2 = {card.shear}: they are much too "
+                "stiff in a thin plate.",
+                card.place("shear order L2"),
+                "use L2 = 1 and support the plate, or elements with mid-side nodes",
+            )
+        if name == NINE_NODES and held <= order < free and nodal:
+            _report_hourglass(card, supported, findings)
+        elif order < (held if supported else free):
+            weak.setdefault(free, []).append(name)
+    if weak:
+        names = dict.fromkeys(name for kind in weak.values() for name in kind)
+        findings.add(
+            "W316",
+            f"The shear order L2 = {card.shear} leaves {' and '.join(names)} motions without "
+            "energy" + ("." if supported else ", and nothing supports the plate's w."),
+            card.place("shear order L2"),
+            f"take L2 = {max(weak)}",
+        )
+
+
+def _report_hourglass(card: Integration, supported: bool, findings: Findings) -> None:
+    place = card.place("shear order L2")
+    if supported:
+        findings.add(
+            "W322",
+            f"Under the shear order L2 = {card.shear} a force on single nodes excites a "
+            "checkerboard motion of the 9-node elements, which only the supports resist.",
+            place,
+            "take L2 = 3",
+        )
+    else:
+        findings.add(
+            HOURGLASS,
+            f"Under the shear order L2 = {card.shear} a force on single nodes excites a "
+            "checkerboard motion of the 9-node elements, which nothing resists in a plate "
+            "without supports.",
+            place,
+            "take L2 = 3; --force runs the deck all the same",
+        )
+
+
+FOUR_NODES, NINE_NODES = "4-node elements", "9-node elements"
+
+HOURGLASS = "E321"
+
+
+def _orders_without_motions(family: element_groups.ElementBlock) -> tuple[str, int, int]:
+    """What a family is called, and the shear order that leaves it no motion without energy.
+
+    The first order is that of a plate whose w is free, the second that of one with a support, which
+    a lower order may do for: the motion of a whole mesh then meets the support.
+    """
+    if family.shape is triangle.SHAPE:
+        return "triangles", 1, 1
+    if family.shape is cubic.SHAPE:
+        return "cubic elements", 3, 3
+    if family.present[8]:
+        return NINE_NODES, 3, 2
+    if family.present[4:].any():
+        return "elements with mid-sides", 2, 2
+    return FOUR_NODES, 2, 1

@@ -1,0 +1,137 @@
+"""Checks of what a run would do: its time step, its length, what it stores."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from decimal import Context, Decimal
+
+from fecm.deck.findings import Findings
+from fecm.deck.macros import MOST_MACROS, STEPS, Body, WorkEstimate, estimate_work, every, flat
+from fecm.deck.model import Deck, Gages, Material
+from fecm.deck.records import Macro
+from fecm.mechanics.elements.quadrature import HIGHEST_ORDER
+from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.plate import UnsoundPlateError
+from fecm.mechanics.time_step import critical_time_step, safe_time_step
+from fecm.problem.build import moving_plate, rules
+
+LARGE_OUTPUT = 10**9
+# Part of the critical time step below which a step's change, of its square, is lost by rounding.
+LEAST_STEP = math.sqrt(sys.float_info.epsilon)
+
+UNSTABLE = "E508"
+
+
+def check_program(deck: Deck, program: Body, findings: Findings) -> None:
+    """Check the length of a program, and that what it is asked to store ever comes up."""
+    sizes = estimate_work(program)
+    if sizes.macros > MOST_MACROS:
+        count = Decimal(sizes.macros).normalize(Context(prec=3))  # may be beyond all floats
+        findings.add(
+            "E509",
+            f"The program carries out {count:g} macros, more than {MOST_MACROS:g}.",
+            deck.macros[0].place("macro"),
+            "nested LOOPs multiply",
+        )
+        return
+    for macro in flat(program):
+        if macro.word == "RODP" and every(macro) > max(1, sizes.steps):
+            findings.add(
+                "W510",
+                f"RODP stores every {every(macro)} steps, but the program takes only "
+                f"{sizes.steps}: no strains are stored.",
+                macro.place("value"),
+            )
+        if macro.word in ("DISP", "STRE") and not sizes.passes[macro.word]:
+            findings.add(
+                "W510",
+                f"{macro.word} stores every {every(macro)} passes, but no loop has as many: "
+                "nothing is stored.",
+                macro.place("value"),
+            )
+    if not sizes.steps and not any(sizes.passes.values()):
+        place = deck.macros[0].place("macro") if deck.macros else None
+        findings.add("W511", "The program takes no step and stores nothing.", place)
+    _check_output(deck, program, sizes, findings)
+
+
+def check_time_step(deck: Deck, mesh: Mesh, program: Body, findings: Findings) -> None:
+    """Compare every DT with the plate's critical time step, where the program steps at all."""
+    steps = [macro for macro in deck.macros if macro.word == "DT"]
+    if not steps or not STEPS.intersection(macro.word for macro in deck.macros):
+        return
+    plate = moving_plate(deck, mesh, program)
+    try:
+        safe = safe_time_step(plate)
+        _check_least_step(steps, safe, findings)
+        if min(m.value for m in steps) > 0.0 and max(m.value for m in steps) < safe:
+            return
+        critical = critical_time_step(plate)
+    except UnsoundPlateError as error:
+        findings.add(
+            "E417",
+            f"The plate has no critical time step: {error}.",
+            deck.require(Material).place(),
+            "look at the units of the ply's constants, the thickness and the coordinates",
+        )
+        return
+    for macro in steps:
+        if macro.value >= critical:
+            findings.add(
+                UNSTABLE,
+                f"DT = {macro.value:.4g} is not below the plate's critical time step "
+                f"{critical:.4g}: the motion would grow without bound.",
+                macro.place("value"),
+                f"take {_below(critical)} or less; --force runs the deck all the same",
+            )
+
+
+def _check_least_step(steps: Sequence[Macro], safe: float, findings: Findings) -> None:
+    """Report every DT that is so small that the motion is lost by rounding."""
+    for macro in steps:
+        if 0.0 < macro.value < LEAST_STEP * safe:
+            findings.add(
+                "E515",
+                f"DT = {macro.value:.4g} is so far below the plate's critical time step (about "
+                f"{safe:.4g}) that the motion is lost by rounding.",
+                macro.place("value"),
+                "look at the unit of time; DT without a number takes 0.9 of the critical step",
+            )
+
+
+def _below(critical: float) -> str:
+    """A round number a little below the critical time step."""
+    return f"{0.95 * critical:.2g}"
+
+
+def output_bytes(deck: Deck, sizes: WorkEstimate) -> int:
+    """Size of a result's large datasets, in bytes."""
+    control = deck.control
+    card = deck.require(Material).integration
+    points = (
+        len(rules(deck.require(Material))[2].xi) if 1 <= abs(card.points) <= HIGHEST_ORDER else 0
+    )
+    gages = sum(len(segment.records) for segment in deck.all(Gages)[-1:])
+    field, point = control.numnp * control.ndf, control.numel * points
+    return 8 * (
+        sizes.passes["DISP"] * (field + control.numnp)
+        + sizes.passes["STRE"] * point * 16
+        + (sizes.passes["REAC"] + sizes.passes["EIGE"]) * field
+        + sizes.contact_rows * (point * 5 + 8)
+        + sizes.steps * (18 + gages)
+    )
+
+
+def _check_output(deck: Deck, program: Body, sizes: WorkEstimate, findings: Findings) -> None:
+    """Warn of a large result."""
+    size = output_bytes(deck, sizes)
+    if size > LARGE_OUTPUT:
+        macro = next((m for m in flat(program) if m.word in ("RODP", "DISP")), None)
+        findings.add(
+            "W512",
+            f"The result will take {size / 1e9:.3g} GB.",
+            macro.place("value") if macro else None,
+            "RODP and DISP store every N steps: take a larger N",
+        )

@@ -1,0 +1,233 @@
+"""From the cards of a deck to its mesh: the generation of nodes, elements, restraints and loads."""
+
+from __future__ import annotations
+
+import bisect
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.deck.findings import Findings, Place
+from fecm.deck.model import Boundary, Coordinates, Deck, Elements, Forces, Impact, Projectile
+from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
+from fecm.mechanics.mesh import Ints, Mesh, equation_numbers
+
+
+def generate(deck: Deck, findings: Findings | None = None, *, unit_force: bool = False) -> Mesh:
+    """Generate nodes, elements, restraints and forces as the listing's GENVEC and PMESH do.
+
+    Parameters
+    ----------
+    deck : Deck
+        The model.
+    findings : Findings, optional
+        Receives what can't be generated.
+    unit_force : bool
+        Set the force of ROD's unknown to 1 where ROD stands among the segments, so that it replaces
+        an earlier FORC's value and a later FORC's replaces it (the slip ``rod-force``).
+
+    Returns
+    -------
+    Mesh
+        What could be generated; complete if there were no findings.
+    """
+    noted = Findings() if findings is None else findings
+    control = deck.control
+    coordinates = np.full((control.numnp, control.ndm), np.nan)
+    elements = np.zeros((control.numel, control.nen), dtype=np.int32)
+    boundaries = [segment for segment in deck.segments if isinstance(segment, Boundary)]
+    codes = restraint_codes(boundaries, control.numnp, control.ndf, noted)
+    forces = np.zeros((control.numnp, control.ndf))
+    for segment in deck.segments:
+        if isinstance(segment, Coordinates):
+            coordinates[:] = np.nan  # a second COOR starts anew, as in the listing
+            _interpolate(coordinates, segment.records, noted)
+        elif isinstance(segment, Forces):
+            _interpolate(forces, segment.records, noted)
+        elif isinstance(segment, Impact) and unit_force:
+            forces[segment.node - 1, segment.dof - 1] = 1.0
+        elif isinstance(segment, Elements):
+            _step(elements, segment.records, noted)
+    return Mesh(coordinates, elements, codes, forces, equation_numbers(codes))
+
+
+def restraint_codes(
+    boundaries: Sequence[Boundary], nodes: int, unknowns: int, findings: Findings | None = None
+) -> Ints:
+    """Generate the restraint codes of BOUN segments.
+
+    Parameters
+    ----------
+    boundaries : sequence of Boundary
+    nodes, unknowns : int
+        Number of nodes, and of unknowns of a node.
+    findings : Findings, optional
+        Receives what cannot be generated.
+
+    Returns
+    -------
+    ndarray (nodes, unknowns)
+    """
+    codes = np.zeros((nodes, unknowns), dtype=np.int32)
+    for segment in boundaries:
+        _carry(codes, segment.records, Findings() if findings is None else findings)
+    return codes
+
+
+def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floats:
+    """Diameter of every element of a rod, generated from PROJ's cards as coordinates are.
+
+    Parameters
+    ----------
+    segment : Projectile
+    findings : Findings, optional
+        Receives what can't be generated.
+
+    Returns
+    -------
+    ndarray (elements,)
+        Length; NaN where no card gives the element.
+    """
+    noted = Findings() if findings is None else findings
+    values = np.full((segment.elements, 1), np.nan)
+    known: list[NodeValues] = []
+    for record in segment.diameters:
+        if not 1 <= record.element <= segment.elements:
+            noted.add(
+                "E420",
+                f"Rod element {record.element} does not exist; PROJ gives the rod elements 1 to "
+                f"{segment.elements}.",
+                record.place("element"),
+            )
+        elif known and record.element <= known[-1].node:
+            noted.add(
+                "E421",
+                f"Rod element {record.element} stands after element {known[-1].node}; elements "
+                "must ascend.",
+                record.place("element"),
+            )
+        else:
+            known.append(NodeValues(record.element, record.increment, (record.diameter,)))
+    _interpolate(values, known, noted)
+    return values[:, 0]
+
+
+_R = TypeVar("_R", NodeValues, NodeCodes, ElementNodes)
+
+
+def _existing(
+    records: Sequence[_R], what: str, count: int, code: str, findings: Findings
+) -> list[_R]:
+    """Records whose node or element exists; the others are reported together."""
+
+    def number(record: _R) -> int:
+        return record.element if isinstance(record, ElementNodes) else record.node
+
+    outside = [record for record in records if not 1 <= number(record) <= count]
+    if outside:
+        more = f" (and {len(outside) - 1} more)" if len(outside) > 1 else ""
+        findings.add(
+            code,
+            f"{what.capitalize()} {number(outside[0])}{more} does not exist; the control card "
+            f"gives the deck {what}s 1 to {count}.",
+            outside[0].place(what),
+        )
+    return [record for record in records if 1 <= number(record) <= count]
+
+
+def _run(start: int, end: int, increment: int) -> Ints:
+    """Node numbers from `start` towards `end`, `end` left out, at steps of `increment`."""
+    step = abs(increment) if end >= start else -abs(increment)
+    return np.arange(start, end, step, dtype=np.int32)
+
+
+def _interpolate(values: Floats, records: Sequence[NodeValues], findings: Findings) -> None:
+    """Fill rows between two cards linearly, adding one constant step at a time (GENVEC)."""
+    last: NodeValues | None = None
+    for record in _existing(records, "node", len(values), "E301", findings):
+        values[record.node - 1] = record.values
+        if last is not None and last.increment != 0:
+            if record.node == last.node:
+                findings.add(
+                    "E302",
+                    f"Node {record.node} follows itself, so that nothing can be generated.",
+                    record.place("node"),
+                    "a generation increment stands on the card before",
+                )
+            else:
+                run = _run(last.node, record.node, last.increment) - 1
+                if len(run) > 1:
+                    ends = values[record.node - 1] - values[last.node - 1]
+                    steps = np.tile(ends / len(run), (len(run), 1))
+                    steps[0] = values[last.node - 1]
+                    # Summed one by one, so that each node has the listing's own rounding.
+                    values[run[1:]] = np.add.accumulate(steps, axis=0)[1:]
+        last = record
+
+
+def _carry(codes: Ints, records: Sequence[NodeCodes], findings: Findings) -> None:
+    """Set restraint codes; negative ones carry on through generated nodes (PMESH)."""
+    last: NodeCodes | None = None
+    for record in _existing(records, "node", len(codes), "E301", findings):
+        row = codes[record.node - 1]
+        row[:] = record.codes
+        if last is not None:
+            before = codes[last.node - 1]
+            row[(row == 0) & (before < 0)] = -1
+            if last.increment != 0 and record.node != last.node:
+                run = _run(last.node, record.node, last.increment) - 1
+                carried = np.logical_or.accumulate(codes[run] < 0, axis=0)[:-1]
+                codes[run[1:]] = np.where(carried, -1, codes[run[1:]])
+        last = record
+
+
+def _step(elements: Ints, records: Sequence[ElementNodes], findings: Findings) -> None:
+    """Set elements; those between two cards add the earlier card's increment (PMESH)."""
+    numel = len(elements)
+    last: ElementNodes | None = None
+    for record in _existing(records, "element", numel, "E303", findings):
+        number = record.element
+        previous = 0 if last is None else last.element
+        if number <= previous:
+            findings.add(
+                "E304",
+                f"Element {number} stands after element {previous}; elements must ascend.",
+                record.place("element"),
+            )
+            continue
+        if last is None and number > 1:
+            findings.add(
+                "E305",
+                f"Element {number} comes first, so that elements before it are not given.",
+                record.place("element"),
+            )
+        if last is not None:
+            _fill(elements, last, number)
+        elements[number - 1] = record.nodes
+        last = record
+    if last is not None:
+        _fill(elements, last, numel + 1)
+
+
+def _fill(elements: Ints, record: ElementNodes, end: int) -> None:
+    """Generate the elements between a card's own and number `end`."""
+    count = end - record.element - 1
+    if count > 0:
+        nodes = np.asarray(record.nodes, dtype=np.int64)
+        steps = np.arange(1, count + 1)[:, None] * (record.increment or 1)
+        generated = np.where(nodes == 0, 0, nodes + steps)
+        # A node that falls to 0 or beyond the integers is no node; the checks report it.
+        generated = np.where((nodes != 0) & (generated == 0), -1, generated)
+        limits = np.iinfo(np.int32)
+        elements[record.element : end - 1] = np.clip(generated, limits.min, limits.max)
+
+
+def place_of_element(deck: Deck, number: int) -> Place | None:
+    """Where the card stands that gives or generates an element."""
+    segment = deck.last(Elements)
+    if segment is None:
+        return None
+    cards = bisect.bisect_right(segment.records, number, key=lambda record: record.element)
+    return segment.records[cards - 1].place("element") if cards else None

@@ -1,0 +1,143 @@
+"""Memory that a run will take, known before it takes any.
+
+The large parts are the element matrices, the assembled stiffness and its factors where a macro or
+the solver wants them, the vectors over nodes, and, of a run without an output file, the result.
+The factors below are upper bounds of what was measured on meshes of 4 000 to 160 000 nodes; the
+memory of interpreter and libraries is not counted.
+"""
+
+from __future__ import annotations
+
+import math
+
+from fecm import _memory
+from fecm.deck.macros import estimate_work, every, flat
+from fecm.deck.model import Material, Projectile
+from fecm.mechanics import element_matrices
+from fecm.mechanics.element_groups import congruence
+from fecm.mechanics.elements.quadrature import HIGHEST_ORDER
+from fecm.mechanics.natural_modes import DENSE
+from fecm.mechanics.plate import ASSEMBLED, BLOCK, PlateModel
+from fecm.mechanics.projectile import REPORT_ELEMENTS
+from fecm.mechanics.stiffness_product import AUTO, CSR, WORTH_GROUPING
+from fecm.problem.build import build_plate, rules
+from fecm.problem.check_program import output_bytes
+from fecm.problem.problem import Problem
+from fecm.results.sinks import RowBuffer
+
+# Bytes a node: mesh, state, fields, rows on their way to the file.
+NODE = 800
+# Bytes an element's unknown: its places, its forces, and the matrix that sums them.
+PLACE = 60
+# Bytes an element's point of strains: Jacobians and strains.
+POINT = 250
+# Bytes an entry of the element matrices that are kept; and of one that is being integrated, for
+# each row of B and point.
+KEPT, INTEGRATED = 12, 24
+# Strains in B: six of the membrane and of bending, two of the transverse shear.
+ROWS = 8
+# Bytes of factors of a plate without coupling: TANG's over n log2 n, EIGE's over n^1.5.
+TANGENT, SHIFTED = 300, 70
+# Bytes a step that the summary behind a run takes.
+STEP = 80
+
+STATIC = {"TANG", "EIGE"}
+
+
+def needed_bytes(
+    checked: Problem, *, solver: str = AUTO, in_memory: bool = False, exact: bool = True
+) -> int:
+    """Memory that a run takes at the most, about.
+
+    Parameters
+    ----------
+    checked : Problem
+        A problem without errors.
+    solver : str
+        How K u is had.
+    in_memory : bool
+        Whether the result is kept in memory instead of being written to a file.
+    exact : bool
+        Count the elements that are congruent to others, instead of taking each for one of its kind.
+    """
+    words = {macro.word for macro in flat(checked.program)}
+    sizes = estimate_work(checked.program)
+    output = output_bytes(checked.deck, sizes)
+    model = build_plate(checked.deck, checked.mesh)
+    total = NODE * checked.deck.control.numnp + _strains(checked)
+    if solver == CSR or words & STATIC:
+        total += ASSEMBLED * model.entries
+    if solver != CSR:
+        total += _product(model, exact=exact)
+    total += _factors(model, words) + _modes(checked)
+    total += 8 * 6 * (2 * _rod_elements(checked) + 2) ** 2
+    if in_memory:
+        return total + output
+    held = output if "CONV" in words else 0  # rows that never came are cut off in memory
+    return total + held + STEP * sizes.steps + 5 * RowBuffer.BYTES
+
+
+def check_memory(checked: Problem, *, solver: str = AUTO, in_memory: bool = False) -> None:
+    """Refuse a run that takes more memory than is free.
+
+    Raises
+    ------
+    NotEnoughMemoryError
+        With both numbers.
+    """
+    remedy = "write it to a file, or store fewer rows" if in_memory else "take a coarser mesh"
+    _memory.check(
+        "the run",
+        lambda exact: needed_bytes(checked, solver=solver, in_memory=in_memory, exact=exact),
+        lambda free: remedy,
+    )
+
+
+def _strains(checked: Problem) -> int:
+    card = checked.deck.require(Material).integration
+    points = len(rules(checked.deck.require(Material))[2].xi)
+    return POINT * checked.deck.control.numel * max(points, min(card.bending, HIGHEST_ORDER) ** 2)
+
+
+def _product(model: PlateModel, *, exact: bool) -> int:
+    """Element matrices of the product K u, and what it is to gather and sum."""
+    points = max(len(rule.xi) for rule in (model.rules.bending, model.rules.shear))
+    total = 0
+    for family in model.families:
+        count, n = len(family.rows), element_matrices.NDOF * family.nodes.shape[1]
+        alone, shared = count, 0
+        if exact:
+            same = congruence(family)
+            sizes = [0] * len(same.representatives)
+            for group in same.group.tolist():
+                sizes[group] += 1
+            shared = sum(size >= WORTH_GROUPING for size in sizes)
+            alone = sum(size for size in sizes if size < WORTH_GROUPING)
+        at_once = max(shared, min(alone, BLOCK))
+        total += (alone + shared) * n * n * KEPT + count * n * PLACE
+        total += at_once * points * ROWS * n * INTEGRATED
+    return total
+
+
+def _factors(model: PlateModel, words: set[str]) -> int:
+    """Factors of the stiffness: n log n in a plane mesh ordered well, n^1.5 ordered by columns."""
+    n = model.neq
+    total = TANGENT * n * math.log2(max(2, n)) if "TANG" in words else 0.0
+    total += SHIFTED * n**1.5 if "EIGE" in words else 0.0
+    # With coupling all five unknowns of two nodes meet, instead of 2 x 2 and 3 x 3 of them.
+    return int(total * (25 / 13 if model.laminate.is_coupled else 1.0))
+
+
+def _modes(checked: Problem) -> int:
+    """Matrices of EIGE, dense where it looks for many modes."""
+    n = checked.mesh.number_of_equations
+    counts = [min(n, every(m)) for m in flat(checked.program) if m.word == "EIGE"]
+    if not counts:
+        return 0
+    most = max(counts)
+    return 8 * n * (5 * n if n < DENSE or most >= n // 2 else 6 * most + 60)
+
+
+def _rod_elements(checked: Problem) -> int:
+    card = checked.deck.last(Projectile)
+    return REPORT_ELEMENTS if card is None else card.elements

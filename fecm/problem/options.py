@@ -1,0 +1,50 @@
+"""What can be chosen about a run, beside its deck; naming it imports nothing heavy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fecm.mechanics.rod_integrators import RodMethod
+from fecm.mechanics.stiffness_product import AUTO, SOLVERS
+
+# Error of the energy balance, as a part of what was given, that ends a run.
+ENERGY_LIMIT = 0.1
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How a problem is run; the default is the report's way.
+
+    Attributes
+    ----------
+    slips : frozenset of str
+        Slips of the printed program that are on: see :func:`~fecm.problem.slips.active_slips`.
+    solver : str
+        How K·u is computed, one of ``SOLVERS``: as suits the mesh, or by a sparse matrix.
+    threads : int
+        Threads that share the work of a step; 0 takes every core for a large mesh.  The result does
+        not depend on it.
+    rod_method : RodMethod
+        The rod's mass matrix and integrator.
+    energy_limit : float
+        Error of the energy balance, as a part of what was given, that ends a run without slips.
+
+    Raises
+    ------
+    ValueError
+        If a value is none of these.
+    """
+
+    slips: frozenset[str] = frozenset()
+    solver: str = AUTO
+    threads: int = 0
+    rod_method: RodMethod = field(default_factory=RodMethod)
+    energy_limit: float = ENERGY_LIMIT
+
+    def __post_init__(self) -> None:
+        if self.solver not in SOLVERS:
+            raise ValueError(f"unknown solver {self.solver!r}; known are {', '.join(SOLVERS)}")
+        if self.threads < 0:
+            raise ValueError(f"threads is {self.threads}; it must be 0 or more")
+        if not self.energy_limit > 0.0:
+            raise ValueError(f"energy_limit is {self.energy_limit:g}; it must be positive")

@@ -1,0 +1,171 @@
+"""Checks of a deck that was read: a plate that can be hit, a program that can run.
+
+Findings about what a segment lacks are held back where a card of that segment could not be read,
+so that one slip makes one finding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fecm.deck.findings import Findings
+from fecm.deck.macros import STEPS, Body, compile_program, hits
+from fecm.deck.model import (
+    Boundary,
+    Coordinates,
+    Deck,
+    Elements,
+    Gages,
+    Impact,
+    Indentation,
+    Material,
+    Projectile,
+    Segment,
+    ShearCorrection,
+    Units,
+)
+from fecm.deck.reader import ParsedProblem
+from fecm.mechanics.mesh import Mesh
+from fecm.problem.check_impact import (
+    check_gages,
+    check_impact,
+    check_law,
+    check_projectile,
+    check_resolution,
+    check_shear_correction,
+    warn_of_the_reports_rod,
+)
+from fecm.problem.check_material import check_material
+from fecm.problem.check_mesh import (
+    check_elements,
+    check_geometry,
+    check_in_plane_supports,
+    check_mesh,
+)
+from fecm.problem.check_plausibility import (
+    check_plausibility,
+    check_purpose,
+    check_time_step_of_contact,
+)
+from fecm.problem.check_program import check_program, check_time_step
+from fecm.problem.generate import generate
+
+ALWAYS: tuple[type[Segment], ...] = (Coordinates, Elements, Material)
+IN_AN_IMPACT: tuple[type[Segment], ...] = (Impact, Indentation)
+# Segments of which only the last counts.
+SINGLE: tuple[type[Segment], ...] = (
+    Coordinates, Elements, Material, Impact, Indentation, Projectile, ShearCorrection, Gages, Units
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A problem that was checked.
+
+    Attributes
+    ----------
+    deck : Deck
+    mesh : Mesh
+    program : tuple
+        The macro program with its loops nested.
+    """
+
+    deck: Deck
+    mesh: Mesh
+    program: Body
+
+
+def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) -> Problem | None:
+    """Check a problem.
+
+    Parameters
+    ----------
+    problem : ParsedProblem
+        As the reader left it.
+    findings : Findings
+        Receives what is wrong.
+    listing : bool
+        Whether the deck is for listing mode.
+
+    Returns
+    -------
+    Problem or None
+        None where the problem has no control card to check anything by.
+    """
+    deck, unsound = problem.deck, problem.unsound
+    if deck is None:
+        return None
+    before = findings.error_count
+    program = compile_program(deck.macros, findings)
+    _check_segments(deck, unsound, findings)
+    generated, elements_generated = findings.error_count, _element_errors(findings)
+    mesh = generate(deck, findings)
+    complete = findings.error_count == generated and not unsound & {"COOR", "ELEM"}
+    given = _element_errors(findings) == elements_generated and "ELEM" not in unsound
+    if given and deck.has(Elements):
+        sound = check_elements(deck, mesh, findings)
+        if sound and complete and deck.has(Coordinates):
+            check_mesh(deck, mesh, findings, listing=listing)
+    if (material := deck.last(Material)) is not None:
+        check_material(material, findings)
+    if (impact := deck.last(Impact)) is not None:
+        check_impact(impact, deck, mesh, findings)
+    if (law := deck.last(Indentation)) is not None:
+        check_law(law, findings)
+    if (projectile := deck.last(Projectile)) is not None:
+        check_projectile(projectile, findings)
+    if (correction := deck.last(ShearCorrection)) is not None:
+        check_shear_correction(correction, findings)
+    if (segment := deck.last(Gages)) is not None and findings.error_count == before and not unsound:
+        check_gages(segment, mesh, deck, findings)
+    checked = Problem(deck, mesh, program)
+    if findings.error_count == before and not unsound:
+        with np.errstate(all="ignore"):  # numbers beyond all range end in a finding
+            check_time_step(deck, mesh, program, findings)
+            check_program(deck, program, findings)
+            check_purpose(deck, mesh, findings)
+            if findings.error_count == before:
+                check_geometry(deck, mesh, findings)
+                check_in_plane_supports(deck, mesh, findings)
+                check_plausibility(deck, mesh, findings, hits=hits(program))
+                if STEPS.intersection(macro.word for macro in deck.macros):
+                    check_time_step_of_contact(deck, mesh, findings, hits=hits(program))
+            if hits(program):
+                if not deck.has(Projectile):
+                    warn_of_the_reports_rod(deck.require(Impact), findings)
+                check_resolution(deck, mesh, findings)
+    return checked
+
+
+def _element_errors(findings: Findings) -> int:
+    """How many ELEM cards no elements can be generated from."""
+    return sum(findings.counts[code] for code in ("E303", "E304", "E305"))
+
+
+def _check_segments(deck: Deck, unsound: set[str], findings: Findings) -> None:
+    """Segments that are missing, and those that another one of the same keyword replaces."""
+    words = {macro.word for macro in deck.macros}
+    for kind in (*ALWAYS, *(IN_AN_IMPACT if "RODP" in words else ())):
+        if not deck.has(kind) and kind.keyword not in unsound:
+            findings.add(
+                "E203",
+                f"The deck has no {kind.keyword} segment.",
+                deck.place(),
+                "it belongs before END",
+            )
+    for kind in SINGLE:
+        for segment in deck.all(kind)[1:]:
+            findings.add(
+                "W204",
+                f"A second {kind.keyword} segment replaces the first.",
+                segment.place(),
+                "take one of them out",
+            )
+    if len(deck.all(Boundary)) > 1:
+        findings.add(
+            "W204",
+            "A second BOUN segment adds to the first and replaces the codes of its nodes.",
+            deck.all(Boundary)[1].place(),
+        )

@@ -1,0 +1,153 @@
+"""What a deck would run: the summary of ``fecm check``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fecm._memory import format_bytes
+from fecm._typing import Floats
+from fecm.deck.macros import estimate_work, flat, hits
+from fecm.deck.units import MASS, mass_in_si, unit_names, unit_of
+from fecm.mechanics.plate import UnsoundPlateError
+from fecm.mechanics.stiffness_product import SAFE
+from fecm.mechanics.time_step import critical_time_step
+from fecm.problem.build import build_plate, build_projectile, moving_plate
+from fecm.problem.check_impact import resolution, said_error
+from fecm.problem.check_program import output_bytes
+from fecm.problem.problem import Problem
+
+
+@dataclass(frozen=True)
+class ProblemSummary:
+    """A problem in numbers.
+
+    Attributes
+    ----------
+    title : str
+    nodes, elements, layers, equations, steps : int
+    A, B, D, shear : ndarray
+        Laminate stiffnesses.
+    plate_mass, projectile_mass : float
+        Mass of the plate, and of the projectile whether it hits or not.
+    critical_time_step : float
+    time_steps : list of float
+        Every DT of the program.
+    output_bytes : int
+        About what the result will take.
+    elements_per_wave : float or None
+        Elements at the impact node per bending wave of the contact; None without impact.
+    mesh_error : float or None
+        Estimated mesh error of the peak force, relative to it.
+    units : dict
+        Names of the units; empty where the deck gives none.
+    """
+
+    title: str
+    nodes: int
+    elements: int
+    layers: int
+    equations: int
+    steps: int
+    A: Floats
+    B: Floats
+    D: Floats
+    shear: Floats
+    plate_mass: float
+    projectile_mass: float
+    critical_time_step: float
+    time_steps: list[float]
+    output_bytes: int
+    elements_per_wave: float | None
+    mesh_error: float | None
+    units: dict[str, str]
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values, for JSON."""
+        return {
+            name: value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in self.__dict__.items()
+        }
+
+    def lines(self) -> list[str]:
+        """Lines that a person reads."""
+
+        def quantity(value: float, dimension: str) -> str:
+            return f"{value:.4g} {unit_of(dimension, self.units)}".rstrip()
+
+        lines = [
+            self.title or "(no title)",
+            f"  nodes               {self.nodes}",
+            f"  elements            {self.elements}",
+            f"  equations           {self.equations}",
+            f"  layers              {self.layers}",
+        ]
+        for name, dimension in (("A", "force/length"), ("B", "force"), ("D", "force*length")):
+            lines += _matrix(name, getattr(self, name), unit_of(dimension, self.units))
+        lines += _matrix("shear xz, yz", self.shear, unit_of("force/length", self.units))
+
+        def mass(value: float) -> str:
+            known = mass_in_si(value, self.units)
+            return quantity(value, MASS) + (f" ({known})" if known else "")
+
+        lines += [
+            f"  plate mass          {mass(self.plate_mass)}",
+            f"  projectile mass     {mass(self.projectile_mass)}",
+            f"  critical time step  {quantity(self.critical_time_step, 'time')}",
+        ]
+        for dt in dict.fromkeys(self.time_steps):
+            dt = dt or SAFE * self.critical_time_step
+            share = dt / self.critical_time_step
+            lines.append(f"  DT                  {quantity(dt, 'time')} ({share:.0%} of it)")
+        if self.elements_per_wave is not None:
+            error = "" if self.mesh_error is None else f" ({said_error(self.mesh_error)})"
+            lines.append(f"  elements per wave   {self.elements_per_wave:.1f}{error}")
+        lines += [
+            f"  impact steps        {self.steps}",
+            f"  output              {format_bytes(self.output_bytes)}",
+        ]
+        return lines
+
+
+def _matrix(name: str, values: Floats, unit: str) -> list[str]:
+    """A matrix, its rounding errors shown as zeros."""
+    shown = np.where(np.abs(values) < 1e-12 * max(1.0, np.abs(values).max()), 0.0, values)
+    rows = [" ".join(f"{value:12.5g}" for value in row) for row in shown]
+    heads = [f"  {name:18}"] + [" " * 20] * (len(rows) - 1)
+    lines = [f"{head}{row}" for head, row in zip(heads, rows, strict=True)]
+    lines[0] = f"{lines[0]}  {unit}".rstrip()
+    return lines
+
+
+def summarise(checked: Problem) -> ProblemSummary:
+    """Summarise a problem without errors."""
+    deck, mesh = checked.deck, checked.mesh
+    plate = build_plate(deck, mesh)
+    sizes = estimate_work(checked.program)
+    laminate = plate.laminate
+    try:
+        critical = critical_time_step(moving_plate(deck, mesh, checked.program))
+    except UnsoundPlateError:  # found by the check wherever the program steps
+        critical = float("nan")
+    resolved = resolution(deck, mesh) if hits(checked.program) else None
+    return ProblemSummary(
+        title=deck.title,
+        nodes=deck.control.numnp,
+        elements=deck.control.numel,
+        layers=deck.control.layers,
+        equations=plate.neq,
+        steps=sizes.steps,
+        A=laminate.A,
+        B=laminate.B,
+        D=laminate.D,
+        shear=laminate.shear,
+        plate_mass=plate.area() * laminate.mass,
+        projectile_mass=build_projectile(deck).total_mass,
+        critical_time_step=critical,
+        time_steps=[m.value for m in flat(checked.program) if m.word == "DT"],
+        output_bytes=output_bytes(deck, sizes),
+        elements_per_wave=None if resolved is None else resolved.elements,
+        mesh_error=None if resolved is None else resolved.error,
+        units=unit_names(deck),
+    )

@@ -1,1 +1,0 @@
-"""From the states of a run to the rows of its result."""

@@ -1,0 +1,175 @@
+"""CSV: datasets of a result as tables in long form, for spreadsheets and data frames.
+
+The columns that number a row come first (step and time, then node, element or point, from 1), the
+values after them.  Numbers are written as Python's repr, from which they can be read back to the
+last bit.
+"""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.deck.records import AXES, DOF_NAMES
+from fecm.results.result import Result
+from fecm.results.schema import DATASETS, SCALES, STORED_BY, ExportError
+
+Array = NDArray[Any]
+
+# What numbers a row: its instant, and of modes their own number.
+CLOCK = ("step", "time", "number")
+# An axis whose places have names becomes columns.
+NAMED: dict[str | int, tuple[str, ...]] = {
+    "ndf": DOF_NAMES,
+    "ndm": AXES,
+    "nen": tuple(f"node_{n}" for n in range(1, 13)),
+    3: ("xx", "yy", "xy"),
+    2: ("xz", "yz"),
+}
+# Lines that are made at a time.
+BLOCK = 100_000
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table.
+
+    Attributes
+    ----------
+    header : tuple of str
+        Names of the columns.
+    rows : iterator of tuple
+        Values of the columns, row by row.
+    """
+
+    header: tuple[str, ...]
+    rows: Iterator[tuple[float, ...]]
+
+    def lines(self) -> Iterator[str]:
+        """All lines with their ends, the header's first."""
+        yield ",".join(self.header) + "\n"
+        for row in self.rows:
+            yield ",".join(map(repr, row)) + "\n"
+
+
+def table(result: Result, name: str = "history") -> Table:
+    """Table of one dataset, or of the datasets of a group side by side.
+
+    Parameters
+    ----------
+    result : Result
+    name : str
+        A dataset as ``tape3/w``, or a group as ``history``.
+
+    Raises
+    ------
+    ExportError
+        If the result has no such dataset or group, or the group's datasets have not the same axes.
+    """
+    members = _members(result, name.strip("/"))
+    beside = [_beside(members[0], column) for column in CLOCK]
+    clock = [path for path in beside if path in result and _in_rows(path)]
+    values = [path for path in members if path not in clock]
+    if clock and values and not any(map(_in_rows, values)):
+        clock = []
+    elif clock:
+        values = list(filter(_in_rows, values))  # the others are the same at every row
+    if name.strip("/") == "tape3":
+        values = ["tape3/displacement"]  # w is one of its columns
+    if not values:  # step or time by itself
+        return Table(_names(clock), zip(*(result[path].tolist() for path in clock), strict=True))
+    if len({result[path].shape for path in values}) > 1:
+        raise ExportError(f"the datasets of {name} are no one table; name {_either(values)}")
+    sizes = _sizes(values[0], result[values[0]].shape)[bool(clock) :]
+    columns = _names(values)
+    if len(values) == 1 and sizes and len(names := NAMED.get(sizes[-1][0], ())) >= sizes[-1][1]:
+        columns = names[: sizes.pop()[1]]
+    keys = tuple(SCALES[str(size)][0] if str(size) in SCALES else "row" for size, _ in sizes)
+    rows = _rows(
+        [result[path] for path in values],
+        [result[path] for path in clock],
+        [_labels(result, size, length) for size, length in sizes],
+    )
+    return Table((*_names(clock), *keys, *columns), rows)
+
+
+def _members(result: Result, name: str) -> list[str]:
+    """Paths of a dataset, or of a group's datasets in the schema's order."""
+    if name in result:
+        return [name]
+    members = [path for path in result if path.startswith(f"{name}/")]
+    if members:
+        known = list(DATASETS)
+        return sorted(members, key=lambda path: known.index(path) if path in known else len(known))
+    group = name.partition("/")[0]
+    groups = sorted({path.partition("/")[0] for path in result})
+    if group in STORED_BY and group not in groups:
+        macro = STORED_BY[group]
+        raise ExportError(
+            f"the result has no {name}; add {macro} to the deck's program and run it again"
+        )
+    names = sorted({*result, *groups})
+    near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    near = near or [path for path in names if path.rpartition("/")[2] == name]
+    hint = f"did you mean {_either(near)}?" if near else f"it has {_either(groups, 'and')}"
+    raise ExportError(f"the result has no dataset {name}; {hint}")
+
+
+def _either(names: Sequence[str], word: str = "or") -> str:
+    """A list in words."""
+    *others, last = names
+    return f"{', '.join(others)} {word} {last}" if others else last
+
+
+def _names(paths: Sequence[str]) -> tuple[str, ...]:
+    """Names of datasets in their groups."""
+    return tuple(path.rpartition("/")[2] for path in paths)
+
+
+def _in_rows(path: str) -> bool:
+    """Whether a dataset of a group with a clock has an instant a row."""
+    return path not in DATASETS or DATASETS[path].shape[0] == "rows"
+
+
+def _beside(path: str, name: str) -> str:
+    """Path of another dataset of the same group."""
+    return f"{path.rpartition('/')[0]}/{name}"
+
+
+def _labels(result: Result, size: str | int, length: int) -> Sequence[int]:
+    """Numbers along an axis: those of the gages' cards, from 1 elsewhere."""
+    if size == "gages" and "gages/number" in result:
+        return [int(number) for number in result["gages/number"]]
+    return range(1, length + 1)
+
+
+def _sizes(path: str, shape: tuple[int, ...]) -> list[tuple[str | int, int]]:
+    """Name and length of every axis."""
+    known = DATASETS[path].shape if path in DATASETS else shape
+    return list(zip(known, shape, strict=True))
+
+
+def _rows(
+    arrays: Sequence[Array], clock: Sequence[Array], keys: Sequence[Sequence[int]]
+) -> Iterator[tuple[float, ...]]:
+    """Rows of arrays that have the axes (instants, keys, columns); the first only with a clock."""
+    if not clock:
+        arrays = [array[None] for array in arrays]
+    numbers = list(itertools.product(*keys))
+    step = max(1, BLOCK // len(numbers))
+    for start in range(0, len(arrays[0]), step):
+        block = slice(start, start + step)
+        instants = list(zip(*(times[block].tolist() for times in clock), strict=True))
+        parts = [array[block] for array in arrays]
+        tables = np.concatenate(
+            [part.reshape(len(part), len(numbers), -1) for part in parts], axis=2
+        ).tolist()
+        for instant, rows in zip(instants or [()], tables, strict=True):
+            for number, row in zip(numbers, rows, strict=True):
+                yield (*instant, *number, *row)

@@ -1,0 +1,246 @@
+"""Writes result files: HDF5, beside their final name and renamed when complete."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._files import beside
+from fecm.deck.records import DOF_NAMES
+from fecm.deck.units import unit_of
+from fecm.results.schema import (
+    GROUP_DESCRIPTIONS,
+    SCALES,
+    Dataset,
+    ResultWriteError,
+    declared_units,
+)
+
+Array = NDArray[Any]
+TIME = "time"
+
+
+class FileSink:
+    """Writes a result into an open HDF5 file."""
+
+    def __init__(self, file: h5py.File, guarded: _Guarded) -> None:
+        self._file = file
+        self._guarded = guarded
+        self._units: dict[str, str] = {}
+        self._datasets: dict[str, h5py.Dataset] = {}
+        self._made: list[Dataset] = []
+
+    def _group(self, name: str) -> h5py.Group:
+        if not name:
+            return self._file
+        new = name not in self._file
+        group = self._file.require_group(name)
+        if new and name in GROUP_DESCRIPTIONS:
+            group.attrs["description"] = GROUP_DESCRIPTIONS[name]
+        return group
+
+    def attributes(self, group: str, values: Mapping[str, Any]) -> None:
+        """Set attributes of a group; a list of strings becomes an array of strings."""
+        target = self._group(group)
+        if not group:
+            self._units = declared_units(values)
+        for name, value in values.items():
+            if isinstance(value, list | tuple):
+                target.attrs.create(name, value, (len(value),), h5py.string_dtype())
+            else:
+                target.attrs[name] = value
+
+    def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
+        """Make a contiguous dataset of its full shape."""
+        made = self._group(dataset.group).create_dataset(dataset.name, shape, dataset.dtype)
+        made.attrs["description"] = dataset.description
+        made.attrs["long_name"] = dataset.description
+        if dataset.dimension:
+            made.attrs["dimension"] = dataset.dimension
+            if unit := unit_of(dataset.dimension, self._units):
+                made.attrs["unit"] = unit
+        self._datasets[dataset.path] = made
+        self._made.append(dataset)
+
+    def label_axes(self) -> None:
+        """Attach scales to every axis of what is stored in rows, by which xarray knows them.
+
+        HDF5's Dimension Scales Specification.  Rows have their group's times; nodes, elements,
+        points and unknowns have the file's own scales, as a netCDF reader finds dimensions in a
+        group and in those above it, and takes a dataset with all of its axes labelled or none.
+        """
+        made_of = [(d, self._datasets[d.path]) for d in self._made if d.path in self._datasets]
+        clocks = {d.group: made for d, made in made_of if d.name == TIME}
+        for clock in clocks.values():
+            clock.make_scale(TIME)
+        for dataset, made in made_of:
+            clock = clocks.get(dataset.group)
+            if clock is None or made == clock:
+                continue
+            for axis, size in enumerate(dataset.shape):
+                rows = size == "rows"
+                scale = clock if rows else self._scale(str(size), made.shape[axis])
+                made.dims[axis].attach_scale(scale)
+
+    def _scale(self, size: str, length: int) -> h5py.Dataset:
+        """The scale of an axis, made when it is first asked for."""
+        name, description = SCALES.get(size, (size, ""))
+        if name not in self._file:
+            if size == "ndf":
+                made = self._file.create_dataset(name, data=DOF_NAMES, dtype=h5py.string_dtype())
+            else:
+                made = self._file.create_dataset(name, data=np.arange(1, length + 1, dtype="i4"))
+            made.make_scale(name)
+            made.attrs["description"] = made.attrs["long_name"] = description
+        return self._file[name]
+
+    def write(self, path: str, start: int, rows: Array) -> None:
+        """Store rows of a dataset.
+
+        Raises
+        ------
+        OSError
+            If this or an earlier write failed.
+        """
+        self.check()
+        # By h5py's low-level interface: its slices take four times as long for a short block.
+        dataset = self._datasets[path]
+        values = np.ascontiguousarray(rows, dataset.dtype)
+        place = dataset.id.get_space()
+        place.select_hyperslab((start, *[0] * (values.ndim - 1)), values.shape)
+        dataset.id.write(h5py.h5s.create_simple(values.shape), place, values)
+
+    def check(self) -> None:
+        """Raise the first error of writing.
+
+        Raises
+        ------
+        OSError
+        """
+        if self._guarded.error is not None:
+            raise self._guarded.error
+
+    def stored(self, path: str, start: int, stop: int) -> Array:
+        """Rows of a dataset as they stand in the file."""
+        return np.asarray(self._datasets[path][start:stop])
+
+    def trim(self, path: str, rows: int) -> None:
+        """Cut a dataset down to its first rows; without any it goes, and an empty group with it."""
+        old = self._datasets.pop(path)
+        group, name = old.parent, path.rpartition("/")[2]
+        attributes = dict(old.attrs)
+        kept = old[:rows]
+        del group[name]
+        if rows:
+            made = group.create_dataset(name, data=kept)
+            made.attrs.update(attributes)
+            self._datasets[path] = made
+        elif not len(group):
+            del self._file[path.rpartition("/")[0]]
+
+    def text(self, path: str, value: str, description: str) -> None:
+        """Store a text."""
+        made = self._file.create_dataset(path, data=value, dtype=h5py.string_dtype())
+        made.attrs["description"] = description
+
+    def texts(self, path: str, values: Sequence[str], description: str) -> None:
+        """Store texts, one a row."""
+        made = self._file.create_dataset(path, data=list(values), dtype=h5py.string_dtype())
+        made.attrs["description"] = description
+
+
+@contextlib.contextmanager
+def writing(path: Path, *, overwrite: bool = True) -> Iterator[FileSink]:
+    """Open a result for writing; it gets its final name only when all went well.
+
+    Parameters
+    ----------
+    path : Path
+    overwrite : bool
+        Replace a file that exists.
+
+    Raises
+    ------
+    ResultWriteError
+        If the file can't be written; what was under the final name is then untouched.
+    """
+    with new_hdf5(path, overwrite=overwrite) as (file, guarded):
+        sink = FileSink(file, guarded)
+        yield sink
+        sink.label_axes()
+
+
+@contextlib.contextmanager
+def new_hdf5(path: Path, *, overwrite: bool = True) -> Iterator[tuple[h5py.File, _Guarded]]:
+    """Open an HDF5 file for writing; see :func:`writing`."""
+    with (
+        beside(path, overwrite=overwrite) as partial,
+        partial.open("w+b", buffering=0) as raw,
+    ):
+        guarded = _Guarded(raw)
+        with h5py.File(guarded, "w") as file:
+            try:
+                yield file, guarded
+            except OSError as error:
+                if error is guarded.error:
+                    raise _unwritten(path, error) from None
+                raise
+        if guarded.error is not None:
+            raise _unwritten(path, guarded.error)
+
+
+def _unwritten(path: Path, error: OSError) -> ResultWriteError:
+    return ResultWriteError(f"{path} can't be written: {error.strerror or error}")
+
+
+class _Guarded:
+    """A file that remembers the first error of writing instead of raising it.
+
+    HDF5 can neither go on nor let go of a file once a write has failed in it: it complains at every
+    turn, and falls over at the end of the program.  So it is left in the belief that all is well,
+    until the sink asks.
+    """
+
+    def __init__(self, raw: io.FileIO) -> None:
+        self._raw = raw
+        self.error: OSError | None = None
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        return self._raw.seek(offset, whence)
+
+    def tell(self) -> int:
+        return self._raw.tell()
+
+    def read(self, size: int = -1) -> bytes:
+        return self._raw.read(size) or b""
+
+    def readinto(self, buffer: memoryview) -> int:
+        return self._raw.readinto(buffer) or 0
+
+    def write(self, data: memoryview) -> int:
+        view = memoryview(data).cast("B")
+        done = 0
+        while self.error is None and done < len(view):
+            try:
+                done += self._raw.write(view[done:]) or 0
+            except OSError as error:
+                self.error = error
+        return len(view)
+
+    def truncate(self, size: int | None = None) -> int:
+        if self.error is None:
+            try:
+                self._raw.truncate(size)
+            except OSError as error:
+                self.error = error
+        return size or 0
+
+    def flush(self) -> None:
+        """Nothing is buffered."""

@@ -1,0 +1,200 @@
+"""VTKHDF: a result as one file of time steps for ParaView and VTK.
+
+The format is VTK's own (VTKHDF File Format, version 2.2, type UnstructuredGrid, temporal): arrays
+of all time steps stand one after another, and offsets say where a step's part begins.  The mesh
+stands there once, all of its offsets being 0.  Point n - 1 is node n, cell n - 1 element n.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm.mechanics.strains import STRAINS
+from fecm.results.hdf5_writer import new_hdf5
+from fecm.results.result import Result
+from fecm.results.schema import ExportError
+
+Array = NDArray[Any]
+Ints = NDArray[np.int64]
+Note = Callable[[str], None]
+
+VERSION = (2, 2)
+CORNERS, TRIANGLE = 4, 3
+# VTK's cell types (vtkCellType.h) of elements whose first 3, 4, 8 or 9 nodes are there.
+TYPES = {3: 5, 4: 9, 8: 23, 9: 28}
+# Points an element that lie at its first nodes (K = -2: corners, K = -3: all nine).
+NODAL_POINTS = (4, 9)
+CONTACT = ("force", "indentation", "transducer")
+# Numbers that stand in memory at a time while fields are written.
+BLOCK = 4_000_000
+
+
+def write_vtkhdf(
+    result: Result, path: Path, note: Note = lambda text: None, *, overwrite: bool = True
+) -> None:
+    """Write a result as VTKHDF, a time step a row of tape3.
+
+    Parameters
+    ----------
+    result : Result
+    path : Path
+    note : callable
+        Receives a sentence about whatever could not be exported in full.
+    overwrite : bool
+        Replace a file that exists.
+
+    Raises
+    ------
+    ExportError
+        If the result holds no displacements.
+    OSError
+        If the file can't be written.
+    """
+    if "tape3/displacement" not in result:
+        raise ExportError(
+            "the result holds no displacements (tape3), so that there is no time step to export; "
+            "add DISP to the deck's program and run it again"
+        )
+    # A state that was stored twice is one time step.
+    steps, rows = np.unique(result["tape3/step"], return_index=True)
+    cells = _cells(result["mesh/elements"])
+    with new_hdf5(path, overwrite=overwrite) as (file, _):
+        root = file.create_group("VTKHDF")
+        root.attrs["Version"] = np.array(VERSION, dtype="i8")
+        root.attrs.create("Type", np.bytes_(b"UnstructuredGrid"))
+        _write_mesh(root, result["mesh/coordinates"], *cells)
+        _write_clock(root, np.asarray(result["tape3/time"])[rows])
+        _write_displacements(root, result["tape3/displacement"], rows)
+        _write_contact(root, result, steps)
+        _write_strains(root, result, steps, note)
+
+
+def _cells(elements: Array) -> tuple[Ints, Ints, Ints]:
+    """Connectivity, offsets and types; elements that VTK has no cell for are drawn by corners."""
+    count = np.cumprod(elements > 0, axis=1).sum(axis=1)  # nodes before the first absent one
+    whole = (count == (elements > 0).sum(axis=1)) & np.isin(count, list(TYPES))
+    used = np.where(whole, count, np.minimum(count, CORNERS))
+    connectivity = elements[np.arange(elements.shape[1]) < used[:, None]] - 1
+    types = np.array([TYPES[int(n)] for n in used])
+    return connectivity.astype("i8"), np.concatenate(([0], np.cumsum(used))), types
+
+
+def _write_mesh(
+    root: h5py.Group, coordinates: Array, connectivity: Ints, offsets: Ints, types: Ints
+) -> None:
+    points = np.zeros((len(coordinates), 3))
+    points[:, : coordinates.shape[1]] = coordinates
+    root["Points"] = points
+    root["Connectivity"], root["Offsets"] = connectivity, offsets.astype("i8")
+    root["Types"] = types.astype("u1")
+    for name, size in (
+        ("NumberOfPoints", len(points)),
+        ("NumberOfCells", len(types)),
+        ("NumberOfConnectivityIds", len(connectivity)),
+    ):
+        root[name] = np.array([size], dtype="i8")
+
+
+def _write_clock(root: h5py.Group, times: Array) -> None:
+    clock = root.create_group("Steps")
+    clock.attrs["NSteps"] = np.int64(len(times))
+    clock["Values"] = times.astype("f8")
+    zeros = np.zeros(len(times), dtype="i8")
+    clock["PartOffsets"] = clock["PointOffsets"] = zeros
+    clock["NumberOfParts"] = zeros + 1
+    clock["CellOffsets"] = clock["ConnectivityIdOffsets"] = zeros[:, None]
+
+
+def _field(root: h5py.Group, kind: str, name: str, steps: int, shape: tuple[int, ...]) -> Any:
+    """Make room for an array of `shape` a step, the steps one after another."""
+    dataset = root.require_group(f"{kind}Data").create_dataset(
+        name, (steps * shape[0], *shape[1:]), "f8"
+    )
+    offsets = np.arange(steps, dtype="i8") * shape[0]
+    root.require_group(f"Steps/{kind}DataOffsets")[name] = offsets
+    if kind == "Field":
+        sizes = np.tile(np.array([1, shape[0]], dtype="i8"), (steps, 1))
+        root.require_group("Steps/FieldDataSizes")[name] = sizes
+    return dataset
+
+
+def _write_displacements(root: h5py.Group, stored: Array, rows: Ints) -> None:
+    """Point data: displacement (u, v, w), w by itself, rotations (theta_x, theta_y)."""
+    _, numnp, ndf = stored.shape
+    parts: dict[str, tuple[list[int], tuple[int, ...]]] = {
+        "displacement": ([0, 1, 2], (3,)),
+        "w": ([2], ()),
+        "rotation": (list(range(3, ndf)), (ndf - 3,)),
+    }
+    fields = {
+        name: _field(root, "Point", name, len(rows), (numnp, *width))
+        for name, (columns, width) in parts.items()
+        if columns
+    }
+    block = max(1, BLOCK // (numnp * ndf))
+    for start in range(0, len(rows), block):
+        values = stored[rows[start : start + block]].reshape(-1, ndf)
+        for name, dataset in fields.items():
+            columns, width = parts[name]
+            part = values[:, columns].reshape(-1, *width)
+            dataset[start * numnp : start * numnp + len(part)] = part
+
+
+def _write_contact(root: h5py.Group, result: Result, steps: Ints) -> None:
+    """Field data: contact at each step; before the first one there was none."""
+    if "history/step" not in result:
+        return
+    at = np.searchsorted(result["history/step"], steps)
+    for name in CONTACT:
+        values = np.concatenate((result[f"history/{name}"], [0.0]))
+        at_step = np.where(steps > 0, values[np.minimum(at, len(values) - 1)], 0.0)
+        _field(root, "Field", name, len(steps), (1,))[:] = at_step
+
+
+def _write_strains(root: h5py.Group, result: Result, steps: Ints, note: Note) -> None:
+    """Curvatures and transverse shear strains: at nodes if stored there, else means of cells."""
+    if "tape8/step" not in result:
+        note("the result holds no strains (tape8): the macro RODP stores them")
+        return
+    stored = result["tape8/step"]
+    at = np.minimum(np.searchsorted(stored, steps), len(stored) - 1)
+    shared = stored[at] == steps
+    if not shared.any():
+        note("strains (tape8) and displacements (tape3) share no step; strains are left out")
+        return
+    if not shared.all():
+        note(
+            f"strains (tape8) were stored at {shared.sum()} of {len(steps)} time steps; at the "
+            "others they are NaN"
+        )
+    elements, numnp = result["mesh/elements"], len(result["mesh/coordinates"])
+    npt = result["tape8/kappa_x"].shape[2]
+    at_nodes = result.tape8.attributes.get("location") == "nodes" and _covers(elements, npt)
+    kind, length = ("Point", numnp) if at_nodes else ("Cell", len(elements))
+    for name in STRAINS:
+        field = _field(root, kind, name, len(steps), (length,))
+        values = result[f"tape8/{name}"]
+        for number in range(len(steps)):
+            row = values[at[number]] if shared[number] else np.full(values.shape[1:], np.nan)
+            step = _nodal_means(row, elements, numnp) if at_nodes else row.mean(axis=1)
+            field[number * length : (number + 1) * length] = step
+
+
+def _covers(elements: Array, npt: int) -> bool:
+    """Whether nodal points lie at every node of every element."""
+    return npt in NODAL_POINTS and not (elements[:, npt:] > 0).any()
+
+
+def _nodal_means(row: Array, elements: Array, numnp: int) -> Array:
+    """Mean of the values of all elements that meet at a node, (numnp,)."""
+    width = min(row.shape[1], elements.shape[1])
+    nodes, values = elements[:, :width], row[:, :width]
+    there = nodes > 0
+    sums = np.bincount(nodes[there] - 1, weights=values[there], minlength=numnp)
+    return np.asarray(sums / np.bincount(nodes[there] - 1, minlength=numnp))

@@ -1,0 +1,1 @@
+"""One program, from its problem to its result."""

@@ -1,0 +1,1 @@
+"""Waves, indentation tests and rod tests."""

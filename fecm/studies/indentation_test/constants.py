@@ -1,0 +1,251 @@
+"""The constants of the indentation law from an indentation test."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fecm._typing import Floats
+from fecm.mechanics.contact_law import (
+    ACR_POWER,
+    LOADING_POWER,
+    ContactParameters,
+    LinearPermanent,
+    YangSunPermanent,
+)
+from fecm.studies.indentation_test.curves import (
+    Curves,
+    Estimate,
+    Solution,
+    r_squared,
+    scaled,
+    solve,
+)
+from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING, NoTestError, divide
+from fecm.studies.indentation_test.permanent import Critical, Line, critical, line
+
+
+@dataclass(frozen=True)
+class FreePower:
+    """The first loading with its own power, F = k a^n (equation 3-1).
+
+    Attributes
+    ----------
+    n : Estimate
+    k : Estimate
+        Force/length^n.
+    r_squared : float or None
+    """
+
+    n: Estimate
+    k: Estimate
+    r_squared: float | None
+
+
+def free_power(curves: Curves) -> FreePower:
+    """Fit the first loading with a power of its own.
+
+    The coefficient at the largest indentation and the power hardly depend on each other; the
+    coefficient at unit indentation, far from every point, inherits the power's error.
+    """
+    from scipy.optimize import least_squares
+
+    rows = curves.division.rows(LOADING)
+    everywhere = np.maximum(curves.a[rows], 0.0), curves.f[rows]
+    a, f = (values[everywhere[0] > 0.0] for values in everywhere)
+    log = np.log(a)
+    found = least_squares(
+        lambda p: f - p[0] * a ** p[1], [1.0, LOADING_POWER], xtol=1e-12, ftol=1e-12
+    )
+    c, n = found.x
+    fitted = c * a**n
+    jacobian = np.stack([a**n, fitted * log], axis=1)
+    inverse = np.linalg.pinv(jacobian)
+    leverage = np.clip(np.einsum("ij,ji->i", jacobian, inverse), 0.0, 0.999)
+    influence = inverse * ((f - fitted) / np.sqrt(1.0 - leverage))
+    covariance = influence @ influence.T
+    k = c * curves.force / curves.length**n
+    by = np.array([k / c, -k * np.log(curves.length)])
+    return FreePower(
+        Estimate(float(n), float(covariance[1, 1] ** 0.5)),
+        Estimate(float(k), float((by @ covariance @ by) ** 0.5)),
+        r_squared(c * everywhere[0] ** n, everywhere[1]),
+    )
+
+
+# Numbers whose powers stay within range.
+LARGEST = 1e60
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """A departure from the first loading curve.
+
+    Attributes
+    ----------
+    alpha_m, alpha_0 : Estimate
+        Largest and permanent indentation (length); alpha_m has an error of 0 where it is the
+        recorded one.
+    recorded : float
+        The largest indentation as recorded, smoothed where it is noisy (length).
+    k_1 : Estimate
+        Reloading rigidity, equation 3-12, force/length^1.5.
+    k_1_measured : Estimate or None
+        The same of the first reloading curve's own origin; None where there is none, or where it
+        began without contact, so that both are one.
+    """
+
+    alpha_m: Estimate
+    alpha_0: Estimate
+    recorded: float
+    k_1: Estimate
+    k_1_measured: Estimate | None
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What a test tells.
+
+    Attributes
+    ----------
+    k : Estimate
+        Contact coefficient with n = 3/2, force/length^1.5.
+    free : FreePower
+        The first loading with a power of its own.
+    q : Estimate or None
+        Unloading power; None without unloading.
+    cycles : tuple of Cycle
+    line : Line or None
+        s_p and alpha_p; None where fewer than two cycles leave an indentation.
+    critical : Critical or None
+        alpha_cr; only where the law of equation 3-7 was asked for.
+    r_squared : dict
+        By ``loading``, ``unloading``, ``reloading``, ``permanent``.
+    scatter : float
+        Root mean square of the residuals over the largest force.
+    solution : Solution
+        The fitted curves.
+    """
+
+    k: Estimate
+    free: FreePower
+    q: Estimate | None
+    cycles: tuple[Cycle, ...]
+    line: Line | None
+    critical: Critical | None
+    r_squared: dict[str, float | None]
+    scatter: float
+    solution: Solution
+
+    def relation(self) -> ContactParameters | None:
+        """The law, with values that it admits; None where alpha_0 is not related to alpha_m."""
+        k = self.k.value
+        if self.critical is not None:
+            return YangSunPermanent(k, self.critical.alpha_cr.value)
+        if self.line is None or self.q is None:
+            return None
+        s_p = self.line.s_p.value
+        if not 0.0 < s_p < 1.0:
+            return LinearPermanent(k, 0.0, 0.0, self.q.value)
+        return LinearPermanent(k, max(self.line.alpha_p.value, 0.0), s_p, self.q.value)
+
+
+def fit(
+    indentation: ArrayLike,
+    force: ArrayLike,
+    *,
+    retreat: float | None = None,
+    q: float | None = None,
+    acr: bool = False,
+) -> Fit:
+    """Fit the indentation law to a test.
+
+    Parameters
+    ----------
+    indentation, force : array_like (n,)
+        In the order of measurement, from first contact at zero on; positive in compression.
+    retreat : float, optional
+        How far the indentation goes back before a turn counts (length); found by itself if None.
+    q : float, optional
+        Unloading power, where it is given instead of found.
+    acr : bool
+        Find alpha_cr of equation 3-7, with q = 5/2, instead of s_p and alpha_p of 3-8.
+
+    Raises
+    ------
+    NoTestError
+        If the points are no indentation test.
+    """
+    a, f = np.asarray(indentation, dtype=float), np.asarray(force, dtype=float)
+    if a.shape != f.shape or a.ndim != 1:
+        raise NoTestError("indentation and force are not equally many")
+    if len(a) < 10:
+        raise NoTestError(f"{len(a)} points are too few for a test")
+    for name, values in (("indentations", a), ("forces", f)):
+        if not 1.0 / LARGEST < float(np.abs(values).max()) < LARGEST:
+            raise NoTestError(f"the {name} are not between {1.0 / LARGEST:g} and {LARGEST:g}")
+    curves = scaled(divide(a, retreat), a, f)
+    solution = solve(curves, ACR_POWER if acr else q)
+    at, division, p = solution.curves.layout, curves.division, solution.values
+    peaks = [at.corners[n] for n in division.peaks]
+    places = peaks + at.permanents
+    covariance = solution.covariance[np.ix_(places, places)]
+    found = p[peaks], p[at.permanents], covariance
+    cycles = tuple(_cycle(solution, n) for n in range(len(peaks)))
+    straight = line(*found) if not acr and len(cycles) > 1 else None
+    fitted, measured = solution.curves.of(solution.scaled, LOADING, FALLING, RISING)
+    return Fit(
+        k=_parameter(solution, at.K),
+        free=free_power(curves),
+        q=_parameter(solution, at.Q) if cycles else None,
+        cycles=cycles,
+        line=straight,
+        critical=critical(*found) if acr and cycles else None,
+        r_squared={
+            kind: solution.curves.r_squared(solution.scaled, kind)
+            for kind in (LOADING, FALLING, RISING)
+        }
+        | {"permanent": _explained(straight, found[0], found[1])},
+        scatter=float(np.sqrt(np.mean((fitted - measured) ** 2))),
+        solution=solution,
+    )
+
+
+def _explained(straight: Line | None, peaks: Floats, permanents: Floats) -> float | None:
+    """R^2 of equation 3-8; None for fewer than three cycles."""
+    if straight is None or len(peaks) < 3:
+        return None
+    fitted = np.maximum(straight.s_p.value * (peaks - straight.alpha_p.value), 0.0)
+    total = float(((permanents - permanents.mean()) ** 2).sum())
+    return 1.0 - float(((permanents - fitted) ** 2).sum()) / total if total else None
+
+
+def _parameter(solution: Solution, place: int) -> Estimate:
+    error = max(float(solution.covariance[place, place]), 0.0) ** 0.5
+    return Estimate(float(solution.values[place]), error)
+
+
+def _cycle(solution: Solution, number: int) -> Cycle:
+    """A cycle's values, and the rigidities that follow from them."""
+    at, division = solution.curves.layout, solution.curves.division
+    corner = division.peaks[number]
+    peak, permanent = at.corners[corner], at.permanents[number]
+
+    def rigidity(origin: int) -> Estimate:
+        def k_1(p: Floats) -> float:
+            return float(p[at.K] * (p[peak] / (p[peak] - p[origin])) ** LOADING_POWER)
+
+        return solution.estimate(k_1)
+
+    own = [
+        place for n, place in at.origins.items() if division.stretches[n].cycle == number
+    ]  # fmt: skip
+    return Cycle(
+        alpha_m=_parameter(solution, peak),
+        alpha_0=_parameter(solution, permanent),
+        recorded=division.corners[corner].indentation,
+        k_1=rigidity(permanent),
+        k_1_measured=rigidity(own[0]) if own else None,
+    )

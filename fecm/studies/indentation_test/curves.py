@@ -1,0 +1,395 @@
+"""Least squares of the curves of an indentation test, with the covariance of all that is found.
+
+First k from the first loading alone (equation 3-1 with n = 3/2).  Then, with this k, the power q,
+of every cycle its peak alpha_m and permanent indentation alpha_0, and of every reloading its
+origin, from all unloading and reloading curves at once (equations 3-3 and 3-11).  A peak is where
+the unloading curve meets the first loading curve; the largest value recorded, which noise pushes
+up and coarse steps cut off, is only its first guess.
+
+Covariances are those of the points' own residuals (divided by 1 less their leverage), not of one
+variance for all: they hold for a scatter that grows with the force as for one that does not, and
+carry the error of k on to all the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._typing import Bools, Floats
+from fecm.mechanics.contact_law import LOADING_POWER, power_curve
+from fecm.studies.indentation_test import LIMITS_Q
+from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING, Division, NoTestError
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value and its standard error; an error of 0 where the value was given."""
+
+    value: float
+    error: float
+
+
+def r_squared(fitted: Floats, measured: Floats) -> float | None:
+    """1 less the residuals' share of the variance; None where nothing varies."""
+    if len(measured) < 2 or not np.ptp(measured):
+        return None
+    total = float(((measured - measured.mean()) ** 2).sum())
+    return 1.0 - float(((measured - fitted) ** 2).sum()) / total
+
+
+Ints = NDArray[np.int64]
+
+# Points that a curve needs.
+FEWEST = 5
+
+FIRST_Q = 2.2
+
+# Distance from a limit, in parts of the way between both, at which a value counts as at it.
+AT_LIMIT = 1e-4
+
+# How far a peak may move from its record, and where origins may lie, in parts of the peak.
+PEAK_MOVES = 0.15
+
+LIMITS_PERMANENT = (-0.5, 0.8)
+
+LIMITS_ORIGIN = (-3.0, 0.8)
+
+# A peak with a larger error than this part of itself is not found by the curves.
+VAGUE = 0.05
+
+# Standard errors by which an origin is clearly above a turn.
+SURE = 3.0
+
+STEP = 1e-6
+
+
+@dataclass(frozen=True)
+class ParameterLayout:
+    """Where each parameter stands in the vector of all.
+
+    Attributes
+    ----------
+    corners, permanents : list of int
+        By corner, by cycle.
+    origins : dict
+        By the number of the RISING stretch.  Those that begin without contact have the cycle's
+        permanent indentation instead, and those with too few points are not fitted.
+    size : int
+    """
+
+    corners: list[int]
+    permanents: list[int]
+    origins: dict[int, int]
+    size: int
+
+    K, Q = 0, 1
+
+
+def layout_of(division: Division, tied: frozenset[int] = frozenset()) -> ParameterLayout:
+    """Number the parameters: k, q, corners, permanent indentations, origins that are not tied."""
+    corners = list(range(2, 2 + len(division.corners)))
+    permanents = [2 + len(corners) + n for n in range(len(division.peaks))]
+    size = 2 + len(corners) + len(permanents)
+    rises = [
+        n
+        for n, s in enumerate(division.stretches)
+        if s.kind == RISING and len(s.rows) >= FEWEST and n not in tied
+    ]
+    return ParameterLayout(
+        corners, permanents, {n: size + i for i, n in enumerate(rises)}, size + len(rises)
+    )
+
+
+@dataclass(frozen=True)
+class Curves:
+    """The curves of a test, in units of its largest indentation and force.
+
+    Attributes
+    ----------
+    division : Division
+    a, f : ndarray (n,)
+        Indentation and force over their largest values.
+    length, force : float
+        The largest values.
+    layout : ParameterLayout
+    """
+
+    division: Division
+    a: Floats
+    f: Floats
+    length: float
+    force: float
+    layout: ParameterLayout
+
+    @property
+    def units(self) -> Floats:
+        """Unit of every parameter."""
+        units = np.full(self.layout.size, self.length)
+        units[[ParameterLayout.K, ParameterLayout.Q]] = self.force / self.length**LOADING_POWER, 1.0
+        return units
+
+    def peak_force(self, p: Floats, cycle: int) -> float:
+        """Force of a cycle's peak, equation 3-1."""
+        peak = p[self.layout.corners[self.division.peaks[cycle]]]
+        return float(p[ParameterLayout.K] * peak**LOADING_POWER)
+
+    def stretch(self, p: Floats, number: int, a: Floats) -> Floats:
+        """Force on a stretch's curve; `p` and `a` in the scaled units."""
+        s, at = self.division.stretches[number], self.layout
+        if s.kind == LOADING:
+            return np.asarray(power_curve(p[at.K], 0.0, 1.0, LOADING_POWER, a))
+        if s.kind == RISING:
+            return self._rising(p, number, s.cycle, a)
+        corner = self.division.corners[s.begin]
+        top = p[at.corners[s.begin]]
+        if corner.is_peak:
+            begin = self.peak_force(p, s.cycle)
+        else:
+            begin = float(self._rising(p, corner.rise, s.cycle, np.array([top]))[0])
+        origin = p[at.permanents[s.cycle]]
+        return np.asarray(power_curve(begin, origin, top - origin, p[at.Q], a))
+
+    def _rising(self, p: Floats, number: int, cycle: int, a: Floats) -> Floats:
+        at = self.layout
+        peak = p[at.corners[self.division.peaks[cycle]]]
+        origin = p[at.origins.get(number, at.permanents[cycle])]
+        top = self.peak_force(p, cycle)
+        return np.asarray(power_curve(top, origin, peak - origin, LOADING_POWER, a))
+
+    def numbers(self, *kinds: str) -> list[int]:
+        """Numbers of the stretches of some kinds that can be fitted."""
+        return [
+            n
+            for n, s in enumerate(self.division.stretches)
+            if s.kind in kinds and (s.kind != RISING or len(s.rows) >= FEWEST)
+        ]
+
+    def of(self, p: Floats, *kinds: str) -> tuple[Floats, Floats]:
+        """Fitted and measured forces of the stretches of some kinds."""
+        parts = [(n, self.division.stretches[n].rows) for n in self.numbers(*kinds)]
+        fitted = [self.stretch(p, n, self.a[rows]) for n, rows in parts]
+        measured = [self.f[rows] for _, rows in parts]
+        return np.concatenate([[], *fitted]), np.concatenate([[], *measured])
+
+    def r_squared(self, p: Floats, *kinds: str) -> float | None:
+        """Share of the forces' variance that the curves explain; None without points."""
+        fitted, measured = self.of(p, *kinds)
+        return r_squared(fitted, measured)
+
+
+def scaled(division: Division, indentation: Floats, force: Floats) -> Curves:
+    """Prepare a divided test for fitting.
+
+    Raises
+    ------
+    NoTestError
+        If there is no force, or a curve has too few points.
+    """
+    length, top = float(division.path.smooth.max()), float(force.max())
+    if length <= 0.0 or top <= 0.0:
+        raise NoTestError("indentation and force are never positive")
+    curves = Curves(
+        division, indentation / length, force / top, length, top, layout_of(division)
+    )  # fmt: skip
+    loading = division.rows(LOADING)
+    if np.count_nonzero(curves.a[loading] > 0.0) < FEWEST:
+        raise NoTestError(f"the first loading has fewer than {FEWEST} points")
+    for cycle in range(len(division.peaks)):
+        falls = [s for s in division.stretches if s.kind == FALLING and s.cycle == cycle]
+        if sum(len(s.rows) for s in falls) < FEWEST:
+            raise NoTestError(f"cycle {cycle + 1} has fewer than {FEWEST} points of unloading")
+    return curves
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What was found, in the test's own units.
+
+    Attributes
+    ----------
+    values : ndarray (m,)
+        As :class:`ParameterLayout` numbers them.
+    covariance : ndarray (m, m)
+    held : frozenset of int
+        Corners that stayed where they were recorded.
+    at_limit : bool
+        Whether a value lies where the search ended: the curves do not fit, and errors mean nothing.
+    """
+
+    curves: Curves
+    values: Floats
+    covariance: Floats
+    held: frozenset[int]
+    at_limit: bool
+
+    @property
+    def scaled(self) -> Floats:
+        """Values in the curves' units."""
+        return np.asarray(self.values / self.curves.units)
+
+    def estimate(self, function: Callable[[Floats], float]) -> Estimate:
+        """A quantity that follows from the parameters, and its error."""
+        gradient = np.zeros(len(self.values))
+        for n, (value, unit) in enumerate(zip(self.values, self.curves.units, strict=True)):
+            ends: list[float] = []
+            for sign in (1.0, -1.0):
+                moved = self.values.copy()
+                moved[n] = value + sign * STEP * unit
+                ends.append(function(moved))
+            gradient[n] = (ends[0] - ends[1]) / (2.0 * STEP * unit)
+        variance = float(gradient @ self.covariance @ gradient)
+        return Estimate(function(self.values), max(variance, 0.0) ** 0.5)
+
+
+def solve(curves: Curves, q: float | None = None) -> Solution:
+    """Fit all curves; corners that the curves do not tell stay where they were recorded.
+
+    Every reloading has an origin of its own at first.  Where that lies clearly above the turn at
+    which the reloading began, contact was lost there, and the origin is the permanent indentation;
+    a reloading that began in contact has its origin below the turn.
+
+    Parameters
+    ----------
+    curves : Curves
+    q : float, optional
+        The unloading power, where it is given.
+    """
+    solution = _held_or_not(curves, q)
+    errors = np.sqrt(np.diag(solution.covariance))
+    tied = frozenset(
+        n
+        for n, place in curves.layout.origins.items()
+        if solution.values[place] - SURE * errors[place] > curves.division.stretches[n].turn
+    )
+    if not tied:
+        return solution
+    return _held_or_not(replace(curves, layout=layout_of(curves.division, tied)), q)
+
+
+def _held_or_not(curves: Curves, q: float | None) -> Solution:
+    """Fit with corners where the curves meet, or held where these do not tell."""
+    held: frozenset[int] = frozenset()
+    while True:
+        solution = _solve(curves, q, held)
+        errors = np.sqrt(np.diag(solution.covariance))
+        vague = {
+            n
+            for n, place in enumerate(curves.layout.corners)
+            if not errors[place] < VAGUE * solution.values[place]
+        }
+        if not vague:
+            return solution
+        held |= vague
+
+
+def _solve(curves: Curves, q: float | None, held: frozenset[int]) -> Solution:
+    from scipy.optimize import least_squares
+
+    start, low, high = _start(curves, q)
+    free = np.full(curves.layout.size, True)
+    free[ParameterLayout.K] = False
+    free[ParameterLayout.Q] = q is None and bool(curves.layout.corners)
+    free[[curves.layout.corners[n] for n in held]] = False
+
+    def residuals(x: Floats) -> Floats:
+        p = start.copy()
+        p[free] = x
+        fitted, measured = curves.of(p, FALLING, RISING)
+        return np.asarray(measured - fitted)
+
+    p = start.copy()
+    if free.any():
+        found = least_squares(
+            residuals, start[free], bounds=(low[free], high[free]),
+            xtol=1e-12, ftol=1e-12, gtol=1e-12,
+        )  # fmt: skip
+        p[free] = found.x
+    units = curves.units
+    covariance = _covariance(curves, p, free) * np.outer(units, units)
+    near = np.minimum(p - low, high - p)[free] < AT_LIMIT * (high - low)[free]
+    return Solution(curves, p * units, covariance, held, bool(near.any()))
+
+
+def _start(curves: Curves, q: float | None) -> tuple[Floats, Floats, Floats]:
+    """First guesses and bounds of all parameters; k is final."""
+    at, division = curves.layout, curves.division
+    rows = division.rows(LOADING)
+    x = np.maximum(curves.a[rows], 0.0) ** LOADING_POWER
+    p, low, high = (np.zeros(at.size) for _ in range(3))
+    p[at.K] = float(x @ curves.f[rows]) / float(x @ x)
+    p[at.Q] = FIRST_Q if q is None else q
+    low[at.Q], high[at.Q] = LIMITS_Q
+    for number, corner in zip(at.corners, division.corners, strict=True):
+        p[number] = corner.indentation / curves.length
+        low[number], high[number] = (1.0 - PEAK_MOVES) * p[number], (1.0 + PEAK_MOVES) * p[number]
+
+    def origin(
+        place: int, rows: Ints, cycle: int, power: float, limits: tuple[float, float]
+    ) -> None:
+        peak = p[at.corners[division.peaks[cycle]]]
+        low[place], high[place] = limits[0] * peak, limits[1] * peak
+        guess = _origin(curves.a[rows], curves.f[rows], power)
+        p[place] = min(max(guess, 0.9 * low[place]), 0.9 * high[place])
+
+    for cycle, place in enumerate(at.permanents):
+        falls = [s.rows for s in division.stretches if s.kind == FALLING and s.cycle == cycle]
+        origin(place, np.concatenate(falls), cycle, p[at.Q], LIMITS_PERMANENT)
+    for number, place in at.origins.items():
+        s = division.stretches[number]
+        origin(place, s.rows, s.cycle, LOADING_POWER, LIMITS_ORIGIN)
+    return p, low, high
+
+
+def _origin(a: Floats, f: Floats, power: float) -> float:
+    """Where the straight line through f^(1/power) is zero."""
+    high = f > 0.1 * f.max()
+    if np.count_nonzero(high) < 3 or not np.ptp(a[high]):
+        return 0.0
+    slope, level = np.polyfit(a[high], f[high] ** (1.0 / power), 1)
+    return float(-level / slope) if slope > 0.0 else 0.0
+
+
+def _covariance(curves: Curves, p: Floats, free: Bools) -> Floats:
+    """Covariance of all parameters in the scaled units; zero where they were not found.
+
+    The sum over the points of the squares of their influence: on k of the first loading's, on the
+    others of theirs and, through k, of the first loading's too.
+    """
+    rows = curves.division.rows(LOADING)
+    x = np.maximum(curves.a[rows], 0.0) ** LOADING_POWER
+    share = x / float(x @ x)
+    residual = (curves.f[rows] - p[ParameterLayout.K] * x) / np.sqrt(1.0 - x * share)
+    on_k = share * residual
+    covariance = np.zeros((len(p), len(p)))
+    whole = np.zeros(len(p))
+    whole[ParameterLayout.K] = 1.0
+    if free.any():
+        jacobian = _jacobian(curves, p)
+        inverse = np.linalg.pinv(jacobian[:, free])
+        fitted, measured = curves.of(p, FALLING, RISING)
+        leverage = np.clip(np.einsum("ij,ji->i", jacobian[:, free], inverse), 0.0, 0.999)
+        influence = inverse * ((measured - fitted) / np.sqrt(1.0 - leverage))
+        whole[free] = -inverse @ jacobian[:, ParameterLayout.K]
+        covariance[np.ix_(free, free)] = influence @ influence.T
+        if np.linalg.matrix_rank(jacobian[:, free], tol=1e-9 * len(fitted)) < np.count_nonzero(
+            free
+        ):
+            covariance[np.ix_(free, free)] += np.diag(np.full(np.count_nonzero(free), np.inf))
+    return covariance + np.outer(whole, whole) * float(on_k @ on_k)
+
+
+def _jacobian(curves: Curves, p: Floats) -> Floats:
+    """Derivatives of the fitted forces by all parameters, by central differences."""
+    columns: list[Floats] = []
+    for n in range(len(p)):
+        ends: list[Floats] = []
+        for sign in (1.0, -1.0):
+            moved = p.copy()
+            moved[n] += sign * STEP
+            ends.append(curves.of(moved, FALLING, RISING)[0])
+        columns.append((ends[0] - ends[1]) / (2.0 * STEP))
+    return np.stack(columns, axis=1)

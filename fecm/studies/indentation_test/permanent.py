@@ -1,0 +1,161 @@
+"""Permanent against largest indentation: equations 3-8 and 3-7, from cycles with their errors.
+
+Both coordinates of a cycle carry errors, which are related to each other and to those of the other
+cycles; generalised least squares with all of these gives the line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._typing import Floats
+from fecm.mechanics.contact_law import ACR_POWER, LOADING_POWER
+from fecm.studies.indentation_test.curves import Estimate
+
+# Repetitions until the errors along and across the line belong to its slope.
+ROUNDS = 20
+# Chance below which a scatter about the line is more than the points' noise.
+UNLIKELY = 0.01
+# Error of a coordinate at the least, in parts of the largest: of a test without noise.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Line:
+    """Equation 3-8.
+
+    Attributes
+    ----------
+    s_p, alpha_p : Estimate
+        Slope; critical indentation (length).
+    elastic : tuple of int
+        Cycles below alpha_p, of which nothing remains.
+    scatter : float
+        Root of chi^2 by degrees of freedom; the errors are multiplied by it where the scatter is
+        more than noise explains, else it is 1.
+    """
+
+    s_p: Estimate
+    alpha_p: Estimate
+    elastic: tuple[int, ...]
+    scatter: float
+
+
+def line(peaks: Floats, permanents: Floats, covariance: Floats) -> Line | None:
+    """Fit alpha_0 = max(0, s_p (alpha_m - alpha_p)).
+
+    Parameters
+    ----------
+    peaks, permanents : ndarray (cycles,)
+        alpha_m and alpha_0 (length).
+    covariance : ndarray (2 cycles, 2 cycles)
+        Of all peaks, then of all permanent indentations.
+
+    Returns
+    -------
+    Line or None
+        None where fewer than two cycles lie beyond alpha_p.
+    """
+    covariance = covariance + np.eye(len(covariance)) * (ROUNDING * peaks.max()) ** 2
+    order = np.argsort(peaks)
+    best: tuple[float, Line] | None = None
+    for count in range(len(peaks) - 1):
+        elastic, beyond = order[:count], order[count:]
+        found = _split(peaks, permanents, covariance, elastic)
+        if found is None:
+            continue
+        chi, candidate = found
+        inside = not count or candidate.alpha_p.value >= peaks[elastic[-1]]
+        if count and not (inside and candidate.alpha_p.value < peaks[beyond[0]]):
+            continue
+        if best is None or chi < best[0]:
+            best = chi, candidate
+    return None if best is None else best[1]
+
+
+def _split(
+    peaks: Floats, permanents: Floats, covariance: Floats, elastic: NDArray[np.intp]
+) -> tuple[float, Line] | None:
+    """Line and chi^2 where some cycles are taken for elastic."""
+    n = len(peaks)
+    beyond = np.full(n, 1.0)
+    beyond[elastic] = 0.0
+    design = np.stack([beyond * peaks, beyond], axis=1)
+    slope, level = np.polyfit(peaks[beyond > 0.0], permanents[beyond > 0.0], 1)
+    normal = np.eye(2)
+    weight = np.eye(n)
+    for _ in range(ROUNDS):
+        across = np.concatenate([np.diag(-slope * beyond), np.eye(n)], axis=1)
+        variance = across @ covariance @ across.T
+        weight = np.linalg.pinv(variance, rcond=1e-14, hermitian=True)
+        normal = design.T @ weight @ design
+        if not np.all(np.isfinite(normal)) or np.linalg.matrix_rank(normal) < 2:
+            return None
+        slope, level = np.linalg.solve(normal, design.T @ weight @ permanents)
+    errors = np.linalg.inv(normal)
+    left = permanents - design @ [slope, level]
+    chi = float(left @ weight @ left)
+    scatter = _scatter(chi, n - 2)
+    if slope == 0.0:
+        return None
+    by = np.array([level / slope**2, -1.0 / slope])
+    return chi, Line(
+        Estimate(float(slope), scatter * float(errors[0, 0] ** 0.5)),
+        Estimate(float(-level / slope), scatter * float((by @ errors @ by) ** 0.5)),
+        tuple(int(i) for i in elastic),
+        scatter,
+    )
+
+
+def _scatter(chi: float, freedom: int) -> float:
+    """Root of chi^2 by degrees of freedom where that is more than noise explains, else 1."""
+    from scipy.stats import chi2
+
+    return (chi / freedom) ** 0.5 if freedom > 0 and chi2.sf(chi, freedom) < UNLIKELY else 1.0
+
+
+@dataclass(frozen=True)
+class Critical:
+    """Equation 3-7.
+
+    Attributes
+    ----------
+    alpha_cr : Estimate
+        Length.
+    scatter : float
+        As :attr:`Line.scatter`.
+    """
+
+    alpha_cr: Estimate
+    scatter: float
+
+
+def critical(peaks: Floats, permanents: Floats, covariance: Floats) -> Critical:
+    """Find alpha_cr = (alpha_m - alpha_0)^(5/2)/alpha_m^(3/2), the same for all cycles.
+
+    Parameters are those of :func:`line`.  Of a cycle below alpha_cr nothing remains, and it says
+    only that alpha_cr is larger: such cycles are left out while there are others.
+    """
+    covariance = covariance + np.eye(len(covariance)) * (ROUNDING * peaks.max()) ** 2
+    own = (peaks - permanents) ** ACR_POWER / peaks**LOADING_POWER
+    across = np.concatenate(
+        [
+            np.diag(own * (ACR_POWER / (peaks - permanents) - LOADING_POWER / peaks)),
+            np.diag(-own * ACR_POWER / (peaks - permanents)),
+        ],
+        axis=1,
+    )
+    variance = across @ covariance @ across.T
+    deep = peaks > own + np.sqrt(np.diag(variance))
+    if not deep.any():
+        deep[:] = True
+    weight = np.linalg.pinv(variance[np.ix_(deep, deep)], hermitian=True)
+    total = float(weight.sum())
+    mean = float((weight @ own[deep]).sum()) / total if total > 0.0 else float(own[deep].mean())
+    left = own[deep] - mean
+    scatter = _scatter(float(left @ weight @ left), int(deep.sum()) - 1)
+    error = scatter * total**-0.5 if total > 0.0 else 0.0
+    return Critical(Estimate(mean, error), scatter)

@@ -1,0 +1,176 @@
+"""What a fit tells, as lines, as plain values and as an EXPE card."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fecm.deck.model import Indentation
+from fecm.mechanics.contact_law import LinearPermanent, YangSunPermanent
+from fecm.studies.indentation_test.constants import Cycle, Fit
+from fecm.studies.indentation_test.curves import Estimate
+from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING
+from fecm.studies.indentation_test.permanent import Line
+
+# Digits of the constants on the card.
+DIGITS = 5
+# Standard errors below which a slope may as well be none.
+SURE = 2.0
+# Scatter that a test of the law should not have.
+BAD = 0.05
+
+
+def card(fit: Fit) -> str:
+    """The EXPE segment; empty where the test does not tell all of its constants."""
+    relation = fit.relation()
+    if isinstance(relation, YangSunPermanent):
+        alpha, s_p, word = relation.alpha_cr, 0.0, Indentation.ACR
+    elif isinstance(relation, LinearPermanent):
+        alpha, s_p, word = relation.alpha_p, relation.s_p, ""
+    else:
+        return ""
+    values = (float(f"{value:.{DIGITS}g}") for value in (relation.k, alpha, s_p, relation.q))
+    k, alpha, s_p, q = values
+    return Indentation(k, alpha, s_p, q, word).text()
+
+
+def notes(fit: Fit) -> list[str]:
+    """What a user should know of the numbers."""
+    told: list[str] = []
+    division = fit.solution.curves.division
+    held = [division.corners[n].cycle + 1 for n in fit.solution.held if division.corners[n].is_peak]
+    if not fit.cycles:
+        told.append("the test never unloads: it tells k and n alone, and no card")
+    elif fit.line is None and fit.critical is None:
+        told.append(
+            "s_p and alpha_p need two peaks or more that leave an indentation: no card; "
+            "--acr needs one"
+        )
+    if fit.solution.at_limit:
+        told.append("a value lies at the limit of the search: the law does not fit this test")
+    if fit.scatter > BAD:
+        told.append(f"the points scatter by {100.0 * fit.scatter:.2g} % of the largest force")
+    if held:
+        which = ", ".join(map(str, sorted(held)))
+        told.append(f"alpha_m of cycle {which} is as recorded: the curves do not tell it")
+    straight = fit.line
+    if straight is not None:
+        if straight.s_p.value < SURE * straight.s_p.error or straight.s_p.value >= 1.0:
+            told.append("s_p is not told apart from 0")
+        if straight.alpha_p.value < 0.0 < straight.s_p.value:
+            told.append("alpha_p is negative, and 0 on the card")
+        if straight.elastic:
+            which = ", ".join(str(n + 1) for n in straight.elastic)
+            told.append(f"cycle {which} lies below alpha_p and leaves nothing")
+        if side := _one_side(fit.cycles, straight):
+            told.append(
+                f"the line of s_p and alpha_p lies {side} all of its points: the points share the "
+                "errors of k and q, and the test does not follow the law; compare n with 3/2, and "
+                "fit single cycles to compare their q"
+            )
+    scatter = straight.scatter if straight else fit.critical.scatter if fit.critical else 1.0
+    if scatter > 1.0:
+        told.append(
+            f"the permanent indentations scatter {scatter:.1f} times as much as the forces' noise "
+            "explains: the errors of their constants are larger by so much"
+        )
+    return told
+
+
+def _one_side(cycles: tuple[Cycle, ...], straight: Line) -> str:
+    """``"above"`` or ``"below"`` where the line is so of all its points, by an error or more."""
+    slope, start = straight.s_p.value, straight.alpha_p.value
+    points = [cycle for n, cycle in enumerate(cycles) if n not in straight.elastic]
+    off = [c.alpha_0.value - slope * (c.alpha_m.value - start) for c in points]
+    least = [max(c.alpha_0.error, 1e-6 * c.alpha_m.value) for c in points]
+    if len(off) < 3 or not any(abs(o) > e for o, e in zip(off, least, strict=True)):
+        return ""
+    return "above" if max(off) < 0.0 else "below" if min(off) > 0.0 else ""
+
+
+def _told(estimate: Estimate | None) -> str:
+    """A value and its error to two digits of the error."""
+    if estimate is None:
+        return "-"
+    if not estimate.error:
+        return f"{estimate.value:.5g}"
+    return f"{estimate.value:.5g} ± {estimate.error:.2g}"
+
+
+def _share(value: float | None) -> str:
+    return "" if value is None else f"   R² {value:.5f}"
+
+
+def lines(fit: Fit) -> list[str]:
+    """Lines that a person reads."""
+    division = fit.solution.curves.division
+    count = len(division.rows(LOADING))
+    told = [
+        f"first loading   {count} points",
+        f"  k             {_told(fit.k)} (n = 3/2){_share(fit.r_squared[LOADING])}",
+        f"  n             {_told(fit.free.n)}, with k {_told(fit.free.k)}"
+        f"{_share(fit.free.r_squared)}",
+    ]
+    if fit.q is not None:
+        told.append(f"unloading       {len(division.rows(FALLING))} points")
+        told.append(f"  q             {_told(fit.q)}{_share(fit.r_squared[FALLING])}")
+    if len(division.rows(RISING)):
+        told.append(
+            f"reloading       {len(division.rows(RISING))} points{_share(fit.r_squared[RISING])}"
+        )
+    if fit.line is not None:
+        told.append(f"permanent       {_share(fit.r_squared['permanent']).strip()}".rstrip())
+        told.append(f"  s_p           {_told(fit.line.s_p)}")
+        told.append(f"  alpha_p       {_told(fit.line.alpha_p)}")
+    if fit.critical is not None:
+        told.append(f"alpha_cr        {_told(fit.critical.alpha_cr)}")
+    told.append(f"scatter         {100.0 * fit.scatter:.2g} % of the largest force")
+    if fit.cycles:
+        told += ["", *_table(fit.cycles), ""]
+    return told
+
+
+def _table(cycles: tuple[Cycle, ...]) -> list[str]:
+    rows: list[tuple[str, ...]] = [("cycle", "alpha_m", "alpha_0", "k_1", "k_1 of the reloading")]
+    rows += [
+        (str(n), *map(_told, (c.alpha_m, c.alpha_0, c.k_1, c.k_1_measured)))
+        for n, c in enumerate(cycles, start=1)
+    ]
+    if all(c.k_1_measured is None for c in cycles):
+        rows = [row[:-1] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
+def _plain(estimate: Estimate | None) -> dict[str, float] | None:
+    return None if estimate is None else {"value": estimate.value, "error": estimate.error}
+
+
+def plain(fit: Fit) -> dict[str, Any]:
+    """Plain values, for JSON."""
+    straight = fit.line
+    return {
+        "k": _plain(fit.k),
+        "n": _plain(fit.free.n),
+        "k_with_n": _plain(fit.free.k),
+        "q": _plain(fit.q),
+        "s_p": _plain(straight.s_p) if straight else None,
+        "alpha_p": _plain(straight.alpha_p) if straight else None,
+        "alpha_cr": _plain(fit.critical.alpha_cr) if fit.critical else None,
+        "r_squared": {**fit.r_squared, "loading_with_n": fit.free.r_squared},
+        "scatter": fit.scatter,
+        "cycles": [
+            {
+                "alpha_m": _plain(cycle.alpha_m),
+                "alpha_m_recorded": cycle.recorded,
+                "alpha_0": _plain(cycle.alpha_0),
+                "k_1": _plain(cycle.k_1),
+                "k_1_measured": _plain(cycle.k_1_measured),
+            }
+            for cycle in fit.cycles
+        ],
+        "notes": notes(fit),
+        "card": card(fit) or None,
+    }

@@ -1,0 +1,141 @@
+"""Indentation tests as testing machines write them: which columns, and in which units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fecm._typing import Floats
+from fecm.studies.tables import TableError, names_of, read_columns, same_name, units_of
+
+# Names that a column may have, the usual one first.
+NAMES = {
+    "indentation": ("indentation", "displacement", "extension", "stroke", "depth"),
+    "force": ("force", "load"),
+}
+
+# Units by their names, in m and N.  The pound-force is that of 0.45359237 kg and 9.80665 m/s^2.
+LENGTHS = {
+    "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9,
+    "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "mil": 2.54e-5, "mils": 2.54e-5,
+}  # fmt: skip
+FORCES = {
+    "N": 1.0, "mN": 1e-3, "daN": 10.0, "kN": 1e3, "MN": 1e6, "kgf": 9.80665, "gf": 9.80665e-3,
+    "lbf": 4.4482216152605, "lb": 4.4482216152605, "lbs": 4.4482216152605,
+    "kip": 4448.2216152605, "kips": 4448.2216152605,
+}  # fmt: skip
+IMPERIAL = {"in", "inch", "inches", "mil", "mils", "lbf", "lb", "lbs", "kip", "kips"}
+
+
+@dataclass(frozen=True)
+class Test:
+    """An indentation test.
+
+    Attributes
+    ----------
+    indentation, force : ndarray (rows,)
+        In `units`.
+    units : mapping of str to str
+        Names of the units of ``length`` and ``force``; empty where nothing names them.
+    stated : tuple of str
+        Units that the file itself names, of the indentation and of the force; empty texts where it
+        names none.
+    """
+
+    indentation: Floats
+    force: Floats
+    units: Mapping[str, str]
+    stated: tuple[str, str]
+
+
+def read_test(
+    path: Path, columns: Sequence[str] = (), units: tuple[str, str] | None = None
+) -> Test:
+    """Read an indentation test, in units of one system.
+
+    Parameters
+    ----------
+    path : Path
+        A table with the columns indentation and force, or with other names for them (`NAMES`).
+    columns : sequence of str
+        Names or numbers (from 1) of the columns of indentation and force, instead.
+    units : tuple of str, optional
+        Units of length and force to convert to.  Without it a file in inches and pounds is
+        converted to in and lbf, others to m and N or to mm and N.  A file that names no units is
+        taken to be in these, and nothing is converted.
+
+    Raises
+    ------
+    TableError
+        If there are no such columns, a unit is unknown, or a number can't be read.
+    OSError
+        If the file can't be read.
+    """
+    present, known = names_of(path), units_of(path)
+    places = [_place(path, present, name, column) for name, column in _asked(columns)]
+    table = read_columns(path, tuple(NAMES), places=places)
+    length, force = (known[place] if place < len(known) else "" for place in places)
+    if not (length or force):
+        names = {} if units is None else dict(zip(("length", "force"), units, strict=True))
+        return Test(table["indentation"], table["force"], names, ("", ""))
+    if units is None and not (length and force):
+        raise TableError(
+            f"{path}: one column is in {length or force}, and the other has no unit; name both, or "
+            "give the missing one by --unit LENGTH,FORCE"
+        )
+    missing = units or (length, force)
+    length, force = length or missing[0], force or missing[1]
+    sizes = _size(path, length, "length"), _size(path, force, "force")
+    target = units or _system(length, force)
+    wanted = _size(path, target[0], "length"), _size(path, target[1], "force")
+    return Test(
+        table["indentation"] * (sizes[0] / wanted[0]),
+        table["force"] * (sizes[1] / wanted[1]),
+        {"length": target[0], "force": target[1]},
+        (length, force),
+    )
+
+
+def _asked(columns: Sequence[str]) -> list[tuple[str, str]]:
+    """What is looked for, each with the column that was asked for or an empty text."""
+    return list(zip(NAMES, columns or ("", ""), strict=True))
+
+
+def _place(path: Path, present: Sequence[str], name: str, column: str) -> int:
+    """Number of a column, from 0."""
+    if column.isdecimal() and int(column) and not any(same_name(column, one) for one in present):
+        return int(column) - 1
+    if not present and not column:
+        return list(NAMES).index(name)
+    for wanted in (column,) if column else NAMES[name]:
+        found = [place for place, one in enumerate(present) if same_name(wanted, one)]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            break
+    told = ", ".join(present)[:80] or "without names"
+    raise TableError(
+        f"{path}: the columns are {told}; there must be one called {column or name}"
+        + (f" (or {', '.join(NAMES[name][1:])})" if not column else "")
+        + "; --columns INDENTATION,FORCE takes others, by name or number"
+    )
+
+
+def _size(path: Path, unit: str, dimension: str) -> float:
+    """Size of a unit in m or N."""
+    sizes = LENGTHS if dimension == "length" else FORCES
+    folded = [name for name in sizes if name.casefold() == unit.casefold()]
+    if unit in sizes:
+        return sizes[unit]
+    if len(folded) == 1:
+        return sizes[folded[0]]
+    known = ", ".join(sizes)
+    raise TableError(f"{path}: `{unit}` is no unit of {dimension} that is known; there are {known}")
+
+
+def _system(length: str, force: str) -> tuple[str, str]:
+    """Units of length and force of a system like those of the file."""
+    if {length.casefold(), force.casefold()} <= IMPERIAL:
+        return "in", "lbf"
+    return ("m" if length == "m" else "mm"), "N"

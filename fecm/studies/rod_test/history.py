@@ -1,0 +1,112 @@
+"""A history to be filtered: a column of a result, or of a measured table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.results.result import Result, load
+from fecm.results.schema import DATASETS, declared_units
+from fecm.studies.tables import TableError, names_of, read_columns, same_name
+
+TRANSDUCER = "transducer"
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
+
+@dataclass(frozen=True)
+class TimeHistory:
+    """A quantity in time.
+
+    Attributes
+    ----------
+    name : str
+    time, values : ndarray (rows,)
+    first : int
+        Row at which what was recorded begins; before it stands the state of rest.
+    beside : mapping of str to ndarray (rows,)
+        What belongs into the same picture.
+    units : mapping
+        Names of the units; empty where none are known.
+    dimension : str
+        Physical dimension; empty where it is not known.
+    """
+
+    name: str
+    time: Floats
+    values: Floats
+    first: int = 0
+    beside: Mapping[str, Floats] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    dimension: str = "force"
+
+
+def recorded(path: Path, column: str | None = None) -> TimeHistory:
+    """Read a history from a result file or a CSV.
+
+    Parameters
+    ----------
+    path : Path
+    column : str, optional
+        Its name; the transducer's without it, or the second column of a CSV that has none.
+
+    Raises
+    ------
+    TableError
+        If there is no such history, or the CSV can't be used.
+    ResultFileError
+        If the file is a broken result.
+    OSError
+        If it can't be read.
+    """
+    with path.open("rb") as file:
+        is_result = file.read(len(SIGNATURE)) == SIGNATURE
+    return _of_result(path, load(path), column) if is_result else _of_table(path, column)
+
+
+def _of_result(path: Path, result: Result, column: str | None) -> TimeHistory:
+    known = [name.partition("/")[2] for name in result if name.startswith("history/")]
+    if not known:
+        raise TableError(f"{path} has no history: no impact step was taken")
+    choice = [name for name in known if name not in ("step", "time")]
+    name = column or TRANSDUCER
+    if name not in choice:
+        raise TableError(f"{path} has no history of {name}; it has {', '.join(choice)}")
+
+    def since_rest(values: Floats) -> Floats:
+        return np.concatenate(([0.0], values))
+
+    # Histories begin after the first step; before it the rod is free of force.
+    dataset = DATASETS.get(f"history/{name}")
+    dimension = dataset.dimension if dataset else ""
+    rests = dimension in ("force", "length")
+    begin = since_rest if rests else np.asarray
+    beside = {"contact force": begin(result["history/force"])} if name == TRANSDUCER else {}
+    return TimeHistory(
+        name=name,
+        time=begin(result["history/time"]),
+        values=begin(result[f"history/{name}"]),
+        first=int(rests),
+        beside=beside,
+        units=declared_units(result.attributes),
+        dimension=dimension,
+    )
+
+
+def _of_table(path: Path, column: str | None) -> TimeHistory:
+    names = names_of(path)
+
+    def found(name: str) -> str | None:
+        return next((known for known in names if same_name(name, known)), None)
+
+    if column is not None and found(column) is None:
+        told = f"it has {', '.join(names)}" if names else "its first line names none"
+        raise TableError(f"{path} has no column {column}; {told}")
+    clock = found("time") or (names[0] if names else "time")
+    others = [name for name in names if name != clock]
+    name = found(column or TRANSDUCER) or (others[0] if others else "value")
+    columns = read_columns(path, (clock, name), increasing=clock)
+    return TimeHistory(name=name, time=columns[clock], values=columns[name], dimension="")

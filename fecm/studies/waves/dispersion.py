@@ -1,0 +1,201 @@
+"""Harmonic plane waves: phase velocities and frequencies, report section 2.2."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecm._typing import Floats
+from fecm.studies.waves.medium import BEYOND, Medium, best, gradients, in_normal_axes, shares
+
+# Names of the modes; the flexural ones by their velocity, the slowest first.
+MODES = ("flexural_1", "flexural_2", "flexural_3", "extension", "in_plane_shear")
+
+# Columns whose cosine is below this are at right angles; sweeps after which they always are.
+ANGLE = 1e-14
+SWEEPS = 60
+
+
+@dataclass(frozen=True)
+class Dispersion:
+    """Harmonic waves in one direction.
+
+    Attributes
+    ----------
+    angle : float
+        Direction of propagation, degrees.
+    wavelength : ndarray (n,)
+        Wavelength over thickness.
+    phase_velocity : ndarray (n, 5)
+        Length/time, in the order of :data:`MODES`.
+    angular_frequency : ndarray (n, 5)
+        Radian/time.
+    """
+
+    angle: float
+    wavelength: Floats
+    phase_velocity: Floats
+    angular_frequency: Floats
+
+
+def dispersion(medium: Medium, angle: float, wavelengths: ArrayLike) -> Dispersion:
+    """Phase velocities and frequencies of all five modes, equations 2-27 to 2-34.
+
+    The determinants 2-29 and 2-30 become one of order 5 with B and R.  All frequencies are right to
+    about 12 digits, for the longest waves too, where they are many orders apart.
+
+    Parameters
+    ----------
+    medium : Medium
+    angle : float
+        Direction of propagation in degrees.
+    wavelengths : array_like (n,)
+        Wavelengths over thickness, positive.
+
+    Returns
+    -------
+    Dispersion
+
+    Raises
+    ------
+    ValueError
+        If a wavelength is not positive or far beyond any sense, or the laminate's constants are.
+    """
+    ratio = np.atleast_1d(np.asarray(wavelengths, dtype=np.float64))
+    if not np.all((ratio >= 1e-9) & (ratio <= 1e9)):
+        raise ValueError("wavelengths over thickness must lie between 1e-9 and 1e9")
+    k = 2.0 * np.pi / (ratio * medium.laminate.thickness)
+    with np.errstate(all="ignore"):  # numbers beyond all range end in an error
+        stiffness, inertia, back = _problem(medium, angle, k)
+        frequency, modes = graded_modes(stiffness, inertia)
+        share = shares(medium.inertia, back @ modes)
+    frequency = np.take_along_axis(frequency, _in_order(share), axis=1)
+    return Dispersion(float(angle), ratio, frequency / k[:, None], frequency)
+
+
+def _problem(medium: Medium, angle: float, k: Floats) -> tuple[Floats, Floats, Floats]:
+    """Stiffness, inertia, and the unknowns that they belong to, each (n, 5, 5).
+
+    With w a quarter of a period ahead of the others all is real: 2-32 without its i.  In long
+    flexural waves phi_n all but cancels k w; what remains of it, phi_n + tau k w, takes its place
+    among the unknowns, so that nothing is lost to cancellation.  In short waves tau fades.
+    """
+    laminate = medium.laminate
+    beyond = k**2 * laminate.rotary_inertia / laminate.mass  # rotary over translatory inertia
+    tau = 1.0 / (1.0 + beyond)
+    back = np.tile(np.eye(5), (len(k), 1, 1))
+    back[:, 2, 4] = -tau * k
+    strain = gradients([angle])[0][0]
+    generalized = np.zeros((len(k), 8, 5))  # strains, curvatures and shear of the unknowns
+    generalized[:, :3, :2] = k[:, None, None] * strain
+    generalized[:, 3:6, 2:4] = k[:, None, None] * strain
+    generalized[:, 3:6, 4] = (-tau * k**2)[:, None] * strain[:, 0]
+    generalized[:, [6, 7], [2, 3]] = 1.0
+    generalized[:, 6, 4] = beyond * tau * k  # (1 - tau) k
+    constitutive = np.zeros((8, 8))
+    constitutive[:6, :6] = medium.section
+    constitutive[6:, 6:] = in_normal_axes(laminate.shear, [angle])[0]
+    stiffness = generalized.transpose(0, 2, 1) @ constitutive @ generalized
+    return stiffness, back.transpose(0, 2, 1) @ medium.inertia @ back, back
+
+
+def graded_modes(stiffness: Floats, inertia: Floats) -> tuple[Floats, Floats]:
+    """Frequencies and modes of K a = omega^2 M a whose diagonals may be many orders apart.
+
+    Parameters
+    ----------
+    stiffness, inertia : ndarray (n, m, m)
+        Symmetric and positive definite, and well conditioned once their diagonals are scaled to 1:
+        then every frequency, and not only the highest, is right to nearly all digits.
+
+    Returns
+    -------
+    tuple of ndarray
+        omega (n, m), falling, and the modes as columns (n, m, m), with unit generalized mass.
+
+    Raises
+    ------
+    ValueError
+        If a matrix is not positive definite or not finite.
+    """
+    of_k, of_m = (np.sqrt(np.diagonal(matrix, axis1=1, axis2=2)) for matrix in (stiffness, inertia))
+    order = np.argsort(of_k / of_m, axis=1)
+    of_k, of_m = (np.take_along_axis(scale, order, axis=1) for scale in (of_k, of_m))
+    turn = np.eye(order.shape[1])[order]  # permutation, by rows
+    back = turn.transpose(0, 2, 1)
+    try:
+        root = np.linalg.cholesky(turn @ stiffness @ back / _outer(of_k)).transpose(0, 2, 1)
+        mass = np.linalg.cholesky(turn @ inertia @ back / _outer(of_m))
+    except np.linalg.LinAlgError:
+        raise ValueError(BEYOND) from None
+    inverse = np.linalg.inv(mass).transpose(0, 2, 1)
+    rise = of_k / of_m
+    # The singular values of this product are the frequencies.  But for the factor `rise` of its
+    # columns it is well conditioned, as the ratios in it are at most 1.
+    ratios = np.triu(rise[:, :, None] / rise[:, None])
+    values, right = _singular(root @ (inverse * ratios) * rise[:, None])
+    return values, back @ ((inverse / of_m[:, :, None]) @ right)
+
+
+def _outer(scale: Floats) -> Floats:
+    """Products of all pairs of scales, (n, m, m)."""
+    return scale[:, :, None] * scale[:, None]
+
+
+def _singular(matrix: Floats) -> tuple[Floats, Floats]:
+    """Singular values, falling, and right singular vectors as columns, by one-sided Jacobi.
+
+    Columns are turned in pairs until all are at right angles.  Scales of the columns do no harm:
+    of the graded matrices here no small singular value is lost beside a large one.
+
+    Parameters
+    ----------
+    matrix : ndarray (n, m, m)
+
+    Raises
+    ------
+    ValueError
+        If the numbers are beyond all range.
+    """
+    size = matrix.shape[1]
+    both = np.concatenate([matrix, np.broadcast_to(np.eye(size), matrix.shape)], axis=1)
+    turned = True
+    for _ in range(SWEEPS):
+        turned = False
+        for p, q in combinations(range(size), 2):
+            a, b = both[:, :, p], both[:, :, q]
+            aa, bb, ab = (
+                (x[:, :size] * y[:, :size]).sum(axis=1) for x, y in ((a, a), (b, b), (a, b))
+            )
+            skew = np.abs(ab) > ANGLE * np.sqrt(aa * bb)
+            zeta = np.where(skew, bb - aa, 1.0) / np.where(skew, 2.0 * ab, 1.0)
+            tangent = np.copysign(1.0, zeta) / (np.abs(zeta) + np.hypot(1.0, zeta))
+            tangent = np.where(skew, tangent, 0.0)[:, None]
+            cosine = 1.0 / np.hypot(1.0, tangent)
+            both[:, :, p], both[:, :, q] = (
+                cosine * (a - tangent * b),
+                cosine * (b + tangent * a),
+            )
+            turned |= bool(skew.any())
+        if not turned:
+            break
+    values = np.sqrt((both[:, :size] ** 2).sum(axis=1))
+    if turned or not np.all(np.isfinite(values) & (values > 0.0)):
+        raise ValueError(BEYOND)
+    order = np.argsort(-values, axis=1)
+    vectors = np.take_along_axis(both[:, size:], order[:, None], axis=2)
+    return np.take_along_axis(values, order, axis=1), vectors
+
+
+_PAIRS = np.array(list(combinations(range(5), 2)))  # modes that may be the two in-plane ones
+
+
+def _in_order(share: Floats) -> NDArray[np.intp]:
+    """Places of the modes, fastest first, in the order of :data:`MODES`; (n, 5)."""
+    in_plane = share[:, :, :2].sum(axis=2)
+    pair = _PAIRS[best(in_plane[:, _PAIRS].sum(axis=2))]
+    rest = [[mode for mode in (4, 3, 2, 1, 0) if mode not in taken] for taken in pair.tolist()]
+    return np.concatenate([np.array(rest, dtype=np.intp), pair], axis=1)

@@ -1,0 +1,230 @@
+"""Wave fronts: normal velocities, rays, positions and cusps, report section 2.3.
+
+Across a front only the highest derivatives jump, so that k drops out of the 5 x 5 problem: what
+remains is L(n) a = c_n^2 M a with A, B, D against P, R, I, and the transverse shear by itself
+(equations 2-60 to 2-65).  Rays follow from c_n and its derivatives with respect to the normal's
+angle, which are had from the eigenvalue problem itself: with the slowness p = n/c_n, equation 2-84
+is the ray velocity V = c_n n + c_n' t, and V' = (c_n + c_n'') t.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+
+from fecm._typing import Floats
+from fecm.studies.waves.medium import Medium, trigonometry
+from fecm.studies.waves.sheets import SURE, assigned, match_modes, sheets, track_branch
+
+# Names of the fronts, by their dominant component: u_n, u_t, phi_n, phi_t, w.
+FRONTS = ("extension", "in_plane_shear", "bending", "twisting", "transverse_shear")
+
+# Steps a degree in which sheets are followed and cusps looked for.
+STEPS = 10
+
+
+@dataclass(frozen=True)
+class Fronts:
+    """The five fronts for a series of normals; the axis of five follows :data:`FRONTS`.
+
+    Attributes
+    ----------
+    normal : ndarray (n,)
+        Angles of the normals, degrees.
+    velocity : ndarray (n, 5)
+        Normal velocity c_n, length/time.
+    slope : ndarray (n, 5)
+        Its derivative with respect to the normal's angle (radian).
+    curvature : ndarray (n, 5)
+        Its second derivative.
+    share : ndarray (n, 5, 5)
+        Shares that u_n, u_t, phi_n, phi_t, w (last axis) have in the kinetic energy.
+    """
+
+    normal: Floats
+    velocity: Floats
+    slope: Floats
+    curvature: Floats
+    share: Floats
+
+    @property
+    def ray(self) -> Floats:
+        """Ray velocity of equation 2-84, (n, 5, 2): x and y, length/time."""
+        cos, sin = (part[:, None] for part in trigonometry(self.normal))
+        c, s = self.velocity, self.slope
+        return np.stack([c * cos - s * sin, c * sin + s * cos], axis=-1)
+
+    @property
+    def ray_angle(self) -> Floats:
+        """Direction of the rays, (n, 5), degrees above -180 and up to 180."""
+        ray = self.ray
+        angle = np.rad2deg(np.arctan2(ray[..., 1], ray[..., 0]))
+        found: Floats = np.where(angle <= -180.0 + 1e-9, angle + 360.0, angle)
+        return found
+
+    def positions(self, time: float, radius: float) -> Floats:
+        """Where a front is that was a circle at time 0, equations 2-85 to 2-87.
+
+        Parameters
+        ----------
+        time : float
+        radius : float
+            Radius of the circle (length); the report's is the laminate's thickness.
+
+        Returns
+        -------
+        ndarray (n, 5, 2)
+        """
+        start = radius * np.stack(trigonometry(self.normal), axis=-1)
+        found: Floats = start[:, None] + time * self.ray
+        return found
+
+    def growth(self, time: float, radius: float) -> Floats:
+        """Length of the front for a radian of the normal, (n, 5); zero at a cusp, then negative."""
+        return radius + time * (self.velocity + self.curvature)
+
+
+@dataclass(frozen=True)
+class Cusp:
+    """A cusp of a front.
+
+    Attributes
+    ----------
+    mode : str
+        One of :data:`FRONTS`.
+    normal : float
+        Angle of the front's normal there, degrees.
+    x, y : float
+        Where it is, length.
+    """
+
+    mode: str
+    normal: float
+    x: float
+    y: float
+
+
+class WaveSurfaces:
+    """The five fronts of a laminate, each followed around all normals.
+
+    Fronts that cross keep their names, and so do those that come near one another and part again.
+
+    Parameters
+    ----------
+    medium : Medium
+
+    Raises
+    ------
+    ValueError
+        If the velocities are too large, or too far apart, for floating-point numbers.
+    """
+
+    def __init__(self, medium: Medium) -> None:
+        self.medium = medium
+        around = sheets(medium, np.arange(360 * STEPS + 1) / STEPS)
+        self._mode = around.mode
+        step, likeness = match_modes(self._mode[:-1], self._mode[1:])
+        # Steps in which sheets pass one another too closely to be told apart by their ends.
+        self._close = likeness <= SURE
+        for row in np.flatnonzero(self._close).tolist():
+            step[row] = track_branch(medium, row / STEPS, (row + 1) / STEPS)
+        self._close &= (step == np.arange(5)).all(axis=1)
+        # Places of the sheets that are one with each sheet of the normal 0.
+        place = np.empty((360 * STEPS + 1, 5), dtype=np.intp)
+        place[0] = np.arange(5)
+        for row, following in enumerate(step):
+            place[row + 1] = following[place[row]]
+        mean = np.take_along_axis(around.velocity, place, axis=1).mean(axis=0)
+        place = place[:, np.argsort(-mean, kind="stable")]
+        share = np.take_along_axis(around.share, place[:, :, None], axis=1).mean(axis=0)
+        self._place = place[:, assigned(share)]
+
+    def fronts(self, normals: ArrayLike) -> Fronts:
+        """Normal velocities of the five fronts and their derivatives.
+
+        Parameters
+        ----------
+        normals : array_like (n,)
+            Angles of the normals, degrees.
+
+        Returns
+        -------
+        Fronts
+        """
+        found = sheets(self.medium, np.atleast_1d(np.asarray(normals, dtype=np.float64)))
+        turn = np.mod(found.normal, 360.0) * STEPS
+        near = np.round(turn).astype(np.intp)
+        alike, _ = match_modes(self._mode[near], found.mode)
+        place = np.take_along_axis(alike, self._place[near], axis=1)
+        # There the order of the velocities tells what the modes can't.
+        step = np.minimum(turn.astype(np.intp), 360 * STEPS - 1)
+        place = np.where(self._close[step, None], self._place[step], place)
+
+        def ordered(values: Floats) -> Floats:
+            return np.take_along_axis(values, place, axis=1)
+
+        return Fronts(
+            found.normal,
+            ordered(found.velocity),
+            ordered(found.slope),
+            ordered(found.curvature),
+            np.take_along_axis(found.share, place[:, :, None], axis=1),
+        )
+
+    def cusps(self, time: float, radius: float) -> list[Cusp]:
+        """Cusps of the fronts that were a circle at time 0.
+
+        A front turns back where its length for a radian of the normal, radius + time (c_n + c_n''),
+        passes through zero.  Between normals a tenth of a degree apart, a thousandth where fronts
+        pass one another closely, one passage is found.
+
+        Parameters
+        ----------
+        time : float
+        radius : float
+            Radius of the circle (length).
+
+        Returns
+        -------
+        list of Cusp
+            By mode, then by the normal's angle from 0 to 360 degrees.
+        """
+        inside = (np.flatnonzero(self._close)[:, None] + np.arange(100) / 100.0).ravel()
+        normals = np.union1d(np.arange(360 * STEPS + 1) - 0.5, inside) / STEPS
+        growth = self.fronts(normals).growth(time, radius)
+        passes = (growth[:-1] > 0.0) != (growth[1:] > 0.0)
+        found = []
+        for mode, row in np.argwhere(passes.T).tolist():
+
+            def at(normal: float, mode: int = mode) -> float:
+                return float(self.fronts(normal).growth(time, radius)[0, mode])
+
+            normal = float(brentq(at, normals[row], normals[row + 1], xtol=1e-11))
+            fronts = self.fronts(normal)
+            # Where fronts touch there may be a jump between the signs, and no zero.
+            if abs(at(normal)) < 1e-5 * (radius + time * fronts.velocity[0, mode]):
+                x, y = fronts.positions(time, radius)[0, mode].tolist()
+                found.append(Cusp(FRONTS[mode], normal % 360.0, x, y))
+        return sorted(found, key=lambda cusp: (FRONTS.index(cusp.mode), cusp.normal))
+
+    def misnamed(self) -> dict[str, list[tuple[float, float]]]:
+        """Where fronts move more in another component than in the one that names them.
+
+        Returns
+        -------
+        dict
+            Of the fronts that do, the first and the last normal of every run of them (degrees, in
+            steps of a tenth).
+        """
+        normals = np.arange(360 * STEPS + 1) / STEPS
+        share = self.fronts(normals).share
+        runs: dict[str, list[tuple[float, float]]] = {}
+        for place, name in enumerate(FRONTS):
+            other = share[:, place].max(axis=1) > share[:, place, place] + 1e-6
+            edges = np.flatnonzero(np.diff([False, *other.tolist(), False], n=1)).reshape(-1, 2)
+            if len(edges):
+                runs[name] = [(float(normals[a]), float(normals[b - 1])) for a, b in edges]
+        return runs

@@ -1,0 +1,170 @@
+"""What a wave sees of a laminate: its stiffness and inertia in the axes of a wave's normal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecm._typing import Floats
+from fecm.mechanics.laminate import Laminate
+
+BEYOND = "the laminate's constants are too large or too far apart to compute with"
+
+
+@dataclass(frozen=True)
+class Medium:
+    """An infinite laminate that carries waves.
+
+    Attributes
+    ----------
+    laminate : Laminate
+        Stiffness, mass P and rotary inertia I; its transverse shear stiffness is taken as it is.
+    coupling_inertia : float
+        R of equation 2-24, the first moment of the density about the midplane (mass/length).  A
+        :class:`Laminate` has plies of one density, for which it is zero.
+
+    Raises
+    ------
+    ValueError
+        If the stiffness or the inertia is not positive definite.
+    """
+
+    laminate: Laminate
+    coupling_inertia: float = 0.0
+
+    def __post_init__(self) -> None:
+        try:
+            for matrix in (self.section, self.laminate.shear):
+                np.linalg.cholesky(_correlation(matrix))
+        except np.linalg.LinAlgError:
+            raise ValueError("the laminate's stiffness is not positive definite") from None
+        p, r, i = self.laminate.mass, self.coupling_inertia, self.laminate.rotary_inertia
+        if not (p > 0.0 and i > 0.0 and abs(r) < (p * i) ** 0.5):
+            raise ValueError("the laminate's inertia is not positive definite")
+
+    @cached_property
+    def section(self) -> Floats:
+        """Stiffness [[A, B], [B, D]] of equation 2-20, (6, 6); a B that is rounding is zero."""
+        laminate = self.laminate
+        b = laminate.B if laminate.is_coupled else np.zeros((3, 3))
+        return np.block([[laminate.A, b], [b.T, laminate.D]])
+
+    @property
+    def inertia(self) -> Floats:
+        """Inertia of u_n, u_t, phi_n, phi_t, w, (5, 5): the right sides of 2-22 and 2-23."""
+        p, r, i = self.laminate.mass, self.coupling_inertia, self.laminate.rotary_inertia
+        matrix = np.diag([p, p, i, i, p])
+        matrix[[0, 1, 2, 3], [2, 3, 0, 1]] = r
+        return matrix
+
+    @property
+    def shear_velocity(self) -> float:
+        """Velocity of transverse shear, mean square of all directions (length/time).
+
+        It is sqrt(G13/rho) where G13 = G23, the velocity that figures 2.4 and 2.5 are scaled by.
+        """
+        return float((np.trace(self.laminate.shear) / (2.0 * self.laminate.mass)) ** 0.5)
+
+
+def trigonometry(degrees: ArrayLike) -> tuple[Floats, Floats]:
+    """Cosine and sine, exact at multiples of 90 degrees.
+
+    Parameters
+    ----------
+    degrees : array_like (n,)
+
+    Returns
+    -------
+    tuple of ndarray (n,)
+    """
+    angle = np.atleast_1d(np.asarray(degrees, dtype=np.float64))
+    quarter = np.round(angle / 90.0)
+    rest = np.deg2rad(angle - 90.0 * quarter)
+    cos, sin = np.cos(rest), np.sin(rest)
+    turn = np.mod(quarter, 4.0).astype(int)
+    along = np.choose(turn, [cos, -sin, -cos, sin]) + 0.0
+    across = np.choose(turn, [sin, cos, -sin, -cos]) + 0.0
+    return along, across
+
+
+def gradients(degrees: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    """Strains xx, yy, xy of a unit gradient along n of u_n and u_t, and their derivatives.
+
+    Returns
+    -------
+    tuple of ndarray (n, 3, 2)
+        The strains, their first and their second derivative with respect to the angle (radian).
+    """
+    cos, sin = trigonometry(degrees)
+    one, two = cos**2 - sin**2, 2.0 * sin * cos  # cosine and sine of twice the angle
+    normal = np.stack([cos**2, sin**2, two], axis=-1)
+    tangential = np.stack([-two / 2.0, two / 2.0, one], axis=-1)
+    slope = np.stack([-one, one, -2.0 * two], axis=-1)
+    return (
+        np.stack([normal, tangential], axis=-1),
+        np.stack([2.0 * tangential, slope], axis=-1),
+        np.stack([2.0 * slope, -4.0 * tangential], axis=-1),
+    )
+
+
+def in_normal_axes(tensor: Floats, degrees: ArrayLike) -> Floats:
+    """Components nn, nt; tn, tt of a symmetric tensor that is given as xx, xy; yx, yy.
+
+    Parameters
+    ----------
+    tensor : ndarray (2, 2)
+    degrees : array_like (n,)
+
+    Returns
+    -------
+    ndarray (n, 2, 2)
+    """
+    cos, sin = trigonometry(degrees)
+    axes = np.stack([np.stack([cos, -sin], axis=-1), np.stack([sin, cos], axis=-1)], axis=1)
+    turned: Floats = axes.transpose(0, 2, 1) @ tensor @ axes
+    return turned
+
+
+def shares(inertia: Floats, vectors: Floats) -> Floats:
+    """Share that every unknown has in the kinetic energy of modes.
+
+    Parameters
+    ----------
+    inertia : ndarray (5, 5)
+    vectors : ndarray (..., 5, modes)
+        Modes as columns.
+
+    Returns
+    -------
+    ndarray (..., modes, 5)
+        Adds up to 1 over the unknowns.
+    """
+    energy = vectors * (inertia @ vectors)
+    found: Floats = np.swapaxes(energy / energy.sum(axis=-2, keepdims=True), -1, -2)
+    return found
+
+
+def best(scores: Floats) -> NDArray[np.intp]:
+    """Place of the largest score of every row; of equal ones, up to rounding, the first.
+
+    Parameters
+    ----------
+    scores : ndarray (n, choices)
+        Sums of shares, of the order of 1.
+    """
+    equal = scores > scores.max(axis=-1, keepdims=True) - 1e-9
+    place: NDArray[np.intp] = equal.argmax(axis=-1)
+    return place
+
+
+def _correlation(matrix: Floats) -> Floats:
+    """Scale a matrix to a unit diagonal."""
+    with np.errstate(all="ignore"):
+        scale = 1.0 / np.sqrt(np.diag(matrix))
+        scaled: Floats = matrix * np.outer(scale, scale)
+    if not np.isfinite(scaled).all():
+        raise np.linalg.LinAlgError
+    return scaled

@@ -1,0 +1,234 @@
+"""Sheets of the wave fronts: the eigenvalue problem, its derivatives, and what joins its solutions.
+
+The squares of the five normal velocities are the eigenvalues of M^-1 L(n).  As the normal turns,
+each runs along a sheet.  Sheets may cross: then they are told apart by their modes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._typing import Floats
+from fecm.studies.waves.medium import BEYOND, Medium, best, gradients, in_normal_axes, shares
+
+# Squares of velocities that differ by less than this part of the largest are equal.
+EQUAL = 1e-10
+# Likeness of two modes above which the one continues the other; degrees between two normals below
+# which that is no longer asked for.
+SURE, FINEST = 0.8, 1e-9
+
+_ORDERS = np.array(list(permutations(range(5))))
+
+
+@dataclass(frozen=True)
+class Sheets:
+    """Solutions for a series of normals; the axis of five follows the velocity, falling.
+
+    Attributes
+    ----------
+    normal : ndarray (n,)
+        Angles of the normals, degrees.
+    velocity, slope, curvature : ndarray (n, 5)
+        Normal velocity c_n (length/time), its first and its second derivative with respect to the
+        normal's angle (radian).
+    mode : ndarray (n, 5, 5)
+        Modes as columns, orthonormal in the inertia's Cholesky factor.
+    share : ndarray (n, 5, 5)
+        Shares of the modes (second axis) that the unknowns (third) have in the kinetic energy.
+    """
+
+    normal: Floats
+    velocity: Floats
+    slope: Floats
+    curvature: Floats
+    mode: Floats
+    share: Floats
+
+
+def sheets(medium: Medium, normal: Floats) -> Sheets:
+    """Solve L(n) a = c_n^2 M a, with derivatives from perturbation of the problem itself.
+
+    Parameters
+    ----------
+    medium : Medium
+    normal : ndarray (n,)
+        Degrees.
+
+    Raises
+    ------
+    ValueError
+        If the velocities are too large, or too far apart, for floating-point numbers.
+    """
+    with np.errstate(all="ignore"):
+        root = np.linalg.inv(np.linalg.cholesky(medium.inertia))
+        operators = [root @ matrix @ root.T for matrix in _stiffness(medium, normal)]
+        if not np.isfinite(operators).all():
+            raise ValueError(BEYOND)
+        square, basis = _solved(*operators)
+        first, second = (basis.transpose(0, 2, 1) @ matrix @ basis for matrix in operators[1:])
+        gap = square[:, :, None] - square[:, None, :]
+        apart = np.abs(gap) > EQUAL * square[:, :1, None]
+        bend = 2.0 * np.where(apart, first**2 / np.where(apart, gap, 1.0), 0.0).sum(axis=2)
+        bend += np.diagonal(second, axis1=1, axis2=2)
+        velocity = np.sqrt(square)
+        slope = np.diagonal(first, axis1=1, axis2=2) / (2.0 * velocity)
+        curvature = (bend / 2.0 - slope**2) / velocity
+        if not np.isfinite(curvature).all():
+            raise ValueError(BEYOND)
+    share = shares(medium.inertia, root.T @ basis)
+    return Sheets(normal, velocity, slope, curvature, basis, share)
+
+
+def match_modes(before: Floats, after: Floats) -> tuple[NDArray[np.intp], Floats]:
+    """Which modes continue which, by their likeness.
+
+    Parameters
+    ----------
+    before, after : ndarray (n, 5, 5)
+        Modes of normals that differ little, as columns.
+
+    Returns
+    -------
+    tuple of ndarray
+        Places in `after` of the modes that continue those of `before`, (n, 5), and the least
+        likeness of such a pair, (n,), at most 1.
+    """
+    likeness = (before.transpose(0, 2, 1) @ after) ** 2
+    pairs = likeness[:, np.arange(5), _ORDERS]
+    place = best(pairs.sum(axis=2))
+    return _ORDERS[place], pairs[np.arange(len(pairs)), place].min(axis=1)
+
+
+def track_branch(medium: Medium, first: float, last: float) -> NDArray[np.intp]:
+    """Places at one normal of the sheets of another, found by steps as small as need be.
+
+    Sheets that pass one another closely turn their modes into one another's within a small angle;
+    those that cross keep them.
+
+    Parameters
+    ----------
+    medium : Medium
+    first, last : float
+        Two normals close to each other, degrees.
+
+    Returns
+    -------
+    ndarray (5,)
+    """
+    before, after = sheets(medium, np.array([first, last])).mode
+    place, likeness = match_modes(before[None], after[None])
+    found: NDArray[np.intp] = place[0]
+    if likeness[0] <= SURE and last - first >= FINEST:
+        middle = (first + last) / 2.0
+        found = track_branch(medium, middle, last)[track_branch(medium, first, middle)]
+    return found
+
+
+def assigned(share: Floats) -> NDArray[np.intp]:
+    """Place of the mode that takes the name of each unknown, so that the shares' sum is largest.
+
+    Parameters
+    ----------
+    share : ndarray (5, 5)
+        Shares of the modes (rows) that the unknowns have.
+
+    Returns
+    -------
+    ndarray (5,)
+    """
+    scores = share[_ORDERS, np.arange(5)].sum(axis=1)
+    found: NDArray[np.intp] = _ORDERS[best(scores[None])[0]]
+    return found
+
+
+def _stiffness(medium: Medium, normal: Floats) -> tuple[Floats, Floats, Floats]:
+    """L(n) and its first and second derivative with respect to the angle, each (n, 5, 5)."""
+    both = [np.zeros((len(normal), 6, 4)) for _ in range(3)]
+    for matrix, part in zip(both, gradients(normal), strict=True):
+        matrix[:, :3, :2] = matrix[:, 3:, 2:] = part
+    strain, first, second = both
+
+    def product(a: Floats, b: Floats) -> Floats:
+        half = a.transpose(0, 2, 1) @ medium.section @ b
+        return (half + half.transpose(0, 2, 1)) / 2.0
+
+    shear = in_normal_axes(medium.laminate.shear, normal)
+    nn, nt, tt = shear[:, 0, 0], shear[:, 0, 1], shear[:, 1, 1]
+    found = []
+    for plane, transverse in (
+        (product(strain, strain), nn),
+        (2.0 * product(strain, first), 2.0 * nt),
+        (2.0 * product(strain, second) + 2.0 * product(first, first), 2.0 * (tt - nn)),
+    ):
+        matrix = np.zeros((len(normal), 5, 5))
+        matrix[:, :4, :4] = plane
+        matrix[:, 4, 4] = transverse
+        found.append(matrix)
+    return found[0], found[1], found[2]
+
+
+def _solved(operator: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues, falling, and eigenvectors; those of equal eigenvalues follow the sheets.
+
+    In-plane and flexural unknowns that nothing couples are solved for by themselves.
+    """
+    coupled = operator[:, :2, 2:4].any()
+    values = np.empty(operator.shape[:2])
+    vectors = np.zeros(operator.shape)
+    for block in (slice(0, 4), slice(4, 5)) if coupled else (slice(0, 2), slice(2, 4), slice(4, 5)):
+        part = [matrix[:, block, block] for matrix in (operator, first, second)]
+        square, basis = np.linalg.eigh(part[0])
+        limit = EQUAL * np.abs(square).max(axis=1)
+        meeting = (np.diff(square, axis=1) < limit[:, None]).any(axis=1)
+        for row in np.flatnonzero(meeting).tolist():
+            basis[row] = _kept_apart(
+                square[row], basis[row], part[1][row], part[2][row], limit[row]
+            )
+        values[:, block], vectors[:, block, block] = square, basis
+    order = np.argsort(-values, axis=1, kind="stable")
+    return (
+        np.take_along_axis(values, order, axis=1),
+        np.take_along_axis(vectors, order[:, None], axis=2),
+    )
+
+
+def _kept_apart(
+    values: Floats, vectors: Floats, first: Floats, second: Floats, limit: float
+) -> Floats:
+    """Eigenvectors that stay eigenvectors as the normal turns, where sheets meet.
+
+    They make the derivatives of the operator diagonal among the equal eigenvalues, the first, then
+    the second; where the sheets are one and the same, the components are kept apart.
+    """
+    parts: list[Floats] = []
+    for group in _runs(values, limit):
+        basis = vectors[:, group]
+        others = np.delete(vectors, group, axis=1)
+        slopes = first @ others
+        gaps = values[group[0]] - np.delete(values, group)
+        bends = second + 2.0 * (slopes / gaps) @ slopes.T
+        components = np.diag(np.linspace(1.0, 0.0, len(values))) * values[-1]
+        parts += _split(basis, [first, bends, components], 1e3 * limit)
+    return np.concatenate(parts, axis=1)
+
+
+def _runs(values: Floats, limit: float) -> list[NDArray[np.intp]]:
+    """Places of the values that are equal up to `limit`, run by run; the values are in order."""
+    steps = np.flatnonzero(np.abs(np.diff(values)) >= limit) + 1
+    return np.split(np.arange(len(values)), steps)
+
+
+def _split(basis: Floats, operators: Sequence[Floats], limit: float) -> list[Floats]:
+    """Parts of a subspace that the operators, one after another, tell apart."""
+    if basis.shape[1] == 1 or not operators:
+        return [basis]
+    values, vectors = np.linalg.eigh(basis.T @ operators[0] @ basis)
+    parts: list[Floats] = []
+    for run in _runs(values, limit):
+        parts += _split(basis @ vectors[:, run], operators[1:], limit)
+    return parts

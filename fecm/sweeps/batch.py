@@ -1,0 +1,435 @@
+"""Runs some cases of a sweep: together where they share a plate, each by itself where not.
+
+Cases share a plate where they differ in the projectile, its approach or the law alone.  The plate
+is then stepped once, under a unit force, and everything else follows from that response.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._memory import require
+from fecm._typing import Floats
+from fecm.deck.findings import Findings
+from fecm.deck.macros import Body, Loop, compile_program, estimate_work, flat
+from fecm.deck.model import Deck, Impact, Projectile
+from fecm.deck.model import Indentation as LawCards
+from fecm.deck.reader import ParsedProblem
+from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, stacked
+from fecm.mechanics.impact import ContactState, couple_step
+from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.plate_motion import DivergenceError
+from fecm.mechanics.projectile import Projectile as ProjectileModel
+from fecm.mechanics.rod_integrators import WilsonStep
+from fecm.mechanics.time_step import critical_time_step, taken_time_step
+from fecm.problem.build import build_law, build_model, build_projectile
+from fecm.problem.check_impact import check_impact, check_law, check_projectile
+from fecm.problem.check_program import check_program
+from fecm.problem.generate import generate
+from fecm.problem.problem import Problem, check
+from fecm.results.schema import Dataset
+from fecm.simulation.simulation import ENERGY_WARNING, simulate
+from fecm.sweeps.cases import Case, CasesError
+from fecm.sweeps.clock import Clock, critical_of, with_time_step
+from fecm.sweeps.outcome import SUMMARY, Indentation, Outcome, status_of, summarise
+from fecm.sweeps.responses import BLOCK, Convolution, TipState, TipSteps, plate_response
+from fecm.sweeps.vary import apply_case
+
+if TYPE_CHECKING:
+    from fecm.sweeps.plan import Plan
+
+
+# Bytes a step of each case that is advanced with others: more than was measured.
+ADVANCED = 28
+
+
+@dataclass(frozen=True)
+class Task:
+    """Cases that are run together.
+
+    Attributes
+    ----------
+    number : int
+        The task's number.
+    deck : Deck
+        What is varied.
+    numbers : tuple of int
+        The cases' numbers.
+    cases : tuple of dict
+        Their values.
+    history : bool
+        Whether the forces are wanted.
+    clock : Clock or None
+        Rule by which the plate has its own time step; None where the deck's holds.
+    """
+
+    number: int
+    deck: Deck
+    numbers: tuple[int, ...]
+    cases: tuple[Case, ...]
+    history: bool = False
+    clock: Clock | None = None
+
+
+def run(task: Task) -> Outcome:
+    """Run the cases of a task; one that can't be run is a row with its reason."""
+    good: list[tuple[int, Deck]] = []
+    lost: dict[int, str] = {}
+    for number, case in zip(task.numbers, task.cases, strict=True):
+        try:
+            good.append((number, apply_case(task.deck, case)))
+        except CasesError as error:
+            lost[number] = str(error)
+    parts: list[Outcome] = []
+    mesh = generate(good[0][1]) if good else None
+    sound = [] if mesh is None else [pair for pair in good if not _refuse(*pair, mesh, lost)]
+    if sound:
+        checked, decks, reason = _timed([deck for _, deck in sound], task.clock)
+        numbers = [number for number, _ in sound]
+        if checked is None:
+            lost |= dict.fromkeys(numbers, reason)
+        elif shares_plate(checked):
+            parts.append(_together(numbers, decks, checked))
+        else:
+            pairs = zip(numbers, decks, strict=True)
+            parts += [_alone(number, replace(checked, deck=deck)) for number, deck in pairs]
+    if lost:
+        parts.append(Outcome.failed(list(lost), list(lost.values())))
+    outcome = merge(parts)
+    return outcome if task.history else replace(outcome, force=None)
+
+
+def deck_of(plan: Plan, case: int) -> Deck:
+    """Make the deck of a case, with its own time step.
+
+    Raises
+    ------
+    CasesError
+        If the case cannot be run.
+    """
+    checked, (deck,), reason = _timed([apply_case(plan.deck, plan.cases[case])], plan.clock)
+    if checked is None:
+        raise CasesError(reason)
+    return deck
+
+
+def _timed(decks: list[Deck], clock: Clock | None) -> tuple[Problem | None, list[Deck], str]:
+    """Check the plate and the program that decks share, and give them the plate's time step."""
+    if clock is None:
+        checked, reason = _checked(decks[0])
+        return checked, decks, reason
+    # DT 0 is below the critical time step of any plate.
+    checked, reason = _checked(with_time_step(decks[0], 0.0))
+    if checked is None:
+        return None, decks, reason
+    dt = clock.time_step(critical_of(checked))
+    timed = [with_time_step(deck, dt, clock.dt) for deck in decks]
+    findings = Findings()
+    program = compile_program(timed[0].macros, findings)
+    check_program(timed[0], program, findings)
+    if findings.errors:
+        return None, decks, findings.errors[0].message
+    return Problem(timed[0], checked.mesh, program), timed, ""
+
+
+def _checked(deck: Deck) -> tuple[Problem | None, str]:
+    """Check a deck whole; the first error where it has any."""
+    findings = Findings()
+    checked = check(ParsedProblem(deck), findings)
+    if findings.errors:
+        return None, findings.errors[0].message
+    return checked, ""
+
+
+def _refuse(number: int, deck: Deck, mesh: Mesh, lost: dict[int, str]) -> bool:
+    """Whether a case's own cards, the plate's apart, can't be used; note why."""
+    findings = Findings()
+    check_impact(deck.require(Impact), deck, mesh, findings)
+    check_law(deck.require(LawCards), findings)
+    if (projectile := deck.last(Projectile)) is not None:
+        check_projectile(projectile, findings)
+    if findings.errors:
+        lost[number] = findings.errors[0].message
+    return bool(findings.errors)
+
+
+def shares_plate(checked: Problem) -> bool:
+    """Whether a program only takes impact steps of one size, on a plate without other loads."""
+    words = [macro.word for macro in flat(checked.program)]
+    sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
+    return (
+        "RODP" in words
+        and len(sizes) == 1
+        and words.index("DT") < words.index("RODP")
+        and not {"EXCD", "TANG", "FORM", "SOLV"}.intersection(words)
+        and not checked.mesh.forces.any()
+    )
+
+
+def _time_step(checked: Problem, plate: PlateModel) -> float:
+    """The program's time step; 0 is 0.9 of the critical one, as in a run."""
+    dt = next(macro.value for macro in flat(checked.program) if macro.word == "DT")
+    return dt or taken_time_step(critical_time_step(plate))
+
+
+def _together(numbers: list[int], decks: list[Deck], checked: Problem) -> Outcome:
+    """Run cases that share a plate, by its response to a unit force."""
+    setup = build_model(checked.deck, checked.mesh, moves_only=True)
+    if setup.impact is None:
+        raise ValueError("nothing hits in this deck")
+    steps = estimate_work(checked.program).steps
+    dt = _time_step(checked, setup.plate)
+    projectiles = [build_projectile(deck) for deck in decks]
+    kinds = {projectile: number for number, projectile in enumerate(dict.fromkeys(projectiles))}
+    # Cases of a kind side by side.
+    order = sorted(range(len(decks)), key=lambda case: kinds[projectiles[case]])
+    kind = np.array([kinds[projectiles[case]] for case in order], dtype=np.intp)
+    require(ADVANCED * steps * len(decks), f"{len(decks)} cases of {steps} steps")
+    with np.errstate(all="ignore"):
+        response = plate_response(setup.motion, setup.impact.contact.row, dt, steps)
+        rods = [WilsonStep(rod.stiffness(), rod.mass(), dt) for rod in kinds]
+        law = HystereticLaw(stacked([build_law(decks[case]).constants for case in order]))
+        speed = np.array([decks[case].require(Impact).velocity for case in order])
+        node_mass = float(setup.motion.mass[setup.impact.contact.row])
+        tips = TipSteps(rods, kind, steps)
+        found = impacts(response, tips, law, speed, node_mass)
+        times = np.add.accumulate(np.full(steps, dt))
+        mass = np.array([projectiles[case].total_mass for case in order])
+        summary = summarise(found.force, times, found.indentation, mass, speed)
+        error = balance_errors(found, tips, list(kinds), kind, speed)
+    back = np.argsort(order)
+    force = np.ascontiguousarray(found.force.T[back])
+    outcome = Outcome(
+        numbers,
+        {name: values[back] for name, values in summary.items()},
+        status_of(force.T),
+        np.full(len(numbers), dt),
+        np.full(len(numbers), steps, dtype=np.int64),
+        found.unconverged_steps[back],
+        force,
+    )
+    doubtful = np.flatnonzero(~(error[back] < ENERGY_WARNING) | (outcome.unconverged_steps > 0))
+    if not len(doubtful):
+        return outcome
+    rest = np.setdiff1d(np.arange(len(numbers)), doubtful)
+    # The run itself judges what is not well below its limits.
+    whole = [_alone(numbers[case], replace(checked, deck=decks[case])) for case in doubtful]
+    return merge([outcome.of(rest), *whole])
+
+
+@dataclass(frozen=True)
+class Impacts:
+    """Many impacts on a plate.
+
+    Attributes
+    ----------
+    force : ndarray (steps, cases)
+        Contact force after every step.
+    indentation : Indentation
+        Of each case.
+    unsettled : ndarray (cases,)
+        Steps whose contact iteration did not converge.
+    work : ndarray (blocks, cases)
+        Work that the contact force has done on plate and indentation, after every block of steps
+        and after the last step (force*length).
+    excess : ndarray (cases,)
+        Largest dt^2/8 m a^2 of the impact node (force*length): by so much the plate's energy is
+        above the work done on it, as far as the node tells.
+    """
+
+    force: Floats
+    indentation: Indentation
+    unconverged_steps: NDArray[np.int64]
+    work: Floats
+    excess: Floats
+
+
+def impacts(
+    response: Floats, tips: TipSteps, law: HystereticLaw, speed: Floats, node_mass: float
+) -> Impacts:
+    """Many impacts on a plate of which the response to a unit force is known.
+
+    Parameters
+    ----------
+    response : ndarray (steps,)
+        See :func:`~fecm.sweeps.responses.plate_response`.
+    tips : TipSteps
+        The projectiles.
+    law : HystereticLaw
+        With arrays of constants.
+    speed : ndarray (cases,)
+        Approach velocities.
+    node_mass : float
+        Lumped mass of the impact node.
+    """
+    steps, cases = len(response), len(speed)
+    none = np.zeros(cases)
+    plate = Convolution(response, np.zeros(cases, dtype=np.intp))
+    state = ContactState(
+        TipState(none, -speed, none), law.start(), ContactPoint(none, none), none,
+        unconverged_steps=np.zeros(cases, dtype=np.int64),
+    )  # fmt: skip
+    force, deepest = np.empty((steps, cases)), none
+    plate_work, moved, sharpest = none, none, none
+    work: list[Floats] = []
+    for step in range(steps):
+        last, w = state.contact.force, state.plate_w
+        couple_step(tips, law, state, plate.next().copy())
+        plate.give(state.contact.force)
+        force[step] = state.contact.force
+        deepest = np.maximum(deepest, state.contact.indentation)
+        # Central differences keep what 1/2 (F + F') (w' - w) puts into the plate.
+        before, moved = moved, state.plate_w - w
+        plate_work = plate_work + 0.5 * (last + state.contact.force) * moved
+        sharpest = np.maximum(sharpest, np.abs(moved - before))
+        if not (step + 1) % BLOCK or step + 1 == steps:
+            work.append(state.contact_work + plate_work)
+    permanent = law.permanent(state.memory, state.contact)
+    return Impacts(
+        force,
+        Indentation(deepest, state.contact.indentation, permanent),
+        state.unconverged_steps,
+        np.array(work),
+        node_mass * sharpest**2 / (8.0 * tips.dt**2),
+    )
+
+
+def balance_errors(
+    found: Impacts,
+    tips: TipSteps,
+    kinds: Sequence[ProjectileModel],
+    kind: NDArray[np.intp],
+    speed: Floats,
+) -> Floats:
+    """Estimate the error of the energy balance, as a part of the initial energy.
+
+    What the projectile holds, after every block of steps and after the last, and the work done on
+    plate and indentation must add up to the initial energy.  The central differences keep
+    1/2 v(-)' M v(+) + 1/2 u' K u, with the velocities half a step before and after: the work done
+    on the plate.  The energy that a run reports is dt^2/8 a' M a above it, of which only the impact
+    node's part is known here.
+
+    Parameters
+    ----------
+    found : Impacts
+    tips : TipSteps
+    kinds : sequence of Projectile
+    kind : ndarray (cases,) of int
+        The kind of each case.
+    speed : ndarray (cases,)
+        Approach velocities.
+
+    Returns
+    -------
+    ndarray (cases,)
+        0 without any energy; not finite where the motion is not.
+    """
+    worst = np.zeros(len(speed))
+    for number, projectile in enumerate(kinds):
+        cases = np.flatnonzero(kind == number)
+        initial = 0.5 * projectile.total_mass * speed[cases] ** 2
+        lost = np.zeros(len(cases))
+        for work, motion in zip(found.work, tips.motions(number, speed), strict=True):
+            deformation, velocity, _ = motion.reshape(3, -1, len(cases)).swapaxes(1, 2)
+            deformation[:, 0] = 0.0
+            held = projectile.kinetic_energy(velocity) + projectile.strain_energy(deformation)
+            lost = np.maximum(lost, np.abs(held + work[cases] - initial))
+        worst[cases] = (lost + found.excess[cases]) / np.where(initial > 0.0, initial, 1.0)
+    return worst
+
+
+class _HistorySink:
+    """Keeps the contact's history of a run and forgets the rest."""
+
+    KEPT = ("history/force", "history/time", "history/indentation")
+
+    def __init__(self) -> None:
+        self.arrays: dict[str, Floats] = {}
+        self.permanent = 0.0
+        self.unconverged_steps = 0
+
+    def attributes(self, group: str, values: Any) -> None:
+        self.permanent = values.get("permanent_indentation", self.permanent)
+        self.unconverged_steps = values.get("unsettled_steps", self.unconverged_steps)
+
+    def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
+        if dataset.path in self.KEPT:
+            self.arrays[dataset.path] = np.zeros(shape)
+
+    def write(self, path: str, start: int, rows: NDArray[Any]) -> None:
+        if path in self.arrays:
+            self.arrays[path][start : start + len(rows)] = rows
+
+    def trim(self, path: str, rows: int) -> None:
+        if path in self.arrays:
+            self.arrays[path] = self.arrays[path][:rows]
+
+    def text(self, path: str, value: str, description: str) -> None:
+        pass
+
+
+def _alone(number: int, checked: Problem) -> Outcome:
+    """Run one case as a whole, without storing fields."""
+    sink = _HistorySink()
+    try:
+        simulation = simulate(replace(checked, program=without_output(checked.program)), sink)
+    except (DivergenceError, ArithmeticError) as error:
+        return Outcome.failed([number], [str(error)])
+    force, times = sink.arrays["history/force"], sink.arrays["history/time"]
+    indentation = sink.arrays["history/indentation"]
+    largest = np.maximum(indentation.max(keepdims=True), 0.0)
+    mass = build_projectile(checked.deck).total_mass
+    speed = checked.deck.require(Impact).velocity
+    found = Indentation(largest, indentation[-1:], np.array([sink.permanent]))
+    summary = summarise(force[:, None], times, found, mass, np.array([speed]))
+    return Outcome(
+        [number],
+        summary,
+        status_of(force[:, None]),
+        np.array([simulation.dt]),
+        np.array([len(force)], dtype=np.int64),
+        np.array([sink.unconverged_steps], dtype=np.int64),
+        force[None],
+    )
+
+
+def without_output(body: Body) -> Body:
+    """A program that stores no fields."""
+    kept: list[Any] = []
+    for item in body:
+        if isinstance(item, Loop):
+            kept.append(replace(item, body=without_output(item.body)))
+        elif item.word == "RODP":
+            kept.append(replace(item, value=1e9))
+        elif item.word not in ("DISP", "STRE", "REAC", "EIGE"):
+            kept.append(item)
+    return tuple(kept)
+
+
+def merge(parts: list[Outcome]) -> Outcome:
+    """One outcome of several, in the order of the cases' numbers."""
+    numbers = [number for part in parts for number in part.numbers]
+    order = np.argsort(numbers)
+    longest = max((0 if part.force is None else part.force.shape[1] for part in parts), default=0)
+    force = np.full((len(numbers), longest), np.nan)
+    row = 0
+    for part in parts:
+        if part.force is not None:
+            force[row : row + len(part.numbers), : part.force.shape[1]] = part.force
+        row += len(part.numbers)
+    status = [text for part in parts for text in part.status]
+    return Outcome(
+        [numbers[i] for i in order],
+        {name: np.concatenate([part.summary[name] for part in parts])[order] for name in SUMMARY},
+        [status[i] for i in order],
+        np.concatenate([part.dt for part in parts])[order],
+        np.concatenate([part.steps for part in parts])[order],
+        np.concatenate([part.unconverged_steps for part in parts])[order],
+        force[order],
+    )

@@ -1,0 +1,83 @@
+"""CSV of a sweep: a row a case, or a row a step of each case.
+
+Cases count from 0, steps from 1.  Numbers are written as Python's repr, from which they can be read
+back to the last bit; texts are quoted where they have to be.  An apostrophe precedes a text that a
+spreadsheet would take for a formula.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import numpy as np
+
+from fecm.results.schema import ExportError
+from fecm.sweeps.result import SweepResult
+
+# First characters of a formula.
+FORMULA = ("=", "+", "-", "@")
+
+CASES, HISTORY = "cases", "history"
+
+
+def lines(sweep: SweepResult, name: str = CASES) -> Iterator[str]:
+    """Lines of a table, with their ends.
+
+    Parameters
+    ----------
+    sweep : SweepResult
+    name : str
+        ``"cases"``: the values of every case and what came out.  ``"history"``: the contact force
+        after every step of every case that was run.
+
+    Raises
+    ------
+    ExportError
+        If there is no such table, or the sweep has kept no forces.
+    """
+    if name not in (CASES, HISTORY):
+        raise ExportError(f"a sweep has the tables {CASES} and {HISTORY}, not {name}")
+    if name == HISTORY and sweep.force is None:
+        raise ExportError("the sweep has kept no forces; run it again with --history")
+    return _written(_cases(sweep) if name == CASES else _history(sweep))
+
+
+def _cases(sweep: SweepResult) -> Iterator[Iterable[Any]]:
+    columns = {**sweep.cases, **sweep.summary}
+    columns |= {"dt": sweep.dt, "steps": sweep.steps, "status": columns.pop("status")}
+    yield ("case", *columns)
+    values = [column.tolist() for column in columns.values()]
+    yield from zip(range(len(sweep)), *values, strict=True)
+
+
+def _history(sweep: SweepResult) -> Iterator[Iterable[Any]]:
+    yield ("case", "step", "time", "force")
+    if sweep.force is None:
+        return
+    for case in np.flatnonzero(sweep.fine).tolist():
+        count = int(sweep.steps[case])
+        times = np.add.accumulate(np.full(count, sweep.dt[case])).tolist()
+        forces = sweep.force[case, :count].tolist()
+        for step, (time, force) in enumerate(zip(times, forces, strict=True), start=1):
+            yield case, step, time, force
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, str) and (value[:1] in FORMULA or value[:1] < " "):
+        return f"'{value}" if value else value
+    return value
+
+
+def _written(rows: Iterable[Iterable[Any]]) -> Iterator[str]:
+    line = io.StringIO()
+    writer = csv.writer(line, lineterminator="\n")
+    for row in rows:
+        writer.writerow(_cell(cell) for cell in row)
+        yield line.getvalue()
+        line.seek(0)
+        line.truncate()

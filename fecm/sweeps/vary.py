@@ -1,0 +1,181 @@
+"""A deck with the values of a case in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+from fecm.deck.findings import Findings
+from fecm.deck.layup import LayupError, parse_layup
+from fecm.deck.model import Boundary, Deck, Impact, Indentation, Material, Projectile, Segment
+from fecm.deck.reader import ParsedProblem
+from fecm.deck.records import Layer, NodeCodes, Ply, RodDiameter
+from fecm.mechanics.mesh import holds_the_plane
+from fecm.mechanics.projectile import RigidMass
+from fecm.mechanics.time_step import taken_time_step
+from fecm.problem.build import build_projectile, is_coupled
+from fecm.problem.generate import restraint_codes
+from fecm.problem.problem import check
+from fecm.sweeps.cases import NAMES, Case, CasesError, Value
+from fecm.sweeps.clock import critical_of, with_time_step
+
+# Fields of a ply's card by their names in a sweep.
+PLY = ("density", "nu12", "e1", "e2", "g12", "g13", "g23")
+
+
+def apply_case(deck: Deck, case: Case) -> Deck:
+    """Put a case's values into a deck.
+
+    A layup takes the deck's ply thickness, so that more plies make a thicker plate; a thickness
+    scales every layer.  A mass scales a rod's density.
+
+    A deck with B = 0 may restrain u and v at every node, as they rest in any case.  Where B of the
+    case is not 0 they do not rest: they are then held at the nodes that hold w, and free elsewhere,
+    as in a deck of ``fecm new``.  A time step changes the number of steps, so that the duration
+    stays.
+
+    Raises
+    ------
+    CasesError
+        If a value can't be used with this deck.
+    """
+    if "rod_mass" in case and "rod_density" in case:
+        raise CasesError("rod_mass and rod_density are two ways to say the same")
+    made = deck
+    # The layup before the whole laminate's thickness, the mass behind what else the rod is made of.
+    for name in sorted(case, key=lambda name: (name != "layup", NAMES.index(name))):
+        if name != "dt":
+            made = _SETTERS[name](made, name, case[name])
+    if "dt" in case:
+        made = with_time_step(made, float(case["dt"]), _taken_time_step(deck))
+    material = deck.last(Material)
+    if material is not None and not is_coupled(material) and is_coupled(made.require(Material)):
+        made = _free_in_plane(made)
+    return replace(made, text="")
+
+
+@lru_cache(maxsize=8)
+def _holds_the_plane(boundaries: tuple[Boundary, ...], nodes: int, unknowns: int) -> bool:
+    return holds_the_plane(restraint_codes(boundaries, nodes, unknowns))
+
+
+def _free_in_plane(deck: Deck) -> Deck:
+    """Hold u and v only where w is held, if the deck restrains them at every node."""
+    boundaries = tuple(deck.all(Boundary))
+    if not _holds_the_plane(boundaries, deck.control.numnp, deck.control.ndf):
+        return deck
+
+    # Codes of one unknown carry on independently of the others, so that copies of w's do as w's.
+    def freed(record: NodeCodes) -> NodeCodes:
+        w = record.codes[2]
+        return replace(record, codes=(w, w, *record.codes[2:]), source=None)
+
+    segments = tuple(
+        replace(s, records=tuple(map(freed, s.records)), source=None)
+        if isinstance(s, Boundary)
+        else s
+        for s in deck.segments
+    )
+    return replace(deck, segments=segments)
+
+
+def _swap(deck: Deck, old: Segment, new: Segment) -> Deck:
+    segments = tuple(new if segment is old else segment for segment in deck.segments)
+    return replace(deck, segments=segments)
+
+
+def _impact(deck: Deck, name: str, value: Value) -> Deck:
+    old = deck.require(Impact)
+    new = (
+        replace(old, velocity=float(value), source=None)
+        if name == "velocity"
+        else replace(old, node=int(value), source=None)
+    )
+    return _swap(deck, old, new)
+
+
+def _law(deck: Deck, name: str, value: Value) -> Deck:
+    old = deck.require(Indentation)
+    changed: dict[str, Any] = {name: float(value), "source": None}
+    return _swap(deck, old, replace(old, **changed))
+
+
+def _rod(deck: Deck, name: str, value: Value) -> Deck:
+    """Change the projectile, which a deck without one gets as a segment."""
+    rod, old = build_projectile(deck), deck.last(Projectile)
+    number = float(value)
+    if isinstance(rod, RigidMass):
+        if name != "rod_mass":
+            raise CasesError(f"{name}: the deck's projectile is a rigid mass")
+        new = Projectile(0, 0, number)
+    else:
+        diameters = tuple(RodDiameter(n, 0, d) for n, d in enumerate(rod.diameters, start=1))
+        transducer = 0 if old is None else old.transducer
+        new = Projectile(rod.elements, transducer, rod.length, rod.modulus, rod.density, diameters)
+        if name == "rod_length":
+            new = replace(new, size=number)
+        elif name == "rod_modulus":
+            new = replace(new, modulus=number)
+        elif name == "rod_density":
+            new = replace(new, density=number)
+        else:
+            new = replace(new, density=rod.density * number / rod.total_mass)
+    if old is None:
+        return replace(deck, segments=(*deck.segments, new))
+    return _swap(deck, old, new)
+
+
+def _ply(deck: Deck, name: str, value: Value) -> Deck:
+    old = deck.require(Material)
+    ply: Ply = replace(old.ply, **{name: float(value)}, source=None)
+    return _swap(deck, old, replace(old, ply=ply))
+
+
+def _thickness(deck: Deck, name: str, value: Value) -> Deck:
+    old = deck.require(Material)
+    total = float(value)
+    factor = total / sum(layer.thickness for layer in old.layers)
+    layers = tuple(
+        replace(layer, thickness=layer.thickness * factor, source=None) for layer in old.layers
+    )
+    integration = replace(old.integration, thickness=total, source=None)
+    return _swap(deck, old, replace(old, integration=integration, layers=layers))
+
+
+def _layup(deck: Deck, name: str, value: Value) -> Deck:
+    old = deck.require(Material)
+    thicknesses = {layer.thickness for layer in old.layers}
+    if len(thicknesses) > 1:
+        raise CasesError("layup: the deck's plies differ in thickness")
+    (ply,) = thicknesses
+    try:
+        angles = parse_layup(str(value))
+    except LayupError as error:
+        raise CasesError(f"layup: {error}") from None
+    layers = tuple(Layer(n, angle, ply) for n, angle in enumerate(angles, start=1))
+    integration = replace(old.integration, thickness=len(angles) * ply, source=None)
+    control = replace(deck.control, layers=len(layers), source=None)
+    made = _swap(deck, old, replace(old, integration=integration, layers=layers))
+    return replace(made, control=control)
+
+
+@lru_cache(maxsize=8)
+def _taken_time_step(deck: Deck) -> float:
+    """What DT 0 takes in a deck; 0 where no DT is 0."""
+    if all(macro.value for macro in deck.macros if macro.word == "DT"):
+        return 0.0
+    checked = check(ParsedProblem(deck), Findings())
+    return 0.0 if checked is None else taken_time_step(critical_of(checked))
+
+
+_SETTERS: dict[str, Callable[[Deck, str, Value], Deck]] = {
+    "velocity": _impact,
+    "impact_node": _impact,
+    **dict.fromkeys(("k", "alpha_p", "s_p", "q"), _law),
+    **dict.fromkeys(("rod_length", "rod_modulus", "rod_density", "rod_mass"), _rod),
+    **dict.fromkeys(PLY, _ply),
+    "thickness": _thickness,
+    "layup": _layup,
+}
