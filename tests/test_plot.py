@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 import fecm
 from fecm.plot.data import patches, strain_points
 from fecm.plot.deflection import profile
+from fecm.plot.kinds import KINDS, MISSING, Picture, PlotError
 from fecm.plot.meshes import supports
-from fecm.plot.pictures import KINDS, MISSING, Options, draw, save
-from fecm.plot.style import COLOURS, Picture, PlotError, scale
+from fecm.plot.pictures import Options, draw, save
+from fecm.plot.style import COLOURS, scale
 from fecm.results.result import Result
 from tests.builders import distorted_square
 from tests.calls import assert_unusable, call

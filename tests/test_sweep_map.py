@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.plot.pictures import KINDS, Options, draw
-from fecm.plot.style import PlotError
+from fecm.plot.kinds import KINDS, PlotError
+from fecm.plot.pictures import Options, draw
 from fecm.sweeps.result import SweepResult, save
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM, small

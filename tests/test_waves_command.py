@@ -12,7 +12,7 @@ import pytest
 
 from fecm.cli.laminate_options import laminate_of_options
 from fecm.cli.new import OptionError
-from fecm.plot.style import PlotError
+from fecm.plot.kinds import PlotError
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from tests.builders import general_plate, report_plate, table
 from tests.calls import Done, assert_unusable, call

@@ -16,7 +16,7 @@ from fecm.cli.types import POSITIVE, Finite
 from fecm.studies.indentation_test import LIMITS_Q
 
 if TYPE_CHECKING:
-    from fecm.plot.style import Picture
+    from fecm.plot.kinds import Picture
     from fecm.studies.indentation_test.table import Test
 
 

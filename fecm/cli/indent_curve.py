@@ -16,7 +16,7 @@ from fecm.cli.types import POSITIVE
 if TYPE_CHECKING:
     from fecm.deck.model import Deck, Indentation
     from fecm.mechanics.contact_law import ContactParameters
-    from fecm.plot.style import Picture
+    from fecm.plot.kinds import Picture
 
 
 def _path(text: str | None) -> list[float]:

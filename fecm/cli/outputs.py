@@ -18,7 +18,7 @@ from fecm._files import check_outputs
 from fecm.cli.common import FILE_PATH, Refused, echo, writing
 
 if TYPE_CHECKING:
-    from fecm.plot.style import Picture
+    from fecm.plot.kinds import Picture
 
 STANDARD_OUTPUT = Path("-")
 
@@ -88,8 +88,8 @@ class OutputPaths:
         """
         if self.picture is None:
             return
+        from fecm.plot.kinds import PlotError
         from fecm.plot.pictures import save
-        from fecm.plot.style import PlotError
 
         try:
             save(draw(), self.picture, overwrite=self.overwrite)
@@ -115,7 +115,7 @@ class OutputPaths:
 
 def _check_picture(path: Path) -> None:
     """Refuse a picture that can't be drawn."""
-    from fecm.plot.pictures import MISSING, SUFFIXES
+    from fecm.plot.kinds import MISSING, SUFFIXES
 
     if path.suffix.lower() not in SUFFIXES:
         raise Refused(f"{path}: pictures are written as {', '.join(SUFFIXES)}")

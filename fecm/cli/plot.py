@@ -13,8 +13,8 @@ import click
 from fecm._files import check_outputs
 from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, echo, progress
 from fecm.cli.isolation import reads
-from fecm.plot.pictures import KINDS, Options, PlotNote, check_options, check_suffix, draw, save
-from fecm.plot.style import Picture, PlotError
+from fecm.plot.kinds import KINDS, Picture, PlotError, PlotNote
+from fecm.plot.pictures import Options, check_options, check_suffix, draw, save
 from fecm.results.schema import printable
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from fecm.mechanics.rod_integrators import INTEGRATORS, LUMPED, MASSES, WILSON
 
 if TYPE_CHECKING:
     from fecm.mechanics.projectile import Rod
-    from fecm.plot.style import Picture
+    from fecm.plot.kinds import Picture
     from fecm.studies.rod_test.pulse_test import RodHistory
 
 FILTER_HELP = ("first-order:RISE or moving-average:RISE; RISE is the time from 10 to 90 % of the "

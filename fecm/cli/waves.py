@@ -17,7 +17,7 @@ from fecm.cli.types import ListCommand, number
 
 if TYPE_CHECKING:
     from fecm.mechanics.laminate import Laminate
-    from fecm.plot.style import Picture
+    from fecm.plot.kinds import Picture
     from fecm.studies.waves import Medium, WaveSurfaces
 
 # Rows of a table beyond which a slip of the pen is more likely than a wish.

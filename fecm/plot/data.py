@@ -15,7 +15,7 @@ from fecm.deck.reader import Reader
 from fecm.mechanics.element_groups import ElementBlock, element_blocks
 from fecm.mechanics.element_matrices import local_shape_functions
 from fecm.mechanics.elements.quadrature import Quadrature
-from fecm.plot.style import PlotError
+from fecm.plot.kinds import PlotError
 from fecm.problem.build import rules
 from fecm.problem.slips import LISTING
 from fecm.results.result import Result

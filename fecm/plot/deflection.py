@@ -15,6 +15,7 @@ from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 from fecm._typing import Floats
 from fecm.plot.data import Array, Patches, impact_point, patches, require, stored_rows, struck
+from fecm.plot.kinds import Picture, PlotError
 from fecm.plot.pictures import Options
 from fecm.plot.style import (
     COLOURS,
@@ -22,8 +23,6 @@ from fecm.plot.style import (
     RATIO,
     SIGNED,
     WIDTHS,
-    Picture,
-    PlotError,
     Scale,
     lines_legend,
     panels,

@@ -12,14 +12,13 @@ from matplotlib.lines import Line2D
 
 from fecm.deck.model import Material
 from fecm.plot.data import Array, deck_of, impact_point, nearest, require, strain_points
-from fecm.plot.pictures import Options, PlotNote
+from fecm.plot.kinds import Picture, PlotError, PlotNote
+from fecm.plot.pictures import Options
 from fecm.plot.style import (
     COLOURS,
     RATIO,
     STYLES,
     WIDTHS,
-    Picture,
-    PlotError,
     legend,
     lines_legend,
     panels,

@@ -9,17 +9,8 @@ from matplotlib.axes import Axes
 
 from fecm._typing import Floats
 from fecm.deck.units import unit_of
-from fecm.plot.style import (
-    COLOURS,
-    RATIO,
-    STYLES,
-    Picture,
-    Scale,
-    lines_legend,
-    panels,
-    scale,
-    styled,
-)
+from fecm.plot.kinds import Picture
+from fecm.plot.style import COLOURS, RATIO, STYLES, Scale, lines_legend, panels, scale, styled
 from fecm.studies.indentation_test.constants import Fit
 from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING
 

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.plot.pictures import Options, PlotNote
-from fecm.plot.style import COLOURS, PlotError, Scale, scale
+from fecm.plot.kinds import PlotError, PlotNote
+from fecm.plot.pictures import Options
+from fecm.plot.style import COLOURS, Scale, scale
 from fecm.sweeps.cases import TEXTS
 from fecm.sweeps.cases import WHOLE as WHOLE_VALUES
 from fecm.sweeps.outcome import RUN, STILL, SUMMARY

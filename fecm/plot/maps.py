@@ -14,9 +14,10 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
+from fecm.plot.kinds import Picture
 from fecm.plot.map_data import CURVES, Axis, Choice, choose
 from fecm.plot.pictures import Options
-from fecm.plot.style import COLOURS, IN_ORDER, RATIO, Picture, lines_legend, panels
+from fecm.plot.style import COLOURS, IN_ORDER, RATIO, lines_legend, panels
 from fecm.sweeps.result import SweepResult
 
 # Cells and points beyond which a drawing of lines holds them as an image.

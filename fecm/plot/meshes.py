@@ -10,8 +10,9 @@ from matplotlib.collections import LineCollection
 
 from fecm._typing import Bools
 from fecm.plot.data import patches, require, struck
+from fecm.plot.kinds import Picture
 from fecm.plot.pictures import Options
-from fecm.plot.style import COLOURS, WIDTHS, Picture, legend, panels, scale_of
+from fecm.plot.style import COLOURS, WIDTHS, legend, panels, scale_of
 from fecm.results.result import Result
 
 # Marks of the supports: how they are called, and how they look.

@@ -14,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fecm.plot.style import Picture, PlotError
+from fecm.plot.kinds import KINDS, MISSING, Picture, PlotError
 from fecm.results.schema import ResultFileError
 
 if TYPE_CHECKING:
@@ -23,53 +23,6 @@ if TYPE_CHECKING:
     from fecm.results.result import Result
     from fecm.sweeps.result import SweepResult
 
-
-SUFFIXES = (".png", ".svg", ".pdf")
-
-MISSING = "pictures need matplotlib: pip install 'fecm[plot]'"
-
-
-class PlotNote(UserWarning):
-    """What a user should know of a picture; all other warnings are those of libraries."""
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of picture.
-
-    Attributes
-    ----------
-    function : str
-        Module of this package, and the function in it.
-    summary : str
-        What it shows.
-    several : bool
-        Whether several results go into one picture.
-    suffixes : tuple of str
-        Formats it can be written in, the usual one first.
-    sweep : bool
-        Whether it shows the result of a sweep, not of a run.
-    """
-
-    function: str
-    summary: str
-    several: bool = False
-    suffixes: tuple[str, ...] = SUFFIXES
-    sweep: bool = False
-
-
-KINDS = {
-    "force": Kind("histories:force", "contact force and transducer against time", True),
-    "loop": Kind("histories:loop", "contact force against indentation", True),
-    "energy": Kind("histories:energy", "where the energy is, against time", True),
-    "strain": Kind("histories:strain", "surface strain at points, against time", True),
-    "line": Kind("deflection:line", "deflection along a line through the impact point", True),
-    "contour": Kind("deflection:contour", "deflection of the plate, seen from above"),
-    "surface": Kind("deflection:surface", "the deflected plate"),
-    "mesh": Kind("meshes:mesh", "mesh, supports and impact point"),
-    "animation": Kind("deflection:animation", "the moving plate", suffixes=(".gif",)),
-    "map": Kind("maps:parameter_map", "a number of a sweep over what varies", sweep=True),
-}
 
 # Kinds that an option is for; the others are for all of them.
 KINDS_OF_OPTION = {
@@ -200,7 +153,7 @@ def draw(
     for name, result in results.items():
         check_kind(kind, name, sweep=not isinstance(result, Result))
     module, _, function = KINDS[kind].function.partition(":")
-    drawn = getattr(import_module(f"fecm.plot.pictures.{module}"), function)
+    drawn = getattr(import_module(f"fecm.plot.{module}"), function)
     with matplotlib.rc_context(RC), _errors_as_one(f"{kind} of {' and '.join(results)}"):
         picture: Picture = drawn(results, options or Options())
     return picture

@@ -11,11 +11,11 @@ from matplotlib.axes import Axes
 
 from fecm._typing import Floats
 from fecm.deck.units import unit_of
+from fecm.plot.kinds import Picture
 from fecm.plot.style import (
     COLOURS,
     RATIO,
     STYLES,
-    Picture,
     legend,
     lines_legend,
     literal,

@@ -6,19 +6,16 @@ import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ParamSpec
+from typing import Any, ParamSpec
 
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from fecm.plot.kinds import Picture, PlotError
 from fecm.results.result import Result
 from fecm.results.schema import printable
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 # Width of a column and of a page (in); points an inch of pictures in print and on a screen.
 WIDTHS = {"column": 3.5, "full": 7.2}
@@ -203,15 +200,3 @@ def lines_legend(figure: Figure, axes: Axes, title: str = "") -> None:
 def _unlabelled(label: str) -> bool:
     """Whether a line was drawn without a label for the legend."""
     return label == "_" or label.startswith("_child")
-
-
-class PlotError(ValueError):
-    """A result lacks what a picture needs, or the options don't fit it."""
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A figure, and what changes it from frame to frame if it moves."""
-
-    figure: Figure
-    frames: Sequence[Callable[[], Any]] = ()

@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from fecm.deck.units import unit_of
-from fecm.plot.style import COLOURS, Picture, PlotError, panels, scale, styled
+from fecm.plot.kinds import Picture, PlotError
+from fecm.plot.style import COLOURS, panels, scale, styled
 from fecm.studies.waves import FRONTS, MODES, Cusp, Dispersion, Medium, WaveSurfaces
 
 AROUND = np.arange(1441) / 4.0  # normals of the points of a curve, degrees

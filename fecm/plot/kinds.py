@@ -1,0 +1,72 @@
+"""Kinds of pictures.
+
+Imports no matplotlib: the command line lists the kinds without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SUFFIXES = (".png", ".svg", ".pdf")
+
+MISSING = "pictures need matplotlib: pip install 'fecm[plot]'"
+
+
+class PlotError(ValueError):
+    """A result lacks what a picture needs, or the options do not fit it."""
+
+
+class PlotNote(UserWarning):
+    """Something a user should know about a picture; other warnings come from libraries."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure; `frames` draw its frames if it is animated."""
+
+    figure: Figure
+    frames: Sequence[Callable[[], Any]] = ()
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of picture.
+
+    Attributes
+    ----------
+    function : str
+        Module of this package, and the function in it.
+    summary : str
+        What it shows.
+    several : bool
+        Whether several results go into one picture.
+    suffixes : tuple of str
+        Formats it can be written in, the usual one first.
+    sweep : bool
+        Whether it shows the result of a sweep, not of a run.
+    """
+
+    function: str
+    summary: str
+    several: bool = False
+    suffixes: tuple[str, ...] = SUFFIXES
+    sweep: bool = False
+
+
+KINDS = {
+    "force": Kind("histories:force", "contact force and transducer against time", True),
+    "loop": Kind("histories:loop", "contact force against indentation", True),
+    "energy": Kind("histories:energy", "where the energy is, against time", True),
+    "strain": Kind("histories:strain", "surface strain at points, against time", True),
+    "line": Kind("deflection:line", "deflection along a line through the impact point", True),
+    "contour": Kind("deflection:contour", "deflection of the plate, seen from above"),
+    "surface": Kind("deflection:surface", "the deflected plate"),
+    "mesh": Kind("meshes:mesh", "mesh, supports and impact point"),
+    "animation": Kind("deflection:animation", "the moving plate", suffixes=(".gif",)),
+    "map": Kind("maps:parameter_map", "a number of a sweep over what varies", sweep=True),
+}
