@@ -20,8 +20,7 @@ from fecm.api import load_deck
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import build_plate
 from fecm.problem.memory import needed_bytes
-from fecm.sweeps.batch import ADVANCED
-from fecm.sweeps.plan import KEPT
+from fecm.sweeps.plan import ADVANCED, KEPT
 from tests.calls import assert_unusable, call
 from tests.decks import small
 

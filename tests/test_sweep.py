@@ -25,10 +25,9 @@ from fecm.problem.build import build_law, build_model, build_projectile
 from fecm.problem.generate import generate
 from fecm.sweeps import schedule
 from fecm.sweeps.api import carry_out, problem_of
-from fecm.sweeps.batch import Task, shares_plate
 from fecm.sweeps.cases import Case, CasesError, grid, parse_vary, read_cases
 from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.plan import plan, tasks
+from fecm.sweeps.plan import Task, plan, shares_plate, tasks
 from fecm.sweeps.responses import Convolution, plate_response
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.schedule import LOST, on_workers

@@ -14,11 +14,11 @@ import pytest
 
 from fecm.sweeps import schedule
 from fecm.sweeps.api import carry_out, problem_of
-from fecm.sweeps.batch import Task, run
+from fecm.sweeps.batch import run
 from fecm.sweeps.cases import grid
 from fecm.sweeps.clock import with_time_step
 from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.plan import Plan, plan, tasks
+from fecm.sweeps.plan import Plan, Task, plan, tasks
 from fecm.sweeps.schedule import LOST
 from fecm.sweeps.store import DamagedPartError, PartialResults
 from tests.calls import call

@@ -16,10 +16,9 @@ from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, count_errors, echo, s
 
 if TYPE_CHECKING:
     from fecm.problem.problem import Problem
-    from fecm.sweeps.batch import Task
     from fecm.sweeps.cases import Case
     from fecm.sweeps.outcome import Outcome
-    from fecm.sweeps.plan import Plan
+    from fecm.sweeps.plan import Plan, Task
     from fecm.sweeps.result import SweepResult
     from fecm.sweeps.store import PartialResults
 

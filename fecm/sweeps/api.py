@@ -11,10 +11,10 @@ from fecm.api import load_deck
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
 from fecm.problem.problem import Problem
-from fecm.sweeps.batch import Task, merge
+from fecm.sweeps.batch import merge
 from fecm.sweeps.cases import Case, CasesError, checked, grid
 from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.plan import Plan, check_memory, plan, tasks
+from fecm.sweeps.plan import Plan, Task, check_memory, plan, tasks
 from fecm.sweeps.result import SweepResult, result_of, save
 from fecm.sweeps.schedule import Done, Idle, lost, on_dask, on_workers, run_serial
 from fecm.sweeps.store import DamagedPartError, PartialResults

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fecm._memory import require
 from fecm._typing import Floats
 from fecm.deck.findings import Findings
-from fecm.deck.macros import Body, Loop, compile_program, estimate_work, flat
+from fecm.deck.macros import compile_program, estimate_work, flat
 from fecm.deck.model import Deck, Impact, Projectile
 from fecm.deck.model import Indentation as LawCards
 from fecm.deck.reader import ParsedProblem
@@ -35,46 +35,12 @@ from fecm.problem.generate import generate
 from fecm.problem.problem import Problem, check
 from fecm.results.schema import Dataset
 from fecm.simulation.simulation import ENERGY_WARNING, simulate
-from fecm.sweeps.cases import Case, CasesError
+from fecm.sweeps.cases import CasesError
 from fecm.sweeps.clock import Clock, critical_of, with_time_step
 from fecm.sweeps.outcome import SUMMARY, Indentation, Outcome, status_of, summarise
+from fecm.sweeps.plan import ADVANCED, Plan, Task, shares_plate, without_output
 from fecm.sweeps.responses import BLOCK, Convolution, TipState, TipSteps, plate_response
 from fecm.sweeps.vary import apply_case
-
-if TYPE_CHECKING:
-    from fecm.sweeps.plan import Plan
-
-
-# Bytes a step of each case that is advanced with others: more than was measured.
-ADVANCED = 28
-
-
-@dataclass(frozen=True)
-class Task:
-    """Cases that are run together.
-
-    Attributes
-    ----------
-    number : int
-        The task's number.
-    deck : Deck
-        What is varied.
-    numbers : tuple of int
-        The cases' numbers.
-    cases : tuple of dict
-        Their values.
-    history : bool
-        Whether the forces are wanted.
-    clock : Clock or None
-        Rule by which the plate has its own time step; None where the deck's holds.
-    """
-
-    number: int
-    deck: Deck
-    numbers: tuple[int, ...]
-    cases: tuple[Case, ...]
-    history: bool = False
-    clock: Clock | None = None
 
 
 def run(task: Task) -> Outcome:
@@ -157,19 +123,6 @@ def _refuse(number: int, deck: Deck, mesh: Mesh, lost: dict[int, str]) -> bool:
     if findings.errors:
         lost[number] = findings.errors[0].message
     return bool(findings.errors)
-
-
-def shares_plate(checked: Problem) -> bool:
-    """Whether a program only takes impact steps of one size, on a plate without other loads."""
-    words = [macro.word for macro in flat(checked.program)]
-    sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
-    return (
-        "RODP" in words
-        and len(sizes) == 1
-        and words.index("DT") < words.index("RODP")
-        and not {"EXCD", "TANG", "FORM", "SOLV"}.intersection(words)
-        and not checked.mesh.forces.any()
-    )
 
 
 def _time_step(checked: Problem, plate: PlateModel) -> float:
@@ -397,19 +350,6 @@ def _alone(number: int, checked: Problem) -> Outcome:
         np.array([sink.unconverged_steps], dtype=np.int64),
         force[None],
     )
-
-
-def without_output(body: Body) -> Body:
-    """A program that stores no fields."""
-    kept: list[Any] = []
-    for item in body:
-        if isinstance(item, Loop):
-            kept.append(replace(item, body=without_output(item.body)))
-        elif item.word == "RODP":
-            kept.append(replace(item, value=1e9))
-        elif item.word not in ("DISP", "STRE", "REAC", "EIGE"):
-            kept.append(item)
-    return tuple(kept)
 
 
 def merge(parts: list[Outcome]) -> Outcome:

@@ -7,20 +7,22 @@ import json
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 from fecm import _memory
 from fecm._version import __version__
-from fecm.deck.macros import estimate_work
+from fecm.deck.macros import Body, Loop, estimate_work, flat
 from fecm.deck.model import Boundary, Deck
 from fecm.problem.memory import needed_bytes
 from fecm.problem.problem import Problem
-from fecm.sweeps.batch import ADVANCED, Task, shares_plate, without_output
 from fecm.sweeps.cases import CONTACT, PLATE, Case, CasesError
 from fecm.sweeps.clock import Clock, clock_of
 from fecm.sweeps.vary import apply_case
 
 # Cases that are advanced together; fixed, as sums depend on it in their last digit.
 TOGETHER = 1024
+# Bytes a step of each case that is advanced with others: more than was measured.
+ADVANCED = 28
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,34 @@ class Plan:
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
+@dataclass(frozen=True)
+class Task:
+    """Cases that are run together.
+
+    Attributes
+    ----------
+    number : int
+        The task's number.
+    deck : Deck
+        What is varied.
+    numbers : tuple of int
+        The cases' numbers.
+    cases : tuple of dict
+        Their values.
+    history : bool
+        Whether the forces are wanted.
+    clock : Clock or None
+        Rule by which the plate has its own time step; None where the deck's holds.
+    """
+
+    number: int
+    deck: Deck
+    numbers: tuple[int, ...]
+    cases: tuple[Case, ...]
+    history: bool = False
+    clock: Clock | None = None
+
+
 def plan(checked: Problem, cases: Sequence[Case], *, history: bool = False) -> Plan:
     """Make the plan of a sweep.
 
@@ -65,6 +95,19 @@ def plan(checked: Problem, cases: Sequence[Case], *, history: bool = False) -> P
     own = "dt" not in cases[0] and not {"impact_node", *CONTACT}.issuperset(cases[0])
     clock = clock_of(checked) if own else None
     return Plan(checked.deck, tuple(cases), history, clock)
+
+
+def shares_plate(checked: Problem) -> bool:
+    """Whether a program only takes impact steps of one size, on a plate without other loads."""
+    words = [macro.word for macro in flat(checked.program)]
+    sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
+    return (
+        "RODP" in words
+        and len(sizes) == 1
+        and words.index("DT") < words.index("RODP")
+        and not {"EXCD", "TANG", "FORM", "SOLV"}.intersection(words)
+        and not checked.mesh.forces.any()
+    )
 
 
 def tasks(checked: Problem, made: Plan) -> list[Task]:
@@ -92,6 +135,19 @@ def freed(some: Sequence[Task]) -> int:
             if apply_case(task.deck, plate).all(Boundary) != task.deck.all(Boundary):
                 count += len(task.numbers)
     return count
+
+
+def without_output(body: Body) -> Body:
+    """A program that stores no fields."""
+    kept: list[Any] = []
+    for item in body:
+        if isinstance(item, Loop):
+            kept.append(replace(item, body=without_output(item.body)))
+        elif item.word == "RODP":
+            kept.append(replace(item, value=1e9))
+        elif item.word not in ("DISP", "STRE", "REAC", "EIGE"):
+            kept.append(item)
+    return tuple(kept)
 
 
 # Bytes a step of each case whose history is kept: more than was measured.

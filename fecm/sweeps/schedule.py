@@ -17,8 +17,9 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 from urllib.parse import urlsplit
 
-from fecm.sweeps.batch import Task, run
+from fecm.sweeps.batch import run
 from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.plan import Task
 
 Done = Callable[[Task, Outcome], None]
 # Given now and then while others work, so that a signal can be heeded.

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from fecm._files import beside, packed
-from fecm.sweeps.batch import Task
 from fecm.sweeps.outcome import SUMMARY, Outcome
+from fecm.sweeps.plan import Task
 
 MARK = "sweep.json"
 # Bytes of the checksum behind the arrays of a part.
