@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import io
+import subprocess
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 from unittest import mock
 
 import pytest
@@ -34,6 +37,17 @@ def call(*arguments: object) -> Done:
         main(list(map(str, arguments)))
     assert isinstance(left.value.code, int)
     return Done(left.value.code, out.getvalue(), err.getvalue())
+
+
+def program(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """Run ``python -m fecm`` in a folder."""
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-m", "fecm", *map(str, arguments)],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
 def diff(*arguments: object) -> Done:

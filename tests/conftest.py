@@ -5,9 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 import fecm
 from tests.decks import APPENDIX, small
+
+# A busy machine fails no example.
+settings.register_profile("fecm", deadline=None)
+settings.load_profile("fecm")
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import fecm
 from fecm.api import load_deck
+from fecm.deck import Deck
 from fecm.problem.build import ImpactModel, build_model
 
 ROOT = Path(__file__).parent.parent
@@ -75,3 +77,10 @@ def small(
     end = "STOP\n" if stop else ""
     control = "   25    4    2    2    5    9\n"
     return f"FECM small plate\n{control}{mesh}{data}END\nMACR\n{program}END\n{end}"
+
+
+def model(text: str | Path) -> Deck:
+    """Model of a deck of one problem."""
+    deck = fecm.read_deck(text)
+    assert isinstance(deck, Deck)
+    return deck

@@ -58,10 +58,6 @@ def test_a_wrong_deck_shows_its_user_exactly_this(
     assert [path.name for path in tmp_path.iterdir()] == [deck.name]
 
 
-def test_there_are_twenty_wrong_decks_and_more() -> None:
-    assert len(WRONG) >= 20
-
-
 def test_five_independent_errors_are_five_findings_in_one_run() -> None:
     deck = next(path for path in WRONG if path.stem == "five-errors")
     assert [f.code for f in load_deck(deck).findings] == ["E005", "E408", "E101", "E403", "E501"]

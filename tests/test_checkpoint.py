@@ -375,7 +375,7 @@ def fecm_in(folder: Path, *arguments: str, **options: object) -> subprocess.Comp
     return done
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.long) for n in (1, 2, 3))])
 def test_a_killed_run_resumes_to_the_same_bytes(whole: Path, seed: int) -> None:
     assert trial(whole, whole / "whole.h5", 1.2, seed).startswith("same")
 

@@ -16,18 +16,8 @@ import numpy as np
 import pytest
 
 from fecm.problem import slips
+from tests.calls import program as fecm
 from tests.decks import APPENDIX, DATA_CARDS, ROOT, small
-
-
-def fecm(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
-    """Run ``python -m fecm`` in a folder."""
-    return subprocess.run(
-        [sys.executable, "-W", "error", "-m", "fecm", *map(str, arguments)],
-        cwd=cwd,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
 
 
 @pytest.fixture

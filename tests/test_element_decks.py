@@ -108,7 +108,7 @@ def test_strains_inside_triangles_are_stored(order: int) -> None:
         (12, (4, 4, 4), (4, 9), ", nodes 5 and 10 divide the side from corner 1 to 2 in thirds"),
     ],
 )  # fmt: skip
-def test_a_folded_element_s_hint_tells_its_family_s_numbering(
+def test_a_folded_elements_hint_tells_its_familys_numbering(
     kind: int, orders: tuple[int, int, int], swap: tuple[int, int], hint: str
 ) -> None:
     coordinates, elements = square(2, 2, kind)
@@ -165,7 +165,7 @@ def test_a_shear_order_that_leaves_motions_without_energy_is_warned_of(
     assert [code for code, _, _ in findings(text)] == codes
 
 
-def test_a_triangle_s_missing_corner_is_no_side_of_it() -> None:
+def test_a_triangles_missing_corner_is_no_side_of_it() -> None:
     coordinates, elements = square(8, 8, 4)
     a, b, c, d = elements[36]  # its first corner is struck
     elements[36] = a, b, c, 0

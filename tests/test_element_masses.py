@@ -31,8 +31,8 @@ from tests.builders import (
     square,
     with_restraints,
 )
-from tests.test_plate import area_of
-from tests.test_plate_motion import (
+from tests.patches import (
+    area_of,
     deflections,
     reference_deflections,
     reference_frequencies,
@@ -188,7 +188,7 @@ def test_frequencies_with_consistent_mass_come_from_above_at_the_rate_of_theory(
 
 
 # The lumped mass of the 12-node element is no quadrature that is exact for more than linear fields.
-def test_lumping_takes_the_12_node_element_s_rate_down_to_2() -> None:
+def test_lumping_takes_the_12_node_elements_rate_down_to_2() -> None:
     exact = reference_frequencies("1.000000")[0]
     errors = [abs(frequency(n, 12, lumped=True) / exact - 1.0) for n in (4, 8, 16)]
     assert abs(np.log2(errors[1] / errors[2]) - 2.0) < 0.25

@@ -30,8 +30,9 @@ from tests.builders import (
     square,
     with_restraints,
 )
-from tests.test_plate import (
+from tests.patches import (
     CURVATURE,
+    PATTERNS,
     STRAIN,
     MeshMaker,
     bent,
@@ -41,7 +42,6 @@ from tests.test_plate import (
     residual,
     stretched,
 )
-from tests.test_quadrature import PATTERNS
 
 Mesh = tuple[Floats, Ints]
 

@@ -144,7 +144,7 @@ def test_a_square_reproduces_as_many_powers_of_xi_and_eta_as_it_has_nodes_and_no
     assert len(found) == nodes
 
 
-def test_a_triangle_s_functions_are_its_area_coordinates() -> None:
+def test_a_triangles_functions_are_its_area_coordinates() -> None:
     corners = np.array([[0.2, 0.1], [2.1, 0.7], [0.9, 1.8]])
     values, _ = TRIANGLE.shape_functions(*sample(), first(TRIANGLE, 3))
     points = values @ corners
@@ -168,7 +168,7 @@ def test_a_triangle_is_the_4_node_square_with_corners_3_and_4_in_one_place() -> 
     np.testing.assert_allclose(local[..., 2], slopes[..., 2] + slopes[..., 3], atol=1e-15)
 
 
-def test_nodes_of_a_cubic_element_stand_where_the_report_s_program_puts_them() -> None:
+def test_nodes_of_a_cubic_element_stand_where_the_reports_program_puts_them() -> None:
     np.testing.assert_allclose(3.0 * np.stack([cubic.XI, cubic.ETA], axis=1), CUBIC_PLACES)
 
 
@@ -206,7 +206,7 @@ def test_a_cubic_along_a_side_is_exact_between_its_four_nodes(side: int) -> None
 
 @pytest.mark.parametrize("side", range(4))
 @pytest.mark.parametrize("shape", [QUADRILATERAL, CUBIC], ids=lambda shape: shape.name)
-def test_on_a_side_functions_depend_on_that_side_s_nodes_alone(
+def test_on_a_side_functions_depend_on_that_sides_nodes_alone(
     shape: ElementShape, side: int
 ) -> None:
     t = np.linspace(-1.0, 1.0, 9)
@@ -238,7 +238,7 @@ def test_one_third_point_of_a_side_looks_the_same_from_both_elements() -> None:
     assert np.abs(at_left[:, 5]).max() > 1.0
 
 
-def test_a_triangle_s_sides_are_lines_that_fit_a_4_node_element() -> None:
+def test_a_triangles_sides_are_lines_that_fit_a_4_node_element() -> None:
     t = np.linspace(-1.0, 1.0, 9)
     rising, falling = (1.0 + t) / 2.0, (1.0 - t) / 2.0
     zero = np.zeros_like(t)

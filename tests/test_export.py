@@ -21,8 +21,8 @@ from fecm.results.result import Result
 from fecm.results.schema import ExportError
 from fecm.results.vtkhdf import write_vtkhdf
 from tests.builders import SQUARE, one_element
+from tests.calls import program as command
 from tests.decks import DATA_CARDS, PROGRAM, ROOT, small
-from tests.test_command_line import fecm as command
 
 Array = NDArray[Any]
 STRAINS = ("kappa_x", "kappa_y", "kappa_xy", "gamma_yz", "gamma_xz")

@@ -23,8 +23,8 @@ PROGRAM = """
 import collections, itertools, os, signal, sys, time
 from pathlib import Path
 import click
-from fecm.cli import apart, cli, main
-from fecm.files import partial_of
+from fecm.cli import cli, isolation, main
+from fecm._files import partial_of
 
 def spin(seconds):
     end = time.process_time() + seconds
@@ -61,7 +61,7 @@ def act(file, what):
     click.echo("done")
 
 if sys.argv[-1] in ("wait", "write"):
-    apart.WAIT, apart.WAIT_SHARE = 0.8, 0.0
+    isolation.WAIT, isolation.WAIT_SHARE = 0.8, 0.0
 main()
 """
 
@@ -220,6 +220,7 @@ def fuzz(*arguments: object, patience: str) -> str:
     return done.stdout
 
 
+@pytest.mark.long
 def test_mutated_results_end_in_one_line() -> None:
     told = fuzz("--count", 120, "--seed", 1, patience="0.25")
     assert "broken 0" in told
@@ -232,6 +233,7 @@ def test_ten_thousand_mutated_results_end_in_one_line() -> None:
     assert "broken 0" in fuzz("--count", 10_000, "--seed", 100_000, patience="1")
 
 
+@pytest.mark.long
 def test_mutated_results_of_sweeps_end_in_one_line() -> None:
     told = fuzz("--count", 16, "--seed", 70, "--sweep", patience="0.25")
     assert "broken 0" in told

@@ -115,7 +115,7 @@ def test_a_larger_peak_between_two_readings_is_found_where_the_curves_meet() -> 
 
 
 def test_partial_unloadings_reload_from_an_origin_of_their_own() -> None:
-    # Up to 3e-3, down to 2e-3, back up through the peak to 4e-3 and out; by READING's formula.
+    # Up to 3e-3, down to 2e-3, back up through the peak to 4e-3 and out: the law's formulas.
     peak, turn, left = 3e-3, 2e-3, S_P * (3e-3 - ALPHA_P)
     top = K * peak**1.5
     at_turn = top * ((turn - left) / (peak - left)) ** Q

@@ -52,7 +52,7 @@ def assert_same(found: Floats, expected: Floats, scale: float | None = None) -> 
 # Plies -------------------------------------------------------------------------------------------
 
 
-def test_a_ply_has_the_reference_file_s_plane_stress_stiffness() -> None:
+def test_a_ply_has_the_reference_files_plane_stress_stiffness() -> None:
     q = reduced_stiffness(REPORT_PLY)
     found = np.array([q[0, 0], q[1, 1], q[0, 1], q[2, 2]])
     assert_same(found, np.array([REFERENCE[name] for name in ("Q11", "Q22", "Q12", "Q66")]))
@@ -61,7 +61,7 @@ def test_a_ply_has_the_reference_file_s_plane_stress_stiffness() -> None:
 
 
 @pytest.mark.parametrize("angle", [0, 45, -45])
-def test_a_turned_ply_has_the_reference_file_s_stiffness(angle: int) -> None:
+def test_a_turned_ply_has_the_reference_files_stiffness(angle: int) -> None:
     found = transformed_stiffness(reduced_stiffness(REPORT_PLY), angle)
     assert_same(found, reference_matrix("Qbar", f"({angle})"))
 
@@ -106,7 +106,7 @@ def test_pulling_a_45_degree_ply_along_x_shears_it_towards_its_fibres() -> None:
 # Stacks ------------------------------------------------------------------------------------------
 
 
-def test_the_report_s_plate_has_the_reference_file_s_stiffness_and_inertia() -> None:
+def test_the_reports_plate_has_the_reference_files_stiffness_and_inertia() -> None:
     plate = report_plate()
     assert_same(plate.A, reference_matrix("A"))
     assert_same(plate.D, reference_matrix("D"))
@@ -173,7 +173,7 @@ def material(ply: Ply, total: float) -> Material:
     return Material(Integration(3, 3, 3, total), ply, layers)
 
 
-def test_a_deck_s_stiffness_is_the_layers_and_its_inertia_the_card_s() -> None:
+def test_a_decks_stiffness_is_the_layers_and_its_inertia_the_cards() -> None:
     found = laminate_of(material(REPORT_PLY, 0.2))
     assert_same(found.A, reference_matrix("A"))
     assert_same(found.D, reference_matrix("D"))

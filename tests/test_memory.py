@@ -156,11 +156,11 @@ def test_a_sweep_that_needs_more_than_is_free_is_refused_with_both_numbers(
 def test_matrices_that_do_not_fit_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    problem = load_deck(plate(tmp_path, 60, IMPACT)).problems[0]
+    problem = load_deck(plate(tmp_path, 46, IMPACT)).problems[0]
     model = build_plate(problem.deck, problem.mesh)
-    monkeypatch.setattr(fecm._memory, "available", lambda: 120 * MEGABYTE)
-    # 24 bytes for each of the 45 x 45 entries of 3600 matrices.
-    told = "assemble the plate's matrices takes about 175 MB of memory, and 120 MB are free"
+    monkeypatch.setattr(fecm._memory, "available", lambda: 101 * MEGABYTE)
+    # 24 bytes for each of the 45 x 45 entries of 2116 matrices.
+    told = "assemble the plate's matrices takes about 103 MB of memory, and 101 MB are free"
     with pytest.raises(NotEnoughMemoryError, match=told):
         _ = model.stiffness
     assert critical_time_step(model) > 0.0  # for which no matrix is assembled
@@ -197,6 +197,19 @@ def test_a_deck_that_never_ends_is_refused(monkeypatch: pytest.MonkeyPatch) -> N
     assert "a deck of more than 1 MB is not read" in done.stderr
 
 
-def test_free_memory_is_a_part_of_the_machines() -> None:
-    free = available()
-    assert free is None or 0 < free < 10**15
+def test_free_memory_is_the_least_of_machine_and_control_groups(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = tmp_path / "groups" / "batch" / "job"
+    job.mkdir(parents=True)
+    for name, group in (("MEMINFO", "meminfo"), ("CGROUP", "cgroup"), ("CGROUPS", "groups")):
+        monkeypatch.setattr(fecm._memory, name, tmp_path / group)
+    (tmp_path / "meminfo").write_text("MemTotal: 9000 kB\nMemAvailable: 4000 kB\n")
+    (tmp_path / "cgroup").write_text("0::/batch/job\n")
+    assert available() == 4000 * 1024
+    (job / "memory.max").write_text("max\n")
+    (job / "memory.current").write_text("1000000\n")
+    assert available() == 4000 * 1024
+    (job.parent / "memory.max").write_text("3000000\n")
+    (job.parent / "memory.current").write_text("1000000\n")
+    assert available() == 2_000_000

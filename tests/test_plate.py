@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import product
 
 import numpy as np
@@ -13,7 +12,7 @@ from fecm.mechanics import element_groups, element_matrices, plate
 from fecm.mechanics.elements import quadrilateral
 from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.elements.quadrilateral import ETA, XI
-from fecm.mechanics.plate import PlateModel, assemble
+from fecm.mechanics.plate import assemble
 from fecm.mechanics.stiffness_product import stiffness_operator
 from fecm.mechanics.strains import StrainField
 from tests.builders import (
@@ -25,12 +24,10 @@ from tests.builders import (
     SQUARE,
     Corners,
     Floats,
-    Ints,
     boundary,
     distorted_square,
     general_plate,
     mixed,
-    nothing,
     one_element,
     parallelograms,
     rules,
@@ -39,84 +36,21 @@ from tests.builders import (
     turned_stiffness,
     with_restraints,
 )
+from tests.patches import (
+    CURVATURE,
+    STRAIN,
+    MeshMaker,
+    area_of,
+    bent,
+    equilibrium,
+    free_stiffness,
+    patch,
+    residual,
+    stretched,
+)
 
 KINDS = (4, 8, 9)
 ORDERS = range(1, HIGHEST_ORDER + 1)
-
-MeshMaker = Callable[[int, int, int], tuple[Floats, Ints]]
-
-
-def stretched(coordinates: Floats, strain: Floats) -> Floats:
-    """Field of a constant midplane strain xx, yy, xy with a rotation in the plane."""
-    x, y = coordinates.T
-    field = np.zeros((len(coordinates), 5))
-    field[:, 0] = 0.2 + strain[0] * x + (0.5 * strain[2] - 0.3) * y
-    field[:, 1] = -0.1 + (0.5 * strain[2] + 0.3) * x + strain[1] * y
-    return field
-
-
-def bent(coordinates: Floats, curvature: Floats) -> Floats:
-    """Field of a constant curvature xx, yy, xy without transverse shear: theta is w's gradient."""
-    x, y = coordinates.T
-    kx, ky, kxy = curvature
-    field = np.zeros((len(coordinates), 5))
-    field[:, 2] = 0.4 - 0.2 * x + 0.1 * y - 0.5 * (kx * x**2 + ky * y**2 + kxy * x * y)
-    field[:, 3] = -0.2 - kx * x - 0.5 * kxy * y
-    field[:, 4] = 0.1 - ky * y - 0.5 * kxy * x
-    return field
-
-
-STRAIN = np.array([0.7, -0.4, 0.9])
-CURVATURE = np.array([1.1, -0.6, 0.8])
-
-
-def area_of(corners: Corners) -> float:
-    """A polygon's area, by the shoelace formula."""
-    x, y = np.array(corners).T
-    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2.0
-
-
-def equilibrium(model: PlateModel) -> Floats:
-    """Displacements of every node under the mesh's loads and prescribed displacements."""
-    return model.field(spsolve(model.stiffness.tocsc(), model.nodal_loads))
-
-
-def patch(
-    mesh: tuple[Floats, Ints], field: Floats, shear: int = 3, *, transposed_jacobian: bool = False
-) -> PlateModel:
-    """Prescribe a field on a patch's boundary."""
-    held = boundary(*mesh)
-    values = np.where(held, field, 0.0)
-    model = assemble(
-        with_restraints(*mesh, held, values),
-        general_plate(),
-        rules(3, shear, transposed_jacobian=transposed_jacobian),
-    )
-    assert model.mesh.number_of_equations > 0
-    return model
-
-
-def residual(
-    mesh: tuple[Floats, Ints], field: Floats, *, transposed_jacobian: bool = False
-) -> float:
-    """Largest force left on an inner node by a field, over the largest that its parts exert."""
-    model = patch(mesh, field, transposed_jacobian=transposed_jacobian)
-    inside = model.mesh.equations > 0
-    left = model.stiffness @ field[inside] + model.support @ field[~inside]
-    parts = abs(model.stiffness) @ abs(field[inside]) + abs(model.support) @ abs(field[~inside])
-    return float(np.abs(left).max() / parts.max())
-
-
-def free_stiffness(mesh: tuple[Floats, Ints], bending: int = 3, shear: int = 3) -> Floats:
-    """Stiffness of an unrestrained plate of the general laminate, unknowns node by node."""
-    coordinates, elements = mesh
-    model = assemble(
-        with_restraints(coordinates, elements, nothing(coordinates)),
-        general_plate(),
-        rules(bending, shear),
-    )
-    return np.asarray(model.stiffness.toarray())
-
 
 # Patch tests -------------------------------------------------------------------------------------
 

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import eigh
-from scipy.sparse.linalg import eigsh, spsolve
+from scipy.sparse.linalg import eigsh
 
 from fecm.mechanics import element_groups, element_matrices
 from fecm.mechanics.elements.quadrature import gauss
@@ -35,15 +32,13 @@ from tests.builders import (
     table,
     with_restraints,
 )
-
-Indices = NDArray[np.signedinteger]
-MeshMaker = Callable[[int, int, int], tuple[Floats, Ints]]
-
-
-def equilibrium(model: PlateModel) -> Floats:
-    """Displacements of every node under the mesh's loads and prescribed displacements."""
-    return model.field(spsolve(model.stiffness.tocsc(), model.nodal_loads))
-
+from tests.patches import (
+    MeshMaker,
+    deflections,
+    reference_deflections,
+    reference_frequencies,
+    summed,
+)
 
 # Mass --------------------------------------------------------------------------------------------
 
@@ -53,7 +48,7 @@ def equilibrium(model: PlateModel) -> Floats:
     ("maker", "kind"), [(distorted_square, 4), (distorted_square, 8), (distorted_square, 9),
     (mixed, 9)]
 )  # fmt: skip
-def test_lumped_mass_is_positive_and_adds_up_to_the_plate_s_mass_and_inertia(
+def test_lumped_mass_is_positive_and_adds_up_to_the_plates_mass_and_inertia(
     maker: MeshMaker, kind: int, order: int
 ) -> None:
     coordinates, elements = mesh = maker(3, 4, kind)
@@ -81,7 +76,7 @@ def test_lumped_mass_is_positive_and_adds_up_to_the_plate_s_mass_and_inertia(
         (9, 4, [1 / 36] * 4 + [4 / 36] * 4 + [16 / 36]),
     ],
 )
-def test_a_square_s_mass_is_shared_as_the_squares_of_its_shape_functions(
+def test_a_squares_mass_is_shared_as_the_squares_of_its_shape_functions(
     kind: int, order: int, shares: list[float]
 ) -> None:
     coordinates, elements = one_element(SQUARE, kind)
@@ -92,15 +87,6 @@ def test_a_square_s_mass_is_shared_as_the_squares_of_its_shape_functions(
 
 
 # Vibration ---------------------------------------------------------------------------------------
-
-
-def reference_frequencies(ks: str) -> Floats:
-    """Flexural frequencies of the simply supported square plate, h/a = 0.1, with multiplicity."""
-    found: list[float] = []
-    for row in table("freq_ssss_mindlin.csv"):
-        if f"h/a=0.1 ks={ks}" in row["case"]:
-            found += [float(row["omega_flex_rad/s_or_nondim"])] * (1 + (row["m"] != row["n"]))
-    return np.sort(found)
 
 
 def frequencies(n: int, kind: int, shear: int, count: int = 1, ks: float = 1.0) -> Floats:
@@ -133,7 +119,7 @@ def frequencies(n: int, kind: int, shear: int, count: int = 1, ks: float = 1.0) 
         (4, 1, (8, 16, 32), 2.0, 1e-3),
     ],
 )
-def test_the_fundamental_frequency_converges_to_mindlin_s_at_the_rate_of_theory(
+def test_the_fundamental_frequency_converges_to_mindlins_at_the_rate_of_theory(
     kind: int, shear: int, meshes: tuple[int, ...], rate: float, ceiling: float
 ) -> None:
     expected = reference_frequencies("1.000000")[0]
@@ -145,7 +131,7 @@ def test_the_fundamental_frequency_converges_to_mindlin_s_at_the_rate_of_theory(
 
 @pytest.mark.parametrize(("ks", "label"), [(1.0, "1.000000"), (5.0 / 6.0, "0.833333")])
 @pytest.mark.parametrize(("kind", "shear", "error"), [(9, 2, 0.002), (9, 3, 0.005), (8, 2, 0.005)])
-def test_the_lowest_six_frequencies_are_mindlin_s(
+def test_the_lowest_six_frequencies_are_mindlins(
     kind: int, shear: int, error: float, ks: float, label: str
 ) -> None:
     expected = reference_frequencies(label)[:6]
@@ -213,44 +199,10 @@ def test_central_differences_stay_bounded_below_the_critical_step_and_grow_above
 # Bending under load ------------------------------------------------------------------------------
 
 
-def reference_deflections(ratio: float, ks: str) -> tuple[float, float]:
-    """Deflections in the centre and at the quarter point under a uniform unit load."""
-    (row,) = (
-        row
-        for row in table("static_ssss_mindlin.csv")
-        if f"h/a={ratio:g} ks={ks} " in row["case"] and row["load"].startswith("uni")
-    )
-    return float(row["w_centre"]), float(row["quarter_point w(a/4,b/4)"])
-
-
-def deflections(
-    mesh: tuple[Floats, Ints], loads: Floats, h: float, orders: tuple[int, int], ks: float = 1.0
-) -> tuple[float, ...]:
-    """Deflections in the centre and at the quarter point of the simply supported unit square."""
-    coordinates, elements = mesh
-    held = simple_support(coordinates)
-    forces = np.zeros(held.shape)
-    forces[:, 2] = loads
-    model = assemble(
-        with_restraints(coordinates, elements, held, np.where(held, 0.0, forces)),
-        isotropic_plate(h, ks),
-        rules(*orders),
-    )
-    w = equilibrium(model)[:, 2]
-    places = [np.hypot(*(coordinates - place).T) for place in (0.5, 0.25)]
-    return tuple(float(w[place.argmin()]) for place in places)
-
-
 def simpson_loads(elements: Ints, numnp: int, area: float) -> Floats:
     """Nodal loads of a unit pressure on equal 9-node rectangles."""
     shares = np.tile(np.array([1, 1, 1, 1, 4, 4, 4, 4, 16]) / 36.0 * area, len(elements))
     return summed(elements - 1, shares, numnp)
-
-
-def summed(nodes: Indices, values: Floats, numnp: int) -> Floats:
-    """Add up what elements give to their nodes."""
-    sums = np.bincount(nodes.ravel(), weights=values.ravel(), minlength=numnp)
-    return np.asarray(sums, dtype=np.float64)
 
 
 def errors_of_square(n: int, ratio: float, shear: int, ks: float, label: str) -> Floats:
@@ -263,7 +215,7 @@ def errors_of_square(n: int, ratio: float, shear: int, ks: float, label: str) ->
 
 @pytest.mark.parametrize(("ks", "label"), [(1.0, "1.000000"), (5.0 / 6.0, "0.833333")])
 @pytest.mark.parametrize("ratio", [0.1, 0.01])
-def test_a_uniformly_loaded_plate_bends_as_mindlin_s_however_thin(
+def test_a_uniformly_loaded_plate_bends_as_mindlins_however_thin(
     ratio: float, ks: float, label: str
 ) -> None:
     assert np.abs(errors_of_square(8, ratio, 2, ks, label)).max() < 2e-4

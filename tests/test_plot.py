@@ -24,8 +24,8 @@ from fecm.plot.style import COLOURS, scale
 from fecm.results.result import Result
 from tests.builders import distorted_square
 from tests.calls import assert_unusable, call
+from tests.calls import program as command
 from tests.decks import DATA_CARDS, MESH, PROGRAM, small
-from tests.test_command_line import fecm as command
 
 Array = NDArray[Any]
 

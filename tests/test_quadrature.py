@@ -10,14 +10,10 @@ import pytest
 
 from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.elements.quadrilateral import ETA, XI, shape_functions
-from tests.builders import (
-    Bools,
-    Floats,
-)
+from tests.builders import Bools, Floats
+from tests.patches import PATTERNS
 
 ORDERS = range(1, HIGHEST_ORDER + 1)
-# Corners are always there, each of the other five nodes may be absent.
-PATTERNS = [np.array([True] * 4 + list(rest)) for rest in product((False, True), repeat=5)]
 
 
 # Quadrature --------------------------------------------------------------------------------------
@@ -61,7 +57,7 @@ def test_the_only_point_of_order_1_is_the_centre() -> None:
     (gauss, 0.339981043584856, 0.861136311594053),
     (nodal, 1.0 / 3.0, 1.0),
 ])  # fmt: skip
-def test_order_4_takes_four_rectangles_in_the_printed_program_s_order(
+def test_order_4_takes_four_rectangles_in_the_printed_programs_order(
     rule_of: Callable[[int], Quadrature], inner: float, outer: float
 ) -> None:
     rule = rule_of(4)
@@ -75,7 +71,7 @@ def test_order_4_takes_four_rectangles_in_the_printed_program_s_order(
     np.testing.assert_allclose(np.stack([rule.xi, rule.eta], axis=-1), expected, atol=1e-14)
 
 
-def test_nodal_points_of_order_3_are_the_element_s_nodes() -> None:
+def test_nodal_points_of_order_3_are_the_elements_nodes() -> None:
     rule = nodal(3)
     assert np.array_equal(rule.xi, XI)
     assert np.array_equal(rule.eta, ETA)
@@ -129,7 +125,7 @@ def test_derivatives_of_shape_functions_are_their_differences(present: Bools) ->
     np.testing.assert_allclose(local, np.stack([along, up], axis=1) / (2.0 * d), atol=1e-13)
 
 
-def test_nine_node_shape_functions_are_the_products_of_lagrange_s_parabolas() -> None:
+def test_nine_node_shape_functions_are_the_products_of_lagranges_parabolas() -> None:
     xi, eta = sample()
 
     def parabola(t: Floats, node: float) -> Floats:

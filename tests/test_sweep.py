@@ -34,20 +34,13 @@ from fecm.sweeps.schedule import LOST, on_workers
 from fecm.sweeps.store import OtherSweepError, PartialResults
 from fecm.sweeps.vary import apply_case
 from tests.calls import Done, call
-from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, small
+from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, model, small
 
 Floats = NDArray[np.float64]
 
 LAYUPS = [f"[{angle}/{angle - 90}]" for angle in range(0, 80, 2)]
 STEPS = PROGRAM.replace("LOOP         10", "LOOP        400")
 CLAMPED = MESH.replace("    1    1   -1   -1    0    0    0", "    1    1    1    1    1    1    1")
-
-
-def model(text: str | Path) -> Deck:
-    """Model of a deck of one problem."""
-    deck = fecm.read_deck(text)
-    assert isinstance(deck, Deck)
-    return deck
 
 
 def full(deck: Deck) -> fecm.Result:
@@ -266,6 +259,7 @@ def serial() -> SweepResult:
     return fecm.sweep(model(small(STEPS)), {"layup": LAYUPS}, history=True)
 
 
+@pytest.mark.long
 def test_two_workers_give_what_one_process_does() -> None:
     shared = fecm.sweep(model(small(STEPS)), {"layup": LAYUPS}, history=True, workers=2)
     assert_same(shared, serial())
@@ -278,6 +272,7 @@ def children() -> list[int]:
     return [int(pid) for pid in found]
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs /proc")
 def test_a_worker_that_dies_costs_time_only() -> None:
     problem = problem_of(model(small(STEPS)))
@@ -299,6 +294,7 @@ def die(task: Task) -> Outcome:
     os._exit(1)
 
 
+@pytest.mark.long
 def test_tasks_whose_workers_always_die_end_as_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = problem_of(model(small()))
     made = plan(problem, grid([("layup", ["[0]", "[90]"])]))
@@ -345,6 +341,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]
         yield address, workers
 
 
+@pytest.mark.long
 def test_a_dask_cluster_that_loses_a_worker_gives_the_same_rows(
     cluster: tuple[str, list[subprocess.Popen[bytes]]],
 ) -> None:

@@ -22,9 +22,8 @@ from fecm.sweeps.plan import Plan, Task, plan, tasks
 from fecm.sweeps.schedule import LOST
 from fecm.sweeps.store import DamagedPartError, PartialResults
 from tests.calls import call
-from tests.decks import small
+from tests.decks import model, small
 from tests.kill_runs import SWEEP, SWEPT
-from tests.test_sweep import model
 
 
 @pytest.fixture

@@ -49,7 +49,7 @@ def column(rows: list[dict[str, str]], name: str) -> Floats:
 
 
 @pytest.mark.parametrize("angle", ["0", "45", "90"])
-def test_flexural_waves_have_the_reference_file_s_velocities_and_frequencies(angle: str) -> None:
+def test_flexural_waves_have_the_reference_files_velocities_and_frequencies(angle: str) -> None:
     rows = [row for row in table("waves_dispersion.csv") if row["alpha_deg"] == angle]
     assert len(rows) == 30
     found = dispersion(Medium(report_plate()), float(angle), column(rows, "lambda_over_h"))
@@ -67,7 +67,7 @@ def test_flexural_waves_have_the_reference_file_s_velocities_and_frequencies(ang
         np.testing.assert_allclose(found.angular_frequency[:, n], expected, rtol=1e-8)
 
 
-def test_fronts_have_the_reference_file_s_normal_velocities(report: WaveSurfaces) -> None:
+def test_fronts_have_the_reference_files_normal_velocities(report: WaveSurfaces) -> None:
     rows = table("waves_normal_velocity.csv")
     names = ("c_ext", "c_inshear", "c_bend", "c_twist", "c_transverse_shear (in/s)")
     expected = np.stack([column(rows, name) for name in names], axis=1)
@@ -76,7 +76,7 @@ def test_fronts_have_the_reference_file_s_normal_velocities(report: WaveSurfaces
 
 
 @pytest.mark.parametrize("mode", ["extension", "inplane_shear", "bending", "twisting"])
-def test_fronts_have_the_reference_file_s_rays_and_positions(
+def test_fronts_have_the_reference_files_rays_and_positions(
     mode: str, report: WaveSurfaces
 ) -> None:
     rows = [row for row in table("waves_wavefront_rays.csv") if row["mode"] == mode]
@@ -97,7 +97,7 @@ def test_fronts_have_the_reference_file_s_rays_and_positions(
 
 @pytest.mark.parametrize("angle", [0.0, 25.0, 45.0, 110.0])
 @pytest.mark.parametrize("wavelength", [0.3, 2.0, 15.0])
-def test_the_report_s_two_groups_are_a_special_case_of_the_five_equations(
+def test_the_reports_two_groups_are_a_special_case_of_the_five_equations(
     angle: float, wavelength: float
 ) -> None:
     plate = report_plate()
@@ -333,7 +333,7 @@ def test_extension_and_bending_cross_and_keep_their_names(report: WaveSurfaces) 
     assert report.misnamed() == {}
 
 
-def test_a_front_s_name_tells_where_it_moves_in_another_way() -> None:
+def test_a_fronts_name_tells_where_it_moves_in_another_way() -> None:
     runs = WaveSurfaces(Medium(laminate(REPORT_PLY, [0.0], [0.1]))).misnamed()
     first, last = runs["extension"][0]
     # Where the faster wave's displacement is 45 degrees from its normal, from Q of one ply.

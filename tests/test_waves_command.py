@@ -32,7 +32,7 @@ def rows(done: Done) -> list[dict[str, str]]:
 # Tables -----------------------------------------------------------------------------------------
 
 
-def test_dispersion_of_the_report_s_deck_is_the_reference_file_s() -> None:
+def test_dispersion_of_the_reports_deck_is_the_reference_files() -> None:
     expected = {
         (float(row["alpha_deg"]), float(row["lambda_over_h"])): row
         for row in table("waves_dispersion.csv")
@@ -56,7 +56,7 @@ def test_dispersion_of_the_report_s_deck_is_the_reference_file_s() -> None:
     assert compared == 90
 
 
-def test_speeds_of_the_report_s_deck_are_the_reference_file_s() -> None:
+def test_speeds_of_the_reports_deck_are_the_reference_files() -> None:
     done = call("waves", "speeds", LONG, "--step", "15")
     header = "angle_deg,extension,in_plane_shear,bending,twisting,transverse_shear"
     assert done.stdout.splitlines()[0] == header
@@ -66,7 +66,7 @@ def test_speeds_of_the_report_s_deck_are_the_reference_file_s() -> None:
     assert done.stderr == ""
 
 
-def test_fronts_of_the_report_s_deck_are_the_reference_file_s() -> None:
+def test_fronts_of_the_reports_deck_are_the_reference_files() -> None:
     done = call("waves", "fronts", LONG, "--step", "45", "--time", "2e-6", "1e-5")
     assert done.stdout.splitlines()[0] == "mode,normal_deg,time,x,y,ray_deg"
     found = {(r["mode"], float(r["normal_deg"]), float(r["time"])): r for r in rows(done)}
@@ -227,7 +227,7 @@ def test_the_picture_of_dispersion_shows_scaled_velocities_and_frequencies() -> 
         dispersion_picture(medium, curves * 4)
 
 
-def test_the_picture_of_speeds_is_polar_and_in_the_deck_s_units() -> None:
+def test_the_picture_of_speeds_is_polar_and_in_the_decks_units() -> None:
     pytest.importorskip("matplotlib")
     from fecm.plot.waves import speeds_picture
 
