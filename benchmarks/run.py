@@ -132,7 +132,7 @@ def full(problem: Problem, folder: str, threads: int = 1) -> float:
 
 def plain(problem: Problem, steps: int) -> float:
     """Seconds of the plain loop."""
-    setup = build_model(problem.deck, problem.mesh)
+    setup = build_model(problem)
     impact, K, m = setup.impact, setup.plate.stiffness, setup.plate.mass
     if impact is None:
         raise ValueError("nothing hits in this deck")

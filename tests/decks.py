@@ -65,9 +65,8 @@ OWN_FINDINGS = ("W318", "W414", "W415")
 
 
 def ready(deck: str | Path) -> ImpactModel:
-    """Parts of a deck's first problem."""
-    problem = load_deck(deck).problems[0]
-    return build_model(problem.deck, problem.mesh)
+    """Model of a deck's first problem."""
+    return build_model(load_deck(deck).problems[0])
 
 
 def small(

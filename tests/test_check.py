@@ -6,12 +6,15 @@ import json
 import re
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from fecm.api import load_deck
+from fecm.problem import build
 from fecm.problem.summary import summarise
 from tests import decks
 from tests.calls import call
@@ -40,6 +43,29 @@ def with_data(old: str, new: str) -> str:
     """The small deck with a change in its data."""
     assert old in DATA_CARDS
     return small(data=DATA_CARDS.replace(old, new))
+
+
+def test_check_and_run_of_a_deck_build_plate_and_laminate_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    built: Counter[str] = Counter()
+
+    def count(name: str) -> None:
+        original = getattr(build, name)
+
+        def counted(*args: Any, **kwargs: Any) -> Any:
+            built[name] += 1
+            return original(*args, **kwargs)
+
+        monkeypatch.setattr(build, name, counted)
+
+    for name in ("assemble", "laminate", "estimate_work"):
+        count(name)
+    assert call("run", APPENDIX, "-o", tmp_path / "a.h5").exit_code == 0
+    assert built == {"assemble": 1, "laminate": 1, "estimate_work": 1}
+    slips = ("--slip", "g12", "-o", tmp_path / "b.h5")
+    assert call("run", APPENDIX, *slips).exit_code == 0
+    assert built == {"assemble": 3, "laminate": 3, "estimate_work": 2}
 
 
 @pytest.mark.parametrize("deck", WRONG, ids=lambda path: path.stem)

@@ -18,11 +18,11 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
+from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, LinearPermanent, stacked
 from fecm.mechanics.plate_motion import PointForce
 from fecm.problem.build import build_law, build_model, build_projectile
-from fecm.problem.generate import generate
 from fecm.sweeps import schedule
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.cases import Case, CasesError, grid, parse_vary, read_cases
@@ -67,8 +67,7 @@ def test_a_plates_displacement_is_the_sum_of_its_impulse_responses() -> None:
     # An unsymmetric laminate, clamped on one corner only, hit beside its middle.
     data = DATA_CARDS.replace("    2  90. ", "    2  30. ").replace("   13    3", "    8    3")
     corner = MESH[: MESH.index("BOUN")] + "BOUN\n    1    0    1    1    1    1    1\n\n"
-    deck = model(small(mesh=corner, data=data))
-    motion = build_model(deck, generate(deck), moves_only=True).motion
+    motion = build_model(load_deck(small(mesh=corner, data=data)).problems[0]).motion
     row, dt, steps = motion.row(7, 2), 2e-7, 300
     force = np.random.default_rng(5).standard_normal(steps)
     state, direct = motion.start(), np.empty(steps)

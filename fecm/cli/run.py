@@ -164,8 +164,6 @@ def _run_one(
     overwrite: bool,
 ) -> None:
     """Run one problem of a deck into a file and say what came out."""
-    from fecm.deck.macros import estimate_work
-    from fecm.problem.check_program import output_bytes
     from fecm.problem.memory import check_memory
     from fecm.results import hdf5_writer
     from fecm.results.result import load
@@ -175,8 +173,7 @@ def _run_one(
     from fecm.simulation.simulation import Simulation
     from fecm.simulation.spool import Journal
 
-    sizes = estimate_work(problem.program)
-    _check_room(path, output_bytes(problem.deck, sizes))
+    _check_room(path, problem.output_bytes)
     check_memory(problem, solver=choices.solver)
     with contextlib.ExitStack() as stack:
         stack.enter_context(signals.deferred())
@@ -187,7 +184,7 @@ def _run_one(
         printer = Printer()
         if printed is not None:
             printer = Printer(stack.enter_context(writing(printed, overwrite=overwrite)))
-        advance = _Advance(stack.enter_context(progress("fecm", sizes.steps)))
+        advance = _Advance(stack.enter_context(progress("fecm", problem.work.steps)))
         look = _Look(checkpointer, every)
         simulation = Simulation(problem, journal, choices, advance, printer, look, look.urgent)
         if resumes:

@@ -1,17 +1,16 @@
-"""From a deck to the parts of a run.
+"""Build the parts of a run from a deck.
 
-Here, and only here, the slips that are on become parameters of the plate, the projectile, the law
-and the transducer.
+The active slips become parameters of plate, projectile, contact law and transducer here.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from fecm.deck.macros import Body, hits, moves_only
+from fecm.deck.macros import Body, WorkEstimate, estimate_work, hits, moves_only
 from fecm.deck.model import Deck, Indentation, Material, ShearCorrection
 from fecm.deck.model import Gages as GageCards
 from fecm.deck.model import Impact as ImpactCard
@@ -45,28 +44,112 @@ from fecm.mechanics.rod_integrators import STEPS, WILSON
 from fecm.mechanics.stiffness_product import CSR, Workers, available
 from fecm.mechanics.strains import StrainField
 from fecm.mechanics.symmetry import moving, symmetry_reduction
+from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.generate import generate, rod_diameters
 from fecm.problem.options import RunOptions
 
-# Moving unknowns from which on threads save more than they cost.
+# Number of equations above which threads save more than they cost.
 WORTH_SHARING = 100_000
+# Slips that change the plate or its loads.
+PLATE_SLIPS = {"g12", "small-stiffness", "shear-order", "tapes", "jacobian", "rod-force"}
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A checked problem; each part is built once, when it is first needed.
+
+    Attributes
+    ----------
+    deck : Deck
+    mesh : Mesh
+    program : tuple
+        The macro program with nested loops.
+    """
+
+    deck: Deck
+    mesh: Mesh
+    program: Body
+
+    def __getstate__(self) -> dict[str, object]:
+        """The deck, mesh and program: a copy in another process builds its own parts."""
+        return {"deck": self.deck, "mesh": self.mesh, "program": self.program}
+
+    @cached_property
+    def rules(self) -> tuple[Quadrature, Quadrature, Quadrature]:
+        """Quadrature of bending, transverse shear and stored strains."""
+        return rules(self.deck.require(Material))
+
+    @cached_property
+    def plate(self) -> PlateModel:
+        """The plate of report mode."""
+        return build_plate(self.deck, self.mesh)
+
+    @property
+    def laminate(self) -> Laminate:
+        """The laminate of report mode, with the shear correction factor."""
+        return self.plate.laminate
+
+    @cached_property
+    def moving_plate(self) -> PlateModel:
+        """The plate with only the dofs free that the program moves."""
+        if not moves_only(self.program):
+            return self.plate
+        return moving(self.plate, self.impact_dof)
+
+    @cached_property
+    def critical_time_step(self) -> float:
+        """Critical time step of the moving plate, which limits the program."""
+        return critical_time_step(self.moving_plate)
+
+    @cached_property
+    def has_impact(self) -> bool:
+        """Whether the program takes impact steps."""
+        return hits(self.program)
+
+    @property
+    def impact_dof(self) -> tuple[int, int] | None:
+        """Impact node and its dof, from 0; None without impact."""
+        if not self.has_impact:
+            return None
+        card = self.deck.require(ImpactCard)
+        return card.node - 1, card.dof - 1
+
+    @cached_property
+    def work(self) -> WorkEstimate:
+        """Number of macros, steps and stored rows."""
+        return estimate_work(self.program)
+
+    @cached_property
+    def output_bytes(self) -> int:
+        """Size of the result's large datasets."""
+        control, work = self.deck.control, self.work
+        points = control.numel * len(self.rules[2].xi)
+        segment = self.deck.last(GageCards)
+        gages = 0 if segment is None else len(segment.records)
+        field = control.numnp * control.ndf
+        return 8 * (
+            work.passes["DISP"] * (field + control.numnp)
+            + work.passes["STRE"] * points * 16
+            + (work.passes["REAC"] + work.passes["EIGE"]) * field
+            + work.contact_rows * (points * 5 + 8)
+            + work.steps * (18 + gages)
+        )
 
 
 @dataclass(frozen=True)
 class ImpactModel:
-    """A problem's parts, ready to run.
+    """Model of a problem, ready to run.
 
     Attributes
     ----------
     plate : PlateModel
     motion : PlateMotion
-        The plate in time; its own plate has only what moves free.
+        Motion of the plate; its own plate has only the moving dofs.
     impact : ImpactSystem or None
-        Plate and projectile; None where nothing hits.
+        Plate and projectile; None without impact.
     station : Transducer
-        The transducer.
     strains, stress_points : StrainField
-        Points of tape8, and of the stresses.
+        Points of tape8 and of the stresses.
     gages : GageArray or None
         Strain gages.
     """
@@ -181,65 +264,47 @@ def build_impact(
     return ImpactSystem(motion, rod, build_law(deck, slips), contact, STEPS[integrator])
 
 
-def moving_plate(deck: Deck, mesh: Mesh, program: Body) -> PlateModel:
-    """Make the plate of a deck, of which only what a program moves is free.
+def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactModel:
+    """Build the model of a checked problem.
 
-    Its critical time step is the one that limits the program.
-    """
-    plate = build_plate(deck, mesh)
-    return moving(plate, _hit(deck) if hits(program) else None) if moves_only(program) else plate
-
-
-def _hit(deck: Deck) -> tuple[int, int]:
-    """Row of the node that is hit, and which of its unknowns, from 0."""
-    card = deck.require(ImpactCard)
-    return card.node - 1, card.dof - 1
-
-
-def build_model(
-    deck: Deck,
-    mesh: Mesh,
-    choices: RunOptions | None = None,
-    *,
-    hits: bool = True,
-    moves_only: bool = False,
-) -> ImpactModel:
-    """Make the parts of a checked problem, as it is to be run.
+    The problem's own plate is used unless a slip changes it.
 
     Parameters
     ----------
-    deck : Deck
-    mesh : Mesh
-    choices : RunOptions, optional
-        The report's way without it.
-    hits : bool
-        Whether there is a projectile.
-    moves_only : bool
-        Whether the plate only moves from rest, so that what provably stays at rest can be left out.
+    problem : Problem
+    options : RunOptions, optional
+        Defaults to the report's options.
     """
-    chosen = choices or RunOptions()
-    slips, solver, method = chosen.slips, chosen.solver, chosen.rod_method
+    chosen = options or RunOptions()
+    deck, slips, method = problem.deck, chosen.slips, chosen.rod_method
     rod = build_projectile(deck, slips).with_mass(method.mass)
-    hit = _hit(deck) if hits else None
-    share = 1.0
+    hit, share = problem.impact_dof, 1.0
+    mesh = problem.mesh
     if hit is not None and "rod-force" in slips:
         forces = generate(deck, unit_force=True).forces
         share = float(forces[hit])
         forces[hit] = 0.0
         mesh = replace(mesh, forces=forces)
-    plate = build_plate(deck, mesh, slips)
-    mobile = moving(plate, hit) if moves_only else plate
-    reduced = symmetry_reduction(mobile, hit) if moves_only and solver != CSR else None
+    only_moves = moves_only(problem.program)
+    if slips & PLATE_SLIPS:
+        plate = build_plate(deck, mesh, slips)
+        mobile = moving(plate, hit) if only_moves else plate
+    else:
+        plate, mobile = problem.plate, problem.moving_plate
+    reduced = symmetry_reduction(mobile, hit) if only_moves and chosen.solver != CSR else None
     count = mobile.neq if reduced is None else reduced.count
     workers = Workers(chosen.threads or (available() if count >= WORTH_SHARING else 1))
-    motion = PlateMotion(mobile, solver, reduced, workers)
+    motion = PlateMotion(mobile, chosen.solver, reduced, workers)
+    impact = None
+    if problem.has_impact:
+        impact = build_impact(deck, motion, rod, slips, method.integrator, share)
     return ImpactModel(
         plate=plate,
         motion=motion,
-        impact=build_impact(deck, motion, rod, slips, method.integrator, share) if hits else None,
+        impact=impact,
         station=build_station(deck, rod, slips),
         strains=plate.strain_field(plate.rules.strains),
-        stress_points=plate.strain_field(rules(deck.require(Material))[2]),
+        stress_points=plate.strain_field(problem.rules[2]),
         gages=build_gages(deck, mesh, plate),
     )
 

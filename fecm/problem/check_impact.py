@@ -15,7 +15,7 @@ from fecm.mechanics.gages import locate
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.projectile import Rod, report_rod
 from fecm.problem import check_mesh
-from fecm.problem.build import build_projectile, laminate_of_deck
+from fecm.problem.build import Problem, build_projectile
 from fecm.problem.generate import rod_diameters
 
 W = 3
@@ -255,7 +255,7 @@ class Resolution:
         return self.wave / self.side
 
 
-def resolution(deck: Deck, mesh: Mesh) -> Resolution | None:
+def resolution(problem: Problem) -> Resolution | None:
     """Compare the elements at the impact node with the bending waves of the impact.
 
     Returns
@@ -263,10 +263,11 @@ def resolution(deck: Deck, mesh: Mesh) -> Resolution | None:
     Resolution or None
         None without an approach, or where a number overflows.
     """
+    deck, mesh = problem.deck, problem.mesh
     impact, law = deck.require(Impact), deck.require(Indentation)
     if impact.velocity <= 0.0:
         return None
-    laminate, mass = laminate_of_deck(deck), build_projectile(deck).total_mass
+    laminate, mass = problem.laminate, build_projectile(deck).total_mass
     v = np.float64(impact.velocity)  # a division by zero is then infinite, not an error
     contact = 2.94 * (5.0 * mass * v**2 / (4.0 * law.k)) ** 0.4 / v
     rigidity = float(min(laminate.D[0, 0], laminate.D[1, 1]))
@@ -313,9 +314,9 @@ def said_error(error: float) -> str:
     return f"mesh error of the peak about {error:.1%}"
 
 
-def check_resolution(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+def check_resolution(problem: Problem, findings: Findings) -> None:
     """Warn of elements at the impact node that are too large for its bending waves."""
-    found = resolution(deck, mesh)
+    found = resolution(problem)
     if found is None or found.elements >= ENOUGH_PER_WAVE:
         return
     coarse = found.elements < LEAST_PER_WAVE
@@ -327,6 +328,6 @@ def check_resolution(deck: Deck, mesh: Mesh, findings: Findings) -> None:
         f"The mesh is {'too coarse' if coarse else 'coarse'} at the impact node: "
         f"{found.elements:.1f} elements of side {found.side:.3g} per bending wave of the contact's "
         f"duration, which is {found.wave:.3g} long{about}.",
-        deck.require(Impact).place("impact node"),
+        problem.deck.require(Impact).place("impact node"),
         f"use {ENOUGH_PER_WAVE} elements per wave: sides up to {found.wave / ENOUGH_PER_WAVE:.2g}",
     )

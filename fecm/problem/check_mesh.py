@@ -16,7 +16,7 @@ from fecm.mechanics import element_groups, element_matrices
 from fecm.mechanics.elements import cubic, triangle
 from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature
 from fecm.mechanics.mesh import Mesh, holds_the_plane
-from fecm.problem.build import is_coupled, rules
+from fecm.problem.build import Problem, rules
 from fecm.problem.generate import place_of_element
 
 # Findings of one kind about elements are gathered beyond this number of cards.
@@ -147,10 +147,10 @@ def _check_coincidence(deck: Deck, mesh: Mesh, findings: Findings) -> None:
         )
 
 
-def check_in_plane_supports(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+def check_in_plane_supports(problem: Problem, findings: Findings) -> None:
     """Warn of in-plane restraints at every node of a laminate whose B is not zero."""
-    if holds_the_plane(mesh.codes) and is_coupled(deck.require(Material)):
-        boundary = deck.last(Boundary)
+    if holds_the_plane(problem.mesh.codes) and problem.laminate.is_coupled:
+        boundary = problem.deck.last(Boundary)
         findings.add(
             "W318",
             "B is not zero, and u and v are restrained at every node: the plate is stiffer than "

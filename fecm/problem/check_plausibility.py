@@ -20,7 +20,7 @@ from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.projectile import Rod
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.time_step import safe_time_step
-from fecm.problem.build import build_plate, build_projectile
+from fecm.problem.build import Problem, build_projectile
 from fecm.problem.contact_step import contact_step
 
 # Thickness over the longer side of the plate.
@@ -58,18 +58,9 @@ class Value(NamedTuple):
     place: Place | None
 
 
-def check_plausibility(deck: Deck, mesh: Mesh, findings: Findings, *, hits: bool) -> None:
-    """Warn of values that no real plate or impact has.
-
-    Parameters
-    ----------
-    deck : Deck
-        Without errors.
-    mesh : Mesh
-    findings : Findings
-    hits : bool
-        Whether the program takes impact steps.
-    """
+def check_plausibility(problem: Problem, findings: Findings) -> None:
+    """Warn of values that no real plate or impact has."""
+    deck, mesh, hits = problem.deck, problem.mesh, problem.has_impact
     material = deck.require(Material)
     _check_ply(material.ply, findings)
     _check_angles(material.layers, findings)
@@ -78,7 +69,7 @@ def check_plausibility(deck: Deck, mesh: Mesh, findings: Findings, *, hits: bool
     if hits:
         _check_law(deck, findings)
         _check_neighbours(deck.require(Impact), mesh, findings)
-        _check_projectile(deck, build_plate(deck, mesh), findings)
+        _check_projectile(deck, problem.plate, findings)
 
 
 def _check_ply(ply: Ply, findings: Findings) -> None:
@@ -273,15 +264,15 @@ def _check_units(deck: Deck, findings: Findings, *, hits: bool) -> None:
         )
 
 
-def check_time_step_of_contact(deck: Deck, mesh: Mesh, findings: Findings, *, hits: bool) -> None:
+def check_time_step_of_contact(problem: Problem, findings: Findings) -> None:
     """Warn of a DT that the contact makes unstable, and of one far below what is stable."""
+    deck, plate = problem.deck, problem.plate
     steps = [macro for macro in deck.macros if macro.word == "DT"]
     if not steps:
         return
-    plate = build_plate(deck, mesh)
     bound = safe_time_step(plate)
     largest = max(macro.value or SAFE * bound for macro in steps)
-    contact = contact_step(deck, plate, largest) if hits else None
+    contact = contact_step(deck, plate, largest) if problem.has_impact else None
     stable = bound if contact is None else min(bound, contact.limit)
     for macro in steps:
         dt = macro.value

@@ -8,14 +8,12 @@ from collections.abc import Sequence
 from decimal import Context, Decimal
 
 from fecm.deck.findings import Findings
-from fecm.deck.macros import MOST_MACROS, STEPS, Body, WorkEstimate, estimate_work, every, flat
-from fecm.deck.model import Deck, Gages, Material
+from fecm.deck.macros import MOST_MACROS, STEPS, every, flat
+from fecm.deck.model import Material
 from fecm.deck.records import Macro
-from fecm.mechanics.elements.quadrature import HIGHEST_ORDER
-from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.plate import UnsoundPlateError
-from fecm.mechanics.time_step import critical_time_step, safe_time_step
-from fecm.problem.build import moving_plate, rules
+from fecm.mechanics.time_step import safe_time_step
+from fecm.problem.build import Problem
 
 LARGE_OUTPUT = 10**9
 # Part of the critical time step below which a step's change, of its square, is lost by rounding.
@@ -24,9 +22,9 @@ LEAST_STEP = math.sqrt(sys.float_info.epsilon)
 UNSTABLE = "E508"
 
 
-def check_program(deck: Deck, program: Body, findings: Findings) -> None:
-    """Check the length of a program, and that what it is asked to store ever comes up."""
-    sizes = estimate_work(program)
+def check_program(problem: Problem, findings: Findings) -> None:
+    """Check the length of a program, and that it reaches the steps that it is to store."""
+    deck, sizes = problem.deck, problem.work
     if sizes.macros > MOST_MACROS:
         count = Decimal(sizes.macros).normalize(Context(prec=3))  # may be beyond all floats
         findings.add(
@@ -36,7 +34,7 @@ def check_program(deck: Deck, program: Body, findings: Findings) -> None:
             "nested LOOPs multiply",
         )
         return
-    for macro in flat(program):
+    for macro in flat(problem.program):
         if macro.word == "RODP" and every(macro) > max(1, sizes.steps):
             findings.add(
                 "W510",
@@ -54,21 +52,21 @@ def check_program(deck: Deck, program: Body, findings: Findings) -> None:
     if not sizes.steps and not any(sizes.passes.values()):
         place = deck.macros[0].place("macro") if deck.macros else None
         findings.add("W511", "The program takes no step and stores nothing.", place)
-    _check_output(deck, program, sizes, findings)
+    _check_output(problem, findings)
 
 
-def check_time_step(deck: Deck, mesh: Mesh, program: Body, findings: Findings) -> None:
+def check_time_step(problem: Problem, findings: Findings) -> None:
     """Compare every DT with the plate's critical time step, where the program steps at all."""
+    deck = problem.deck
     steps = [macro for macro in deck.macros if macro.word == "DT"]
     if not steps or not STEPS.intersection(macro.word for macro in deck.macros):
         return
-    plate = moving_plate(deck, mesh, program)
     try:
-        safe = safe_time_step(plate)
+        safe = safe_time_step(problem.moving_plate)
         _check_least_step(steps, safe, findings)
         if min(m.value for m in steps) > 0.0 and max(m.value for m in steps) < safe:
             return
-        critical = critical_time_step(plate)
+        critical = problem.critical_time_step
     except UnsoundPlateError as error:
         findings.add(
             "E417",
@@ -106,29 +104,11 @@ def _below(critical: float) -> str:
     return f"{0.95 * critical:.2g}"
 
 
-def output_bytes(deck: Deck, sizes: WorkEstimate) -> int:
-    """Size of a result's large datasets, in bytes."""
-    control = deck.control
-    card = deck.require(Material).integration
-    points = (
-        len(rules(deck.require(Material))[2].xi) if 1 <= abs(card.points) <= HIGHEST_ORDER else 0
-    )
-    gages = sum(len(segment.records) for segment in deck.all(Gages)[-1:])
-    field, point = control.numnp * control.ndf, control.numel * points
-    return 8 * (
-        sizes.passes["DISP"] * (field + control.numnp)
-        + sizes.passes["STRE"] * point * 16
-        + (sizes.passes["REAC"] + sizes.passes["EIGE"]) * field
-        + sizes.contact_rows * (point * 5 + 8)
-        + sizes.steps * (18 + gages)
-    )
-
-
-def _check_output(deck: Deck, program: Body, sizes: WorkEstimate, findings: Findings) -> None:
+def _check_output(problem: Problem, findings: Findings) -> None:
     """Warn of a large result."""
-    size = output_bytes(deck, sizes)
+    size = problem.output_bytes
     if size > LARGE_OUTPUT:
-        macro = next((m for m in flat(program) if m.word in ("RODP", "DISP")), None)
+        macro = next((m for m in flat(problem.program) if m.word in ("RODP", "DISP")), None)
         findings.add(
             "W512",
             f"The result will take {size / 1e9:.3g} GB.",

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from fecm import _memory
-from fecm.deck.macros import estimate_work, every, flat
+from fecm.deck.macros import every, flat
 from fecm.deck.model import Material, Projectile
 from fecm.mechanics import element_matrices
 from fecm.mechanics.element_groups import congruence
@@ -20,9 +20,7 @@ from fecm.mechanics.natural_modes import DENSE
 from fecm.mechanics.plate import ASSEMBLED, BLOCK, PlateModel
 from fecm.mechanics.projectile import REPORT_ELEMENTS
 from fecm.mechanics.stiffness_product import AUTO, CSR, WORTH_GROUPING
-from fecm.problem.build import build_plate, rules
-from fecm.problem.check_program import output_bytes
-from fecm.problem.problem import Problem
+from fecm.problem.build import Problem
 from fecm.results.sinks import RowBuffer
 
 # Bytes a node: mesh, state, fields, rows on their way to the file.
@@ -61,9 +59,7 @@ def needed_bytes(
         Count the elements that are congruent to others, instead of taking each for one of its kind.
     """
     words = {macro.word for macro in flat(checked.program)}
-    sizes = estimate_work(checked.program)
-    output = output_bytes(checked.deck, sizes)
-    model = build_plate(checked.deck, checked.mesh)
+    output, model = checked.output_bytes, checked.plate
     total = NODE * checked.deck.control.numnp + _strains(checked)
     if solver == CSR or words & STATIC:
         total += ASSEMBLED * model.entries
@@ -74,7 +70,7 @@ def needed_bytes(
     if in_memory:
         return total + output
     held = output if "CONV" in words else 0  # rows that never came are cut off in memory
-    return total + held + STEP * sizes.steps + 5 * RowBuffer.BYTES
+    return total + held + STEP * checked.work.steps + 5 * RowBuffer.BYTES
 
 
 def check_memory(checked: Problem, *, solver: str = AUTO, in_memory: bool = False) -> None:
@@ -95,7 +91,7 @@ def check_memory(checked: Problem, *, solver: str = AUTO, in_memory: bool = Fals
 
 def _strains(checked: Problem) -> int:
     card = checked.deck.require(Material).integration
-    points = len(rules(checked.deck.require(Material))[2].xi)
+    points = len(checked.rules[2].xi)
     return POINT * checked.deck.control.numel * max(points, min(card.bending, HIGHEST_ORDER) ** 2)
 
 

@@ -6,12 +6,10 @@ so that one slip makes one finding.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from fecm.deck.findings import Findings
-from fecm.deck.macros import STEPS, Body, compile_program, hits
+from fecm.deck.macros import STEPS, compile_program
 from fecm.deck.model import (
     Boundary,
     Coordinates,
@@ -27,7 +25,7 @@ from fecm.deck.model import (
     Units,
 )
 from fecm.deck.reader import ParsedProblem
-from fecm.mechanics.mesh import Mesh
+from fecm.problem.build import Problem
 from fecm.problem.check_impact import (
     check_gages,
     check_impact,
@@ -52,29 +50,14 @@ from fecm.problem.check_plausibility import (
 from fecm.problem.check_program import check_program, check_time_step
 from fecm.problem.generate import generate
 
+__all__ = ["Problem", "check"]
+
 ALWAYS: tuple[type[Segment], ...] = (Coordinates, Elements, Material)
 IN_AN_IMPACT: tuple[type[Segment], ...] = (Impact, Indentation)
 # Segments of which only the last counts.
 SINGLE: tuple[type[Segment], ...] = (
     Coordinates, Elements, Material, Impact, Indentation, Projectile, ShearCorrection, Gages, Units
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Problem:
-    """A problem that was checked.
-
-    Attributes
-    ----------
-    deck : Deck
-    mesh : Mesh
-    program : tuple
-        The macro program with its loops nested.
-    """
-
-    deck: Deck
-    mesh: Mesh
-    program: Body
 
 
 def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) -> Problem | None:
@@ -123,19 +106,19 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
     checked = Problem(deck, mesh, program)
     if findings.error_count == before and not unsound:
         with np.errstate(all="ignore"):  # numbers beyond all range end in a finding
-            check_time_step(deck, mesh, program, findings)
-            check_program(deck, program, findings)
+            check_time_step(checked, findings)
+            check_program(checked, findings)
             check_purpose(deck, mesh, findings)
             if findings.error_count == before:
                 check_geometry(deck, mesh, findings)
-                check_in_plane_supports(deck, mesh, findings)
-                check_plausibility(deck, mesh, findings, hits=hits(program))
+                check_in_plane_supports(checked, findings)
+                check_plausibility(checked, findings)
                 if STEPS.intersection(macro.word for macro in deck.macros):
-                    check_time_step_of_contact(deck, mesh, findings, hits=hits(program))
-            if hits(program):
+                    check_time_step_of_contact(checked, findings)
+            if checked.has_impact:
                 if not deck.has(Projectile):
                     warn_of_the_reports_rod(deck.require(Impact), findings)
-                check_resolution(deck, mesh, findings)
+                check_resolution(checked, findings)
     return checked
 
 

@@ -8,15 +8,12 @@ import numpy as np
 
 from fecm._memory import format_bytes
 from fecm._typing import Floats
-from fecm.deck.macros import estimate_work, flat, hits
+from fecm.deck.macros import flat
 from fecm.deck.units import MASS, mass_in_si, unit_names, unit_of
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.stiffness_product import SAFE
-from fecm.mechanics.time_step import critical_time_step
-from fecm.problem.build import build_plate, build_projectile, moving_plate
+from fecm.problem.build import Problem, build_projectile
 from fecm.problem.check_impact import resolution, said_error
-from fecm.problem.check_program import output_bytes
-from fecm.problem.problem import Problem
 
 
 @dataclass(frozen=True)
@@ -120,24 +117,21 @@ def _matrix(name: str, values: Floats, unit: str) -> list[str]:
     return lines
 
 
-def summarise(checked: Problem) -> ProblemSummary:
+def summarise(problem: Problem) -> ProblemSummary:
     """Summarise a problem without errors."""
-    deck, mesh = checked.deck, checked.mesh
-    plate = build_plate(deck, mesh)
-    sizes = estimate_work(checked.program)
-    laminate = plate.laminate
+    deck, plate, laminate = problem.deck, problem.plate, problem.laminate
     try:
-        critical = critical_time_step(moving_plate(deck, mesh, checked.program))
+        critical = problem.critical_time_step
     except UnsoundPlateError:  # found by the check wherever the program steps
         critical = float("nan")
-    resolved = resolution(deck, mesh) if hits(checked.program) else None
+    resolved = resolution(problem) if problem.has_impact else None
     return ProblemSummary(
         title=deck.title,
         nodes=deck.control.numnp,
         elements=deck.control.numel,
         layers=deck.control.layers,
         equations=plate.neq,
-        steps=sizes.steps,
+        steps=problem.work.steps,
         A=laminate.A,
         B=laminate.B,
         D=laminate.D,
@@ -145,8 +139,8 @@ def summarise(checked: Problem) -> ProblemSummary:
         plate_mass=plate.area() * laminate.mass,
         projectile_mass=build_projectile(deck).total_mass,
         critical_time_step=critical,
-        time_steps=[m.value for m in flat(checked.program) if m.word == "DT"],
-        output_bytes=output_bytes(deck, sizes),
+        time_steps=[m.value for m in flat(problem.program) if m.word == "DT"],
+        output_bytes=problem.output_bytes,
         elements_per_wave=None if resolved is None else resolved.elements,
         mesh_error=None if resolved is None else resolved.error,
         units=unit_names(deck),

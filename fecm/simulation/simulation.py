@@ -11,7 +11,7 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm._version import __version__
-from fecm.deck.macros import hits, moves_only, number
+from fecm.deck.macros import number
 from fecm.deck.model import Material
 from fecm.deck.records import LoadTable, Macro, load_factor
 from fecm.deck.units import unit_names
@@ -102,9 +102,7 @@ class Simulation:
         deck, mesh, program = self.checked.deck, self.checked.mesh, self.checked.program
         self.slips = self.choices.slips
         with np.errstate(all="ignore"):
-            self.setup = build_model(
-                deck, mesh, self.choices, hits=hits(program), moves_only=moves_only(program)
-            )
+            self.setup = build_model(self.checked, self.choices)
         self.plate = self.setup.motion.start()
         if self.setup.impact is not None:
             self.impact = self.setup.impact.start(self.plate)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fecm._memory import require
 from fecm._typing import Floats
 from fecm.deck.findings import Findings
-from fecm.deck.macros import compile_program, estimate_work, flat
+from fecm.deck.macros import compile_program, flat
 from fecm.deck.model import Deck, Impact, Projectile
 from fecm.deck.model import Indentation as LawCards
 from fecm.deck.reader import ParsedProblem
@@ -97,11 +97,11 @@ def _timed(decks: list[Deck], clock: Clock | None) -> tuple[Problem | None, list
     dt = clock.time_step(critical_of(checked))
     timed = [with_time_step(deck, dt, clock.dt) for deck in decks]
     findings = Findings()
-    program = compile_program(timed[0].macros, findings)
-    check_program(timed[0], program, findings)
+    problem = Problem(timed[0], checked.mesh, compile_program(timed[0].macros, findings))
+    check_program(problem, findings)
     if findings.errors:
         return None, decks, findings.errors[0].message
-    return Problem(timed[0], checked.mesh, program), timed, ""
+    return problem, timed, ""
 
 
 def _checked(deck: Deck) -> tuple[Problem | None, str]:
@@ -133,10 +133,10 @@ def _time_step(checked: Problem, plate: PlateModel) -> float:
 
 def _together(numbers: list[int], decks: list[Deck], checked: Problem) -> Outcome:
     """Run cases that share a plate, by its response to a unit force."""
-    setup = build_model(checked.deck, checked.mesh, moves_only=True)
+    setup = build_model(checked)
     if setup.impact is None:
         raise ValueError("nothing hits in this deck")
-    steps = estimate_work(checked.program).steps
+    steps = checked.work.steps
     dt = _time_step(checked, setup.plate)
     projectiles = [build_projectile(deck) for deck in decks]
     kinds = {projectile: number for number, projectile in enumerate(dict.fromkeys(projectiles))}

@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 from fecm.deck.macros import STEPS, every, flat
 from fecm.deck.model import Deck
 from fecm.deck.records import Macro
-from fecm.mechanics.time_step import critical_time_step, rounded_time_step, taken_time_step
-from fecm.problem.build import moving_plate
+from fecm.mechanics.time_step import rounded_time_step, taken_time_step
 from fecm.problem.problem import Problem
 
 # No loop is made longer than this; the checks refuse a program that is shorter.
@@ -56,7 +55,7 @@ def clock_of(checked: Problem) -> Clock | None:
 
 def critical_of(checked: Problem) -> float:
     """Critical time step of a problem (time)."""
-    return critical_time_step(moving_plate(checked.deck, checked.mesh, checked.program))
+    return checked.critical_time_step
 
 
 def with_time_step(deck: Deck, dt: float, taken: float = 0.0) -> Deck:

@@ -11,7 +11,7 @@ from typing import Any
 
 from fecm import _memory
 from fecm._version import __version__
-from fecm.deck.macros import Body, Loop, estimate_work, flat
+from fecm.deck.macros import Body, Loop, flat
 from fecm.deck.model import Boundary, Deck
 from fecm.problem.memory import needed_bytes
 from fecm.problem.problem import Problem
@@ -170,7 +170,7 @@ def check_memory(checked: Problem, made: Plan, workers: int) -> None:
     NotEnoughMemoryError
         With both numbers.
     """
-    steps, cases = estimate_work(checked.program).steps, len(made.cases)
+    steps, cases = checked.work.steps, len(made.cases)
     together = min(TOGETHER, cases) if shares_plate(checked) else 1
     at_once = min(workers, len(tasks(checked, made)))
     plate = replace(checked, program=without_output(checked.program))
