@@ -136,13 +136,13 @@ def plain(problem: Problem, steps: int) -> float:
     impact, K, m = setup.impact, setup.plate.stiffness, setup.plate.mass
     if impact is None:
         raise ValueError("nothing hits in this deck")
-    state, row = impact.start(), impact.contact.row
+    state, equation = impact.start(), impact.contact.equation
     displacement, velocity = state.plate.displacement, np.zeros(setup.plate.neq)
     dt = time_step(problem.deck)
     begin = time.perf_counter()
     for _ in range(steps):
         force = -(K @ displacement)
-        force[row] += state.contact.force
+        force[equation] += state.contact.force
         velocity += dt * (force / m)
         displacement += dt * velocity
         impact.move_projectile(state, dt)

@@ -256,9 +256,9 @@ def altered(path: Path, change: str) -> None:
         case "words":
             about["values"]["dt"] = "soon"
         case "shape":
-            arrays["state/extended"] = arrays["state/extended"][:1]
+            arrays["state/padded"] = arrays["state/padded"][:1]
         case "type":
-            arrays["state/extended"] = arrays["state/extended"].astype("S8")
+            arrays["state/padded"] = arrays["state/padded"].astype("S8")
         case "spool":
             line = b'{"do": "write", "path": "tape3/w", "start": -1, "rows": 1, "dtype": "<f8", '
             line += b'"shape": [-1]}\n' + b"[" * 100_000 + b"\n"

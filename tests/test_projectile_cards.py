@@ -235,7 +235,7 @@ def test_a_gage_reads_a_constant_strain_in_its_direction_and_depth(
     deck = model(with_segment(f"GAGE\n7, {x}, {y}, 0.05, {direction}\n\n"))
     mesh = generate(deck)
     made = gages(mesh, deck.require(fecm.deck.model.Gages).records)
-    strain = (made.weights * bent(mesh.coordinates).ravel()[made.places]).sum(axis=1)
+    strain = (made.weights * bent(mesh.coordinates).ravel()[made.dof_indices]).sum(axis=1)
     assert strain == pytest.approx([expected], rel=1e-12)
 
 

@@ -68,13 +68,13 @@ def test_a_plates_displacement_is_the_sum_of_its_impulse_responses() -> None:
     data = DATA_CARDS.replace("    2  90. ", "    2  30. ").replace("   13    3", "    8    3")
     corner = MESH[: MESH.index("BOUN")] + "BOUN\n    1    0    1    1    1    1    1\n\n"
     motion = build_model(load_deck(small(mesh=corner, data=data)).problems[0]).motion
-    row, dt, steps = motion.row(7, 2), 2e-7, 300
+    equation, dt, steps = motion.equation(7, 2), 2e-7, 300
     force = np.random.default_rng(5).standard_normal(steps)
     state, direct = motion.start(), np.empty(steps)
     for step in range(steps):
-        motion.advance(state, dt, 0.0, PointForce(row, float(force[step])))
-        direct[step] = state.displacement[row]
-    response = plate_response(motion, row, dt, steps)
+        motion.advance(state, dt, 0.0, PointForce(equation, float(force[step])))
+        direct[step] = state.displacement[equation]
+    response = plate_response(motion, equation, dt, steps)
     sums = np.convolve(response, force)[:steps]
     np.testing.assert_allclose(sums, direct, atol=1e-12 * np.abs(direct).max())
     blocks = Convolution(response, np.zeros(1, dtype=np.intp))

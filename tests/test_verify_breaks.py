@@ -185,7 +185,7 @@ def turned(of: Callable[[Any, Any], bool], **factors: float) -> Break:
         after = right(law, before, *args)
         if after is before or not of(before, after):
             return after
-        return replace(after, **{n: times * getattr(after, n) for n, times in factors.items()})
+        return after._replace(**{n: times * getattr(after, n) for n, times in factors.items()})
 
     return instead(HystereticLaw, "_turned", broken)
 

@@ -1,28 +1,28 @@
-"""Indentation laws: the contact force for an indentation and for what came before it.
+"""Contact laws: the contact force as a function of indentation and loading history.
 
-Every curve of the report's laws (equations 3-1, 3-3 and 3-11) has one form,
-F = f ((a - b)/w)^p, zero for a <= b.  A law's memory is the curve that it is on and the peak where
-the first loading curve was left; memories are never changed but replaced.  Force and indentation
-are positive in compression.  All values are floats, or arrays with one entry a case.
+Every curve of the report's laws (equations 3-1, 3-3 and 3-11) has the form F = f ((a - b)/w)^p, and
+is zero for a <= b.  The loading history is the current curve and the peak at which first loading
+ended; it is immutable.  Force and indentation are positive in compression.  All values are floats,
+or arrays with one entry per case.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, fields
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-# A float or an array of floats; a bool or an array of bools.
+# float or Floats, and bool or Bools: one case, or an array of cases.
 Number = Any
 Truth = Any
 
 LOADING_POWER = 1.5
-# The only unloading power that equation 3-7 holds for.
+# Equation 3-7 holds for this unloading power only.
 ACR_POWER = 2.5
 
 # Branches.
@@ -67,7 +67,7 @@ def hertz_coefficient(radius: float, e_s: float, nu_s: float, e_t: float) -> flo
 
 
 class ContactParameters(ABC):
-    """What was measured: the first loading curve, the unloading power, and what remains.
+    """Parameters of the contact law.
 
     Attributes
     ----------
@@ -85,6 +85,11 @@ class ContactParameters(ABC):
     def permanent(self, peak: Number) -> Number:
         """Permanent indentation after a peak (length)."""
 
+    def of_cases(self, cases: NDArray[np.intp]) -> ContactParameters:
+        """Select some cases."""
+        selected: ContactParameters = _map(lambda values: values[0][cases], [self])
+        return selected
+
     def loading(self, indentation: Number) -> Number:
         """Force on the first loading curve, equation 3-1."""
         return power_curve(self.k, 0.0, 1.0, LOADING_POWER, indentation)
@@ -92,14 +97,14 @@ class ContactParameters(ABC):
     def rigidity(self, peak: Number) -> Number:
         """Unloading rigidity s after a positive peak, equation 3-5, force/length^q.
 
-        With the permanent indentation of 3-8 it is 3-9 and 3-10, with that of 3-7 it is 3-6.
+        The permanent indentation of 3-8 gives 3-9 and 3-10, that of 3-7 gives 3-6.
         """
         return self.loading(peak) / (peak - self.permanent(peak)) ** self.q
 
 
 @dataclass(frozen=True, slots=True)
 class LinearPermanent(ContactParameters):
-    """What was measured: EXPE's card.
+    """Parameters with a linear permanent indentation (the card of EXPE).
 
     Attributes
     ----------
@@ -124,7 +129,7 @@ class LinearPermanent(ContactParameters):
 
 @dataclass(frozen=True, slots=True)
 class YangSunPermanent(ContactParameters):
-    """What was measured, with one unloading rigidity k/alpha_cr for every peak: EXPE ACR's card.
+    """Parameters with one unloading rigidity k/alpha_cr for every peak (the card of EXPE ACR).
 
     Attributes
     ----------
@@ -154,9 +159,20 @@ def power_curve(f: Number, b: Number, w: Number, p: Number, a: Number) -> Number
     return f * ((a - b) / w) ** p if a > b else 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class LoadingHistory:
-    """Where a law stands.
+def _map(function: Callable[[list[Any]], Any], records: Sequence[Any]) -> Any:
+    """Replace every parameter by a function of its values in several records."""
+    names = [part.name for part in fields(records[0]) if part.init]
+    return replace(records[0], **{n: function([getattr(r, n) for r in records]) for n in names})
+
+
+def stacked(records: Sequence[ContactParameters]) -> ContactParameters:
+    """Parameters of many cases, all of one class, as arrays."""
+    parameters: ContactParameters = _map(np.array, records)
+    return parameters
+
+
+class LoadingHistory(NamedTuple):
+    """Loading history of a contact.
 
     Attributes
     ----------
@@ -165,7 +181,7 @@ class LoadingHistory:
     f, b, w, p : float
         The branch's curve F = f ((a - b)/w)^p.
     peak, peak_force : float
-        Where the first loading curve was left last.
+        Last point of first loading.
     permanent : float
         Permanent indentation after that peak.
     """
@@ -179,15 +195,6 @@ class LoadingHistory:
     peak_force: Number
     permanent: Number
 
-    def with_rows(self, rows: NDArray[np.intp], new: LoadingHistory) -> LoadingHistory:
-        """The same with other values in some cases."""
-        values = []
-        for name in LoadingHistory.__slots__:
-            array = getattr(self, name).copy()
-            array[rows] = getattr(new, name)
-            values.append(array)
-        return LoadingHistory(*values)
-
     def force(self, indentation: Number) -> Number:
         """Force on the branch's curve."""
         return power_curve(self.f, self.b, self.w, self.p, indentation)
@@ -200,102 +207,96 @@ class ContactPoint(NamedTuple):
     force: Number
 
 
-class Law(Protocol):
-    """An indentation law."""
-
-    @property
-    def constants(self) -> ContactParameters:
-        """What was measured."""
-        ...
-
-    def start(self) -> LoadingHistory:
-        """Memory before the first contact."""
-        ...
-
-    def trial(
-        self, memory: LoadingHistory, last: ContactPoint, indentation: Number
-    ) -> tuple[Number, LoadingHistory]:
-        """Contact force at a trial indentation, and the memory to go on with.
-
-        Parameters
-        ----------
-        memory : LoadingHistory
-            Where the law stands.
-        last : ContactPoint
-            The last accepted point.
-        indentation : float
-            The trial value.
-        """
-        ...
-
-    def accept(
-        self, memory: LoadingHistory, last: ContactPoint, indentation: Number
-    ) -> LoadingHistory:
-        """Memory after a step that ended at an indentation."""
-        ...
-
-
-def _start(constants: ContactParameters) -> LoadingHistory:
-    zero = 0.0 * constants.k
-    one = zero + 1.0
-    branch = VIRGIN + (zero == one)  # VIRGIN, once a case
-    return LoadingHistory(branch, constants.k, zero, one, LOADING_POWER * one, zero, zero, zero)
-
-
 @dataclass(frozen=True, slots=True)
-class HystereticLaw:
-    """The report's law with any number of unloadings and reloadings in any order.
+class Law(ABC):
+    """A contact law.
 
-    A fall from the first loading curve (3-1) sets the peak.  Below it every fall follows (3-3) down
-    to the permanent indentation, every rise follows (3-11) back to the peak, and each begins where
-    the other ended, so that the force is continuous.  At the peak the first curve goes on.
+    Attributes
+    ----------
+    constants : ContactParameters
     """
 
     constants: ContactParameters
 
     def start(self) -> LoadingHistory:
-        """Memory before the first contact."""
-        return _start(self.constants)
+        """Loading history before the first contact."""
+        zero = 0.0 * self.constants.k
+        one = zero + 1.0
+        branch = VIRGIN + (zero == one)  # VIRGIN for every case
+        k, power = self.constants.k, LOADING_POWER * one
+        return LoadingHistory(branch, k, zero, one, power, zero, zero, zero)
+
+    def permanent(self, memory: LoadingHistory, last: ContactPoint) -> Number:
+        """Permanent indentation after unloading from the last accepted point (length)."""
+        peak = _select(memory.branch == VIRGIN, last.indentation, memory.peak)
+        return self.constants.permanent(_select(peak > memory.peak, peak, memory.peak))
+
+    @abstractmethod
+    def trial(
+        self, memory: LoadingHistory, last: ContactPoint, indentation: Number
+    ) -> tuple[Number, LoadingHistory]:
+        """Contact force at a trial indentation, and the loading history after the trial.
+
+        Parameters
+        ----------
+        memory : LoadingHistory
+            Before the trial.
+        last : ContactPoint
+            The last accepted point.
+        indentation : float
+            Trial value.
+        """
+
+    @abstractmethod
+    def accept(
+        self, memory: LoadingHistory, last: ContactPoint, indentation: Number
+    ) -> LoadingHistory:
+        """Loading history after a step that ends at an indentation."""
+
+
+@dataclass(frozen=True, slots=True)
+class HystereticLaw(Law):
+    """The report's law with any sequence of unloadings and reloadings.
+
+    The peak is the point at which the indentation falls from the first loading curve (3-1).  Below
+    it every unloading follows (3-3) down to the permanent indentation and every reloading follows
+    (3-11) back to the peak; each starts where the other ended, so that the force is continuous.
+    Beyond the peak first loading continues.
+    """
 
     def trial(
         self, memory: LoadingHistory, last: ContactPoint, indentation: Number
     ) -> tuple[Number, LoadingHistory]:
-        """Contact force at a trial indentation; a trial does not change the memory."""
-        return self._follow(memory, last, indentation).force(indentation), memory
+        """Contact force at a trial indentation; a trial does not change the history."""
+        return self.accept(memory, last, indentation).force(indentation), memory
 
     def accept(
         self, memory: LoadingHistory, last: ContactPoint, indentation: Number
     ) -> LoadingHistory:
-        """Memory after a step that ended at an indentation."""
-        return self._follow(memory, last, indentation)
-
-    def permanent(self, memory: LoadingHistory, last: ContactPoint) -> Number:
-        """Permanent indentation that the law would leave behind now (length)."""
-        peak = _select(memory.branch == VIRGIN, last.indentation, memory.peak)
-        return self.constants.permanent(_select(peak > memory.peak, peak, memory.peak))
-
-    def _follow(self, m: LoadingHistory, last: ContactPoint, a: Number) -> LoadingHistory:
-        """Memory on whose curve `a` lies, coming from the last accepted point."""
+        """Loading history after a step that ends at an indentation."""
+        m, a = memory, indentation
         falls = a < last.indentation
         virgin, unloading = m.branch == VIRGIN, m.branch == UNLOADING
         if isinstance(a, np.ndarray):
             rises = a > last.indentation
             turns = np.where(virgin, falls, (a >= m.peak) | np.where(unloading, rises, falls))
-            rows = np.flatnonzero(turns)
-            if not len(rows):
+            cases = np.flatnonzero(turns)
+            if not len(cases):
                 return m
-            law, at = (
-                HystereticLaw(_taken(self.constants, rows)),
-                ContactPoint(*(x[rows] for x in last)),
-            )
-            return m.with_rows(rows, law._turned(_taken(m, rows), at, a[rows]))
-        # Most often the way goes on along the same curve.
+            law = HystereticLaw(self.constants.of_cases(cases))
+            at = ContactPoint(*(x[cases] for x in last))
+            new = law._turned(LoadingHistory(*(x[cases] for x in m)), at, a[cases])
+            updated = LoadingHistory(*(x.copy() for x in m))
+            for values, changed in zip(updated, new, strict=True):
+                values[cases] = changed
+            return updated
+        # Most steps stay on the same curve.
         if not falls if virgin else a < m.peak and falls == unloading:
             return m
         return self._turned(m, last, a)
 
     def _turned(self, m: LoadingHistory, last: ContactPoint, a: Number) -> LoadingHistory:
-        """The same where the curve may end."""
+        """Loading history where the indentation may leave the branch."""
         falls = a < last.indentation
         leaves = (m.branch == VIRGIN) & falls
         returns = (m.branch != VIRGIN) & (a >= m.peak)
@@ -305,7 +306,7 @@ class HystereticLaw:
         peak = _select(leaves, last.indentation, m.peak)
         peak_force = _select(leaves, c.loading(last.indentation), m.peak_force)
         permanent = _select(leaves, c.permanent(last.indentation), m.permanent)
-        # Unloading, from the first curve's own point or from a reloading curve's last point.
+        # Unloading starts on the first loading curve, or at the last point of a reloading curve.
         begin = _select(leaves, peak_force, last.force)
         width = last.indentation - permanent
         down = LoadingHistory(
@@ -319,14 +320,14 @@ class HystereticLaw:
         return _choose(leaves | turns_down, down, _choose(turns_up, up, _choose(returns, first, m)))
 
     def _reloading(self, m: LoadingHistory, last: ContactPoint) -> LoadingHistory:
-        """Curve from the last point back to the peak."""
+        """Reloading from the last point to the peak, equation 3-11."""
         loaded = (last.force > 0.0) & (last.force < m.peak_force)
         ratio = (_select(loaded, last.force, 0.0) / _select(loaded, m.peak_force, 1.0)) ** (
             1.0 / LOADING_POWER
         )
         origin = _select(loaded, (last.indentation - ratio * m.peak) / (1.0 - ratio), m.permanent)
-        # A force that has not fallen below the peak's (the accepted force is one pass older than
-        # the indentation) leaves no room for a curve: it stays constant up to the peak.
+        # The accepted force is one iteration older than the indentation.  If it has not fallen
+        # below the peak's, it stays constant up to the peak.
         level = (last.force > 0.0) & (last.force >= m.peak_force)
         width = m.peak - origin
         power = _select(level, 0.0, LOADING_POWER)
@@ -337,24 +338,18 @@ class HystereticLaw:
 
 
 @dataclass(frozen=True, slots=True)
-class ListingLaw:
-    """The printed program's law (the slip ``reload``), which never goes back a branch.
+class ListingLaw(Law):
+    """The printed program's law (the slip ``reload``), which never returns to an earlier branch.
 
-    The first trial whose force is below the last accepted one ends loading for good; the first
-    trial on the unloading curve whose force is not, begins reloading for good.  Trials count, also
-    those that the contact iteration discards.
+    The first trial whose force is below the last accepted one ends loading; the first trial on the
+    unloading curve whose force is not below it starts reloading.  Trials that the contact iteration
+    discards count.
     """
-
-    constants: ContactParameters
-
-    def start(self) -> LoadingHistory:
-        """Memory before the first contact."""
-        return _start(self.constants)
 
     def trial(
         self, memory: LoadingHistory, last: ContactPoint, indentation: Number
     ) -> tuple[Number, LoadingHistory]:
-        """Contact force at a trial indentation, and the memory that the trial leaves behind."""
+        """Contact force at a trial indentation, and the loading history after the trial."""
         m, c = memory, self.constants
         force = m.force(indentation)
         leaves = (m.branch == VIRGIN) & (force < last.force)
@@ -380,27 +375,27 @@ class ListingLaw:
     def accept(
         self, memory: LoadingHistory, last: ContactPoint, indentation: Number
     ) -> LoadingHistory:
-        """Memory after a step: trials have done everything."""
+        """Loading history after a step, which its trials have already changed."""
         return memory
 
 
 def follow(
     law: Law, corners: Sequence[float], points: int = 1
 ) -> Iterator[tuple[ContactPoint, int]]:
-    """Force of one case along a path, from the first contact at zero on.
+    """Force of one case along a path of indentations, starting at zero.
 
     Parameters
     ----------
     law : Law
     corners : sequence of float
-        Indentations between which the path goes straight; it starts at 0.
+        Indentations at which the path turns.
     points : int
-        Points from one corner to the next.
+        Points per section.
 
     Yields
     ------
-    Point, int
-        Indentation and force, and the branch that they lie on; the start first.
+    ContactPoint, int
+        Indentation and force, and their branch; the start first.
     """
     memory, last, begin = law.start(), ContactPoint(0.0, 0.0), 0.0
     yield last, VIRGIN
@@ -416,29 +411,7 @@ def follow(
 
 
 def _choose(condition: Truth, yes: LoadingHistory, no: LoadingHistory) -> LoadingHistory:
-    """One memory or the other, case by case."""
+    """`yes` where the condition holds, otherwise `no`."""
     if not isinstance(condition, np.ndarray):
         return yes if condition else no
-    return LoadingHistory(
-        *(np.where(condition, getattr(yes, n), getattr(no, n)) for n in LoadingHistory.__slots__)
-    )
-
-
-def _taken(record: Any, rows: NDArray[np.intp]) -> Any:
-    """A record with the values of some cases."""
-    taken = object.__new__(type(record))
-    for part in fields(record):
-        value = getattr(record, part.name)
-        some = value[rows] if isinstance(value, np.ndarray) else value
-        object.__setattr__(taken, part.name, some)
-    return taken
-
-
-def stacked(records: Sequence[ContactParameters]) -> ContactParameters:
-    """Constants of many cases in one, of one kind."""
-    kind: Any = type(records[0])
-    names = [part.name for part in fields(kind) if part.init]
-    made: ContactParameters = kind(
-        *(np.array([getattr(r, name) for r in records]) for name in names)
-    )
-    return made
+    return LoadingHistory(*(np.where(condition, a, b) for a, b in zip(yes, no, strict=True)))

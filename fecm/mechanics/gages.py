@@ -1,9 +1,9 @@
 """Strain gages: the normal strain at a point of the plate, in a direction and at a depth.
 
-z runs from the mid-plane towards the face away from the projectile.  A normal line stays straight,
+z runs from the midplane towards the face away from the projectile.  Normals stay straight,
 u(z) = u - z theta, so that the strain at z is the midplane strain plus z times the curvature.
-Strains jump from element to element: a gage on a common edge or node reads the mean of all elements
-that meet there.
+Strains are discontinuous between elements: a gage on a common edge or node reads the mean of the
+adjacent elements.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from fecm.mechanics.mesh import Mesh
 
 Indices = NDArray[np.intp]
 
-# How far outside of an element, in local coordinates, a point still belongs to it.
+# Tolerance, in local coordinates, for points on the edge of an element.
 MARGIN = 1.0e-6
-# Triangles have no strain in the very point of node 3.
+# The Jacobian of a triangle is singular at node 3.
 INSIDE = 1.0 - 1.0e-9
 PASSES = 50
 
 
 class OutsideError(ValueError):
-    """A point lies outside of the plate."""
+    """A point is not on the plate."""
 
 
 class GagePlace(Protocol):
@@ -52,32 +52,32 @@ class GagePlace(Protocol):
 
 @dataclass(frozen=True)
 class GageArray:
-    """Strains of gages as sums over unknowns.
+    """Strains of gages as weighted sums of dofs.
 
     Attributes
     ----------
     numbers : ndarray (gages,)
-    places : ndarray (gages, m)
-        Places of unknowns in a field laid out flat.
+    dof_indices : ndarray (gages, m)
+        Indices into a flattened field.
     weights : ndarray (gages, m)
-        Strain per unknown.
+        Strain per unit of the dof.
     """
 
     numbers: NDArray[np.int32]
-    places: Indices
+    dof_indices: Indices
     weights: Floats
 
 
 def gages(
     mesh: Mesh, records: Sequence[GagePlace], *, transposed_jacobian: bool = False
 ) -> GageArray:
-    """Find the gages' elements, and how their strains follow from the unknowns.
+    """Express the gages' strains by the dofs of their elements.
 
     Parameters
     ----------
     mesh : Mesh
     records : sequence of GagePlace
-    transposed : bool
+    transposed_jacobian : bool
         See :func:`fecm.mechanics.element_matrices.interpolate`.
 
     Raises
@@ -87,19 +87,21 @@ def gages(
     """
     families = element_groups.element_blocks(mesh.elements, mesh.coordinates)
     rows = [_functional(families, record, transposed_jacobian) for record in records]
-    most = max(len(places) for places, _ in rows)
-    places = np.zeros((len(rows), most), dtype=np.intp)
+    most = max(len(indices) for indices, _ in rows)
+    dof_indices = np.zeros((len(rows), most), dtype=np.intp)
     weights = np.zeros((len(rows), most))
-    for number, (unknowns, values) in enumerate(rows):
-        places[number, : len(unknowns)] = unknowns
+    for number, (indices, values) in enumerate(rows):
+        dof_indices[number, : len(indices)] = indices
         weights[number, : len(values)] = values
-    return GageArray(np.array([record.number for record in records], np.int32), places, weights)
+    return GageArray(
+        np.array([record.number for record in records], np.int32), dof_indices, weights
+    )
 
 
 def locate(
     families: Sequence[ElementBlock], x: float, y: float
 ) -> list[tuple[ElementBlock, float, float]]:
-    """Elements that a point belongs to, each as a family of one, with its local coordinates."""
+    """Elements that contain a point, each as a block of one, with the local coordinates."""
     found: list[tuple[ElementBlock, float, float]] = []
     point = np.array([x, y])
     for family in families:
@@ -115,7 +117,7 @@ def locate(
 
 
 def _local(element: ElementBlock, point: Floats) -> tuple[float, float] | None:
-    """Local coordinates of a point, by Newton's method; None where it lies outside."""
+    """Local coordinates of a point, by Newton's method; None if it is outside."""
     xi = np.zeros(2)
     for _ in range(PASSES):
         rule = _at(xi)
@@ -141,12 +143,12 @@ def _at(xi: Floats) -> Quadrature:
 def _functional(
     families: Sequence[ElementBlock], gage: GagePlace, transposed_jacobian: bool
 ) -> tuple[Indices, Floats]:
-    """Unknowns that a gage's strain depends on, and how."""
+    """Dofs and weights of a gage's strain."""
     found = locate(families, gage.x, gage.y)
     if not found:
         raise OutsideError(f"gage {gage.number} at ({gage.x:g}, {gage.y:g}) is not on the plate")
     c, s = np.cos(np.deg2rad(gage.direction)), np.sin(np.deg2rad(gage.direction))
-    places: list[Indices] = []
+    dof_indices: list[Indices] = []
     weights: list[Floats] = []
     for element, xi, eta in found:
         at = element_matrices.interpolate(
@@ -154,7 +156,7 @@ def _functional(
         )
         along = c * at.dN[0, 0, 0] + s * at.dN[0, 0, 1]  # derivative in the gage's direction
         nodes = element.nodes[0] * NDOF
-        for unknown, factor in ((0, c), (1, s), (3, -gage.z * c), (4, -gage.z * s)):
-            places.append(nodes + unknown)
+        for dof, factor in ((0, c), (1, s), (3, -gage.z * c), (4, -gage.z * s)):
+            dof_indices.append(nodes + dof)
             weights.append(factor * along / len(found))
-    return np.concatenate(places), np.concatenate(weights)
+    return np.concatenate(dof_indices), np.concatenate(weights)

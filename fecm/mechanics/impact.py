@@ -1,14 +1,14 @@
-"""The coupled step: plate, projectile and the indentation between them, report section 4.3.
+"""The coupled step of plate, projectile and contact law, report section 4.3.
 
-The plate moves by v += dt M^-1 (P - K u), u += dt v under the last step's contact force.  Then the
-projectile's implicit step and the indentation law are iterated on the tip's acceleration, at most
-five times.  Signs: w is positive along the push, the projectile's motion away from the plate, so
-that the indentation is -u_tip - w.
+Equations 4-14 (plate) and 4-25 (projectile) with the contact force F of 3-1, 3-3 and 3-11.  The
+plate moves by v += dt M^-1 (P - K u), u += dt v under the last step's contact force.  Then the
+projectile's implicit step and the contact law are iterated on the tip's acceleration, at most five
+times.  Signs: w is positive along the push and the projectile's motion away from the plate, so that
+the indentation is -u_tip - w.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -24,31 +24,31 @@ from fecm.mechanics.plate_motion import DivergenceError, PlateMotion, PlateState
 from fecm.mechanics.projectile import Projectile, rigid_approach
 from fecm.mechanics.rod_integrators import RodIntegrator, RodState, TipStep, WilsonStep
 
-# The contact iteration of the listing; its length is part of the numbers.
+# The listing's contact iteration; the number of passes affects the results.
 PASSES = 5
 TOLERANCE = 1.0e-6
 
 
 @dataclass(slots=True)
 class ContactState:
-    """The projectile's and the law's part of what one step hands to the next.
+    """State of projectile and contact after a step.
 
-    Values are floats, or arrays with one entry a case.
+    Values are floats, or arrays with one entry per case.
 
     Attributes
     ----------
     rod : RodState or TipState
         The projectile.
     memory : LoadingHistory
-        The indentation law.
+        History of the contact law.
     contact : ContactPoint
         Accepted indentation and contact force.
     plate_w : float
-        The plate's displacement that the law sees.
+        The plate's displacement in the contact law.
     contact_work : float
-        Work stored in or lost to the indentation.
-    unsettled : int
-        Steps whose contact iteration did not settle.
+        Work stored or dissipated by the indentation.
+    unconverged_steps : int
+        Steps whose contact iteration did not converge.
     """
 
     rod: Any
@@ -61,33 +61,32 @@ class ContactState:
 
 @dataclass(slots=True)
 class ImpactState(ContactState):
-    """Everything that one step hands to the next.
+    """State of plate, projectile and contact after a step.
 
     Attributes
     ----------
     plate : PlateState
-        The plate, with the number of steps and their time.
+        The plate, with the number of steps and the time.
     """
 
     plate: PlateState = field(kw_only=True)
 
     def to_arrays(self) -> dict[str, Floats]:
-        """Store the state as plain arrays, from which :meth:`from_arrays` makes it again."""
+        """Convert the state to plain arrays, the inverse of :meth:`from_arrays`."""
         scalars = [
             self.rod.tip, self.contact.indentation, self.contact.force, self.plate_w,
             self.contact_work, self.unconverged_steps,
         ]  # fmt: skip
-        memory = [getattr(self.memory, f.name) for f in dataclasses.fields(LoadingHistory)]
         return {
             "contact": np.array(scalars, dtype=float),
-            "memory": np.array(memory, dtype=float),
+            "memory": np.array(self.memory, dtype=float),
             "rod": self.rod.motion.copy(),
             **self.plate.to_arrays(),
         }
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, Floats]) -> ImpactState:
-        """Make the state again that :meth:`to_arrays` stored."""
+        """Restore a state from the arrays of :meth:`to_arrays`."""
         tip, indentation, force, w, work, unconverged_steps = arrays["contact"].tolist()
         branch, *curve = arrays["memory"].tolist()
         return cls(
@@ -103,25 +102,26 @@ class ImpactState(ContactState):
 
 @dataclass(frozen=True)
 class ImpactConditions:
-    """How plate and projectile meet; the slips that concern it are parameters here.
+    """Conditions of the impact, with the slips that affect it as parameters.
 
     Attributes
     ----------
-    row : int
-        Place of the impact unknown among those that move.
+    equation : int
+        Equation of the impact dof, from 0.
     velocity : float
         Approach velocity, length/time.
     plate_moves : bool
-        Whether the law sees the plate move (not under the slip ``target``).
+        Whether the contact law takes the plate's motion into account (not with the slip
+        ``target``).
     strains_start_moving : bool
         Whether the rod's du/dx start at the approach velocity (the slip ``rod-start``).
     keeps_first_step : bool
         Whether the rod keeps the constants of the first time step (the slip ``rod-dt``).
     share : float
-        Part of the contact force that the plate feels; 1 but for the slip ``rod-force``.
+        Fraction of the contact force that acts on the plate; 1 without the slip ``rod-force``.
     """
 
-    row: int
+    equation: int
     velocity: float
     plate_moves: bool = True
     strains_start_moving: bool = False
@@ -130,7 +130,7 @@ class ImpactConditions:
 
 
 class ImpactSystem:
-    """Steps a plate and a projectile through time.
+    """Time integration of a plate and a projectile.
 
     Parameters
     ----------
@@ -139,12 +139,12 @@ class ImpactSystem:
     law : Law
     contact : ImpactConditions
     integrator : type of RodIntegrator
-        The rod's.
+        Integration method of the rod.
 
     Attributes
     ----------
     first_dt : float or None
-        Time step that the rod's constants are made for.
+        Time step for which the rod's constants are computed.
     """
 
     def __init__(
@@ -171,12 +171,12 @@ class ImpactSystem:
         return self.motion.plate
 
     def start(self, plate: PlateState | None = None) -> ImpactState:
-        """State before the first step: the projectile about to touch the plate.
+        """State before the first step, with the projectile just touching the plate.
 
         Parameters
         ----------
         plate : PlateState, optional
-            The plate's state, shared with the caller; at rest without it.
+            The plate's state, shared with the caller; at rest by default.
         """
         rod = rigid_approach(
             self.rod, self.contact.velocity, derivatives_too=self.contact.strains_start_moving
@@ -185,9 +185,9 @@ class ImpactSystem:
         return ImpactState(rod, self.law.start(), ContactPoint(0.0, 0.0), plate=state)
 
     def point_force(self, state: ImpactState, force: float | None = None) -> PointForce:
-        """The force on the plate: the contact force, or another in its place."""
-        given = state.contact.force if force is None else force
-        return PointForce(self.contact.row, self.contact.share * given)
+        """Force on the plate: the contact force unless another is passed."""
+        applied = state.contact.force if force is None else force
+        return PointForce(self.contact.equation, self.contact.share * applied)
 
     def advance(
         self, state: ImpactState, dt: float, factor: float = 1.0, force: float | None = None
@@ -203,24 +203,24 @@ class ImpactSystem:
         factor : float
             Load factor of FORC's values.
         force : float, optional
-            Force that the plate feels in place of the contact force (the slip ``prop-contact``).
+            Replaces the contact force on the plate (the slip ``prop-contact``).
 
         Raises
         ------
         DivergenceError
-            If a number is no longer finite.
+            If indentation or force is no longer finite.
         """
         self.motion.advance(state.plate, dt, factor, self.point_force(state, force))
         step = state.plate.step
         try:
             self.move_projectile(state, dt)
         except OverflowError:
-            raise DivergenceError(step, "the contact force is beyond all bounds") from None
+            raise DivergenceError(step, "the contact force overflows") from None
         if not math.isfinite(state.contact.indentation + state.contact.force):
             raise DivergenceError(step, "the motion is no longer finite")
 
     def _rod_step(self, dt: float) -> RodIntegrator:
-        """Give the rod's linear map for a time step."""
+        """Linear map of the rod for a time step, computed when the step changes."""
         if self._step is None or self._step.dt != dt:
             if not self.contact.keeps_first_step or self.first_dt is None:
                 self.first_dt = dt
@@ -228,13 +228,14 @@ class ImpactSystem:
         return self._step
 
     def move_projectile(self, state: ImpactState, dt: float) -> None:
-        """Bring projectile and law to the plate's instant."""
-        w = state.plate.extended.item(self.contact.row) if self.contact.plate_moves else 0.0
+        """Advance projectile and contact to the plate's time."""
+        moves = self.contact.plate_moves
+        w = state.plate.displacement_at(self.contact.equation) if moves else 0.0
         couple_step(self._rod_step(dt), self.law, state, w)
 
 
 def couple_step(step: TipStep, law: Law, state: ContactState, w: Number) -> None:
-    """Iterate force and tip acceleration, then move the whole projectile with what came out.
+    """Iterate contact force and tip acceleration, then advance the projectile under that force.
 
     Parameters
     ----------
@@ -244,15 +245,15 @@ def couple_step(step: TipStep, law: Law, state: ContactState, w: Number) -> None
     state : ContactState
         Changed in place.
     w : float
-        The plate's displacement under the projectile; an array where there are many cases.
+        The plate's displacement at the contact; an array for many cases.
     """
     last = state.contact
     motion, base, drift, acceleration = step.begin(state.rod)
     carried = (1.0 - step.theta) * last.force
     iterate = _iterate_cases if isinstance(w, np.ndarray) else _iterate
     guess = drift + step.weight * acceleration
-    force, state.memory, settled = iterate(step, law, state, w, guess, base, drift, carried)
-    state.unconverged_steps += 1 - settled
+    force, state.memory, converged = iterate(step, law, state, w, guess, base, drift, carried)
+    state.unconverged_steps += 1 - converged
     state.rod = step.end(state.rod, motion, carried + step.theta * force)
     indentation = -state.rod.tip - w
     state.memory = law.accept(state.memory, last, indentation)
@@ -271,7 +272,7 @@ def _iterate(
     drift: float,
     carried: float,
 ) -> tuple[float, LoadingHistory, bool]:
-    """Contact force of one case, the memory that its trials leave, and whether it settled."""
+    """Contact force of one case, the history after its trials, and whether it converged."""
     memory, last = state.memory, state.contact
     theta, gain, weight = step.theta, step.gain, step.weight
     force = last.force
@@ -294,7 +295,7 @@ def _iterate_cases(
     drift: Floats,
     carried: Floats,
 ) -> tuple[Floats, LoadingHistory, NDArray[np.int_]]:
-    """The same of many cases, each of which stands still once it has settled."""
+    """:func:`_iterate` for many cases; the force of a case is kept once it has converged."""
     last, memory = state.contact, state.memory
     force: Floats = last.force
     open_cases = np.ones(len(w), dtype=bool)

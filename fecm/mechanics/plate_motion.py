@@ -1,15 +1,16 @@
-"""Explicit motion of the plate: M a = P - K u.
+"""Explicit motion of the plate: M a = P - K u, report section 4.3.1.
 
-The central differences in increments: d = u - u_last, which is dt times the velocity in the middle
-of the last step, and d + dt^2 M^-1 (P - K u) is the next one.  Vectors are over equations, and
-are gone through piece by piece.
+Central differences in increments: d = u - u_last is dt times the velocity in the middle of the last
+step, and d + dt^2 M^-1 (P - K u) is the next increment.  Vectors are over equations and are
+processed in pieces that fit the cache.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,20 +18,20 @@ from numpy.typing import NDArray
 from fecm._typing import Floats
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.stiffness_product import AUTO, CSR, Workers, pieces, stiffness_operator
-from fecm.mechanics.symmetry import SymmetryReduction, whole
+from fecm.mechanics.symmetry import SymmetryReduction, unreduced
 
 Indices = NDArray[np.intp]
 
 
 class DivergenceError(ArithmeticError):
-    """The motion has lost all sense.
+    """The solution diverged.
 
     Attributes
     ----------
     step : int
-        The step at which it did.
+        Step at which it diverged.
     reason : str
-        How that shows.
+        Symptom.
     """
 
     def __init__(self, step: int, reason: str) -> None:
@@ -39,50 +40,60 @@ class DivergenceError(ArithmeticError):
         super().__init__(f"step {step}: {reason}")
 
     def __reduce__(self) -> tuple[type[DivergenceError], tuple[int, str]]:
-        """Make the error again in another process."""
+        """Pickle the error with its arguments."""
         return DivergenceError, (self.step, self.reason)
 
 
 @dataclass(slots=True)
 class PlateState:
-    """The plate's part of what one step hands to the next.
+    """State of the plate after a step.
 
     Attributes
     ----------
-    extended : ndarray (size,)
-        The displacement, extended as the product needs it.
+    padded : ndarray (size,)
+        Displacement, padded as the stiffness operator requires.
     increment : ndarray (n,)
-        What the last step added to the displacement.
-    pull : ndarray (n,)
-        M^-1 K u times `area`.
+        Displacement increment of the last step.
+    scaled_internal_force : ndarray (n,)
+        M^-1 K u times `dt2`.
     step : int
-        Steps taken.
+        Number of steps.
     time : float
-        Sum of their time steps.
+        Sum of the time steps.
     dt : float
-        The last time step.
-    area : float
-        Square of the time step that `pull` is made for.
+        Last time step.
+    dt2 : float
+        Factor of `scaled_internal_force`, the square of the time step.
     external_work : float
         Work done by nodal forces.
     sums : Sums
         Inner products of the vectors.
     """
 
-    extended: Floats
+    padded: Floats
     increment: Floats
-    pull: Floats
+    scaled_internal_force: Floats
     step: int = 0
     time: float = 0.0
     dt: float = 0.0
-    area: float = 0.0
+    dt2: float = 0.0
     external_work: float = 0.0
     sums: Sums = field(default_factory=lambda: Sums(*[0.0] * 6))
+    # Displacement, increment and scaled internal force of each piece.
+    views: list[tuple[Floats, Floats, Floats]] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        u, d, force = self.displacement, self.increment, self.scaled_internal_force
+        self.views = [(u[piece], d[piece], force[piece]) for piece in pieces(len(d))]
 
     @property
     def displacement(self) -> Floats:
-        """The unknowns that move on their own, (n,); a view."""
-        return self.extended[: len(self.increment)]
+        """Displacement of the independent dofs, (n,); a view."""
+        return self.padded[: len(self.increment)]
+
+    def displacement_at(self, equation: int) -> float:
+        """Displacement of one equation, from 0."""
+        return self.padded.item(equation)
 
     @property
     def velocity(self) -> Floats:
@@ -91,90 +102,86 @@ class PlateState:
 
     @property
     def strain_energy(self) -> float:
-        """Strain energy, half of the product of displacement and internal force (force*length)."""
+        """Strain energy, half the product of displacement and internal force (force*length)."""
         return 0.5 * self.sums.strain
 
     def to_arrays(self) -> dict[str, Floats]:
-        """Store the state as plain arrays, from which :meth:`from_arrays` makes it again."""
-        scalars = [self.step, self.time, self.dt, self.area, self.external_work]
+        """Convert the state to plain arrays, the inverse of :meth:`from_arrays`."""
+        scalars = [self.step, self.time, self.dt, self.dt2, self.external_work]
         return {
             "plate": np.array(scalars, dtype=float),
             "sums": np.array(self.sums),
-            "extended": self.extended.copy(),
+            "padded": self.padded.copy(),
             "increment": self.increment.copy(),
-            "pull": self.pull.copy(),
+            "scaled_internal_force": self.scaled_internal_force.copy(),
         }
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, Floats]) -> PlateState:
-        """Make the state again that :meth:`to_arrays` stored."""
-        step, time, dt, area, external_work = arrays["plate"].tolist()
-        return cls(
-            arrays["extended"].copy(),
-            arrays["increment"].copy(),
-            arrays["pull"].copy(),
-            int(step),
-            time,
-            dt,
-            area,
-            external_work,
-            Sums(*arrays["sums"].tolist()),
-        )
+        """Restore a state from the arrays of :meth:`to_arrays`."""
+        step, time, dt, dt2, work = arrays["plate"].tolist()
+        names = ("padded", "increment", "scaled_internal_force")
+        u, d, force = (arrays[name].copy() for name in names)
+        sums = Sums(*arrays["sums"].tolist())
+        return cls(u, d, force, int(step), time, dt, dt2, work, sums)
 
 
 class Sums(NamedTuple):
-    """Inner products that the energies are made of: d increment, u displacement, P nodal loads."""
+    """Inner products that give the energies.
+
+    d is the increment, u the displacement, P the nodal loads and s the scaled internal force.
+    """
 
     inertia: float  # d M d
     power: float  # d K u
     strain: float  # u K u
-    pull: float  # (K u) pull
+    force: float  # (K u) s
     load: float  # P d
-    load_pull: float  # P pull
+    load_force: float  # P s
 
 
 class PointForce(NamedTuple):
-    """A force on one equation, on top of the nodal forces."""
+    """A force on one equation, in addition to the nodal forces."""
 
-    row: int
+    equation: int
     force: float
 
 
 @dataclass(frozen=True)
-class Watch:
-    """Sums over unknowns: strains of gages, say.
+class DofSums:
+    """Weighted sums of dofs, such as the strains of gages.
 
     Attributes
     ----------
-    slots : ndarray (n, m)
-        Places in the extended displacement.
+    dof_indices : ndarray (n, m)
+        Indices into the padded displacement.
     weights : ndarray (n, m)
     prescribed : ndarray (n,)
-        What the prescribed displacements add, for a load factor of 1.
+        Contribution of the prescribed displacements at a load factor of 1.
     """
 
-    slots: Indices
+    dof_indices: Indices
     weights: Floats
     prescribed: Floats
 
-    def read(self, state: PlateState, factor: float) -> Floats:
+    def evaluate(self, state: PlateState, factor: float) -> Floats:
         """Values of the sums, (n,), under a load factor."""
-        values = np.einsum("gi,gi->g", state.extended.take(self.slots), self.weights)
+        values = np.einsum("gi,gi->g", state.padded.take(self.dof_indices), self.weights)
         return np.asarray(values + factor * self.prescribed)
 
 
 class PlateMotion:
-    """Moves a plate through time.
+    """Time integration of a plate.
 
     Parameters
     ----------
     plate : PlateModel
     solver : str
-        How K u is had: see :func:`~fecm.mechanics.stiffness_product.stiffness_operator`.
+        How K u is computed: see :func:`~fecm.mechanics.stiffness_product.stiffness_operator`.
     reduced : SymmetryReduction, optional
-        What moves; every unknown without it, and with the sparse matrix.
+        The independent dofs; all of them by default, and with the sparse matrix.
     workers : Workers, optional
-        Threads to share the work of a step.
+        Threads that share the work of a step.
     """
 
     def __init__(
@@ -184,44 +191,45 @@ class PlateMotion:
         reduced: SymmetryReduction | None = None,
         workers: Workers | None = None,
     ) -> None:
-        kept = whole(plate) if reduced is None or solver == CSR else reduced
+        kept = unreduced(plate) if reduced is None or solver == CSR else reduced
         self.plate = plate
         self.product = stiffness_operator(plate, solver, kept, workers)
         self.mass = kept.gather(kept.sign * plate.field(plate.mass, 0.0))
-        self._slots = kept.slots
+        self._dof_indices = kept.dof_indices
         self._inverse_mass = 1.0 / self.mass
-        self._scale = np.zeros(kept.count)  # M^-1 times the state's area
+        self._scale = np.zeros(kept.count)  # M^-1 times the state's dt2
         self._scaled_for = 0.0
-        self._work = np.empty(kept.count)
+        work = np.empty(kept.count)
         loads = kept.gather(plate.field(plate.nodal_loads, 0.0))
         self._loads = loads if loads.any() else None
         self._loads_square = float(loads @ (loads * self._inverse_mass))
         self._prescribed = np.where(kept.sign == 0.0, plate.mesh.forces, 0.0)
         self._prescribes = bool(self._prescribed.any())
-        self._pieces = pieces(kept.count)
-        self._viewed: PlateState | None = None
-        self._views: list[tuple[Any, ...]] = []
+        self._views = [
+            (self._scale[p], self.mass[p], work[p], None if self._loads is None else loads[p])
+            for p in pieces(kept.count)
+        ]
 
     def start(self) -> PlateState:
         """State of the plate at rest."""
         count = len(self.mass)
         return PlateState(np.zeros(self.product.size), np.zeros(count), np.zeros(count))
 
-    def row(self, node: int, unknown: int) -> int:
-        """Place among the moving unknowns of an unknown of a node, both from 0.
+    def equation(self, node: int, dof: int) -> int:
+        """Equation of a dof of a node, all from 0.
 
         Raises
         ------
         ValueError
-            If it does not move.
+            If the dof is restrained or follows another one.
         """
-        slot = int(self._slots[node, unknown])
-        if slot >= len(self.mass):
-            raise ValueError(f"unknown {unknown + 1} of node {node + 1} does not move on its own")
-        return slot
+        equation = int(self._dof_indices[node, dof])
+        if equation >= len(self.mass):
+            raise ValueError(f"dof {dof + 1} of node {node + 1} has no equation")
+        return equation
 
     def field(self, state: PlateState, factor: float) -> Floats:
-        """Every unknown of every node, (numnp, 5).
+        """All dofs of all nodes, (numnp, 5).
 
         Parameters
         ----------
@@ -229,60 +237,53 @@ class PlateMotion:
         factor : float
             Load factor of the prescribed displacements.
         """
-        full = state.extended.take(self._slots)
+        full = state.padded.take(self._dof_indices)
         full += factor * self._prescribed if self._prescribes else 0.0  # no negative zeros
         return full
 
-    def watch(self, places: Indices, weights: Floats) -> Watch:
-        """Sums over unknowns, ready to be taken at every step.
+    def dof_sums(self, dof_indices: Indices, weights: Floats) -> DofSums:
+        """Prepare weighted sums of dofs for evaluation at every step.
 
         Parameters
         ----------
-        places : ndarray (n, m)
-            Places of unknowns in a field laid out flat.
+        dof_indices : ndarray (n, m)
+            Indices into a flattened field.
         weights : ndarray (n, m)
         """
-        prescribed = (weights * self._prescribed.ravel()[places]).sum(axis=1)
-        return Watch(self._slots.ravel()[places], weights, prescribed)
+        prescribed = (weights * self._prescribed.ravel()[dof_indices]).sum(axis=1)
+        return DofSums(self._dof_indices.ravel()[dof_indices], weights, prescribed)
 
-    def refresh(self, state: PlateState) -> None:
-        """Make all that follows from the displacement agree with it."""
-        self._prepare(state)
-        sums = self.product.each(state.extended, self._account)
+    def displace(self, state: PlateState, change: Floats) -> None:
+        """Add to the displacement of a state, (n,), without a time step."""
+        displacement = state.displacement
+        displacement += change
+        self._update_forces(state)
+
+    def _update_forces(self, state: PlateState) -> None:
+        """Compute internal force and inner products from the displacement."""
+        if self._scaled_for != state.dt2:
+            np.multiply(self._inverse_mass, state.dt2, out=self._scale)
+            self._scaled_for = state.dt2
+        sums = self.product.each(state.padded, partial(self._piece_sums, state))
         state.sums = sums[0] if len(sums) == 1 else Sums(*map(sum, zip(*sums, strict=True)))
 
-    def _prepare(self, state: PlateState) -> None:
-        """Scale the masses for the state's time step, and cut all vectors into pieces."""
-        if self._scaled_for != state.area:
-            np.multiply(self._inverse_mass, state.area, out=self._scale)
-            self._scaled_for = state.area
-        if self._viewed is state:
-            return
-        own = (state.displacement, state.increment, state.pull)
-        vectors = (*own, self._scale, self.mass, self._work)
-        loads = self._loads
-        self._views = [
-            (*(v[piece] for v in vectors), None if loads is None else loads[piece])
-            for piece in self._pieces
-        ]
-        self._viewed = state
-
-    def _account(self, number: int, internal: Floats) -> Sums:
-        """Pull and sums of one piece, from K u."""
-        u, d, pull, scale, mass, work, loads = self._views[number]
-        np.multiply(internal, scale, out=pull)
+    def _piece_sums(self, state: PlateState, number: int, internal: Floats) -> Sums:
+        """Scaled internal force and inner products of one piece, from K u."""
+        u, d, force = state.views[number]
+        scale, mass, work, loads = self._views[number]
+        np.multiply(internal, scale, out=force)
         np.multiply(mass, d, out=work)
         return Sums(
             float(np.dot(work, d)),
             float(np.dot(d, internal)),
             float(np.dot(u, internal)),
-            float(np.dot(internal, pull)),
+            float(np.dot(internal, force)),
             0.0 if loads is None else float(np.dot(loads, d)),
-            0.0 if loads is None else float(np.dot(loads, pull)),
+            0.0 if loads is None else float(np.dot(loads, force)),
         )
 
     def unbalanced(self, state: PlateState, factor: float) -> Floats:
-        """Load less internal force of every equation.
+        """Load minus internal force of every equation.
 
         Parameters
         ----------
@@ -302,9 +303,9 @@ class PlateMotion:
         factor: float,
         point: PointForce | None = None,
         *,
-        kick: float | None = None,
+        velocity_dt: float | None = None,
     ) -> None:
-        """Take one step: v += kick M^-1 (P - K u), u += dt v.
+        """Take one step: v += velocity_dt M^-1 (P - K u), u += dt v.
 
         Parameters
         ----------
@@ -315,26 +316,25 @@ class PlateMotion:
         factor : float
             Load factor of the nodal forces.
         point : PointForce, optional
-        kick : float, optional
-            Time between the middles of the last step and of this one; `dt` without it.
+        velocity_dt : float, optional
+            Time between the middles of the last step and of this one; `dt` by default.
         """
-        area = dt * (dt if kick is None else kick)
-        if state.area != area:
-            state.area = area
-            self.refresh(state)
+        dt2 = dt * (dt if velocity_dt is None else velocity_dt)
+        if state.dt2 != dt2 or self._scaled_for != dt2:
+            state.dt2 = dt2
+            self._update_forces(state)
         if state.dt != dt:
             state.increment *= dt / state.dt if state.dt else 1.0
             state.dt = dt
-        self._prepare(state)
         if point is not None:
-            row, force = point
-            state.pull[row] -= force * self._scale[row]
-        for u, d, pull, scale, _, _, loads in self._views:
-            d -= pull
+            equation, force = point
+            state.scaled_internal_force[equation] -= force * self._scale[equation]
+        for (u, d, internal), (scale, _, _, loads) in zip(state.views, self._views, strict=True):
+            d -= internal
             if loads is not None:
                 d += factor * scale * loads
             u += d
-        self.refresh(state)
+        self._update_forces(state)
         state.external_work += factor * state.sums.load
         state.step += 1
         state.time += dt
@@ -342,10 +342,10 @@ class PlateMotion:
     def kinetic_energy(
         self, state: PlateState, factor: float, point: PointForce | None = None
     ) -> float:
-        """Kinetic energy at the displacement's instant (force*length).
+        """Kinetic energy at the time of the displacement (force*length).
 
-        The stored velocity is half a step old, so that the energy is that of v + dt/2 a, with
-        a = M^-1 (P - K u).  Its square is taken apart, which needs no vector that the step has not.
+        The stored velocity is half a step old: the energy is that of v + dt/2 a, with
+        a = M^-1 (P - K u).  Its square is expanded into the inner products of :class:`Sums`.
 
         Parameters
         ----------
@@ -357,24 +357,25 @@ class PlateMotion:
         dt2 = state.dt**2
         if not dt2:
             return 0.0
-        inertia, power, _, pull, load, load_pull = state.sums
-        to_step = dt2 / state.area
+        inertia, power, _, internal, load, load_force = state.sums
+        to_step = dt2 / state.dt2
         work = factor * load - power  # d (P - K u)
-        force = factor * (factor * self._loads_square * dt2 - 2.0 * load_pull * to_step)
-        force += pull * to_step  # dt^2 (P - K u) M^-1 (P - K u)
+        force = factor * (factor * self._loads_square * dt2 - 2.0 * load_force * to_step)
+        force += internal * to_step  # dt^2 (P - K u) M^-1 (P - K u)
         if point is not None:
-            row, F = point
-            inverse, p = float(self._inverse_mass[row]) * dt2, float(state.pull[row]) * to_step
-            work += F * float(state.increment[row])
+            equation, F = point
+            inverse = float(self._inverse_mass[equation]) * dt2
+            p = float(state.scaled_internal_force[equation]) * to_step
+            work += F * float(state.increment[equation])
             force += F * (F * inverse - 2.0 * p)
             if self._loads is not None:
-                force += 2.0 * factor * F * float(self._loads[row]) * inverse
+                force += 2.0 * factor * F * float(self._loads[equation]) * inverse
         return 0.5 * (inertia / dt2 + work + 0.25 * force)
 
     def central_difference(self, state: PlateState, dt: float, factor: float) -> None:
         """Take one step of the central differences, from rest or from the last step.
 
-        The first step from rest has half a kick, so that the velocity belongs to its middle; a
-        change of the time step is met in the same way.
+        The velocity belongs to the middle of a step: the first step from rest accelerates for half
+        a step, and a change of the time step for the mean of both.
         """
-        self.advance(state, dt, factor, kick=0.5 * (state.dt + dt))
+        self.advance(state, dt, factor, velocity_dt=0.5 * (state.dt + dt))

@@ -1,12 +1,12 @@
-"""K u, the product that a time step is made of.
+"""The product K u of stiffness and displacement, which dominates the cost of a time step.
 
-Two ways to have it: scipy's CSR matrix, and element by element, where congruent elements share one
-small matrix that stays in the cache and the products run at the speed of BLAS.
+It is computed with scipy's CSR matrix, or element by element: congruent elements share one small
+matrix that stays in the cache, and the products run at the speed of BLAS.
 
-A vector q is extended by one entry that is always zero and stands for every unknown at rest, and by
--q before it where some unknowns move against the one that they follow.  The result comes in pieces,
-each handed on while it is in the cache; pieces and their order depend on the plate alone, so that
-sums over them are the same whatever the number of threads.
+A vector q is padded to (q, 0), or to (q, -q, 0) where symmetry reverses the sign of some dofs; the
+zero stands for every dof at rest.  The result is processed in pieces while they are in the cache.
+The pieces and their order depend only on the plate, so that sums do not depend on the number of
+threads.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from scipy import sparse
 from fecm._typing import Floats
 from fecm.mechanics.element_groups import congruence
 from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.symmetry import SymmetryReduction, whole
+from fecm.mechanics.symmetry import SymmetryReduction, unreduced
 
-# By what suits the mesh, or by the sparse matrix in any case.
+# Chosen by the mesh, or always the sparse matrix.
 AUTO, CSR = "auto", "csr"
 
 SOLVERS = (AUTO, CSR)
 
-# Part of the critical time step that is taken where a deck gives none.
+# Fraction of the critical time step used if the deck has no time step.
 SAFE = 0.9
 
 T = TypeVar("T")
@@ -47,7 +47,7 @@ def available() -> int:
 
 
 class Workers:
-    """A few threads, the caller's own among them.
+    """A pool of threads that includes the caller's.
 
     Parameters
     ----------
@@ -64,9 +64,9 @@ class Workers:
         self._pool = ThreadPoolExecutor(self.count - 1) if self.count > 1 else None
 
     def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
-        """Results of a function that lets other threads run, in the order of the items.
+        """Results of a function that releases the GIL, in the order of the items.
 
-        Each thread takes ceil(items / count) items that follow one another.
+        Each thread takes ceil(items / count) consecutive items.
         """
         if self._pool is None or len(items) < 2:
             return [function(item) for item in items]
@@ -87,59 +87,59 @@ def _each(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
 
 Indices = NDArray[np.intp]
 
-# Equations of one piece: BLAS adds up so long a vector in one thread.
+# Equations per piece: BLAS sums vectors of this length in one thread.
 PIECE = 8192
 
-# Elements of one matrix product: small enough for the cache, and for BLAS to use one thread only.
+# Elements per matrix product: it fits the cache, and BLAS uses one thread.
 BLOCK = 256
 
-# Fewer congruent elements than this, and a matrix for each of them is as fast as one for all.
+# With fewer congruent elements, one matrix per element is as fast as a shared one.
 WORTH_GROUPING = 4
 
-# Nodal values of the elements that a thread takes at a time; so many share the cache.
+# Nodal values per domain, which fit the cache.
 BATCH = 65536
 
-# Large meshes are cut into a multiple of so many domains, that as many threads have equal shares.
+# The number of domains of a large mesh is a multiple of this, for equal shares of the threads.
 SHARES = 4
 
 
 def pieces(neq: int) -> list[slice]:
-    """The equations, piece by piece."""
+    """Slices of the equations."""
     return [slice(i, min(i + PIECE, neq)) for i in range(0, neq, PIECE)]
 
 
 class StiffnessOperator(ABC):
     """The internal forces of a displacement."""
 
-    # Entries of an extended vector.
+    # Entries of a padded vector.
     size: int
 
     @abstractmethod
-    def each(self, extended: Floats, use: Callable[[int, Floats], R]) -> list[R]:
-        """Hand K u on, piece by piece.
+    def each(self, padded: Floats, use: Callable[[int, Floats], R]) -> list[R]:
+        """Compute K u and apply a function to each piece.
 
         Parameters
         ----------
-        extended : ndarray (size,)
-            The displacement at its beginning, and a zero at its end.
+        padded : ndarray (size,)
+            Starts with the displacement and ends with a zero.
         use : callable
-            Given a piece's number and its forces.
+            Function of a piece's number and forces.
 
         Returns
         -------
         list
-            What `use` gave, in the order of the pieces.
+            Results of `use`, in the order of the pieces.
         """
 
     def __call__(self, displacement: Floats) -> Floats:
         """K u, (neq,)."""
-        extended = np.zeros(self.size)
-        extended[: len(displacement)] = displacement
-        return np.concatenate(self.each(extended, lambda _, forces: forces.copy()))
+        padded = np.zeros(self.size)
+        padded[: len(displacement)] = displacement
+        return np.concatenate(self.each(padded, lambda _, forces: forces.copy()))
 
 
 class CsrProduct(StiffnessOperator):
-    """K u by one sparse matrix.
+    """K u with a sparse matrix.
 
     Parameters
     ----------
@@ -151,14 +151,14 @@ class CsrProduct(StiffnessOperator):
         self._pieces = pieces(stiffness.shape[0])
         self.size = stiffness.shape[0] + 1
 
-    def each(self, extended: Floats, use: Callable[[int, Floats], R]) -> list[R]:
-        """Hand K u on, piece by piece."""
-        forces = np.asarray(self._stiffness @ extended[:-1])
+    def each(self, padded: Floats, use: Callable[[int, Floats], R]) -> list[R]:
+        """Compute K u and apply a function to each piece."""
+        forces = np.asarray(self._stiffness @ padded[:-1])
         return [use(number, forces[piece]) for number, piece in enumerate(self._pieces)]
 
 
-# Stiffness that a group's elements share, (n, n), or (ne, n, n) where each has its own; places of
-# their unknowns in the extended vector, (ne, n).
+# Stiffness of a group's elements, shared (n, n) or individual (ne, n, n), and the indices of their
+# dofs in the padded vector, (ne, n).
 Group = tuple[Floats, Indices]
 
 
@@ -169,23 +169,23 @@ class _Domain:
     ----------
     groups : sequence of Group
     count : int
-        Number of unknowns.
+        Number of independent dofs.
     size : int
-        Entries of an extended vector.
+        Entries of a padded vector.
     scratch : ndarray (2, entries)
-        Room for nodal values and forces, which other domains may use at other times.
+        Buffer for nodal values and forces, shared with domains of the same thread.
     """
 
     def __init__(self, groups: Sequence[Group], count: int, size: int, scratch: Floats) -> None:
         lists: list[Indices] = []
         matrices: list[Floats] = []
-        for K, places in groups:
-            kept = (places < size - 1).any(axis=0)
-            lists.append(places[:, kept])
+        for K, dof_indices in groups:
+            kept = (dof_indices < size - 1).any(axis=0)
+            lists.append(dof_indices[:, kept])
             matrices.append(np.ascontiguousarray(K[..., kept, :][..., kept]))
-        self.places = np.concatenate([part.ravel() for part in lists])
-        self._gathered, self.forces = scratch[:, : len(self.places)]
-        # How it is multiplied, nodal values, matrix or matrices, forces.
+        self.dof_indices = np.concatenate([part.ravel() for part in lists])
+        self._gathered, self.forces = scratch[:, : len(self.dof_indices)]
+        # Product function, nodal values, matrix or matrices, forces.
         self._parts: list[tuple[Callable[..., Any], Floats, Floats, Floats]] = []
         end = 0
         for K, part in zip(matrices, lists, strict=True):
@@ -201,27 +201,28 @@ class _Domain:
                 end = cut.stop
         self._count, self._last = count, size - 1
 
-    def multiply(self, extended: Floats) -> None:
-        """Find the forces of each element."""
-        extended.take(self.places, out=self._gathered, mode="clip")
+    def multiply(self, padded: Floats) -> None:
+        """Compute the forces of each element."""
+        padded.take(self.dof_indices, out=self._gathered, mode="clip")
         for product, q, K, forces in self._parts:
             product(q, K, out=forces)
 
     def prepare_sums(self) -> None:
-        """Make the matrix that sums the elements' forces, for the range of rows that it needs."""
-        turned = (self.places >= self._count) & (self.places < self._last)
-        rows = np.where(turned, self.places - self._count, self.places)
-        entries = np.flatnonzero(self.places < self._last)
-        signs, rows = np.where(turned, -1.0, 1.0)[entries], rows[entries]
-        self.rows = slice(int(rows.min()), int(rows.max()) + 1)
+        """Build the matrix that sums the elements' forces, for the equations of the domain."""
+        turned = (self.dof_indices >= self._count) & (self.dof_indices < self._last)
+        equations = np.where(turned, self.dof_indices - self._count, self.dof_indices)
+        entries = np.flatnonzero(self.dof_indices < self._last)
+        signs, equations = np.where(turned, -1.0, 1.0)[entries], equations[entries]
+        first, end = int(equations.min()), int(equations.max()) + 1
+        self.equations = slice(first, end)
         self._sums = sparse.csr_array(
-            (signs, ((rows - self.rows.start).astype(np.int32), entries.astype(np.int32))),
-            shape=(self.rows.stop - self.rows.start, len(self.places)),
+            (signs, ((equations - first).astype(np.int32), entries.astype(np.int32))),
+            shape=(end - first, len(self.dof_indices)),
         )
 
-    def sums(self, extended: Floats) -> Floats:
-        """Forces of the domain's unknowns, those of :attr:`rows`."""
-        self.multiply(extended)
+    def sums(self, padded: Floats) -> Floats:
+        """Forces on the domain's :attr:`equations`."""
+        self.multiply(padded)
         return np.asarray(self._sums @ self.forces)
 
 
@@ -231,13 +232,13 @@ class ElementProduct(StiffnessOperator):
     Parameters
     ----------
     domains : sequence of sequence of Group
-        The elements; domains may be taken by different threads.
+        The elements; different threads may process different domains.
     count : int
-        Number of unknowns.
+        Number of independent dofs.
     signed : bool
-        Whether -q is part of the extended vector.
+        Whether the padded vector contains -q.
     workers : Workers, optional
-        Threads to share the work.
+        Threads that share the work.
     """
 
     def __init__(
@@ -252,7 +253,7 @@ class ElementProduct(StiffnessOperator):
         self._workers = workers or Workers()
         self.size = (2 if signed else 1) * count + 1
         share = -(-len(domains) // self._workers.count)
-        most = max(sum(places.size for _, places in groups) for groups in domains)
+        most = max(sum(indices.size for _, indices in groups) for groups in domains)
         scratches = [np.empty((2, most)) for _ in range(0, len(domains), share)]
         self._domains = [
             _Domain(groups, count, self.size, scratches[number // share])
@@ -260,36 +261,36 @@ class ElementProduct(StiffnessOperator):
         ]
         self._total = np.empty(count)
         self._pieces = pieces(count)
-        # A count is the faster sum of few forces, a sparse matrix that of many.
+        # np.bincount sums few forces faster, a sparse matrix many.
         self._small = len(self._domains) == 1
         if not self._small:
             for domain in self._domains:
                 domain.prepare_sums()
 
-    def each(self, extended: Floats, use: Callable[[int, Floats], R]) -> list[R]:
-        """Hand K u on, piece by piece."""
+    def each(self, padded: Floats, use: Callable[[int, Floats], R]) -> list[R]:
+        """Compute K u and apply a function to each piece."""
         count = self._count
         if self._signed:
-            np.negative(extended[:count], out=extended[count:-1])
-        total = self._sum(extended) if self._small else self._sum_of_domains(extended)
+            np.negative(padded[:count], out=padded[count:-1])
+        total = self._sum(padded) if self._small else self._sum_of_domains(padded)
         if len(self._pieces) == 1:
             return [use(0, total)]
         return [use(number, total[piece]) for number, piece in enumerate(self._pieces)]
 
-    def _sum(self, extended: Floats) -> Floats:
+    def _sum(self, padded: Floats) -> Floats:
         (domain,) = self._domains
-        domain.multiply(extended)
-        forces: Floats = np.bincount(domain.places, domain.forces, self.size)  # type: ignore[assignment]
+        domain.multiply(padded)
+        forces: Floats = np.bincount(domain.dof_indices, domain.forces, self.size)  # type: ignore[assignment]
         total = forces[: self._count]
         if self._signed:
             total -= forces[self._count : -1]
         return total
 
-    def _sum_of_domains(self, extended: Floats) -> Floats:
-        sums = self._workers.map(lambda domain: domain.sums(extended), self._domains)
+    def _sum_of_domains(self, padded: Floats) -> Floats:
+        sums = self._workers.map(lambda domain: domain.sums(padded), self._domains)
         self._total.fill(0.0)
         for domain, forces in zip(self._domains, sums, strict=True):
-            self._total[domain.rows] += forces
+            self._total[domain.equations] += forces
         return self._total
 
 
@@ -299,47 +300,47 @@ def stiffness_operator(
     reduced: SymmetryReduction | None = None,
     workers: Workers | None = None,
 ) -> StiffnessOperator:
-    """K u of a plate, by the way that suits the mesh.
+    """Build the operator K u of a plate.
 
     Parameters
     ----------
     plate : PlateModel
     solver : str
-        ``"csr"`` for the sparse matrix of all unknowns; otherwise element by element, where
-        elements that are congruent to enough others share a matrix.
+        One of `SOLVERS`: ``"csr"`` for the sparse matrix of all dofs; otherwise element by element,
+        with one matrix for elements that are congruent to enough others.
     reduced : SymmetryReduction, optional
-        What moves; every unknown without it.
+        The independent dofs; all of them by default.
     workers : Workers, optional
-        Threads to share the work.
+        Threads that share the work.
     """
     if solver == CSR:
         return CsrProduct(plate.stiffness)
-    kept = reduced or whole(plate)
+    kept = reduced or unreduced(plate)
     domains: list[list[Group]] = []
     for family in plate.families:
         weights = kept.weights[family.rows]
         members = np.flatnonzero(weights)
-        entries = len(members) * family.nodes.shape[1] * kept.unknowns_a_node
+        entries = len(members) * family.nodes.shape[1] * kept.dofs_per_node
         shares = 1 if entries <= BATCH else SHARES * -(-entries // (SHARES * BATCH))
         same = congruence(family)
-        # An element that is its own image counts once, where the others count twice.
+        # An element that is its own image counts once, the others twice.
         common = weights == weights.max()
         sizes = np.bincount(same.group[common], minlength=len(same.representatives))
         shared = sizes >= WORTH_GROUPING
         numbers = np.flatnonzero(shared)
         stiffness = plate.stiffness_of(family.take(same.representatives[numbers]))
         matrices = dict(zip(numbers.tolist(), weights.max() * stiffness, strict=True))
-        places = kept.slots[family.nodes].reshape(len(family.rows), -1)
+        dof_indices = kept.dof_indices[family.nodes].reshape(len(family.rows), -1)
         for share in np.array_split(members, shares):
             groups: list[Group] = []
             grouped = common[share] & shared[same.group[share]]
             for number in np.unique(same.group[share[grouped]]):
                 inside = share[grouped & (same.group[share] == number)]
-                groups.append((matrices[int(number)], places[inside]))
+                groups.append((matrices[int(number)], dof_indices[inside]))
             alone = share[~grouped]
             for start in range(0, len(alone), BLOCK):
                 rows = alone[start : start + BLOCK]
                 K = plate.stiffness_of(family.take(rows))
-                groups.append((weights[rows, None, None] * K, places[rows]))
+                groups.append((weights[rows, None, None] * K, dof_indices[rows]))
             domains.append(groups)
     return ElementProduct(domains, kept.count, signed=kept.signed, workers=workers)

@@ -43,7 +43,7 @@ from fecm.mechanics.projectile import (
 from fecm.mechanics.rod_integrators import STEPS, WILSON
 from fecm.mechanics.stiffness_product import CSR, Workers, available
 from fecm.mechanics.strains import StrainField
-from fecm.mechanics.symmetry import moving, symmetry_reduction
+from fecm.mechanics.symmetry import restrain_resting_dofs, symmetry_reduction
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.generate import generate, rod_diameters
 from fecm.problem.options import RunOptions
@@ -94,7 +94,7 @@ class Problem:
         """The plate with only the dofs free that the program moves."""
         if not moves_only(self.program):
             return self.plate
-        return moving(self.plate, self.impact_dof)
+        return restrain_resting_dofs(self.plate, self.impact_dof)
 
     @cached_property
     def critical_time_step(self) -> float:
@@ -254,7 +254,7 @@ def build_impact(
     """
     card = deck.require(ImpactCard)
     contact = ImpactConditions(
-        row=motion.row(card.node - 1, card.dof - 1),
+        equation=motion.equation(card.node - 1, card.dof - 1),
         velocity=card.velocity,
         plate_moves="target" not in slips,
         strains_start_moving="rod-start" in slips,
@@ -288,7 +288,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     only_moves = moves_only(problem.program)
     if slips & PLATE_SLIPS:
         plate = build_plate(deck, mesh, slips)
-        mobile = moving(plate, hit) if only_moves else plate
+        mobile = restrain_resting_dofs(plate, hit) if only_moves else plate
     else:
         plate, mobile = problem.plate, problem.moving_plate
     reduced = symmetry_reduction(mobile, hit) if only_moves and chosen.solver != CSR else None

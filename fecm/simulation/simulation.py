@@ -15,7 +15,6 @@ from fecm.deck.macros import number
 from fecm.deck.model import Material
 from fecm.deck.records import LoadTable, Macro, load_factor
 from fecm.deck.units import unit_names
-from fecm.mechanics.contact_law import VIRGIN
 from fecm.mechanics.impact import ImpactState
 from fecm.mechanics.natural_modes import modes
 from fecm.mechanics.plate import UnsoundPlateError
@@ -151,8 +150,7 @@ class Simulation:
         if self.impact is None or self.setup.impact is None or not self.plate.step:
             return
         memory, point = self.impact.memory, self.impact.contact
-        peak = point.indentation if memory.branch == VIRGIN else memory.peak
-        permanent = self.setup.impact.law.constants.permanent(max(peak, memory.peak))
+        permanent = self.setup.impact.law.permanent(memory, point)
         values = {
             "permanent_indentation": permanent,
             "unsettled_steps": self.impact.unconverged_steps,
@@ -379,10 +377,8 @@ class Simulation:
         if self._tangent is None or self._residual is None:
             return
         change = self._tangent.solve(self._residual)
-        displacement = self.plate.displacement
-        displacement += change
-        self.setup.motion.refresh(self.plate)
-        size = float(np.linalg.norm(displacement))
+        self.setup.motion.displace(self.plate, change)
+        size = float(np.linalg.norm(self.plate.displacement))
         self._settled = float(np.linalg.norm(change)) <= self.tolerance * size
 
     def set_tolerance(self, n: float, current: int) -> None:

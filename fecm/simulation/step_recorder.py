@@ -13,7 +13,7 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.mechanics.impact import ImpactState
-from fecm.mechanics.plate_motion import DivergenceError, PlateState, Watch
+from fecm.mechanics.plate_motion import DivergenceError, DofSums, PlateState
 from fecm.mechanics.projectile import Rod
 from fecm.problem.build import ImpactModel
 from fecm.results.schema import DATASETS
@@ -71,10 +71,10 @@ class StepRecorder:
         self._rod = np.empty((0, 3, 0))
         if impact is not None:
             self._rod = np.empty((BLOCK, 3, len(impact.rod_mass)))
-        self._gages: Watch | None = None
+        self._gages: DofSums | None = None
         self._strains = np.empty((0, 0))
         if setup.gages is not None:
-            self._gages = setup.motion.watch(setup.gages.places, setup.gages.weights)
+            self._gages = setup.motion.dof_sums(setup.gages.dof_indices, setup.gages.weights)
             self._strains = np.empty((BLOCK, len(setup.gages.numbers)))
         self.initial = 0.0
 
@@ -112,7 +112,7 @@ class StepRecorder:
         strain = plate.strain_energy
         own = (plate.step, plate.time, kinetic, strain, plate.external_work)
         if self._gages is not None:
-            self._strains[len(self._rows)] = self._gages.read(plate, factor)
+            self._strains[len(self._rows)] = self._gages.evaluate(plate, factor)
         if impact is None:
             self._rows.append((*own, 0.0, 0.0, 0.0, 0.0, 0.0))
         else:

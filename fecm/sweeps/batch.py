@@ -145,11 +145,11 @@ def _together(numbers: list[int], decks: list[Deck], checked: Problem) -> Outcom
     kind = np.array([kinds[projectiles[case]] for case in order], dtype=np.intp)
     require(ADVANCED * steps * len(decks), f"{len(decks)} cases of {steps} steps")
     with np.errstate(all="ignore"):
-        response = plate_response(setup.motion, setup.impact.contact.row, dt, steps)
+        response = plate_response(setup.motion, setup.impact.contact.equation, dt, steps)
         rods = [WilsonStep(rod.stiffness(), rod.mass(), dt) for rod in kinds]
         law = HystereticLaw(stacked([build_law(decks[case]).constants for case in order]))
         speed = np.array([decks[case].require(Impact).velocity for case in order])
-        node_mass = float(setup.motion.mass[setup.impact.contact.row])
+        node_mass = float(setup.motion.mass[setup.impact.contact.equation])
         tips = TipSteps(rods, kind, steps)
         found = impacts(response, tips, law, speed, node_mass)
         times = np.add.accumulate(np.full(steps, dt))

@@ -27,15 +27,15 @@ BLOCK = 64
 SMALL = BLOCK**3
 
 
-def plate_response(motion: PlateMotion, row: int, dt: float, steps: int) -> Floats:
-    """Displacement of one unknown after 1 to `steps` steps, the first under a unit force on it.
+def plate_response(motion: PlateMotion, equation: int, dt: float, steps: int) -> Floats:
+    """Displacement of one dof after 1 to `steps` steps, the first under a unit force on it.
 
     Parameters
     ----------
     motion : PlateMotion
         A plate without nodal loads.
-    row : int
-        Place of the unknown among those that move.
+    equation : int
+        Equation of the dof, from 0.
     dt : float
         Time step.
     steps : int
@@ -48,8 +48,8 @@ def plate_response(motion: PlateMotion, row: int, dt: float, steps: int) -> Floa
     state = motion.start()
     response = np.empty(steps)
     for step in range(steps):
-        motion.advance(state, dt, 0.0, PointForce(row, 1.0) if step == 0 else None)
-        response[step] = state.extended[row]
+        motion.advance(state, dt, 0.0, PointForce(equation, 1.0) if step == 0 else None)
+        response[step] = state.displacement_at(equation)
     return response
 
 
