@@ -11,12 +11,14 @@ import pytest
 from fecm import _memory
 from fecm._memory import NotEnoughMemoryError
 from fecm.api import load_deck
-from fecm.deck import Finding, reader
-from fecm.deck.card import parse_integer
+from fecm.deck import Finding, reader, segments
+from fecm.deck.card import Card, parse_integer
 from fecm.deck.findings import MOST, Findings
 from fecm.deck.layup import LayupError, parse_layup
 from fecm.deck.macros import estimate_work
 from fecm.deck.reader import MOST_PROBLEMS, load_text
+from fecm.mechanics.mesh import Ints
+from fecm.problem import check_impact, generate
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, MESH, OWN_FINDINGS, PROGRAM, small
 
@@ -114,6 +116,69 @@ def test_counting_errors_does_not_take_longer_with_their_number() -> None:
         findings.add("E101", "This is no number.")
     assert findings.error_count == 3 * MOST
     assert findings.closed
+
+
+# Cost ------------------------------------------------------------------------------------------
+
+
+def test_blank_lines_between_segments_make_no_cards(monkeypatch: pytest.MonkeyPatch) -> None:
+    cards = 0
+
+    def counted(line: int, text: str) -> Card:
+        nonlocal cards
+        cards += 1
+        return Card(line, text)
+
+    monkeypatch.setattr(segments, "Card", counted)
+    made = []
+    for blanks in (0, 5000):
+        cards = 0
+        assert codes(small().replace("MATE", "\n" * blanks + "MATE")) == []
+        made.append(cards)
+    assert made[0] == made[1] > 0
+
+
+@pytest.mark.parametrize(
+    ("keyword", "pair"),
+    [
+        ("COOR", "1,1,0.,0.\n9000,1,1.,1.\n"),
+        ("FORC", "1,1,0.,0.\n9000,1,1.,1.\n"),
+        ("BOUN", "1,1,-1\n9000,1,-1\n"),
+    ],
+)
+def test_cards_that_generate_the_same_nodes_again_and_again_are_refused(
+    keyword: str, pair: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run, nodes = generate._run, 0
+
+    def counted(start: int, end: int, increment: int) -> Ints:
+        nonlocal nodes
+        numbers = run(start, end, increment)
+        nodes += len(numbers)
+        return numbers
+
+    monkeypatch.setattr(generate, "_run", counted)
+    text = f"FECM\n9000,1,1,2,5,3\n{keyword}\n{pair * 500}\nEND\nMACR\nEND\nSTOP\n"
+    assert "E012" in codes(text)
+    assert 5 * 9000 < nodes <= 10 * 9000 + 10_000
+
+
+def test_a_coor_segment_for_every_few_bytes_is_refused() -> None:
+    text = "FECM\n9000,1,1,2,5,3\n" + "COOR\n\n" * 50 + "END\nMACR\nEND\nSTOP\n"
+    assert "E012" in codes(text)
+
+
+def test_too_many_segments_layers_and_gages_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    prints = small(data=DATA_CARDS + "PRIN\nNOPR\n")
+    gages = small(data=DATA_CARDS + "GAGE\n1,1.,1.\n2,1.,1.\n\n")
+    assert codes(prints) == codes(gages) == []
+    monkeypatch.setattr(check_impact, "MOST_GAGES", 1)
+    assert codes(gages) == ["E012"]
+    monkeypatch.setattr(reader, "MOST_LAYERS", 1)
+    assert codes(small()) == ["E201"]
+    monkeypatch.setattr(reader, "MOST_LAYERS", 2)
+    monkeypatch.setattr(reader, "MOST_SEGMENTS", 7)
+    assert codes(prints) == ["E012"]
 
 
 # Programs ----------------------------------------------------------------------------------------

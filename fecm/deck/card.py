@@ -6,6 +6,7 @@ values separated by commas, in the same order; everything from ``!`` on is a com
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 import sys
@@ -156,20 +157,29 @@ def layout(*descriptors: str) -> Fields:
 
 @dataclass(frozen=True, slots=True)
 class Card:
-    """One line of a deck: its number in the file and its text as it stands there."""
+    """One line of a deck.
+
+    Attributes
+    ----------
+    line : int
+        Line number in the file, from 1.
+    text : str
+        The line as written.
+    data : str
+        The text without its comment and trailing blanks.
+    """
 
     line: int
     text: str
+    data: str = dataclasses.field(init=False, compare=False, repr=False)
 
-    @property
-    def data(self) -> str:
-        """The text without its comment."""
-        return self.text.partition("!")[0].rstrip()
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "data", self.text.partition("!")[0].rstrip())
 
     @property
     def is_blank(self) -> bool:
         """Whether every field of the card is blank."""
-        return not self.data.replace(",", "").strip()
+        return not self.data or not self.data.replace(",", "").strip()
 
     @property
     def is_keyword(self) -> bool:

@@ -20,11 +20,13 @@ from fecm.deck.segments import READERS, SegmentReader, Stream
 MACROS = "MACR"
 END = "END"
 
-# What a card's count may be at the most: beyond it a deck is a slip of the pen.
+# Largest number of nodes or elements, and of layers; anything beyond is certainly a typo.
 MOST = 1_000_000
+MOST_LAYERS = 10_000
 
-# Problems of a file, and cards of a macro program, that are read.
+# Largest number of problems and segments of a file, and of cards of a macro program.
 MOST_PROBLEMS = 1000
+MOST_SEGMENTS = 20_000
 MOST_MACRO_CARDS = 100_000
 
 # Bytes of a file that no such deck needs.
@@ -74,6 +76,7 @@ class Reader:
     ) -> None:
         self.stream = Stream(text, blanks_are_zeros=blanks_are_zeros, keeps_values=keeps_values)
         self._unsound: set[str] = set()
+        self._segments = 0
         self._counted = {"NUMNP": 0, "NUMEL": 0}
 
     @property
@@ -85,9 +88,7 @@ class Reader:
         """Read every problem of the file."""
         problems: list[ParsedProblem] = []
         stopped = False
-        while (card := self.stream.take()) is not None:
-            if card.is_blank:
-                continue
+        while (card := self.stream.take_filled()) is not None:
             if card.keyword == STOP:
                 stopped = True
                 break
@@ -171,7 +172,7 @@ class Reader:
         for name, value, least, most, hint in (
             ("NUMNP", control.numnp, 1, MOST, ""),
             ("NUMEL", control.numel, 1, MOST, ""),
-            ("LAYER", control.layers, 1, MOST, ""),
+            ("LAYER", control.layers, 1, MOST_LAYERS, ""),
             ("NDM", control.ndm, 2, 2, "the plate lies in 2 dimensions"),
             ("NDF", control.ndf, 5, 5, f"a node has the unknowns {', '.join(DOF_NAMES)}"),
             ("NEN", control.nen, low, high, "nodes an element"),
@@ -206,10 +207,8 @@ class Reader:
         reader = None if control is None else SegmentReader(self.stream, control)
         if reader is not None:
             self._unsound = reader.unsound
-        while (card := self.stream.take()) is not None:
+        while (card := self.stream.take_filled()) is not None:
             keyword = card.keyword
-            if card.is_blank:
-                continue
             if keyword == END:
                 return segments
             if keyword in (MACROS, STOP, TITLE):
@@ -224,8 +223,12 @@ class Reader:
                     self.stream.skip_data()
             elif reader is None:
                 self.stream.skip_data()  # without counts the data can't be told apart
-            elif (segment := reader.read(card)) is not None:
-                segments.append(segment)
+            elif self._segments == MOST_SEGMENTS:
+                self._end(f"The file has more than {MOST_SEGMENTS} segments.", card)
+            else:
+                self._segments += 1
+                if (segment := reader.read(card)) is not None:
+                    segments.append(segment)
         self.findings.add("E004", "The mesh data are not ended by END.", title.place)
         return segments
 
@@ -262,9 +265,7 @@ class Reader:
 
     def _program(self, title: Card) -> list[Macro]:
         """Read the macro program from its MACR card to its END."""
-        while (card := self.stream.take()) is not None:
-            if card.is_blank:
-                continue
+        while (card := self.stream.take_filled()) is not None:
             if card.keyword == MACROS:
                 return self._macros(card)
             if card.keyword in (TITLE, STOP):
@@ -288,9 +289,7 @@ class Reader:
     def _macros(self, head: Card) -> list[Macro]:
         macros: list[Macro] = []
         card: Card | None = head
-        while (card := self.stream.take()) is not None:
-            if card.is_blank:
-                continue
+        while (card := self.stream.take_filled()) is not None:
             if card.keyword == END:
                 return macros
             if card.keyword in (STOP, TITLE):

@@ -96,6 +96,14 @@ class Stream:
                 return Card(self.position, line)
         return None
 
+    def take_filled(self) -> Card | None:
+        """The next card that is not blank, or None as in :meth:`take`."""
+        while self.position < len(self.lines) and not self.lines[self.position].strip():
+            self.position += 1
+        while (card := self.take()) is not None and card.is_blank:
+            pass
+        return card
+
     def give_back(self) -> None:
         """Let the last card be taken again."""
         self.position -= 1

@@ -21,6 +21,8 @@ from fecm.problem.generate import rod_diameters
 W = 3
 # A rod's step is a full matrix of three times as many rows and columns as it has unknowns.
 MOST_ROD_ELEMENTS = 500
+# Each gage is compared with every element.
+MOST_GAGES, MOST_GAGE_PAIRS = 10_000, 10**8
 # Elements per bending wave of the contact's duration: the minimum, and enough for a peak.
 LEAST_PER_WAVE, ENOUGH_PER_WAVE = 4, 8
 # Mesh error of the peak that is warned of, and the largest that is estimated.
@@ -151,6 +153,15 @@ def _is_computable(projectile: Projectile, diameters: NDArray[np.float64]) -> bo
 
 def check_gages(segment: Gages, mesh: Mesh, deck: Deck, findings: Findings) -> None:
     """Check a GAGE segment on a sound mesh."""
+    count = len(segment.records)
+    if count > MOST_GAGES or count * len(mesh.elements) > MOST_GAGE_PAIRS:
+        findings.add(
+            "E012",
+            f"{count} gages on {len(mesh.elements)} elements are too many: at most {MOST_GAGES} "
+            f"gages and {MOST_GAGE_PAIRS:.0e} pairs of gage and element are allowed.",
+            segment.place(),
+        )
+        return
     families = element_groups.element_blocks(mesh.elements, mesh.coordinates)
     seen: set[int] = set()
     for record in segment.records:

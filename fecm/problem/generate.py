@@ -14,6 +14,34 @@ from fecm.deck.model import Boundary, Coordinates, Deck, Elements, Forces, Impac
 from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
 from fecm.mechanics.mesh import Ints, Mesh, equation_numbers
 
+# Nodes that cards may generate or reset, per node of the deck and besides.
+GENERATED_PER_NODE, GENERATED = 10, 10_000
+
+
+class _Budget:
+    """Limit of the nodes that the cards of a deck generate, with repetitions.
+
+    Without it the cost would grow with the product of cards and nodes.
+    """
+
+    def __init__(self, nodes: int, findings: Findings) -> None:
+        self._limit = self._left = GENERATED_PER_NODE * nodes + GENERATED
+        self._findings = findings
+
+    def covers(self, count: int, place: Place | None) -> bool:
+        """Take `count` nodes off the budget; report the first card that exceeds it."""
+        exceeded = self._left < 0
+        self._left -= count
+        if self._left < 0 and not exceeded:
+            self._findings.add(
+                "E012",
+                f"The cards up to this one generate more than {self._limit} nodes, counted with "
+                "repetitions.",
+                place,
+                "generate each node once",
+            )
+        return self._left >= 0
+
 
 def generate(deck: Deck, findings: Findings | None = None, *, unit_force: bool = False) -> Mesh:
     """Generate nodes, elements, restraints and forces as the listing's GENVEC and PMESH do.
@@ -40,12 +68,15 @@ def generate(deck: Deck, findings: Findings | None = None, *, unit_force: bool =
     boundaries = [segment for segment in deck.segments if isinstance(segment, Boundary)]
     codes = restraint_codes(boundaries, control.numnp, control.ndf, noted)
     forces = np.zeros((control.numnp, control.ndf))
+    budget = _Budget(control.numnp, noted)
     for segment in deck.segments:
         if isinstance(segment, Coordinates):
-            coordinates[:] = np.nan  # a second COOR starts anew, as in the listing
-            _interpolate(coordinates, segment.records, noted)
+            if not budget.covers(control.numnp, segment.place()):
+                break
+            coordinates[:] = np.nan  # a second COOR replaces the first, as in the listing
+            _interpolate(coordinates, segment.records, noted, budget)
         elif isinstance(segment, Forces):
-            _interpolate(forces, segment.records, noted)
+            _interpolate(forces, segment.records, noted, budget)
         elif isinstance(segment, Impact) and unit_force:
             forces[segment.node - 1, segment.dof - 1] = 1.0
         elif isinstance(segment, Elements):
@@ -71,8 +102,10 @@ def restraint_codes(
     ndarray (nodes, unknowns)
     """
     codes = np.zeros((nodes, unknowns), dtype=np.int32)
+    noted = Findings() if findings is None else findings
+    budget = _Budget(nodes, noted)
     for segment in boundaries:
-        _carry(codes, segment.records, Findings() if findings is None else findings)
+        _carry(codes, segment.records, noted, budget)
     return codes
 
 
@@ -110,7 +143,7 @@ def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floa
             )
         else:
             known.append(NodeValues(record.element, record.increment, (record.diameter,)))
-    _interpolate(values, known, noted)
+    _interpolate(values, known, noted, _Budget(segment.elements, noted))
     return values[:, 0]
 
 
@@ -137,13 +170,20 @@ def _existing(
     return [record for record in records if 1 <= number(record) <= count]
 
 
+def _steps(first: NodeValues | NodeCodes, last: NodeValues | NodeCodes) -> int:
+    """Number of nodes from one card up to the next."""
+    return -(-abs(last.node - first.node) // abs(first.increment))
+
+
 def _run(start: int, end: int, increment: int) -> Ints:
     """Node numbers from `start` towards `end`, `end` left out, at steps of `increment`."""
     step = abs(increment) if end >= start else -abs(increment)
     return np.arange(start, end, step, dtype=np.int32)
 
 
-def _interpolate(values: Floats, records: Sequence[NodeValues], findings: Findings) -> None:
+def _interpolate(
+    values: Floats, records: Sequence[NodeValues], findings: Findings, budget: _Budget
+) -> None:
     """Fill rows between two cards linearly, adding one constant step at a time (GENVEC)."""
     last: NodeValues | None = None
     for record in _existing(records, "node", len(values), "E301", findings):
@@ -156,6 +196,8 @@ def _interpolate(values: Floats, records: Sequence[NodeValues], findings: Findin
                     record.place("node"),
                     "a generation increment stands on the card before",
                 )
+            elif not budget.covers(_steps(last, record), record.place("node")):
+                return
             else:
                 run = _run(last.node, record.node, last.increment) - 1
                 if len(run) > 1:
@@ -167,7 +209,7 @@ def _interpolate(values: Floats, records: Sequence[NodeValues], findings: Findin
         last = record
 
 
-def _carry(codes: Ints, records: Sequence[NodeCodes], findings: Findings) -> None:
+def _carry(codes: Ints, records: Sequence[NodeCodes], findings: Findings, budget: _Budget) -> None:
     """Set restraint codes; negative ones carry on through generated nodes (PMESH)."""
     last: NodeCodes | None = None
     for record in _existing(records, "node", len(codes), "E301", findings):
@@ -177,6 +219,8 @@ def _carry(codes: Ints, records: Sequence[NodeCodes], findings: Findings) -> Non
             before = codes[last.node - 1]
             row[(row == 0) & (before < 0)] = -1
             if last.increment != 0 and record.node != last.node:
+                if not budget.covers(_steps(last, record), record.place("node")):
+                    return
                 run = _run(last.node, record.node, last.increment) - 1
                 carried = np.logical_or.accumulate(codes[run] < 0, axis=0)[:-1]
                 codes[run[1:]] = np.where(carried, -1, codes[run[1:]])
