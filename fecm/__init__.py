@@ -11,6 +11,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from fecm._errors import FecmError
 from fecm._version import __version__
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = [
     "DeckError",
     "DivergenceError",
+    "FecmError",
     "Result",
     "SweepResult",
     "__version__",

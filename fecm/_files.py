@@ -16,6 +16,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from fecm._errors import FecmError
+
 # Windows has neither.
 NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
 NO_WAIT = getattr(os, "O_NONBLOCK", 0)
@@ -27,7 +29,7 @@ NO_LINKS = {errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EM
 ATTEMPTS = 10
 
 
-class OutputError(OSError):
+class OutputError(FecmError, OSError):
     """An output can't be written where it was asked for; the message says why."""
 
 

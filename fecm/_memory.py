@@ -7,6 +7,8 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+from fecm._errors import FecmError
+
 MEMINFO = Path("/proc/meminfo")
 CGROUP = Path("/proc/self/cgroup")
 CGROUPS = Path("/sys/fs/cgroup")
@@ -16,7 +18,7 @@ CGROUPS = Path("/sys/fs/cgroup")
 UNNOTICED = 100_000_000
 
 
-class NotEnoughMemoryError(MemoryError):
+class NotEnoughMemoryError(FecmError, MemoryError):
     """Something takes more memory than is free; the message says how much."""
 
 

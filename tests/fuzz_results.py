@@ -235,9 +235,9 @@ def examine(sound: Path, folder: Path, seed: int, commands: Sequence[str], tally
         tally.longest = max(tally.longest, time.monotonic() - begin)
         told = err.read_text()
         tally.ended[f"{command} {status}"] += 1
-        for mark in ("did not come back", "broke off (", "takes more memory", "was killed"):
+        for mark in ("did not return", "crashed (", "takes more memory", "was killed"):
             if mark in told:
-                name = told.partition("broke off (")[2].partition(")")[0] if "(" in mark else mark
+                name = told.partition("crashed (")[2].partition(")")[0] if "(" in mark else mark
                 tally.limits[name] += 1
         if wrong := judge(command, status, out.read_text(), told):
             tally.broken.append(f"seed {seed} ({kind}), {command}: {wrong}")

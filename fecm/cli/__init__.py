@@ -1,46 +1,102 @@
 """The command line: ``fecm COMMAND``.
 
-Results go to standard output, everything else to standard error.  Exit status: 0 done, 1 the answer
-is no, 2 unusable input or call, 130 and 143 after SIGINT and SIGTERM.  Heavy modules are imported
-by the command that needs them.
+Results go to standard output, everything else to standard error.  Exit status: 0 success, 1 a
+failed check, 2 unusable input or call, 130 and 143 after SIGINT and SIGTERM.  A command's module is
+imported when the command is called.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
 from typing import NoReturn
 
 import click
+from click.shell_completion import CompletionItem
 
-from fecm._memory import NotEnoughMemoryError
+from fecm._errors import FecmError
 from fecm._version import __version__
 from fecm.cli import isolation, streams
 from fecm.cli.common import INTERRUPTED, SIGNALLED, UNUSABLE, echo, signals
-from fecm.cli.decks import check, fmt, materials, new
-from fecm.cli.diff import diff
-from fecm.cli.export import export, tapes
-from fecm.cli.indent import indent
-from fecm.cli.info import info
-from fecm.cli.plot import plot
-from fecm.cli.rod import rod
-from fecm.cli.run import run
-from fecm.cli.sweep import sweep
-from fecm.cli.verify import verify
-from fecm.cli.waves import waves
-from fecm.results.schema import ResultFileError, printable
+from fecm.results.schema import printable
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@dataclass(frozen=True)
+class LazyCommand:
+    """A command that is imported when it is called.
+
+    Attributes
+    ----------
+    module : str
+        Module of the command, which has the command's name there.
+    summary : str
+        Its line in ``fecm --help``.
+    isolated : bool
+        Whether it reads result files and runs in a child process.
+    """
+
+    module: str
+    summary: str
+    isolated: bool = False
+
+
+COMMANDS = {
+    "check": LazyCommand("fecm.cli.decks", "Check DECK without running it, and summarise it."),
+    "diff": LazyCommand("fecm.cli.diff", "Compare two results dataset by dataset.", True),
+    "export": LazyCommand("fecm.cli.export", "Write RESULT for ParaView or a spreadsheet.", True),
+    "fmt": LazyCommand("fecm.cli.decks", "Align the columns of DECK."),
+    "indent": LazyCommand("fecm.cli.indent", "Indentation tests and the law of contact."),
+    "info": LazyCommand("fecm.cli.info", "Show what is in RESULT.", True),
+    "materials": LazyCommand("fecm.cli.decks", "List the named plies of `fecm new`."),
+    "new": LazyCommand("fecm.cli.decks", "Write a deck from plate, layup, supports and impact."),
+    "plot": LazyCommand("fecm.cli.plot", "Draw the report's figures, or the map of a sweep.", True),
+    "rod": LazyCommand("fecm.cli.rod", "The projectile's rod alone: pulses and calibration."),
+    "run": LazyCommand("fecm.cli.run", "Run every problem in DECK and write its result."),
+    "sweep": LazyCommand("fecm.cli.sweep", "Run DECK many times with other values."),
+    "tapes": LazyCommand("fecm.cli.export", "Write tape3, tape8 and tape9 as text.", True),
+    "verify": LazyCommand("fecm.cli.verify", "Compare fecm with closed forms and known figures."),
+    "waves": LazyCommand("fecm.cli.waves", "Waves in a laminate."),
+}
+
+
+class LazyGroup(click.Group):
+    """A group that imports the command that is called, and no other."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of the commands, sorted."""
+        return sorted(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a command; an isolated one in a child process."""
+        if (command := COMMANDS.get(cmd_name)) is None:
+            return None
+        if command.isolated and not ctx.resilient_parsing:
+            isolation.fork()
+        found: click.Command = getattr(import_module(command.module), cmd_name)
+        return found
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the commands with their summaries."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, COMMANDS[name].summary) for name in sorted(COMMANDS)])
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Complete the name of a command or an option."""
+        names = [name for name in sorted(COMMANDS) if name.startswith(incomplete)]
+        return [
+            *(CompletionItem(name, help=COMMANDS[name].summary) for name in names),
+            *click.Command.shell_complete(self, ctx, incomplete),
+        ]
+
+
+@click.group(
+    cls=LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
 @click.version_option(__version__, prog_name="fecm")
 def cli() -> None:
     """Impact on laminated composite plates, from the punched-card decks of NASA CR-168057."""
-
-
-for _command in (
-    run, check, new, fmt, materials, info, tapes, diff, export, plot, waves, indent, rod, sweep,
-    verify,
-):  # fmt: skip
-    cli.add_command(_command)
 
 
 def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoReturn:
@@ -58,7 +114,7 @@ def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoR
 
 
 def _status(arguments: Sequence[str] | None, prog_name: str) -> int:
-    """Carry out a command; its exit status."""
+    """Run a command; return its exit status."""
     try:
         cli.main(arguments, prog_name=prog_name, standalone_mode=False)
     except SystemExit as left:
@@ -69,21 +125,21 @@ def _status(arguments: Sequence[str] | None, prog_name: str) -> int:
     except (KeyboardInterrupt, click.Abort):
         echo("fecm: interrupted", err=True)
         return INTERRUPTED
-    except (OSError, MemoryError, ImportError, ResultFileError) as error:
+    except (FecmError, OSError, MemoryError, ImportError) as error:
         if error is not streams.failure():
-            echo(f"fecm: error: {_told(error)}", err=True)
-        return UNUSABLE
+            echo(f"fecm: error: {_message(error)}", err=True)
+        return error.exit_code if isinstance(error, FecmError) else UNUSABLE
     return 0
 
 
-def _told(error: Exception) -> str:
-    """One line about an error of the operating system, or of a file."""
-    if isinstance(error, MemoryError) and not isinstance(error, NotEnoughMemoryError):
-        return "there is not enough memory"
+def _message(error: Exception) -> str:
+    """One line about an error of the package, of a file or of the system."""
     if isinstance(error, OSError) and error.strerror:
-        name = error.filename2 or error.filename  # of a renaming its target
-        told = error.strerror if isinstance(name, int) or not name else f"{name}: {error.strerror}"
-        return printable(told)
+        name = error.filename2 or error.filename  # the target of a rename
+        named = name and not isinstance(name, int)
+        return printable(f"{name}: {error.strerror}" if named else error.strerror)
+    if isinstance(error, MemoryError) and not isinstance(error, FecmError):
+        return "there is not enough memory"
     if isinstance(error, ImportError):
         while isinstance(error.__cause__, ImportError):  # NumPy wraps the error in advice
             error = error.__cause__

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import click
 
+from fecm._errors import FecmError
 from fecm._files import beside
 from fecm.problem.slips import MODES, REPORT
 from fecm.results.schema import printable
@@ -47,22 +48,16 @@ FORMAT_OPTION = click.option(
     type=click.Choice(["text", "json"]),
     default="text",
     show_default=True,
-    help="For persons, or for programs.",
+    help="Text for people, or JSON for programs.",
 )
 
 
-class Refused(click.ClickException):
+class RefusedError(FecmError):
     """The input or the call can't be used."""
 
-    exit_code = UNUSABLE
 
-    def show(self, file: object = None) -> None:
-        """Print the message on standard error."""
-        echo(f"fecm: error: {printable(self.message)}", err=True)
-
-
-class CheckFailed(Refused):
-    """Everything was understood, and the answer is no."""
+class CheckFailedError(FecmError):
+    """The input was understood, and the check failed."""
 
     exit_code = NO
 

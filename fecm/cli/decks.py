@@ -13,8 +13,8 @@ from fecm.cli.common import (
     DECK_PATH,
     FORMAT_OPTION,
     MODE_OPTION,
-    CheckFailed,
-    Refused,
+    CheckFailedError,
+    RefusedError,
     count_errors,
     echo,
     echo_file,
@@ -50,7 +50,7 @@ def check(deck: Path, mode: str, form: str) -> None:
         for view in views:
             echo("\n".join(view.lines()))
     if errors:
-        raise CheckFailed(count_errors(errors))
+        raise CheckFailedError(count_errors(errors))
 
 
 @click.command(short_help="Align the columns of DECK.")
@@ -78,10 +78,10 @@ def fmt(deck: Path, output: Path | None, only_check: bool, overwrite: bool) -> N
         after = format_deck(before, str(deck))
     except DeckError as error:
         echo(error, err=True)
-        raise Refused("the deck can't be read; nothing was written") from None
+        raise RefusedError("the deck can't be read; nothing was written") from None
     if only_check:
         if after != before:
-            raise CheckFailed(f"{deck} would change")
+            raise CheckFailedError(f"{deck} would change")
     elif str(target) == "-":
         echo_file(after)
     else:
@@ -148,7 +148,7 @@ def new(output: Path, overwrite: bool, **options: Any) -> None:
     if errors := prepared.errors():
         for finding in errors:
             echo(finding.render("the new deck"), err=True)
-        raise Refused("these options make no sound deck; nothing was written")
+        raise RefusedError("these options make no sound deck; nothing was written")
     for note in notes:
         echo(f"fecm: note: {note}", err=True)
     source = "the new deck" if str(output) == "-" else str(output)

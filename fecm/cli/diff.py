@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, Refused
+from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, RefusedError
 from fecm.cli.isolation import reads
 from fecm.results.schema import jsonable, printable, told_apart
 
@@ -24,7 +24,7 @@ def _tolerance(_: click.Context, option: click.Parameter, value: str) -> float:
     except ValueError:
         number = math.nan
     if not 0.0 <= number < math.inf:
-        raise Refused(f"{option.opts[0]}: `{printable(value)}` is no number from 0 on")
+        raise RefusedError(f"{option.opts[0]}: `{printable(value)}` is no number from 0 on")
     return number
 
 
@@ -68,7 +68,7 @@ def diff(
         with opened(a) as left, opened(b) as right:
             found = difference(left, right, Tolerance(rtol, atol), only)
     except IncomparableError as error:
-        raise Refused(printable(str(error))) from None
+        raise RefusedError(printable(str(error))) from None
     if form == "json":
         head = {"a": printable(str(a)), "b": printable(str(b)), "rtol": rtol, "atol": atol}
         click.echo(json.dumps(jsonable(_json(found, head, brief))))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from fecm._files import check_outputs
-from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, echo, writing
+from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, writing
 from fecm.cli.isolation import reads
 from fecm.cli.outputs import STANDARD_OUTPUT
 
@@ -32,7 +32,7 @@ def tapes(result: Path, directory: Path, overwrite: bool) -> None:
     if directory.is_dir():
         check_outputs([directory / name for name in tape_texts(loaded)], overwrite, [result])
     elif directory.exists():
-        raise Refused(f"{directory} is not a folder")
+        raise RefusedError(f"{directory} is not a folder")
     for path in write_tapes(loaded, directory, overwrite=overwrite):
         echo(path)
 
@@ -77,7 +77,7 @@ def export(
         else:
             _write_table(contents, name, path, overwrite=overwrite)
     except ExportError as error:
-        raise Refused(f"{result}: {error}") from None
+        raise RefusedError(f"{result}: {error}") from None
     if path != STANDARD_OUTPUT:
         echo(path)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fecm.cli.common import DECK_PATH, FORMAT_OPTION, Refused
+from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError
 from fecm.cli.indent_curve import curve
 from fecm.cli.outputs import OVERWRITE, PLOT, STANDARD_OUTPUT, OutputPaths
 from fecm.cli.types import POSITIVE, Finite
@@ -81,9 +81,9 @@ def fit(
         read = read_test(test, chosen or (), pair)
         found = fitted(read.indentation, read.force, retreat=turn, q=q, acr=acr)
     except TableError as error:
-        raise Refused(str(error)) from None
+        raise RefusedError(str(error)) from None
     except NoTestError as error:
-        raise Refused(f"{test}: {error}") from None
+        raise RefusedError(f"{test}: {error}") from None
 
     def draw() -> Picture:
         from fecm.plot.indentation import fit_picture

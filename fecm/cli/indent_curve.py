@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fecm.cli.common import DECK_PATH, Refused
+from fecm.cli.common import DECK_PATH, RefusedError
 from fecm.cli.outputs import OUTPUT, OVERWRITE, PLOT, OutputPaths
 from fecm.cli.types import POSITIVE
 
@@ -44,9 +44,9 @@ def _law(deck: Path) -> tuple[Deck, Indentation]:
     for finding in reader.findings:
         click.echo(finding.render(str(deck)), err=True)
     if reader.findings.errors:
-        raise Refused(f"{deck} has errors")
+        raise RefusedError(f"{deck} has errors")
     if not laws:
-        raise Refused(f"{deck} has no EXPE segment, and so no indentation law")
+        raise RefusedError(f"{deck} has no EXPE segment, and so no indentation law")
     return laws[0]
 
 
@@ -122,7 +122,7 @@ def _forces(
     except OverflowError:
         walk = []
     if not walk or not all(math.isfinite(point.force) for point, _ in walk):
-        raise Refused("--path leads to forces beyond the range of numbers")
+        raise RefusedError("--path leads to forces beyond the range of numbers")
     names = ("loading", "unloading", "reloading")
     rows: list[Sequence[float | str]] = [("indentation", "force", "branch")]
     rows += [(point.indentation, point.force, names[branch]) for point, branch in walk]
@@ -161,7 +161,7 @@ def _rigidities(
     critical = YangSunPermanent(card.k, _alpha_cr(problem, own, alpha_cr))
     slope = LinearPermanent(card.k, alpha_p, s_p, own.q if q is None else q)
     if slope.q != ACR_POWER and draws:
-        raise Refused(
+        raise RefusedError(
             f"s of 3-9 is force/length^{slope.q:g} here, that of 3-7 force/length^2.5: they can't "
             "share axes; --q 2.5 makes them comparable"
         )
@@ -177,7 +177,7 @@ def _rigidities(
     with np.errstate(all="ignore"):
         by = [np.asarray(relation.rigidity(peaks)) for relation in (slope, critical)]
     if not np.all(np.isfinite(by)):
-        raise Refused("--path leads to rigidities beyond the range of numbers")
+        raise RefusedError("--path leads to rigidities beyond the range of numbers")
     rows: list[Sequence[float | str]] = [("alpha_m", "s_3_9", "s_3_7")]
     rows += list(zip(peaks, *by, strict=True))
 
@@ -198,7 +198,9 @@ def _report_length(deck: Deck, value: float, what: str, option: str) -> float:
     name = unit_names(deck).get("length", "in")
     system = {names[0]: key for key, (names, _) in SYSTEMS.items()}.get(name)
     if system is None:
-        raise Refused(f"the report's {what} is in inches and the deck's in {name}: give {option}")
+        raise RefusedError(
+            f"the report's {what} is in inches and the deck's in {name}: give {option}"
+        )
     click.echo(f"fecm: note: {what} is the report's {value:g} in; {option} gives another", err=True)
     return value * (1.0 if system == SYSTEM else lengths(system))
 

@@ -1,24 +1,20 @@
-"""Commands that read result files are carried out in a child process.
+"""Commands that read result files run in a child process.
 
-HDF5 can fall over a damaged file, or never come back from it.  The program forks before it has
-imported anything heavy; the child is the command, under limits, and the parent waits for it and
-hands on its exit status.  A child that a signal ends, or that takes too much, becomes one line.
+HDF5 can crash on a damaged file, or never return from it.  The program forks before it imports
+anything heavy; the child is the command, under limits, and the parent waits for it and hands on its
+exit status.  A child that crashes, hangs or takes too much memory becomes one line.
 
 Limits of the child:
 
-- memory: three quarters of what is free, and no more than ``ROOM`` and ``ROOM_A_BYTE`` bytes for
-  each byte of the files;
-- processor time of one call of a library, in which no Python is carried out: ``PATIENCE`` seconds
-  and one for every ``SPEED`` bytes of the files; the variable FECM_PATIENCE puts another number in
-  the place of ``PATIENCE``;
-- processor time of the whole command: ``WHOLE`` seconds and one for every ``WHOLE_SPEED`` bytes;
-- waiting inside of one call of a library, without any processor time: ``WAIT`` seconds, or
-  ``WAIT_SHARE`` times the patience if that is longer, and one for every ``WAIT_SPEED`` bytes.
+- memory: three quarters of what is free, and at most ``ROOM`` plus ``ROOM_A_BYTE`` bytes per byte
+  of the files;
+- one call of a library, in which no Python runs: ``PATIENCE`` seconds plus one per ``SPEED`` bytes
+  of the files; the variable FECM_PATIENCE replaces ``PATIENCE``;
+- processor time of the command: ``TOTAL`` seconds plus one per ``TOTAL_SPEED`` bytes.
 
-A child that runs Python sends a byte through a pipe about once a second, also while Python waits
-for a reader of its output; the parent counts the time without such a byte.  A machine that is busy
-or asleep does not count.  The child is killed when its parent ends.  Where the system has no fork,
-the command reads the files itself.
+A timer makes the child write to a pipe while Python runs, also while it waits for a reader of its
+output; the parent measures the time without a byte.  The child is killed when its parent ends.
+Where the system has no fork, the command reads the files itself.
 """
 
 from __future__ import annotations
@@ -26,6 +22,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import functools
+import json
 import math
 import os
 import select
@@ -33,7 +30,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn, TypeVar
@@ -42,73 +39,69 @@ from fecm._children import die_with_parent
 from fecm._files import clear_partials
 from fecm._memory import available, format_bytes
 from fecm.cli import streams
-from fecm.cli.common import SIGNALLED, SIGNALS, Refused, echo
+from fecm.cli.common import SIGNALLED, SIGNALS, RefusedError, echo
 from fecm.results.schema import printable
 
 GB = 10**9
 ROOM, ROOM_A_BYTE = 4 * GB, 50
-PATIENCE, SPEED = 10.0, 20_000_000
-WHOLE, WHOLE_SPEED = 600.0, 100_000
-WAIT, WAIT_SHARE, WAIT_SPEED = 60.0, 6.0, 1_000_000
+PATIENCE, SPEED = 30.0, 5_000_000
+TOTAL, TOTAL_SPEED = 600.0, 100_000
 FREE_SHARE = 0.75
 
-# Parts of the time that a child may wait; a stop of parent and child (Ctrl-Z) spoils one of them.
+# Parts of a silence; a stop of parent and child (Ctrl-Z) spoils one of them.
 PARTS = 4
 
-# Seconds that a child is given to end after a signal, first by itself, then when told.
+# Seconds that a child has to end after a signal, first by itself, then when told.
 GRACE = 0.3, 2.0
 
 Command = TypeVar("Command", bound=Callable[..., None])
 
 
-class _Switch:
-    """Whether commands are carried out apart; the program turns it on, its tests do not."""
+class _State:
+    """Whether commands are isolated, which the program turns on, and the pipe of a child."""
 
     on = False
+    pipe: int | None = None
 
 
-switch = _Switch()
+switch = _State()
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a child may take.
+    """Limits of a child.
 
     Attributes
     ----------
     memory : int
         Bytes.
-    call, whole : float
-        Processor time of one call of a library, and of the command (s).
-    wait : float
-        Time that one call of a library may wait without processor time (s).
+    call : float
+        Time of one call of a library (s).
+    total : float
+        Processor time of the command (s).
     """
 
     memory: int
     call: float
-    whole: float
-    wait: float
+    total: float
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What a child tells its parent: names of its files, limits, folders that it may write to."""
+
+    files: str
+    call: float
+    total: float
+    folders: list[str]
 
 
 def limits_for(size: int, free: int | None) -> Limits:
-    """Limits of a command that reads files of this many bytes together.
-
-    Parameters
-    ----------
-    size : int
-    free : int or None
-        Bytes of memory that are free; None where nobody knows.
-    """
+    """Limits of a command that reads `size` bytes of files; `free` is the free memory, if known."""
     memory = ROOM + ROOM_A_BYTE * size
     if free is not None:
         memory = min(memory, int(FREE_SHARE * free))
-    patience = _patience()
-    return Limits(
-        memory,
-        call=patience + size / SPEED,
-        whole=WHOLE + size / WHOLE_SPEED,
-        wait=max(WAIT, WAIT_SHARE * patience) + size / WAIT_SPEED,
-    )
+    return Limits(memory, _patience() + size / SPEED, TOTAL + size / TOTAL_SPEED)
 
 
 def _patience() -> float:
@@ -118,12 +111,28 @@ def _patience() -> float:
     except ValueError:
         seconds = math.nan
     if not 0.0 < seconds < 1e6:
-        raise Refused(f"FECM_PATIENCE is `{printable(text)}`; it must be a number of seconds")
+        raise RefusedError(f"FECM_PATIENCE is `{printable(text)}`; it must be a number of seconds")
     return seconds
 
 
+def fork() -> None:
+    """Continue in a child process; the parent waits for it and ends as it does."""
+    if not (switch.on and hasattr(os, "fork")):
+        return
+    sys.stdout.flush()
+    sys.stderr.flush()
+    parent = os.getpid()
+    reading, writing = os.pipe()
+    if child := os.fork():
+        os.close(writing)
+        _wait(child, reading)
+    os.close(reading)
+    die_with_parent(parent)
+    switch.pipe = writing
+
+
 def reads(*names: str) -> Callable[[Command], Command]:
-    """Carry out a command in a child process.
+    """Put limits on a command when it runs in a child process.
 
     Parameters
     ----------
@@ -134,7 +143,7 @@ def reads(*names: str) -> Callable[[Command], Command]:
     def decorate(function: Command) -> Command:
         @functools.wraps(function)
         def command(**values: Any) -> None:
-            if not (switch.on and hasattr(os, "fork")):
+            if switch.pipe is None:
                 function(**values)
                 return
             files: list[Path] = []
@@ -142,23 +151,15 @@ def reads(*names: str) -> Callable[[Command], Command]:
                 value = values[name]
                 files += value if isinstance(value, tuple) else [value]
             limits = limits_for(sum(map(_size, files)), available())
-            told = printable(" or ".join(map(str, dict.fromkeys(files))))
-            sys.stdout.flush()
-            sys.stderr.flush()
-            parent = os.getpid()
-            beats, heart = os.pipe()
-            if child := os.fork():
-                os.close(heart)
-                ended = _wait(child, beats, limits)
-                _end_like(child, ended, told, limits, _folders(values))
-            os.close(beats)
-            die_with_parent(parent)
-            _confine(limits, heart)
+            label = printable(" or ".join(map(str, dict.fromkeys(files))))
+            job = _Job(label, limits.call, limits.total, _folders(values))
+            os.write(switch.pipe, json.dumps(asdict(job)).encode() + b"\n")
+            _confine(limits, switch.pipe)
             try:
                 function(**values)
             except MemoryError:
-                raise Refused(
-                    f"{told}: this takes more memory than the {format_bytes(limits.memory)} "
+                raise RefusedError(
+                    f"{label}: this takes more memory than the {format_bytes(limits.memory)} "
                     "that reading it may take"
                 ) from None
 
@@ -168,7 +169,7 @@ def reads(*names: str) -> Callable[[Command], Command]:
 
 
 def _size(path: Path) -> int:
-    """Bytes of a file, or of a folder's files; 0 of what can't be read, which is told later."""
+    """Bytes of a file or of a folder's files; 0 if it can't be read, which is reported later."""
     try:
         if path.is_dir():
             return sum(member.stat().st_size for member in path.iterdir())
@@ -177,20 +178,17 @@ def _size(path: Path) -> int:
         return 0
 
 
-def _folders(values: dict[str, Any]) -> set[Path]:
+def _folders(values: dict[str, Any]) -> list[str]:
     """Folders that a command may write to."""
     named = [values[name] for name in ("output", "directory") if isinstance(values.get(name), Path)]
-    return {Path(), *named, *(path.parent for path in named)}
+    return sorted({str(path) for path in (Path(), *named, *(path.parent for path in named))})
 
 
 # The child --------------------------------------------------------------------------------------
 
 
-def _confine(limits: Limits, heart: int) -> None:
-    """Put the limits on this process, and take the noise of libraries from standard error.
-
-    The open pipe `heart` tells the parent that this process runs.
-    """
+def _confine(limits: Limits, pipe: int) -> None:
+    """Put the limits on this process, and take the noise of libraries from standard error."""
     import resource
 
     def limit(what: int, most: int) -> None:
@@ -201,29 +199,24 @@ def _confine(limits: Limits, heart: int) -> None:
 
     limit(resource.RLIMIT_CORE, 0)
     limit(resource.RLIMIT_DATA, limits.memory)
-    limit(resource.RLIMIT_CPU, math.ceil(limits.whole))
+    limit(resource.RLIMIT_CPU, math.ceil(limits.total))
     _quieten()
-
-    os.set_blocking(heart, False)
+    os.set_blocking(pipe, False)
 
     def beat(number: int, frame: FrameType | None) -> None:
-        signal.setitimer(signal.ITIMER_PROF, limits.call)
         with contextlib.suppress(OSError):  # the pipe is full: the parent is stopped
-            os.write(heart, b".")
+            os.write(pipe, b".")
 
-    # Python carries out a handler between two of its own instructions, and when a signal interrupts
-    # its own reading or writing: as long as it does, the timer that would end the process is wound
-    # up again.
-    signal.signal(signal.SIGPROF, signal.SIG_DFL)
+    # Python runs a handler between two of its instructions, and when a signal interrupts its own
+    # reading or writing; inside a call of a library it does not.
     signal.signal(signal.SIGALRM, beat)
-    every = min(1.0, limits.call / 4.0)
+    every = min(1.0, limits.call / (2.0 * PARTS))
     signal.setitimer(signal.ITIMER_REAL, every, every)
-    signal.setitimer(signal.ITIMER_PROF, limits.call)
     atexit.register(signal.setitimer, signal.ITIMER_REAL, 0.0)
 
 
 def _quieten() -> None:
-    """Leave standard error to Python: C libraries write there when they fall over."""
+    """Leave standard error to Python: C libraries write there when they crash."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         old = sys.stderr
         own = os.dup(old.fileno())
@@ -236,16 +229,16 @@ def _quieten() -> None:
 # The parent -------------------------------------------------------------------------------------
 
 
-class _CameError(Exception):
-    """A signal came while the child was waited for."""
+class _SignalledError(Exception):
+    """A signal arrived while the parent waited for the child."""
 
 
 @contextlib.contextmanager
-def _noticing() -> Iterator[None]:
+def _signals_raise() -> Iterator[None]:
     """Turn signals that end the program into an exception."""
 
     def came(number: int, frame: FrameType | None) -> None:
-        raise _CameError(number)
+        raise _SignalledError(number)
 
     old = {number: signal.signal(number, came) for number in SIGNALS}
     try:
@@ -255,57 +248,64 @@ def _noticing() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _wait(child: int, beats: int, limits: Limits) -> int | None:
-    """Exit status of a child, negative for a signal, None for one that waited too long.
-
-    Ends the child when a signal asks for that.
-    """
+def _wait(child: int, pipe: int) -> NoReturn:
+    """Wait for a child and end as it does; kill it if it is silent for too long."""
+    job: list[_Job] = []
     try:
-        with _noticing():
-            waited = not _watch(child, beats, limits.wait)
-            if waited:
+        with _signals_raise():
+            hangs = not _watch(pipe, job)
+            if hangs:
                 os.kill(child, signal.SIGKILL)
             status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-            return None if waited and status == -signal.SIGKILL else status
-    except _CameError as came:
-        number = int(came.args[0])
-        # Ctrl-C goes to the child as well, which may say so itself; a hanging one can't.
-        for seconds, then in zip(GRACE, (number, signal.SIGKILL), strict=True):
-            until = time.monotonic() + seconds
-            while time.monotonic() < until:
-                if _ended(child):
-                    return 128 + number
-                time.sleep(0.01)
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(child, then)
-        with contextlib.suppress(ChildProcessError):
-            os.waitpid(child, 0)
-        echo("fecm: interrupted", err=True)
-        return 128 + number
+    except _SignalledError as signalled:
+        hangs, status = False, 128 + int(signalled.args[0])
+        _end(child, status - 128)
+    files = job[0].files if job else "the command"
+    if job and (status < 0 or status in SIGNALLED):
+        clear_partials(map(Path, job[0].folders))
+    if status >= 0:
+        raise SystemExit(status)
+    if hangs and status == -signal.SIGKILL:
+        raise RefusedError(
+            f"{files} can't be read: the HDF5 library did not return within {job[0].call:.3g} s, "
+            "as happens with damaged files and with disks that hang (FECM_PATIENCE=SECONDS allows "
+            "more)"
+        )
+    if -status in SIGNALS:
+        raise SystemExit(128 - status)
+    raise RefusedError(f"{files} can't be read: {_death(-status, job[0].total if job else TOTAL)}")
 
 
-def _watch(child: int, beats: int, wait: float) -> bool:
-    """Wait for the end of a child; False if it neither beats nor computes for too long."""
-    silent, before = 0, _processor_time(child)
+def _watch(pipe: int, job: list[_Job]) -> bool:
+    """Wait until a child closes its pipe; False if it is silent for too long."""
+    start, silent = b"", 0
     while silent < PARTS:
-        silent += 1
-        if select.select([beats], [], [], wait / PARTS)[0]:
-            if not os.read(beats, 4096):
-                return True
-            silent = 0
-        now = _processor_time(child)
-        if now != before:
-            silent, before = 0, now
+        if not select.select([pipe], [], [], job[0].call / PARTS if job else None)[0]:
+            silent += 1
+            continue
+        silent, data = 0, os.read(pipe, 4096)
+        if not data:
+            return True
+        if not job:
+            start += data
+            if b"\n" in start:
+                job.append(_Job(**json.loads(start.partition(b"\n")[0])))
     return False
 
 
-def _processor_time(child: int) -> tuple[bytes, ...]:
-    """Processor time of a child by proc(5); nothing where the system does not tell."""
-    try:
-        stat = Path(f"/proc/{child}/stat").read_bytes()
-    except OSError:
-        return ()
-    return tuple(stat.rpartition(b")")[2].split()[11:13])
+def _end(child: int, number: int) -> None:
+    """End a child after a signal, which Ctrl-C also sends to it; kill one that hangs."""
+    for seconds, then in zip(GRACE, (number, signal.SIGKILL), strict=True):
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            if _ended(child):
+                return
+            time.sleep(0.01)
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(child, then)
+    with contextlib.suppress(ChildProcessError):
+        os.waitpid(child, 0)
+    echo("fecm: interrupted", err=True)
 
 
 def _ended(child: int) -> bool:
@@ -315,34 +315,11 @@ def _ended(child: int) -> bool:
         return True
 
 
-def _end_like(
-    child: int, status: int | None, told: str, limits: Limits, folders: set[Path]
-) -> NoReturn:
-    """End this program as the child has ended."""
-    if status is None or status < 0 or status in SIGNALLED:
-        clear_partials(folders)
-    if status is None:
-        raise Refused(
-            f"{told} can't be read: the system did not deliver it within {limits.wait:.3g} s, as "
-            "happens with a disk or network that hangs (FECM_PATIENCE=SECONDS gives it longer)"
-        )
-    if status >= 0:
-        raise SystemExit(status)
-    if -status in SIGNALS:
-        raise SystemExit(128 - status)
-    raise Refused(f"{told} can't be read: {_death(-status, limits)}")
-
-
-def _death(number: int, limits: Limits) -> str:
-    """What ended a child."""
-    if number == signal.SIGPROF:
-        return (
-            f"the HDF5 library did not come back within {limits.call:.3g} s of processor time, as "
-            "happens with damaged files (FECM_PATIENCE=SECONDS gives it longer)"
-        )
+def _death(number: int, total: float) -> str:
+    """How a signal ended a child."""
     if number == signal.SIGXCPU:
-        return f"it took more than {limits.whole:.3g} s of processor time"
+        return f"it took more than {total:.3g} s of processor time"
     if number == signal.SIGKILL:
         return "the reading process was killed, as the system does when memory runs out"
     name = signal.Signals(number).name if number in set(signal.Signals) else f"signal {number}"
-    return f"the HDF5 library broke off ({name}), as happens with damaged files"
+    return f"the HDF5 library crashed ({name}), as happens with damaged files"

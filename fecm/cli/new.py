@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 
+from fecm._errors import FecmError
 from fecm.deck.catalogue import CONTACTS, MATERIALS, SYSTEMS
 from fecm.deck.catalogue import SYSTEM as REPORT_SYSTEM
 from fecm.deck.grid import Grid, Section, graded, listed, uniform
@@ -20,7 +21,7 @@ MOST = 2000
 ROD_ELEMENTS = 20
 
 
-class OptionError(ValueError):
+class OptionError(FecmError, ValueError):
     """An option can't be meant."""
 
 

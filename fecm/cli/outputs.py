@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import click
 
 from fecm._files import check_outputs
-from fecm.cli.common import FILE_PATH, Refused, echo, writing
+from fecm.cli.common import FILE_PATH, RefusedError, echo, writing
 
 if TYPE_CHECKING:
     from fecm.plot.kinds import Picture
@@ -66,7 +66,7 @@ class OutputPaths:
 
         Raises
         ------
-        Refused
+        RefusedError
         OutputError
         """
         if picture is not None:
@@ -81,7 +81,7 @@ class OutputPaths:
 
         Raises
         ------
-        Refused
+        RefusedError
             If what is to be drawn does not fit a picture.
         OSError
             If it can't be written.
@@ -94,7 +94,7 @@ class OutputPaths:
         try:
             save(draw(), self.picture, overwrite=self.overwrite)
         except PlotError as error:
-            raise Refused(str(error)) from None
+            raise RefusedError(str(error)) from None
         echo(f"fecm: note: drew {self.picture}", err=True)
 
     def write(self, lines: Iterable[str]) -> None:
@@ -118,8 +118,8 @@ def _check_picture(path: Path) -> None:
     from fecm.plot.kinds import MISSING, SUFFIXES
 
     if path.suffix.lower() not in SUFFIXES:
-        raise Refused(f"{path}: pictures are written as {', '.join(SUFFIXES)}")
+        raise RefusedError(f"{path}: pictures are written as {', '.join(SUFFIXES)}")
     try:
         import matplotlib  # noqa: F401
     except ImportError:
-        raise Refused(MISSING) from None
+        raise RefusedError(MISSING) from None

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fecm._files import check_outputs
-from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, echo, progress
+from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, progress
 from fecm.cli.isolation import reads
 from fecm.plot.kinds import KINDS, Picture, PlotError, PlotNote
 from fecm.plot.pictures import Options, check_options, check_suffix, draw, save
@@ -136,11 +136,11 @@ def plot(
                 save(pictures[kind], path, overwrite=overwrite, advance=advance)
             echo(path)
     except PlotError as error:
-        raise Refused(str(error)) from None
+        raise RefusedError(str(error)) from None
     except ImportError as error:
         if error.name and not error.name.startswith("matplotlib"):
             raise
-        raise Refused(str(error)) from None
+        raise RefusedError(str(error)) from None
 
 
 def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path]:
@@ -148,7 +148,9 @@ def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path
     is_folder = output is None or output.is_dir() or not (output.exists() or output.suffix)
     if output is not None and not is_folder:
         if len(kinds) > 1:
-            raise Refused(f"{output} is not a folder, and {len(kinds)} pictures were asked for")
+            raise RefusedError(
+                f"{output} is not a folder, and {len(kinds)} pictures were asked for"
+            )
         check_suffix(kinds[0], output)
         return {kinds[0]: output}
     folder = output or Path()
@@ -168,7 +170,7 @@ def _named(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:
     if len(set(names)) < len(names):
         names = [printable(str(path)) for path in paths]
     if len(set(names)) < len(names):
-        raise Refused("a result is given twice")
+        raise RefusedError("a result is given twice")
     return {name: _loaded(path) for name, path in zip(names, paths, strict=True)}
 
 

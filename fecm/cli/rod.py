@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fecm.cli.common import DECK_PATH, FORMAT_OPTION, Refused, count_errors, report
+from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError, count_errors, report
 from fecm.cli.outputs import OUTPUT, OVERWRITE, PLOT, STANDARD_OUTPUT, OutputPaths
 from fecm.cli.types import POSITIVE, Finite
 from fecm.mechanics.rod_integrators import INTEGRATORS, LUMPED, MASSES, WILSON
@@ -115,7 +115,7 @@ def pulse(
             integrator,
         )
     except ValueError as error:
-        raise Refused(str(error)) from None
+        raise RefusedError(str(error)) from None
     filtered = None if slow is None else slow(history.time, history.forces)
 
     def draw() -> Picture:
@@ -158,14 +158,14 @@ def _of_deck(deck: Path) -> tuple[Rod, float, float | None, Mapping[str, str]]:
     prepared = load_deck(deck)
     report(prepared)
     if errors := prepared.errors(force=True):
-        raise Refused(count_errors(errors))
+        raise RefusedError(count_errors(errors))
     if not prepared.problems:
-        raise Refused(f"{deck} holds no problem")
+        raise RefusedError(f"{deck} holds no problem")
     first = prepared.problems[0].deck
     steps = [macro.value for macro in first.macros if macro.word == "DT" and macro.value > 0.0]
     projectile = build_projectile(first)
     if isinstance(projectile, RigidMass):
-        raise Refused(f"{deck}: the projectile is a rigid mass, through which no wave runs")
+        raise RefusedError(f"{deck}: the projectile is a rigid mass, through which no wave runs")
     node = build_station(first, projectile, frozenset()).node
     x = (node - 1) * projectile.length / projectile.elements
     return projectile, x, steps[0] if steps else None, unit_names(first)
@@ -221,7 +221,7 @@ def filter_(
         slow = filter_of(filter_text)
         series = recorded(history, column)
     except ValueError as error:
-        raise Refused(str(error)) from None
+        raise RefusedError(str(error)) from None
     filtered = slow(series.time, series.values)
 
     def draw() -> Picture:
@@ -270,13 +270,13 @@ def calibrate(
     try:
         columns = read_columns(test, ("time", "V_F", "V_a"), increasing="time")
     except ValueError as error:
-        raise Refused(str(error)) from None
+        raise RefusedError(str(error)) from None
     try:
         found = calibration.calibrate(
             columns["V_F"], columns["V_a"], mass, c_a, through_origin=through_origin
         )
     except ValueError as error:
-        raise Refused(f"{test}: {error}") from None
+        raise RefusedError(f"{test}: {error}") from None
 
     def draw() -> Picture:
         from fecm.plot.rod import calibration_picture

@@ -16,8 +16,8 @@ from fecm.cli.common import (
     DECK_PATH,
     FILE_PATH,
     MODE_OPTION,
-    CheckFailed,
-    Refused,
+    CheckFailedError,
+    RefusedError,
     count_errors,
     echo,
     progress,
@@ -122,7 +122,7 @@ def run(
     prepared = load_deck(deck, mode)
     report(prepared)
     if errors := prepared.errors(force):
-        raise Refused(f"{count_errors(errors)}; nothing was run")
+        raise RefusedError(f"{count_errors(errors)}; nothing was run")
     first = output or Path(f"{deck.stem}.h5")
     paths = [numbered(first, n) for n in range(1, len(prepared.problems) + 1)]
     prints = [None if printed is None else numbered(printed, n + 1) for n in range(len(paths))]
@@ -131,9 +131,9 @@ def run(
     check_outputs(outputs, True, [deck], beside)
     left = next((n for n, path in enumerate(paths) if checkpoint_of(path).exists()), None)
     if resume and left is None:
-        raise Refused(f"there is no checkpoint {checkpoint_of(paths[0])} to go on from")
+        raise RefusedError(f"there is no checkpoint {checkpoint_of(paths[0])} to go on from")
     if left is not None and not (resume or overwrite):
-        raise Refused(
+        raise RefusedError(
             f"{checkpoint_of(paths[left])} is what an interrupted run has left: --resume goes on "
             "from it, --overwrite starts again"
         )
@@ -218,16 +218,16 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
     try:
         yield
     except SingularStiffnessError as error:
-        raise Refused(
+        raise RefusedError(
             f"{error}: the plate is not held, so that it has no static displacement; restrain "
             f"it with BOUN; {path} was not written"
         ) from None
     except DivergenceError as diverged:
-        raise CheckFailed(
+        raise CheckFailedError(
             f"the run diverged at step {diverged.step}: {diverged.reason}; {path} was not written"
         ) from None
     except (CheckpointError, SpoolError) as error:
-        raise Refused(
+        raise RefusedError(
             f"{error}; --overwrite without --resume discards the checkpoint and starts again"
         ) from None
     except _StoppedError as stopped:
@@ -243,7 +243,7 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
         if not resumes or of_disk or isinstance(error, MemoryError):
             raise
         # The state of a checkpoint that was made up can fail anywhere.
-        raise Refused(
+        raise RefusedError(
             f"the run can't go on from {checkpoint_of(path)} ({error}); --overwrite without "
             "--resume discards it and starts again"
         ) from None
@@ -290,7 +290,7 @@ def _check_room(path: Path, size: int) -> None:
     """Refuse a result that the disk has no room for."""
     free = shutil.disk_usage(path.parent).free
     if size > free:
-        raise Refused(
+        raise RefusedError(
             f"{path}: the result takes about {format_bytes(size)}, and the disk has "
             f"{format_bytes(free)} left"
         )

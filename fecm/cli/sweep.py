@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from fecm._files import check_outputs
-from fecm.cli.common import DECK_PATH, FILE_PATH, Refused, count_errors, echo, signals
+from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, count_errors, echo, signals
 
 if TYPE_CHECKING:
     from fecm.problem.problem import Problem
@@ -85,7 +85,7 @@ def sweep(
             )
         result = _carry_out(problem, made, path, workers, scheduler, overwrite=overwrite)
     except CasesError as error:
-        raise Refused(str(error)) from None
+        raise RefusedError(str(error)) from None
     save(result, path, overwrite=overwrite)
     if lost := sum(status.startswith(LOST) for status in result["status"].tolist()):
         _note(f"{lost} cases were lost with their workers; --overwrite runs them again")
@@ -130,7 +130,7 @@ def _problem(deck: Path) -> Problem:
     except DeckError as error:
         echo(error, err=True)
         errors = [finding for finding in error.findings if finding.severity == "error"]
-        raise Refused(f"{count_errors(errors)}; nothing was run") from None
+        raise RefusedError(f"{count_errors(errors)}; nothing was run") from None
 
 
 def _parts(made: Plan, path: Path, *, restart: bool) -> PartialResults:
@@ -139,7 +139,7 @@ def _parts(made: Plan, path: Path, *, restart: bool) -> PartialResults:
     try:
         return PartialResults(path, made.fingerprint(), restart=restart)
     except OtherSweepError as error:
-        raise Refused(str(error)) from None
+        raise RefusedError(str(error)) from None
 
 
 def _carry_out(
@@ -164,7 +164,7 @@ def _carry_out(
             )  # fmt: skip
     except SchedulerError as error:
         parts.clear()
-        raise Refused(str(error)) from None
+        raise RefusedError(str(error)) from None
     except (KeyboardInterrupt, SystemExit):
         echo("fecm: the same command goes on where this sweep was", err=True)
         raise

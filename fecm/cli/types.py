@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from fecm.cli.common import Refused
+from fecm.cli.common import RefusedError
 
 
 class Finite(click.FloatRange):
@@ -41,7 +41,7 @@ def finite(name: str, text: str, low: float = -math.inf, *, above: bool = False)
 
     Raises
     ------
-    Refused
+    RefusedError
     """
     try:
         value = float(text)
@@ -50,7 +50,7 @@ def finite(name: str, text: str, low: float = -math.inf, *, above: bool = False)
     if math.isfinite(value) and (value > low if above else value >= low):
         return value
     bound = "" if low == -math.inf else f" {'above' if above else 'of at least'} {low:g}"
-    raise Refused(f"{name} takes a number{bound}, not `{text}`")
+    raise RefusedError(f"{name} takes a number{bound}, not `{text}`")
 
 
 def number(low: float = -math.inf, *, above: bool = False) -> Callable[..., Any]:

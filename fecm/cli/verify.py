@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fecm.cli.common import FORMAT_OPTION, CheckFailed, Refused
+from fecm.cli.common import FORMAT_OPTION, CheckFailedError, RefusedError
 
 if TYPE_CHECKING:
     from fecm.verification import Case, Row
@@ -27,11 +27,11 @@ def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: str) -> 
     from fecm.verification import UnknownCaseError, chosen
 
     if markdown and (listing or form == "json"):
-        raise Refused("--markdown goes with neither --list nor --format json")
+        raise RefusedError("--markdown goes with neither --list nor --format json")
     try:
         wanted = chosen(cases)
     except UnknownCaseError as error:
-        raise Refused(str(error)) from None
+        raise RefusedError(str(error)) from None
     if listing:
         _name(wanted, form)
         return
@@ -39,7 +39,7 @@ def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: str) -> 
     bad = sum(not row.within for row in rows)
     count = f"{len(rows)} row{'s' * (len(rows) != 1)}"
     if bad:
-        raise CheckFailed(f"{bad} of {count} {'is' if bad == 1 else 'are'} beyond tolerance")
+        raise CheckFailedError(f"{bad} of {count} {'is' if bad == 1 else 'are'} beyond tolerance")
     if form == "text" and not markdown:
         click.echo(f"{count}, all within tolerance")
 

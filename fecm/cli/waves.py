@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fecm.cli.common import DECK_PATH, Refused, count_errors
+from fecm.cli.common import DECK_PATH, RefusedError, count_errors
 from fecm.cli.outputs import OUTPUT, OVERWRITE, PLOT, OutputPaths
 from fecm.cli.types import ListCommand, number
 
@@ -35,14 +35,14 @@ def _range(context: click.Context, parameter: click.Parameter, text: str) -> tup
     except (ValueError, IndexError):
         first, last, count = math.nan, math.nan, 0
     if len(parts) != 3 or not 0.0 < first <= last < math.inf or count < 1:
-        raise Refused(
+        raise RefusedError(
             f"--wavelengths takes FROM:TO:N with 0 < FROM <= TO and N >= 1, as in 0.1:20:200, "
             f"not `{text}`"
         )
     if (count == 1) != (first == last):
-        raise Refused(f"--wavelengths {text}: one wavelength, and only one, has FROM = TO")
+        raise RefusedError(f"--wavelengths {text}: one wavelength, and only one, has FROM = TO")
     if count > MOST // 5:
-        raise Refused(f"--wavelengths {text}: {MOST // 5} wavelengths are the most")
+        raise RefusedError(f"--wavelengths {text}: {MOST // 5} wavelengths are the most")
     step = (last - first) / max(1, count - 1)
     return (*(first + n * step for n in range(count - 1)), last)
 
@@ -118,7 +118,7 @@ def _job(
     try:
         medium = Medium(replace(laminate, shear=shear_factor * laminate.shear))
     except ValueError as error:
-        raise Refused(str(error)) from None
+        raise RefusedError(str(error)) from None
     return _Job(medium, units, targets)
 
 
@@ -128,10 +128,10 @@ def _laminate(
     """Laminate and names of units, from a deck or from options."""
     given = [name for name, value in constants.items() if value is not None]
     if deck is None and layup is None:
-        raise Refused("give a DECK, or --layup, --ply-thickness and --ply or --material")
+        raise RefusedError("give a DECK, or --layup, --ply-thickness and --ply or --material")
     if deck is not None and (layup is not None or given):
         option = "layup" if layup is not None else given[0]
-        raise Refused(f"--{option.replace('_', '-')} stands for a deck; {deck} is one already")
+        raise RefusedError(f"--{option.replace('_', '-')} stands for a deck; {deck} is one already")
     if deck is not None:
         return _laminate_of_deck(deck)
     from fecm.cli.laminate_options import laminate_of_options
@@ -140,7 +140,7 @@ def _laminate(
     try:
         return laminate_of_options(layup or "", **constants)
     except OptionError as error:
-        raise Refused(str(error)) from None
+        raise RefusedError(str(error)) from None
 
 
 def _laminate_of_deck(path: Path) -> tuple[Laminate, dict[str, str]]:
@@ -152,7 +152,7 @@ def _laminate_of_deck(path: Path) -> tuple[Laminate, dict[str, str]]:
     if errors := prepared.errors(force=True):
         for finding in errors:
             click.echo(finding.render(prepared.source), err=True)
-        raise Refused(f"{count_errors(errors)}; no waves were computed")
+        raise RefusedError(f"{count_errors(errors)}; no waves were computed")
     if len(prepared.problems) > 1:
         _note(f"{path} has {len(prepared.problems)} problems; the first one's laminate is taken")
     deck = prepared.problems[0].deck
@@ -195,7 +195,7 @@ def dispersion(angles: tuple[float, ...], wavelengths: tuple[float, ...], **shar
     try:
         curves = [compute(job.medium, angle, wavelengths) for angle in angles]
     except ValueError as error:
-        raise Refused(str(error)) from None
+        raise RefusedError(str(error)) from None
     rows = (
         (curve.angle, wavelength, mode, velocity, frequency)
         for curve in curves
@@ -260,7 +260,7 @@ def fronts(times: tuple[float, ...], radius: float | None, step: float, **shared
     surfaces = _surfaces(job.medium)
     found = surfaces.fronts(_normals(step))
     if not math.isfinite(max(times) * float(found.velocity.max()) + start):
-        raise Refused("the fronts would be beyond all range at these times")
+        raise RefusedError("the fronts would be beyond all range at these times")
     positions = [found.positions(time, start).tolist() for time in times]
     rays, normals = found.ray_angle.tolist(), found.normal.tolist()
     rows = (
@@ -281,7 +281,7 @@ def fronts(times: tuple[float, ...], radius: float | None, step: float, **shared
 
 def _bound(rows: float) -> None:
     if rows > MOST:
-        raise Refused(f"the table would have {rows:.3g} rows; {MOST} are the most")
+        raise RefusedError(f"the table would have {rows:.3g} rows; {MOST} are the most")
 
 
 def _surfaces(medium: Medium) -> WaveSurfaces:
@@ -290,7 +290,7 @@ def _surfaces(medium: Medium) -> WaveSurfaces:
     try:
         return WaveSurfaces(medium)
     except ValueError as error:
-        raise Refused(str(error)) from None
+        raise RefusedError(str(error)) from None
 
 
 def _notes_of_names(surfaces: WaveSurfaces) -> list[str]:

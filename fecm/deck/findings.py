@@ -10,6 +10,8 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from fecm._errors import FecmError
+
 # Errors and warnings of a file that are kept, of each kind.
 MOST = 1000
 # The code of the error that ends too many of them.
@@ -186,7 +188,7 @@ class Findings:
         return [finding for finding in self if finding.severity == "warning"]
 
 
-class DeckError(ValueError):
+class DeckError(FecmError, ValueError):
     """A deck can't be used; carries every finding, not just the first.
 
     Attributes

@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 import re
 
+from fecm._errors import FecmError
+
 # A layup of more plies than this is a slip of the pen.
 MOST_PLIES = 10_000
 
@@ -22,7 +24,7 @@ _ANGLE = re.compile(r"(±|\+-|\+/-)?([+-]?(?:\d+(?:\.\d*)?|\.\d+))(?:_\{?(\d+)\}
 _SUFFIX = re.compile(r"_?\{?(\d*)([sST]?)\}?")
 
 
-class LayupError(ValueError):
+class LayupError(FecmError, ValueError):
     """A layup can't be read."""
 
 

@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._errors import FecmError
 from fecm._typing import Floats
 from fecm.mechanics import element_groups, element_matrices
 from fecm.mechanics.element_groups import ElementBlock
@@ -31,7 +32,7 @@ INSIDE = 1.0 - 1.0e-9
 PASSES = 50
 
 
-class OutsideError(ValueError):
+class OutsideError(FecmError, ValueError):
     """A point is not on the plate."""
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from fecm._errors import FecmError
 from fecm._memory import require
 from fecm._typing import Floats
 from fecm.mechanics import element_groups, element_matrices
@@ -31,7 +32,7 @@ ASSEMBLED = 24
 BLOCK = 1024
 
 
-class UnsoundPlateError(ArithmeticError):
+class UnsoundPlateError(FecmError, ArithmeticError):
     """A plate's numbers are such that nothing can be computed with them."""
 
 

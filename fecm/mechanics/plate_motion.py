@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._errors import FecmError
 from fecm._typing import Floats
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.stiffness_product import AUTO, CSR, Workers, pieces, stiffness_operator
@@ -23,7 +24,7 @@ from fecm.mechanics.symmetry import SymmetryReduction, unreduced
 Indices = NDArray[np.intp]
 
 
-class DivergenceError(ArithmeticError):
+class DivergenceError(FecmError, ArithmeticError):
     """The solution diverged.
 
     Attributes
@@ -33,6 +34,8 @@ class DivergenceError(ArithmeticError):
     reason : str
         Symptom.
     """
+
+    exit_code = 1
 
     def __init__(self, step: int, reason: str) -> None:
         self.step = step

@@ -7,6 +7,7 @@ import warnings
 import numpy as np
 from scipy.sparse.linalg import MatrixRankWarning, SuperLU, splu
 
+from fecm._errors import FecmError
 from fecm._typing import Floats
 from fecm.mechanics.plate import PlateModel
 
@@ -14,7 +15,7 @@ from fecm.mechanics.plate import PlateModel
 SINGULAR = 1.0e-6
 
 
-class SingularStiffnessError(ArithmeticError):
+class SingularStiffnessError(FecmError, ArithmeticError):
     """The plate is not held: it can move without strain."""
 
 

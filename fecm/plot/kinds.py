@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from fecm._errors import FecmError
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -17,7 +19,7 @@ SUFFIXES = (".png", ".svg", ".pdf")
 MISSING = "pictures need matplotlib: pip install 'fecm[plot]'"
 
 
-class PlotError(ValueError):
+class PlotError(FecmError, ValueError):
     """A result lacks what a picture needs, or the options do not fit it."""
 
 

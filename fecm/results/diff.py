@@ -23,6 +23,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._errors import FecmError
 from fecm.deck.records import DOF_NAMES
 from fecm.results.hdf5_reader import OpenArrays, read
 from fecm.results.schema import DATASETS, FORMAT, SCALES, SWEEP
@@ -47,7 +48,7 @@ TAPES = "tapes"
 WHAT = {FORMAT: "the result of a run", SWEEP: "the result of a sweep", TAPES: "a folder of tapes"}
 
 
-class IncomparableError(ValueError):
+class IncomparableError(FecmError, ValueError):
     """The sides have nothing in common, or not what was asked for."""
 
 

@@ -12,8 +12,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from fecm._errors import FecmError
 
-class ExportError(ValueError):
+
+class ExportError(FecmError, ValueError):
     """A result lacks what an export needs, or the call asks for what there is not."""
 
 
@@ -69,7 +71,7 @@ SWEEP = "fecm-sweep"
 FORMAT_VERSION = 1
 
 
-class ResultFileError(ValueError):
+class ResultFileError(FecmError, ValueError):
     """A file is not a result that this program can read."""
 
 
@@ -80,7 +82,7 @@ class NotStoredError(AttributeError, KeyError, ResultFileError):
         return str(self.args[0])
 
 
-class ResultWriteError(OSError):
+class ResultWriteError(FecmError, OSError):
     """A result can't be written."""
 
 

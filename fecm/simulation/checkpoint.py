@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._errors import FecmError
 from fecm._files import beside, naming, open_ordinary, packed
 from fecm._version import __version__
 from fecm.simulation.simulation import Simulation
@@ -29,7 +30,7 @@ from fecm.simulation.spool import Journal, Part
 FORMAT = 1
 
 
-class CheckpointError(ValueError):
+class CheckpointError(FecmError, ValueError):
     """A checkpoint can't be used; the message says why."""
 
 

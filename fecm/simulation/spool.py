@@ -17,6 +17,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._errors import FecmError
 from fecm._files import naming, open_ordinary, sync
 from fecm.results.hdf5_writer import FileSink
 from fecm.results.schema import DATASETS, Dataset
@@ -27,7 +28,7 @@ Array = NDArray[Any]
 CHUNK = 1_000_000
 
 
-class SpoolError(ValueError):
+class SpoolError(FecmError, ValueError):
     """A spool is not whole."""
 
 

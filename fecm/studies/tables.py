@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fecm._errors import FecmError
 from fecm._typing import Floats
 
 Row = tuple[int, list[str]]
@@ -26,7 +27,7 @@ _COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 _UNIT = re.compile(r"[^(\[]*[(\[]([^)\]]*)[)\]]")
 
 
-class TableError(ValueError):
+class TableError(FecmError, ValueError):
     """A table can't be used; the message names the file, and the line where there is one."""
 
 

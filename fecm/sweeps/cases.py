@@ -11,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from fecm._errors import FecmError
+
 Value = float | int | str
 Case = dict[str, Value]
 
@@ -29,7 +31,7 @@ WHOLE = ("impact_node",)
 MOST = 1_000_000
 
 
-class CasesError(ValueError):
+class CasesError(FecmError, ValueError):
     """What was asked for is no set of cases."""
 
 

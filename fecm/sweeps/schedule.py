@@ -17,6 +17,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 from urllib.parse import urlsplit
 
+from fecm._errors import FecmError
 from fecm.sweeps.batch import run
 from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.plan import Task
@@ -39,7 +40,7 @@ def lost(outcome: Outcome) -> bool:
     return any(text.startswith(LOST) for text in outcome.status)
 
 
-class SchedulerError(RuntimeError):
+class SchedulerError(FecmError, RuntimeError):
     """A scheduler can't be used."""
 
 

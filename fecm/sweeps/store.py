@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from fecm._errors import FecmError
 from fecm._files import beside, packed
 from fecm.sweeps.outcome import SUMMARY, Outcome
 from fecm.sweeps.plan import Task
@@ -25,11 +26,11 @@ MARK = "sweep.json"
 CHECKSUM = hashlib.sha256().digest_size
 
 
-class OtherSweepError(ValueError):
+class OtherSweepError(FecmError, ValueError):
     """The folder holds what another sweep has finished."""
 
 
-class DamagedPartError(ValueError):
+class DamagedPartError(FecmError, ValueError):
     """A file of the folder is not as it was written."""
 
 

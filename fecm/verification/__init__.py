@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from fecm._errors import FecmError
 from fecm.verification import coupled, impacts, indentations, laminates, plates, rods, waves
 from fecm.verification.case import (
     AGAINST_CHANGE,
@@ -42,7 +43,7 @@ CASES: tuple[Case, ...] = (
 )
 
 
-class UnknownCaseError(LookupError):
+class UnknownCaseError(FecmError, LookupError):
     """A name that no case has."""
 
 

@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._errors import FecmError
 from fecm._typing import Floats
 
 Ints = NDArray[np.int64]
@@ -27,7 +28,7 @@ GUARD = 2.0
 NEGLIGIBLE = 0.1
 
 
-class NoTestError(ValueError):
+class NoTestError(FecmError, ValueError):
     """The points are no indentation test."""
 
 

@@ -1,0 +1,15 @@
+"""The root of the package's errors."""
+
+from __future__ import annotations
+
+
+class FecmError(Exception):
+    """Base class of all errors that fecm raises on purpose.
+
+    Attributes
+    ----------
+    exit_code : int
+        Exit status of the command line: 2 for unusable input, 1 for a failed check or run.
+    """
+
+    exit_code = 2
