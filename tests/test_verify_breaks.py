@@ -357,7 +357,7 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
         {"resultants": ("ε", "γ_xy", "N"), "cross-ply-plate": ("ω11", "w", "u")},
     ),
     "SHEA ignored": (
-        instead(laminates, "laminate_of",
+        instead(build, "laminate_of",
                 lambda right, material, factor, **kwargs: right(material, **kwargs)),
         {"resultants": ("γ_xz", "γ_yz")},
     ),

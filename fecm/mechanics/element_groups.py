@@ -1,4 +1,4 @@
-"""Which family an element belongs to: its last node decides (the listing's NEL)."""
+"""Element blocks by node pattern, and groups of congruent elements."""
 
 from __future__ import annotations
 
@@ -12,19 +12,18 @@ from fecm._typing import Bools, Floats
 from fecm.mechanics.elements import cubic, quadrilateral, triangle
 from fecm.mechanics.elements.shape import ElementShape
 
-# Two elements are congruent if their nodes' relative places agree to this part of the largest
-# element's size.
+# Tolerance of the relative node positions of congruent elements, relative to the largest element.
 TOLERANCE = 1.0e-9
 
 
 @dataclass(frozen=True)
 class Congruence:
-    """Which elements of a family are translations of which.
+    """Groups of elements of a block that are translations of one another.
 
     Attributes
     ----------
     representatives : ndarray (ng,)
-        Position in the family of one element of every group.
+        Position in the block of one element per group.
     group : ndarray (ne,)
         Group of every element.
     """
@@ -34,22 +33,21 @@ class Congruence:
 
 
 def congruence(family: ElementBlock) -> Congruence:
-    """Sort a family's elements into groups of congruent ones.
+    """Group the congruent elements of a block.
 
-    Places are compared on a grid of :data:`TOLERANCE` times the largest element's size; two equal
-    elements that rounding puts on either side of a grid line make two groups, which costs time but
-    no accuracy.
+    Positions are compared on a grid of :data:`TOLERANCE` times the largest element's size.
+    Congruent elements that rounding separates form two groups, which costs time but no accuracy.
     """
     places = family.coordinates[:, 1:] - family.coordinates[:, :1]
     flat = places.reshape(len(places), -1)
     pitch = TOLERANCE * float(np.abs(flat).max())
-    # An offset that no mesh has keeps round numbers away from the grid lines.
+    # An uncommon offset keeps round numbers away from the grid lines.
     cells = np.floor(flat / pitch + 1.0 / np.pi).astype(np.int64)
     _, representatives, group = np.unique(cells, axis=0, return_index=True, return_inverse=True)
     return Congruence(representatives.astype(np.intp), group.ravel().astype(np.intp))
 
 
-# Each takes the elements whose last node the one before does not know.
+# In ascending order of their number of nodes.
 SHAPES = (triangle.SHAPE, quadrilateral.SHAPE, cubic.SHAPE)
 
 # Number of nodes of the largest element.
@@ -57,7 +55,7 @@ MOST_NODES = SHAPES[-1].nodes
 
 
 def shape_of(present: Bools) -> ElementShape:
-    """Family of an element: 3 nodes a triangle, up to 9 a quadrilateral, up to 12 a cubic one.
+    """Shape of an element by its last node (NEL of the listing): up to 3, 9 or 12.
 
     Parameters
     ----------
@@ -67,7 +65,7 @@ def shape_of(present: Bools) -> ElementShape:
     Raises
     ------
     ValueError
-        If a node stands beyond the twelfth place.
+        If a node follows the twelfth.
     """
     found = np.flatnonzero(present)
     last = int(found[-1]) + 1 if len(found) else 0
@@ -87,13 +85,13 @@ class ElementBlock:
     Attributes
     ----------
     rows : ndarray (ne,)
-        The elements' rows in the mesh.
+        Rows of the elements in the mesh.
     nodes : ndarray (ne, nn)
         Rows of their nodes, from 0.
     coordinates : ndarray (ne, nn, 2)
         Length.
     present : ndarray (shape.nodes,) of bool
-        Which of their shape's nodes they have.
+        Which nodes of the shape are present.
     shape : ElementShape
         Triangle, quadrilateral or cubic quadrilateral.
     """
@@ -105,12 +103,12 @@ class ElementBlock:
     shape: ElementShape
 
     def blocks(self, size: int) -> Iterator[ElementBlock]:
-        """Cut the family into blocks of at most `size` elements."""
+        """Split into blocks of at most `size` elements."""
         for start in range(0, len(self.rows), size):
             yield self.take(np.arange(start, min(start + size, len(self.rows))))
 
     def take(self, members: NDArray[np.intp]) -> ElementBlock:
-        """Pick some of the family's elements, by their position in it."""
+        """Select elements by their position in the block."""
         return replace(
             self,
             rows=self.rows[members],
@@ -120,7 +118,7 @@ class ElementBlock:
 
 
 def element_blocks(elements: Ints, coordinates: Floats) -> list[ElementBlock]:
-    """Sort elements by the nodes they have; a family's shape follows from the last of them.
+    """Sort elements into blocks with the same nodes present.
 
     Parameters
     ----------
@@ -132,7 +130,7 @@ def element_blocks(elements: Ints, coordinates: Floats) -> list[ElementBlock]:
     Raises
     ------
     ValueError
-        If an element lacks one of its corners: three up to a third node, four beyond.
+        If a corner is missing: three for a triangle, four for the others.
     """
     nodes = np.zeros((len(elements), max(MOST_NODES, elements.shape[1])), dtype=np.intp)
     nodes[:, : elements.shape[1]] = elements

@@ -1,6 +1,6 @@
 """Plate elements: geometry, stiffness, lumped mass and strains of many elements at once.
 
-Conventions: the unknowns of a node are u, v, w, theta_x, theta_y; an element's unknowns run node by
+Conventions: the dofs of a node are u, v, w, theta_x, theta_y; an element's dofs are ordered node by
 node.  Rotations have the listing's sign, opposite to the report's phi: transverse shear is
 gamma_xz = w,x - theta_x and gamma_yz = w,y - theta_y, curvature kappa_x = -theta_x,x and
 kappa_y = -theta_y,y.  Arrays over elements have the element first, then the quadrature point.
@@ -22,7 +22,7 @@ NDOF = 5
 
 @dataclass(frozen=True)
 class Interpolation:
-    """Shape functions of a family at the points of a rule.
+    """Shape functions of an element block at the points of a rule.
 
     Attributes
     ----------
@@ -30,17 +30,17 @@ class Interpolation:
         Values.
     dN : ndarray (ne, npt, 2, nn)
         Derivatives with respect to x and y, 1/length.
-    area : ndarray (ne, npt)
-        Area that belongs to each point: Jacobian determinant times weight.
+    jxw : ndarray (ne, npt)
+        Jacobian determinant times weight, length squared.
     """
 
     N: Floats
     dN: Floats
-    area: Floats
+    jxw: Floats
 
 
 def local_shape_functions(family: ElementBlock, rule: Quadrature) -> tuple[Floats, Floats]:
-    """Shape functions of a family's nodes: values (npt, nn), d/dxi and d/deta (npt, 2, nn)."""
+    """Shape functions of the nodes present: values (npt, nn), d/dxi and d/deta (npt, 2, nn)."""
     values, local = family.shape.shape_functions(rule.xi, rule.eta, family.present)
     return values[:, family.present], local[:, :, family.present]
 
@@ -48,7 +48,7 @@ def local_shape_functions(family: ElementBlock, rule: Quadrature) -> tuple[Float
 def inverse_jacobian(
     family: ElementBlock, local: Floats, *, transposed_jacobian: bool = False
 ) -> tuple[Floats, Floats]:
-    """Inverse of the Jacobian, and its determinant.
+    """Inverse and determinant of the Jacobian.
 
     Parameters
     ----------
@@ -56,8 +56,8 @@ def inverse_jacobian(
         The elements.
     local : ndarray (npt, 2, nn)
         Derivatives of the shape functions with respect to xi and eta.
-    transposed : bool
-        Give the inverse transposed (the slip ``jacobian``).
+    transposed_jacobian : bool
+        Transpose the inverse (the slip ``jacobian``).
 
     Returns
     -------
@@ -90,8 +90,8 @@ def interpolate(
         The elements.
     rule : Quadrature
         The points.
-    transposed : bool
-        Use the inverse Jacobian transposed (the slip ``jacobian``).
+    transposed_jacobian : bool
+        Transpose the inverse Jacobian (the slip ``jacobian``).
     """
     values, local = local_shape_functions(family, rule)
     inverse, determinant = inverse_jacobian(family, local, transposed_jacobian=transposed_jacobian)
@@ -100,7 +100,7 @@ def interpolate(
 
 
 def _membrane_and_bending(at: Interpolation) -> Floats:
-    """Matrix of midplane strains xx, yy, xy and curvatures xx, yy, xy: (ne, npt, 6, 5 nn)."""
+    """B matrix of midplane strains and curvatures, equations 2-6 to 2-9: (ne, npt, 6, 5 nn)."""
     ne, npt, _, nn = at.dN.shape
     B = np.zeros((ne, npt, 6, nn, NDOF))
     x, y = at.dN[:, :, 0], at.dN[:, :, 1]
@@ -114,20 +114,20 @@ def _membrane_and_bending(at: Interpolation) -> Floats:
 
 
 def _transverse_shear(at: Interpolation) -> Floats:
-    """Matrix of transverse shear strains xz, yz: (ne, npt, 2, 5 nn)."""
+    """B matrix of transverse shear strains xz, yz, equations 2-6 to 2-9: (ne, npt, 2, 5 nn)."""
     ne, npt, _, nn = at.dN.shape
     B = np.zeros((ne, npt, 2, nn, NDOF))
-    for row in (0, 1):
-        B[:, :, row, :, 2] = at.dN[:, :, row]
-        B[:, :, row, :, 3 + row] = -at.N
+    for direction in (0, 1):
+        B[:, :, direction, :, 2] = at.dN[:, :, direction]
+        B[:, :, direction, :, 3 + direction] = -at.N
     return B.reshape(ne, npt, 2, nn * NDOF)
 
 
-def _integrate(B: Floats, C: Floats, area: Floats) -> Floats:
-    """Sum of B' C B over the points, (ne, n, n); exactly symmetric."""
+def _integrate(B: Floats, C: Floats, jxw: Floats) -> Floats:
+    """Integral of B' C B by quadrature, (ne, n, n); exactly symmetric."""
     ne, npt, rows, n = B.shape
     flat = B.reshape(ne, npt * rows, n)
-    weighted = (area[:, :, None, None] * (C @ B)).reshape(ne, npt * rows, n)
+    weighted = (jxw[:, :, None, None] * (C @ B)).reshape(ne, npt * rows, n)
     product = flat.swapaxes(1, 2) @ weighted
     return np.asarray((product + product.swapaxes(1, 2)) / 2.0)
 
@@ -140,7 +140,7 @@ def stiffness(
     *,
     transposed_jacobian: bool = False,
 ) -> Floats:
-    """Stiffness matrices of a family's elements.
+    """Element stiffness matrices, K_p of equation 4-14.
 
     Parameters
     ----------
@@ -149,8 +149,8 @@ def stiffness(
     laminate : Laminate
         Stiffness per area.
     bending, shear : Quadrature
-        Quadrature of the membrane and bending energy, and of the transverse shear energy.
-    transposed : bool
+        Rules for membrane and bending energy, and for transverse shear energy.
+    transposed_jacobian : bool
         See :func:`interpolate`.
 
     Returns
@@ -159,16 +159,16 @@ def stiffness(
     """
     ABD = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
     at = interpolate(family, bending, transposed_jacobian=transposed_jacobian)
-    K = _integrate(_membrane_and_bending(at), ABD, at.area)
+    K = _integrate(_membrane_and_bending(at), ABD, at.jxw)
     at = interpolate(family, shear, transposed_jacobian=transposed_jacobian)
-    return K + _integrate(_transverse_shear(at), laminate.shear, at.area)
+    return K + _integrate(_transverse_shear(at), laminate.shear, at.jxw)
 
 
 def lumped_mass(family: ElementBlock, laminate: Laminate, rule: Quadrature) -> Floats:
-    """Lumped masses of a family's elements: the consistent matrix' diagonal, scaled to the whole.
+    """Lumped element masses: diagonal of the consistent matrix, scaled to the element's mass.
 
-    The listing's MASS01.  The scaling keeps the element's mass; every entry is positive unless the
-    rule has all its points on a node's zero line, as order 1 has for mid-sides and corners.
+    The listing's MASS01, the method of Hinton, Rock and Zienkiewicz (1976).  Every entry is
+    positive unless a node's shape function is zero at all points, as with order 1 for mid-sides.
 
     Returns
     -------
@@ -184,10 +184,10 @@ def lumped_mass(family: ElementBlock, laminate: Laminate, rule: Quadrature) -> F
 
 
 def consistent_mass(family: ElementBlock, laminate: Laminate, rule: Quadrature) -> Floats:
-    """Consistent mass matrices of a family's elements (the listing's MASS01).
+    """Consistent element mass matrices, M_p of equation 4-14 (the listing's MASS01).
 
-    Two nodes share the integral of N_i N_j, with the mass per area rho h for u, v and w, and with
-    the rotary inertia rho h^3 / 12 for the rotations; different unknowns share nothing.
+    The integral of N_i N_j times the mass per area rho h for u, v and w, and times the rotary
+    inertia rho h^3 / 12 for the rotations; different dofs are not coupled.
 
     Parameters
     ----------
@@ -196,8 +196,8 @@ def consistent_mass(family: ElementBlock, laminate: Laminate, rule: Quadrature) 
     laminate : Laminate
         Mass and rotary inertia per area.
     rule : Quadrature
-        Quadrature; the 4-node element takes order 2, those with mid-sides order 3, the cubic one
-        order 4 to be exact on parallelograms.
+        Exact on parallelograms with order 2 for the 4-node element, 3 with mid-sides, and 4 for
+        the cubic element.
 
     Returns
     -------
@@ -211,6 +211,6 @@ def consistent_mass(family: ElementBlock, laminate: Laminate, rule: Quadrature) 
     inertia = np.repeat([laminate.mass, laminate.rotary_inertia], (3, 2))
     ne, nn = family.nodes.shape
     M = np.zeros((ne, nn, NDOF, nn, NDOF))
-    for unknown in range(NDOF):
-        M[:, :, unknown, :, unknown] = inertia[unknown] * shared
+    for dof in range(NDOF):
+        M[:, :, dof, :, dof] = inertia[dof] * shared
     return M.reshape(ne, nn * NDOF, nn * NDOF)

@@ -15,8 +15,8 @@ import numpy as np
 
 from fecm._typing import Floats
 
-# Entries of A, B and D that the slip ``small-stiffness`` sets to 0, and the rounding, as a part of
-# A h^n, that it leaves alone.
+# The slip ``small-stiffness`` sets entries of A, B and D below the first limit to 0, except
+# rounding errors below the second one, relative to A h^n.
 LISTING_LEAST = 1.0e-6
 
 ROUNDING = 1.0e-12
@@ -78,7 +78,7 @@ class Laminate:
     def without_small_entries(self) -> Laminate:
         """Set the entries of A, B and D below 1e-6 to 0, as the listing's CNPD does.
 
-        Rounding of entries that vanish by symmetry stays: it is no stiffness.
+        Rounding errors of entries that vanish by symmetry are kept.
         """
         scale = ROUNDING * np.abs(self.A).max()
 
@@ -110,7 +110,7 @@ def reduced_stiffness(ply: PlyConstants) -> Floats:
 
 
 def transformed_stiffness(q: Floats, angle: float) -> Floats:
-    """Turn a ply's plane-stress stiffness into the laminate's axes, equation 2-5.
+    """Transform a ply's plane-stress stiffness to the laminate's axes, equation 2-5.
 
     Parameters
     ----------
@@ -136,9 +136,9 @@ def transformed_stiffness(q: Floats, angle: float) -> Floats:
 
 
 def transformed_shear(g13: float, g23: float, angle: float) -> Floats:
-    """Turn a ply's transverse shear stiffness into the laminate's axes, equation 2-5.
+    """Transform a ply's transverse shear stiffness to the laminate's axes, equation 2-5.
 
-    The sign of Q45 is that of the rotation itself; the report's (2-5) has it the wrong way round.
+    The sign of Q45 follows from the rotation; equation 2-5 of the report has the opposite sign.
 
     Returns
     -------
@@ -163,11 +163,11 @@ def laminate(
     ply : PlyConstants
         Constants of every layer.
     angles : sequence of float
-        Fibre angles in degrees, from the struck face at z = -h/2 on.
+        Fibre angles in degrees, starting at the struck face, z = -h/2.
     thicknesses : sequence of float
         Layer thicknesses.
     total : float, optional
-        Thickness that the inertia is taken with; the sum of the layers without it.
+        Thickness for the inertia; the sum of the layers by default.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""The mesh that a deck's cards stand for: generation by increment, and equation numbers.
+"""Mesh and equation numbers.
 
 Nodes, elements and equations are numbered from 1 as on the cards; row n - 1 of an array belongs to
-node or element n.  An absent node of an element, and the equation of a restrained unknown, is 0.
+node or element n.  An absent node of an element and the equation of a restrained dof are 0.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ class Mesh:
     Attributes
     ----------
     coordinates : ndarray (numnp, 2)
-        Length; NaN where no card gives the node.
+        Length; NaN for undefined nodes.
     elements : ndarray (numel, nen)
         Node numbers, 0 where absent.
     codes : ndarray (numnp, 5)
-        Restraint codes; an unknown with a code other than 0 is restrained.
+        Restraint codes; a dof with a nonzero code is restrained.
     forces : ndarray (numnp, 5)
-        Nodal force, or displacement of a restrained unknown.
+        Nodal force, or displacement of a restrained dof.
     equations : ndarray (numnp, 5)
-        Equation numbers in the order of nodes and their unknowns, 0 where restrained.
+        Equation numbers in the order of nodes and dofs, 0 where restrained.
     """
 
     coordinates: Floats
@@ -42,17 +42,17 @@ class Mesh:
 
     @property
     def number_of_equations(self) -> int:
-        """Number of unknowns that are not restrained."""
+        """Number of free dofs."""
         return int(np.count_nonzero(self.equations))
 
     @property
     def given(self) -> Bools:
-        """Which nodes have coordinates."""
+        """Whether each node has coordinates."""
         return ~np.isnan(self.coordinates[:, 0])
 
     @property
     def used(self) -> Bools:
-        """Which nodes belong to an element."""
+        """Whether each node belongs to an element."""
         used = np.zeros(len(self.coordinates) + 1, dtype=bool)
         inside = (self.elements >= 0) & (self.elements <= len(self.coordinates))
         used[np.where(inside, self.elements, 0)] = True
@@ -60,7 +60,7 @@ class Mesh:
 
 
 def equation_numbers(codes: Ints) -> Ints:
-    """Number the unknowns without a restraint code from 1, node by node; the others are 0."""
+    """Number the dofs without a restraint code from 1, node by node; the others get 0."""
     free = codes.ravel() == 0
     return np.where(free, np.cumsum(free), 0).astype(np.int32).reshape(codes.shape)
 

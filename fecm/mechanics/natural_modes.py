@@ -11,10 +11,10 @@ from scipy.sparse.linalg import eigsh
 from fecm._typing import Floats
 from fecm.mechanics.plate import PlateModel
 
-# Fewer equations than this are solved as a dense problem.
+# Fewer equations are solved as a dense problem.
 DENSE = 60
-# Part of the largest eigenvalue that the spectrum is shifted by, so that a plate without supports
-# has a regular matrix; half the digits of a double.
+# Shift of the spectrum relative to the largest eigenvalue, about half the digits of a double, which
+# makes the matrix of a plate without supports regular.
 SHIFT = 1.0e-9
 
 
@@ -27,7 +27,7 @@ class Modes:
     angular_frequency : ndarray (n,)
         Ascending; rigid motions are 0 (1/time).
     shapes : ndarray (n, neq)
-        Of unit modal mass; the largest entry is positive.
+        Unit modal mass; the largest entry is positive.
     """
 
     angular_frequency: Floats
@@ -35,15 +35,15 @@ class Modes:
 
 
 def modes(plate: PlateModel, count: int, *, consistent: bool) -> Modes:
-    """Find the lowest modes.
+    """Compute the lowest modes.
 
     Parameters
     ----------
     plate : PlateModel
     count : int
-        How many; at most as many as there are equations.
+        Number of modes; limited to the number of equations.
     consistent : bool
-        Take the consistent mass instead of the lumped one.
+        Use the consistent mass instead of the lumped one.
     """
     K = plate.stiffness
     M = plate.consistent_mass if consistent else sparse.diags_array(plate.mass, format="csr")

@@ -1,7 +1,7 @@
-"""The plate as a whole: stiffness, mass, and what restraints and loads make of them.
+"""The discrete plate: assembled stiffness, mass and loads (equation 4-14).
 
-Vectors over equations hold the unknowns that are not restrained, in the order of their equation
-numbers; a field holds every unknown of every node, (numnp, 5).
+Vectors over equations contain the free dofs in the order of their equation numbers; a field
+contains all dofs of all nodes, (numnp, 5).
 """
 
 from __future__ import annotations
@@ -26,28 +26,28 @@ from fecm.mechanics.strains import StrainField
 
 Indices = NDArray[np.intp]
 
-# Bytes that assembly takes an entry of the element matrices: more than were measured.
+# Upper bound of the bytes that assembly needs per entry of the element matrices.
 ASSEMBLED = 24
-# Elements whose matrices are in memory at the same time.
+# Number of element matrices in memory at the same time.
 BLOCK = 1024
 
 
 class UnsoundPlateError(FecmError, ArithmeticError):
-    """A plate's numbers are such that nothing can be computed with them."""
+    """The plate's stiffness is not finite or has no largest frequency."""
 
 
 @dataclass(frozen=True)
 class IntegrationRules:
-    """Quadrature of a plate, and how its derivatives are taken.
+    """Quadrature rules of a plate.
 
     Attributes
     ----------
     bending, shear : Quadrature
         Membrane, bending and mass; transverse shear.
     strains : Quadrature
-        Where strains are stored.
-    transposed : bool
-        Use the inverse Jacobian transposed (the slip ``jacobian``).
+        Points of the stored strains.
+    transposed_jacobian : bool
+        Transpose the inverse Jacobian (the slip ``jacobian``).
     """
 
     bending: Quadrature
@@ -81,13 +81,13 @@ class PlateModel:
         return np.asarray(self.mesh.equations > 0)
 
     @cached_property
-    def _free_places(self) -> Indices:
-        """Places of the equations' unknowns in a field laid out flat."""
+    def _free_indices(self) -> Indices:
+        """Indices of the free dofs in a flattened field."""
         return np.flatnonzero(self._free)
 
     @cached_property
     def _numbers(self) -> Indices:
-        """Number of every unknown from 0: equations first, restrained unknowns behind them."""
+        """Number of every dof from 0: equations first, then restrained dofs."""
         numbers = self.mesh.equations.astype(np.intp) - 1
         restrained = numbers < 0
         numbers[restrained] = self.neq + np.arange(np.count_nonzero(restrained))
@@ -95,11 +95,11 @@ class PlateModel:
 
     @cached_property
     def families(self) -> list[element_groups.ElementBlock]:
-        """The elements, sorted by the nodes they have."""
+        """The elements, in blocks with the same nodes present."""
         return element_groups.element_blocks(self.mesh.elements, self.mesh.coordinates)
 
     def stiffness_of(self, family: element_groups.ElementBlock) -> Floats:
-        """Stiffness of each of some elements, (ne, 5 nn, 5 nn)."""
+        """Element stiffness matrices, (ne, 5 nn, 5 nn)."""
         rules = self.rules
         return element_matrices.stiffness(
             family,
@@ -109,7 +109,7 @@ class PlateModel:
             transposed_jacobian=rules.transposed_jacobian,
         )
 
-    def _unknowns(self, family: element_groups.ElementBlock) -> Indices:
+    def _dofs(self, family: element_groups.ElementBlock) -> Indices:
         return self._numbers[family.nodes].reshape(len(family.rows), -1)
 
     def _mass_of(self, family: element_groups.ElementBlock) -> Floats:
@@ -118,18 +118,18 @@ class PlateModel:
     def _element_matrices(
         self, matrices_of: Callable[[element_groups.ElementBlock], Floats]
     ) -> Iterator[tuple[Indices, Floats]]:
-        """Unknowns (ne, n) and matrices (ne, n, n) of all elements, block by block."""
+        """Dofs (ne, n) and matrices (ne, n, n) of all elements, block by block."""
         for family in self.families:
             same = congruence(family)
             for start in range(0, len(family.rows), BLOCK):
                 block = np.arange(start, min(start + BLOCK, len(family.rows)))
                 wanted, which = np.unique(same.group[block], return_inverse=True)
                 matrices = matrices_of(family.take(same.representatives[wanted]))
-                yield self._unknowns(family.take(block)), matrices[which.ravel()]
+                yield self._dofs(family.take(block)), matrices[which.ravel()]
 
     @property
     def entries(self) -> int:
-        """Entries of all element matrices."""
+        """Number of entries of all element matrices."""
         return sum(
             f.nodes.shape[0] * (element_matrices.NDOF * f.nodes.shape[1]) ** 2
             for f in self.families
@@ -138,16 +138,16 @@ class PlateModel:
     def _assembled(
         self, matrices_of: Callable[[element_groups.ElementBlock], Floats]
     ) -> sparse.csr_array:
-        """Sum of matrices, the restrained unknowns' columns behind those of the equations."""
-        neq, whole = self.neq, self._numbers.size
+        """Assembled matrix (neq, neq + restrained); columns of restrained dofs come last."""
+        neq, ndof = self.neq, self._numbers.size
         require(ASSEMBLED * self.entries, "to assemble the plate's matrices")
-        total = sparse.csr_array((neq, whole))
-        for unknowns, matrices in self._element_matrices(matrices_of):
-            rows = np.broadcast_to(unknowns[:, :, None], matrices.shape)
-            columns = np.broadcast_to(unknowns[:, None, :], matrices.shape)
+        total = sparse.csr_array((neq, ndof))
+        for dofs, matrices in self._element_matrices(matrices_of):
+            rows = np.broadcast_to(dofs[:, :, None], matrices.shape)
+            columns = np.broadcast_to(dofs[:, None, :], matrices.shape)
             wanted = (rows < neq) & (matrices != 0.0)
             total = total + sparse.coo_array(
-                (matrices[wanted], (rows[wanted], columns[wanted])), shape=(neq, whole)
+                (matrices[wanted], (rows[wanted], columns[wanted])), shape=(neq, ndof)
             )
         total = total.tocsr()
         total.sort_indices()
@@ -155,17 +155,17 @@ class PlateModel:
 
     @cached_property
     def _with_supports(self) -> sparse.csr_array:
-        """K with the columns of the restrained unknowns behind those of the equations."""
+        """K with the columns of the restrained dofs last."""
         return self._assembled(self.stiffness_of)
 
     @cached_property
     def stiffness(self) -> sparse.csr_array:
-        """K, sparse (neq, neq); assembled when it is first asked for."""
+        """K, sparse (neq, neq); assembled on first access."""
         return self._with_supports[:, : self.neq].tocsr()
 
     @cached_property
     def support(self) -> sparse.csr_array:
-        """What a displacement of each restrained unknown does to the equations."""
+        """Internal forces per displacement of each restrained dof, (neq, restrained)."""
         return self._with_supports[:, self.neq :].tocsr()
 
     @cached_property
@@ -180,7 +180,7 @@ class PlateModel:
 
     @cached_property
     def consistent_mass(self) -> sparse.csr_array:
-        """Consistent M, sparse (neq, neq), under the bending rule; made when first asked for."""
+        """Consistent M, sparse (neq, neq), with the bending rule; assembled on first access."""
         return self._assembled(self._mass_of)[:, : self.neq].tocsr()
 
     def area(self) -> float:
@@ -192,32 +192,32 @@ class PlateModel:
         )
 
     def profile(self) -> int:
-        """Entries of K in the listing's profile storage: columns from their first to the diagonal.
+        """Number of entries of K in the listing's profile storage, from the first of each column.
 
         The listing's JDIAG(NEQ).
         """
         first = np.arange(self.neq)
         for family in self.families:
-            unknowns = self._unknowns(family)
-            lowest = np.where(unknowns < self.neq, unknowns, self.neq).min(axis=1)
-            for column in unknowns.T:
+            dofs = self._dofs(family)
+            lowest = np.where(dofs < self.neq, dofs, self.neq).min(axis=1)
+            for column in dofs.T:
                 held = column < self.neq
                 np.minimum.at(first, column[held], lowest[held])
         return int((np.arange(self.neq) - first + 1).sum())
 
     def internal_forces(self, field: Floats) -> Floats:
-        """Internal force of every unknown of every node under a field, (numnp, 5)."""
+        """Internal forces of all dofs under a displacement field, (numnp, 5)."""
         order = np.empty(self._numbers.size)
         order[self._numbers.ravel()] = field.ravel()
         forces = np.zeros(self._numbers.size)
-        for unknowns, K in self._element_matrices(self.stiffness_of):
-            local = np.einsum("eij,ej->ei", K, order[unknowns])
-            forces += np.bincount(unknowns.ravel(), local.ravel(), len(forces))
+        for dofs, K in self._element_matrices(self.stiffness_of):
+            local = np.einsum("eij,ej->ei", K, order[dofs])
+            forces += np.bincount(dofs.ravel(), local.ravel(), len(forces))
         return np.asarray(forces[self._numbers])
 
     @property
     def nodal_loads(self) -> Floats:
-        """FORC's forces on the equations, less what its prescribed displacements cause: (neq,)."""
+        """Nodal forces minus internal forces of the prescribed displacements, (neq,)."""
         forces, free = self.mesh.forces, self._free
         loads = forces[free]
         if forces[~free].any():
@@ -225,12 +225,12 @@ class PlateModel:
         return np.asarray(loads)
 
     def field(self, displacement: Floats, scale: float = 1.0) -> Floats:
-        """Every unknown of every node.
+        """All dofs of all nodes.
 
         Parameters
         ----------
         displacement : ndarray (neq,)
-            The unknowns.
+            The free dofs.
         scale : float
             Load factor of the prescribed displacements.
 
@@ -239,11 +239,11 @@ class PlateModel:
         ndarray (numnp, 5)
         """
         full = scale * self.mesh.forces
-        full.reshape(-1)[self._free_places] = displacement
+        full.reshape(-1)[self._free_indices] = displacement
         return full
 
     def strain_field(self, points: Quadrature) -> StrainField:
-        """Strains at the given points of every element."""
+        """Strains at points of every element."""
         mesh, transposed_jacobian = self.mesh, self.rules.transposed_jacobian
         return StrainField(
             mesh.elements, mesh.coordinates, points, transposed_jacobian=transposed_jacobian
@@ -251,7 +251,7 @@ class PlateModel:
 
 
 def assemble(mesh: Mesh, laminate: Laminate, rules: IntegrationRules) -> PlateModel:
-    """Make the plate of a mesh, a laminate and quadrature rules; matrices follow when needed.
+    """Build the plate of a mesh, a laminate and quadrature rules.
 
     Raises
     ------

@@ -1,10 +1,9 @@
-"""The projectile: a rigid mass, or an elastic rod of two-unknown elements, report section 4.3.2.
+"""The projectile: a rigid mass, or an elastic rod, report section 4.3.2.
 
-Conventions: unknowns of a node are u and du/dx, node by node; x runs from the impacted end (node 1)
-into the rod.  Displacement, velocity and acceleration are positive away from the plate, so that an
-approach is negative, and the contact force pushes u at node 1 in the positive direction.  The rod
-knows nothing of the plate or the law.  Every state array has the unknowns first; more axes, one
-column a case, may follow.
+Conventions: the dofs of a node are u and du/dx, node by node; x runs from the impacted end (node 1)
+into the rod.  Displacement, velocity and acceleration are positive away from the plate: an approach
+is negative, and the contact force acts on u of node 1 in the positive direction.  The first axis of
+state arrays is over dofs; another axis, one column per case, may follow.
 """
 
 from __future__ import annotations
@@ -39,15 +38,15 @@ class Rod:
     Attributes
     ----------
     length : float
-        Whole length.
+        Length.
     diameters : tuple of float
-        Diameter of each element, from the impacted end on.
+        Diameter of each element, starting at the impacted end.
     modulus : float
         Young's modulus, force/area.
     density : float
         Mass per volume.
     consistent : bool
-        Whether the mass matrix is the consistent one, equation 4-24, instead of the lumped one.
+        Use the consistent mass matrix, equation 4-24, instead of the lumped one.
     """
 
     length: float
@@ -63,16 +62,16 @@ class Rod:
 
     @property
     def areas(self) -> Floats:
-        """Cross-section of each element, length squared."""
+        """Cross-sectional area of each element, length squared."""
         return np.pi * np.array(self.diameters) ** 2 / 4.0
 
     @property
     def total_mass(self) -> float:
-        """Mass of the whole rod."""
+        """Mass of the rod."""
         return float(self.density * self.areas.sum() * self.length / self.elements)
 
     def stiffness(self) -> Floats:
-        """Stiffness matrix of the whole rod, equation 4-23: (n, n)."""
+        """Stiffness matrix, equation 4-23: (n, n)."""
         L = self.length / self.elements
         shape = np.array(
             [
@@ -84,8 +83,8 @@ class Rod:
         )
         K = np.zeros((2 * self.elements + 2, 2 * self.elements + 2))
         for element, area in enumerate(self.areas):
-            unknowns = slice(2 * element, 2 * element + 4)
-            K[unknowns, unknowns] += self.modulus * area / (30.0 * L) * shape
+            dofs = slice(2 * element, 2 * element + 4)
+            K[dofs, dofs] += self.modulus * area / (30.0 * L) * shape
         return K
 
     def with_mass(self, mass: str) -> Rod:
@@ -93,11 +92,11 @@ class Rod:
         return replace(self, consistent=mass == CONSISTENT)
 
     def mass(self) -> Floats:
-        """The mass in use: lumped, (n,), or consistent, (n, n)."""
+        """Lumped mass, (n,), or consistent mass, (n, n)."""
         return self.consistent_mass() if self.consistent else self.lumped_mass()
 
     def consistent_mass(self) -> Floats:
-        """Consistent mass matrix of the whole rod, equation 4-24: (n, n)."""
+        """Consistent mass matrix, equation 4-24: (n, n)."""
         L = self.length / self.elements
         shape = np.array(
             [
@@ -109,12 +108,12 @@ class Rod:
         )
         M = np.zeros((2 * self.elements + 2, 2 * self.elements + 2))
         for element, area in enumerate(self.areas):
-            unknowns = slice(2 * element, 2 * element + 4)
-            M[unknowns, unknowns] += self.density * area * L / 420.0 * shape
+            dofs = slice(2 * element, 2 * element + 4)
+            M[dofs, dofs] += self.density * area * L / 420.0 * shape
         return M
 
     def lumped_mass(self) -> Floats:
-        """Lumped mass of each unknown, (n,): rho A L/2 for u and rho A L^3/420 for du/dx."""
+        """Lumped mass of each dof, (n,): rho A L/2 for u and rho A L^3/420 for du/dx (listing)."""
         L = self.length / self.elements
         m = np.zeros(2 * self.elements + 2)
         for element, area in enumerate(self.areas):
@@ -132,10 +131,10 @@ class Rod:
 
 
 def _energy(matrix: Floats, x: Floats) -> Floats:
-    """Half of x' A x for each row of x (rows, n), where A is diagonal, (n,), or the rod's band."""
+    """X' A x / 2 for each row of x (rows, n); A is diagonal, (n,), or the rod's band matrix."""
     if matrix.ndim == 1:
         return np.asarray(0.5 * np.einsum("ri,ri,i->r", x, x, matrix))
-    # Diagonal by diagonal, of which there are few, and in an order of its own.
+    # Diagonal by diagonal, in a fixed order of summation.
     energy = 0.5 * np.einsum("ri,ri,i->r", x, x, np.diagonal(matrix))
     for off in range(1, 4):
         energy += np.einsum("ri,ri,i->r", x[:, :-off], x[:, off:], np.diagonal(matrix, off))
@@ -144,7 +143,7 @@ def _energy(matrix: Floats, x: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class RigidMass:
-    """A projectile that does not deform: a rod of one unknown.
+    """A projectile that does not deform, with one dof.
 
     Attributes
     ----------
@@ -155,15 +154,15 @@ class RigidMass:
     total_mass: float
 
     def with_mass(self, mass: str) -> RigidMass:
-        """The same mass, whatever the matrix."""
+        """The same projectile: lumped and consistent mass are equal."""
         return self
 
     def stiffness(self) -> Floats:
-        """Stiffness matrix, (1, 1): none."""
+        """Stiffness matrix, (1, 1): zero."""
         return np.zeros((1, 1))
 
     def mass(self) -> Floats:
-        """Mass of the unknown, (1,)."""
+        """Mass of the dof, (1,)."""
         return np.array([self.total_mass])
 
     def kinetic_energy(self, velocity: Floats) -> Floats:
@@ -171,7 +170,7 @@ class RigidMass:
         return np.asarray(0.5 * self.total_mass * velocity[:, 0] ** 2)
 
     def strain_energy(self, deformation: Floats) -> Floats:
-        """Strain energy of displacements (rows, 1) relative to the tip: none."""
+        """Strain energy of displacements (rows, 1) relative to the tip: zero."""
         return np.zeros(len(deformation))
 
 
@@ -180,14 +179,14 @@ Projectile = Rod | RigidMass
 
 @dataclass(frozen=True)
 class Transducer:
-    """Where and how the transducer measures.
+    """Node and sign of the force that the transducer measures.
 
     Attributes
     ----------
     node : int
         Node of the rod, from 1; 0 for the contact force itself.
     sign : float
-        -1 for a force that is positive in compression, +1 in tension.
+        -1 for a force positive in compression, +1 for one positive in tension.
     """
 
     node: int
@@ -195,14 +194,14 @@ class Transducer:
 
 
 def report_rod(density: float = REPORT_DENSITY) -> Rod:
-    """Build the rod that stands in the report's program (lb, in, s)."""
+    """Build the rod of the report's program (lb, in, s)."""
     rest = REPORT_ELEMENTS - len(REPORT_CAP)
     diameters = REPORT_CAP + (REPORT_DIAMETER,) * rest
     return Rod(REPORT_LENGTH, diameters, REPORT_MODULUS, density)
 
 
 def rigid_approach(rod: Projectile, velocity: float, *, derivatives_too: bool = False) -> RodState:
-    """State of a projectile that approaches the plate as a rigid body.
+    """Initial state of a projectile that approaches the plate as a rigid body.
 
     Parameters
     ----------

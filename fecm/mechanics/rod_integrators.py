@@ -1,4 +1,4 @@
-"""Choices of the rod's mass matrix and integration, named without importing anything else."""
+"""Implicit integration of the projectile: Wilson's theta method and average acceleration."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from fecm._typing import Floats
 
-# The report's program lumps the mass; its text has the consistent one (equation 4-24).
+# The report's program uses the lumped mass, its text the consistent one (equation 4-24).
 LUMPED, CONSISTENT = "lumped", "consistent"
 
 MASSES = (LUMPED, CONSISTENT)
@@ -21,7 +21,7 @@ INTEGRATORS = (WILSON, AVERAGE)
 
 @dataclass(frozen=True)
 class RodMethod:
-    """How a rod is made to move; the default is the report's program.
+    """Mass matrix and integration method of a rod; the defaults are the report program's.
 
     Attributes
     ----------
@@ -33,27 +33,25 @@ class RodMethod:
     Raises
     ------
     ValueError
-        If one of them is unknown.
+        If mass or integrator is unknown.
     """
 
     mass: str = LUMPED
     integrator: str = WILSON
 
     def __post_init__(self) -> None:
-        for what, value, known in (
+        for name, value, known in (
             ("mass", self.mass, MASSES),
             ("integrator", self.integrator, INTEGRATORS),
         ):
             if value not in known:
-                raise ValueError(f"unknown rod {what} {value!r}; known are {', '.join(known)}")
+                raise ValueError(f"unknown rod {name} {value!r}; known are {', '.join(known)}")
 
     @property
     def attributes(self) -> dict[str, str]:
-        """What a result tells of it: nothing of what is the default."""
-        default = RodMethod()
-        told = {"rod_mass": self.mass, "rod_integrator": self.integrator}
-        usual = {"rod_mass": default.mass, "rod_integrator": default.integrator}
-        return {name: value for name, value in told.items() if value != usual[name]}
+        """Attributes of a result: the values that differ from the defaults."""
+        values = {"rod_mass": self.mass, "rod_integrator": self.integrator}
+        return {name: value for name, value in values.items() if value not in (LUMPED, WILSON)}
 
 
 WILSON_THETA = 1.4
@@ -63,14 +61,13 @@ WILSON_THETA = 1.4
 class RodState:
     """State of a rod.
 
-    Displacements are kept relative to the tip: a projectile flies far, and what is strain in them
-    would drown in the rounding of the flight.
+    Displacements are relative to the tip, so that a long flight does not cancel the strains.
 
     Attributes
     ----------
     motion : ndarray (3, n, ...)
-        Displacement relative to the tip, velocity and acceleration of every unknown; in the place
-        of the tip's own displacement stands what the last step added to it.
+        Displacement relative to the tip, velocity and acceleration of every dof; the first
+        displacement is the tip's increment of the last step.
     tip : float or ndarray (...)
         Displacement of the tip.
     """
@@ -80,68 +77,69 @@ class RodState:
 
     @classmethod
     def of(cls, displacement: Floats, velocity: Floats, acceleration: Floats) -> RodState:
-        """Make a state of the displacement, velocity and acceleration of every unknown."""
+        """State with the displacement, velocity and acceleration of every dof."""
         motion = np.array([displacement, velocity, acceleration])
         motion[0, ::2] -= displacement[0]
         return cls(motion, displacement[0])
 
     @property
     def deformation(self) -> Floats:
-        """Displacement of every unknown relative to the tip, (n, ...)."""
+        """Displacement of every dof relative to the tip, (n, ...)."""
         deformation = self.motion[0].copy()
         deformation[0] = 0.0
         return np.asarray(deformation)
 
     @property
     def displacement(self) -> Floats:
-        """Displacement of every unknown, (n, ...)."""
+        """Displacement of every dof, (n, ...)."""
         displacement = self.deformation
         displacement[::2] += self.tip
         return displacement
 
     @property
     def velocity(self) -> Floats:
-        """Velocity of every unknown, (n, ...)."""
+        """Velocity of every dof, (n, ...)."""
         return np.asarray(self.motion[1])
 
     @property
     def acceleration(self) -> Floats:
-        """Acceleration of every unknown, (n, ...)."""
+        """Acceleration of every dof, (n, ...)."""
         return np.asarray(self.motion[2])
 
 
 class TipStep(Protocol):
-    """What the contact iteration needs of a projectile's step; see :class:`RodIntegrator`."""
+    """Interface of a projectile's step to the contact iteration; see :class:`RodIntegrator`."""
 
     @property
     def theta(self) -> float:
-        """Where in the step equilibrium is met."""
+        """Time of equilibrium, as a fraction of the step."""
         ...
 
     @property
     def gain(self) -> Any:
-        """The tip's acceleration per force."""
+        """Tip acceleration per force."""
         ...
 
     @property
     def weight(self) -> Any:
-        """The tip's displacement per new acceleration."""
+        """Tip displacement per new acceleration."""
         ...
 
     def begin(self, state: Any) -> tuple[Any, Any, Any, Any]:
-        """Free motion, and of the tip: acceleration in it, drift, acceleration so far."""
+        """Free motion, and the tip's acceleration in it, drift and last acceleration."""
         ...
 
     def end(self, state: Any, motion: Any, force: Any) -> Any:
-        """State after the step, with the displacement `tip`."""
+        """State after the step."""
         ...
 
 
 class RodIntegrator:
     r"""One step of an implicit method as a linear map, for a rod and a time step.
 
-    Equilibrium is met at :math:`t + \theta \Delta t`, the acceleration running linearly from
-    :math:`a` to :math:`a'` over the step; displacements are those of Newmark's method,
+    Equilibrium (equation 4-25) is satisfied at :math:`t + \theta \Delta t`, with the acceleration
+    linear from :math:`a` to :math:`a'` over the step [1]_.  Displacements are those of Newmark's
+    method,
     :math:`u' = u + \Delta t v + \Delta t^2 ((1/2 - \beta) a + \beta a')`, velocities
     :math:`v' = v + \Delta t (a + a') / 2`.  With :math:`y` the motion of :class:`RodState` and
     :math:`f` the force on the tip at :math:`t + \theta \Delta t`, the new motion is
@@ -156,24 +154,28 @@ class RodIntegrator:
     dt : float
         Time step.
     constants_dt : float, optional
-        Time step that the method's constants are made for, if not `dt` (the slip ``rod-dt``).
+        Time step of the method's constants, if not `dt` (the slip ``rod-dt``).
 
     Attributes
     ----------
     theta : float
-        Where in the step equilibrium is met.
+        Time of equilibrium, as a fraction of the step.
     inverse_beta : float
         1/beta, above 2.
     T : ndarray (3 n, 3 n)
     h : ndarray (3 n,)
     gain : float
-        The tip's acceleration per force, of `h`.
+        Tip acceleration per force, from `h`.
     weights : (float, float)
-        The tip's displacement per acceleration at the step's begin and at its end.
+        Tip displacement per acceleration at the start and at the end of the step.
     weight : float
         The latter.
     n : int
-        Number of the rod's unknowns.
+        Number of dofs.
+
+    References
+    ----------
+    .. [1] K.-J. Bathe and E. L. Wilson, Numerical Methods in Finite Element Analysis, 1976.
     """
 
     theta: ClassVar[float]
@@ -198,7 +200,7 @@ class RodIntegrator:
             weighed = factor * effective
             return np.asarray(weighed * m if lumped else weighed @ m)
 
-        # Written for the increment from u, so that the rigid motion does not cancel against it.
+        # In terms of the increment from u, to avoid cancellation with the rigid motion.
         acceleration = np.hstack(
             [
                 -a4 * effective @ K,
@@ -206,7 +208,7 @@ class RodIntegrator:
                 on_mass((r / 2.0 - 1.0) * a4) + (1.0 - r / 2.0 / theta) * one,
             ]
         )
-        # Rigid displacements cause no force, and displacements are relative to the tip.
+        # Rigid displacements cause no force; displacements are relative to the tip.
         acceleration[:, 0] = 0.0
         kept, relative = one.copy(), one.copy()
         kept[0, 0] = 0.0
@@ -227,8 +229,8 @@ class RodIntegrator:
         motion : ndarray (3 n, ...)
             New motion if no force acted on the tip.
         base, drift, acceleration : float or ndarray (...)
-            The tip's acceleration in it; its displacement but for what the new acceleration adds,
-            `weight` times it; its acceleration so far.
+            Of the tip: acceleration in that motion; new displacement without `weight` times the
+            new acceleration; last acceleration.
         """
         motion = np.dot(self.T, state.motion.reshape(3 * self.n, *state.motion.shape[2:]))
         _, v, a = state.motion[:, 0].tolist() if motion.ndim == 1 else state.motion[:, 0]
@@ -236,26 +238,26 @@ class RodIntegrator:
         return motion, base, state.tip + self.dt * v + self.weights[0] * a, a
 
     def end(self, state: RodState, motion: Floats, force: Any) -> RodState:
-        """End a step that began with `motion`, under a force on the tip at t + theta dt."""
+        """Complete a step of free motion `motion` under a force on the tip at t + theta dt."""
         h = self.h if motion.ndim == 1 else self.h[:, None]
         motion += h * force
         moved = motion.item(0) if motion.ndim == 1 else motion[0]
         return RodState(motion.reshape(3, self.n, *motion.shape[1:]), state.tip + moved)
 
     def advance(self, state: RodState, force: Any = 0.0) -> RodState:
-        """State after a whole step under a force on the tip at t + theta dt."""
+        """State after a step under a force on the tip at t + theta dt."""
         return self.end(state, self.begin(state)[0], force)
 
 
 class WilsonStep(RodIntegrator):
-    """Wilson's theta method: the report's program."""
+    """Wilson's theta method, used by the report's program."""
 
     theta = WILSON_THETA
     inverse_beta = 6.0
 
 
 class AverageAccelerationStep(RodIntegrator):
-    """Newmark's average acceleration, which keeps the energy of free motion."""
+    """Newmark's average acceleration, which conserves the energy of free motion."""
 
     theta = 1.0
     inverse_beta = 4.0

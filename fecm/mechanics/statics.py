@@ -1,4 +1,4 @@
-"""Static solution: K u = P with scipy's sparse factorisation, and the reactions of the supports."""
+"""Static solution K u = P by sparse factorisation, and support reactions."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from fecm._errors import FecmError
 from fecm._typing import Floats
 from fecm.mechanics.plate import PlateModel
 
-# Residual, relative to the load, beyond which a stiffness counts as singular.
+# Residual relative to the load above which the stiffness is considered singular.
 SINGULAR = 1.0e-6
 
 
 class SingularStiffnessError(FecmError, ArithmeticError):
-    """The plate is not held: it can move without strain."""
+    """The supports allow motion without strain."""
 
 
 class Tangent:
@@ -29,7 +29,7 @@ class Tangent:
     Raises
     ------
     SingularStiffnessError
-        If no factors exist.
+        If the factorisation fails.
     """
 
     def __init__(self, plate: PlateModel) -> None:
@@ -40,8 +40,8 @@ class Tangent:
                 self._factors: SuperLU = splu(
                     plate.stiffness.tocsc(),
                     permc_spec="MMD_AT_PLUS_A",
-                    # K is positive definite: to look for other pivots only costs fill, forty
-                    # times the factors on a plate of 30 x 30 elements.
+                    # K is positive definite; pivoting only costs fill, a factor of 40 on a plate
+                    # of 30 x 30 elements.
                     diag_pivot_thresh=0.0,
                     options={"SymmetricMode": True},
                 )
@@ -49,12 +49,12 @@ class Tangent:
             raise SingularStiffnessError(f"the stiffness is singular ({error})") from None
 
     def solve(self, residual: Floats) -> Floats:
-        """Displacement that a load causes, (neq,).
+        """Displacement under a load, (neq,).
 
         Raises
         ------
         SingularStiffnessError
-            If what comes out does not balance the load.
+            If the solution does not balance the load.
         """
         change = self._factors.solve(residual)
         left = np.abs(self._stiffness @ change - residual).max()
@@ -64,15 +64,15 @@ class Tangent:
 
 
 def reactions(plate: PlateModel, field: Floats, factor: float) -> Floats:
-    """Internal less applied force of every unknown of every node.
+    """Internal minus applied force of every dof of every node.
 
-    Forces of the supports where an unknown is restrained; what is out of balance where it is not.
+    The support force where a dof is restrained; the residual where it is free.
 
     Parameters
     ----------
     plate : PlateModel
     field : ndarray (numnp, 5)
-        Every unknown of every node.
+        All dofs of all nodes.
     factor : float
         Load factor of nodal forces.
 

@@ -23,15 +23,15 @@ RESULTANTS = ("N_x", "N_y", "N_xy", "M_x", "M_y", "M_xy", "Q_x", "Q_y")
 def strains_and_resultants(
     strains: StrainField, laminate: Laminate, field: Floats
 ) -> dict[str, Floats]:
-    """Midplane strains, curvatures, transverse shear strains, and what they cause (equation 2-20).
+    """Midplane strains, curvatures, transverse shear strains and resultants (equation 2-20).
 
     Parameters
     ----------
     strains : StrainField
-        The points.
+        Strains at the points.
     laminate : Laminate
     field : ndarray (numnp, 5)
-        Every unknown of every node.
+        All dofs of all nodes.
 
     Returns
     -------
@@ -39,7 +39,7 @@ def strains_and_resultants(
         By the names of :data:`GENERALISED_STRAINS` and :data:`RESULTANTS`.
     """
     bending = strains.evaluate(field)
-    # The curvature of rotations (-u, -v) is the midplane strain of u and v.
+    # The curvatures of the rotations (-u, -v) are the midplane strains of u and v.
     in_plane = np.zeros_like(field)
     in_plane[:, 3:] = -field[:, :2]
     membrane = strains.evaluate(in_plane)[:3]
@@ -53,7 +53,7 @@ def strains_and_resultants(
 
 STRAINS = ("kappa_x", "kappa_y", "kappa_xy", "gamma_yz", "gamma_xz")
 
-# Elements whose strains are found at once: so few that BLAS uses one thread.
+# Elements per product: so few that BLAS uses one thread.
 STRAIN_BLOCK = 256
 
 
@@ -68,8 +68,8 @@ class StrainField:
         Length.
     rule : Quadrature
         The points.
-    transposed : bool
-        See :func:`interpolate`.
+    transposed_jacobian : bool
+        See :func:`~fecm.mechanics.element_matrices.interpolate`.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class StrainField:
         for family in element_blocks(elements, coordinates):
             values, local = local_shape_functions(family, rule)
             self._families.append((family, values))
-            # Rows: d/dxi, d/deta and value at every point, so that one product gives them all.
+            # Rows: d/dxi, d/deta and value at every point, for one matrix product.
             table = np.concatenate([local[:, 0], local[:, 1], values])
             inverse = inverse_jacobian(family, local, transposed_jacobian=transposed_jacobian)[0]
             for start in range(0, len(family.rows), STRAIN_BLOCK):
@@ -102,7 +102,7 @@ class StrainField:
                 )
 
     def places(self, coordinates: Floats) -> tuple[Floats, Floats]:
-        """Where the points are: x and y, (numel, npt)."""
+        """Coordinates x and y of the points, (numel, npt)."""
         x, y = np.empty((2, *self.shape))
         for family, values in self._families:
             place = np.einsum("eni,pn->iep", coordinates[family.nodes], values)
@@ -115,7 +115,7 @@ class StrainField:
         Parameters
         ----------
         displacement : ndarray (numnp, 5) or (rows, numnp, 5)
-            All unknowns of all nodes.
+            All dofs of all nodes.
 
         Returns
         -------
@@ -129,10 +129,10 @@ class StrainField:
         for rows, places, table, inverse in self._blocks:
             q = fields.take(places, axis=1).reshape(len(fields), len(places), -1)
             at = (table @ q).reshape(len(fields), 3, npt, 3, len(rows))
-            xi, eta, values = at.swapaxes(0, 1)  # each: field, point, unknown, element
+            xi, eta, values = at.swapaxes(0, 1)  # each: field, point, dof, element
             dx = inverse[0, 0] * xi + inverse[0, 1] * eta
             dy = inverse[1, 0] * xi + inverse[1, 1] * eta
-            # 0.0 - a, so that a plate at rest has no negative zeros.
+            # 0.0 - a avoids negative zeros of a plate at rest.
             parts = (
                 0.0 - dx[:, :, 1],
                 0.0 - dy[:, :, 2],

@@ -1,6 +1,6 @@
-"""Time steps below which the central differences are stable.
+"""Critical time step of the central differences.
 
-They are stable below 2 over the largest angular frequency of the plate with its lumped mass.
+It is 2 over the largest angular frequency of the plate with its lumped mass.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from fecm.mechanics.element_groups import congruence
 from fecm.mechanics.plate import BLOCK, PlateModel, UnsoundPlateError
 from fecm.mechanics.stiffness_product import SAFE, stiffness_operator
 
-# Residual of the highest mode over its eigenvalue, at the most; no eigenvalue is farther off.
+# Largest residual of the highest mode, relative to its eigenvalue; it bounds the error.
 TOLERANCE = 1.0e-4
-# Equations below which all eigenvalues are as quick to find.
+# Fewer equations are solved as a dense problem.
 FEW = 20
 
 BEYOND = "the stiffness is beyond the range of numbers"
@@ -26,13 +26,13 @@ BEYOND = "the stiffness is beyond the range of numbers"
 def safe_time_step(model: PlateModel) -> float:
     """A lower bound of the critical time step, from the elements alone.
 
-    No mode of the plate is faster than the fastest of its unsupported elements (Irons and
-    Treharne's theorem).  A few per cent below the critical step, and far cheaper to have.
+    The largest frequency of the plate is at most that of its unsupported elements (theorem of Irons
+    and Treharne).  The bound is a few per cent below the critical step and far cheaper to compute.
 
     Raises
     ------
     UnsoundPlateError
-        If an element's numbers are beyond all range.
+        If an element's stiffness is not finite.
     """
     fastest = 0.0
     for family in model.families:
@@ -49,33 +49,33 @@ def safe_time_step(model: PlateModel) -> float:
 
 
 def taken_time_step(critical: float) -> float:
-    """Time step that DT 0 takes below a critical one: 0.9 of it, in three digits."""
+    """Time step of DT 0: 0.9 of the critical one, rounded to three digits."""
     return float(f"{SAFE * critical:.3g}")
 
 
 def rounded_time_step(critical: float) -> float:
-    """Time step that ``fecm new`` writes: 0.9 of the critical one, rounded down to two digits."""
+    """Time step of ``fecm new``: 0.9 of the critical one, rounded down to two digits."""
     limit = SAFE * critical
     unit = 10.0 ** (math.floor(math.log10(limit)) - 1)
     return float(f"{math.floor(limit / unit) * unit:.1e}")
 
 
 def critical_time_step(model: PlateModel, spring: tuple[int, float] | None = None) -> float:
-    """Largest stable step of the central differences: 2 over the largest angular frequency.
+    """Critical time step of the central differences: 2 over the largest angular frequency.
 
-    The time integrated by v += dt a, u += dt v is stable below it.  Found by Lanczos iteration,
-    without a matrix of the whole plate, to a relative accuracy of 5e-5 at the least.
+    Computed by Lanczos iteration without assembling the stiffness; the relative error is at most
+    5e-5.
 
     Parameters
     ----------
     model : PlateModel
     spring : (int, float), optional
-        Row of an equation, from 0, and the stiffness (force/length) of a spring to ground on it.
+        Equation, from 0, and stiffness (force/length) of a spring to ground.
 
     Raises
     ------
     UnsoundPlateError
-        If the iteration fails, as it does where numbers are beyond all range.
+        If the stiffness is not finite or the iteration fails.
     """
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
@@ -87,8 +87,8 @@ def critical_time_step(model: PlateModel, spring: tuple[int, float] | None = Non
         with np.errstate(all="ignore"):
             y = np.asarray(scale * product(scale * x.ravel()))
             if spring is not None:
-                row, stiffness = spring
-                y[row] += stiffness * scale[row] ** 2 * x.ravel()[row]
+                equation, stiffness = spring
+                y[equation] += stiffness * scale[equation] ** 2 * x.ravel()[equation]
             return y
 
     start = np.random.default_rng(0).standard_normal(model.neq)

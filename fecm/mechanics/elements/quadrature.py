@@ -1,8 +1,8 @@
-"""Points and weights on the square -1 <= xi, eta <= 1.
+"""Quadrature points and weights on the square -1 <= xi, eta <= 1.
 
-Points are in the report's order: corners counter-clockwise from (-1, -1), mid-sides from eta = -1
-on, centre.  Order 4 takes the corners of the large square, of the tall and the wide rectangle, and
-of the small square.
+Points are in the report's order: corners counter-clockwise from (-1, -1), mid-sides starting at
+eta = -1, centre.  Order 4 has the corners of the large square, of the tall and the wide rectangle,
+and of the small square.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ _ETA = np.array([-1, -1, 1, 1, -1, 0, 1, 0, 0])
 
 @dataclass(frozen=True)
 class Quadrature:
-    """Points of a quadrature rule, or of the nodes' grid.
+    """Points and weights of a quadrature rule.
 
     Attributes
     ----------
     xi, eta : ndarray (n,)
         Local coordinates.
     weights : ndarray (n,)
-        They add up to 4, the square's area.
+        Their sum is 4, the area of the square.
     """
 
     xi: Floats
@@ -49,10 +49,10 @@ def gauss(order: int) -> Quadrature:
 
 
 def nodal(order: int) -> Quadrature:
-    """Grid of `order` equally spaced points in each direction, the outer ones on the edges.
+    """Grid of `order` equally spaced points in each direction, including the edges.
 
-    Order 3 gives the nodes of the 9-node element.  Weights are those of the Gauss rule of the same
-    order and serve no integration.
+    Order 3 gives the nodes of the 9-node element.  Weights are those of the Gauss rule and must not
+    be used for integration.
 
     Raises
     ------
@@ -70,9 +70,9 @@ def _known(order: int) -> int:
 
 
 def _rule(order: int, points: Floats, weights: Floats) -> Quadrature:
-    """Take a rule's tensor product in the report's order, from ascending points in 1D."""
+    """Tensor product of ascending 1D points, in the report's order."""
     if order <= 3:
-        # Indices of the points at -1, 0 and +1: with two points there is no middle one.
+        # Indices of the points at -1, 0 and +1; two points have no middle one.
         index = {-1: 0, 0: order // 2, 1: order - 1}
         first = 8 if order == 1 else 0
         pairs = [

@@ -1,7 +1,7 @@
-"""Quadrilateral with 4 to 9 nodes: corners, then mid-sides, then the centre (equation 4-7 ff.).
+"""Quadrilateral with 4 to 9 nodes: corners, then mid-sides, then the centre (equations 4-7 ff.).
 
 Corners run counter-clockwise from (-1, -1), mid-side node 5 lies between corners 1 and 2, and so
-on, node 9 in the centre.  Any of nodes 5 to 9 may be absent; what is left stays continuous with its
+on, node 9 in the centre.  Any of nodes 5 to 9 may be absent; the element stays compatible with its
 neighbours and reproduces every linear field.  Shape functions of an absent node are zero.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from fecm._typing import Bools, Floats
-from fecm.mechanics.elements.shape import ElementShape
+from fecm.mechanics.elements.shape import ElementShape, corner_functions
 
 NODES = 9
 # Local coordinates of the nodes.
@@ -28,7 +28,7 @@ def shape_functions(xi: Floats, eta: Floats, present: Bools) -> tuple[Floats, Fl
     xi, eta : ndarray (n,)
         Points.
     present : ndarray (9,) of bool
-        Which nodes the element has; the corners always are.
+        Which nodes are present; the corners always are.
 
     Returns
     -------
@@ -38,11 +38,8 @@ def shape_functions(xi: Floats, eta: Floats, present: Bools) -> tuple[Floats, Fl
         Derivatives with respect to xi and eta.
     """
     xi, eta = np.asarray(xi, dtype=float), np.asarray(eta, dtype=float)
-    # Rows: value, d/dxi, d/deta.  First each function as if it stood alone on its side.
-    S = np.zeros((3, NODES, len(xi)))
-    for i in range(4):
-        a, b = 1.0 + XI[i] * xi, 1.0 + ETA[i] * eta
-        S[:, i] = a * b / 4.0, XI[i] * b / 4.0, ETA[i] * a / 4.0
+    # Rows: value, d/dxi, d/deta.  First each function without the other nodes of its side.
+    S = corner_functions(NODES, xi, eta)
     for i in (4, 6):  # mid-sides at eta = -1 and +1
         a, b = 1.0 - xi**2, 1.0 + ETA[i] * eta
         S[:, i] = a * b / 2.0, -xi * b, ETA[i] * a / 2.0
@@ -51,7 +48,7 @@ def shape_functions(xi: Floats, eta: Floats, present: Bools) -> tuple[Floats, Fl
         S[:, i] = a * b / 2.0, XI[i] * b / 2.0, -a * eta
     S[:, 8] = (1.0 - xi**2) * (1.0 - eta**2), -2.0 * xi * (1.0 - eta**2), -2.0 * eta * (1.0 - xi**2)
     S[:, ~np.asarray(present)] = 0.0
-    # Then take from each what it has at the nodes of a higher kind.
+    # Then subtract from each function its values at the mid-sides and the centre.
     centre = S[:, 8].copy()
     for i in range(4, 8):
         if present[i]:

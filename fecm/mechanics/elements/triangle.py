@@ -1,8 +1,7 @@
-"""Triangle with 3 nodes: the 4-node quadrilateral whose corners 3 and 4 are one.
+"""Triangle with 3 nodes: the 4-node quadrilateral with coincident corners 3 and 4.
 
-Corners run counter-clockwise; the square's side eta = 1 is the point of node 3.  There the Jacobian
-is zero, so that strains exist inside the element only.  They are constant: in x and y the shape
-functions are the area coordinates.
+Corners run counter-clockwise; the side eta = 1 of the square is collapsed to node 3, where the
+Jacobian is singular.  Strains are constant: the shape functions are the area coordinates.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import numpy as np
 from fecm._typing import Bools, Floats
 from fecm.mechanics.elements.shape import ElementShape
 
-# Local coordinates of the nodes; node 3 takes the whole side eta = 1, and stands in its middle.
+# Local coordinates of the nodes; node 3 is in the middle of the collapsed side eta = 1.
 XI = np.array([-1.0, 1.0, 0.0])
 ETA = np.array([-1.0, -1.0, 1.0])
 
@@ -25,7 +24,7 @@ def shape_functions(xi: Floats, eta: Floats, present: Bools) -> tuple[Floats, Fl
     xi, eta : ndarray (n,)
         Points.
     present : ndarray (3,) of bool
-        All true: a triangle has its corners.
+        All true.
 
     Returns
     -------

@@ -7,16 +7,13 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg.lapack import dgejsv
 
 from fecm._typing import Floats
 from fecm.studies.waves.medium import BEYOND, Medium, best, gradients, in_normal_axes, shares
 
 # Names of the modes; the flexural ones by their velocity, the slowest first.
 MODES = ("flexural_1", "flexural_2", "flexural_3", "extension", "in_plane_shear")
-
-# Columns whose cosine is below this are at right angles; sweeps after which they always are.
-ANGLE = 1e-14
-SWEEPS = 60
 
 
 @dataclass(frozen=True)
@@ -136,7 +133,7 @@ def graded_modes(stiffness: Floats, inertia: Floats) -> tuple[Floats, Floats]:
     # The singular values of this product are the frequencies.  But for the factor `rise` of its
     # columns it is well conditioned, as the ratios in it are at most 1.
     ratios = np.triu(rise[:, :, None] / rise[:, None])
-    values, right = _singular(root @ (inverse * ratios) * rise[:, None])
+    values, right = _singular_values(root @ (inverse * ratios) * rise[:, None])
     return values, back @ ((inverse / of_m[:, :, None]) @ right)
 
 
@@ -145,49 +142,31 @@ def _outer(scale: Floats) -> Floats:
     return scale[:, :, None] * scale[:, None]
 
 
-def _singular(matrix: Floats) -> tuple[Floats, Floats]:
-    """Singular values, falling, and right singular vectors as columns, by one-sided Jacobi.
+def _singular_values(matrices: Floats) -> tuple[Floats, Floats]:
+    """Singular values, descending, and right singular vectors as columns.
 
-    Columns are turned in pairs until all are at right angles.  Scales of the columns do no harm:
-    of the graded matrices here no small singular value is lost beside a large one.
+    LAPACK's Jacobi method keeps small singular values of column-scaled matrices accurate.
 
     Parameters
     ----------
-    matrix : ndarray (n, m, m)
+    matrices : ndarray (n, m, m)
 
     Raises
     ------
     ValueError
-        If the numbers are beyond all range.
+        If a number is not finite or not positive.
     """
-    size = matrix.shape[1]
-    both = np.concatenate([matrix, np.broadcast_to(np.eye(size), matrix.shape)], axis=1)
-    turned = True
-    for _ in range(SWEEPS):
-        turned = False
-        for p, q in combinations(range(size), 2):
-            a, b = both[:, :, p], both[:, :, q]
-            aa, bb, ab = (
-                (x[:, :size] * y[:, :size]).sum(axis=1) for x, y in ((a, a), (b, b), (a, b))
-            )
-            skew = np.abs(ab) > ANGLE * np.sqrt(aa * bb)
-            zeta = np.where(skew, bb - aa, 1.0) / np.where(skew, 2.0 * ab, 1.0)
-            tangent = np.copysign(1.0, zeta) / (np.abs(zeta) + np.hypot(1.0, zeta))
-            tangent = np.where(skew, tangent, 0.0)[:, None]
-            cosine = 1.0 / np.hypot(1.0, tangent)
-            both[:, :, p], both[:, :, q] = (
-                cosine * (a - tangent * b),
-                cosine * (b + tangent * a),
-            )
-            turned |= bool(skew.any())
-        if not turned:
-            break
-    values = np.sqrt((both[:, :size] ** 2).sum(axis=1))
-    if turned or not np.all(np.isfinite(values) & (values > 0.0)):
+    if not np.isfinite(matrices).all():
         raise ValueError(BEYOND)
-    order = np.argsort(-values, axis=1)
-    vectors = np.take_along_axis(both[:, size:], order[:, None], axis=2)
-    return np.take_along_axis(values, order, axis=1), vectors
+    values, vectors = np.empty(matrices.shape[:2]), np.empty(matrices.shape)
+    for n, matrix in enumerate(matrices):
+        scaled, _, vectors[n], scale, _, info = dgejsv(matrix, joba=0)
+        if info:
+            raise ValueError(BEYOND)
+        values[n] = scaled * (scale[0] / scale[1])
+    if not np.all(np.isfinite(values) & (values > 0.0)):
+        raise ValueError(BEYOND)
+    return values, vectors
 
 
 _PAIRS = np.array(list(combinations(range(5), 2)))  # modes that may be the two in-plane ones
