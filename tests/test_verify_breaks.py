@@ -26,6 +26,7 @@ from fecm.mechanics.contact_law import (
 from fecm.mechanics.impact import ImpactSystem
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.strains import StrainField
+from fecm.problem import build
 from fecm.simulation.recorder import Recorder
 from fecm.studies.rod_test import pulse_test
 from fecm.studies.waves.fronts import Fronts
