@@ -12,7 +12,7 @@ from scipy.linalg.lapack import dgejsv
 from fecm._typing import Floats
 from fecm.studies.waves.medium import BEYOND, Medium, best, gradients, in_normal_axes, shares
 
-# Names of the modes; the flexural ones by their velocity, the slowest first.
+# Names of the modes; flexural modes in ascending order of velocity.
 MODES = ("flexural_1", "flexural_2", "flexural_3", "extension", "in_plane_shear")
 
 
@@ -41,8 +41,8 @@ class Dispersion:
 def dispersion(medium: Medium, angle: float, wavelengths: ArrayLike) -> Dispersion:
     """Phase velocities and frequencies of all five modes, equations 2-27 to 2-34.
 
-    The determinants 2-29 and 2-30 become one of order 5 with B and R.  All frequencies are right to
-    about 12 digits, for the longest waves too, where they are many orders apart.
+    With B and R the determinants 2-29 and 2-30 become one of order 5.  All frequencies are accurate
+    to about 12 digits, even for long waves, where they differ by many orders of magnitude.
 
     Parameters
     ----------
@@ -59,13 +59,13 @@ def dispersion(medium: Medium, angle: float, wavelengths: ArrayLike) -> Dispersi
     Raises
     ------
     ValueError
-        If a wavelength is not positive or far beyond any sense, or the laminate's constants are.
+        If a wavelength is outside 1e-9 to 1e9, or the laminate's constants are out of range.
     """
     ratio = np.atleast_1d(np.asarray(wavelengths, dtype=np.float64))
     if not np.all((ratio >= 1e-9) & (ratio <= 1e9)):
         raise ValueError("wavelengths over thickness must lie between 1e-9 and 1e9")
     k = 2.0 * np.pi / (ratio * medium.laminate.thickness)
-    with np.errstate(all="ignore"):  # numbers beyond all range end in an error
+    with np.errstate(all="ignore"):  # overflow raises an error below
         stiffness, inertia, back = _problem(medium, angle, k)
         frequency, modes = graded_modes(stiffness, inertia)
         share = shares(medium.inertia, back @ modes)
@@ -74,11 +74,11 @@ def dispersion(medium: Medium, angle: float, wavelengths: ArrayLike) -> Dispersi
 
 
 def _problem(medium: Medium, angle: float, k: Floats) -> tuple[Floats, Floats, Floats]:
-    """Stiffness, inertia, and the unknowns that they belong to, each (n, 5, 5).
+    """Stiffness, inertia, and transformation to the components u_n ... w, each (n, 5, 5).
 
-    With w a quarter of a period ahead of the others all is real: 2-32 without its i.  In long
-    flexural waves phi_n all but cancels k w; what remains of it, phi_n + tau k w, takes its place
-    among the unknowns, so that nothing is lost to cancellation.  In short waves tau fades.
+    With w a quarter of a period ahead of the others all matrices are real: 2-32 without i.  In long
+    flexural waves phi_n nearly cancels k w; the variable phi_n + tau k w replaces phi_n to avoid
+    the cancellation.  In short waves tau vanishes.
     """
     laminate = medium.laminate
     beyond = k**2 * laminate.rotary_inertia / laminate.mass  # rotary over translatory inertia
@@ -86,7 +86,7 @@ def _problem(medium: Medium, angle: float, k: Floats) -> tuple[Floats, Floats, F
     back = np.tile(np.eye(5), (len(k), 1, 1))
     back[:, 2, 4] = -tau * k
     strain = gradients([angle])[0][0]
-    generalized = np.zeros((len(k), 8, 5))  # strains, curvatures and shear of the unknowns
+    generalized = np.zeros((len(k), 8, 5))  # strains, curvatures and shear
     generalized[:, :3, :2] = k[:, None, None] * strain
     generalized[:, 3:6, 2:4] = k[:, None, None] * strain
     generalized[:, 3:6, 4] = (-tau * k**2)[:, None] * strain[:, 0]
@@ -100,18 +100,18 @@ def _problem(medium: Medium, angle: float, k: Floats) -> tuple[Floats, Floats, F
 
 
 def graded_modes(stiffness: Floats, inertia: Floats) -> tuple[Floats, Floats]:
-    """Frequencies and modes of K a = omega^2 M a whose diagonals may be many orders apart.
+    """Frequencies and modes of K a = omega^2 M a with diagonals of very different magnitude.
 
     Parameters
     ----------
     stiffness, inertia : ndarray (n, m, m)
-        Symmetric and positive definite, and well conditioned once their diagonals are scaled to 1:
-        then every frequency, and not only the highest, is right to nearly all digits.
+        Symmetric, positive definite, and well conditioned after scaling to a unit diagonal: then
+        every frequency, not only the highest, is accurate to nearly all digits.
 
     Returns
     -------
     tuple of ndarray
-        omega (n, m), falling, and the modes as columns (n, m, m), with unit generalized mass.
+        omega (n, m), descending, and the modes as columns (n, m, m), with unit generalized mass.
 
     Raises
     ------
@@ -130,8 +130,8 @@ def graded_modes(stiffness: Floats, inertia: Floats) -> tuple[Floats, Floats]:
         raise ValueError(BEYOND) from None
     inverse = np.linalg.inv(mass).transpose(0, 2, 1)
     rise = of_k / of_m
-    # The singular values of this product are the frequencies.  But for the factor `rise` of its
-    # columns it is well conditioned, as the ratios in it are at most 1.
+    # The singular values of this product are the frequencies.  Apart from the column factor `rise`
+    # it is well conditioned, because its ratios are at most 1.
     ratios = np.triu(rise[:, :, None] / rise[:, None])
     values, right = _singular_values(root @ (inverse * ratios) * rise[:, None])
     return values, back @ ((inverse / of_m[:, :, None]) @ right)
@@ -169,11 +169,11 @@ def _singular_values(matrices: Floats) -> tuple[Floats, Floats]:
     return values, vectors
 
 
-_PAIRS = np.array(list(combinations(range(5), 2)))  # modes that may be the two in-plane ones
+_PAIRS = np.array(list(combinations(range(5), 2)))  # candidates for the two in-plane modes
 
 
 def _in_order(share: Floats) -> NDArray[np.intp]:
-    """Places of the modes, fastest first, in the order of :data:`MODES`; (n, 5)."""
+    """Indices of the modes, sorted by velocity, in the order of :data:`MODES`; (n, 5)."""
     in_plane = share[:, :, :2].sum(axis=2)
     pair = _PAIRS[best(in_plane[:, _PAIRS].sum(axis=2))]
     rest = [[mode for mode in (4, 3, 2, 1, 0) if mode not in taken] for taken in pair.tolist()]

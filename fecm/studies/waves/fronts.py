@@ -1,10 +1,10 @@
 """Wave fronts: normal velocities, rays, positions and cusps, report section 2.3.
 
-Across a front only the highest derivatives jump, so that k drops out of the 5 x 5 problem: what
-remains is L(n) a = c_n^2 M a with A, B, D against P, R, I, and the transverse shear by itself
+Across a front only the highest derivatives are discontinuous, so that k drops out of the 5 x 5
+problem: L(n) a = c_n^2 M a couples A, B, D with P, R, I, and transverse shear is independent
 (equations 2-60 to 2-65).  Rays follow from c_n and its derivatives with respect to the normal's
-angle, which are had from the eigenvalue problem itself: with the slowness p = n/c_n, equation 2-84
-is the ray velocity V = c_n n + c_n' t, and V' = (c_n + c_n'') t.
+angle, computed by perturbation of the eigenvalue problem: with the slowness p = n/c_n, equation
+2-84 is the ray velocity V = c_n n + c_n' t, and V' = (c_n + c_n'') t.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from fecm.studies.waves.sheets import SURE, assigned, match_modes, sheets, track
 # Names of the fronts, by their dominant component: u_n, u_t, phi_n, phi_t, w.
 FRONTS = ("extension", "in_plane_shear", "bending", "twisting", "transverse_shear")
 
-# Steps a degree in which sheets are followed and cusps looked for.
+# Steps per degree for tracking sheets and searching cusps.
 STEPS = 10
 
 
 @dataclass(frozen=True)
 class Fronts:
-    """The five fronts for a series of normals; the axis of five follows :data:`FRONTS`.
+    """The five fronts for a series of normals, in the order of :data:`FRONTS`.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Fronts:
     curvature : ndarray (n, 5)
         Its second derivative.
     share : ndarray (n, 5, 5)
-        Shares that u_n, u_t, phi_n, phi_t, w (last axis) have in the kinetic energy.
+        Shares of u_n, u_t, phi_n, phi_t, w (last axis) in the kinetic energy.
     """
 
     normal: Floats
@@ -59,14 +59,14 @@ class Fronts:
 
     @property
     def ray_angle(self) -> Floats:
-        """Direction of the rays, (n, 5), degrees above -180 and up to 180."""
+        """Direction of the rays, (n, 5), degrees in (-180, 180]."""
         ray = self.ray
         angle = np.rad2deg(np.arctan2(ray[..., 1], ray[..., 0]))
         found: Floats = np.where(angle <= -180.0 + 1e-9, angle + 360.0, angle)
         return found
 
     def positions(self, time: float, radius: float) -> Floats:
-        """Where a front is that was a circle at time 0, equations 2-85 to 2-87.
+        """Positions of fronts that start as a circle, equations 2-85 to 2-87.
 
         Parameters
         ----------
@@ -83,7 +83,7 @@ class Fronts:
         return found
 
     def growth(self, time: float, radius: float) -> Floats:
-        """Length of the front for a radian of the normal, (n, 5); zero at a cusp, then negative."""
+        """Length of the front per radian of the normal, (n, 5); zero at a cusp, then negative."""
         return radius + time * (self.velocity + self.curvature)
 
 
@@ -96,9 +96,9 @@ class Cusp:
     mode : str
         One of :data:`FRONTS`.
     normal : float
-        Angle of the front's normal there, degrees.
+        Angle of the front's normal at the cusp, degrees.
     x, y : float
-        Where it is, length.
+        Position, length.
     """
 
     mode: str
@@ -108,9 +108,9 @@ class Cusp:
 
 
 class WaveSurfaces:
-    """The five fronts of a laminate, each followed around all normals.
+    """The five fronts of a laminate, tracked over all normals.
 
-    Fronts that cross keep their names, and so do those that come near one another and part again.
+    Fronts that cross keep their names, as do fronts that approach each other without crossing.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ class WaveSurfaces:
     Raises
     ------
     ValueError
-        If the velocities are too large, or too far apart, for floating-point numbers.
+        If the velocities are out of the floating-point range.
     """
 
     def __init__(self, medium: Medium) -> None:
@@ -127,12 +127,12 @@ class WaveSurfaces:
         around = sheets(medium, np.arange(360 * STEPS + 1) / STEPS)
         self._mode = around.mode
         step, likeness = match_modes(self._mode[:-1], self._mode[1:])
-        # Steps in which sheets pass one another too closely to be told apart by their ends.
+        # Steps whose end points do not identify the sheets.
         self._close = likeness <= SURE
         for row in np.flatnonzero(self._close).tolist():
             step[row] = track_branch(medium, row / STEPS, (row + 1) / STEPS)
         self._close &= (step == np.arange(5)).all(axis=1)
-        # Places of the sheets that are one with each sheet of the normal 0.
+        # Indices of the sheets that continue each sheet of the normal 0.
         place = np.empty((360 * STEPS + 1, 5), dtype=np.intp)
         place[0] = np.arange(5)
         for row, following in enumerate(step):
@@ -159,7 +159,7 @@ class WaveSurfaces:
         near = np.round(turn).astype(np.intp)
         alike, _ = match_modes(self._mode[near], found.mode)
         place = np.take_along_axis(alike, self._place[near], axis=1)
-        # There the order of the velocities tells what the modes can't.
+        # In close steps the velocities identify the sheets, not the modes.
         step = np.minimum(turn.astype(np.intp), 360 * STEPS - 1)
         place = np.where(self._close[step, None], self._place[step], place)
 
@@ -175,11 +175,10 @@ class WaveSurfaces:
         )
 
     def cusps(self, time: float, radius: float) -> list[Cusp]:
-        """Cusps of the fronts that were a circle at time 0.
+        """Cusps of the fronts that start as a circle.
 
-        A front turns back where its length for a radian of the normal, radius + time (c_n + c_n''),
-        passes through zero.  Between normals a tenth of a degree apart, a thousandth where fronts
-        pass one another closely, one passage is found.
+        A front turns back where its length per radian of the normal, radius + time (c_n + c_n''),
+        changes sign.  The search step is a tenth of a degree, a thousandth where fronts are close.
 
         Parameters
         ----------
@@ -204,20 +203,20 @@ class WaveSurfaces:
 
             normal = float(brentq(at, normals[row], normals[row + 1], xtol=1e-11))
             fronts = self.fronts(normal)
-            # Where fronts touch there may be a jump between the signs, and no zero.
+            # Where fronts touch, the sign may change by a jump instead of a zero.
             if abs(at(normal)) < 1e-5 * (radius + time * fronts.velocity[0, mode]):
                 x, y = fronts.positions(time, radius)[0, mode].tolist()
                 found.append(Cusp(FRONTS[mode], normal % 360.0, x, y))
         return sorted(found, key=lambda cusp: (FRONTS.index(cusp.mode), cusp.normal))
 
     def misnamed(self) -> dict[str, list[tuple[float, float]]]:
-        """Where fronts move more in another component than in the one that names them.
+        """Normals at which a component other than the name's dominates.
 
         Returns
         -------
         dict
-            Of the fronts that do, the first and the last normal of every run of them (degrees, in
-            steps of a tenth).
+            First and last normal (degrees) of every such interval, by front; fronts without one are
+            left out.
         """
         normals = np.arange(360 * STEPS + 1) / STEPS
         share = self.fronts(normals).share

@@ -1,4 +1,4 @@
-"""What a wave sees of a laminate: its stiffness and inertia in the axes of a wave's normal."""
+"""Stiffness and inertia of a laminate in the axes of a wave's normal."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ class Medium:
     Attributes
     ----------
     laminate : Laminate
-        Stiffness, mass P and rotary inertia I; its transverse shear stiffness is taken as it is.
+        Stiffness, mass P and rotary inertia I.
     coupling_inertia : float
-        R of equation 2-24, the first moment of the density about the midplane (mass/length).  A
-        :class:`Laminate` has plies of one density, for which it is zero.
+        R of equation 2-24, the first moment of the density about the midplane (mass/length); zero
+        if all plies have the same density.
 
     Raises
     ------
@@ -47,7 +47,7 @@ class Medium:
 
     @cached_property
     def section(self) -> Floats:
-        """Stiffness [[A, B], [B, D]] of equation 2-20, (6, 6); a B that is rounding is zero."""
+        """Stiffness [[A, B], [B, D]] of equation 2-20, (6, 6), without rounding errors of B."""
         laminate = self.laminate
         b = laminate.B if laminate.is_coupled else np.zeros((3, 3))
         return np.block([[laminate.A, b], [b.T, laminate.D]])
@@ -62,9 +62,9 @@ class Medium:
 
     @property
     def shear_velocity(self) -> float:
-        """Velocity of transverse shear, mean square of all directions (length/time).
+        """Velocity of transverse shear, root mean square over all directions (length/time).
 
-        It is sqrt(G13/rho) where G13 = G23, the velocity that figures 2.4 and 2.5 are scaled by.
+        It is sqrt(G13/rho) if G13 = G23, the scale of figures 2.4 and 2.5.
         """
         return float((np.trace(self.laminate.shear) / (2.0 * self.laminate.mass)) ** 0.5)
 
@@ -111,7 +111,7 @@ def gradients(degrees: ArrayLike) -> tuple[Floats, Floats, Floats]:
 
 
 def in_normal_axes(tensor: Floats, degrees: ArrayLike) -> Floats:
-    """Components nn, nt; tn, tt of a symmetric tensor that is given as xx, xy; yx, yy.
+    """Components nn, nt; tn, tt of a symmetric tensor with components xx, xy; yx, yy.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def in_normal_axes(tensor: Floats, degrees: ArrayLike) -> Floats:
 
 
 def shares(inertia: Floats, vectors: Floats) -> Floats:
-    """Share that every unknown has in the kinetic energy of modes.
+    """Share of every component in the kinetic energy of modes.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def shares(inertia: Floats, vectors: Floats) -> Floats:
     Returns
     -------
     ndarray (..., modes, 5)
-        Adds up to 1 over the unknowns.
+        The sum over the components is 1.
     """
     energy = vectors * (inertia @ vectors)
     found: Floats = np.swapaxes(energy / energy.sum(axis=-2, keepdims=True), -1, -2)
@@ -148,7 +148,7 @@ def shares(inertia: Floats, vectors: Floats) -> Floats:
 
 
 def best(scores: Floats) -> NDArray[np.intp]:
-    """Place of the largest score of every row; of equal ones, up to rounding, the first.
+    """Index of the largest score of every row; the first of those equal up to rounding.
 
     Parameters
     ----------

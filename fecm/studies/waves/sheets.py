@@ -1,7 +1,7 @@
-"""Sheets of the wave fronts: the eigenvalue problem, its derivatives, and what joins its solutions.
+"""Sheets of the wave fronts: the eigenvalue problem, its derivatives, and branch tracking.
 
-The squares of the five normal velocities are the eigenvalues of M^-1 L(n).  As the normal turns,
-each runs along a sheet.  Sheets may cross: then they are told apart by their modes.
+The squares of the five normal velocities are the eigenvalues of M^-1 L(n).  As functions of the
+normal they form sheets; sheets that cross are identified by their modes.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from fecm._typing import Floats
 from fecm.studies.waves.medium import BEYOND, Medium, best, gradients, in_normal_axes, shares
 
-# Squares of velocities that differ by less than this part of the largest are equal.
+# Relative tolerance of equal squared velocities.
 EQUAL = 1e-10
-# Likeness of two modes above which the one continues the other; degrees between two normals below
-# which that is no longer asked for.
+# Squared scalar product above which one mode continues another; smallest step of the normal
+# (degrees).
 SURE, FINEST = 0.8, 1e-9
 
 _ORDERS = np.array(list(permutations(range(5))))
@@ -27,7 +27,7 @@ _ORDERS = np.array(list(permutations(range(5))))
 
 @dataclass(frozen=True)
 class Sheets:
-    """Solutions for a series of normals; the axis of five follows the velocity, falling.
+    """Solutions for a series of normals, in descending order of velocity.
 
     Attributes
     ----------
@@ -37,9 +37,9 @@ class Sheets:
         Normal velocity c_n (length/time), its first and its second derivative with respect to the
         normal's angle (radian).
     mode : ndarray (n, 5, 5)
-        Modes as columns, orthonormal in the inertia's Cholesky factor.
+        Modes as columns, orthonormal after scaling by the inertia's Cholesky factor.
     share : ndarray (n, 5, 5)
-        Shares of the modes (second axis) that the unknowns (third) have in the kinetic energy.
+        Shares of the components (last axis) in the kinetic energy of the modes (second).
     """
 
     normal: Floats
@@ -51,7 +51,7 @@ class Sheets:
 
 
 def sheets(medium: Medium, normal: Floats) -> Sheets:
-    """Solve L(n) a = c_n^2 M a, with derivatives from perturbation of the problem itself.
+    """Solve L(n) a = c_n^2 M a, with derivatives by perturbation.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def sheets(medium: Medium, normal: Floats) -> Sheets:
     Raises
     ------
     ValueError
-        If the velocities are too large, or too far apart, for floating-point numbers.
+        If the velocities are out of the floating-point range.
     """
     with np.errstate(all="ignore"):
         root = np.linalg.inv(np.linalg.cholesky(medium.inertia))
@@ -85,18 +85,18 @@ def sheets(medium: Medium, normal: Floats) -> Sheets:
 
 
 def match_modes(before: Floats, after: Floats) -> tuple[NDArray[np.intp], Floats]:
-    """Which modes continue which, by their likeness.
+    """Match modes of neighbouring normals.
 
     Parameters
     ----------
     before, after : ndarray (n, 5, 5)
-        Modes of normals that differ little, as columns.
+        Modes as columns.
 
     Returns
     -------
     tuple of ndarray
-        Places in `after` of the modes that continue those of `before`, (n, 5), and the least
-        likeness of such a pair, (n,), at most 1.
+        Indices in `after` of the modes that continue those of `before`, (n, 5), and the smallest
+        squared scalar product of such a pair, (n,), at most 1.
     """
     likeness = (before.transpose(0, 2, 1) @ after) ** 2
     pairs = likeness[:, np.arange(5), _ORDERS]
@@ -105,10 +105,10 @@ def match_modes(before: Floats, after: Floats) -> tuple[NDArray[np.intp], Floats
 
 
 def track_branch(medium: Medium, first: float, last: float) -> NDArray[np.intp]:
-    """Places at one normal of the sheets of another, found by steps as small as need be.
+    """Match the sheets of two normals, bisecting the step as necessary.
 
-    Sheets that pass one another closely turn their modes into one another's within a small angle;
-    those that cross keep them.
+    Sheets that approach each other without crossing exchange their modes within a small angle;
+    sheets that cross keep them.
 
     Parameters
     ----------
@@ -130,12 +130,12 @@ def track_branch(medium: Medium, first: float, last: float) -> NDArray[np.intp]:
 
 
 def assigned(share: Floats) -> NDArray[np.intp]:
-    """Place of the mode that takes the name of each unknown, so that the shares' sum is largest.
+    """Assign a mode to each component so that the sum of the shares is largest.
 
     Parameters
     ----------
     share : ndarray (5, 5)
-        Shares of the modes (rows) that the unknowns have.
+        Shares of the components (columns) in the modes (rows).
 
     Returns
     -------
@@ -173,9 +173,9 @@ def _stiffness(medium: Medium, normal: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _solved(operator: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues, falling, and eigenvectors; those of equal eigenvalues follow the sheets.
+    """Eigenvalues, descending, and eigenvectors; those of equal eigenvalues follow the sheets.
 
-    In-plane and flexural unknowns that nothing couples are solved for by themselves.
+    Uncoupled in-plane and flexural components are solved separately.
     """
     coupled = operator[:, :2, 2:4].any()
     values = np.empty(operator.shape[:2])
@@ -200,10 +200,10 @@ def _solved(operator: Floats, first: Floats, second: Floats) -> tuple[Floats, Fl
 def _kept_apart(
     values: Floats, vectors: Floats, first: Floats, second: Floats, limit: float
 ) -> Floats:
-    """Eigenvectors that stay eigenvectors as the normal turns, where sheets meet.
+    """Eigenvectors that are continuous in the normal where sheets meet.
 
-    They make the derivatives of the operator diagonal among the equal eigenvalues, the first, then
-    the second; where the sheets are one and the same, the components are kept apart.
+    Among equal eigenvalues they diagonalise the first, then the second derivative of the operator;
+    for identical sheets they separate the components.
     """
     parts: list[Floats] = []
     for group in _runs(values, limit):
@@ -218,13 +218,13 @@ def _kept_apart(
 
 
 def _runs(values: Floats, limit: float) -> list[NDArray[np.intp]]:
-    """Places of the values that are equal up to `limit`, run by run; the values are in order."""
+    """Indices of runs of sorted values that are equal up to `limit`."""
     steps = np.flatnonzero(np.abs(np.diff(values)) >= limit) + 1
     return np.split(np.arange(len(values)), steps)
 
 
 def _split(basis: Floats, operators: Sequence[Floats], limit: float) -> list[Floats]:
-    """Parts of a subspace that the operators, one after another, tell apart."""
+    """Split a subspace into eigenspaces of the operators, one after another."""
     if basis.shape[1] == 1 or not operators:
         return [basis]
     values, vectors = np.linalg.eigh(basis.T @ operators[0] @ basis)
