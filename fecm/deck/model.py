@@ -7,7 +7,6 @@ only imply are generated from it by :mod:`fecm.mechanics.mesh`.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, TypeVar
@@ -39,23 +38,23 @@ _S = TypeVar("_S", bound="Segment")
 
 
 @dataclass(frozen=True)
-class Segment(Record, ABC):
+class Segment(Record):
     """A keyword card and the data that follow it."""
 
     keyword: ClassVar[str]
+    fields: ClassVar[Fields]
 
-    @abstractmethod
     def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards, the keyword card included."""
+        """Text of the segment's cards: the keyword card and, by default, one card of data."""
+        yield self.keyword
+        yield write_card(self.fields, self.row())
 
 
-def _numbered(
-    keyword: str, fields: Fields, rows: Sequence[tuple[int, ...] | tuple[float, ...]]
-) -> Iterator[str]:
-    """A keyword card, a card a row and the blank card that ends them."""
+def _numbered(keyword: str, fields: Fields, records: Sequence[Record]) -> Iterator[str]:
+    """A keyword card, one card per record and the final blank card."""
     yield keyword
-    for row in rows:
-        yield write_card(fields, row)
+    for record in records:
+        yield write_card(fields, record.row())
     yield ""
 
 
@@ -68,8 +67,7 @@ class Coordinates(Segment):
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
-        rows = [(r.node, r.increment, *r.values) for r in self.records]
-        return _numbered("COOR", node_fields(control.ndm), rows)
+        return _numbered("COOR", node_fields(control.ndm), self.records)
 
 
 @dataclass(frozen=True)
@@ -81,8 +79,7 @@ class Elements(Segment):
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
-        rows = [(r.element, *r.nodes, r.increment) for r in self.records]
-        return _numbered("ELEM", element_fields(control.nen), rows)
+        return _numbered("ELEM", element_fields(control.nen), self.records)
 
 
 @dataclass(frozen=True)
@@ -94,8 +91,7 @@ class Boundary(Segment):
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
-        rows = [(r.node, r.increment, *r.codes) for r in self.records]
-        return _numbered("BOUN", code_fields(control.ndf), rows)
+        return _numbered("BOUN", code_fields(control.ndf), self.records)
 
 
 @dataclass(frozen=True)
@@ -107,8 +103,7 @@ class Forces(Segment):
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
-        rows = [(r.node, r.increment, *r.values) for r in self.records]
-        return _numbered("FORC", force_fields(control.ndf), rows)
+        return _numbered("FORC", force_fields(control.ndf), self.records)
 
 
 @dataclass(frozen=True)
@@ -122,18 +117,12 @@ class Material(Segment):
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
-        rule, ply = self.integration, self.ply
-        values: list[Value] = [rule.bending, rule.shear, rule.points, rule.thickness]
-        if rule.width:
-            values.append(rule.width)
+        values = self.integration.row()[: None if self.integration.width else -1]
         yield "MATE"
         yield write_card(Integration.fields[: len(values)], values)
-        yield write_card(
-            Ply.fields,
-            [ply.density, ply.nu12, ply.e1, ply.e2, ply.g12, ply.g13, ply.g23],
-        )
+        yield write_card(Ply.fields, self.ply.row())
         for layer in self.layers:
-            yield write_card(Layer.fields, [layer.number, layer.angle, layer.thickness])
+            yield write_card(Layer.fields, layer.row())
 
 
 @dataclass(frozen=True)
@@ -158,11 +147,6 @@ class Impact(Segment):
     fields: ClassVar[Fields] = layout(
         "I5 impact node|node", "I5 impact unknown|dof", "F10 impact velocity|velocity"
     )
-
-    def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
-        yield "ROD"
-        yield write_card(self.fields, [self.node, self.dof, self.velocity])
 
 
 @dataclass(frozen=True)
@@ -260,9 +244,7 @@ class Projectile(Segment):
         if not self.elements:
             return
         for record in self.diameters:
-            yield write_card(
-                RodDiameter.fields, [record.element, record.increment, record.diameter]
-            )
+            yield write_card(RodDiameter.fields, record.row())
         yield ""
 
 
@@ -281,11 +263,6 @@ class ShearCorrection(Segment):
 
     fields: ClassVar[Fields] = layout("F10 shear correction factor|factor")
 
-    def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
-        yield "SHEA"
-        yield write_card(self.fields, [self.factor])
-
 
 @dataclass(frozen=True)
 class Gages(Segment):
@@ -296,8 +273,7 @@ class Gages(Segment):
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
-        rows = [(r.number, r.x, r.y, r.z, r.direction) for r in self.records]
-        return _numbered("GAGE", Gage.fields, rows)
+        return _numbered("GAGE", Gage.fields, self.records)
 
 
 @dataclass(frozen=True)
@@ -411,7 +387,7 @@ class Deck(Record):
         """
         lines = [
             f"{TITLE} {self.title}".rstrip(),
-            write_card(Control.fields, self.control.values()),
+            write_card(Control.fields, self.control.row()),
         ]
         for segment in self.segments:
             lines.extend(segment.cards(self.control))

@@ -151,13 +151,13 @@ class Reader:
         row = self.stream.row(card, Control.fields)
         if row is None:
             return None
-        control = Control(*map(int, row[0]), source=row[1])
+        control = Control.from_row(*row)
         return control if self._is_sound(control) else None
 
     def _is_sound(self, control: Control) -> bool:
         """Whether counts and dimensions are such as a deck can have; report them if not."""
         before = len(self.findings)
-        values = control.values()
+        values = control.row()
         if control.nen == 0:
             missing = [f.name for f, value in zip(Control.fields, values, strict=True) if not value]
             self.findings.add(
@@ -338,13 +338,7 @@ class Reader:
             if row is None:
                 self._unsound.add(MACROS)
                 continue
-            (kind, exponent, begin, end, *constants), source = row
-            tables.append(
-                LoadTable(
-                    int(kind), int(exponent), float(begin), float(end),
-                    tuple(map(float, constants)), source=source,
-                )
-            )  # fmt: skip
+            tables.append(LoadTable.from_row(*row))
         return tables
 
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import ClassVar
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, Self
 
 from fecm.deck.card import Fields, Source, Value, layout, write_card
 from fecm.deck.findings import Place
@@ -45,9 +45,33 @@ DOF_NAMES = ("u", "v", "w", "theta_x", "theta_y")
 
 @dataclass(frozen=True, kw_only=True)
 class Record:
-    """Whatever was read from one card."""
+    """Values of one card, as attributes in the card's order.
+
+    Attributes
+    ----------
+    source : Source or None
+        The card; None for a record made in Python.
+    """
 
     source: Source | None = field(default=None, compare=False, repr=False)
+    # Values of the card that one attribute holds as a tuple.
+    packed: ClassVar[slice | None] = None
+
+    @classmethod
+    def from_row(cls, values: Sequence[Value], source: Source) -> Self:
+        """Build the record from a card's values."""
+        arguments: list[Any] = list(values)
+        if cls.packed is not None:
+            arguments[cls.packed] = [tuple(arguments[cls.packed])]
+        return cls(*arguments, source=source)
+
+    def row(self) -> list[Value]:
+        """Values in the card's order."""
+        row: list[Value] = []
+        for attribute in fields(self)[1:]:  # the first is the source
+            value = getattr(self, attribute.name)
+            row += value if isinstance(value, tuple) else (value,)
+        return row
 
     def place(self, name: str = "") -> Place | None:
         """Where the field called `name` stands in the deck; the whole card without a name."""
@@ -77,10 +101,6 @@ class Control(Record):
         "I5 NUMNP", "I5 NUMEL", "I5 LAYER", "I5 NDM", "I5 NDF", "I5 NEN"
     )
 
-    def values(self) -> list[Value]:
-        """Values in the card's order."""
-        return [self.numnp, self.numel, self.layers, self.ndm, self.ndf, self.nen]
-
 
 @dataclass(frozen=True)
 class NodeValues(Record):
@@ -89,6 +109,8 @@ class NodeValues(Record):
     node: int
     increment: int
     values: tuple[float, ...]
+
+    packed: ClassVar[slice] = slice(2, None)
 
 
 @dataclass(frozen=True)
@@ -136,6 +158,8 @@ class NodeCodes(Record):
     increment: int
     codes: tuple[int, ...]
 
+    packed: ClassVar[slice] = slice(2, None)
+
 
 @dataclass(frozen=True)
 class ElementNodes(Record):
@@ -144,6 +168,8 @@ class ElementNodes(Record):
     element: int
     nodes: tuple[int, ...]
     increment: int
+
+    packed: ClassVar[slice] = slice(1, -1)
 
 
 def node_fields(ndm: int) -> Fields:
@@ -311,6 +337,8 @@ class LoadTable(Record):
     end: float
     constants: tuple[float, ...]
 
+    packed: ClassVar[slice] = slice(4, None)
+
     fields: ClassVar[Fields] = layout(
         "I5 type", "I5 exponent|exp", "F10 begin|t_min", "F10 end|t_max",
         *(f"F10 constant A{i}|A{i}" for i in range(1, 6)),
@@ -318,6 +346,4 @@ class LoadTable(Record):
 
     def text(self) -> str:
         """Text of the card."""
-        return write_card(
-            self.fields, [self.kind, self.exponent, self.begin, self.end, *self.constants]
-        )
+        return write_card(self.fields, self.row())

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeVar
 
 from fecm.deck.card import Card, Fields, Source, Value, read_values
 from fecm.deck.findings import Findings
@@ -31,6 +33,7 @@ from fecm.deck.records import (
     NodeCodes,
     NodeValues,
     Ply,
+    Record,
     RodDiameter,
     code_fields,
     element_fields,
@@ -139,6 +142,7 @@ def _is_comment(line: str) -> bool:
 
 
 Row = tuple[list[Value], Source]
+_R = TypeVar("_R", bound=Record)
 
 
 class SegmentReader:
@@ -171,23 +175,23 @@ class SegmentReader:
 
     # Numbered cards up to a blank one ------------------------------------------------------------
 
-    def _rows(self, head: Card, fields: Fields) -> list[Row]:
-        """Rows of numbered cards up to the blank card that ends them."""
-        rows: list[Row] = []
+    def _records(self, head: Card, kind: type[_R], fields: Fields) -> tuple[_R, ...]:
+        """Records of numbered cards up to the final blank card."""
+        records: list[_R] = []
         while (card := self._stream.take()) is not None:
             if card.is_blank:
-                return rows
+                return tuple(records)
             if card.is_keyword:
                 self._stream.give_back()
                 self._not_ended(head, card)
-                return rows
+                return tuple(records)
             row = self._stream.row(card, fields)
             if row is None:
                 self.unsound.add(head.keyword)
             else:
-                rows.append(row)
+                records.append(kind.from_row(*row))
         self._not_ended(head, head)
-        return rows
+        return tuple(records)
 
     def _not_ended(self, head: Card, at: Card) -> None:
         self._stream.findings.add(
@@ -198,20 +202,16 @@ class SegmentReader:
         )
 
     def _coordinates(self, head: Card) -> Segment:
-        rows = self._rows(head, node_fields(self._control.ndm))
-        return Coordinates(_node_values(rows), source=Source(head, ()))
+        records = self._records(head, NodeValues, node_fields(self._control.ndm))
+        return Coordinates(records, source=Source(head, ()))
 
     def _forces(self, head: Card) -> Segment:
-        rows = self._rows(head, force_fields(self._control.ndf))
-        return Forces(_node_values(rows), source=Source(head, ()))
+        records = self._records(head, NodeValues, force_fields(self._control.ndf))
+        return Forces(records, source=Source(head, ()))
 
     def _boundary(self, head: Card) -> Segment:
-        rows = self._rows(head, code_fields(self._control.ndf))
-        records = [
-            NodeCodes(int(v[0]), int(v[1]), tuple(map(int, v[2:])), source=source)
-            for v, source in rows
-        ]
-        return Boundary(tuple(records), source=Source(head, ()))
+        records = self._records(head, NodeCodes, code_fields(self._control.ndf))
+        return Boundary(records, source=Source(head, ()))
 
     def _elements(self, head: Card) -> Segment:
         """Read ELEM cards up to a blank card, or to the last element's card without one."""
@@ -227,8 +227,7 @@ class SegmentReader:
             if row is None:
                 self.unsound.add("ELEM")
             else:
-                number, *nodes, increment = map(int, row[0])
-                records.append(ElementNodes(number, tuple(nodes), increment, source=row[1]))
+                records.append(ElementNodes.from_row(*row))
         return Elements(tuple(records), source=Source(head, ()))
 
     # Cards of a fixed number ---------------------------------------------------------------------
@@ -250,10 +249,7 @@ class SegmentReader:
 
     def _impact(self, head: Card) -> Segment | None:
         row = self._single(head, Impact.fields, "The card of the impact")
-        if row is None:
-            return None
-        (node, dof, velocity), source = row
-        return Impact(int(node), int(dof), float(velocity), source=source)
+        return None if row is None else Impact.from_row(*row)
 
     def _indentation(self, head: Card) -> Segment | None:
         word = " ".join(head.data.replace(",", " ").split()[1:]).upper()
@@ -267,36 +263,24 @@ class SegmentReader:
             word = ""
         fields = Indentation.acr_fields if word else Indentation.fields
         row = self._single(head, fields, "The card of the indentation law")
-        if row is None:
-            return None
-        k, alpha, s_p, q = map(float, row[0])
-        return Indentation(k, alpha, s_p, q, word, source=row[1])
+        return None if row is None else replace(Indentation.from_row(*row), word=word)
 
     def _projectile(self, head: Card) -> Segment | None:
         row = self._single(head, Projectile.fields, "The first card of PROJ")
         if row is None:
             return None
-        (elements, transducer, size, modulus, density), source = row
-        diameters = [
-            RodDiameter(int(v[0]), int(v[1]), float(v[2]), source=at)
-            for v, at in (self._rows(head, RodDiameter.fields) if elements else [])
-        ]
-        return Projectile(
-            int(elements), int(transducer), float(size), float(modulus), float(density),
-            tuple(diameters), source=source,
-        )  # fmt: skip
+        projectile = Projectile.from_row(*row)
+        if not projectile.elements:
+            return projectile
+        diameters = self._records(head, RodDiameter, RodDiameter.fields)
+        return replace(projectile, diameters=diameters)
 
     def _shear_correction(self, head: Card) -> Segment | None:
         row = self._single(head, ShearCorrection.fields, "The card of the shear correction factor")
-        return None if row is None else ShearCorrection(float(row[0][0]), source=row[1])
+        return None if row is None else ShearCorrection.from_row(*row)
 
     def _gages(self, head: Card) -> Segment:
-        rows = self._rows(head, Gage.fields)
-        records = [
-            Gage(int(v[0]), *(float(number) for number in v[1:]), source=source)
-            for v, source in rows
-        ]
-        return Gages(tuple(records), source=Source(head, ()))
+        return Gages(self._records(head, Gage, Gage.fields), source=Source(head, ()))
 
     def _units(self, head: Card) -> Segment | None:
         card = self._stream.take()
@@ -326,11 +310,7 @@ class SegmentReader:
         layers = self._layers(head) if rule or ply else None
         if rule is None or ply is None or layers is None:
             return None
-        bending, shear, points, thickness, width = rule[0]
-        integration = Integration(
-            int(bending), int(shear), int(points), float(thickness), float(width), source=rule[1]
-        )
-        constants = Ply(*map(float, ply[0]), source=ply[1])
+        integration, constants = Integration.from_row(*rule), Ply.from_row(*ply)
         return Material(integration, constants, layers, source=Source(head, ()))
 
     def _layers(self, head: Card) -> tuple[Layer, ...] | None:
@@ -350,8 +330,7 @@ class SegmentReader:
                 return None
             row = self._stream.row(card, Layer.fields)
             if row is not None:
-                (layer, angle, thickness), source = row
-                layers.append(Layer(int(layer), float(angle), float(thickness), source=source))
+                layers.append(Layer.from_row(*row))
         return tuple(layers) if len(layers) == count else None
 
 
@@ -372,11 +351,3 @@ READERS: dict[str, Callable[[SegmentReader, Card], Segment | None]] = {
     "NOPR": SegmentReader._print_option,
     "PAGE": SegmentReader._page,
 }
-
-
-def _node_values(rows: list[Row]) -> tuple[NodeValues, ...]:
-    """COOR or FORC records of their rows."""
-    return tuple(
-        NodeValues(int(v[0]), int(v[1]), tuple(map(float, v[2:])), source=source)
-        for v, source in rows
-    )
