@@ -78,7 +78,7 @@ def test_the_command_prints_the_sensitivity_for_persons_and_for_programs(tmp_pat
         ("time,V_F,V_a\n0,1,1\n1,x,2\n2,3,3\n", ":3: V_F is 'x'"),
         ("time,V_F,V_b\n0,1,1\n1,2,2\n2,3,3\n", ":1: there is no column V_a"),
         ("time,V_F,V_a\n0,1,1\n1,2\n2,3,3\n", ":3: V_a is nothing"),
-        ("time,V_F,V_a\n0,1,1\n1,2,2\n1,3,3\n", ":4: time 1 does not come after 1"),
+        ("time,V_F,V_a\n0,1,1\n1,2,2\n1,3,3\n", ":4: time must increase: 1 follows 1"),
         ("", "fewer than two rows"),
     ],
 )

@@ -248,7 +248,7 @@ def test_a_sweep_whose_cases_are_single_numbers_is_one_line(tmp_path: Path) -> N
         file["cases/velocity"] = 1.0
     done = call("plot", path, "-o", tmp_path / "x.png")
     assert_unusable(done)
-    assert "the cases of this result of a sweep are not all there" in done.stderr
+    assert "the data of this sweep do not match in type or number of cases" in done.stderr
 
 
 def test_elements_of_nodes_that_the_mesh_has_not_are_one_line(result: Path) -> None:

@@ -257,4 +257,4 @@ def test_numbers_with_points_and_commas_are_refused_between_semicolons(tmp_path:
     file.write_text("displacement;load\n0.001;1,234\n0.002;2,345\n")
     done = call("indent", "fit", file)
     assert_unusable(done)
-    assert ":2: force is '1,234', which is no finite number" in done.stderr
+    assert ":2: force is '1,234', not a finite number" in done.stderr

@@ -175,7 +175,10 @@ def test_forces_of_the_cases_that_were_run_are_exported_a_row_a_step(swept: Path
     ("options", "told"),
     [
         (("--to", "vtkhdf"), "a sweep has no fields; --to csv writes its cases"),
-        (("--to", "csv", "--dataset", "tape3"), "the tables cases and history, not tape3"),
+        (
+            ("--to", "csv", "--dataset", "tape3"),
+            "unknown table tape3; a sweep has cases and history",
+        ),
     ],
 )
 def test_what_a_sweep_has_not_is_not_exported(
@@ -203,4 +206,4 @@ def test_steps_that_there_are_not_end_in_one_line(
     for command in (("info",), ("export", "--to", "csv", "-o", "-")):
         done = call(*command, bad)
         assert_unusable(done)
-        assert "history/steps counts other steps than there are" in done.stderr
+        assert "history/steps does not match the stored steps" in done.stderr

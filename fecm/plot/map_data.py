@@ -15,16 +15,16 @@ from numpy.typing import NDArray
 from fecm.plot.kinds import PlotError, PlotNote
 from fecm.plot.pictures import Options
 from fecm.plot.style import COLOURS, Scale, scale
+from fecm.sweeps.cases import INTEGERS as WHOLE_VALUES
 from fecm.sweeps.cases import TEXTS
-from fecm.sweeps.cases import WHOLE as WHOLE_VALUES
+from fecm.sweeps.outcome import INTEGERS as WHOLE_NUMBERS
 from fecm.sweeps.outcome import RUN, STILL, SUMMARY
-from fecm.sweeps.outcome import WHOLE as WHOLE_NUMBERS
 from fecm.sweeps.result import SweepResult
 
 Array = NDArray[Any]
 Ints = NDArray[np.intp]
 
-WHOLE = (*WHOLE_VALUES, *WHOLE_NUMBERS)
+INTEGERS = (*WHOLE_VALUES, *WHOLE_NUMBERS)
 # Texts that get a curve each; there are as many colours.
 CURVES = len(COLOURS)
 LABELS = {
@@ -65,7 +65,7 @@ class Axis:
     @property
     def whole(self) -> bool:
         """Whether the numbers count something."""
-        return self.name in WHOLE
+        return self.name in INTEGERS
 
 
 @dataclass(frozen=True)
@@ -223,7 +223,7 @@ def _quantity(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
         warnings.warn(
             f"{lacking} cases of {name} without contact have no {quantity}", PlotNote, stacklevel=2
         )
-    if quantity in WHOLE:
+    if quantity in INTEGERS:
         return Axis(quantity, Scale(1.0, ""), values)
     shown = scale(float(np.nanmax(np.abs(values))), _unit(sweep, quantity))
     return Axis(quantity, shown, shown.factor * values)
@@ -241,7 +241,7 @@ def _axis(sweep: SweepResult, name: str, rows: Ints) -> Axis:
         ticks = tuple(dict.fromkeys(values.tolist()))
         places = {text: place for place, text in enumerate(ticks)}
         return Axis(name, Scale(1.0, ""), np.array([places[v] for v in values.tolist()]), ticks)
-    if name in WHOLE:
+    if name in INTEGERS:
         return Axis(name, Scale(1.0, ""), values)
     shown = scale(float(np.abs(values).max()), _unit(sweep, name))
     return Axis(name, shown, shown.factor * values)

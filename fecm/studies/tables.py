@@ -1,8 +1,8 @@
-"""Tables that users measured: text with a line of names, read by name.
+"""Tables of measured data: text files with a header of column names.
 
-Tabs, semicolons or commas separate columns; between tabs and semicolons numbers may have a decimal
-comma.  Blank lines and those that begin with # are skipped.  A unit stands behind a name in
-brackets, or in a line of its own below the names; the case of letters in names counts for nothing.
+Columns are separated by tabs, semicolons or commas; with tabs and semicolons, numbers may have a
+decimal comma.  Blank lines and lines that begin with # are skipped.  A unit follows its name in
+brackets, or is in the line below the names.  Names are not case-sensitive.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ Row = tuple[int, list[str]]
 
 # A number with a decimal comma.
 _COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
-# A name with its unit in brackets behind it.
+# A name followed by its unit in brackets.
 _UNIT = re.compile(r"[^(\[]*[(\[]([^)\]]*)[)\]]")
 
 
 class TableError(FecmError, ValueError):
-    """A table can't be used; the message names the file, and the line where there is one."""
+    """A table is invalid; the message states the file, and the line if known."""
 
 
 def read_columns(
@@ -36,18 +36,18 @@ def read_columns(
 ) -> Mapping[str, Floats]:
     """Read columns of a CSV file.
 
-    Where the first line names none of the columns, or holds numbers already, they are the first
-    ones in the order of `names`.
+    If the first line contains none of the names, or contains numbers, the first columns are taken
+    in the order of `names`.
 
     Parameters
     ----------
     path : Path
     names : sequence of str
-        Columns that are wanted.
+        Columns to read.
     increasing : str
-        The one of them whose values must increase from row to row.
+        Name of the column whose values must increase.
     places : sequence of int
-        Numbers of the columns from 0, whatever the first line calls them.
+        Numbers of the columns from 0; the names in the first line are then ignored.
 
     Returns
     -------
@@ -56,12 +56,12 @@ def read_columns(
     Raises
     ------
     TableError
-        If the file is no text, a column is missing, a field is no finite number, there are fewer
-        than two rows, or the values don't increase.
+        If the file is not text, a column is missing, a field is not a finite number, there are
+        fewer than two rows, or the values do not increase.
     OSError
-        If it can't be read.
+        If the file cannot be read.
     """
-    rows = _rows(path)
+    rows = read_rows(path)
     own = list(places or range(len(names)))
     if _names_columns(rows):
         head = rows.pop(0)
@@ -78,58 +78,58 @@ def read_columns(
         ):
             if not after > before:
                 raise TableError(
-                    f"{path}:{number}: {increasing} {after:g} does not come after {before:g}"
+                    f"{path}:{number}: {increasing} must increase: {after:g} follows {before:g}"
                 )
     return columns
 
 
 def names_of(path: Path) -> list[str]:
-    """Names in the first line, without their units; none where it holds numbers.
+    """Return the names in the first line without units; empty if it contains numbers.
 
     Raises
     ------
     TableError
-        If the file is no text.
+        If the file is not text.
     OSError
-        If it can't be read.
+        If the file cannot be read.
     """
-    rows = _rows(path)
+    rows = read_rows(path)
     return [_without_unit(name) for name in rows[0][1]] if _names_columns(rows) else []
 
 
 def units_of(path: Path) -> list[str]:
-    """Units of the columns, by brackets behind their names or a line below; empty where none is.
+    """Return the units of the columns from brackets or the line below; empty if none is given.
 
     Raises
     ------
     TableError
-        If the file is no text.
+        If the file is not text.
     OSError
-        If it can't be read.
+        If the file cannot be read.
     """
-    rows = _rows(path)
+    rows = read_rows(path)
     if not _names_columns(rows):
         return []
     below = [field.strip("()[] ") for field in rows[1][1]] if _names_units(rows[1:]) else []
     found = []
     for place, name in enumerate(rows[0][1]):
-        behind = _UNIT.match(name)
-        found.append(behind[1].strip() if behind else below[place] if place < len(below) else "")
+        unit = _UNIT.match(name)
+        found.append(unit[1].strip() if unit else below[place] if place < len(below) else "")
     return found
 
 
 def same_name(one: str, other: str) -> bool:
-    """Whether two names mean the same column."""
+    """Whether two names denote the same column."""
     return _plain(one) == _plain(other)
 
 
 def _names_columns(rows: Sequence[Row]) -> bool:
-    """Whether the first line names columns instead of holding numbers."""
+    """Whether the first line contains names instead of numbers."""
     return bool(rows) and any(_number(field) is None for field in rows[0][1])
 
 
 def _names_units(rows: Sequence[Row]) -> bool:
-    """Whether the line below the names holds units: no number, and numbers in the next line."""
+    """Whether the second line contains units: it has no numbers, and the next line has."""
     return (
         len(rows) > 1
         and not any(_number(field) is not None for field in rows[0][1])
@@ -137,15 +137,23 @@ def _names_units(rows: Sequence[Row]) -> bool:
     )
 
 
-def _rows(path: Path) -> list[Row]:
-    """Fields of every line that holds any, with its number."""
+def read_rows(path: Path) -> list[Row]:
+    """Read the number and the fields of every line with content.
+
+    Raises
+    ------
+    TableError
+        If the file is not text.
+    OSError
+        If the file cannot be read.
+    """
     data = path.read_bytes()
     if b"\0" in data:
-        raise TableError(f"{path} is no text file")
+        raise TableError(f"{path} is not a text file")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        text = data.decode("latin-1")  # as older programs write µm and °
+        text = data.decode("latin-1")  # older programs write µm and ° so
     lines = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)
@@ -164,10 +172,10 @@ def _rows(path: Path) -> list[Row]:
 
 
 def _with_points(rows: list[Row]) -> list[Row]:
-    """Rows with points for decimal commas, unless numbers have points already."""
+    """Replace decimal commas by points, unless some numbers have points already."""
     fields = [field for _, row in rows for field in row]
     if any("." in field and _number(field) is not None for field in fields):
-        return rows  # a comma may then stand between thousands
+        return rows  # a comma may then separate thousands
     return [
         (line, [f.replace(",", ".") if _COMMA.fullmatch(f) else f for f in row])
         for line, row in rows
@@ -179,26 +187,26 @@ def _without_unit(name: str) -> str:
 
 
 def _plain(name: str) -> str:
-    """A column's name without unit and case."""
+    """Name of a column without unit, in lower case."""
     return _without_unit(name).casefold()
 
 
 def _places(path: Path, head: Row, names: Sequence[str]) -> list[int]:
-    """Where the columns stand, by the line of names."""
+    """Return the numbers of the columns from the line of names."""
     known = [_plain(name) for name in head[1]]
     missing = [name for name in names if _plain(name) not in known]
     if len(missing) == len(names) and len(known) >= len(names):
         return list(range(len(names)))
     if missing:
         raise TableError(
-            f"{path}:{head[0]}: there is no column {missing[0]}; the first line names "
-            f"{', '.join(head[1])}, and {', '.join(names)} are needed"
+            f"{path}:{head[0]}: there is no column {missing[0]}; the columns are "
+            f"{', '.join(head[1])}; {', '.join(names)} are required"
         )
     return [known.index(_plain(name)) for name in names]
 
 
 def _number(field: str) -> float | None:
-    """The number in a field, or None."""
+    """Return the number in a field, or None."""
     try:
         return float(field)
     except ValueError:
@@ -206,14 +214,14 @@ def _number(field: str) -> float | None:
 
 
 def _values(path: Path, row: Row, names: Sequence[str], places: Sequence[int]) -> list[float]:
-    """Numbers of one row, in the order of `names`."""
+    """Return the numbers of one row in the order of `names`."""
     line, fields = row
     values = []
     for name, place in zip(names, places, strict=True):
         field = fields[place] if place < len(fields) else ""
         value = _number(field)
         if value is None or not math.isfinite(value):
-            told = repr(field) if field else "nothing"
-            raise TableError(f"{path}:{line}: {name} is {told}, which is no finite number")
+            found = repr(field) if field else "empty"
+            raise TableError(f"{path}:{line}: {name} is {found}, not a finite number")
         values.append(value)
     return values

@@ -1,4 +1,4 @@
-"""Sweeps in Python."""
+"""Sweeps from Python."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from fecm.sweeps.store import DamagedPartError, PartialResults
 
 
 def problem_of(deck: str | Path | Deck) -> Problem:
-    """The one problem of a deck, checked.
+    """Return the checked problem of a deck with a single problem.
 
     Raises
     ------
     DeckError
         If the deck has errors.
     CasesError
-        If it holds several problems.
+        If the deck has several problems.
     """
     prepared = load_deck(deck)
     if prepared.errors(force=True):
         raise DeckError(prepared.findings, prepared.source)
-    if len(prepared.problems) != 1:
-        raise CasesError(f"{prepared.source} holds {len(prepared.problems)} problems; sweep one")
+    if (count := len(prepared.problems)) != 1:
+        raise CasesError(f"{prepared.source} has {count} problems; a sweep takes one")
     return prepared.problems[0]
 
 
@@ -49,30 +49,30 @@ def carry_out(
     idle: Idle = lambda: None,
     note: Callable[[str], None] = warnings.warn,
 ) -> SweepResult:
-    """Run a plan.
+    """Run the tasks of a plan.
 
     Parameters
     ----------
     problem : Problem
-        The deck that is varied.
+        Checked problem of the deck.
     made : Plan
     workers : int
-        Worker processes on this machine; 1 runs everything in this process.
+        Worker processes on this machine; 1 runs all tasks in this process.
     scheduler : str, optional
-        Address of a Dask scheduler, whose workers run everything instead.
+        Address of a Dask scheduler whose workers run the tasks instead.
     parts : PartialResults, optional
-        What was finished before, and where to keep what is.
+        Store of finished tasks, which are not run again.
     done : callable
-        Told of each task as it is finished, and of those that were before.
+        Called with each task and its outcome, including tasks finished earlier.
     idle : callable
-        Called now and then.
+        Called regularly.
     note : callable
-        Given what the user should know.
+        Called with messages for the user.
 
     Raises
     ------
     SchedulerError
-        If the scheduler can't be used.
+        If the scheduler cannot be used.
     """
     outcomes: list[Outcome] = []
     left: list[Task] = []
@@ -116,25 +116,25 @@ def sweep(
     scheduler: str | None = None,
     output: str | Path | None = None,
 ) -> SweepResult:
-    """Run a deck with other values, many times.
+    """Run a deck many times with varied values.
 
     Parameters
     ----------
     deck : str, Path or Deck
-        A deck of one problem.
+        Deck with a single problem.
     vary : mapping of str to sequence
-        Values by name; every combination is run.
+        Values by name; all combinations are run.
     cases : iterable of mapping, optional
-        One mapping a case instead.
+        Cases instead, one mapping each.
     history : bool
-        Keep the contact force of every step.
+        Store the contact force of every step.
     workers : int
-        Worker processes on this machine. Where it is above 1 a script needs the usual
+        Worker processes on this machine.  With more than 1, a script needs
         ``if __name__ == "__main__"``.
     scheduler : str, optional
-        Address of a Dask scheduler (needs dask.distributed).
+        Address of a Dask scheduler (requires dask.distributed).
     output : str or Path, optional
-        File to write, in place of an earlier one.
+        Output file, which is overwritten.
 
     Returns
     -------
@@ -143,15 +143,15 @@ def sweep(
     Raises
     ------
     CasesError
-        If the cases can't be meant.
+        If the cases are invalid.
     DeckError
         If the deck has errors.
     NotEnoughMemoryError
-        If the sweep takes more memory than is free: a MemoryError.
+        If the sweep needs more memory than is free; a MemoryError.
     SchedulerError
-        If the scheduler can't be used.
+        If the scheduler cannot be used.
     OSError
-        If a file can't be read or written.
+        If a file cannot be read or written.
 
     Examples
     --------

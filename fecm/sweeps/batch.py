@@ -1,14 +1,13 @@
-"""Runs some cases of a sweep: together where they share a plate, each by itself where not.
+"""Run cases of a sweep: together if they share a plate, otherwise one by one.
 
-Cases share a plate where they differ in the projectile, its approach or the law alone.  The plate
-is then stepped once, under a unit force, and everything else follows from that response.
+Cases share a plate if they differ only in projectile, impact velocity or contact law.  The plate is
+then stepped once under a unit force; the convolution of its response gives every case.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +32,7 @@ from fecm.problem.check_impact import check_impact, check_law, check_projectile
 from fecm.problem.check_program import check_program
 from fecm.problem.generate import generate
 from fecm.problem.problem import Problem, check
-from fecm.results.schema import Dataset
+from fecm.results.sinks import MemorySink
 from fecm.simulation.simulation import ENERGY_WARNING, simulate
 from fecm.sweeps.cases import CasesError
 from fecm.sweeps.clock import Clock, critical_of, with_time_step
@@ -44,7 +43,7 @@ from fecm.sweeps.vary import apply_case
 
 
 def run(task: Task) -> Outcome:
-    """Run the cases of a task; one that can't be run is a row with its reason."""
+    """Run the cases of a task; a case that cannot be run becomes a row with the reason."""
     good: list[tuple[int, Deck]] = []
     lost: dict[int, str] = {}
     for number, case in zip(task.numbers, task.cases, strict=True):
@@ -72,7 +71,7 @@ def run(task: Task) -> Outcome:
 
 
 def deck_of(plan: Plan, case: int) -> Deck:
-    """Make the deck of a case, with its own time step.
+    """Return the deck of a case with its time step.
 
     Raises
     ------
@@ -86,7 +85,7 @@ def deck_of(plan: Plan, case: int) -> Deck:
 
 
 def _timed(decks: list[Deck], clock: Clock | None) -> tuple[Problem | None, list[Deck], str]:
-    """Check the plate and the program that decks share, and give them the plate's time step."""
+    """Check the plate and program shared by decks, and set the time step of the plate."""
     if clock is None:
         checked, reason = _checked(decks[0])
         return checked, decks, reason
@@ -105,7 +104,7 @@ def _timed(decks: list[Deck], clock: Clock | None) -> tuple[Problem | None, list
 
 
 def _checked(deck: Deck) -> tuple[Problem | None, str]:
-    """Check a deck whole; the first error where it has any."""
+    """Check a complete deck; return the problem and the first error message."""
     findings = Findings()
     checked = check(ParsedProblem(deck), findings)
     if findings.errors:
@@ -114,7 +113,7 @@ def _checked(deck: Deck) -> tuple[Problem | None, str]:
 
 
 def _refuse(number: int, deck: Deck, mesh: Mesh, lost: dict[int, str]) -> bool:
-    """Whether a case's own cards, the plate's apart, can't be used; note why."""
+    """Whether the impact, law or projectile of a case is invalid; store the reason in `lost`."""
     findings = Findings()
     check_impact(deck.require(Impact), deck, mesh, findings)
     check_law(deck.require(LawCards), findings)
@@ -126,21 +125,21 @@ def _refuse(number: int, deck: Deck, mesh: Mesh, lost: dict[int, str]) -> bool:
 
 
 def _time_step(checked: Problem, plate: PlateModel) -> float:
-    """The program's time step; 0 is 0.9 of the critical one, as in a run."""
+    """Time step of the program; 0 means 0.9 of the critical time step, as in a run."""
     dt = next(macro.value for macro in flat(checked.program) if macro.word == "DT")
     return dt or taken_time_step(critical_time_step(plate))
 
 
 def _together(numbers: list[int], decks: list[Deck], checked: Problem) -> Outcome:
-    """Run cases that share a plate, by its response to a unit force."""
+    """Run cases that share a plate by its response to a unit force."""
     setup = build_model(checked)
     if setup.impact is None:
-        raise ValueError("nothing hits in this deck")
+        raise ValueError("the deck has no impact")
     steps = checked.work.steps
     dt = _time_step(checked, setup.plate)
     projectiles = [build_projectile(deck) for deck in decks]
     kinds = {projectile: number for number, projectile in enumerate(dict.fromkeys(projectiles))}
-    # Cases of a kind side by side.
+    # Cases with the same projectile are adjacent.
     order = sorted(range(len(decks)), key=lambda case: kinds[projectiles[case]])
     kind = np.array([kinds[projectiles[case]] for case in order], dtype=np.intp)
     require(ADVANCED * steps * len(decks), f"{len(decks)} cases of {steps} steps")
@@ -171,29 +170,29 @@ def _together(numbers: list[int], decks: list[Deck], checked: Problem) -> Outcom
     if not len(doubtful):
         return outcome
     rest = np.setdiff1d(np.arange(len(numbers)), doubtful)
-    # The run itself judges what is not well below its limits.
-    whole = [_alone(numbers[case], replace(checked, deck=decks[case])) for case in doubtful]
-    return merge([outcome.of(rest), *whole])
+    # Cases near the limits of a run are run in full, which accepts or rejects them.
+    full = [_alone(numbers[case], replace(checked, deck=decks[case])) for case in doubtful]
+    return merge([outcome.select(rest), *full])
 
 
 @dataclass(frozen=True)
 class Impacts:
-    """Many impacts on a plate.
+    """Histories of many impacts on one plate.
 
     Attributes
     ----------
     force : ndarray (steps, cases)
         Contact force after every step.
     indentation : Indentation
-        Of each case.
-    unsettled : ndarray (cases,)
+        Indentation of each case.
+    unconverged_steps : ndarray (cases,)
         Steps whose contact iteration did not converge.
     work : ndarray (blocks, cases)
-        Work that the contact force has done on plate and indentation, after every block of steps
-        and after the last step (force*length).
+        Work of the contact force on plate and indentation, after every block of steps and after
+        the last step (force*length).
     excess : ndarray (cases,)
-        Largest dt^2/8 m a^2 of the impact node (force*length): by so much the plate's energy is
-        above the work done on it, as far as the node tells.
+        Largest dt^2/8 m a^2 of the impact node (force*length): its share of the difference
+        between the plate's energy and the work done on it.
     """
 
     force: Floats
@@ -206,16 +205,16 @@ class Impacts:
 def impacts(
     response: Floats, tips: TipSteps, law: HystereticLaw, speed: Floats, node_mass: float
 ) -> Impacts:
-    """Many impacts on a plate of which the response to a unit force is known.
+    """Compute many impacts on a plate from its response to a unit force.
 
     Parameters
     ----------
     response : ndarray (steps,)
         See :func:`~fecm.sweeps.responses.plate_response`.
     tips : TipSteps
-        The projectiles.
+        Steps of the projectiles.
     law : HystereticLaw
-        With arrays of constants.
+        Contact law with arrays of constants.
     speed : ndarray (cases,)
         Approach velocities.
     node_mass : float
@@ -229,7 +228,7 @@ def impacts(
         unconverged_steps=np.zeros(cases, dtype=np.int64),
     )  # fmt: skip
     force, deepest = np.empty((steps, cases)), none
-    plate_work, moved, sharpest = none, none, none
+    plate_work, dw, largest_ddw = none, none, none
     work: list[Floats] = []
     for step in range(steps):
         last, w = state.contact.force, state.plate_w
@@ -237,10 +236,10 @@ def impacts(
         plate.give(state.contact.force)
         force[step] = state.contact.force
         deepest = np.maximum(deepest, state.contact.indentation)
-        # Central differences keep what 1/2 (F + F') (w' - w) puts into the plate.
-        before, moved = moved, state.plate_w - w
-        plate_work = plate_work + 0.5 * (last + state.contact.force) * moved
-        sharpest = np.maximum(sharpest, np.abs(moved - before))
+        # Central differences conserve the work 1/2 (F + F') (w' - w) on the plate.
+        before, dw = dw, state.plate_w - w
+        plate_work = plate_work + 0.5 * (last + state.contact.force) * dw
+        largest_ddw = np.maximum(largest_ddw, np.abs(dw - before))
         if not (step + 1) % BLOCK or step + 1 == steps:
             work.append(state.contact_work + plate_work)
     permanent = law.permanent(state.memory, state.contact)
@@ -249,7 +248,7 @@ def impacts(
         Indentation(deepest, state.contact.indentation, permanent),
         state.unconverged_steps,
         np.array(work),
-        node_mass * sharpest**2 / (8.0 * tips.dt**2),
+        node_mass * largest_ddw**2 / (8.0 * tips.dt**2),
     )
 
 
@@ -260,13 +259,13 @@ def balance_errors(
     kind: NDArray[np.intp],
     speed: Floats,
 ) -> Floats:
-    """Estimate the error of the energy balance, as a part of the initial energy.
+    """Estimate the error of the energy balance relative to the initial energy.
 
-    What the projectile holds, after every block of steps and after the last, and the work done on
-    plate and indentation must add up to the initial energy.  The central differences keep
-    1/2 v(-)' M v(+) + 1/2 u' K u, with the velocities half a step before and after: the work done
-    on the plate.  The energy that a run reports is dt^2/8 a' M a above it, of which only the impact
-    node's part is known here.
+    The energy of the projectile and the work done on plate and indentation must add up to the
+    initial energy, after every block of steps and after the last.  Central differences conserve
+    1/2 v(-)' M v(+) + 1/2 u' K u, with velocities half a step before and after: the work done on
+    the plate.  The energy that a run reports is larger by dt^2/8 a' M a, of which only the part of
+    the impact node is known here.
 
     Parameters
     ----------
@@ -274,14 +273,14 @@ def balance_errors(
     tips : TipSteps
     kinds : sequence of Projectile
     kind : ndarray (cases,) of int
-        The kind of each case.
+        Index of the projectile of each case.
     speed : ndarray (cases,)
         Approach velocities.
 
     Returns
     -------
     ndarray (cases,)
-        0 without any energy; not finite where the motion is not.
+        0 if the initial energy is 0; not finite if the motion is not finite.
     """
     worst = np.zeros(len(speed))
     for number, projectile in enumerate(kinds):
@@ -297,39 +296,9 @@ def balance_errors(
     return worst
 
 
-class _HistorySink:
-    """Keeps the contact's history of a run and forgets the rest."""
-
-    KEPT = ("history/force", "history/time", "history/indentation")
-
-    def __init__(self) -> None:
-        self.arrays: dict[str, Floats] = {}
-        self.permanent = 0.0
-        self.unconverged_steps = 0
-
-    def attributes(self, group: str, values: Any) -> None:
-        self.permanent = values.get("permanent_indentation", self.permanent)
-        self.unconverged_steps = values.get("unsettled_steps", self.unconverged_steps)
-
-    def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
-        if dataset.path in self.KEPT:
-            self.arrays[dataset.path] = np.zeros(shape)
-
-    def write(self, path: str, start: int, rows: NDArray[Any]) -> None:
-        if path in self.arrays:
-            self.arrays[path][start : start + len(rows)] = rows
-
-    def trim(self, path: str, rows: int) -> None:
-        if path in self.arrays:
-            self.arrays[path] = self.arrays[path][:rows]
-
-    def text(self, path: str, value: str, description: str) -> None:
-        pass
-
-
 def _alone(number: int, checked: Problem) -> Outcome:
-    """Run one case as a whole, without storing fields."""
-    sink = _HistorySink()
+    """Run one case in full, without storing fields."""
+    sink = MemorySink()
     try:
         simulation = simulate(replace(checked, program=without_output(checked.program)), sink)
     except (DivergenceError, ArithmeticError) as error:
@@ -339,7 +308,9 @@ def _alone(number: int, checked: Problem) -> Outcome:
     largest = np.maximum(indentation.max(keepdims=True), 0.0)
     mass = build_projectile(checked.deck).total_mass
     speed = checked.deck.require(Impact).velocity
-    found = Indentation(largest, indentation[-1:], np.array([sink.permanent]))
+    values = sink.groups["history"]
+    permanent = values.get("permanent_indentation", 0.0)
+    found = Indentation(largest, indentation[-1:], np.array([permanent]))
     summary = summarise(force[:, None], times, found, mass, np.array([speed]))
     return Outcome(
         [number],
@@ -347,13 +318,13 @@ def _alone(number: int, checked: Problem) -> Outcome:
         status_of(force[:, None]),
         np.array([simulation.dt]),
         np.array([len(force)], dtype=np.int64),
-        np.array([sink.unconverged_steps], dtype=np.int64),
+        np.array([values.get("unsettled_steps", 0)], dtype=np.int64),
         force[None],
     )
 
 
 def merge(parts: list[Outcome]) -> Outcome:
-    """One outcome of several, in the order of the cases' numbers."""
+    """Merge outcomes, ordered by the numbers of the cases."""
     numbers = [number for part in parts for number in part.numbers]
     order = np.argsort(numbers)
     longest = max((0 if part.force is None else part.force.shape[1] for part in parts), default=0)

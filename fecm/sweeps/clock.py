@@ -1,7 +1,7 @@
-"""Time steps of a sweep's cases: the duration of the deck is kept.
+"""Time steps of the cases of a sweep; the duration of the deck is kept.
 
-A deck whose DT is 0, or is the one that ``fecm new`` writes for its plate, takes each case's time
-step from the critical one of its own plate.  Any other DT holds for every case.
+If DT of the deck is 0, or the value that ``fecm new`` writes for its plate, the time step of each
+case follows from the critical time step of its plate.  Any other DT applies to every case.
 """
 
 from __future__ import annotations
@@ -15,34 +15,34 @@ from fecm.deck.records import Macro
 from fecm.mechanics.time_step import rounded_time_step, taken_time_step
 from fecm.problem.problem import Problem
 
-# No loop is made longer than this; the checks refuse a program that is shorter.
+# Longest loop; the checks reject much shorter programs.
 LONGEST = 1e15
-# Words that count steps or passes, and store at every N-th.
+# Macros that store every N-th step or pass.
 STORING = ("RODP", "DISP", "STRE")
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Rule by which each plate has its own time step.
+    """Rule for the time step of each plate.
 
     Attributes
     ----------
     dt : float
-        Time step of the deck itself (time).
+        Time step of the deck (time).
     rounded : bool
-        Whether it is the one of ``fecm new``, not the one that DT 0 takes.
+        Whether the rule is that of ``fecm new`` instead of that of DT 0.
     """
 
     dt: float
     rounded: bool
 
     def time_step(self, critical: float) -> float:
-        """Time step of a plate with a critical one."""
+        """Return the time step for a critical time step."""
         return rounded_time_step(critical) if self.rounded else taken_time_step(critical)
 
 
 def clock_of(checked: Problem) -> Clock | None:
-    """Find the rule of a deck; None where its DT holds for every case."""
+    """Find the rule of a deck; None if its DT applies to every case."""
     sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
     if len(sizes) != 1:
         return None
@@ -54,25 +54,25 @@ def clock_of(checked: Problem) -> Clock | None:
 
 
 def critical_of(checked: Problem) -> float:
-    """Critical time step of a problem (time)."""
+    """Return the critical time step of a problem (time)."""
     return checked.critical_time_step
 
 
 def with_time_step(deck: Deck, dt: float, taken: float = 0.0) -> Deck:
-    """Change every DT of a deck; loops get as many steps as the same duration takes.
+    """Change every DT of a deck, and the loops so that the duration is kept.
 
     Parameters
     ----------
     deck : Deck
     dt : float
-        The new time step (time).  Where it is not positive only the DT cards change.
+        New time step (time).  If it is not positive, only the DT cards change.
     taken : float
-        What DT 0 stands for in the deck; 0 where no DT is 0.
+        Time step that DT 0 means in the deck; 0 if no DT is 0.
 
     Returns
     -------
     Deck
-        Storing macros in the loops keep their number of rows, about.
+        Macros that store rows keep approximately their number of rows.
     """
     ratios: dict[int, float] = {}
     open_loops: list[int] = []

@@ -1,8 +1,7 @@
-"""CSV of a sweep: a row a case, or a row a step of each case.
+"""CSV export of a sweep: one row per case, or one row per step of each case.
 
-Cases count from 0, steps from 1.  Numbers are written as Python's repr, from which they can be read
-back to the last bit; texts are quoted where they have to be.  An apostrophe precedes a text that a
-spreadsheet would take for a formula.
+Cases count from 0, steps from 1.  Numbers are written as Python's repr, which preserves every bit.
+An apostrophe precedes texts that a spreadsheet would read as formulas.
 """
 
 from __future__ import annotations
@@ -24,24 +23,24 @@ CASES, HISTORY = "cases", "history"
 
 
 def lines(sweep: SweepResult, name: str = CASES) -> Iterator[str]:
-    """Lines of a table, with their ends.
+    """Return the lines of a table, with line ends.
 
     Parameters
     ----------
     sweep : SweepResult
     name : str
-        ``"cases"``: the values of every case and what came out.  ``"history"``: the contact force
-        after every step of every case that was run.
+        ``"cases"``: values and results of every case.  ``"history"``: the contact force after
+        every step of every case that was run.
 
     Raises
     ------
     ExportError
-        If there is no such table, or the sweep has kept no forces.
+        If the table is unknown, or the sweep has no stored forces.
     """
     if name not in (CASES, HISTORY):
-        raise ExportError(f"a sweep has the tables {CASES} and {HISTORY}, not {name}")
+        raise ExportError(f"unknown table {name}; a sweep has {CASES} and {HISTORY}")
     if name == HISTORY and sweep.force is None:
-        raise ExportError("the sweep has kept no forces; run it again with --history")
+        raise ExportError("the sweep has no stored forces; run it again with --history")
     return _written(_cases(sweep) if name == CASES else _history(sweep))
 
 

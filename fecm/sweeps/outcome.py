@@ -1,4 +1,4 @@
-"""What came out of cases, in a few numbers each."""
+"""Summary of each case."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fecm._typing import Floats
 
-# Name, description and dimension of every number of a case.
+# Description and dimension of every quantity, by name.
 SUMMARY = {
     "peak_force": ("largest contact force", "force"),
     "time_of_peak": ("time of the largest contact force", "time"),
@@ -28,32 +28,32 @@ SUMMARY = {
         "kinetic energy that the projectile's centre has lost at the end", "force*length"
     ),
 }  # fmt: skip
-WHOLE = ("contacts",)
+INTEGERS = ("contacts",)
 FINE = "ok"
-# The run ends while the projectile is on the plate.
+# The run ends during contact.
 STILL = "still in contact"
 RUN = (FINE, STILL)
-# Peaks, which stay where they lie before the end.
+# Peaks: valid even if the run ends in contact, unless they occur at the end.
 PEAKS = ("peak_force", "time_of_peak", "max_indentation")
 
 
 @dataclass
 class Outcome:
-    """What came out of some cases.
+    """Results of some cases.
 
     Attributes
     ----------
     numbers : list of int
-        The cases, from 0.
+        Numbers of the cases, from 0.
     summary : dict of ndarray (cases,)
-        By the names of :data:`SUMMARY`; NaN where a case failed, or where a number is not known
-        because the projectile is still in contact.
+        By the names of :data:`SUMMARY`; NaN if the case failed, or if the quantity is not known
+        because the run ended in contact.
     status : list of str
-        ``"ok"``, ``"still in contact"``, or why a case failed.
-    unsettled : ndarray (cases,)
+        ``"ok"``, ``"still in contact"``, or the reason for the failure.
+    unconverged_steps : ndarray (cases,)
         Steps whose contact iteration did not converge.
     dt, steps : ndarray (cases,)
-        Time step, and number of steps.
+        Time step and number of steps.
     force : ndarray (cases, steps) or None
         Contact force after every step.
     """
@@ -66,8 +66,8 @@ class Outcome:
     unconverged_steps: NDArray[np.int64]
     force: Floats | None = field(default=None, repr=False)
 
-    def of(self, rows: NDArray[np.intp]) -> Outcome:
-        """The same of some of the cases, given by their rows."""
+    def select(self, rows: NDArray[np.intp]) -> Outcome:
+        """Return the outcome of some of the cases."""
         return Outcome(
             [self.numbers[row] for row in rows],
             {name: values[rows] for name, values in self.summary.items()},
@@ -80,7 +80,7 @@ class Outcome:
 
     @classmethod
     def failed(cls, numbers: list[int], reasons: list[str]) -> Outcome:
-        """Cases that could not be run."""
+        """Return the outcome of cases that could not be run."""
         none = np.full(len(numbers), np.nan)
         steps = np.zeros(len(numbers), dtype=np.int64)
         summary = {name: none.copy() for name in SUMMARY}
@@ -88,7 +88,7 @@ class Outcome:
 
 
 class Indentation(NamedTuple):
-    """Largest and last indentation, and the permanent one, of cases (length)."""
+    """Largest, last and permanent indentation of cases (length)."""
 
     largest: Floats
     last: Floats
@@ -98,20 +98,20 @@ class Indentation(NamedTuple):
 def summarise(
     force: Floats, times: Floats, indentation: Indentation, mass: Any, velocity: Any
 ) -> dict[str, Floats]:
-    """Numbers of many cases from their contact forces.
+    """Summarise many cases from their contact forces.
 
-    Where the last step is in contact, what depends on the rest of the contact is NaN: everything
-    but the peaks, and a peak at the last step.
+    If the last step is in contact, quantities that depend on the rest of the contact are NaN:
+    everything except the peaks, and a peak at the last step.
 
     Parameters
     ----------
     force : ndarray (steps, cases)
-        After every step.
+        Contact force after every step.
     times : ndarray (steps,)
-        Of the steps.
+        Times of the steps.
     indentation : Indentation
     mass, velocity : float or ndarray (cases,)
-        Of the projectile; its approach.
+        Mass and impact velocity of the projectile.
 
     Returns
     -------
@@ -149,5 +149,5 @@ def summarise(
 
 
 def status_of(force: Floats) -> list[str]:
-    """Status of cases that were run, from their contact forces (steps, cases)."""
+    """Return the status of cases from their contact forces (steps, cases)."""
     return [STILL if still else FINE for still in force[-1] > 0.0]

@@ -1,4 +1,4 @@
-"""Memory that a sweep will take, known before it takes any."""
+"""Plan of a sweep: its cases, its tasks, and the memory that they need."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from fecm.sweeps.cases import CONTACT, PLATE, Case, CasesError
 from fecm.sweeps.clock import Clock, clock_of
 from fecm.sweeps.vary import apply_case
 
-# Cases that are advanced together; fixed, as sums depend on it in their last digit.
+# Cases advanced together; fixed, because the last digit of sums depends on it.
 TOGETHER = 1024
-# Bytes a step of each case that is advanced with others: more than was measured.
+# Bytes per step and case advanced together: above the measured value.
 ADVANCED = 28
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a sweep does.
+    """Definition of a sweep.
 
     Attributes
     ----------
     deck : Deck
-        What is varied.
+        Deck that is varied.
     cases : tuple of dict
         Values of every case.
     history : bool
-        Whether forces are stored.
+        Whether contact forces are stored.
     clock : Clock or None
-        Rule by which each plate has its own time step; None where the deck's holds for all.
+        Rule for the time step of each plate; None if the deck's time step applies to all.
     """
 
     deck: Deck
@@ -47,29 +47,29 @@ class Plan:
     clock: Clock | None = None
 
     def fingerprint(self) -> str:
-        """What tells this sweep from another one."""
+        """Hash that identifies this sweep."""
         parts = [__version__, self.deck.to_text(), self.cases, self.history, TOGETHER]
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
 @dataclass(frozen=True)
 class Task:
-    """Cases that are run together.
+    """Cases run together.
 
     Attributes
     ----------
     number : int
-        The task's number.
+        Number of the task.
     deck : Deck
-        What is varied.
+        Deck that is varied.
     numbers : tuple of int
-        The cases' numbers.
+        Numbers of the cases.
     cases : tuple of dict
-        Their values.
+        Values of each case.
     history : bool
-        Whether the forces are wanted.
+        Whether contact forces are returned.
     clock : Clock or None
-        Rule by which the plate has its own time step; None where the deck's holds.
+        Rule for the time step of the plate; None if the deck's time step applies.
     """
 
     number: int
@@ -81,7 +81,7 @@ class Task:
 
 
 def plan(checked: Problem, cases: Sequence[Case], *, history: bool = False) -> Plan:
-    """Make the plan of a sweep.
+    """Create the plan of a sweep.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def plan(checked: Problem, cases: Sequence[Case], *, history: bool = False) -> P
         If the deck has no impact, or there are no cases.
     """
     if not any(macro.word == "RODP" for macro in checked.deck.macros):
-        raise CasesError("the deck takes no impact step (RODP): there is nothing to sweep")
+        raise CasesError("the deck has no impact step (RODP); there is nothing to sweep")
     if not cases:
         raise CasesError("there are no cases")
     own = "dt" not in cases[0] and not {"impact_node", *CONTACT}.issuperset(cases[0])
@@ -98,7 +98,7 @@ def plan(checked: Problem, cases: Sequence[Case], *, history: bool = False) -> P
 
 
 def shares_plate(checked: Problem) -> bool:
-    """Whether a program only takes impact steps of one size, on a plate without other loads."""
+    """Whether a program has only impact steps of one size, and the plate no other loads."""
     words = [macro.word for macro in flat(checked.program)]
     sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
     return (
@@ -111,23 +111,23 @@ def shares_plate(checked: Problem) -> bool:
 
 
 def tasks(checked: Problem, made: Plan) -> list[Task]:
-    """Cut a plan into tasks: cases that share a plate together, whole runs one by one."""
+    """Split a plan into tasks: cases that share a plate together, full runs one by one."""
     together = TOGETHER if shares_plate(checked) else 1
     groups: dict[tuple[object, ...], list[int]] = {}
     for number, case in enumerate(made.cases):
         key = tuple(case[name] for name in PLATE if name in case)
         groups.setdefault(key, []).append(number)
-    cut: list[Task] = []
+    found: list[Task] = []
     for numbers in groups.values():
         for start in range(0, len(numbers), together):
             some = tuple(numbers[start : start + together])
             cases = tuple(made.cases[n] for n in some)
-            cut.append(Task(len(cut), made.deck, some, cases, made.history, made.clock))
-    return cut
+            found.append(Task(len(found), made.deck, some, cases, made.history, made.clock))
+    return found
 
 
 def freed(some: Sequence[Task]) -> int:
-    """Count the cases with B != 0 in which u and v, restrained at every node, are set free."""
+    """Count cases with B != 0 in which u and v, restrained at every node, are released."""
     count = 0
     for task in some:
         plate = {name: value for name, value in task.cases[0].items() if name in PLATE}
@@ -138,7 +138,7 @@ def freed(some: Sequence[Task]) -> int:
 
 
 def without_output(body: Body) -> Body:
-    """A program that stores no fields."""
+    """Return a program that stores no fields."""
     kept: list[Any] = []
     for item in body:
         if isinstance(item, Loop):
@@ -150,25 +150,25 @@ def without_output(body: Body) -> Body:
     return tuple(kept)
 
 
-# Bytes a step of each case whose history is kept: more than was measured.
+# Bytes per step and case whose history is stored: above the measured value.
 KEPT = 24
 
 
 def check_memory(checked: Problem, made: Plan, workers: int) -> None:
-    """Refuse a sweep that takes more memory than is free.
+    """Reject a sweep that needs more memory than is free.
 
     Parameters
     ----------
     checked : Problem
-        The deck that is varied.
+        Deck that is varied.
     made : Plan
     workers : int
-        Processes on this machine that run cases; 0 where others do.
+        Worker processes on this machine; 0 if a cluster runs the cases.
 
     Raises
     ------
     NotEnoughMemoryError
-        With both numbers.
+        If the sweep needs more memory than is free; the message states both.
     """
     steps, cases = checked.work.steps, len(made.cases)
     together = min(TOGETHER, cases) if shares_plate(checked) else 1

@@ -1,10 +1,10 @@
-"""Responses to a unit force in the first step, and what a history of forces makes of them.
+"""Responses to a unit force in the first step, and their convolution with force histories.
 
-The plate is linear and feels the projectile at one unknown, so that its displacement there is the
-sum of its impulse responses, step by step and exactly: w_n = sum over m < n of g_(n-m) F_m.  A rod
-is linear too: its tip's acceleration is such a sum of the forces on the tip.  All sums are taken
-block by block: what earlier blocks contribute is a matrix product, what the block's own steps do is
-added as they come.
+The plate is linear and the projectile acts on one dof, so that the displacement of this dof is
+exactly the sum of its impulse responses: w_n = sum over m < n of g_(n-m) F_m.  A rod is linear too:
+the acceleration of its tip is such a sum of the forces on the tip.  The sums are evaluated in
+blocks: a matrix product adds the contributions of earlier blocks, and those of steps within the
+block are added one by one.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from fecm._typing import Floats
 from fecm.mechanics.plate_motion import PlateMotion, PointForce
 from fecm.mechanics.rod_integrators import RodIntegrator, RodState
 
-# Steps of a block, and steps and cases of a matrix product with those before it: so few that BLAS
-# uses one thread.
+# Steps of a block, and steps and cases of a matrix product with earlier blocks: small enough for
+# BLAS to use one thread.
 BLOCK = 64
-# Multiplications of a matrix product for which BLAS uses one thread.
+# Multiplications of a matrix product small enough for BLAS to use one thread.
 SMALL = BLOCK**3
 
 
 def plate_response(motion: PlateMotion, equation: int, dt: float, steps: int) -> Floats:
-    """Displacement of one dof after 1 to `steps` steps, the first under a unit force on it.
+    """Compute the displacement of one dof after 1 to `steps` steps, the first under a unit force.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def plate_response(motion: PlateMotion, equation: int, dt: float, steps: int) ->
 
 
 def tip_response(step: RodIntegrator, steps: int) -> Floats:
-    """Acceleration of a projectile's tip after 1 to `steps` steps, the first under a unit force.
+    """Compute the acceleration of a tip after 1 to `steps` steps, the first under a unit force.
 
     Returns
     -------
@@ -71,21 +71,21 @@ def tip_response(step: RodIntegrator, steps: int) -> Floats:
 
 
 def _product(a: Floats, b: Floats) -> Floats:
-    """A matrix product in pieces so small that BLAS uses one thread."""
+    """Matrix product in pieces small enough for BLAS to use one thread."""
     columns = max(1, SMALL // a.size)
     pieces = [a @ b[:, i : i + columns] for i in range(0, b.shape[1], columns)]
     return np.hstack(pieces)
 
 
 class Convolution:
-    """Sums x_n = sum over m < n of r_(n-m) f_m of many cases, of which each f_n may need x_n.
+    """Sums x_n = sum over m < n of r_(n-m) f_m of many cases, where f_n may depend on x_n.
 
     Parameters
     ----------
-    response : ndarray (steps,) or (steps, kinds)
-        r_1, r_2, ...; of each kind.
+    responses : ndarray (steps,) or (steps, kinds)
+        r_1, r_2, ... of each kind.
     kinds : ndarray (cases,) of int
-        Which response each case has; its cases stand side by side.
+        Response of each case; cases of a kind are adjacent.
     """
 
     def __init__(self, responses: Floats, kinds: NDArray[np.intp]) -> None:
@@ -99,13 +99,13 @@ class Convolution:
         steps, cases = len(responses), len(kinds)
         self._given = np.zeros((steps + 1, cases))
         self._block = np.zeros((BLOCK, cases))
-        # r_1 to r_BLOCK of each case, for what the block's own steps add.
+        # r_1 to r_BLOCK of each case, for the steps within a block.
         self._near = np.zeros((BLOCK, cases))
         self._near[:steps] = self._responses[:BLOCK, kinds]
         self._step = 0
 
     def next(self) -> Floats:
-        """x_n of the next step n = 1, 2, ..., (cases,)."""
+        """Return x_n (cases,) of the next step n = 1, 2, ..."""
         row = self._step % BLOCK
         self._step += 1
         if row == 0:
@@ -113,7 +113,7 @@ class Convolution:
         return np.asarray(self._block[row])
 
     def give(self, values: Floats) -> None:
-        """Give f_n of the step that :meth:`next` was called for last; f_0 before the first."""
+        """Set f_n of the step last returned by :meth:`next`; f_0 before the first step."""
         self._given[self._step] = values
         row = self._step % BLOCK  # of the next step's x in its block
         left = BLOCK - row
@@ -122,11 +122,11 @@ class Convolution:
 
     @property
     def given(self) -> Floats:
-        """f_1, f_2, ... up to the last one given, (steps, cases)."""
+        """f_1, f_2, ... up to the last one set, (steps, cases)."""
         return self._given[1 : self._step + 1]
 
     def _begin_block(self) -> None:
-        """What all steps before the block contribute to each of its steps."""
+        """Compute the contribution of all earlier steps to each step of the block."""
         known = self._step  # f_0 to f_(known - 1)
         rows = min(BLOCK, len(self._responses) - self._step + 1)
         for kind, cases in self._cuts:
@@ -144,7 +144,7 @@ class Convolution:
 
 @dataclass(slots=True)
 class TipState:
-    """Motion of the projectiles' tips, one a case.
+    """Motion of the tips of projectiles, one per case.
 
     Attributes
     ----------
@@ -157,14 +157,14 @@ class TipState:
 
 
 class TipSteps:
-    """Steps of many projectiles, of which only the tips' motion is followed.
+    """Time steps of many projectiles that compute only the motion of the tips.
 
     Parameters
     ----------
     steps : sequence of RodIntegrator
-        One a kind of projectile, of the same time step and method.
+        One per kind of projectile, all with the same time step and method.
     kinds : ndarray (cases,) of int
-        The kind of each case; cases of a kind stand side by side.
+        Kind of each case; cases of a kind are adjacent.
     count : int
         Number of time steps.
     """
@@ -175,29 +175,29 @@ class TipSteps:
         self.theta, self.weight, self.dt = first.theta, first.weight, first.dt
         self._begin = first.weights[0]
         self.gain: Floats = np.array([step.gain for step in steps])[kinds]
-        # r_1 = gain comes with the force itself; the sum of earlier forces begins with r_2.
+        # `end` adds r_1 = gain; the sum over earlier forces starts with r_2.
         responses = np.column_stack([tip_response(step, count + 1)[1:] for step in steps])
         self._carried = Convolution(responses, kinds)
 
     def motions(self, kind: int, speed: Floats) -> Iterator[Floats]:
-        """Motion of whole projectiles of a kind, after every block of steps and after the last.
+        """Compute the motion of complete projectiles after every block of steps and after the last.
 
         Parameters
         ----------
         kind : int
         speed : ndarray (cases,)
-            Approach velocity of each case, of whatever kind.
+            Impact velocity of each case, of all kinds.
 
         Yields
         ------
         ndarray (3 n, cases of the kind)
-            As in :class:`~fecm.mechanics.rod_integrators.RodState`.
+            Motion as in :class:`~fecm.mechanics.rod_integrators.RodState`.
         """
         step, cases = self._steps[kind], np.flatnonzero(self._kinds == kind)
         forces = self._carried.given[:, cases]
         motion = np.zeros((3 * step.n, len(cases)))
         motion[step.n : 2 * step.n : 2] = -speed[cases]
-        # T^1, T^2, T^4, ..., and in column j what a force does j steps after its own.
+        # T^1, T^2, T^4, ...; column j of `reach` is the effect of a unit force after j steps.
         powers, reach = [step.T], step.h[:, None]
         while reach.shape[1] < BLOCK:
             reach = np.hstack([reach, _product(powers[-1], reach)])
@@ -212,13 +212,13 @@ class TipSteps:
             yield motion
 
     def begin(self, state: TipState) -> tuple[Floats, Floats, Floats, Floats]:
-        """Free acceleration (twice), drift, and acceleration so far."""
+        """Return the free acceleration (twice), the drift and the previous acceleration."""
         base = self._carried.next()
         drift = state.tip + self.dt * state.velocity + self._begin * state.acceleration
         return base, base, drift, state.acceleration
 
     def end(self, state: TipState, motion: Floats, force: Any) -> TipState:
-        """State after a step under forces at t + theta dt."""
+        """Return the state after a step under the forces at t + theta dt."""
         acceleration = motion + self.gain * force
         self._carried.give(force)
         tip = state.tip + self.dt * state.velocity + self._begin * state.acceleration

@@ -1,4 +1,4 @@
-"""A sweep's result: values and numbers of every case, in memory or in a file."""
+"""Result of a sweep: values and results of every case, in memory or in a file."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from fecm.results.hdf5_reader import Contents
 
 
-# Reasons of failed cases that are told one by one.
-TOLD = 5
+# Reasons of failure that the summary lists.
+LISTED = 5
 
 
 def summary(result: SweepResult) -> list[str]:
-    """Summarise a sweep: its cases, the smallest and the largest peak force, why cases failed."""
+    """Return summary lines: number of cases, smallest and largest peak force, failures."""
     fine = result.fine
     lines = [f"cases             {len(result)}"]
     force = np.where(fine, result["peak_force"], np.nan)
@@ -39,32 +39,29 @@ def summary(result: SweepResult) -> list[str]:
             peak = f"{force[case]:.6g} {result.unit('peak_force')}".rstrip()
             lines.append(f"{word + ' peak':17} {peak} ({values})")
     reasons = Counter(result["status"][~fine].tolist())
-    for reason, times in reasons.most_common(TOLD):
+    for reason, times in reasons.most_common(LISTED):
         lines.append(f"failed            {times}: {reason}")
-    if len(reasons) > TOLD:
-        lines.append(f"failed            for {len(reasons) - TOLD} other reasons")
+    if (others := len(reasons) - LISTED) > 0:
+        lines.append(f"failed            for {others} other reason{'s' * (others > 1)}")
     return lines
 
 
 def verdict(result: SweepResult) -> str:
-    """Count the cases, those that failed, and those whose numbers are in doubt."""
-    unconverged_steps = (
-        0
-        if result.unconverged_steps is None
-        else int((result.unconverged_steps > 0)[result.fine].sum())
-    )
+    """Count the cases, the failures, and the cases with doubtful results."""
+    steps = result.unconverged_steps
+    unconverged = 0 if steps is None else int((steps > 0)[result.fine].sum())
     counts = (
         (int(result.still.sum()), "still in contact at the end"),
-        (unconverged_steps, "with a contact iteration that did not converge"),
+        (unconverged, "with a contact iteration that did not converge"),
         (int((~result.fine).sum()), "failed"),
     )
-    told = ", ".join(f"{count} {what}" for count, what in counts if count)
-    return f"{len(result)} case{'' if len(result) == 1 else 's'}: {told or 'all ok'}"
+    found = ", ".join(f"{count} {what}" for count, what in counts if count)
+    return f"{len(result)} case{'' if len(result) == 1 else 's'}: {found or 'all ok'}"
 
 
 Array = NDArray[Any]
 
-# Physical dimension of what varies.
+# Physical dimensions of the values.
 DIMENSIONS = {
     "velocity": "length/time", "k": "force/length^1.5", "alpha_p": "length",
     "rod_length": "length", "rod_modulus": "force/length^2",
@@ -83,28 +80,27 @@ GROUPS = {
 
 @dataclass
 class SweepResult:
-    """What a sweep gave.
+    """Result of a sweep.
 
     Attributes
     ----------
     cases : dict of ndarray (n,)
         Values of every case, by name.
     summary : dict of ndarray (n,)
-        Numbers of every case, and ``status``: ``"ok"``, ``"still in contact"``, or why a case
-        failed.
+        Results of every case, and ``status``: ``"ok"``, ``"still in contact"``, or the reason for
+        the failure.
     dt, steps : ndarray (n,)
         Time step and number of steps of every case.
     force : ndarray (n, steps) or None
-        Contact force after every step, NaN beyond a case's steps; None unless asked for.
-    unsettled : ndarray (n,) or None
-        Steps of every case whose contact iteration did not converge; None where the file does not
-        tell.
+        Contact force after every step, NaN after the last step; None unless requested.
+    unconverged_steps : ndarray (n,) or None
+        Steps whose contact iteration did not converge; None if the file does not contain them.
     deck : str
-        The deck that was varied.
+        Text of the deck.
     title : str
-        Its title.
+        Title of the deck.
     units : dict
-        Names of its units; empty where it gives none.
+        Names of the units; empty if the deck states none.
     """
 
     cases: dict[str, Array]
@@ -121,26 +117,26 @@ class SweepResult:
         return len(self.dt)
 
     def __getitem__(self, name: str) -> Array:
-        """Values or numbers of every case, by name."""
+        """Values or results of every case, by name."""
         return self.cases[name] if name in self.cases else self.summary[name]
 
     @property
     def fine(self) -> NDArray[np.bool_]:
-        """Which cases were run."""
+        """Cases that were run."""
         return np.isin(self.summary["status"], RUN)
 
     @property
     def still(self) -> NDArray[np.bool_]:
-        """Which cases were run, and ended while the projectile was on the plate."""
+        """Cases that were run and ended in contact."""
         return np.asarray(self.summary["status"] == STILL)
 
     def unit(self, name: str) -> str:
-        """Unit of a value or a number, as the deck names it; empty where it has none."""
+        """Return the unit of a value or result; empty if the deck states none."""
         dimension = SUMMARY[name][1] if name in SUMMARY else DIMENSIONS.get(name, "")
         return unit_of(dimension, self.units)
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """Values and numbers as a table, a row a case (needs pandas)."""
+        """Return values and results as a table with one row per case (requires pandas)."""
         import pandas
 
         table = pandas.DataFrame({**self.cases, **self.summary})
@@ -154,16 +150,16 @@ class SweepResult:
         path: str | Path | None = None,
         **options: Any,
     ) -> Figure:
-        """Draw a map, and write it if there is a path.
+        """Draw a map; write it if a path is given.
 
         Parameters
         ----------
         quantity : str
-            What it shows, a name of the summary.
+            Name in the summary.
         over : str or sequence of str
-            One or two names of what varies; all that does if empty.
+            One or two names of varied values; all varied values if empty.
         path : str or Path, optional
-            Where to write it, in place of what is there; its suffix is the format.
+            Output file, which is overwritten; the suffix selects the format.
         **options
             Other fields of :class:`fecm.plot.pictures.Options`: ``where``, ``level``, ``width``.
 
@@ -174,7 +170,7 @@ class SweepResult:
         Raises
         ------
         PlotError
-            If the sweep lacks what is asked for.
+            If the sweep does not contain the data.
         ImportError
             If matplotlib is not installed.
         """
@@ -186,7 +182,7 @@ class SweepResult:
 
 
 def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
-    """Put a plan and its outcome together."""
+    """Create the result from a plan and its outcome."""
     names = list(plan.cases[0])
     cases = {name: np.array([case[name] for case in plan.cases]) for name in names}
     summary: dict[str, Array] = dict(outcome.summary)
@@ -199,19 +195,19 @@ def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
 
 
 def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
-    """Write a sweep's result.
+    """Write the result of a sweep.
 
     Parameters
     ----------
     result : SweepResult
     path : Path
     overwrite : bool
-        Replace a file that exists.
+        Replace an existing file.
 
     Raises
     ------
     ResultWriteError
-        If the file can't be written; what stood under the name is then untouched.
+        If the file cannot be written; an existing file is then unchanged.
     """
     from fecm.results.hdf5_writer import writing
 
@@ -260,14 +256,14 @@ def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
 
 
 def load(path: Path) -> SweepResult:
-    """Read a sweep's result.
+    """Read the result of a sweep.
 
     Raises
     ------
     ResultFileError
-        If the file is none.
+        If the file is not the result of a sweep.
     OSError
-        If it can't be opened.
+        If the file cannot be opened.
     """
     from fecm.results.hdf5_reader import read
 
@@ -275,18 +271,18 @@ def load(path: Path) -> SweepResult:
 
 
 def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
-    """A sweep's result, of what stands in its file.
+    """Create the result of a sweep from the contents of its file.
 
     Parameters
     ----------
     contents : Contents
     history : bool
-        Read the forces as well, which may be many.
+        Also read the forces, which may be large.
 
     Raises
     ------
     ResultFileError
-        If something of it is missing, or does not belong to as many cases.
+        If data are missing, or their number of cases differs.
     """
     arrays, path = contents.arrays, contents.path
 
@@ -299,7 +295,7 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     cases, summary = group("cases/"), group("summary/")
     missing = [name for name in (*SUMMARY, "status") if name not in summary]
     if missing or "history/dt" not in arrays or "history/steps" not in arrays:
-        raise ResultFileError(f"{path}: this result of a sweep is not whole")
+        raise ResultFileError(f"{path}: the result of the sweep is incomplete")
     summary = {name: summary[name] for name in (*SUMMARY, "status")} | summary  # in their order
     count = np.shape(arrays["history/dt"])[:1]
     rows = (*cases.values(), *summary.values(), arrays["history/dt"], arrays["history/steps"])
@@ -312,11 +308,13 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
         or (shape is not None and (len(shape), shape[:1]) != (2, count))
         or not set(kinds.values()) <= set("fiu")
     ):
-        raise ResultFileError(f"{path}: the cases of this result of a sweep are not all there")
+        raise ResultFileError(
+            f"{path}: the data of this sweep do not match in type or number of cases"
+        )
     steps = arrays["history/steps"]
     most = np.inf if shape is None else shape[1]
     if steps.dtype.kind not in "iu" or not ((steps >= 0) & (steps <= most)).all():
-        raise ResultFileError(f"{path}: history/steps counts other steps than there are")
+        raise ResultFileError(f"{path}: history/steps does not match the stored steps")
     return SweepResult(
         cases, summary, arrays["history/dt"], steps,
         arrays.get("history/force") if history else None,

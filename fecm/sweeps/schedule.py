@@ -1,7 +1,7 @@
-"""Who runs the tasks: this process, worker processes on this machine, or a Dask cluster.
+"""Run tasks in this process, in worker processes on this machine, or on a Dask cluster.
 
-Tasks are independent and their outcome does not depend on who runs them.  Each is told of as soon
-as it is done, so that an interrupted sweep has lost no more than what was under way.
+Tasks are independent, and their outcomes do not depend on where they run.  Each outcome is reported
+as soon as it is available, so that an interrupted sweep loses only the tasks in progress.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
@@ -23,32 +23,32 @@ from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.plan import Task
 
 Done = Callable[[Task, Outcome], None]
-# Given now and then while others work, so that a signal can be heeded.
+# Called regularly while workers run, to handle signals.
 Idle = Callable[[], None]
 
-# Times that workers may die without a task being finished, before what is left counts as lost.
+# Deaths of workers without a finished task after which the remaining tasks count as lost.
 DEATHS = 3
-# Seconds between two looks at what else there is.
+# Polling interval in seconds.
 LOOK = 0.5
-# How long a scheduler may take to answer.
+# Timeout for the scheduler.
 PATIENCE = "5s"
 LOST = "the worker that ran this case died, again and again"
 
 
 def lost(outcome: Outcome) -> bool:
-    """Whether the worker of a task died, so that its cases may be run again."""
+    """Whether the worker of a task died; its cases may be run again."""
     return any(text.startswith(LOST) for text in outcome.status)
 
 
 class SchedulerError(FecmError, RuntimeError):
-    """A scheduler can't be used."""
+    """The scheduler cannot be used."""
 
 
 def attempt(task: Task) -> Outcome:
-    """Run a task; whatever goes wrong in it is its cases' reason."""
+    """Run a task; an exception becomes the status of its cases."""
     try:
         return run(task)
-    except Exception as error:  # a case that fails is a row, not the end of the sweep
+    except Exception as error:  # a failed case must not end the sweep
         reason = f"{type(error).__name__}: {error}"
         return Outcome.failed(list(task.numbers), [reason] * len(task.numbers))
 
@@ -61,7 +61,7 @@ def run_serial(tasks: Sequence[Task], done: Done, idle: Idle) -> None:
 
 
 def _end_with(parent: int) -> None:
-    """End this worker process soon after the process that started it."""
+    """End this worker process soon after its parent process has ended."""
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -71,8 +71,18 @@ def _end_with(parent: int) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
+def _finished(
+    running: dict[Future[Outcome], Task], idle: Idle
+) -> Iterator[tuple[Task, Future[Outcome]]]:
+    """Yield tasks with their futures as they finish."""
+    while running:
+        idle()
+        for future in wait(running, timeout=LOOK, return_when=FIRST_COMPLETED).done:
+            yield running.pop(future), future
+
+
 def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> None:
-    """Run tasks in worker processes; those of a worker that died are run again."""
+    """Run tasks in worker processes; rerun the tasks of a worker that died."""
     left = {task.number: task for task in tasks}
     deaths = 0
     while left and deaths < DEATHS:
@@ -84,13 +94,9 @@ def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> Non
             running: dict[Future[Outcome], Task] = {
                 pool.submit(attempt, task): task for task in left.values()
             }
-            while running:
-                idle()
-                finished, _ = wait(running, timeout=LOOK, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    task = running.pop(future)
-                    done(task, future.result())
-                    del left[task.number]
+            for task, future in _finished(running, idle):
+                done(task, future.result())
+                del left[task.number]
         except BrokenProcessPool:
             deaths = 0 if len(left) < before else deaths + 1
         finally:
@@ -100,16 +106,16 @@ def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> Non
 
 
 def _check_address(address: str) -> None:
-    """Refuse an address that is none, or where nothing listens, before a client is made for it."""
-    none = f"`{address}` is not the address of a Dask scheduler, as in tcp://host:8786"
+    """Reject an invalid address, or one where nothing listens."""
+    invalid = f"`{address}` is not the address of a Dask scheduler (tcp://host:8786)"
     try:
-        place = urlsplit(address if "://" in address else f"tcp://{address}")
-        host, port = place.hostname, place.port
+        url = urlsplit(address if "://" in address else f"tcp://{address}")
+        host, port = url.hostname, url.port
     except ValueError:
-        raise SchedulerError(none) from None
+        raise SchedulerError(invalid) from None
     if not (host and port):
-        raise SchedulerError(none)
-    if place.scheme in ("tcp", "tls"):
+        raise SchedulerError(invalid)
+    if url.scheme in ("tcp", "tls"):
         try:
             socket.create_connection((host, port), float(PATIENCE.rstrip("s"))).close()
         except OSError as error:
@@ -117,7 +123,7 @@ def _check_address(address: str) -> None:
 
 
 def on_dask(tasks: Sequence[Task], address: str, done: Done, idle: Idle) -> None:
-    """Run tasks on a Dask cluster, which runs those of a dead worker again.
+    """Run tasks on a Dask cluster, which reruns the tasks of a dead worker.
 
     Raises
     ------
@@ -137,12 +143,11 @@ def on_dask(tasks: Sequence[Task], address: str, done: Done, idle: Idle) -> None
     except (OSError, ValueError, TimeoutError) as error:
         raise SchedulerError(f"no Dask scheduler answers at {address} ({error})") from None
     with client:
-        futures = {client.submit(attempt, task, pure=False): task for task in tasks}
-        for future in module.as_completed(futures, loop=client.loop):
-            idle()
-            task = futures[future]
-            if future.status == "finished":
-                done(task, future.result())
-            else:
-                reason = f"{LOST} ({type(future.exception()).__name__})"
-                done(task, Outcome.failed(list(task.numbers), [reason] * len(task.numbers)))
+        executor = client.get_executor(pure=False)
+        for task, future in _finished({executor.submit(attempt, t): t for t in tasks}, idle):
+            try:
+                outcome = future.result()
+            except Exception as error:
+                reason = f"{LOST} ({type(error).__name__})"
+                outcome = Outcome.failed(list(task.numbers), [reason] * len(task.numbers))
+            done(task, outcome)

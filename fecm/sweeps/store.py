@@ -1,7 +1,7 @@
-"""Where a sweep's outcomes are kept until all are there: a folder beside the result.
+"""Partial results of a sweep: a folder beside the result.
 
-One file for each task, written beside its name, synchronised and renamed, so that whatever ends a
-sweep leaves whole files behind.  A checksum at the end of each file tells a damaged one.
+There is one file per task.  It is written under a temporary name, synchronised and renamed, so that
+an interrupted sweep leaves only complete files.  A checksum at its end reveals damage.
 """
 
 from __future__ import annotations
@@ -22,36 +22,36 @@ from fecm.sweeps.outcome import SUMMARY, Outcome
 from fecm.sweeps.plan import Task
 
 MARK = "sweep.json"
-# Bytes of the checksum behind the arrays of a part.
+# Bytes of the checksum after the arrays of a file.
 CHECKSUM = hashlib.sha256().digest_size
 
 
 class OtherSweepError(FecmError, ValueError):
-    """The folder holds what another sweep has finished."""
+    """The folder holds the outcomes of another sweep."""
 
 
 class DamagedPartError(FecmError, ValueError):
-    """A file of the folder is not as it was written."""
+    """A file of the folder is damaged."""
 
 
 class PartialResults:
-    """The outcomes that a sweep has finished.
+    """Outcomes of finished tasks.
 
     Parameters
     ----------
     result : Path
-        The sweep's result.
+        Result file of the sweep.
     fingerprint : str
-        What tells this sweep from another one.
+        Identification of the sweep.
     restart : bool
-        Throw away what another sweep has left.
+        Delete the outcomes of another sweep.
 
     Raises
     ------
     OtherSweepError
         If the folder holds another sweep's outcomes.
     OSError
-        If it can't be made.
+        If the folder cannot be created.
     """
 
     def __init__(self, result: Path, fingerprint: str, *, restart: bool = False) -> None:
@@ -60,8 +60,7 @@ class PartialResults:
         if self.folder.exists() and _mark(mark) != fingerprint:
             if not restart:
                 raise OtherSweepError(
-                    f"{self.folder} holds what another sweep has finished; --overwrite throws it "
-                    "away"
+                    f"{self.folder} holds the outcomes of another sweep; --overwrite deletes them"
                 )
             shutil.rmtree(self.folder)
         self.folder.mkdir(exist_ok=True)
@@ -72,12 +71,12 @@ class PartialResults:
         return self.folder / f"task-{task.number:06d}.npz"
 
     def get(self, task: Task) -> Outcome | None:
-        """Outcome of a task that was finished before; None if it was not.
+        """Return the outcome of a finished task; None if there is none.
 
         Raises
         ------
         DamagedPartError
-            If the file is not as it was written.
+            If the file is damaged.
         """
         path = self._path(task)
         try:
@@ -103,7 +102,7 @@ class PartialResults:
             )
 
     def put(self, task: Task, outcome: Outcome) -> None:
-        """Keep the outcome of a task."""
+        """Store the outcome of a task."""
         arrays: dict[str, Any] = {
             **outcome.summary,
             "numbers": np.array(outcome.numbers),
@@ -122,7 +121,7 @@ class PartialResults:
             os.fsync(file.fileno())
 
     def clear(self) -> None:
-        """Throw everything away."""
+        """Delete the folder."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
 

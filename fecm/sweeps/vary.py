@@ -1,4 +1,4 @@
-"""A deck with the values of a case in it."""
+"""Apply the values of a case to a deck."""
 
 from __future__ import annotations
 
@@ -21,30 +21,29 @@ from fecm.problem.problem import check
 from fecm.sweeps.cases import NAMES, Case, CasesError, Value
 from fecm.sweeps.clock import critical_of, with_time_step
 
-# Fields of a ply's card by their names in a sweep.
+# Fields of a ply card.
 PLY = ("density", "nu12", "e1", "e2", "g12", "g13", "g23")
 
 
 def apply_case(deck: Deck, case: Case) -> Deck:
-    """Put a case's values into a deck.
+    """Return a deck with the values of a case.
 
-    A layup takes the deck's ply thickness, so that more plies make a thicker plate; a thickness
-    scales every layer.  A mass scales a rod's density.
+    A layup uses the ply thickness of the deck, so that more plies give a thicker plate; a thickness
+    scales every layer.  A mass scales the density of a rod.  A time step changes the number of
+    steps, so that the duration is kept.
 
-    A deck with B = 0 may restrain u and v at every node, as they rest in any case.  Where B of the
-    case is not 0 they do not rest: they are then held at the nodes that hold w, and free elsewhere,
-    as in a deck of ``fecm new``.  A time step changes the number of steps, so that the duration
-    stays.
+    A deck with B = 0 may restrain u and v at every node, because they are zero anyway.  If the case
+    has B != 0, they are restrained only at the nodes that restrain w, as in a deck of ``fecm new``.
 
     Raises
     ------
     CasesError
-        If a value can't be used with this deck.
+        If a value is invalid for this deck.
     """
     if "rod_mass" in case and "rod_density" in case:
-        raise CasesError("rod_mass and rod_density are two ways to say the same")
+        raise CasesError("rod_mass and rod_density exclude each other")
     made = deck
-    # The layup before the whole laminate's thickness, the mass behind what else the rod is made of.
+    # Apply the layup before the laminate thickness, and the mass after the other rod properties.
     for name in sorted(case, key=lambda name: (name != "layup", NAMES.index(name))):
         if name != "dt":
             made = _SETTERS[name](made, name, case[name])
@@ -57,17 +56,17 @@ def apply_case(deck: Deck, case: Case) -> Deck:
 
 
 @lru_cache(maxsize=8)
-def _holds_the_plane(boundaries: tuple[Boundary, ...], nodes: int, unknowns: int) -> bool:
-    return holds_the_plane(restraint_codes(boundaries, nodes, unknowns))
+def _holds_the_plane(boundaries: tuple[Boundary, ...], nodes: int, dofs: int) -> bool:
+    return holds_the_plane(restraint_codes(boundaries, nodes, dofs))
 
 
 def _free_in_plane(deck: Deck) -> Deck:
-    """Hold u and v only where w is held, if the deck restrains them at every node."""
+    """Restrain u and v only where w is, if the deck restrains them at every node."""
     boundaries = tuple(deck.all(Boundary))
     if not _holds_the_plane(boundaries, deck.control.numnp, deck.control.ndf):
         return deck
 
-    # Codes of one unknown carry on independently of the others, so that copies of w's do as w's.
+    # Codes are generated for each dof independently, so that copies of the codes of w act like w's.
     def freed(record: NodeCodes) -> NodeCodes:
         w = record.codes[2]
         return replace(record, codes=(w, w, *record.codes[2:]), source=None)
@@ -103,12 +102,12 @@ def _law(deck: Deck, name: str, value: Value) -> Deck:
 
 
 def _rod(deck: Deck, name: str, value: Value) -> Deck:
-    """Change the projectile, which a deck without one gets as a segment."""
+    """Change the projectile; add the segment if the deck has none."""
     rod, old = build_projectile(deck), deck.last(Projectile)
     number = float(value)
     if isinstance(rod, RigidMass):
         if name != "rod_mass":
-            raise CasesError(f"{name}: the deck's projectile is a rigid mass")
+            raise CasesError(f"{name}: the projectile of the deck is a rigid mass")
         new = Projectile(0, 0, number)
     else:
         diameters = tuple(RodDiameter(n, 0, d) for n, d in enumerate(rod.diameters, start=1))
@@ -148,7 +147,7 @@ def _layup(deck: Deck, name: str, value: Value) -> Deck:
     old = deck.require(Material)
     thicknesses = {layer.thickness for layer in old.layers}
     if len(thicknesses) > 1:
-        raise CasesError("layup: the deck's plies differ in thickness")
+        raise CasesError("layup: the plies of the deck differ in thickness")
     (ply,) = thicknesses
     try:
         angles = parse_layup(str(value))
@@ -163,7 +162,7 @@ def _layup(deck: Deck, name: str, value: Value) -> Deck:
 
 @lru_cache(maxsize=8)
 def _taken_time_step(deck: Deck) -> float:
-    """What DT 0 takes in a deck; 0 where no DT is 0."""
+    """Time step that DT 0 means in a deck; 0 if no DT is 0."""
     if all(macro.value for macro in deck.macros if macro.word == "DT"):
         return 0.0
     checked = check(ParsedProblem(deck), Findings())
