@@ -1,9 +1,9 @@
-"""Constants of the indentation law from an indentation test (the report's chapter 3).
+"""Parameters of the contact law from an indentation test (report, chapter 3).
 
-A test is a series of indentations and forces in the order of measurement.  `cycles` finds where
-it turns, `curves` fits the loading, unloading and reloading curves, `permanent` the relation of
-permanent to largest indentation, `constants` puts all together, and `report` tells it.
+A test is a series of indentations and forces in the order of measurement.  `cycles` finds its
+turning points, `curves` fits the loading, unloading and reloading curves, `permanent` fits the
+relation of permanent to largest indentation, `constants` combines them, and `report` formats them.
 """
 
-# Unloading powers that are searched.
+# Bounds of the unloading power.
 LIMITS_Q = (0.3, 12.0)

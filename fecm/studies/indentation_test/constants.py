@@ -1,4 +1,4 @@
-"""The constants of the indentation law from an indentation test."""
+"""Parameters of the contact law from an indentation test."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from fecm.studies.indentation_test.permanent import Critical, Line, critical, li
 
 @dataclass(frozen=True)
 class FreePower:
-    """The first loading with its own power, F = k a^n (equation 3-1).
+    """First loading with a free power, F = k a^n (equation 3-1).
 
     Attributes
     ----------
@@ -45,10 +45,10 @@ class FreePower:
 
 
 def free_power(curves: Curves) -> FreePower:
-    """Fit the first loading with a power of its own.
+    """Fit the first loading with a free power.
 
-    The coefficient at the largest indentation and the power hardly depend on each other; the
-    coefficient at unit indentation, far from every point, inherits the power's error.
+    The coefficient at the largest indentation is almost independent of the power; the coefficient
+    at unit indentation, far from every point, inherits the error of the power.
     """
     from scipy.optimize import least_squares
 
@@ -75,26 +75,26 @@ def free_power(curves: Curves) -> FreePower:
     )
 
 
-# Numbers whose powers stay within range.
+# Largest number whose powers are finite.
 LARGEST = 1e60
 
 
 @dataclass(frozen=True)
 class Cycle:
-    """A departure from the first loading curve.
+    """Unloading and reloading from a point of the first loading curve.
 
     Attributes
     ----------
     alpha_m, alpha_0 : Estimate
-        Largest and permanent indentation (length); alpha_m has an error of 0 where it is the
-        recorded one.
+        Largest and permanent indentation (length); the error of alpha_m is 0 if it is the
+        recorded value.
     recorded : float
-        The largest indentation as recorded, smoothed where it is noisy (length).
+        Largest recorded indentation, smoothed if noisy (length).
     k_1 : Estimate
         Reloading rigidity, equation 3-12, force/length^1.5.
     k_1_measured : Estimate or None
-        The same of the first reloading curve's own origin; None where there is none, or where it
-        began without contact, so that both are one.
+        The same from the origin of the first reloading curve; None if there is no reloading, or if
+        it began without contact, where both are equal.
     """
 
     alpha_m: Estimate
@@ -106,27 +106,27 @@ class Cycle:
 
 @dataclass(frozen=True)
 class Fit:
-    """What a test tells.
+    """Result of a fit.
 
     Attributes
     ----------
     k : Estimate
         Contact coefficient with n = 3/2, force/length^1.5.
     free : FreePower
-        The first loading with a power of its own.
+        First loading with a free power.
     q : Estimate or None
-        Unloading power; None without unloading.
+        Unloading power; None if the test has no unloading.
     cycles : tuple of Cycle
     line : Line or None
-        s_p and alpha_p; None where fewer than two cycles leave an indentation.
+        s_p and alpha_p; None if fewer than two cycles leave an indentation.
     critical : Critical or None
-        alpha_cr; only where the law of equation 3-7 was asked for.
+        alpha_cr, if the law of equation 3-7 was requested.
     r_squared : dict
-        By ``loading``, ``unloading``, ``reloading``, ``permanent``.
+        R² by ``loading``, ``unloading``, ``reloading``, ``permanent``.
     scatter : float
-        Root mean square of the residuals over the largest force.
+        Root mean square of the residuals, relative to the largest force.
     solution : Solution
-        The fitted curves.
+        Fitted curves.
     """
 
     k: Estimate
@@ -140,7 +140,7 @@ class Fit:
     solution: Solution
 
     def relation(self) -> ContactParameters | None:
-        """The law, with values that it admits; None where alpha_0 is not related to alpha_m."""
+        """Return the contact law with admissible values; None if alpha_0(alpha_m) is unknown."""
         k = self.k.value
         if self.critical is not None:
             return YangSunPermanent(k, self.critical.alpha_cr.value)
@@ -160,27 +160,27 @@ def fit(
     q: float | None = None,
     acr: bool = False,
 ) -> Fit:
-    """Fit the indentation law to a test.
+    """Fit the contact law to a test.
 
     Parameters
     ----------
     indentation, force : array_like (n,)
-        In the order of measurement, from first contact at zero on; positive in compression.
+        In the order of measurement from first contact at zero; positive in compression.
     retreat : float, optional
-        How far the indentation goes back before a turn counts (length); found by itself if None.
+        Decrease of the indentation that counts as a turn (length); automatic if None.
     q : float, optional
-        Unloading power, where it is given instead of found.
+        Fixed unloading power; fitted if None.
     acr : bool
-        Find alpha_cr of equation 3-7, with q = 5/2, instead of s_p and alpha_p of 3-8.
+        Fit alpha_cr of equation 3-7 with q = 5/2 instead of s_p and alpha_p of equation 3-8.
 
     Raises
     ------
     NoTestError
-        If the points are no indentation test.
+        If the points are not an indentation test.
     """
     a, f = np.asarray(indentation, dtype=float), np.asarray(force, dtype=float)
     if a.shape != f.shape or a.ndim != 1:
-        raise NoTestError("indentation and force are not equally many")
+        raise NoTestError("indentation and force differ in length")
     if len(a) < 10:
         raise NoTestError(f"{len(a)} points are too few for a test")
     for name, values in (("indentations", a), ("forces", f)):
@@ -214,12 +214,11 @@ def fit(
 
 
 def _explained(straight: Line | None, peaks: Floats, permanents: Floats) -> float | None:
-    """R^2 of equation 3-8; None for fewer than three cycles."""
+    """Return R² of equation 3-8; None for fewer than three cycles."""
     if straight is None or len(peaks) < 3:
         return None
     fitted = np.maximum(straight.s_p.value * (peaks - straight.alpha_p.value), 0.0)
-    total = float(((permanents - permanents.mean()) ** 2).sum())
-    return 1.0 - float(((permanents - fitted) ** 2).sum()) / total if total else None
+    return r_squared(fitted, permanents)
 
 
 def _parameter(solution: Solution, place: int) -> Estimate:
@@ -228,7 +227,7 @@ def _parameter(solution: Solution, place: int) -> Estimate:
 
 
 def _cycle(solution: Solution, number: int) -> Cycle:
-    """A cycle's values, and the rigidities that follow from them."""
+    """Return the values of a cycle and the rigidities derived from them."""
     at, division = solution.curves.layout, solution.curves.division
     corner = division.peaks[number]
     peak, permanent = at.corners[corner], at.permanents[number]

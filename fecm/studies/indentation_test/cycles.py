@@ -1,8 +1,7 @@
-"""Where an indentation test turns, and which of the law's curves each stretch lies on.
+"""Turning points of an indentation test, and the curve of the law for each stretch between them.
 
-A stretch is a run of points between two turns.  A turn counts once the path has gone back from it
-by more than a threshold that the path's own noise cannot cross.  Points so near to a turn that
-noise hides on which side of it they lie belong to no stretch.
+A stretch is a run of points between two turns.  A turn is a point from which the path retreats by
+more than a threshold above its noise.  Points within the noise of a turn belong to no stretch.
 """
 
 from __future__ import annotations
@@ -19,31 +18,31 @@ from fecm._typing import Floats
 
 Ints = NDArray[np.int64]
 
-# A turn is a retreat by this part of the whole path's range, or by so many standard deviations.
+# Threshold of a turn: fraction of the range of the path, or standard deviations of its noise.
 LEAST_RETREAT = 0.02
 SURE = 8.0
-# Standard deviations of a smoothed point, within which a turn is not told from its neighbours.
+# Standard deviations of a smoothed point within which its neighbours may be the turn.
 GUARD = 2.0
-# Noise below this part of a step does not reverse any.
+# Noise below this fraction of a step reverses no step.
 NEGLIGIBLE = 0.1
 
 
 class NoTestError(FecmError, ValueError):
-    """The points are no indentation test."""
+    """The points are not an indentation test."""
 
 
 @dataclass(frozen=True)
 class Path:
-    """Indentations as they were measured, and what is known of their noise.
+    """Measured indentations and an estimate of their noise.
 
     Attributes
     ----------
     raw, smooth : ndarray (n,)
-        As measured, and a moving mean (length).
+        Measured values and their moving mean (length).
     noise : float
-        Standard deviation of a smoothed point (length); 0 where noise reverses no step.
+        Standard deviation of a smoothed point (length); 0 if noise reverses no step.
     reach : int
-        Points on either side that the moving mean takes in.
+        Points of the moving mean on either side.
     """
 
     raw: Floats
@@ -53,12 +52,12 @@ class Path:
 
     @property
     def range(self) -> float:
-        """Largest less smallest indentation (length)."""
+        """Largest minus smallest indentation (length)."""
         return float(np.ptp(self.smooth))
 
 
 def smoothed(indentation: Floats) -> Path:
-    """Estimate the noise of a path and smooth it as little as its turns need.
+    """Estimate the noise of a path, and smooth it only as much as needed to find its turns.
 
     Parameters
     ----------
@@ -66,9 +65,9 @@ def smoothed(indentation: Floats) -> Path:
 
     Notes
     -----
-    Third differences of a path without noise are next to nothing; their median gives the noise.
-    A moving mean over w points divides it by sqrt(w) and cuts off about w/4 steps of a turn; w is
-    where both are alike.
+    Third differences of a path without noise are almost zero; their median gives the noise.  A
+    moving mean over w points divides the noise by sqrt(w) and cuts off about w/4 steps at a turn; w
+    balances both.
     """
     n = len(indentation)
     if n < 5:
@@ -86,22 +85,22 @@ def smoothed(indentation: Floats) -> Path:
 
 
 def _moving_mean(values: Floats, reach: int) -> Floats:
-    """Mean of each point and of `reach` neighbours on either side, as far as there are some."""
+    """Mean of each point and up to `reach` neighbours on either side."""
     sums = np.concatenate([[0.0], np.cumsum(values)])
-    here = np.arange(len(values))
-    first, last = np.maximum(here - reach, 0), np.minimum(here + reach + 1, len(values))
+    n = np.arange(len(values))
+    first, last = np.maximum(n - reach, 0), np.minimum(n + reach + 1, len(values))
     means: Floats = (sums[last] - sums[first]) / (last - first)
     return means
 
 
 def turns(path: Path, retreat: float) -> list[int]:
-    """Points at which the direction changes, the first and the last point included.
+    """Find points at which the direction changes, including the first and last point.
 
     Parameters
     ----------
     path : Path
     retreat : float
-        How far the path goes back before a turn counts (length).
+        Retreat of the path that counts as a turn (length).
     """
     s = path.smooth
     found, high, low, direction = [0], 0, 0, 0
@@ -135,14 +134,14 @@ class Stretch:
     kind : str
         LOADING, FALLING or RISING.
     cycle : int
-        From 0: the peak that was left last; of LOADING the peak to come.
+        Number of the last peak, from 0; of LOADING, of the next peak.
     rows : ndarray of int
-        The points.
+        Numbers of the points.
     begin : int
-        Of FALLING, the number of the corner at which it begins: its cycle's peak, or a turn on the
-        way back to the peak.
+        Of FALLING, the corner at which it begins: the peak of its cycle, or a turn during
+        reloading.
     turn : float
-        Of RISING, the recorded indentation at which it begins (length).
+        Of RISING, the recorded indentation at its beginning (length).
     """
 
     kind: str
@@ -159,13 +158,13 @@ class Corner:
     Attributes
     ----------
     indentation : float
-        As recorded (length): the largest value near the turn, of the smoothed path.
+        Largest value of the smoothed path near the turn (length).
     cycle : int
-        Its cycle.
+        Number of its cycle.
     is_peak : bool
-        Whether it lies on the first loading curve.
+        Whether it is on the first loading curve.
     rise : int
-        Of others the number of the RISING stretch that ends there.
+        Otherwise, the number of the RISING stretch that ends there.
     """
 
     indentation: float
@@ -176,13 +175,13 @@ class Corner:
 
 @dataclass(frozen=True)
 class Division:
-    """A test cut into stretches.
+    """A test divided into stretches.
 
     Attributes
     ----------
     path : Path
     retreat : float
-        What counted as a turn (length).
+        Threshold of a turn (length).
     stretches : tuple of Stretch
     corners : tuple of Corner
     """
@@ -194,30 +193,30 @@ class Division:
 
     @property
     def peaks(self) -> list[int]:
-        """Corners that are peaks, one a cycle."""
+        """Corners that are peaks, one per cycle."""
         return [n for n, corner in enumerate(self.corners) if corner.is_peak]
 
     def rows(self, kind: str) -> Ints:
-        """Points of all stretches of a kind."""
+        """Return the points of all stretches of a kind."""
         parts = [s.rows for s in self.stretches if s.kind == kind]
         return np.concatenate([np.empty(0, dtype=np.int64), *parts])
 
 
 def divide(indentation: Floats, retreat: float | None = None) -> Division:
-    """Cut a test into stretches on the law's curves.
+    """Divide a test into stretches on the curves of the law.
 
     Parameters
     ----------
     indentation : ndarray (n,)
-        In the order of measurement, from the first contact on.
+        In the order of measurement from first contact.
     retreat : float, optional
-        How far the path goes back before a turn counts (length); by default 2 % of its range, or
-        eight standard deviations of its noise where these are more.
+        Retreat of the path that counts as a turn (length); by default the larger of 2 % of its
+        range and eight standard deviations of its noise.
 
     Raises
     ------
     NoTestError
-        If the test does not begin by loading.
+        If the test does not begin with loading.
     """
     path = smoothed(indentation)
     if path.range <= 0.0:
@@ -225,21 +224,21 @@ def divide(indentation: Floats, retreat: float | None = None) -> Division:
     if retreat is None:
         retreat = max(LEAST_RETREAT * path.range, SURE * path.noise)
     if retreat >= path.range:
-        raise NoTestError(f"the whole path is not longer than a turn ({retreat:g})")
+        raise NoTestError(f"the range of the path is below the threshold of a turn ({retreat:g})")
     found = turns(path, retreat)
     s = path.smooth
     if s[found[1]] <= s[0]:
-        raise NoTestError("the test begins by unloading; its first points are the first loading")
+        raise NoTestError("the test begins with unloading; it must begin with the first loading")
     return _Divider(path, retreat).divide(found)
 
 
 class _Divider:
-    """Follows a test from turn to turn."""
+    """State while following a test from turn to turn."""
 
     def __init__(self, path: Path, retreat: float) -> None:
         self.path = path
         self.retreat = retreat
-        # Two peaks as near as this are one.
+        # Peaks within this distance are one.
         self.near = max(retreat / 2.0, 4.0 * path.noise)
         self.stretches: list[Stretch] = []
         self.corners: list[Corner] = []
@@ -247,7 +246,7 @@ class _Divider:
         self.peak = -math.inf
 
     def divide(self, found: list[int]) -> Division:
-        """Stretches between the turns."""
+        """Return the division at the turns."""
         last = len(found) - 2
         for n, (first, end) in enumerate(pairwise(found)):
             rows = self._between(first, end, n < last)
@@ -258,9 +257,9 @@ class _Divider:
         return Division(self.path, self.retreat, tuple(self.stretches), tuple(self.corners))
 
     def _between(self, first: int, end: int, turns: bool) -> Ints:
-        """Points between two turns, without the turns themselves and what is too near to them.
+        """Return the points between two turns, without the turns and points too close to them.
 
-        The point at a turn may have been read before or after it.
+        The point at a turn may have been recorded before or after it.
         """
         begin = first + 1 if first else 0
         rows: Ints = np.arange(begin, end if turns else end + 1, dtype=np.int64)
@@ -275,7 +274,7 @@ class _Divider:
         return np.asarray(rows[keep])
 
     def _rise(self, rows: Ints, first: int, end: int, *, ends_in_turn: bool) -> None:
-        """A rise, which goes on along the first loading curve where it passes the peak."""
+        """Add a rise, which continues on the first loading curve beyond the peak."""
         s = self.path.smooth
         top = float(s[end])
         if self.cycle >= 0:

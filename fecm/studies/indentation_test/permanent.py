@@ -1,7 +1,7 @@
-"""Permanent against largest indentation: equations 3-8 and 3-7, from cycles with their errors.
+"""Relation of permanent to largest indentation, equations 3-8 and 3-7.
 
-Both coordinates of a cycle carry errors, which are related to each other and to those of the other
-cycles; generalised least squares with all of these gives the line.
+Both coordinates of a cycle have errors, which are correlated with each other and with those of
+other cycles; the fit is by generalised least squares with the complete covariance.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from fecm._typing import Floats
 from fecm.mechanics.contact_law import ACR_POWER, LOADING_POWER
 from fecm.studies.indentation_test.curves import Estimate
 
-# Repetitions until the errors along and across the line belong to its slope.
+# Iterations of the weights, which depend on the slope.
 ROUNDS = 20
-# Chance below which a scatter about the line is more than the points' noise.
+# Probability below which the scatter about the line exceeds the noise of the points.
 UNLIKELY = 0.01
-# Error of a coordinate at the least, in parts of the largest: of a test without noise.
+# Smallest error of a coordinate relative to the largest indentation, for tests without noise.
 ROUNDING = 1e-9
 
 
@@ -32,10 +32,10 @@ class Line:
     s_p, alpha_p : Estimate
         Slope; critical indentation (length).
     elastic : tuple of int
-        Cycles below alpha_p, of which nothing remains.
+        Cycles below alpha_p, without permanent indentation.
     scatter : float
-        Root of chi^2 by degrees of freedom; the errors are multiplied by it where the scatter is
-        more than noise explains, else it is 1.
+        Root of chi² per degree of freedom, which multiplies the errors, if the scatter exceeds the
+        noise; else 1.
     """
 
     s_p: Estimate
@@ -52,12 +52,12 @@ def line(peaks: Floats, permanents: Floats, covariance: Floats) -> Line | None:
     peaks, permanents : ndarray (cycles,)
         alpha_m and alpha_0 (length).
     covariance : ndarray (2 cycles, 2 cycles)
-        Of all peaks, then of all permanent indentations.
+        Covariance of all peaks, then all permanent indentations.
 
     Returns
     -------
     Line or None
-        None where fewer than two cycles lie beyond alpha_p.
+        None if fewer than two cycles exceed alpha_p.
     """
     covariance = covariance + np.eye(len(covariance)) * (ROUNDING * peaks.max()) ** 2
     order = np.argsort(peaks)
@@ -79,7 +79,7 @@ def line(peaks: Floats, permanents: Floats, covariance: Floats) -> Line | None:
 def _split(
     peaks: Floats, permanents: Floats, covariance: Floats, elastic: NDArray[np.intp]
 ) -> tuple[float, Line] | None:
-    """Line and chi^2 where some cycles are taken for elastic."""
+    """Return chi² and the line for a set of elastic cycles."""
     n = len(peaks)
     beyond = np.full(n, 1.0)
     beyond[elastic] = 0.0
@@ -111,7 +111,7 @@ def _split(
 
 
 def _scatter(chi: float, freedom: int) -> float:
-    """Root of chi^2 by degrees of freedom where that is more than noise explains, else 1."""
+    """Return the root of chi² per degree of freedom if it exceeds the noise, else 1."""
     from scipy.stats import chi2
 
     return (chi / freedom) ** 0.5 if freedom > 0 and chi2.sf(chi, freedom) < UNLIKELY else 1.0
@@ -134,10 +134,10 @@ class Critical:
 
 
 def critical(peaks: Floats, permanents: Floats, covariance: Floats) -> Critical:
-    """Find alpha_cr = (alpha_m - alpha_0)^(5/2)/alpha_m^(3/2), the same for all cycles.
+    """Fit alpha_cr = (alpha_m - alpha_0)^(5/2)/alpha_m^(3/2), equal for all cycles.
 
-    Parameters are those of :func:`line`.  Of a cycle below alpha_cr nothing remains, and it says
-    only that alpha_cr is larger: such cycles are left out while there are others.
+    Parameters are those of :func:`line`.  A cycle below alpha_cr has no permanent indentation and
+    only bounds alpha_cr: such cycles are excluded if there are others.
     """
     covariance = covariance + np.eye(len(covariance)) * (ROUNDING * peaks.max()) ** 2
     own = (peaks - permanents) ** ACR_POWER / peaks**LOADING_POWER

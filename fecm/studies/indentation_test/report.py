@@ -1,4 +1,4 @@
-"""What a fit tells, as lines, as plain values and as an EXPE card."""
+"""Fit results as text, as plain values and as an EXPE card."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from fecm.studies.indentation_test.curves import Estimate
 from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING
 from fecm.studies.indentation_test.permanent import Line
 
-# Digits of the constants on the card.
+# Digits on the card.
 DIGITS = 5
-# Standard errors below which a slope may as well be none.
+# Standard errors within which a slope does not differ from 0.
 SURE = 2.0
-# Scatter that a test of the law should not have.
+# Scatter that triggers a note.
 BAD = 0.05
 
 
 def card(fit: Fit) -> str:
-    """The EXPE segment; empty where the test does not tell all of its constants."""
+    """Return the EXPE segment; empty if the test does not determine all parameters."""
     relation = fit.relation()
     if isinstance(relation, YangSunPermanent):
         alpha, s_p, word = relation.alpha_cr, 0.0, Indentation.ACR
@@ -34,50 +34,51 @@ def card(fit: Fit) -> str:
 
 
 def notes(fit: Fit) -> list[str]:
-    """What a user should know of the numbers."""
-    told: list[str] = []
+    """Return notes on the reliability of the fit."""
+    found: list[str] = []
     division = fit.solution.curves.division
     held = [division.corners[n].cycle + 1 for n in fit.solution.held if division.corners[n].is_peak]
     if not fit.cycles:
-        told.append("the test never unloads: it tells k and n alone, and no card")
+        found.append("the test has no unloading: it gives only k and n, and no card")
     elif fit.line is None and fit.critical is None:
-        told.append(
-            "s_p and alpha_p need two peaks or more that leave an indentation: no card; "
-            "--acr needs one"
+        found.append(
+            "no card: s_p and alpha_p require two or more peaks with a permanent indentation; "
+            "--acr requires one"
         )
     if fit.solution.at_limit:
-        told.append("a value lies at the limit of the search: the law does not fit this test")
+        found.append("a value is at a bound of the fit: the law does not fit this test")
     if fit.scatter > BAD:
-        told.append(f"the points scatter by {100.0 * fit.scatter:.2g} % of the largest force")
+        found.append(f"the points scatter by {100.0 * fit.scatter:.2g} % of the largest force")
     if held:
         which = ", ".join(map(str, sorted(held)))
-        told.append(f"alpha_m of cycle {which} is as recorded: the curves do not tell it")
+        found.append(
+            f"alpha_m of cycle {which} is the recorded value: the curves do not determine it"
+        )
     straight = fit.line
     if straight is not None:
         if straight.s_p.value < SURE * straight.s_p.error or straight.s_p.value >= 1.0:
-            told.append("s_p is not told apart from 0")
+            found.append("s_p does not differ significantly from 0")
         if straight.alpha_p.value < 0.0 < straight.s_p.value:
-            told.append("alpha_p is negative, and 0 on the card")
+            found.append("alpha_p is negative; the card has 0")
         if straight.elastic:
             which = ", ".join(str(n + 1) for n in straight.elastic)
-            told.append(f"cycle {which} lies below alpha_p and leaves nothing")
+            found.append(f"cycle {which} is below alpha_p and has no permanent indentation")
         if side := _one_side(fit.cycles, straight):
-            told.append(
-                f"the line of s_p and alpha_p lies {side} all of its points: the points share the "
-                "errors of k and q, and the test does not follow the law; compare n with 3/2, and "
-                "fit single cycles to compare their q"
+            found.append(
+                f"the line of s_p and alpha_p is {side} all of its points: the test does not "
+                "follow the law; compare n with 3/2, and fit single cycles to compare q"
             )
     scatter = straight.scatter if straight else fit.critical.scatter if fit.critical else 1.0
     if scatter > 1.0:
-        told.append(
-            f"the permanent indentations scatter {scatter:.1f} times as much as the forces' noise "
-            "explains: the errors of their constants are larger by so much"
+        found.append(
+            f"the scatter of the permanent indentations is {scatter:.1f} times that expected from "
+            "the noise of the forces: the errors of their parameters are multiplied by it"
         )
-    return told
+    return found
 
 
 def _one_side(cycles: tuple[Cycle, ...], straight: Line) -> str:
-    """``"above"`` or ``"below"`` where the line is so of all its points, by an error or more."""
+    """Return whether the line is ``"above"`` or ``"below"`` all points by more than an error."""
     slope, start = straight.s_p.value, straight.alpha_p.value
     points = [cycle for n, cycle in enumerate(cycles) if n not in straight.elastic]
     off = [c.alpha_0.value - slope * (c.alpha_m.value - start) for c in points]
@@ -87,8 +88,8 @@ def _one_side(cycles: tuple[Cycle, ...], straight: Line) -> str:
     return "above" if max(off) < 0.0 else "below" if min(off) > 0.0 else ""
 
 
-def _told(estimate: Estimate | None) -> str:
-    """A value and its error to two digits of the error."""
+def _format(estimate: Estimate | None) -> str:
+    """Format a value and its error."""
     if estimate is None:
         return "-"
     if not estimate.error:
@@ -101,38 +102,38 @@ def _share(value: float | None) -> str:
 
 
 def lines(fit: Fit) -> list[str]:
-    """Lines that a person reads."""
+    """Return the fit as lines of text."""
     division = fit.solution.curves.division
     count = len(division.rows(LOADING))
-    told = [
+    found = [
         f"first loading   {count} points",
-        f"  k             {_told(fit.k)} (n = 3/2){_share(fit.r_squared[LOADING])}",
-        f"  n             {_told(fit.free.n)}, with k {_told(fit.free.k)}"
+        f"  k             {_format(fit.k)} (n = 3/2){_share(fit.r_squared[LOADING])}",
+        f"  n             {_format(fit.free.n)}, with k {_format(fit.free.k)}"
         f"{_share(fit.free.r_squared)}",
     ]
     if fit.q is not None:
-        told.append(f"unloading       {len(division.rows(FALLING))} points")
-        told.append(f"  q             {_told(fit.q)}{_share(fit.r_squared[FALLING])}")
+        found.append(f"unloading       {len(division.rows(FALLING))} points")
+        found.append(f"  q             {_format(fit.q)}{_share(fit.r_squared[FALLING])}")
     if len(division.rows(RISING)):
-        told.append(
+        found.append(
             f"reloading       {len(division.rows(RISING))} points{_share(fit.r_squared[RISING])}"
         )
     if fit.line is not None:
-        told.append(f"permanent       {_share(fit.r_squared['permanent']).strip()}".rstrip())
-        told.append(f"  s_p           {_told(fit.line.s_p)}")
-        told.append(f"  alpha_p       {_told(fit.line.alpha_p)}")
+        found.append(f"permanent       {_share(fit.r_squared['permanent']).strip()}".rstrip())
+        found.append(f"  s_p           {_format(fit.line.s_p)}")
+        found.append(f"  alpha_p       {_format(fit.line.alpha_p)}")
     if fit.critical is not None:
-        told.append(f"alpha_cr        {_told(fit.critical.alpha_cr)}")
-    told.append(f"scatter         {100.0 * fit.scatter:.2g} % of the largest force")
+        found.append(f"alpha_cr        {_format(fit.critical.alpha_cr)}")
+    found.append(f"scatter         {100.0 * fit.scatter:.2g} % of the largest force")
     if fit.cycles:
-        told += ["", *_table(fit.cycles), ""]
-    return told
+        found += ["", *_table(fit.cycles), ""]
+    return found
 
 
 def _table(cycles: tuple[Cycle, ...]) -> list[str]:
     rows: list[tuple[str, ...]] = [("cycle", "alpha_m", "alpha_0", "k_1", "k_1 of the reloading")]
     rows += [
-        (str(n), *map(_told, (c.alpha_m, c.alpha_0, c.k_1, c.k_1_measured)))
+        (str(n), *map(_format, (c.alpha_m, c.alpha_0, c.k_1, c.k_1_measured)))
         for n, c in enumerate(cycles, start=1)
     ]
     if all(c.k_1_measured is None for c in cycles):
@@ -149,7 +150,7 @@ def _plain(estimate: Estimate | None) -> dict[str, float] | None:
 
 
 def plain(fit: Fit) -> dict[str, Any]:
-    """Plain values, for JSON."""
+    """Return the fit as plain values for JSON."""
     straight = fit.line
     return {
         "k": _plain(fit.k),

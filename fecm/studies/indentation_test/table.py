@@ -1,4 +1,4 @@
-"""Indentation tests as testing machines write them: which columns, and in which units."""
+"""Tables of indentation tests: columns and units."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from pathlib import Path
 from fecm._typing import Floats
 from fecm.studies.tables import TableError, names_of, read_columns, same_name, units_of
 
-# Names that a column may have, the usual one first.
+# Accepted names of the columns; the first is the default.
 NAMES = {
     "indentation": ("indentation", "displacement", "extension", "stroke", "depth"),
     "force": ("force", "load"),
 }
 
-# Units by their names, in m and N.  The pound-force is that of 0.45359237 kg and 9.80665 m/s^2.
+# Units in m and N.  The pound-force is 0.45359237 kg times 9.80665 m/s^2.
 LENGTHS = {
     "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9,
     "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "mil": 2.54e-5, "mils": 2.54e-5,
@@ -35,12 +35,11 @@ class Test:
     Attributes
     ----------
     indentation, force : ndarray (rows,)
-        In `units`.
+        Values in `units`.
     units : mapping of str to str
-        Names of the units of ``length`` and ``force``; empty where nothing names them.
+        Names of the units of ``length`` and ``force``; empty if unknown.
     stated : tuple of str
-        Units that the file itself names, of the indentation and of the force; empty texts where it
-        names none.
+        Units of the indentation and the force stated in the file; empty texts if none.
     """
 
     indentation: Floats
@@ -52,25 +51,25 @@ class Test:
 def read_test(
     path: Path, columns: Sequence[str] = (), units: tuple[str, str] | None = None
 ) -> Test:
-    """Read an indentation test, in units of one system.
+    """Read an indentation test in consistent units.
 
     Parameters
     ----------
     path : Path
-        A table with the columns indentation and force, or with other names for them (`NAMES`).
+        Table with columns for indentation and force, named as in `NAMES`.
     columns : sequence of str
-        Names or numbers (from 1) of the columns of indentation and force, instead.
+        Names or numbers (from 1) of the two columns, if they have other names.
     units : tuple of str, optional
-        Units of length and force to convert to.  Without it a file in inches and pounds is
-        converted to in and lbf, others to m and N or to mm and N.  A file that names no units is
-        taken to be in these, and nothing is converted.
+        Units of length and force to convert to.  By default, a file in inches and pounds is
+        converted to in and lbf, others to m and N or mm and N.  A file without units is assumed to
+        be in `units`.
 
     Raises
     ------
     TableError
-        If there are no such columns, a unit is unknown, or a number can't be read.
+        If a column is missing, a unit is unknown, or a number is invalid.
     OSError
-        If the file can't be read.
+        If the file cannot be read.
     """
     present, known = names_of(path), units_of(path)
     places = [_place(path, present, name, column) for name, column in _asked(columns)]
@@ -81,8 +80,8 @@ def read_test(
         return Test(table["indentation"], table["force"], names, ("", ""))
     if units is None and not (length and force):
         raise TableError(
-            f"{path}: one column is in {length or force}, and the other has no unit; name both, or "
-            "give the missing one by --unit LENGTH,FORCE"
+            f"{path}: one column is in {length or force}, the other has no unit; state both, or "
+            "use --unit LENGTH,FORCE"
         )
     missing = units or (length, force)
     length, force = length or missing[0], force or missing[1]
@@ -98,12 +97,12 @@ def read_test(
 
 
 def _asked(columns: Sequence[str]) -> list[tuple[str, str]]:
-    """What is looked for, each with the column that was asked for or an empty text."""
+    """Return each name with the requested column, or an empty text."""
     return list(zip(NAMES, columns or ("", ""), strict=True))
 
 
 def _place(path: Path, present: Sequence[str], name: str, column: str) -> int:
-    """Number of a column, from 0."""
+    """Return the number of a column, from 0."""
     if column.isdecimal() and int(column) and not any(same_name(column, one) for one in present):
         return int(column) - 1
     if not present and not column:
@@ -114,16 +113,16 @@ def _place(path: Path, present: Sequence[str], name: str, column: str) -> int:
             return found[0]
         if found:
             break
-    told = ", ".join(present)[:80] or "without names"
+    names = ", ".join(present)[:80] or "unnamed"
     raise TableError(
-        f"{path}: the columns are {told}; there must be one called {column or name}"
+        f"{path}: the columns are {names}; one must be named {column or name}"
         + (f" (or {', '.join(NAMES[name][1:])})" if not column else "")
-        + "; --columns INDENTATION,FORCE takes others, by name or number"
+        + "; --columns INDENTATION,FORCE selects others by name or number"
     )
 
 
 def _size(path: Path, unit: str, dimension: str) -> float:
-    """Size of a unit in m or N."""
+    """Return the size of a unit in m or N."""
     sizes = LENGTHS if dimension == "length" else FORCES
     folded = [name for name in sizes if name.casefold() == unit.casefold()]
     if unit in sizes:
@@ -131,11 +130,11 @@ def _size(path: Path, unit: str, dimension: str) -> float:
     if len(folded) == 1:
         return sizes[folded[0]]
     known = ", ".join(sizes)
-    raise TableError(f"{path}: `{unit}` is no unit of {dimension} that is known; there are {known}")
+    raise TableError(f"{path}: unknown unit of {dimension} `{unit}`; known units: {known}")
 
 
 def _system(length: str, force: str) -> tuple[str, str]:
-    """Units of length and force of a system like those of the file."""
+    """Return units of length and force of the same system as those of the file."""
     if {length.casefold(), force.casefold()} <= IMPERIAL:
         return "in", "lbf"
     return ("m" if length == "m" else "mm"), "N"

@@ -1,7 +1,7 @@
-"""Sensitivity of the impact-force transducer from a target's acceleration, report section 4.2.
+"""Sensitivity of the force transducer from the acceleration of a target, report section 4.2.
 
-The projectile's transducer answers V_F = c_F F, the accelerometer on a free target of mass m
-V_a = c_a a, and F = m a (equations 4-1 to 4-3).  The slope of V_F over V_a then gives
+The output of the transducer is V_F = c_F F, that of the accelerometer on a free target of mass m
+is V_a = c_a a, and F = m a (equations 4-1 to 4-3).  The slope of V_F over V_a gives
 c_F = (c_a / m) V_F / V_a (equation 4-4).
 """
 
@@ -16,19 +16,19 @@ from fecm._typing import Floats
 
 @dataclass(frozen=True)
 class Calibration:
-    """A straight line through V_F against V_a, and what it says.
+    """Straight line through V_F against V_a, and the sensitivity.
 
     Attributes
     ----------
     points : int
     slope, slope_error : float
-        V_F over V_a, and its standard error.
+        V_F over V_a and its standard error.
     offset, offset_error : float
-        V_F where V_a is 0; both 0 for a line through the origin.
+        V_F at V_a = 0 and its standard error; 0 for a line through the origin.
     r_squared : float
-        Part of the scatter of V_F that the line explains, about zero for a line through the origin.
+        Explained fraction of the variation of V_F, about zero for a line through the origin.
     sensitivity, sensitivity_error : float
-        c_F of the transducer, V_F per force.
+        c_F of the transducer, V_F per force, and its standard error.
     """
 
     points: int
@@ -46,38 +46,38 @@ def calibrate(
 ) -> Calibration:
     """Fit the sensitivity of a transducer by least squares, equations 4-1 to 4-4.
 
-    The scatter is put down to V_F.  Scatter of V_a flattens the line: the true slope lies between
-    the one given and that over R².
+    The scatter is attributed to V_F.  Scatter of V_a flattens the line: the true slope is between
+    the fitted slope and the fitted slope divided by R².
 
     Parameters
     ----------
     v_f, v_a : ndarray (points,)
         Output of the transducer and of the accelerometer at the same instants.
     mass : float
-        Mass of the target, force*time^2/length.
+        Mass of the target (force*time^2/length).
     c_a : float
-        Sensitivity of the accelerometer, its output per length/time^2.
+        Sensitivity of the accelerometer (output per length/time^2).
     through_origin : bool
-        Leave out the offset.
+        Fit without an offset.
 
     Raises
     ------
     ValueError
-        If there are fewer than three points, V_a or V_F does not vary, or a sum is beyond range.
+        If there are fewer than three points, V_a or V_F is constant, or a sum overflows.
     """
-    unknowns = 1 if through_origin else 2
+    parameters = 1 if through_origin else 2
     if len(v_f) < 3:
-        raise ValueError(f"a line with its error needs at least 3 points; there are {len(v_f)}")
+        raise ValueError(f"at least 3 points are required; there are {len(v_f)}")
     for name, values in (("V_a", v_a), ("V_F", v_f)):
         if float(np.ptp(values)) == 0.0:
-            raise ValueError(f"{name} is {values[0]:g} throughout: there is no slope")
+            raise ValueError(f"{name} is constant ({values[0]:g}): the slope is undefined")
     middle_a, middle_f = (0.0, 0.0) if through_origin else (v_a.mean(), v_f.mean())
     x, y = v_a - middle_a, v_f - middle_f
     with np.errstate(all="ignore"):
         xx, yy = float(x @ x), float(y @ y)
         slope = float(x @ y) / xx
         rest = y - slope * x
-        variance = float(rest @ rest) / (len(x) - unknowns)
+        variance = float(rest @ rest) / (len(x) - parameters)
         slope_error = float(np.sqrt(variance / xx))
         share = 0.0 if through_origin else 1.0 / len(x) + middle_a**2 / xx
         factor = c_a / mass
@@ -92,5 +92,5 @@ def calibrate(
         sensitivity_error=abs(factor) * slope_error,
     )
     if not np.isfinite(list(vars(found).values())).all():
-        raise ValueError("the sums are beyond all range: look at the numbers and their units")
+        raise ValueError("the sums overflow: check the numbers and their units")
     return found

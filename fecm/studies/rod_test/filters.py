@@ -1,9 +1,8 @@
-"""Filters of given rise time, which stand for a transducer that can't follow everything.
+"""Filters with a given rise time, which model a transducer.
 
-The rise time is that of the answer to a unit step: from the instant at which it passes 0.1 to that
-at which it passes 0.9.  The filters take the history as a polygon, linear between samples at any
-spacing, and give the exact answer to it at the samples; before the first sample the history is
-taken to have stood at its first value for ever.
+The rise time is the time in which the response to a unit step rises from 0.1 to 0.9.  The filters
+take the history as linear between samples at any spacing, and as constant before the first sample;
+their response at the samples is exact.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ class Filter:
         ``"first-order"``: T y' + y = x, whose rise time is T ln 9; ``"moving-average"``: the mean
         of x over the last W, whose rise time is 0.8 W.
     rise : float
-        Time from 10 to 90 % of the answer to a step (Table 4.1 has 10 us).
+        Time from 10 to 90 % of the step response (10 us in Table 4.1).
     """
 
     kind: str
@@ -58,7 +57,7 @@ class Filter:
         Returns
         -------
         ndarray
-            Of the shape of `values`.
+            Same shape as `values`.
         """
         columns = values.reshape(len(time), -1)
         apply = self._first_order if self.kind == FIRST_ORDER else self._moving_average
@@ -67,11 +66,11 @@ class Filter:
 
     def _first_order(self, time: Floats, x: Floats) -> Floats:
         r = np.maximum(np.diff(time) / self.time_constant, 1e-300)
-        kept = np.exp(-r)
-        mean = -np.expm1(-r) / r  # of the kept part over the interval
-        driven = (mean - kept) * x[:-1] + (1.0 - mean) * x[1:]
+        decay = np.exp(-r)
+        mean = -np.expm1(-r) / r  # of exp(-t/T) over the interval
+        driven = (mean - decay) * x[:-1] + (1.0 - mean) * x[1:]
         y = [float(x[0])]
-        for part, push in zip(kept.tolist(), driven.tolist(), strict=True):
+        for part, push in zip(decay.tolist(), driven.tolist(), strict=True):
             y.append(part * y[-1] + push)
         return np.array(y)
 
@@ -79,7 +78,7 @@ class Filter:
         dt = np.diff(time)
         slope = np.concatenate(([0.0], np.diff(x) / dt))  # towards each sample
         integral = np.concatenate(([0.0], np.cumsum((x[:-1] + x[1:]) / 2.0 * dt)))
-        # The first sample inside the window, and how far inside.
+        # The first sample inside the window, and its distance from the start of the window.
         first = np.searchsorted(time, time - self.window, side="right").clip(max=np.arange(len(x)))
         inside = time[first] - time + self.window
         part = inside * (x[first] - slope[first] * inside / 2.0)
@@ -87,20 +86,20 @@ class Filter:
 
 
 def filter_of(text: str) -> Filter:
-    """Make the filter that a user names: ``first-order:10e-6`` or ``moving-average:10e-6``.
+    """Parse a filter: ``first-order:10e-6`` or ``moving-average:10e-6``.
 
     Raises
     ------
     ValueError
-        If the kind is unknown, or the rise time is no positive number.
+        If the kind is unknown, or the rise time is not a positive number.
     """
     kind, _, rise = text.partition(":")
     if kind not in KINDS:
-        raise ValueError(f"{text} is no filter; it is {USAGE}")
+        raise ValueError(f"unknown filter {text}; use {USAGE}")
     try:
         value = float(rise)
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value > 0.0):
-        raise ValueError(f"{text}: the rise time is no positive number; a filter is {USAGE}")
+        raise ValueError(f"{text}: the rise time must be positive; use {USAGE}")
     return Filter(kind, value)

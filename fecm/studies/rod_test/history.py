@@ -1,4 +1,4 @@
-"""A history to be filtered: a column of a result, or of a measured table."""
+"""Time histories to be filtered: a column of a result or of a measured table."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ class TimeHistory:
     name : str
     time, values : ndarray (rows,)
     first : int
-        Row at which what was recorded begins; before it stands the state of rest.
+        First recorded row; the rows before it are the state of rest.
     beside : mapping of str to ndarray (rows,)
-        What belongs into the same picture.
+        Other histories for the same plot.
     units : mapping
-        Names of the units; empty where none are known.
+        Names of the units; empty if unknown.
     dimension : str
-        Physical dimension; empty where it is not known.
+        Physical dimension; empty if unknown.
     """
 
     name: str
@@ -45,22 +45,22 @@ class TimeHistory:
 
 
 def recorded(path: Path, column: str | None = None) -> TimeHistory:
-    """Read a history from a result file or a CSV.
+    """Read a history from a result file or a CSV file.
 
     Parameters
     ----------
     path : Path
     column : str, optional
-        Its name; the transducer's without it, or the second column of a CSV that has none.
+        Name of the column; by default the transducer, or the second column of a CSV file.
 
     Raises
     ------
     TableError
-        If there is no such history, or the CSV can't be used.
+        If the history does not exist, or the CSV file is invalid.
     ResultFileError
-        If the file is a broken result.
+        If the result file is damaged.
     OSError
-        If it can't be read.
+        If the file cannot be read.
     """
     with path.open("rb") as file:
         is_result = file.read(len(SIGNATURE)) == SIGNATURE
@@ -70,7 +70,7 @@ def recorded(path: Path, column: str | None = None) -> TimeHistory:
 def _of_result(path: Path, result: Result, column: str | None) -> TimeHistory:
     known = [name.partition("/")[2] for name in result if name.startswith("history/")]
     if not known:
-        raise TableError(f"{path} has no history: no impact step was taken")
+        raise TableError(f"{path} has no history: the run has no impact step")
     choice = [name for name in known if name not in ("step", "time")]
     name = column or TRANSDUCER
     if name not in choice:
@@ -79,7 +79,7 @@ def _of_result(path: Path, result: Result, column: str | None) -> TimeHistory:
     def since_rest(values: Floats) -> Floats:
         return np.concatenate(([0.0], values))
 
-    # Histories begin after the first step; before it the rod is free of force.
+    # Histories begin after the first step; before it, the rod is at rest.
     dataset = DATASETS.get(f"history/{name}")
     dimension = dataset.dimension if dataset else ""
     rests = dimension in ("force", "length")
@@ -103,8 +103,8 @@ def _of_table(path: Path, column: str | None) -> TimeHistory:
         return next((known for known in names if same_name(name, known)), None)
 
     if column is not None and found(column) is None:
-        told = f"it has {', '.join(names)}" if names else "its first line names none"
-        raise TableError(f"{path} has no column {column}; {told}")
+        known = f"it has {', '.join(names)}" if names else "the first line has no names"
+        raise TableError(f"{path} has no column {column}; {known}")
     clock = found("time") or (names[0] if names else "time")
     others = [name for name in names if name != clock]
     name = found(column or TRANSDUCER) or (others[0] if others else "value")

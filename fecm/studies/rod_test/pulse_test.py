@@ -1,7 +1,7 @@
-"""A free rod under a force pulse on its end, report section 4.2, figures 4.7 to 4.9.
+"""Free rod under a force pulse on its end, report section 4.2, figures 4.7 to 4.9.
 
-Element, mass and step are those of the projectile in an impact; x runs from the struck end into the
-rod.  Forces are positive in compression, accelerations positive in the sense of the push.
+Elements, mass and integrator are those of the projectile in an impact; x is the distance from the
+struck end.  Forces are positive in compression, accelerations in the direction of the pulse.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from fecm.mechanics.rod_integrators import STEPS, WILSON, RodState
 from fecm.studies.rod_test.pulses import Pulse
 
 MOST_STEPS = 2_000_000
-# Part of the time that a wave takes through an element, which is the step where none is given.
+# Default time step relative to the travel time of a wave through an element.
 PART = 0.8
-# Part of the pulse's peak from which on the ratio to it counts in the mean.
+# Fraction of the peak of the pulse above which a row counts in the mean ratio.
 COUNTS = 0.01
 
 POINTS = ("struck_end", "middle", "far_end")
@@ -28,20 +28,20 @@ POINTS = ("struck_end", "middle", "far_end")
 
 @dataclass(frozen=True)
 class RodHistory:
-    """What a rod did.
+    """History of a rod under a pulse.
 
     Attributes
     ----------
     time : ndarray (rows,)
-        From 0 on.
+        Times from 0.
     applied : ndarray (rows,)
-        Force on the end.
+        Force on the struck end.
     stations : tuple of float
         Distances from the struck end.
     forces : ndarray (rows, stations)
         Force at the stations, positive in compression.
     accelerations : ndarray (rows, 3)
-        At the struck end, the middle and the far end.
+        Accelerations of the struck end, the middle and the far end.
     """
 
     time: Floats
@@ -52,16 +52,16 @@ class RodHistory:
 
     @property
     def ratios(self) -> Floats:
-        """Force at the stations over the applied one, (rows, stations); NaN where that is 0."""
+        """Force at the stations over the applied force, (rows, stations); NaN where that is 0."""
         with np.errstate(all="ignore"):
             ratios = self.forces / self.applied[:, None]
         return np.where(self.applied[:, None] == 0.0, np.nan, ratios)
 
     @property
     def mean_ratios(self) -> Floats:
-        """Mean of the ratio over all rows at which the pulse is above 1 % of its peak, (stations,).
+        """Mean ratio over all rows with a pulse above 1 % of its peak, (stations,).
 
-        The report's 0.498 (section 4.2) for its exponential pulse is this.
+        The report has 0.498 (section 4.2) for its exponential pulse.
         """
         size = np.abs(self.applied)
         counted = size > COUNTS * size.max()
@@ -71,7 +71,7 @@ class RodHistory:
 
 
 def default_time_step(rod: Rod) -> float:
-    """Most of the time that a wave takes through an element, to two figures."""
+    """Return 0.8 of the travel time of a wave through an element, to two digits."""
     return float(f"{PART * rod.length / rod.elements * math.sqrt(rod.density / rod.modulus):.2g}")
 
 
@@ -83,11 +83,10 @@ def simulate_pulse(
     stations: Sequence[float],
     integrator: str = WILSON,
 ) -> RodHistory:
-    """Push a free rod, at rest at first, at its end x = 0.
+    """Compute the response of a free rod, initially at rest, to a pulse at x = 0.
 
-    As in an impact, the force between two steps, and beyond the second where the integrator looks
-    there, is taken to be linear.  A pulse that starts with a jump meets a rod whose end is
-    accelerated by it at once.
+    As in an impact, the force is linear between two steps, and extrapolated linearly to t + theta
+    dt.  If the pulse starts with a jump, the rod has the corresponding acceleration at t = 0.
 
     Parameters
     ----------
@@ -96,71 +95,69 @@ def simulate_pulse(
     dt : float
         Time step.
     duration : float
-        Time to be covered; the last step ends at it or behind it.
+        Duration; the last step ends at or after it.
     stations : sequence of float
         Distances from the struck end, 0 to the rod's length.
     integrator : str
-        One of :data:`fecm.mechanics.rod_integrators.INTEGRATORS`.
+        Key of :data:`fecm.mechanics.rod_integrators.STEPS`.
 
     Raises
     ------
     ValueError
-        If a station is not on the rod, there would be more than two million steps, or the numbers
-        are beyond all range.
+        If a station is not on the rod, the steps are more than two million, or the motion is not
+        finite.
     """
     for x in stations:
         if not 0.0 <= x <= rod.length:
-            raise ValueError(
-                f"the station {x:g} is not on the rod, which reaches to {rod.length:g}"
-            )
+            raise ValueError(f"the station {x:g} is not on the rod of length {rod.length:g}")
     if duration / dt > MOST_STEPS:
         raise ValueError(
-            f"{duration:g} in steps of {dt:g} are more than {MOST_STEPS:,} steps: take a longer "
-            "time step or a shorter duration"
+            f"{duration:g} in steps of {dt:g} is more than {MOST_STEPS:,} steps: increase the "
+            "time step or reduce the duration"
         )
-    with np.errstate(all="ignore"):  # an overflow is found, and said better, below
+    with np.errstate(all="ignore"):  # overflow is reported below
         steps = max(1, math.ceil(duration / dt * (1.0 - 1e-12)))
         time = np.asarray(dt * np.arange(steps + 1.0))
         applied = pulse.force(time)
         try:
-            noted = _march(rod, applied, dt, stations, integrator)
+            rows = _march(rod, applied, dt, stations, integrator)
         except np.linalg.LinAlgError:
-            noted = np.full((1, 1), np.nan)
-    if not (np.isfinite(noted).all() and np.isfinite(applied).all()):
-        raise ValueError("the motion is not finite: look at the numbers and their units")
+            rows = np.full((1, 1), np.nan)
+    if not (np.isfinite(rows).all() and np.isfinite(applied).all()):
+        raise ValueError("the motion is not finite: check the numbers and their units")
     count = len(stations)
-    return RodHistory(time, applied, tuple(stations), noted[:, :count], noted[:, count:])
+    return RodHistory(time, applied, tuple(stations), rows[:, :count], rows[:, count:])
 
 
 def _march(
     rod: Rod, applied: Floats, dt: float, stations: Sequence[float], integrator: str
 ) -> Floats:
-    """Step through the pulse; forces at the stations and accelerations, (rows, stations + 3)."""
+    """Return forces at the stations and accelerations, (rows, stations + 3)."""
     m = rod.mass()
     step = STEPS[integrator](rod.stiffness(), m, dt)
-    push = np.zeros(step.n)
-    push[0] = applied[0]
+    load = np.zeros(step.n)
+    load[0] = applied[0]
     at_rest = np.zeros(step.n)
-    start = np.linalg.solve(m if m.ndim == 2 else np.diag(m), push)
+    start = np.linalg.solve(m if m.ndim == 2 else np.diag(m), load)
     state = RodState.of(at_rest, at_rest, np.asarray(start, dtype=np.float64))
     strain = np.array([force_row(rod, x) for x in stations]).reshape(-1, step.n)
     middle = np.array([displacement_row(rod, part * rod.length) for part in (0.0, 0.5, 1.0)])
-    noted = np.empty((len(applied), len(strain) + len(middle)))
+    history = np.empty((len(applied), len(strain) + len(middle)))
 
-    def note(row: int) -> None:
-        noted[row, : len(strain)] = strain @ state.deformation
-        noted[row, len(strain) :] = middle @ state.acceleration
+    def record(row: int) -> None:
+        history[row, : len(strain)] = strain @ state.deformation
+        history[row, len(strain) :] = middle @ state.acceleration
 
-    note(0)
+    record(0)
     forces = (1.0 - step.theta) * applied[:-1] + step.theta * applied[1:]
     for row, force in enumerate(forces.tolist(), start=1):
         state = step.advance(state, force)
-        note(row)
-    return noted
+        record(row)
+    return history
 
 
 def _place(rod: Rod, x: float) -> tuple[int, float]:
-    """The element at x, of two the one behind, and how far into it, from 0 to 1."""
+    """Return the element at x (the farther of two) and the local coordinate, from 0 to 1."""
     along = x / rod.length * rod.elements
     node = round(along)
     if abs(along - node) < 1e-9 * rod.elements:
@@ -170,7 +167,7 @@ def _place(rod: Rod, x: float) -> tuple[int, float]:
 
 
 def force_row(rod: Rod, x: float) -> Floats:
-    """Row that gives the force at x, -E A du/dx, from the unknowns: (n,)."""
+    """Return the row (n,) that maps the dofs to the force at x, -E A du/dx."""
     element, s = _place(rod, x)
     L = rod.length / rod.elements
     row = np.zeros(2 * rod.elements + 2)
@@ -184,7 +181,7 @@ def force_row(rod: Rod, x: float) -> Floats:
 
 
 def displacement_row(rod: Rod, x: float) -> Floats:
-    """Row that gives the displacement at x from the unknowns, equation 4-19: (n,)."""
+    """Return the row (n,) that maps the dofs to the displacement at x, equation 4-19."""
     element, s = _place(rod, x)
     L = rod.length / rod.elements
     row = np.zeros(2 * rod.elements + 2)
@@ -198,13 +195,13 @@ def displacement_row(rod: Rod, x: float) -> Floats:
 
 
 def table(history: RodHistory, filtered: Floats | None = None) -> Iterator[str]:
-    """Lines of a CSV of everything, with their ends.
+    """Return the lines of a CSV of the complete history, with line ends.
 
     Parameters
     ----------
     history : RodHistory
     filtered : ndarray (rows, stations), optional
-        Forces at the stations as a transducer with a rise time shows them.
+        Filtered forces at the stations.
     """
     names = [f"{x:.12g}" for x in history.stations]
     header = ["time", "force", *(f"force_at_{x}" for x in names)]

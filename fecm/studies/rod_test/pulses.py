@@ -1,6 +1,6 @@
-"""Force pulses on the end of a rod: the report's two, and tables.
+"""Force pulses on the end of a rod: the two of the report, and tables.
 
-A pulse is positive in compression and acts from t = 0 on.  Force and time are in any units.
+A pulse is positive in compression and acts from t = 0.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ USAGE = "gauss:F0,TAU,B, sine:F0,B or a CSV file of time and force"
 
 
 class Pulse(Protocol):
-    """A force in time."""
+    """A force as a function of time."""
 
     @property
     def duration(self) -> float:
-        """Time that shows what it does, if none is asked for."""
+        """Default duration of a test."""
 
     def force(self, time: Floats) -> Floats:
         """Force at times of any shape."""
@@ -33,9 +33,9 @@ class Pulse(Protocol):
 
 @dataclass(frozen=True)
 class GaussPulse:
-    """The exponential pulse F0 exp(-(t - tau)^2 / 4 b^2), equation 4-5.
+    """Exponential pulse F0 exp(-(t - tau)^2 / 4 b^2), equation 4-5.
 
-    At t = 0 it starts with a jump of F0 exp(-tau^2 / 4 b^2).
+    It starts at t = 0 with a jump of F0 exp(-tau^2 / 4 b^2).
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class GaussPulse:
 
     @property
     def duration(self) -> float:
-        """Time until it has fallen to a 500th."""
+        """Time until the force has fallen to 1/500 of its peak."""
         return max(0.0, self.tau) + 10.0 * self.b
 
     def force(self, time: Floats) -> Floats:
@@ -63,7 +63,7 @@ class GaussPulse:
 
 @dataclass(frozen=True)
 class SinePulse:
-    """Half a wave of F0 sin(pi t / b), equation 4-6; zero after t = b.
+    """Half wave F0 sin(pi t / b), equation 4-6; zero after t = b.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class SinePulse:
 
     @property
     def duration(self) -> float:
-        """Its own and half as long again, in which the rod rings on."""
+        """Duration of the pulse, and half of it again for the ringing of the rod."""
         return 1.5 * self.b
 
     def force(self, time: Floats) -> Floats:
@@ -89,7 +89,7 @@ class SinePulse:
 
 @dataclass(frozen=True)
 class TablePulse:
-    """A table of forces, linear between its rows and zero before the first and after the last.
+    """Table of forces, linear between rows, and zero before the first and after the last.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class TablePulse:
 
     @property
     def duration(self) -> float:
-        """Its last time."""
+        """Last time of the table."""
         return float(self.times[-1])
 
     def force(self, time: Floats) -> Floats:
@@ -111,7 +111,7 @@ class TablePulse:
 
 
 def pulse_of(text: str) -> Pulse:
-    """Make the pulse that a user names.
+    """Parse a pulse.
 
     Parameters
     ----------
@@ -121,9 +121,9 @@ def pulse_of(text: str) -> Pulse:
     Raises
     ------
     ValueError
-        If it is none of these, a width is not positive, or the table can't be used.
+        If the text has none of these forms, a width is not positive, or the table is invalid.
     OSError
-        If the file can't be read.
+        If the file cannot be read.
     """
     kind, colon, rest = text.partition(":")
     if not colon or kind not in FORMS:
@@ -133,12 +133,12 @@ def pulse_of(text: str) -> Pulse:
     if len(values) != len(names):
         raise ValueError(f"{text}: {kind} takes {len(names)} numbers, {kind}:{','.join(names)}")
     if not values[-1] > 0.0:
-        raise ValueError(f"{text}: the width B is not positive")
+        raise ValueError(f"{text}: the width B must be positive")
     return GaussPulse(*values) if kind == "gauss" else SinePulse(*values)
 
 
 def _numbers(text: str) -> Sequence[float]:
-    """Finite numbers with commas between them; none where one of them is no number."""
+    """Parse finite numbers separated by commas; empty if one is invalid."""
     try:
         values = [float(part) for part in text.split(",")]
     except ValueError:
@@ -149,8 +149,8 @@ def _numbers(text: str) -> Sequence[float]:
 def _table(text: str) -> TablePulse:
     path = Path(text)
     if not path.is_file():
-        raise ValueError(f"{text} is neither a file nor a pulse; a pulse is {USAGE}")
+        raise ValueError(f"{text} is neither a file nor a pulse; use {USAGE}")
     columns = read_columns(path, ("time", "force"), increasing="time")
     if columns["time"][-1] <= 0.0:
-        raise ValueError(f"{path}: the pulse is over before time 0, when it would begin to act")
+        raise ValueError(f"{path}: the pulse ends before time 0")
     return TablePulse(columns["time"], columns["force"])
