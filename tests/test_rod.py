@@ -229,11 +229,11 @@ def test_a_table_in_a_file_is_a_pulse(tmp_path: Path) -> None:
     ("options", "told"),
     [
         (("--pulse", "gauss:1,2"), "gauss takes 3 numbers, gauss:F0,TAU,B"),
-        (("--pulse", "gauss:1,2,0"), "the width B is not positive"),
+        (("--pulse", "gauss:1,2,0"), "the width B must be positive"),
         (("--pulse", "sine:1,nan"), "sine takes 2 numbers"),
         (("--pulse", "box:1,2"), "neither a file nor a pulse"),
-        ((*PUSH, "--station", 1.5), "not on the rod, which reaches to 1"),
-        ((*PUSH, "--filter", "slow:1"), "slow:1 is no filter"),
+        ((*PUSH, "--station", 1.5), "not on the rod of length 1"),
+        ((*PUSH, "--filter", "slow:1"), "unknown filter slow:1"),
         ((*PUSH, "--duration", 1e3), "more than 2,000,000 steps"),
         ((*PUSH, "--plot", "out.bmp"), "written as .png, .svg, .pdf"),
         ((*PUSH, "-o", "no-such-folder/out.csv"), "there is no folder"),
@@ -265,7 +265,7 @@ def test_a_rod_that_is_not_whole_is_refused_with_what_it_lacks() -> None:
 def test_a_table_without_a_future_is_no_pulse(tmp_path: Path, text: str) -> None:
     file = tmp_path / "pulse.csv"
     file.write_text(text)
-    with pytest.raises(ValueError, match=r"over before time 0|fewer than two rows"):
+    with pytest.raises(ValueError, match=r"ends before time 0|fewer than two rows"):
         pulse_of(str(file))
 
 
