@@ -1,6 +1,6 @@
-"""Built-in verification: closed forms, figures from outside, and figures that guard against change.
+"""Built-in verification against closed forms, external references and regression values.
 
-Nothing here reads a file: decks are made in Python, figures stand beside their sources.
+No files are read: decks are built in Python, and reference values are stated with their sources.
 """
 
 from __future__ import annotations
@@ -44,20 +44,20 @@ CASES: tuple[Case, ...] = (
 
 
 class UnknownCaseError(FecmError, LookupError):
-    """A name that no case has."""
+    """The name of a case is unknown."""
 
 
 def chosen(names: Iterable[str] = ()) -> list[Case]:
-    """Pick the cases of some names, once each and in their usual order; all without names.
+    """Return the named cases in their usual order; all cases if there are no names.
 
     Raises
     ------
     UnknownCaseError
-        If no case has one of the names.
+        If a name is unknown.
     """
     wanted = list(names)
     known = [one.name for one in CASES]
     for name in wanted:
         if name not in known:
-            raise UnknownCaseError(f"there is no case {name}; there are {', '.join(known)}")
+            raise UnknownCaseError(f"there is no case {name}; the cases are {', '.join(known)}")
     return [one for one in CASES if not wanted or one.name in wanted]

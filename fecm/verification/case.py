@@ -1,9 +1,9 @@
-"""What a verification case is, and how it is carried out.
+"""Verification cases.
 
-A case computes a few numbers; each of its checks says what one of them should be, where that figure
-comes from, how far off it may be, and why so far.  A check is independent if its figure is a closed
-form or comes from outside this program; it is one of consistency if two ways through this program
-have to agree; otherwise it guards against change.
+A case computes a few values; each of its checks states the expected value, its source, the
+tolerance and the reason for the tolerance.  A check is independent if the expected value is a
+closed form or an external reference, a consistency check if two computations by this program must
+agree, and otherwise guards against change.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ INDEPENDENT, CONSISTENCY, AGAINST_CHANGE = "independent", "consistency", "agains
 
 @dataclass(frozen=True)
 class Check:
-    """One number that a case has to give.
+    """Expected value of one quantity.
 
     Attributes
     ----------
     quantity : str
-        What it is, with its unit.
+        Name and unit.
     expected : float
-        The figure.
+        Expected value.
     source : str
-        Where the figure comes from.
+        Source of the expected value.
     tolerance : float
-        Largest error that is allowed.
+        Largest admissible error.
     why : str
-        Why an error of that size is.
+        Reason for the tolerance.
     label : str
         `INDEPENDENT`, `CONSISTENCY` or `AGAINST_CHANGE`.
     scale : float or None
-        What the error is relative to; None for the figure itself.
+        Reference of the relative error; None for the expected value.
     """
 
     quantity: str
@@ -46,21 +46,21 @@ class Check:
     scale: float | None = None
 
     def error(self, got: float) -> float:
-        """What was computed less the figure, relative to the scale."""
+        """Return the relative error of a computed value."""
         return (got - self.expected) / abs(self.expected if self.scale is None else self.scale)
 
 
 @dataclass(frozen=True)
 class Case:
-    """Numbers that are computed together.
+    """Quantities computed together.
 
     Attributes
     ----------
     name, title : str
-        What it is called by, and what it is.
+        Name and description.
     checks : tuple of Check
     compute : callable
-        Gives one number a check, in their order.
+        Returns one value per check, in order.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Row:
-    """A check that was carried out.
+    """Result of a check.
 
     Attributes
     ----------
@@ -79,9 +79,9 @@ class Row:
         Name of the case.
     check : Check
     got : float
-        What was computed; NaN where nothing was.
+        Computed value; NaN if the computation failed.
     failure : str
-        Why nothing was.
+        Reason for the failure.
     """
 
     case: str
@@ -91,17 +91,17 @@ class Row:
 
     @property
     def error(self) -> float:
-        """Relative error, with its sign."""
+        """Signed relative error."""
         return self.check.error(self.got)
 
     @property
     def within(self) -> bool:
-        """Whether the error is allowed; NaN is not."""
+        """Whether the error is within the tolerance; False for NaN."""
         return abs(self.error) <= self.check.tolerance
 
 
 def case(name: str, title: str, *checks: Check) -> Callable[[Callable[[], Sequence[float]]], Case]:
-    """Make a case of the function that computes its numbers."""
+    """Return a decorator that makes a case of the function that computes its values."""
 
     def made(compute: Callable[[], Sequence[float]]) -> Case:
         return Case(name, title, checks, compute)
@@ -110,12 +110,12 @@ def case(name: str, title: str, *checks: Check) -> Callable[[Callable[[], Sequen
 
 
 def carry_out(one: Case) -> list[Row]:
-    """Compute a case's numbers; what keeps them from being computed is told in its rows."""
+    """Compute the rows of a case; an exception becomes the failure of all rows."""
     try:
         numbers, failure = [float(number) for number in one.compute()], ""
         if len(numbers) != len(one.checks):
             raise ValueError(f"{len(numbers)} numbers for {len(one.checks)} checks")
-    except Exception as error:  # whatever it is, the answer is no
+    except Exception as error:  # any exception fails the rows
         failure = f"{type(error).__name__}: {error}".splitlines()[0]
         numbers = [math.nan] * len(one.checks)
     return [
@@ -125,7 +125,7 @@ def carry_out(one: Case) -> list[Row]:
 
 
 def farthest(values: Iterable[float], expected: float) -> float:
-    """The value that is farthest from what all should be; NaN if any is."""
+    """Return the value farthest from the expected value; NaN if any value is NaN."""
     every = list(values)
     if any(math.isnan(value) for value in every):
         return math.nan

@@ -1,4 +1,4 @@
-"""Rows of a verification as text, as values for programs, and as the page of the documentation."""
+"""Output of verification rows as text, JSON values and Markdown."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FINE, NOT_FINE = "ok", "FAILED"
 
 
 def cells(row: Row) -> tuple[str, ...]:
-    """A row's cells, in the order of :data:`HEAD`."""
+    """Return the cells of a row in the order of :data:`HEAD`."""
     check = row.check
     return (
         row.case,
@@ -30,12 +30,12 @@ def cells(row: Row) -> tuple[str, ...]:
 
 
 def lines(cases: Sequence[Case], rows: Iterable[Row]) -> Iterator[str]:
-    """A table in columns, line by line as rows come in.
+    """Yield the lines of a table as rows are computed.
 
     Parameters
     ----------
     cases : sequence of Case
-        Where the rows come from, for the columns' widths.
+        Cases of the rows, for the widths of the columns.
     rows : iterable of Row
     """
     # Numbers of nine digits are at most 15 wide, errors 8.
@@ -59,7 +59,7 @@ def lines(cases: Sequence[Case], rows: Iterable[Row]) -> Iterator[str]:
 
 
 def values(row: Row) -> dict[str, Any]:
-    """A row for programs; what could not be computed is None."""
+    """Return a row as plain values; None for values that could not be computed."""
     check = row.check
     return {
         "case": row.case,
@@ -79,39 +79,38 @@ def values(row: Row) -> dict[str, Any]:
 INTRODUCTION = """\
 # Verification
 
-`fecm verify` computes the cases below, in a few seconds, and compares what it gets with figures
-that are known. It needs no file, so that it tests the program as it is installed. Exit status 0:
-every row is within its tolerance; 1: some are not.
+`fecm verify` computes the cases below in a few seconds and compares the results with known values.
+It needs no files, so that it tests the installed program. The exit status is 0 if every row is
+within its tolerance, and 1 otherwise.
 
 ```sh
-fecm verify                        # all of them
-fecm verify patch rod-pulse        # some
-fecm verify --list                 # what there is
-fecm verify --format json          # for programs
+fecm verify                        # all cases
+fecm verify patch rod-pulse        # some cases
+fecm verify --list                 # names of the cases
+fecm verify --format json          # JSON
 fecm verify --markdown             # this page
 ```
 
-- **independent**: the figure is a closed form, or comes from outside this program.
-- **consistency**: two ways through this program have to agree, or its own numbers have to obey a
-  law such as the balance of energy. Such a row can't see an error that both sides share.
-- **against change**: the figure is one of the original program, recompiled, or of this program
-  itself. Such a row can't show that either is right, only that nothing has moved.
+- **independent**: the expected value is a closed form or an external reference.
+- **consistency**: two computations by this program must agree, or its results must satisfy a law
+  such as the energy balance. Such a row cannot detect an error that both sides share.
+- **against change**: the expected value was computed by the original program, recompiled, or by
+  this program. Such a row does not show that either is correct, only that nothing has changed.
 
-The error is what was got less what was expected, relative to what was expected; where that is zero,
-relative to the scale that the quantity names or that suits it. What is allowed is what the theory
-of the discretisation justifies, for the reason beside it. Each row of the first two kinds fails
-when the physics that it speaks of is broken on purpose: `tests/test_verify_breaks.py` does it,
-break by break, and requires that no such row is left out.
+The error is relative to the expected value; if that is zero, to a scale stated in the row or a
+natural scale of the quantity. The tolerance follows from the theory of the discretisation, for the
+reason stated. Each row of the first two kinds fails if the physics that it tests is broken on
+purpose: `tests/test_verify_breaks.py` does so, and requires that every such row is covered.
 
 Units are lb, in and s, except for the square plates of `static-bending` and `frequencies`, whose
-sides, moduli and densities are 1. Plates have L2 = 2 where a row does not say otherwise, but for
-`patch`, `resultants`, `time-step` and the impacts: these have L2 = 3, as the report's deck has."""
+sides, moduli and densities are 1. Plates have L2 = 2 unless stated otherwise; `patch`,
+`resultants`, `time-step` and the impacts have L2 = 3, as the deck of the report."""
 
 COLUMNS = ("quantity", "source", "expected", "got", "error", "allowed", "because", "label")
 
 
 def page(rows: Iterable[Row]) -> str:
-    """Write the page of the documentation, in Markdown, of the rows of all cases."""
+    """Return the documentation page in Markdown."""
     of_case: dict[str, list[Row]] = {}
     for row in rows:
         of_case.setdefault(row.case, []).append(row)

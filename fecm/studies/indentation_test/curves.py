@@ -1,14 +1,14 @@
-"""Least squares of the curves of an indentation test, with the covariance of all that is found.
+"""Least squares fit of the curves of an indentation test, with the covariance of all parameters.
 
-First k from the first loading alone (equation 3-1 with n = 3/2).  Then, with this k, the power q,
-of every cycle its peak alpha_m and permanent indentation alpha_0, and of every reloading its
-origin, from all unloading and reloading curves at once (equations 3-3 and 3-11).  A peak is where
-the unloading curve meets the first loading curve; the largest value recorded, which noise pushes
-up and coarse steps cut off, is only its first guess.
+k follows from the first loading (equation 3-1 with n = 3/2).  With this k, one fit of all unloading
+and reloading curves (equations 3-3 and 3-11) gives the power q, the peak alpha_m and the permanent
+indentation alpha_0 of every cycle, and the origin of every reloading.  A peak is the intersection
+of the unloading and first loading curves; the largest recorded value, which noise increases and
+coarse steps reduce, is only the initial guess.
 
-Covariances are those of the points' own residuals (divided by 1 less their leverage), not of one
-variance for all: they hold for a scatter that grows with the force as for one that does not, and
-carry the error of k on to all the rest.
+Covariances follow from the residuals of the points (divided by 1 minus their leverage) instead of
+a common variance: they hold also for a scatter that grows with the force, and include the error of
+k.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING, Divis
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value and its standard error; an error of 0 where the value was given."""
+    """A value and its standard error, which is 0 for a prescribed value."""
 
     value: float
     error: float
 
 
 def r_squared(fitted: Floats, measured: Floats) -> float | None:
-    """1 less the residuals' share of the variance; None where nothing varies."""
+    """Return 1 minus the residual fraction of the variance; None for constant data."""
     if len(measured) < 2 or not np.ptp(measured):
         return None
     total = float(((measured - measured.mean()) ** 2).sum())
@@ -43,25 +43,25 @@ def r_squared(fitted: Floats, measured: Floats) -> float | None:
 
 Ints = NDArray[np.int64]
 
-# Points that a curve needs.
+# Fewest points of a curve.
 FEWEST = 5
 
 FIRST_Q = 2.2
 
-# Distance from a limit, in parts of the way between both, at which a value counts as at it.
+# Distance from a bound at which a value counts as at it, relative to the range.
 AT_LIMIT = 1e-4
 
-# How far a peak may move from its record, and where origins may lie, in parts of the peak.
+# Bounds of peaks relative to the recorded value, and of origins relative to the peak.
 PEAK_MOVES = 0.15
 
 LIMITS_PERMANENT = (-0.5, 0.8)
 
 LIMITS_ORIGIN = (-3.0, 0.8)
 
-# A peak with a larger error than this part of itself is not found by the curves.
+# Relative error above which the curves do not determine a peak.
 VAGUE = 0.05
 
-# Standard errors by which an origin is clearly above a turn.
+# Standard errors by which an origin must exceed a turn.
 SURE = 3.0
 
 STEP = 1e-6
@@ -69,16 +69,17 @@ STEP = 1e-6
 
 @dataclass(frozen=True)
 class ParameterLayout:
-    """Where each parameter stands in the vector of all.
+    """Index of each parameter in the vector of parameters.
 
     Attributes
     ----------
     corners, permanents : list of int
-        By corner, by cycle.
+        Indices by corner and by cycle.
     origins : dict
-        By the number of the RISING stretch.  Those that begin without contact have the cycle's
-        permanent indentation instead, and those with too few points are not fitted.
+        Indices by RISING stretch.  Stretches that begin without contact use the permanent
+        indentation of the cycle; those with too few points are not fitted.
     size : int
+        Number of parameters.
     """
 
     corners: list[int]
@@ -90,7 +91,7 @@ class ParameterLayout:
 
 
 def layout_of(division: Division, tied: frozenset[int] = frozenset()) -> ParameterLayout:
-    """Number the parameters: k, q, corners, permanent indentations, origins that are not tied."""
+    """Number the parameters: k, q, corners, permanent indentations, and origins not in `tied`."""
     corners = list(range(2, 2 + len(division.corners)))
     permanents = [2 + len(corners) + n for n in range(len(division.peaks))]
     size = 2 + len(corners) + len(permanents)
@@ -106,15 +107,15 @@ def layout_of(division: Division, tied: frozenset[int] = frozenset()) -> Paramet
 
 @dataclass(frozen=True)
 class Curves:
-    """The curves of a test, in units of its largest indentation and force.
+    """Curves of a test, scaled by its largest indentation and force.
 
     Attributes
     ----------
     division : Division
     a, f : ndarray (n,)
-        Indentation and force over their largest values.
+        Indentation and force divided by their largest values.
     length, force : float
-        The largest values.
+        Largest indentation and force.
     layout : ParameterLayout
     """
 
@@ -133,12 +134,12 @@ class Curves:
         return units
 
     def peak_force(self, p: Floats, cycle: int) -> float:
-        """Force of a cycle's peak, equation 3-1."""
+        """Return the force at the peak of a cycle, equation 3-1."""
         peak = p[self.layout.corners[self.division.peaks[cycle]]]
         return float(p[ParameterLayout.K] * peak**LOADING_POWER)
 
     def stretch(self, p: Floats, number: int, a: Floats) -> Floats:
-        """Force on a stretch's curve; `p` and `a` in the scaled units."""
+        """Return the scaled force on the curve of a stretch for scaled `p` and `a`."""
         s, at = self.division.stretches[number], self.layout
         if s.kind == LOADING:
             return np.asarray(power_curve(p[at.K], 0.0, 1.0, LOADING_POWER, a))
@@ -161,7 +162,7 @@ class Curves:
         return np.asarray(power_curve(top, origin, peak - origin, LOADING_POWER, a))
 
     def numbers(self, *kinds: str) -> list[int]:
-        """Numbers of the stretches of some kinds that can be fitted."""
+        """Return the numbers of the stretches of some kinds with enough points."""
         return [
             n
             for n, s in enumerate(self.division.stretches)
@@ -169,14 +170,14 @@ class Curves:
         ]
 
     def of(self, p: Floats, *kinds: str) -> tuple[Floats, Floats]:
-        """Fitted and measured forces of the stretches of some kinds."""
+        """Return fitted and measured forces of the stretches of some kinds."""
         parts = [(n, self.division.stretches[n].rows) for n in self.numbers(*kinds)]
         fitted = [self.stretch(p, n, self.a[rows]) for n, rows in parts]
         measured = [self.f[rows] for _, rows in parts]
         return np.concatenate([[], *fitted]), np.concatenate([[], *measured])
 
     def r_squared(self, p: Floats, *kinds: str) -> float | None:
-        """Share of the forces' variance that the curves explain; None without points."""
+        """Return R² of the stretches of some kinds; None without points."""
         fitted, measured = self.of(p, *kinds)
         return r_squared(fitted, measured)
 
@@ -187,7 +188,7 @@ def scaled(division: Division, indentation: Floats, force: Floats) -> Curves:
     Raises
     ------
     NoTestError
-        If there is no force, or a curve has too few points.
+        If no force is positive, or a curve has too few points.
     """
     length, top = float(division.path.smooth.max()), float(force.max())
     if length <= 0.0 or top <= 0.0:
@@ -207,17 +208,17 @@ def scaled(division: Division, indentation: Floats, force: Floats) -> Curves:
 
 @dataclass(frozen=True)
 class Solution:
-    """What was found, in the test's own units.
+    """Fitted parameters in the units of the test.
 
     Attributes
     ----------
     values : ndarray (m,)
-        As :class:`ParameterLayout` numbers them.
+        Numbered by :class:`ParameterLayout`.
     covariance : ndarray (m, m)
     held : frozenset of int
-        Corners that stayed where they were recorded.
+        Corners held at their recorded values.
     at_limit : bool
-        Whether a value lies where the search ended: the curves do not fit, and errors mean nothing.
+        Whether a value is at a bound: the curves do not fit, and the errors are meaningless.
     """
 
     curves: Curves
@@ -228,35 +229,29 @@ class Solution:
 
     @property
     def scaled(self) -> Floats:
-        """Values in the curves' units."""
+        """Scaled values."""
         return np.asarray(self.values / self.curves.units)
 
     def estimate(self, function: Callable[[Floats], float]) -> Estimate:
-        """A quantity that follows from the parameters, and its error."""
-        gradient = np.zeros(len(self.values))
-        for n, (value, unit) in enumerate(zip(self.values, self.curves.units, strict=True)):
-            ends: list[float] = []
-            for sign in (1.0, -1.0):
-                moved = self.values.copy()
-                moved[n] = value + sign * STEP * unit
-                ends.append(function(moved))
-            gradient[n] = (ends[0] - ends[1]) / (2.0 * STEP * unit)
+        """Return a function of the parameters and its standard error."""
+        units = self.curves.units
+        gradient = _derivatives(lambda x: np.array([function(x * units)]), self.scaled)[0] / units
         variance = float(gradient @ self.covariance @ gradient)
         return Estimate(function(self.values), max(variance, 0.0) ** 0.5)
 
 
 def solve(curves: Curves, q: float | None = None) -> Solution:
-    """Fit all curves; corners that the curves do not tell stay where they were recorded.
+    """Fit all curves; corners that the curves do not determine keep their recorded values.
 
-    Every reloading has an origin of its own at first.  Where that lies clearly above the turn at
-    which the reloading began, contact was lost there, and the origin is the permanent indentation;
-    a reloading that began in contact has its origin below the turn.
+    In a first fit, every reloading has a separate origin.  If it is significantly above the turn at
+    which the reloading began, contact was lost, and the origin is the permanent indentation; a
+    reloading that began in contact has its origin below the turn.
 
     Parameters
     ----------
     curves : Curves
     q : float, optional
-        The unloading power, where it is given.
+        Prescribed unloading power; fitted if None.
     """
     solution = _held_or_not(curves, q)
     errors = np.sqrt(np.diag(solution.covariance))
@@ -271,7 +266,7 @@ def solve(curves: Curves, q: float | None = None) -> Solution:
 
 
 def _held_or_not(curves: Curves, q: float | None) -> Solution:
-    """Fit with corners where the curves meet, or held where these do not tell."""
+    """Fit; hold corners that the curves do not determine."""
     held: frozenset[int] = frozenset()
     while True:
         solution = _solve(curves, q, held)
@@ -315,7 +310,7 @@ def _solve(curves: Curves, q: float | None, held: frozenset[int]) -> Solution:
 
 
 def _start(curves: Curves, q: float | None) -> tuple[Floats, Floats, Floats]:
-    """First guesses and bounds of all parameters; k is final."""
+    """Return initial values and bounds of all parameters; k is final."""
     at, division = curves.layout, curves.division
     rows = division.rows(LOADING)
     x = np.maximum(curves.a[rows], 0.0) ** LOADING_POWER
@@ -345,7 +340,7 @@ def _start(curves: Curves, q: float | None) -> tuple[Floats, Floats, Floats]:
 
 
 def _origin(a: Floats, f: Floats, power: float) -> float:
-    """Where the straight line through f^(1/power) is zero."""
+    """Return the zero of a straight line through f^(1/power)."""
     high = f > 0.1 * f.max()
     if np.count_nonzero(high) < 3 or not np.ptp(a[high]):
         return 0.0
@@ -354,10 +349,10 @@ def _origin(a: Floats, f: Floats, power: float) -> float:
 
 
 def _covariance(curves: Curves, p: Floats, free: Bools) -> Floats:
-    """Covariance of all parameters in the scaled units; zero where they were not found.
+    """Return the covariance of the scaled parameters; zero for parameters that are not free.
 
-    The sum over the points of the squares of their influence: on k of the first loading's, on the
-    others of theirs and, through k, of the first loading's too.
+    It is the sum over the points of the squares of their influence.  Points of the first loading
+    affect k and, through k, all other parameters.
     """
     rows = curves.division.rows(LOADING)
     x = np.maximum(curves.a[rows], 0.0) ** LOADING_POWER
@@ -365,31 +360,24 @@ def _covariance(curves: Curves, p: Floats, free: Bools) -> Floats:
     residual = (curves.f[rows] - p[ParameterLayout.K] * x) / np.sqrt(1.0 - x * share)
     on_k = share * residual
     covariance = np.zeros((len(p), len(p)))
-    whole = np.zeros(len(p))
-    whole[ParameterLayout.K] = 1.0
+    by_k = np.zeros(len(p))
+    by_k[ParameterLayout.K] = 1.0
     if free.any():
-        jacobian = _jacobian(curves, p)
+        jacobian = _derivatives(lambda x: curves.of(x, FALLING, RISING)[0], p)
         inverse = np.linalg.pinv(jacobian[:, free])
         fitted, measured = curves.of(p, FALLING, RISING)
         leverage = np.clip(np.einsum("ij,ji->i", jacobian[:, free], inverse), 0.0, 0.999)
         influence = inverse * ((measured - fitted) / np.sqrt(1.0 - leverage))
-        whole[free] = -inverse @ jacobian[:, ParameterLayout.K]
+        by_k[free] = -inverse @ jacobian[:, ParameterLayout.K]
         covariance[np.ix_(free, free)] = influence @ influence.T
         if np.linalg.matrix_rank(jacobian[:, free], tol=1e-9 * len(fitted)) < np.count_nonzero(
             free
         ):
             covariance[np.ix_(free, free)] += np.diag(np.full(np.count_nonzero(free), np.inf))
-    return covariance + np.outer(whole, whole) * float(on_k @ on_k)
+    return covariance + np.outer(by_k, by_k) * float(on_k @ on_k)
 
 
-def _jacobian(curves: Curves, p: Floats) -> Floats:
-    """Derivatives of the fitted forces by all parameters, by central differences."""
-    columns: list[Floats] = []
-    for n in range(len(p)):
-        ends: list[Floats] = []
-        for sign in (1.0, -1.0):
-            moved = p.copy()
-            moved[n] += sign * STEP
-            ends.append(curves.of(moved, FALLING, RISING)[0])
-        columns.append((ends[0] - ends[1]) / (2.0 * STEP))
-    return np.stack(columns, axis=1)
+def _derivatives(function: Callable[[Floats], Floats], p: Floats) -> Floats:
+    """Return the Jacobian of a function of scaled parameters by central differences."""
+    steps = STEP * np.eye(len(p))
+    return np.stack([(function(p + h) - function(p - h)) / (2.0 * STEP) for h in steps], axis=1)
