@@ -34,7 +34,7 @@ _REAL = re.compile(
 
 
 def parse_integer(text: str) -> int | None:
-    """Read an I field without blanks in it; None when it is no whole number.
+    """Read an I field without blanks; None if it is not an integer.
 
     The caller limits the length to :data:`LONGEST` characters.
     """
@@ -42,7 +42,7 @@ def parse_integer(text: str) -> int | None:
 
 
 def parse_real(text: str) -> float | None:
-    """Read an F field without blanks in it; None when it is no number.
+    """Read an F field without blanks; None if it is not a number.
 
     Understands every Fortran form: ``45.``, ``.2E-6``, ``1.5D+3``, ``1.5-3``.  A number beyond the
     range of double precision is infinite.  The caller limits the length to :data:`LONGEST`
@@ -63,12 +63,12 @@ def format_real(value: float, width: int) -> str | None:
     value : float
         A finite number.
     width : int
-        Columns to be had.
+        Available columns.
 
     Returns
     -------
     str or None
-        The most readable form that fits, not padded; None when none does.  Only fields of ten
+        The most readable form that fits, not padded; None if none fits.  Only fields of ten
         columns or more get an exponent without its letter: 2.5E-7 as ``25-8`` is hard to read.
     """
     for letter in ("E", "") if width >= _LETTERLESS else ("E",):
@@ -135,7 +135,7 @@ Fields = tuple[Field, ...]
 
 @cache
 def layout(*descriptors: str) -> Fields:
-    """Lay fields out from column 1 on.
+    """Lay out fields from column 1.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ class Card:
 
     @property
     def place(self) -> Place:
-        """The whole card."""
+        """Place of the entire card."""
         return Place(self.line, 1, max(1, len(self.data)), self.text)
 
     def cut(self, fields: Fields) -> list[tuple[int, str]]:
@@ -216,13 +216,13 @@ class Card:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Where a record was read: its card and the fields that the card was cut into."""
+    """Source of a record: its card and the fields of the card."""
 
     card: Card
     fields: Fields
 
     def place(self, name: str = "") -> Place:
-        """Where the field called `name` stands; the whole card without a name."""
+        """Place of the field `name`, or of the entire card without a name."""
         for field, (first, text) in zip(self.fields, self.card.cut(self.fields), strict=False):
             if field.name == name:
                 last = first + max(1, len(text)) - 1
@@ -241,9 +241,9 @@ def read_values(
     card : Card
         The card.
     fields : tuple of Field
-        What stands where.
+        Its fields.
     findings : Findings
-        Receives what is wrong.
+        Receives the errors.
     blanks_are_zeros : bool
         Read a blank inside a number as the zero that it was on the report's machine, with a
         warning; otherwise it is an error where it would change the value.
@@ -438,7 +438,7 @@ def _number(
 
 
 def _why(field: Field, text: str) -> str:
-    """What keeps a text from being a number."""
+    """Why a text is not a number."""
     if field.kind == "I" and parse_real(text) is not None:
         return "this field takes no decimal point"
     if re.search("[A-Za-z]", text):

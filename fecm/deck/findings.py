@@ -1,4 +1,4 @@
-"""Findings: what is wrong with a deck, where, and how to mend it.
+"""Findings: errors and warnings of a deck, with place and remedy.
 
 A finding has a stable code whose first letter is its severity: ``E`` for an error, ``W`` for a
 warning.  Lines and columns are counted from 1.
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from fecm._errors import FecmError
 
-# Errors and warnings of a file that are kept, of each kind.
+# Largest number of errors, and of warnings, that are kept.
 MOST = 1000
 # The code of the error that ends too many of them.
 TOO_MANY = "E000"
@@ -23,7 +23,7 @@ LONGEST = 600
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a value stands: its line, its first and last column, and the card's text."""
+    """Place of a value: line, first and last column, and the card's text."""
 
     line: int
     first: int
@@ -34,18 +34,18 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that is wrong with a deck.
+    """One error or warning.
 
     Attributes
     ----------
     code : str
         Stable identifier, ``E101`` for an error or ``W301`` for a warning.
     message : str
-        One sentence that stands alone.
+        One self-contained sentence.
     place : Place or None
-        Where it is; None when no single card is to blame.
+        None if no single card is the cause.
     hint : str
-        How to mend it; may be empty.
+        Remedy; may be empty.
     """
 
     code: str
@@ -82,7 +82,7 @@ class Finding:
         }
 
     def render(self, source: str) -> str:
-        """Write the finding as a person reads it, with the card and a caret under the field.
+        """Format the finding as text, with the card and a caret under the field.
 
         Parameters
         ----------
@@ -126,7 +126,7 @@ def _shortened(text: str) -> str:
 
 
 def _printable(text: str) -> str:
-    """A text that a terminal shows as it stands: control characters become dots."""
+    """Replace control characters, which a terminal would interpret, by dots."""
     return "".join(char if char.isprintable() else "·" for char in text)
 
 
@@ -136,11 +136,11 @@ class Findings:
     Attributes
     ----------
     counts : Counter
-        How often each code was found, also of findings that are not kept.
+        Number of findings by code, including those that are not kept.
     error_count : int
-        How many errors were found.
+        Number of errors.
     closed : bool
-        Whether no more findings are kept, so that there is no use in reading on.
+        Whether no more findings are kept, so that reading can stop.
     """
 
     def __init__(self) -> None:
@@ -150,7 +150,7 @@ class Findings:
         self.closed = False
 
     def add(self, code: str, message: str, place: Place | None = None, hint: str = "") -> None:
-        """Note one more finding; after :data:`MOST` errors add that there are more, and close."""
+        """Add a finding; after :data:`MOST` errors report that there are more, and close."""
         is_error = code.startswith("E")
         self.counts[code] += 1
         self.error_count += is_error
@@ -179,12 +179,12 @@ class Findings:
 
     @property
     def errors(self) -> list[Finding]:
-        """The findings that make the deck unusable."""
+        """The errors, which make the deck unusable."""
         return [finding for finding in self if finding.severity == "error"]
 
     @property
     def warnings(self) -> list[Finding]:
-        """The findings that a person should know of."""
+        """The warnings."""
         return [finding for finding in self if finding.severity == "warning"]
 
 

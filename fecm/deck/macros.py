@@ -1,4 +1,4 @@
-"""The macro program: words, loops, the order in which macros are carried out.
+"""The macro program: words, loops and the order of execution.
 
 A pass is the number of times that the innermost loop has been entered at its head, from 1; outside
 any loop it is 1.  LOOP 0 runs once.
@@ -29,13 +29,13 @@ class Word:
     name : str
         Up to four letters.
     meaning : str
-        What it does, in one sentence.
+        Its effect, in one sentence.
     value : str
-        What its number is: ``"count"`` (whole, not negative), ``"every"`` (the same, 0 or blank
+        Kind of its number: ``"count"`` (an integer, at least 0), ``"every"`` (the same, 0 or blank
         counting as 1), ``"time step"`` or ``"tolerance"`` (positive; 0 is a time step by itself),
-        or empty where it takes none.
+        or empty without a number.
     needs : tuple of str
-        Words that must have been carried out before; ``"LMAS|CMAS"`` is one or the other.
+        Words that must come before; ``"LMAS|CMAS"`` is one or the other.
     inside : bool
         Whether it belongs inside a loop.
     """
@@ -84,7 +84,7 @@ WORDS = {
 
 @dataclass(frozen=True)
 class Loop:
-    """A loop: its LOOP card, how often it runs, and what it carries out."""
+    """A loop: its LOOP card, number of passes and body."""
 
     macro: Macro
     count: int
@@ -95,12 +95,12 @@ Body = tuple[Macro | Loop, ...]
 
 
 def every(macro: Macro) -> int:
-    """N of a macro that acts at every N-th step or pass; 1 where it is blank."""
+    """N of a macro that acts at every N-th step or pass; 1 if blank."""
     return max(1, int(macro.value))
 
 
 def number(macro: Macro) -> float:
-    """What a macro's number means: its N where it has one, otherwise what stands on the card."""
+    """Meaning of a macro's number: its N if it has one, otherwise the number on the card."""
     return every(macro) if WORDS[macro.word].value == "every" else macro.value
 
 
@@ -112,7 +112,7 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
     macros : tuple of Macro
         The cards.
     findings : Findings
-        Receives what is wrong with them.
+        Receives their errors.
     """
     open_loops: list[tuple[Macro, list[Macro | Loop]]] = []
     body: list[Macro | Loop] = []
@@ -164,11 +164,11 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
 
 
 def _unknown(macro: Macro, findings: Findings) -> Word | None:
-    """Report an unknown word; the word that it most likely means, so that loops stay whole."""
+    """Report an unknown word; return the closest known one, so that loops stay complete."""
     near = difflib.get_close_matches(macro.word, WORDS, 1, 0.5)
     findings.add(
         "E501",
-        f"`{macro.word}` is no macro.",
+        f"`{macro.word}` is not a macro.",
         macro.place("macro"),
         f"did you mean {near[0]}?" if near else f"known are {', '.join(WORDS)}, END",
     )
@@ -176,14 +176,14 @@ def _unknown(macro: Macro, findings: Findings) -> Word | None:
 
 
 def _check_order(word: Word, macro: Macro, done: set[str], findings: Findings) -> None:
-    """Report the words that must have been carried out before this one, each once."""
+    """Report each missing word that must come before this one, once."""
     for require in word.needs:
         choices = require.split("|")
         if not done.intersection(choices):
             names = " or ".join(choices)
             findings.add(
                 "E504",
-                f"{word.name} needs {names}, which does not stand before it.",
+                f"{names} must come before {word.name}.",
                 macro.place("macro"),
                 f"put {names} before it",
             )
@@ -273,7 +273,7 @@ def hits(body: Body) -> bool:
 
 
 def moves_only(body: Body) -> bool:
-    """Whether a program moves the plate from rest, and finds no static solution."""
+    """Whether a program moves the plate from rest and has no static solution."""
     return all(macro.word not in ("TANG", "FORM", "SOLV") for macro in flat(body))
 
 
@@ -283,12 +283,12 @@ STEPS = {"RODP", "EXCD"}
 
 @dataclass(frozen=True, slots=True)
 class WorkEstimate:
-    """How much a program does and stores; the most of it where CONV may leave loops early.
+    """Work and output of a program; an upper bound where CONV may leave loops early.
 
     Attributes
     ----------
     macros : int
-        Macros carried out; each pass of a loop carries out its NEXT.
+        Executed macros; each pass of a loop executes its NEXT.
     steps : int
         Time steps, impact steps and central differences.
     contact_rows : int
@@ -310,10 +310,10 @@ _ALWAYS = ("REAC", "EIGE")
 
 
 def estimate_work(body: Body) -> WorkEstimate:
-    """Count what a program does without carrying out its loops.
+    """Count the work of a program without executing its loops.
 
-    Exact, but for `contact_rows` where RODP cards differ in their number, or EXCD stands among
-    them: then an upper bound.
+    Exact, except that `contact_rows` is an upper bound where RODP cards differ in their number or
+    are mixed with EXCD.
     """
     macros, passes, steps = _entry(body, 1)
     total = sum(steps.values())

@@ -1,8 +1,8 @@
-"""The model: what a deck says, as plain typed objects that know nothing of mechanics.
+"""The model of a deck: plain typed objects without mechanics.
 
 A :class:`Deck` is one problem of a file: its control card, its segments in the deck's order, its
-macro program.  It keeps the cards' values as they were given; nodes and elements that the cards
-only imply are generated from it by :mod:`fecm.mechanics.mesh`.
+macro program.  It keeps the values of the cards; :mod:`fecm.problem.generate` generates the nodes
+and elements between them.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class Elements(Segment):
 
 @dataclass(frozen=True)
 class Boundary(Segment):
-    """BOUN: restraint codes of the nodes; an unknown with a code other than 0 is restrained."""
+    """BOUN: restraint codes of the nodes; a dof with a code other than 0 is restrained."""
 
     records: tuple[NodeCodes, ...]
     keyword: ClassVar[str] = "BOUN"
@@ -96,7 +96,7 @@ class Boundary(Segment):
 
 @dataclass(frozen=True)
 class Forces(Segment):
-    """FORC: nodal forces, or displacements where the unknown is restrained."""
+    """FORC: nodal forces, or displacements where the dof is restrained."""
 
     records: tuple[NodeValues, ...]
     keyword: ClassVar[str] = "FORC"
@@ -127,14 +127,14 @@ class Material(Segment):
 
 @dataclass(frozen=True)
 class Impact(Segment):
-    """ROD: (2I5,F10.0); where and how fast the projectile hits.
+    """ROD: (2I5,F10.0); impact point and velocity.
 
     Attributes
     ----------
     node : int
-        The node that is hit.
+        Impact node.
     dof : int
-        The node's unknown in the direction of impact, from 1 (3 is w).
+        Its dof in the direction of impact, from 1 (3 is w).
     velocity : float
         Approach velocity, length/time.
     """
@@ -332,7 +332,7 @@ class Deck(Record):
     Attributes
     ----------
     title : str
-        What stands behind FECM on the title card.
+        Text after FECM on the title card.
     control : Control
     segments : tuple of Segment
         In the order of the deck.
@@ -341,7 +341,7 @@ class Deck(Record):
     tables : tuple of LoadTable
         Proportional loads, one for each PROP that reads one.
     text : str
-        The problem's cards as they were read, ended by STOP; empty for a deck made in Python.
+        The problem's cards as they were read, ended by STOP; empty for a deck built in Python.
     """
 
     title: str
@@ -360,12 +360,12 @@ class Deck(Record):
         return [segment for segment in self.segments if isinstance(segment, kind)]
 
     def last(self, kind: type[_S]) -> _S | None:
-        """The last segment of one kind, which is the one that counts; None without any."""
+        """The last segment of one kind, which is the effective one; None if there is none."""
         found = self.all(kind)
         return found[-1] if found else None
 
     def require(self, kind: type[_S]) -> _S:
-        """The segment of one kind that counts.
+        """The effective segment of one kind.
 
         Raises
         ------

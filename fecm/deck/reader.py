@@ -1,7 +1,7 @@
 """The card reader: a deck's text in, models and findings out.
 
-It reads on after an error, so that one run shows all of a deck's errors, and it does not draw
-conclusions from what it could not read.
+It continues after an error, so that one run shows all errors of a deck, and draws no conclusions
+from unreadable cards.
 """
 
 from __future__ import annotations
@@ -31,27 +31,25 @@ MOST_MACRO_CARDS = 100_000
 
 # Bytes of a file that no such deck needs.
 LARGEST_FILE = 1_000_000_000
-# Bytes of memory that a deck takes at the most, measured at 10 MB: for each byte of text, and for
-# each line.
+# Largest memory of a deck per byte of text and per line, measured at 10 MB.
 BYTES_A_BYTE, BYTES_A_LINE = 12, 1100
-# What ends a line: see str.splitlines.  The last three are the last bytes of longer characters.
+# Line ends, see str.splitlines.  The last three are the last bytes of longer characters.
 LINE_ENDS = b"\n\r\x0b\x0c\x1c\x1d\x1e\x85\xa8\xa9"
-# Bytes by which a file that is no text is recognised.
+# Number of bytes that identify a binary file.
 FIRST = 4096
 HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 @dataclass
 class ParsedProblem:
-    """A problem as far as it could be read.
+    """The readable part of a problem.
 
     Attributes
     ----------
     deck : Deck or None
         The model; None where the control card could not be read.
     unsound : set of str
-        Keywords of segments of which a card could not be read: nothing can be concluded from what
-        such a segment lacks.
+        Keywords of segments with unreadable cards, from which no conclusion can be drawn.
     """
 
     deck: Deck | None
@@ -81,7 +79,7 @@ class Reader:
 
     @property
     def findings(self) -> Findings:
-        """What is wrong with the file."""
+        """Findings about the file."""
         return self.stream.findings
 
     def problems(self) -> list[ParsedProblem]:
@@ -109,7 +107,7 @@ class Reader:
         return problems
 
     def _end(self, message: str, card: Card) -> None:
-        """Report that there is too much of something, and read no further."""
+        """Report that a limit is exceeded, and stop reading."""
         self.findings.add("E012", message, card.place, "write several files")
         self.findings.close()
 
@@ -136,7 +134,7 @@ class Reader:
     # Control card --------------------------------------------------------------------------------
 
     def _control(self, title: Card) -> Control | None:
-        """Read the control card; None if it is missing or can't be meant."""
+        """Read the control card; None if it is missing or invalid."""
         card = self.stream.take()
         if card is None or card.is_keyword:
             if card is not None:
@@ -155,7 +153,7 @@ class Reader:
         return control if self._is_sound(control) else None
 
     def _is_sound(self, control: Control) -> bool:
-        """Whether counts and dimensions are such as a deck can have; report them if not."""
+        """Whether counts and dimensions are valid; report those that are not."""
         before = len(self.findings)
         values = control.row()
         if control.nen == 0:
@@ -185,7 +183,7 @@ class Reader:
         return len(self.findings) == before and self._is_few(control)
 
     def _is_few(self, control: Control) -> bool:
-        """Whether the file's problems have together no more nodes and elements than one may."""
+        """Whether all problems of the file together keep the limits of nodes and elements."""
         before = len(self.findings)
         for name, value in (("NUMNP", control.numnp), ("NUMEL", control.numel)):
             self._counted[name] += value
@@ -222,7 +220,7 @@ class Reader:
                 if not card.is_keyword:
                     self.stream.skip_data()
             elif reader is None:
-                self.stream.skip_data()  # without counts the data can't be told apart
+                self.stream.skip_data()  # without counts the cards are ambiguous
             elif self._segments == MOST_SEGMENTS:
                 self._end(f"The file has more than {MOST_SEGMENTS} segments.", card)
             else:
@@ -233,13 +231,13 @@ class Reader:
         return segments
 
     def _stray(self, card: Card, known: list[str]) -> None:
-        """Report a card where a keyword should stand, once for all that follow it."""
+        """Report a card in place of a keyword, once for all cards up to the next keyword."""
         if card.is_keyword:
             near = _close(card.keyword, known)
             self._unsound.update(near)
             self.findings.add(
                 "E005",
-                f"`{card.data.split()[0]}` is no keyword here.",
+                f"`{card.data.split()[0]}` is not a keyword here.",
                 Place(card.line, 1, min(4, len(card.data)), card.text),
                 f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}",
             )
@@ -278,7 +276,7 @@ class Reader:
                 )
                 return self._macros(card)
             self._stray(card, [MACROS])
-            if card.is_keyword:  # MACR misspelt: what follows is the program all the same
+            if card.is_keyword:  # MACR misspelt: the program follows all the same
                 return self._macros(card)
         self.findings.add(
             "E009", "The problem has no macro program.", title.place, "it begins with a MACR card"
@@ -343,7 +341,7 @@ class Reader:
 
 
 def _close(word: str, known: list[str]) -> list[str]:
-    """The known word that a misspelt one most likely means, or nothing."""
+    """The closest known word, if any."""
     return difflib.get_close_matches(word, known, 1, 0.6)
 
 
@@ -363,21 +361,21 @@ def decode(data: bytes) -> str:
 
 
 def load_text(path_or_text: str | Path) -> tuple[str, str]:
-    """Text of a deck and the name to call it by: see :func:`read_deck`."""
+    """Text and name of a deck, see :func:`read_deck`."""
     if isinstance(path_or_text, str) and ("\n" in path_or_text or not path_or_text.strip()):
         return path_or_text, "<text>"
     return decode(_bytes(Path(path_or_text))), str(path_or_text)
 
 
 def _bytes(path: Path) -> bytes:
-    """All bytes of a deck, which may come from a pipe, and need not end.
+    """All bytes of a deck, which may be an endless pipe.
 
     Raises
     ------
     NotEnoughMemoryError
-        If its cards would take more memory than is free.
+        If its cards need more memory than is free.
     OSError
-        If it can't be read, or is no text.
+        If it can't be read or is not text.
     """
     free = available()
     most = LARGEST_FILE if free is None else min(LARGEST_FILE, free // BYTES_A_BYTE)

@@ -1,7 +1,6 @@
-"""Records: what is read from one card, as plain typed objects, and the fields of each card.
+"""Records: the values of one card as plain typed objects, and the fields of each card.
 
-Every record knows the card that it was read from (`source`), which does not count when records are
-compared.
+The `source` of a record, its card, is ignored when records are compared.
 """
 
 from __future__ import annotations
@@ -32,10 +31,10 @@ def load_factor(table: LoadTable, clock: float) -> float:
     return a1 + a2 * clock + a3 * wave ** max(table.exponent, 1)
 
 
-# Least and greatest number of nodes an element.
+# Smallest and largest number of nodes per element.
 NODES_AN_ELEMENT = (3, 12)
 
-# Below this number every whole one is a float.
+# Floats represent every integer below this number.
 EXACT = 2**53
 
 AXES = ("x", "y", "z")
@@ -74,7 +73,7 @@ class Record:
         return row
 
     def place(self, name: str = "") -> Place | None:
-        """Where the field called `name` stands in the deck; the whole card without a name."""
+        """Place of the field `name` in the deck, or of the entire card without a name."""
         return self.source.place(name) if self.source else None
 
 
@@ -87,7 +86,7 @@ class Control(Record):
     numnp, numel, layers : int
         Numbers of nodes, elements and layers.
     ndm, ndf, nen : int
-        Spatial dimensions, unknowns a node, nodes an element at the most.
+        Spatial dimensions, dofs per node, largest number of nodes per element.
     """
 
     numnp: int
@@ -133,7 +132,7 @@ class Gage(Record):
     number : int
         Its name in the result.
     x, y, z : float
-        Where it sits; z from the mid-plane, positive on the face away from the projectile (length).
+        Its position; z from the mid-plane, positive on the face away from the projectile (length).
     direction : float
         Degrees from the x-axis to the y-axis.
     """
@@ -231,7 +230,7 @@ class Integration(Record):
     points : int
         Stress points: Gauss points of this order if positive, nodal points if negative (K).
     thickness, width : float
-        Total thickness (length); the width is read and never used.
+        Total thickness (length); the width is not used.
     """
 
     bending: int
@@ -301,7 +300,7 @@ class Macro(Record):
     short_fields: ClassVar[Fields] = (fields[0], *fields[2:])
 
     def text(self) -> str:
-        """Text of the card; whole numbers stand without a point, zeros at its end not at all."""
+        """Text of the card; integers have no point, trailing zeros are left out."""
         values: list[Value] = [self.word, self.option, self.value, self.second]
         while values and not values[-1]:
             values.pop()
@@ -309,7 +308,7 @@ class Macro(Record):
 
     @classmethod
     def card(cls, values: Sequence[Value]) -> str:
-        """Text of the card's first values; whole numbers stand without a point."""
+        """Text of the card's first values; integers have no point."""
         plain = [
             int(v) if isinstance(v, float) and v.is_integer() and abs(v) < EXACT else v
             for v in values
@@ -319,7 +318,7 @@ class Macro(Record):
 
 @dataclass(frozen=True)
 class LoadTable(Record):
-    """Card of PROP: (2I5,7F10.0), behind the macro program's END.
+    """Card of PROP: (2I5,7F10.0), after the macro program's END.
 
     Attributes
     ----------

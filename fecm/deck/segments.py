@@ -57,11 +57,11 @@ class Stream:
     Attributes
     ----------
     findings : Findings
-        Receives what is wrong.
+        Receives the errors.
     lines : list of str
         The file's lines.
     position : int
-        Number of lines that were taken.
+        Number of lines taken.
     read : dict
         By line number, the fields and values of every card that was read, if they are kept.
     """
@@ -91,7 +91,7 @@ class Stream:
         return None
 
     def take(self) -> Card | None:
-        """The next card, or None at the end of the file or of what is kept of findings."""
+        """The next card; None at the end of the file or when findings are closed."""
         while self.position < len(self.lines) and not self.findings.closed:
             self.position += 1
             line = self.lines[self.position - 1]
@@ -108,7 +108,7 @@ class Stream:
         return card
 
     def give_back(self) -> None:
-        """Let the last card be taken again."""
+        """Return the last card to the stream."""
         self.position -= 1
 
     def text_since(self, position: int) -> str:
@@ -117,27 +117,27 @@ class Stream:
         return "\n".join(line.rstrip() for line in taken if not _is_comment(line))
 
     def skip_data(self) -> None:
-        """Pass over cards up to the next keyword."""
+        """Skip cards up to the next keyword."""
         while (card := self.take()) is not None:
             if card.is_keyword:
                 self.give_back()
                 return
 
     def values(self, card: Card, fields: Fields) -> list[Value] | None:
-        """Values of a card; None after an error, which is noted."""
+        """Values of a card; None after an error, which is reported."""
         values = read_values(card, fields, self.findings, blanks_are_zeros=self._blanks_are_zeros)
         if values is not None and self._keeps_values:
             self.read[card.line] = (fields, values)
         return values
 
     def row(self, card: Card, fields: Fields) -> tuple[list[Value], Source] | None:
-        """Values of a card and where they stand; None after an error."""
+        """Values of a card and their source; None after an error."""
         values = self.values(card, fields)
         return None if values is None else (values, Source(card, fields))
 
 
 def _is_comment(line: str) -> bool:
-    """Whether a line is no card."""
+    """Whether a line is a comment."""
     return line.startswith("!")
 
 
@@ -167,7 +167,7 @@ class SegmentReader:
         self.unsound: set[str] = set()
 
     def read(self, head: Card) -> Segment | None:
-        """Read the segment that a keyword card begins; None if it can't be made."""
+        """Read the segment of a keyword card; None after an error."""
         segment = READERS[head.keyword](self, head)
         if segment is None:
             self.unsound.add(head.keyword)
@@ -233,7 +233,7 @@ class SegmentReader:
     # Cards of a fixed number ---------------------------------------------------------------------
 
     def _single(self, head: Card, fields: Fields, what: str) -> Row | None:
-        """A card that must be there; None if it is missing or can't be read."""
+        """A mandatory card; None if it is missing or unreadable."""
         card = self._stream.take()
         if card is None or card.is_keyword:
             if card is not None:
@@ -334,7 +334,7 @@ class SegmentReader:
         return tuple(layers) if len(layers) == count else None
 
 
-# What reads the data of each keyword; None where a segment can't be made.
+# Readers of the segments, by keyword.
 READERS: dict[str, Callable[[SegmentReader, Card], Segment | None]] = {
     "COOR": SegmentReader._coordinates,
     "ELEM": SegmentReader._elements,

@@ -180,7 +180,7 @@ def rules(material: Material) -> tuple[Quadrature, Quadrature, Quadrature]:
 
 
 def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> PlateModel:
-    """Make the plate of a deck, with the slips that are on."""
+    """Build the plate of a deck with the active slips."""
     material = deck.require(Material)
     bending, shear, points = rules(material)
     laminate = laminate_of_deck(deck, isotropic_g12="g12" in slips)
@@ -199,7 +199,7 @@ def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> 
 
 
 def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> Projectile:
-    """Make the projectile of a deck; without a PROJ segment the report's, with the slips on."""
+    """Build the projectile of a deck; without a PROJ segment the report's rod."""
     card = deck.last(ProjectileCard)
     if card is None:
         return report_rod(LISTING_DENSITY if "density" in slips else REPORT_DENSITY)
@@ -210,14 +210,14 @@ def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> Project
 
 
 def build_constants(measured: Indentation) -> ContactParameters:
-    """Make what an EXPE segment says of the indentation law."""
+    """Build the contact parameters of an EXPE segment."""
     if measured.word == Indentation.ACR:
         return YangSunPermanent(measured.k, measured.alpha_p)
     return LinearPermanent(*measured.values())
 
 
 def build_station(deck: Deck, projectile: Projectile, slips: frozenset[str]) -> Transducer:
-    """Make the transducer: PROJ's node, or the rod's middle (one node on under its slip)."""
+    """Build the transducer: PROJ's node, or the rod's middle (the next node under its slip)."""
     sign = 1.0 if "station" in slips else -1.0
     if isinstance(projectile, RigidMass):
         return Transducer(0, sign)
@@ -227,7 +227,7 @@ def build_station(deck: Deck, projectile: Projectile, slips: frozenset[str]) -> 
 
 
 def build_gages(deck: Deck, mesh: Mesh, plate: PlateModel) -> GageArray | None:
-    """Make the strain gages of a deck; None without a GAGE segment."""
+    """Build the strain gages of a deck; None without a GAGE segment."""
     segment = deck.last(GageCards)
     if segment is None:
         return None
@@ -235,7 +235,7 @@ def build_gages(deck: Deck, mesh: Mesh, plate: PlateModel) -> GageArray | None:
 
 
 def build_law(deck: Deck, slips: frozenset[str] = frozenset()) -> Law:
-    """Make the indentation law of a deck, with the slips that are on."""
+    """Build the contact law of a deck with the active slips."""
     constants = build_constants(deck.require(Indentation))
     return ListingLaw(constants) if "reload" in slips else HystereticLaw(constants)
 
@@ -248,7 +248,7 @@ def build_impact(
     integrator: str = WILSON,
     share: float = 1.0,
 ) -> ImpactSystem:
-    """Make projectile, law and contact, with the slips that are on.
+    """Build projectile, contact law and contact with the active slips.
 
     The plate feels the given share of the contact force.
     """
@@ -350,7 +350,7 @@ def laminate_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> Laminate:
 
 @lru_cache(maxsize=256)
 def is_coupled(material: Material) -> bool:
-    """Whether B of a deck's laminate is not 0; False where the MATE segment is unsound."""
+    """Whether B of a deck's laminate is not 0; False where the MATE segment is invalid."""
     try:
         with np.errstate(all="ignore"):
             return laminate_of(material).is_coupled

@@ -51,15 +51,15 @@ def generate(deck: Deck, findings: Findings | None = None, *, unit_force: bool =
     deck : Deck
         The model.
     findings : Findings, optional
-        Receives what can't be generated.
+        Receives the errors.
     unit_force : bool
-        Set the force of ROD's unknown to 1 where ROD stands among the segments, so that it replaces
+        Set the force of ROD's dof to 1 at ROD's place among the segments, so that it replaces
         an earlier FORC's value and a later FORC's replaces it (the slip ``rod-force``).
 
     Returns
     -------
     Mesh
-        What could be generated; complete if there were no findings.
+        Complete if there were no findings.
     """
     noted = Findings() if findings is None else findings
     control = deck.control
@@ -93,9 +93,9 @@ def restraint_codes(
     ----------
     boundaries : sequence of Boundary
     nodes, unknowns : int
-        Number of nodes, and of unknowns of a node.
+        Number of nodes, and of dofs of a node.
     findings : Findings, optional
-        Receives what cannot be generated.
+        Receives the errors.
 
     Returns
     -------
@@ -116,7 +116,7 @@ def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floa
     ----------
     segment : Projectile
     findings : Findings, optional
-        Receives what can't be generated.
+        Receives the errors.
 
     Returns
     -------
@@ -269,7 +269,7 @@ def _fill(elements: Ints, record: ElementNodes, end: int) -> None:
 
 
 def place_of_element(deck: Deck, number: int) -> Place | None:
-    """Where the card stands that gives or generates an element."""
+    """Place of the card that gives or generates an element."""
     segment = deck.last(Elements)
     if segment is None:
         return None

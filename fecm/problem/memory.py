@@ -1,7 +1,7 @@
-"""Memory that a run will take, known before it takes any.
+"""Estimate of the memory of a run, before the run.
 
-The large parts are the element matrices, the assembled stiffness and its factors where a macro or
-the solver wants them, the vectors over nodes, and, of a run without an output file, the result.
+The large parts are the element matrices, the assembled stiffness and its factors if a macro or the
+solver needs them, the nodal vectors and, without an output file, the result.
 The factors below are upper bounds of what was measured on meshes of 4 000 to 160 000 nodes; the
 memory of interpreter and libraries is not counted.
 """
@@ -23,20 +23,20 @@ from fecm.mechanics.stiffness_product import AUTO, CSR, WORTH_GROUPING
 from fecm.problem.build import Problem
 from fecm.results.sinks import RowBuffer
 
-# Bytes a node: mesh, state, fields, rows on their way to the file.
+# Bytes per node: mesh, state, fields, rows on their way to the file.
 NODE = 800
-# Bytes an element's unknown: its places, its forces, and the matrix that sums them.
+# Bytes per dof of an element: its indices, its forces, and the matrix that sums them.
 PLACE = 60
-# Bytes an element's point of strains: Jacobians and strains.
+# Bytes per strain point of an element: Jacobians and strains.
 POINT = 250
-# Bytes an entry of the element matrices that are kept; and of one that is being integrated, for
-# each row of B and point.
+# Bytes per entry of the element matrices that are kept; and of one under integration, for each row
+# of B and point.
 KEPT, INTEGRATED = 12, 24
 # Strains in B: six of the membrane and of bending, two of the transverse shear.
 ROWS = 8
 # Bytes of factors of a plate without coupling: TANG's over n log2 n, EIGE's over n^1.5.
 TANGENT, SHIFTED = 300, 70
-# Bytes a step that the summary behind a run takes.
+# Bytes per step of the summary after a run.
 STEP = 80
 
 STATIC = {"TANG", "EIGE"}
@@ -45,18 +45,18 @@ STATIC = {"TANG", "EIGE"}
 def needed_bytes(
     checked: Problem, *, solver: str = AUTO, in_memory: bool = False, exact: bool = True
 ) -> int:
-    """Memory that a run takes at the most, about.
+    """Approximate upper bound of the memory of a run.
 
     Parameters
     ----------
     checked : Problem
         A problem without errors.
     solver : str
-        How K u is had.
+        Computation of K u.
     in_memory : bool
         Whether the result is kept in memory instead of being written to a file.
     exact : bool
-        Count the elements that are congruent to others, instead of taking each for one of its kind.
+        Count congruent elements once, instead of taking all elements as different.
     """
     words = {macro.word for macro in flat(checked.program)}
     output, model = checked.output_bytes, checked.plate
@@ -74,7 +74,7 @@ def needed_bytes(
 
 
 def check_memory(checked: Problem, *, solver: str = AUTO, in_memory: bool = False) -> None:
-    """Refuse a run that takes more memory than is free.
+    """Refuse a run that needs more memory than is free.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def _strains(checked: Problem) -> int:
 
 
 def _product(model: PlateModel, *, exact: bool) -> int:
-    """Element matrices of the product K u, and what it is to gather and sum."""
+    """Element matrices of the product K u, and the vectors that it gathers and sums."""
     points = max(len(rule.xi) for rule in (model.rules.bending, model.rules.shear))
     total = 0
     for family in model.families:
@@ -120,7 +120,7 @@ def _factors(model: PlateModel, words: set[str]) -> int:
     n = model.neq
     total = TANGENT * n * math.log2(max(2, n)) if "TANG" in words else 0.0
     total += SHIFTED * n**1.5 if "EIGE" in words else 0.0
-    # With coupling all five unknowns of two nodes meet, instead of 2 x 2 and 3 x 3 of them.
+    # With coupling all 5 x 5 dofs of two nodes interact, instead of 2 x 2 and 3 x 3.
     return int(total * (25 / 13 if model.laminate.is_coupled else 1.0))
 
 

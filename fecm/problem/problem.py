@@ -1,7 +1,7 @@
-"""Checks of a deck that was read: a plate that can be hit, a program that can run.
+"""Checks of a deck.
 
-Findings about what a segment lacks are held back where a card of that segment could not be read,
-so that one slip makes one finding.
+Findings about missing data of a segment are suppressed where one of its cards is unreadable, so
+that one mistake makes one finding.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ __all__ = ["Problem", "check"]
 
 ALWAYS: tuple[type[Segment], ...] = (Coordinates, Elements, Material)
 IN_AN_IMPACT: tuple[type[Segment], ...] = (Impact, Indentation)
-# Segments of which only the last counts.
+# Segments of which only the last is effective.
 SINGLE: tuple[type[Segment], ...] = (
     Coordinates, Elements, Material, Impact, Indentation, Projectile, ShearCorrection, Gages, Units
 )  # fmt: skip
@@ -66,16 +66,16 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
     Parameters
     ----------
     problem : ParsedProblem
-        As the reader left it.
+        From the reader.
     findings : Findings
-        Receives what is wrong.
+        Receives errors and warnings.
     listing : bool
         Whether the deck is for listing mode.
 
     Returns
     -------
     Problem or None
-        None where the problem has no control card to check anything by.
+        None without a control card.
     """
     deck, unsound = problem.deck, problem.unsound
     if deck is None:
@@ -123,12 +123,12 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
 
 
 def _element_errors(findings: Findings) -> int:
-    """How many ELEM cards no elements can be generated from."""
+    """Number of ELEM cards that generate no elements."""
     return sum(findings.counts[code] for code in ("E303", "E304", "E305"))
 
 
 def _check_segments(deck: Deck, unsound: set[str], findings: Findings) -> None:
-    """Segments that are missing, and those that another one of the same keyword replaces."""
+    """Report missing segments, and those that a later one of the same keyword replaces."""
     words = {macro.word for macro in deck.macros}
     for kind in (*ALWAYS, *(IN_AN_IMPACT if "RODP" in words else ())):
         if not deck.has(kind) and kind.keyword not in unsound:
