@@ -113,7 +113,7 @@ def run(
         Run with a time step above the critical one, or with a checkerboard motion (E321), all the
         same.
     solver : str
-        How K u is had: ``"auto"`` by what suits the mesh, ``"csr"`` by a sparse matrix.
+        How K·u is computed: ``"auto"`` as suits the mesh, ``"csr"`` by a sparse matrix.
     threads : int
         Threads that share the work of a step; 0 takes every core for a large mesh. The result does
         not depend on it.
@@ -123,7 +123,7 @@ def run(
         The projectile's integration: ``"wilson"`` as in the report's program, or
         ``"average-acceleration"``.
     energy_limit : float
-        Error of the energy balance, as a part of what was given, that ends a run without slips.
+        Relative error of the energy balance that ends a run without slips.
 
     Returns
     -------
@@ -138,7 +138,7 @@ def run(
         If the motion grows without bound, or the energy balance passes its limit.
     ValueError
         If the mode, a slip, the solver, the rod's mass or its integrator is unknown, or a number
-        can't be meant.
+        is invalid.
     NotEnoughMemoryError
         If the run takes more memory than is free: a MemoryError.
     OSError

@@ -505,7 +505,7 @@ def test_what_stands_beyond_the_interrupted_problem_is_not_taken_for_done(tmp_pa
     assert (tmp_path / "d-2.h5").read_text() == "of last week"
     done = fecm_in(tmp_path, "run", "d.inp", "--resume", "--overwrite")
     assert done.returncode == 0
-    assert "d.h5 goes on behind step" in done.stderr
+    assert "d.h5 resumes after step" in done.stderr
     assert (tmp_path / "d-2.h5").read_bytes() == (tmp_path / "d.h5").read_bytes()
 
 
@@ -527,7 +527,7 @@ def test_a_disk_that_fills_leaves_the_last_checkpoint_usable(whole: Path) -> Non
     assert (whole / "f.h5").read_text() == "precious"
     again = fecm_in(whole, "run", "deck.inp", "-o", "f.h5", "--resume")
     assert again.returncode == 0
-    assert "goes on behind step" in again.stderr
+    assert "resumes after step" in again.stderr
     assert (whole / "f.h5").read_bytes() == (whole / "whole.h5").read_bytes()
 
 

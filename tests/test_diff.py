@@ -262,7 +262,7 @@ def test_small_blocks_of_rows_find_the_same(runs: Path, monkeypatch: pytest.Monk
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--rtol", "-1"), "--rtol: `-1` is no number from 0 on"),
+        (("--rtol", "-1"), "--rtol: `-1` is not a number of at least 0"),
         (("--atol", "nan"), "--atol: `nan`"),
         (("--rtol", "nan", "--atol", "-1"), "`nan`"),
         (("--rtol", "inf"), "`inf`"),

@@ -109,7 +109,7 @@ def test_a_case_that_can_not_be_computed_says_why_and_fails(
 
 
 def test_a_list_names_the_cases_without_computing_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fecm.verification.carry_out", None)
+    monkeypatch.setattr("fecm.cli.verify.carry_out", None)
     done = call("verify", "--list")
     assert [line.split()[0] for line in done.stdout.splitlines()] == [one.name for one in CASES]
     told = json.loads(call("verify", "--list", "patch", "--format", "json").stdout)

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from fecm._files import check_outputs
+from fecm.api import load_deck
 from fecm.cli.common import (
     DECK_PATH,
     FORMAT_OPTION,
@@ -20,7 +21,13 @@ from fecm.cli.common import (
     echo_file,
     write_text,
 )
+from fecm.cli.new import OptionError, deck_of_options
 from fecm.cli.types import Finite
+from fecm.deck.catalogue import MATERIALS
+from fecm.deck.findings import DeckError
+from fecm.deck.format import format_deck
+from fecm.deck.reader import load_text
+from fecm.problem.summary import summarise
 
 
 @click.command(short_help="Check DECK without running it, and summarise it.")
@@ -30,12 +37,9 @@ from fecm.cli.types import Finite
 def check(deck: Path, mode: str, form: str) -> None:
     """Read and check DECK without running it: findings, then a summary.
 
-    With --format json, one JSON object a finding and one a problem, a line each.  Exit status 1 if
-    the deck has errors.
+    With --format json, one JSON object per finding and per problem, each on a line.  Exit status 1
+    if the deck has errors.
     """
-    from fecm.api import load_deck
-    from fecm.problem.summary import summarise
-
     prepared = load_deck(deck, mode)
     errors = prepared.errors()
     views = [] if errors else [summarise(problem) for problem in prepared.problems]
@@ -65,10 +69,6 @@ def fmt(deck: Path, output: Path | None, only_check: bool, overwrite: bool) -> N
 
     The model, comments and blank cards stay as they are.
     """
-    from fecm.deck.findings import DeckError
-    from fecm.deck.format import format_deck
-    from fecm.deck.reader import load_text
-
     target = deck if output is None or _same(output, deck) else output
     in_place = target is deck
     if not only_check and str(target) != "-":
@@ -105,7 +105,7 @@ def _same(one: Path, other: Path) -> bool:
                    "--mesh.")  # fmt: skip
 @click.option("--rows", metavar="LIST", help="The same along y.")
 @click.option("--layup", required=True, metavar="LAYUP",
-              help='Layup from the struck face on, as in "[0/45/0/-45/0]2s".')  # fmt: skip
+              help='Layup from the struck face, as in "[0/45/0/-45/0]2s".')  # fmt: skip
 @click.option("--ply-thickness", type=float, required=True, help="Thickness of a ply.")
 @click.option("--ply", metavar="RHO,NU12,E1,E2,G12,G13,G23", help="Constants of a ply.")
 @click.option("--material", metavar="NAME",
@@ -132,23 +132,19 @@ def _same(one: Path, other: Path) -> bool:
 @click.option("--overwrite", is_flag=True, help="Replace a deck that exists.")
 def new(output: Path, overwrite: bool, **options: Any) -> None:
     """Write a ready deck from plate, layup, supports and impact; - is standard output."""
-    from fecm.cli.new import OptionError, deck_of_options
-    from fecm.deck.format import format_deck
-
     if str(output) != "-":
         check_outputs([output], overwrite)
     try:
         deck, notes = deck_of_options(**options)
     except OptionError as error:
         raise click.UsageError(str(error)) from None
-    from fecm.api import load_deck
 
     text = format_deck(deck.to_text())
     prepared = load_deck(text)
     if errors := prepared.errors():
         for finding in errors:
             echo(finding.render("the new deck"), err=True)
-        raise RefusedError("these options make no sound deck; nothing was written")
+        raise RefusedError("these options do not give a valid deck; nothing was written")
     for note in notes:
         echo(f"fecm: note: {note}", err=True)
     source = "the new deck" if str(output) == "-" else str(output)
@@ -164,8 +160,6 @@ def new(output: Path, overwrite: bool, **options: Any) -> None:
 @click.command()
 def materials() -> None:
     """List the named plies of `fecm new`, with their sources."""
-    from fecm.deck.catalogue import MATERIALS
-
     for material in MATERIALS.values():
         ply = material.ply
         click.echo(f"{material.name} ({material.system})")

@@ -5,16 +5,24 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, RefusedError
 from fecm.cli.isolation import reads
+from fecm.results.diff import (
+    SCALE_NAMES,
+    Comparison,
+    Difference,
+    IncomparableError,
+    Listed,
+    Place,
+    Tolerance,
+    difference,
+    opened,
+)
 from fecm.results.schema import jsonable, printable, told_apart
-
-if TYPE_CHECKING:
-    from fecm.results.diff import Comparison, Difference, Listed, Place
 
 
 def _tolerance(_: click.Context, option: click.Parameter, value: str) -> float:
@@ -24,7 +32,7 @@ def _tolerance(_: click.Context, option: click.Parameter, value: str) -> float:
     except ValueError:
         number = math.nan
     if not 0.0 <= number < math.inf:
-        raise RefusedError(f"{option.opts[0]}: `{printable(value)}` is no number from 0 on")
+        raise RefusedError(f"{option.opts[0]}: `{printable(value)}` is not a number of at least 0")
     return number
 
 
@@ -33,7 +41,7 @@ def _tolerance(_: click.Context, option: click.Parameter, value: str) -> float:
 @click.argument("b", type=FILE_PATH)
 @click.option("--rtol", default="0", show_default=True, callback=_tolerance, metavar="R",
               help="Relative tolerance: a share of each dataset's own largest absolute value, in A "
-                   "and B together; so a history's zero crossings are no difference.")  # fmt: skip
+                   "and B together; so zero crossings of a history do not count.")  # fmt: skip
 @click.option("--atol", default="0", show_default=True, callback=_tolerance, metavar="T",
               help="Absolute tolerance, in each dataset's own unit.")  # fmt: skip
 @click.option("--only", multiple=True, metavar="PATH",
@@ -62,8 +70,6 @@ def diff(
 
     Exit status: 0 the same, 1 different, 2 a file or the call can't be used.
     """
-    from fecm.results.diff import IncomparableError, Tolerance, difference, opened
-
     try:
         with opened(a) as left, opened(b) as right:
             found = difference(left, right, Tolerance(rtol, atol), only)
@@ -112,8 +118,6 @@ def _lines(found: Difference) -> list[str]:
 
 def _told(found: Comparison) -> str:
     """What there is to say about a dataset: sizes, then where, then since when."""
-    from fecm.results.diff import SCALE_NAMES
-
     a, b = found.layouts
     parts: list[str] = []
     if a.shape != b.shape:

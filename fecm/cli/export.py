@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -12,9 +11,14 @@ from fecm._files import check_outputs
 from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, writing
 from fecm.cli.isolation import reads
 from fecm.cli.outputs import STANDARD_OUTPUT
-
-if TYPE_CHECKING:
-    from fecm.results.hdf5_reader import Contents
+from fecm.results import csv
+from fecm.results.hdf5_reader import Contents, read
+from fecm.results.result import load, result_of
+from fecm.results.schema import FORMAT, SWEEP, ExportError
+from fecm.results.tapes import tape_texts, write_tapes
+from fecm.results.vtkhdf import write_vtkhdf
+from fecm.sweeps import csv as sweep_csv
+from fecm.sweeps.result import sweep_of
 
 
 @click.command(short_help="Write tape3, tape8 and tape9 as text.")
@@ -25,9 +29,6 @@ if TYPE_CHECKING:
 @reads("result")
 def tapes(result: Path, directory: Path, overwrite: bool) -> None:
     """Write tape3, tape8 and tape9 of RESULT as text, in the original program's formats."""
-    from fecm.results.result import load
-    from fecm.results.tapes import tape_texts, write_tapes
-
     loaded = load(result)
     if directory.is_dir():
         check_outputs([directory / name for name in tape_texts(loaded)], overwrite, [result])
@@ -56,14 +57,13 @@ def export(
     """Write RESULT, of a run or of a sweep, in another program's format.
 
     vtkhdf is one file with a time step for each row that DISP stored; csv is a table with a header
-    line.  A sweep has the tables cases, a row a case, and with its forces kept history.
+    line.  A sweep has the tables cases, with one row per case, and history if its forces
+    are stored.
     """
     if target == "vtkhdf" and dataset is not None:
         raise click.UsageError("--dataset is for --to csv; vtkhdf holds all fields")
     if target == "vtkhdf" and output == STANDARD_OUTPUT:
         raise click.UsageError("vtkhdf can't go to standard output")
-    from fecm.results.hdf5_reader import read
-    from fecm.results.schema import FORMAT, SWEEP, ExportError
 
     contents = read(result, FORMAT, SWEEP)
     name = (dataset or ("cases" if contents.form == SWEEP else "history")).strip("/")
@@ -84,10 +84,6 @@ def export(
 
 def _write_fields(contents: Contents, path: Path, *, overwrite: bool) -> None:
     """Write the fields of a run for ParaView."""
-    from fecm.results.result import result_of
-    from fecm.results.schema import SWEEP, ExportError
-    from fecm.results.vtkhdf import write_vtkhdf
-
     if contents.form == SWEEP:
         raise ExportError("a sweep has no fields; --to csv writes its cases")
     result = result_of(contents)
@@ -100,12 +96,6 @@ def _write_fields(contents: Contents, path: Path, *, overwrite: bool) -> None:
 
 def _write_table(contents: Contents, name: str, path: Path, *, overwrite: bool) -> None:
     """Write a table of a run or of a sweep."""
-    from fecm.results import csv
-    from fecm.results.result import result_of
-    from fecm.results.schema import SWEEP
-    from fecm.sweeps import csv as sweep_csv
-    from fecm.sweeps.result import sweep_of
-
     if contents.form == SWEEP:
         lines = sweep_csv.lines(sweep_of(contents, history=name == sweep_csv.HISTORY), name)
     else:

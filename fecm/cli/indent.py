@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -13,11 +12,16 @@ from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError
 from fecm.cli.indent_curve import curve
 from fecm.cli.outputs import OVERWRITE, PLOT, STANDARD_OUTPUT, OutputPaths
 from fecm.cli.types import POSITIVE, Finite
+from fecm.deck.catalogue import CONTACTS
+from fecm.deck.model import Indentation
+from fecm.mechanics.contact_law import hertz_coefficient
+from fecm.plot.kinds import Picture
 from fecm.studies.indentation_test import LIMITS_Q
-
-if TYPE_CHECKING:
-    from fecm.plot.kinds import Picture
-    from fecm.studies.indentation_test.table import Test
+from fecm.studies.indentation_test.constants import fit as fitted
+from fecm.studies.indentation_test.cycles import NoTestError
+from fecm.studies.indentation_test.report import card, lines, notes, plain
+from fecm.studies.indentation_test.table import Test, read_test
+from fecm.studies.tables import TableError
 
 
 @click.group(short_help="Indentation tests and the law of contact.")
@@ -64,14 +68,8 @@ def fit(
 
     TEST.csv has the columns indentation and force, its rows in the order of measurement:
     first loading, unloading, reloading, as often as was done.  Commas, semicolons or tabs separate
-    them.  Units stand in brackets behind the names, or in a line below.
+    them.  Units are in brackets after the names, or in the line below.
     """
-    from fecm.studies.indentation_test.constants import fit as fitted
-    from fecm.studies.indentation_test.cycles import NoTestError
-    from fecm.studies.indentation_test.report import card, lines, notes, plain
-    from fecm.studies.indentation_test.table import read_test
-    from fecm.studies.tables import TableError
-
     if acr and q not in (None, 2.5):
         raise click.UsageError("--acr takes q = 5/2, as equation 3-7 holds for no other")
     pair = _pair(units, "--unit", "units", "in,lbf")
@@ -151,11 +149,8 @@ def hertz(
 ) -> None:
     """Print the EXPE card of Hertz' contact of a sphere, k by equation 3-2.
 
-    All in one system of units.  Without further options it is elastic: nothing remains.
+    All in one system of units.  Without further options the law is elastic.
     """
-    from fecm.deck.model import Indentation
-    from fecm.mechanics.contact_law import hertz_coefficient
-
     try:
         k = hertz_coefficient(radius, e_s, nu_s, e_t)
     except ValueError as error:
@@ -176,8 +171,6 @@ def hertz(
 @FORMAT_OPTION
 def contacts(name: str | None, units: str, form: str) -> None:
     """List the named contacts of `fecm new --contact`, or print the EXPE card of one."""
-    from fecm.deck.catalogue import CONTACTS
-
     if name is not None and name not in CONTACTS:
         raise click.BadParameter(f"there is {', '.join(CONTACTS)}, not `{name}`",
                                  param_hint="NAME")  # fmt: skip

@@ -5,18 +5,29 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
+import numpy as np
 
 from fecm.cli.common import DECK_PATH, RefusedError
 from fecm.cli.outputs import OUTPUT, OVERWRITE, PLOT, OutputPaths
 from fecm.cli.types import POSITIVE
-
-if TYPE_CHECKING:
-    from fecm.deck.model import Deck, Indentation
-    from fecm.mechanics.contact_law import ContactParameters
-    from fecm.plot.kinds import Picture
+from fecm.deck.catalogue import ALPHA_CR, ALPHA_P, S_P, SYSTEM, SYSTEMS, lengths
+from fecm.deck.model import Deck, Indentation
+from fecm.deck.reader import Reader, load_text
+from fecm.deck.units import unit_names
+from fecm.mechanics.contact_law import (
+    ACR_POWER,
+    ContactParameters,
+    HystereticLaw,
+    LinearPermanent,
+    YangSunPermanent,
+    follow,
+)
+from fecm.plot.kinds import Picture
+from fecm.problem.build import build_constants
+from fecm.problem.check_impact import check_law
 
 
 def _path(text: str | None) -> list[float]:
@@ -32,10 +43,6 @@ def _path(text: str | None) -> list[float]:
 
 def _law(deck: Path) -> tuple[Deck, Indentation]:
     """The first problem of a deck that has an EXPE segment, and the segment."""
-    from fecm.deck.model import Indentation
-    from fecm.deck.reader import Reader, load_text
-    from fecm.problem.check_impact import check_law
-
     reader = Reader(load_text(deck)[0])
     problems = [problem.deck for problem in reader.problems() if problem.deck is not None]
     laws = [(one, law) for one in problems if (law := one.last(Indentation)) is not None]
@@ -109,12 +116,6 @@ def _forces(
     deck: Path, path: list[float], points: int, draws: bool, **_: Any
 ) -> tuple[Rows, Callable[[], Picture]]:
     """Indentation, force and branch along a path, and how they are drawn."""
-    import numpy as np
-
-    from fecm.deck.units import unit_names
-    from fecm.mechanics.contact_law import HystereticLaw, follow
-    from fecm.problem.build import build_constants
-
     problem, card = _law(deck)
     law = HystereticLaw(build_constants(card))
     try:
@@ -147,12 +148,6 @@ def _rigidities(
     line: str | None,
 ) -> tuple[Rows, Callable[[], Picture]]:
     """Largest indentation and rigidities by both equations, and how they are drawn."""
-    import numpy as np
-
-    from fecm.deck.units import unit_names
-    from fecm.mechanics.contact_law import ACR_POWER, LinearPermanent, YangSunPermanent
-    from fecm.problem.build import build_constants
-
     if path and (len(path) != 2 or not 0.0 <= path[0] < path[1]):
         raise click.BadParameter("with --rigidity the range FROM,TO", param_hint="--path")
     problem, card = _law(deck)
@@ -192,9 +187,6 @@ def _rigidities(
 
 def _report_length(deck: Deck, value: float, what: str, option: str) -> float:
     """A length of the report in a deck's unit; without a unit the report's, and a note of it."""
-    from fecm.deck.catalogue import SYSTEM, SYSTEMS, lengths
-    from fecm.deck.units import unit_names
-
     name = unit_names(deck).get("length", "in")
     system = {names[0]: key for key, (names, _) in SYSTEMS.items()}.get(name)
     if system is None:
@@ -206,8 +198,6 @@ def _report_length(deck: Deck, value: float, what: str, option: str) -> float:
 
 
 def _alpha_cr(deck: Deck, own: ContactParameters, given: float | None) -> float:
-    from fecm.deck.catalogue import ALPHA_CR
-    from fecm.mechanics.contact_law import YangSunPermanent
 
     if given is not None:
         return given
@@ -218,9 +208,6 @@ def _alpha_cr(deck: Deck, own: ContactParameters, given: float | None) -> float:
 
 def _line(deck: Deck, own: ContactParameters, given: str | None) -> tuple[float, float]:
     """alpha_p and s_p."""
-    from fecm.deck.catalogue import ALPHA_P, S_P
-    from fecm.mechanics.contact_law import LinearPermanent
-
     if given is not None:
         values = _path(given)
         if len(values) != 2 or values[0] < 0.0 or not 0.0 <= values[1] < 1.0:

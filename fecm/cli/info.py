@@ -6,17 +6,23 @@ import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION
 from fecm.cli.isolation import reads
-from fecm.results.schema import jsonable, printable, shown
-
-if TYPE_CHECKING:
-    from fecm.results.hdf5_reader import Contents
-    from fecm.results.info import DatasetInformation, GroupInformation, Information
+from fecm.results.hdf5_reader import Contents, read
+from fecm.results.info import (
+    DatasetInformation,
+    GroupInformation,
+    Information,
+    information,
+    summary_of_run,
+)
+from fecm.results.result import result_of
+from fecm.results.schema import FORMAT, SWEEP, jsonable, printable, shown
+from fecm.sweeps.result import summary, sweep_of
 
 # Attributes of the file that have lines of their own.
 TOLD = ("title", "mode", "slips", "fecm_version", "format", "format_version",
@@ -33,11 +39,7 @@ PERMANENT = "permanent_indentation"
 @FORMAT_OPTION
 @reads("result")
 def info(result: Path, form: str) -> None:
-    """Tell what is in RESULT, of a run or of a sweep: its units, its summary, every dataset."""
-    from fecm.results.hdf5_reader import read
-    from fecm.results.info import information
-    from fecm.results.schema import FORMAT, SWEEP
-
+    """Show what is in RESULT, of a run or of a sweep: its units, its summary, every dataset."""
     contents = read(result, FORMAT, SWEEP)
     about = _of_sweep(contents) if contents.form == SWEEP else _of_run(contents)
     if about.get("still_in_contact") and PERMANENT in contents.groups["history"]:
@@ -51,9 +53,6 @@ def info(result: Path, form: str) -> None:
 
 def _of_run(contents: Contents) -> dict[str, Any]:
     """Steps, first and last time, and summary of a run."""
-    from fecm.results.info import summary_of_run
-    from fecm.results.result import result_of
-
     result = result_of(contents)
     steps, span = 0, None
     if "history/time" in result and (steps := len(times := result["history/time"])):
@@ -68,8 +67,6 @@ def _of_run(contents: Contents) -> dict[str, Any]:
 
 def _of_sweep(contents: Contents) -> dict[str, Any]:
     """Cases, failed ones among them, and summary of a sweep."""
-    from fecm.sweeps.result import summary, sweep_of
-
     result = sweep_of(contents, history=False)
     failed = len(result) - int(result.fine.sum())
     return {"cases": len(result), "failed": failed, "summary": summary(result)}

@@ -41,7 +41,7 @@ def laminate_of_options(
     Raises
     ------
     OptionError
-        If an option is missing or can't be meant; the message names it.
+        If an option is missing or invalid; the message names it.
     """
     try:
         angles = parse_layup(layup)

@@ -15,14 +15,14 @@ from fecm.deck.model import Deck, Indentation, Projectile, Units
 from fecm.deck.records import Ply, RodDiameter
 from fecm.problem.new import EDGES, SUPPORTS, Specification, new_deck
 
-# Elements in one direction, at the most.
+# Most elements in one direction.
 MOST = 2000
 # Elements of a rod, as many as the report's has.
 ROD_ELEMENTS = 20
 
 
 class OptionError(FecmError, ValueError):
-    """An option can't be meant."""
+    """An option is invalid."""
 
 
 def deck_of_options(
@@ -54,7 +54,7 @@ def deck_of_options(
     Raises
     ------
     OptionError
-        If an option can't be meant; the message names it.
+        If an option is invalid; the message names it.
     """
     try:
         angles = parse_layup(layup)
@@ -204,7 +204,7 @@ def ply_of_options(
     Raises
     ------
     OptionError
-        If an option can't be meant; the message names it.
+        If an option is invalid; the message names it.
     """
     if system is not None and system not in SYSTEMS:
         raise OptionError(f"--units takes {', '.join(SYSTEMS)}, not `{system}`")

@@ -10,15 +10,13 @@ import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from fecm._files import check_outputs
 from fecm.cli.common import FILE_PATH, RefusedError, echo, writing
-
-if TYPE_CHECKING:
-    from fecm.plot.kinds import Picture
+from fecm.plot.kinds import MISSING, SUFFIXES, Picture, PlotError
+from fecm.plot.pictures import save
 
 STANDARD_OUTPUT = Path("-")
 
@@ -88,8 +86,6 @@ class OutputPaths:
         """
         if self.picture is None:
             return
-        from fecm.plot.kinds import PlotError
-        from fecm.plot.pictures import save
 
         try:
             save(draw(), self.picture, overwrite=self.overwrite)
@@ -115,8 +111,6 @@ class OutputPaths:
 
 def _check_picture(path: Path) -> None:
     """Refuse a picture that can't be drawn."""
-    from fecm.plot.kinds import MISSING, SUFFIXES
-
     if path.suffix.lower() not in SUFFIXES:
         raise RefusedError(f"{path}: pictures are written as {', '.join(SUFFIXES)}")
     try:

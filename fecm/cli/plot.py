@@ -6,7 +6,7 @@ import math
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -15,11 +15,10 @@ from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, progress
 from fecm.cli.isolation import reads
 from fecm.plot.kinds import KINDS, Picture, PlotError, PlotNote
 from fecm.plot.pictures import Options, check_options, check_suffix, draw, save
-from fecm.results.schema import printable
-
-if TYPE_CHECKING:
-    from fecm.results.result import Result
-    from fecm.sweeps.result import SweepResult
+from fecm.results.hdf5_reader import read
+from fecm.results.result import Result, result_of
+from fecm.results.schema import FORMAT, SWEEP, printable
+from fecm.sweeps.result import SweepResult, sweep_of
 
 _KIND_HELP = "; ".join(f"{name}: {kind.summary}" for name, kind in KINDS.items())
 
@@ -159,8 +158,6 @@ def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path
 
 def _usual(result: Result | SweepResult) -> str:
     """The kind that is drawn when none is asked for."""
-    from fecm.results.result import Result
-
     return "force" if isinstance(result, Result) else "map"
 
 
@@ -175,10 +172,6 @@ def _named(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:
 
 
 def _loaded(path: Path) -> Result | SweepResult:
-    from fecm.results.hdf5_reader import read
-    from fecm.results.result import result_of
-    from fecm.results.schema import FORMAT, SWEEP
-    from fecm.sweeps.result import sweep_of
 
     contents = read(path, FORMAT, SWEEP)
     return sweep_of(contents, history=False) if contents.form == SWEEP else result_of(contents)

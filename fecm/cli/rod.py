@@ -5,19 +5,25 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from fecm.api import load_deck
 from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError, count_errors, report
 from fecm.cli.outputs import OUTPUT, OVERWRITE, PLOT, STANDARD_OUTPUT, OutputPaths
 from fecm.cli.types import POSITIVE, Finite
+from fecm.deck.units import unit_names
+from fecm.mechanics.projectile import REPORT_ELEMENTS, RigidMass, Rod
 from fecm.mechanics.rod_integrators import INTEGRATORS, LUMPED, MASSES, WILSON
-
-if TYPE_CHECKING:
-    from fecm.mechanics.projectile import Rod
-    from fecm.plot.kinds import Picture
-    from fecm.studies.rod_test.pulse_test import RodHistory
+from fecm.plot.kinds import Picture
+from fecm.problem.build import build_projectile, build_station
+from fecm.studies.rod_test import calibration
+from fecm.studies.rod_test.filters import filter_of
+from fecm.studies.rod_test.history import recorded
+from fecm.studies.rod_test.pulse_test import RodHistory, default_time_step, simulate_pulse, table
+from fecm.studies.rod_test.pulses import pulse_of
+from fecm.studies.tables import read_columns
 
 FILTER_HELP = ("first-order:RISE or moving-average:RISE; RISE is the time from 10 to 90 % of the "
                "answer to a step.")  # fmt: skip
@@ -91,9 +97,6 @@ def pulse(
     """
     targets = OutputPaths.checked(output, picture, overwrite)
     _check_shape(deck, shape)
-    from fecm.studies.rod_test.filters import filter_of
-    from fecm.studies.rod_test.pulse_test import default_time_step, simulate_pulse, table
-    from fecm.studies.rod_test.pulses import pulse_of
 
     units: Mapping[str, str] = {}
     deck_dt = None
@@ -142,19 +145,12 @@ def _check_shape(deck: Path | None, shape: Mapping[str, float | int | None]) -> 
 
 def _uniform(shape: Mapping[str, Any]) -> Rod:
     """The rod of the options."""
-    from fecm.mechanics.projectile import REPORT_ELEMENTS, Rod
-
     diameters = (shape["diameter"],) * (shape["elements"] or REPORT_ELEMENTS)
     return Rod(shape["length"], diameters, shape["modulus"], shape["density"])
 
 
 def _of_deck(deck: Path) -> tuple[Rod, float, float | None, Mapping[str, str]]:
     """The projectile of a deck's first problem, its transducer's x, its first DT, its units."""
-    from fecm.api import load_deck
-    from fecm.deck.units import unit_names
-    from fecm.mechanics.projectile import RigidMass
-    from fecm.problem.build import build_projectile, build_station
-
     prepared = load_deck(deck)
     report(prepared)
     if errors := prepared.errors(force=True):
@@ -214,8 +210,6 @@ def filter_(
     columns time, the history, and filtered.
     """
     targets = OutputPaths.checked(output, picture, overwrite, history)
-    from fecm.studies.rod_test.filters import filter_of
-    from fecm.studies.rod_test.history import recorded
 
     try:
         slow = filter_of(filter_text)
@@ -264,8 +258,6 @@ def calibrate(
     the accelerometer on a free target.  The slope of V_F over V_a gives c_F = (c_a / m) V_F / V_a.
     """
     targets = OutputPaths.checked(STANDARD_OUTPUT, picture, overwrite)
-    from fecm.studies.rod_test import calibration
-    from fecm.studies.tables import read_columns
 
     try:
         columns = read_columns(test, ("time", "V_F", "V_a"), increasing="time")

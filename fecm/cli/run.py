@@ -6,12 +6,12 @@ import contextlib
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from fecm._files import check_outputs
 from fecm._memory import format_bytes
+from fecm.api import load_deck, numbered
 from fecm.cli.common import (
     DECK_PATH,
     FILE_PATH,
@@ -26,15 +26,21 @@ from fecm.cli.common import (
     writing,
 )
 from fecm.cli.types import POSITIVE, Finite
+from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.rod_integrators import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
+from fecm.mechanics.statics import SingularStiffnessError
 from fecm.mechanics.stiffness_product import AUTO, SOLVERS
+from fecm.problem.memory import check_memory
 from fecm.problem.options import ENERGY_LIMIT, RunOptions
+from fecm.problem.problem import Problem
 from fecm.problem.slips import NAMES, active_slips
-
-if TYPE_CHECKING:
-    from fecm.problem.problem import Problem
-    from fecm.simulation.checkpoint import Checkpointer
-    from fecm.simulation.simulation import Simulation
+from fecm.results import hdf5_writer
+from fecm.results.result import load
+from fecm.results.summary import OPEN_END, summary
+from fecm.simulation.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
+from fecm.simulation.printout import Printer
+from fecm.simulation.simulation import Simulation
+from fecm.simulation.spool import Journal, SpoolError
 
 
 @click.command()
@@ -48,14 +54,14 @@ if TYPE_CHECKING:
 @click.option(
     "--overwrite",
     is_flag=True,
-    help="Replace result files that exist, and what interrupted runs have left.",
+    help="Replace existing results and the checkpoints of interrupted runs.",
 )
 @click.option(
     "--solver",
     type=click.Choice(SOLVERS),
     default=AUTO,
     show_default=True,
-    help="How K u is had: by what suits the mesh, or by a sparse matrix in any case.",
+    help="How K·u is computed: as suits the mesh, or always by a sparse matrix.",
 )
 @click.option(
     "--threads",
@@ -71,18 +77,17 @@ if TYPE_CHECKING:
               show_default=True,
               help="The projectile's integration; the report's is Wilson's.")  # fmt: skip
 @click.option("--checkpoint", "every", type=Finite(min=0.0), metavar="SECONDS",
-              help="Keep a checkpoint beside the output, written every so often.")  # fmt: skip
+              help="Write a checkpoint beside the output at this interval.")  # fmt: skip
 @click.option("--resume", is_flag=True,
-              help="Go on from the checkpoint that an interrupted run has left.")  # fmt: skip
+              help="Resume from the checkpoint of an interrupted run.")  # fmt: skip
 @click.option("--energy-limit", type=POSITIVE, default=ENERGY_LIMIT,
               show_default=True, metavar="PART",
-              help="Error of the energy balance, as a part of what was given, that ends a run "
-                   "without slips.")  # fmt: skip
+              help="Relative error of the energy balance that ends a run without "
+                   "slips.")  # fmt: skip
 @click.option(
     "--force",
     is_flag=True,
-    help="Run in spite of a time step above the critical one (E508) or of L2 = 2 in a free plate "
-    "(E321).",
+    help="Run despite a time step above the critical one (E508) or L2 = 2 in a free plate (E321).",
 )
 @click.option(
     "--print",
@@ -110,14 +115,12 @@ def run(
     """Run every problem in DECK and write its result.
 
     A second problem in the deck goes to OUT-2.h5, and so on.  An interrupted run leaves a
-    checkpoint beside its output; --resume with the same options goes on from it, to the same bytes.
+    checkpoint beside its output; --resume with the same options gives the same bytes.
     """
     try:
         active = active_slips(mode, slips)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
-    from fecm.api import load_deck, numbered
-    from fecm.simulation.checkpoint import checkpoint_of, spool_of
 
     prepared = load_deck(deck, mode)
     report(prepared)
@@ -163,16 +166,7 @@ def _run_one(
     resumes: bool,
     overwrite: bool,
 ) -> None:
-    """Run one problem of a deck into a file and say what came out."""
-    from fecm.problem.memory import check_memory
-    from fecm.results import hdf5_writer
-    from fecm.results.result import load
-    from fecm.results.summary import OPEN_END, summary
-    from fecm.simulation.checkpoint import Checkpointer
-    from fecm.simulation.printout import Printer
-    from fecm.simulation.simulation import Simulation
-    from fecm.simulation.spool import Journal
-
+    """Run one problem of a deck into a file and say the summary."""
     _check_room(path, problem.output_bytes)
     check_memory(problem, solver=choices.solver)
     with contextlib.ExitStack() as stack:
@@ -190,7 +184,7 @@ def _run_one(
         if resumes:
             checkpointer.restore(simulation)
             step = simulation.plate.step
-            echo(f"fecm: note: {path} goes on behind step {step}", err=True)
+            echo(f"fecm: note: {path} resumes after step {step}", err=True)
         look.started = True
         simulation.run()
     checkpointer.clear()
@@ -210,16 +204,11 @@ def _run_one(
 @contextlib.contextmanager
 def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
     """Say how a run ended that did not end well."""
-    from fecm.mechanics.plate_motion import DivergenceError
-    from fecm.mechanics.statics import SingularStiffnessError
-    from fecm.simulation.checkpoint import CheckpointError, checkpoint_of
-    from fecm.simulation.spool import SpoolError
-
     try:
         yield
     except SingularStiffnessError as error:
         raise RefusedError(
-            f"{error}: the plate is not held, so that it has no static displacement; restrain "
+            f"{error}: the plate is not restrained and has no static displacement; restrain "
             f"it with BOUN; {path} was not written"
         ) from None
     except DivergenceError as diverged:
@@ -232,7 +221,7 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
         ) from None
     except _StoppedError as stopped:
         echo(
-            f"fecm: stopped behind step {stopped.step}; the same command with --resume goes on to "
+            f"fecm: stopped after step {stopped.step}; the same command with --resume goes on to "
             f"{path}",
             err=True,
         )

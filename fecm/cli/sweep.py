@@ -7,20 +7,24 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from fecm._files import check_outputs
+from fecm.api import load_deck
 from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, count_errors, echo, signals
-
-if TYPE_CHECKING:
-    from fecm.problem.problem import Problem
-    from fecm.sweeps.cases import Case
-    from fecm.sweeps.outcome import Outcome
-    from fecm.sweeps.plan import Plan, Task
-    from fecm.sweeps.result import SweepResult
-    from fecm.sweeps.store import PartialResults
+from fecm.deck.findings import DeckError
+from fecm.problem.problem import Problem
+from fecm.results import hdf5_writer
+from fecm.simulation.simulation import simulate
+from fecm.sweeps.api import carry_out, problem_of
+from fecm.sweeps.batch import deck_of
+from fecm.sweeps.cases import Case, CasesError, grid, parse_vary, read_cases
+from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.plan import Plan, Task, check_memory, freed, plan, tasks
+from fecm.sweeps.result import SweepResult, save, summary, verdict
+from fecm.sweeps.schedule import LOST, SchedulerError
+from fecm.sweeps.store import OtherSweepError, PartialResults
 
 
 @click.command()
@@ -30,7 +34,7 @@ if TYPE_CHECKING:
                    "alpha_p, s_p, q, rod_length, rod_modulus, rod_density, rod_mass; impact_node, "
                    "thickness, density, nu12, e1, e2, g12, g13, g23, layup, dt.")  # fmt: skip
 @click.option("--cases", "table", type=DECK_PATH, metavar="CASES.csv",
-              help="A table instead: a header of names, a row a case.")  # fmt: skip
+              help="A table instead: a header of names, one row per case.")  # fmt: skip
 @click.option("-o", "--output", type=FILE_PATH, metavar="SWEEP.h5",
               help="Result.  [default: the deck's name with -sweep.h5, in this "
                    "folder]")  # fmt: skip
@@ -56,18 +60,12 @@ def sweep(
     allow_failed: bool,
     overwrite: bool,
 ) -> None:
-    """Run DECK with other values, many times.
+    """Run DECK many times with other values.
 
     Cases that differ in the projectile, its velocity or the indentation law alone share one run of
-    the plate.  An interrupted sweep goes on where it was when the same command is given again.
-    The last line counts the cases that failed, whose exit status is 1, and those that ended while
-    the projectile was still on the plate.
+    the plate.  The same command resumes an interrupted sweep.  The last line counts the cases that
+    failed, whose exit status is 1, and those that ended in contact.
     """
-    from fecm.sweeps.cases import CasesError
-    from fecm.sweeps.plan import check_memory, freed, plan, tasks
-    from fecm.sweeps.result import save, summary, verdict
-    from fecm.sweeps.schedule import LOST
-
     path = output or Path(f"{deck.stem}-sweep.h5")
     try:
         cases = _cases(varied, table)
@@ -102,7 +100,6 @@ def sweep(
 
 
 def _cases(varied: tuple[str, ...], table: Path | None) -> list[Case]:
-    from fecm.sweeps.cases import grid, parse_vary, read_cases
 
     if bool(varied) == (table is not None):
         raise click.UsageError("give either --vary or --cases")
@@ -122,8 +119,6 @@ def _chosen(text: str, count: int) -> list[int]:
 
 
 def _problem(deck: Path) -> Problem:
-    from fecm.deck.findings import DeckError
-    from fecm.sweeps.api import problem_of
 
     try:
         return problem_of(deck)
@@ -134,7 +129,6 @@ def _problem(deck: Path) -> Problem:
 
 
 def _parts(made: Plan, path: Path, *, restart: bool) -> PartialResults:
-    from fecm.sweeps.store import OtherSweepError, PartialResults
 
     try:
         return PartialResults(path, made.fingerprint(), restart=restart)
@@ -152,9 +146,6 @@ def _carry_out(
     overwrite: bool,
 ) -> SweepResult:
     """Run the plan with a progress bar; what is finished survives whatever happens."""
-    from fecm.sweeps.api import carry_out
-    from fecm.sweeps.schedule import SchedulerError
-
     parts = _parts(made, path, restart=overwrite)
     try:
         with signals.deferred(), _progress(len(made.cases)) as done:
@@ -200,12 +191,6 @@ def _progress(count: int) -> Iterator[Callable[[Task, Outcome], None]]:
 
 def _run_in_full(made: Plan, fulls: dict[int, Path], *, overwrite: bool) -> None:
     """Run chosen cases with everything that their deck stores."""
-    from fecm.api import load_deck
-    from fecm.results import hdf5_writer
-    from fecm.simulation.simulation import simulate
-    from fecm.sweeps.batch import deck_of
-    from fecm.sweeps.cases import CasesError
-
     for case, path in fulls.items():
         try:
             prepared = load_deck(deck_of(made, case))

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import click
 
 from fecm.cli.common import FORMAT_OPTION, CheckFailedError, RefusedError
-
-if TYPE_CHECKING:
-    from fecm.verification import Case, Row
+from fecm.verification import Case, Row, UnknownCaseError, carry_out, chosen, table
 
 
 @click.command()
@@ -24,8 +21,6 @@ def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: str) -> 
 
     All cases are computed, or those named. Exit status 1 if a row is beyond its tolerance.
     """
-    from fecm.verification import UnknownCaseError, chosen
-
     if markdown and (listing or form == "json"):
         raise RefusedError("--markdown goes with neither --list nor --format json")
     try:
@@ -57,8 +52,6 @@ def _name(cases: Sequence[Case], form: str) -> None:
 
 def _printed(cases: Sequence[Case], form: str, markdown: bool) -> list[Row]:
     """Compute cases and print their rows; a table grows while they are computed."""
-    from fecm.verification import carry_out, table
-
     found: list[Row] = []
 
     def rows() -> Iterator[Row]:

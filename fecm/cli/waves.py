@@ -5,20 +5,24 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from fecm.api import load_deck
 from fecm.cli.common import DECK_PATH, RefusedError, count_errors
+from fecm.cli.laminate_options import laminate_of_options
+from fecm.cli.new import OptionError
 from fecm.cli.outputs import OUTPUT, OVERWRITE, PLOT, OutputPaths
 from fecm.cli.types import ListCommand, number
-
-if TYPE_CHECKING:
-    from fecm.mechanics.laminate import Laminate
-    from fecm.plot.kinds import Picture
-    from fecm.studies.waves import Medium, WaveSurfaces
+from fecm.deck.units import unit_names
+from fecm.mechanics.laminate import Laminate
+from fecm.plot.kinds import Picture
+from fecm.problem.build import laminate_of_deck
+from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces
+from fecm.studies.waves import dispersion as compute
 
 # Rows of a table beyond which a slip of the pen is more likely than a wish.
 MOST = 1_000_000
@@ -109,10 +113,6 @@ def _job(
     **constants: Any,
 ) -> _Job:
     """Check the outputs and make the laminate."""
-    from dataclasses import replace
-
-    from fecm.studies.waves import Medium
-
     targets = OutputPaths.checked(output, picture, overwrite, deck)
     laminate, units = _laminate(deck, layup, constants)
     try:
@@ -134,8 +134,6 @@ def _laminate(
         raise RefusedError(f"--{option.replace('_', '-')} stands for a deck; {deck} is one already")
     if deck is not None:
         return _laminate_of_deck(deck)
-    from fecm.cli.laminate_options import laminate_of_options
-    from fecm.cli.new import OptionError
 
     try:
         return laminate_of_options(layup or "", **constants)
@@ -144,9 +142,6 @@ def _laminate(
 
 
 def _laminate_of_deck(path: Path) -> tuple[Laminate, dict[str, str]]:
-    from fecm.api import load_deck
-    from fecm.deck.units import unit_names
-    from fecm.problem.build import laminate_of_deck
 
     prepared = load_deck(path)
     if errors := prepared.errors(force=True):
@@ -187,9 +182,6 @@ def waves() -> None:
 @_shared
 def dispersion(angles: tuple[float, ...], wavelengths: tuple[float, ...], **shared: Any) -> None:
     """Phase velocity and frequency of all modes against wavelength (figures 2.4, 2.5)."""
-    from fecm.studies.waves import MODES
-    from fecm.studies.waves import dispersion as compute
-
     _bound(5 * len(angles) * len(wavelengths))
     job = _job(**shared)
     try:
@@ -222,8 +214,6 @@ def dispersion(angles: tuple[float, ...], wavelengths: tuple[float, ...], **shar
 @_shared
 def speeds(step: float, **shared: Any) -> None:
     """Normal velocities of the five wave fronts (figures 2.7, 2.8)."""
-    from fecm.studies.waves import FRONTS
-
     _bound(360.0 / step)
     job = _job(**shared)
     surfaces = _surfaces(job.medium)
@@ -252,8 +242,6 @@ def speeds(step: float, **shared: Any) -> None:
 @_shared
 def fronts(times: tuple[float, ...], radius: float | None, step: float, **shared: Any) -> None:
     """Front positions and rays (figures 2.9 to 2.12); cusps go to standard error."""
-    from fecm.studies.waves import FRONTS
-
     _bound(5 * len(times) * 360.0 / step)
     job = _job(**shared)
     start = job.medium.laminate.thickness if radius is None else radius
@@ -285,7 +273,6 @@ def _bound(rows: float) -> None:
 
 
 def _surfaces(medium: Medium) -> WaveSurfaces:
-    from fecm.studies.waves import WaveSurfaces
 
     try:
         return WaveSurfaces(medium)
@@ -304,8 +291,6 @@ def _notes_of_names(surfaces: WaveSurfaces) -> list[str]:
 
 def _notes_of_cusps(surfaces: WaveSurfaces, times: Sequence[float], radius: float) -> list[str]:
     """Where the fronts have cusps: a line for each time and mode."""
-    from fecm.studies.waves import FRONTS
-
     notes = []
     for time in times:
         found = surfaces.cusps(time, radius)
