@@ -19,7 +19,7 @@ from fecm.plot.data import patches, strain_points
 from fecm.plot.deflection import profile
 from fecm.plot.kinds import KINDS, MISSING, Picture, PlotError
 from fecm.plot.meshes import supports
-from fecm.plot.pictures import Options, draw, save
+from fecm.plot.pictures import draw, save
 from fecm.plot.style import COLOURS, scale
 from fecm.results.result import Result
 from tests.builders import distorted_square
@@ -290,17 +290,18 @@ def test_a_picture_names_the_macro_that_stores_what_it_lacks(kind: str) -> None:
 @pytest.mark.parametrize(
     ("kind", "options", "words"),
     [
-        ("line", Options(times=(1.0,)), "no displacements at time 1"),
-        ("strain", Options(at=((9.0, 9.0),)), "9,9 is not on the plate"),
-        ("strain", Options(gages=tuple(range(8))), "fewer points"),
-        ("picture", Options(), "no kind 'picture'"),
+        ("line", {"times": (1.0,)}, "no displacements at time 1"),
+        ("strain", {"at": ((9.0, 9.0),)}, "9,9 is not on the plate"),
+        ("strain", {"gages": tuple(range(8))}, "fewer points"),
+        ("picture", {}, "unknown kind of picture 'picture'"),
+        ("force", {"colour": "red"}, "unknown option colour"),
     ],
 )
 def test_options_that_do_not_fit_are_refused(
-    result: Result, kind: str, options: Options, words: str
+    result: Result, kind: str, options: dict[str, Any], words: str
 ) -> None:
     with pytest.raises(PlotError, match=words):
-        draw(kind, {"small": result}, options)
+        draw(kind, {"small": result}, **options)
 
 
 def test_without_matplotlib_one_line_says_what_to_install(

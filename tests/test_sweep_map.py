@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm.plot.kinds import KINDS, PlotError
-from fecm.plot.pictures import Options, draw
+from fecm.plot.pictures import draw
 from fecm.sweeps.result import SweepResult, save
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM, small
@@ -257,11 +257,11 @@ def test_a_sweep_without_units_has_none_on_its_axes() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"quantity": "force"}, "no quantity force; there is peak_force, "),
-        ({"over": "q"}, "q is not among what .* varies: velocity and k"),
-        ({"over": "velocity", "where": {"velocity": 50.0}}, "velocity is the same in all"),
+        ({"quantity": "force"}, "unknown quantity force; a sweep has peak_force, "),
+        ({"over": "q"}, "no parameter q; it has velocity and k"),
+        ({"over": "velocity", "where": {"velocity": 50.0}}, "velocity does not vary"),
         ({"where": {"velocity": 50.0, "k": 1e6}}, "nothing varies"),
-        ({"where": {"velocity": 500.0}}, "no velocity 500.0; its values reach from 50 to 150"),
+        ({"where": {"velocity": 500.0}}, "no velocity 500.0; its values range from 50 to 150"),
         ({"where": {"velocity": "fast"}}, "no velocity fast"),
     ],
 )
@@ -274,9 +274,11 @@ def test_options_that_do_not_fit_are_refused(
 
 def test_more_than_two_values_need_a_choice() -> None:
     sweep = fecm.sweep(NAMED, {"velocity": [50.0, 60.0], "k": [1e6, 2e6], "s_p": [0.1, 0.2]})
-    with pytest.raises(PlotError, match="velocity, k and s_p are 3 values to draw over; --over"):
+    with pytest.raises(
+        PlotError, match="two axes, and velocity, k and s_p vary; choose with --over"
+    ):
         sweep.plot()
-    with pytest.raises(PlotError, match=r"s_p varies too, .*; --where s_p=VALUE picks"):
+    with pytest.raises(PlotError, match=r"s_p varies too, .*; --where s_p=VALUE selects"):
         sweep.plot(over=("velocity", "k"))
     figure = sweep.plot(over=("velocity", "k"), where={"s_p": 0.2})
     kept = sweep["s_p"] == 0.2
@@ -298,7 +300,7 @@ def test_a_level_beyond_all_values_is_told(plane: SweepResult) -> None:
 @pytest.mark.parametrize("kind", [name for name, kind in KINDS.items() if not kind.sweep])
 def test_kinds_of_runs_do_not_show_a_sweep(plane: SweepResult, kind: str) -> None:
     with pytest.raises(PlotError, match=f"plane is the result of a sweep, .* {kind} can't show"):
-        draw(kind, {"plane": plane}, Options())
+        draw(kind, {"plane": plane})
 
 
 # The command -------------------------------------------------------------------------------------
@@ -334,9 +336,9 @@ def test_a_command_notes_failed_cases(plane: SweepResult, tmp_path: Path) -> Non
         ("run.h5", ("--kind", "map"), "result of a run, which the kind map can't show"),
         ("run.h5", ("--kind", "force", "--kind", "map"), "the kind map can't show"),
         ("plane.h5", ("copy/plane.h5",), "one result; 2 were given"),
-        ("plane.h5", ("--over", "q"), "q is not among what plane varies"),
-        ("plane.h5", ("--quantity", "status"), "no quantity status"),
-        ("deck.inp", ("--kind", "map"), "no readable HDF5 file"),
+        ("plane.h5", ("--over", "q"), "plane has no parameter q"),
+        ("plane.h5", ("--quantity", "status"), "unknown quantity status"),
+        ("deck.inp", ("--kind", "map"), "not a readable HDF5 file"),
     ],
 )
 def test_a_call_that_makes_no_map_is_refused_in_one_line(

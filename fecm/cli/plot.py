@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from fecm._files import check_outputs
 from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, progress
 from fecm.cli.isolation import reads
 from fecm.plot.kinds import KINDS, Picture, PlotError, PlotNote
-from fecm.plot.pictures import Options, check_options, check_suffix, draw, save
+from fecm.plot.pictures import check_options, check_suffix, draw, options_of, save
 from fecm.results.hdf5_reader import read
 from fecm.results.result import Result, result_of
 from fecm.results.schema import FORMAT, SWEEP, printable
@@ -24,7 +24,7 @@ _KIND_HELP = "; ".join(f"{name}: {kind.summary}" for name, kind in KINDS.items()
 
 
 def _numbers(form: str, count: int = 0) -> Callable[[click.Context, click.Parameter, Any], Any]:
-    """A callback that reads finite numbers with commas between them, `count` of them if not 0."""
+    """Return a callback that reads finite numbers separated by commas, `count` of them if not 0."""
 
     def read(value: str) -> tuple[float, ...]:
         try:
@@ -79,22 +79,22 @@ def _pairs(
               help="Point of strain; may be repeated.  [default: the impact point]",
               )  # fmt: skip
 @click.option("--gage", "gages", callback=_numbers("DEGREES,..."), metavar="DEGREES,...",
-              default="0,90", show_default=True,
-              help="Directions of strain, from the x-axis.")  # fmt: skip
-@click.option("--face", type=click.Choice(["far", "struck", "curvature"]), default="far",
-              show_default=True, help="Face of the strain, or curvature instead.")  # fmt: skip
+              help="Directions of strain, from the x-axis.  [default: 0,90]")  # fmt: skip
+@click.option("--face", type=click.Choice(["far", "struck", "curvature"]),
+              help="Face of the strain, or curvature instead.  [default: far]")  # fmt: skip
 @click.option("--times", callback=_numbers("T,T,..."), metavar="T,T,...",
               help="Times, in the deck's unit; the nearest stored rows are drawn.")  # fmt: skip
-@click.option("--along", type=click.Choice(["x", "y"]), default="x", show_default=True,
-              help="Direction of line.")  # fmt: skip
-@click.option("--width", type=click.Choice(["column", "full"]), default="column",
-              show_default=True, help="3.5 in, or 7.2 in.")  # fmt: skip
-@click.option("--quantity", metavar="NAME", default="peak_force", show_default=True,
-              help="What map shows: a name of the sweep's summary.")  # fmt: skip
+@click.option("--along", type=click.Choice(["x", "y"]),
+              help="Direction of line.  [default: x]")  # fmt: skip
+@click.option("--width", type=click.Choice(["column", "full"]),
+              help="3.5 in, or 7.2 in.  [default: column]")  # fmt: skip
+@click.option("--quantity", metavar="NAME",
+              help="Quantity of map: a name of the sweep's summary.  [default: "
+                   "peak_force]")  # fmt: skip
 @click.option("--over", callback=_names, metavar="NAME[,NAME]", default="",
-              help="What map is over.  [default: what varies]")  # fmt: skip
+              help="Parameters on the axes of map.  [default: those that vary]")  # fmt: skip
 @click.option("--where", callback=_pairs, multiple=True, metavar="NAME=VALUE",
-              help="The map's cases with this value alone, the nearest there is; may be "
+              help="Show in map only the cases nearest to this value; may be "
                    "repeated.")  # fmt: skip
 @click.option("--level", callback=_numbers("VALUE,..."), metavar="VALUE,...",
               help="Values to mark in map, in the deck's unit.")  # fmt: skip
@@ -104,20 +104,11 @@ def plot(
     results: tuple[Path, ...],
     kinds: tuple[str, ...],
     output: Path | None,
-    at: tuple[tuple[float, float], ...],
-    gages: tuple[float, ...],
-    face: str,
-    times: tuple[float, ...],
-    along: str,
-    width: str,
-    quantity: str,
-    over: tuple[str, ...],
-    where: dict[str, str],
-    level: tuple[float, ...],
     overwrite: bool,
+    **asked: Any,
 ) -> None:
-    """Draw the report's figures from one RESULT or several, or the map of a sweep."""
-    options = Options(at, gages, face, times, along, width, quantity, over, where, level)
+    """Draw the report's figures from one or more RESULTs, or the map of a sweep."""
+    options = {name: value for name, value in asked.items() if value}
     try:
         named = _named(results)
         chosen = list(dict.fromkeys(kinds)) or [_usual(next(iter(named.values())))]
@@ -143,13 +134,11 @@ def plot(
 
 
 def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path]:
-    """Where each picture goes."""
+    """Path of each picture, by kind."""
     is_folder = output is None or output.is_dir() or not (output.exists() or output.suffix)
     if output is not None and not is_folder:
         if len(kinds) > 1:
-            raise RefusedError(
-                f"{output} is not a folder, and {len(kinds)} pictures were asked for"
-            )
+            raise RefusedError(f"{output} is not a folder, and {len(kinds)} pictures are requested")
         check_suffix(kinds[0], output)
         return {kinds[0]: output}
     folder = output or Path()
@@ -157,12 +146,12 @@ def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path
 
 
 def _usual(result: Result | SweepResult) -> str:
-    """The kind that is drawn when none is asked for."""
+    """Kind of picture to draw by default."""
     return "force" if isinstance(result, Result) else "map"
 
 
 def _named(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:
-    """Results by the shortest names that tell them apart."""
+    """Results by the shortest distinct names."""
     names = [printable(path.stem) for path in paths]
     if len(set(names)) < len(names):
         names = [printable(str(path)) for path in paths]
@@ -180,15 +169,16 @@ def _loaded(path: Path) -> Result | SweepResult:
 def _draw(
     results: dict[str, Result | SweepResult],
     kinds: list[str],
-    options: Options,
+    options: Mapping[str, Any],
     advance: Callable[[int], object],
 ) -> dict[str, Picture]:
-    """Draw all pictures, before any is written."""
+    """Draw all pictures before writing any."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         pictures = {}
         for kind in kinds:
-            pictures[kind] = draw(kind, results, options)
+            own = options_of(kind)
+            pictures[kind] = draw(kind, results, **{n: v for n, v in options.items() if n in own})
             advance(1)
     notes = [str(one.message) for one in caught if issubclass(one.category, PlotNote)]
     for text in dict.fromkeys(notes):

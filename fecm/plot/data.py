@@ -1,7 +1,9 @@
-"""What pictures take from a result: rows by time, points of the plate, the deck's own data."""
+"""Data of pictures: rows by time, points of the plate, segments of the deck."""
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,13 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Bools, Floats
-from fecm.deck.model import Deck, Impact, Material
+from fecm.deck.model import Deck, Impact
 from fecm.deck.reader import Reader
 from fecm.mechanics.element_groups import ElementBlock, element_blocks
 from fecm.mechanics.element_matrices import local_shape_functions
-from fecm.mechanics.elements.quadrature import Quadrature
+from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.plot.kinds import PlotError
-from fecm.problem.build import rules
 from fecm.problem.slips import LISTING
 from fecm.results.result import Result
 from fecm.results.schema import STORED_BY
@@ -24,10 +25,10 @@ from fecm.results.schema import STORED_BY
 Array = NDArray[Any]
 Ints = NDArray[np.intp]
 
-# Beyond these, axes and their numbers lose all sense long before they overflow.
+# Larger numbers are refused: axes fail long before numbers overflow.
 LARGEST = 1e100
 
-# Elements beyond which an element's inside is drawn by its nodes alone.
+# Meshes with more elements are drawn with fewer points per element.
 MANY = 2000
 
 
@@ -37,8 +38,8 @@ def require(result: Result, name: str, *paths: str) -> list[Array]:
     Raises
     ------
     PlotError
-        If one is not there (the message names the macro that stores it), is empty, or holds
-        numbers that no axis can show.
+        If one is missing (the message names the macro that stores it), is empty, or holds numbers
+        that an axis can't show.
     """
     for path in paths:
         if path not in result:
@@ -49,13 +50,13 @@ def require(result: Result, name: str, *paths: str) -> list[Array]:
 
 
 def _shown(name: str, path: str, values: Array) -> Array:
-    """Numbers that a picture can show, or a PlotError."""
+    """Return numbers that a picture can show, or raise a PlotError."""
     if not values.size:
         raise PlotError(f"{name} has no rows of {path}")
     if not (np.abs(values) <= LARGEST).all():
         raise PlotError(
-            f"{path} of {name} holds numbers beyond ±{LARGEST:g}, infinite ones or NaN; no picture "
-            "can show them"
+            f"{path} of {name} holds numbers beyond ±{LARGEST:g}, infinities or NaN, which "
+            "can't be drawn"
         )
     return values
 
@@ -66,7 +67,7 @@ def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:
     Raises
     ------
     PlotError
-        If the nodes all lie on one line parallel to an axis.
+        If all nodes lie on a line parallel to an axis.
     """
     elements, coordinates = require(result, name, "mesh/elements", "mesh/coordinates")
     coordinates = coordinates[:, :2]
@@ -79,33 +80,39 @@ def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:
 
 
 def deck_of(result: Result, name: str) -> Deck:
-    """The model of a result's deck.
+    """Model of a result's deck.
 
     Raises
     ------
     PlotError
-        If the result holds no deck.
+        If the result holds no readable deck.
     """
-    reader = Reader(result.deck, blanks_are_zeros=result.mode == LISTING)
-    decks = [problem.deck for problem in reader.problems() if problem.deck is not None]
-    if not decks:
+    deck = _parsed(result.deck, result.mode == LISTING)
+    if deck is None:
         raise PlotError(f"{name} holds no deck that can be read")
-    return decks[0]
+    return deck
+
+
+@functools.lru_cache(maxsize=8)
+def _parsed(text: str, blanks_are_zeros: bool) -> Deck | None:
+    """Parse a deck's text once, however many pictures need it."""
+    problems = Reader(text, blanks_are_zeros=blanks_are_zeros).problems()
+    return next((problem.deck for problem in problems if problem.deck is not None), None)
 
 
 def struck(result: Result, name: str) -> Floats:
-    """Coordinates of the impact node, (1, 2), length; (0, 2) where nothing strikes the plate.
+    """Coordinates of the impact node, (1, 2), length; (0, 2) without impact.
 
     Raises
     ------
     PlotError
-        If the deck's impact node is none of the mesh's.
+        If the mesh lacks the deck's impact node.
     """
     impact = deck_of(result, name).last(Impact)
     nodes = [] if impact is None else [impact.node - 1]
     coordinates = result["mesh/coordinates"][:, :2]
     if impact is not None and not 1 <= impact.node <= len(coordinates):
-        raise PlotError(f"{name} has no node {impact.node}, which its deck says is struck")
+        raise PlotError(f"{name} has no node {impact.node}, the impact node of its deck")
     return np.asarray(coordinates[nodes])
 
 
@@ -115,7 +122,7 @@ def impact_point(result: Result, name: str) -> Floats:
     Raises
     ------
     PlotError
-        If the deck has none.
+        If the deck has no impact.
     """
     points = struck(result, name)
     if not len(points):
@@ -124,7 +131,7 @@ def impact_point(result: Result, name: str) -> Floats:
 
 
 def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -> Ints:
-    """Rows of tape3 nearest to given times; without any, `count` at equal distances.
+    """Rows of tape3 nearest to the given times; by default `count` rows at equal distances.
 
     Raises
     ------
@@ -132,8 +139,6 @@ def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -
         If there are no rows, or a time is outside them.
     """
     (stored,) = require(result, name, "tape3/time")
-    if not len(stored):
-        raise PlotError(f"{name} has no rows of displacements")
     if not times:
         ends = np.arange(1, min(count, len(stored)) + 1) / min(count, len(stored))
         return (ends * len(stored)).round().astype(np.intp) - 1
@@ -141,7 +146,7 @@ def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -
     for time in times:
         if not stored[0] - spacing <= time <= stored[-1] + spacing:
             raise PlotError(
-                f"{name} has no displacements at time {time:g}: its rows reach from "
+                f"{name} has no displacements at time {time:g}: its rows cover "
                 f"{stored[0]:g} to {stored[-1]:g}"
             )
     return np.array([np.abs(stored - time).argmin() for time in times])
@@ -149,18 +154,18 @@ def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -
 
 @dataclass(frozen=True)
 class Patches:
-    """The plate cut into small quadrilaterals, each element into the same number.
+    """The plate divided into small quadrilaterals, equally many per element.
 
     Attributes
     ----------
     points : ndarray (n, 2)
-        Their corners (length).
+        Corners (length).
     quads : ndarray (m, 4)
-        Rows of their corners.
+        Rows of the corners in `points`.
     edges : list of ndarray (k,)
-        Rows of the points around each element, the first again at the end.
+        Rows of the points around each element; the first is repeated at the end.
     parts : list of (ElementBlock, ndarray)
-        Elements, and their shape functions at their points.
+        Elements, and the shape functions at their points.
     """
 
     points: Floats
@@ -174,7 +179,7 @@ class Patches:
 
     @property
     def triangles(self) -> Ints:
-        """Two triangles a quadrilateral, one where a triangle's side is a point."""
+        """Two triangles per quadrilateral; those without area are left out."""
         found = np.concatenate([self.quads[:, [0, 1, 2]], self.quads[:, [0, 2, 3]]])
         first, second = (self.points[found[:, n]] - self.points[found[:, 0]] for n in (1, 2))
         area = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
@@ -183,12 +188,12 @@ class Patches:
 
 
 def patches(result: Result, cuts: int, name: str = "the result") -> Patches:
-    """Cut every element into cuts × cuts quadrilaterals."""
+    """Divide every element into cuts × cuts quadrilaterals."""
     elements, coordinates = mesh_of(result, name)
     cuts = min(cuts, 2) if len(elements) > MANY else cuts
     ticks = np.linspace(-1.0, 1.0, cuts + 1)
     eta, xi = (places.ravel() for places in np.meshgrid(ticks, ticks, indexing="ij"))
-    grid = Quadrature(xi, eta, np.zeros(len(xi)))  # points alone; nothing is integrated
+    grid = Quadrature(xi, eta, np.zeros(len(xi)))  # points only; nothing is integrated
     number = np.arange(len(xi)).reshape(cuts + 1, cuts + 1)
     quad = np.stack(
         [a.ravel() for a in (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1])],
@@ -210,9 +215,19 @@ def patches(result: Result, cuts: int, name: str = "the result") -> Patches:
 
 
 def strain_points(result: Result, name: str) -> Floats:
-    """Coordinates of the points at which tape8 holds strains, (numel, npt, 2), length."""
-    bending, _, points = rules(deck_of(result, name).require(Material))
-    rule = bending if "tapes" in result.slips else points
+    """Coordinates of the points of tape8, (numel, npt, 2), length.
+
+    Raises
+    ------
+    PlotError
+        If the result holds no strains at such points.
+    """
+    (stored,) = require(result, name, "tape8/kappa_x")
+    order = math.isqrt(stored.shape[2])
+    if order**2 != stored.shape[2] or order > HIGHEST_ORDER:
+        raise PlotError(f"{name} has {stored.shape[2]} strain points per element, which is invalid")
+    at_nodes = result.tape8.attributes.get("location") == "nodes"
+    rule = nodal(order) if at_nodes else gauss(order)
     elements, coordinates = mesh_of(result, name)
     found = np.empty((len(elements), len(rule.xi), 2))
     for family in element_blocks(elements, coordinates):
@@ -222,18 +237,18 @@ def strain_points(result: Result, name: str) -> Floats:
 
 
 def nearest(points: Floats, at: Floats, name: str) -> Bools:
-    """Which points are nearest to a place; several if elements meet there.
+    """Mask of the points nearest to a place; several if elements meet there.
 
     Raises
     ------
     PlotError
-        If the place is outside the plate's extent.
+        If the place is outside the plate.
     """
     low, high = points.min(axis=(0, 1)), points.max(axis=(0, 1))
     room = 0.02 * float((high - low).max())
     if not ((at >= low - room) & (at <= high + room)).all():
         raise PlotError(
-            f"the point {at[0]:g},{at[1]:g} is not on the plate of {name}, which reaches from "
+            f"the point {at[0]:g},{at[1]:g} is not on the plate of {name}, which extends from "
             f"{low[0]:g},{low[1]:g} to {high[0]:g},{high[1]:g}"
         )
     distance = np.hypot(*np.moveaxis(points - at, -1, 0))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.tri import LinearTriInterpolator, Triangulation
@@ -16,14 +16,15 @@ from matplotlib.tri import LinearTriInterpolator, Triangulation
 from fecm._typing import Floats
 from fecm.plot.data import Array, Patches, impact_point, patches, require, stored_rows, struck
 from fecm.plot.kinds import Picture, PlotError
-from fecm.plot.pictures import Options
 from fecm.plot.style import (
     COLOURS,
     IN_ORDER,
     RATIO,
     SIGNED,
     WIDTHS,
+    Graph,
     Scale,
+    limit_count,
     lines_legend,
     panels,
     scale_of,
@@ -36,7 +37,7 @@ AXES = {"x": 0, "y": 1}
 FRAMES = 60
 SAMPLES = 401
 LEVELS = 21
-# Height of a deflected plate over its longer side.
+# Height of the deflected plate over its longer side.
 EXAGGERATION = 0.3
 
 
@@ -50,7 +51,7 @@ def profile(result: Result, name: str, along: str, rows: Array) -> tuple[Floats,
     ----------
     result : Result
     name : str
-        What messages call it.
+        Its name in messages.
     along : str
         ``"x"`` or ``"y"``.
     rows : ndarray of int
@@ -59,8 +60,7 @@ def profile(result: Result, name: str, along: str, rows: Array) -> tuple[Floats,
     Returns
     -------
     position : ndarray (n,)
-        Of the nodes on the line if a row of nodes lies on it from edge to edge, else of equidistant
-        points on it.
+        Positions of the nodes on the line if they cover it, else of equidistant points.
     w : ndarray (rows, n)
     """
     coordinates, w = result["mesh/coordinates"], result["tape3/w"][rows]
@@ -84,7 +84,7 @@ def profile(result: Result, name: str, along: str, rows: Array) -> tuple[Floats,
 
 
 def _chord(cut: Patches, axis: int, level: float) -> tuple[float, float]:
-    """Ends of the plate on a line: where it crosses the small quadrilaterals' sides."""
+    """Ends of the plate on a line, from its intersections with sides of quadrilaterals."""
     corners = cut.points[cut.quads]
     ends = np.roll(corners, -1, axis=1)
     a, b = corners[..., 1 - axis] - level, ends[..., 1 - axis] - level
@@ -99,81 +99,86 @@ def _longest_side(result: Result) -> float:
     return float(np.hypot(*np.moveaxis(np.roll(corners, -1, axis=1) - corners, -1, 0)).max())
 
 
-def line(results: Results, options: Options) -> Picture:
-    """Deflection along a line at several times; of several results, an axes a time."""
+def line(
+    results: Results,
+    *,
+    times: Sequence[float] = (),
+    along: str = "x",
+    width: str = "column",
+) -> Picture:
+    """Deflection along a line through the impact point; of several results, one graph per time.
+
+    Parameters
+    ----------
+    results : mapping of str to Result
+    times : sequence of float
+        Times (the deck's unit), for which the nearest stored rows are drawn; by default a few.
+    along : str
+        Direction, ``"x"`` or ``"y"``.
+    width : str
+        ``"column"`` or ``"full"``.
+    """
     data = {}
     for name, result in results.items():
         require(result, name, "tape3/w")
-        rows = stored_rows(result, name, options.times, 6 if len(results) == 1 else 3)
-        data[name] = (result["tape3/time"][rows], *profile(result, name, options.along, rows))
-    if len({len(times) for times, _, _ in data.values()}) > 1 or len(data) > len(COLOURS):
-        raise PlotError("the results have not the same number of rows to draw; give --times")
-    clock = scale_of(results, "time", [times for times, _, _ in data.values()])
+        rows = stored_rows(result, name, times, 6 if len(results) == 1 else 3)
+        data[name] = (result["tape3/time"][rows], *profile(result, name, along, rows))
+    limit_count(len(data), "results")
+    instants = [stored for stored, _, _ in data.values()]
+    if len({len(stored) for stored in instants}) > 1:
+        raise PlotError("the results differ in the number of stored rows; give --times")
+    clock = scale_of(results, "time", instants)
     place = scale_of(results, "length", [position for _, position, _ in data.values()])
-    length = scale_of(results, "length", [np.nan_to_num(w) for _, _, w in data.values()])
+    length = scale_of(results, "length", [w for _, _, w in data.values()])
     if len(data) == 1:
-        ((times, position, w),) = data.values()
-        figure, axes = panels(options.width, ratio=RATIO[options.width])
-        shades = matplotlib.colormaps[IN_ORDER](np.linspace(0.0, 0.85, len(times)))
-        for time, values, shade in zip(times, w, shades, strict=True):
-            axes[0].plot(
-                place.factor * position, length.factor * values, color=shade,
-                label=f"{clock.factor * time:.4g}",
-            )  # fmt: skip
-        lines_legend(figure, axes[0], clock.label("Time"))
+        figure, axes = panels(width, ratio=RATIO[width])
     else:
-        figure, axes = _lines_by_time(data, options, clock, place, length)
-    for ax in axes:
-        ax.set_ylabel(length.label("Deflection"))
-        ax.margins(x=0.0)
-    axes[-1].set_xlabel(place.label(f"${options.along}$"))
+        ratio = 0.6 * RATIO[width]
+        figure, axes = panels(width, len(instants[0]), sharex=True, sharey=True, ratio=ratio)
+    graphs = [Graph(ax, place, length) for ax in axes]
+    if len(data) == 1:
+        ((stored, position, w),) = data.values()
+        shades = matplotlib.colormaps[IN_ORDER](np.linspace(0.0, 0.85, len(stored)))
+        for time, values, shade in zip(stored, w, shades, strict=True):
+            graphs[0].plot(position, values, color=shade, label=f"{clock.factor * time:.4g}")
+    for (name, (stored, position, w)), colour in zip(data.items(), COLOURS, strict=False):
+        if len(data) > 1:
+            for graph, time, values in zip(graphs, stored, w, strict=True):
+                graph.plot(position, values, color=colour, label=name)
+                graph.axes.set_title(f"time {clock.show(time)}", loc="left")
+    lines_legend(figure, axes[0], clock.label("Time") if len(data) == 1 else "")
+    for graph in graphs:
+        graph.label(y="Deflection")
+        graph.axes.margins(x=0.0)
+    graphs[-1].label(f"${along}$")
     return Picture(figure)
-
-
-def _lines_by_time(
-    data: Mapping[str, tuple[Array, Array, Array]],
-    options: Options,
-    clock: Scale,
-    place: Scale,
-    length: Scale,
-) -> tuple[Figure, list[Axes]]:
-    """An axes a time, a colour a result."""
-    count, ratio = len(next(iter(data.values()))[0]), 0.6 * RATIO[options.width]
-    figure, axes = panels(options.width, count, sharex=True, sharey=True, ratio=ratio)
-    for (name, (times, position, w)), colour in zip(data.items(), COLOURS, strict=False):
-        for ax, time, values in zip(axes, times, w, strict=True):
-            ax.plot(place.factor * position, length.factor * values, color=colour, label=name)
-            ax.set_title(f"time {clock.show(time)}", loc="left")
-    lines_legend(figure, axes[0])
-    return figure, axes
 
 
 # The whole plate --------------------------------------------------------------------------------
 
 
-def contour(results: Results, options: Options) -> Picture:
-    """Deflection of the plate at given times, seen from above, in one scale of colours."""
+def contour(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
+    """Deflection of the plate at given times, seen from above, on one colour scale."""
     ((name, result),) = results.items()
     require(result, name, "tape3/w")
-    rows = stored_rows(result, name, options.times, 4)
+    rows = stored_rows(result, name, times, 4)
     cut, w = patches(result, 4, name), result["tape3/w"][rows]
     clock = scale_of(results, "time", [result["tape3/time"][rows]])
     length = scale_of(results, "length", [w])
     place = scale_of(results, "length", [cut.points])
-    columns = min(len(rows), 2 if options.width == "column" else 4)
+    columns = min(len(rows), 2 if width == "column" else 4)
     height, wide = np.ptp(cut.points[:, 1]), np.ptp(cut.points[:, 0])
     lines = math.ceil(len(rows) / columns)
     figure, axes = panels(
-        options.width,
+        width,
         lines,
         columns,
         sharex=True,
         sharey=True,
-        ratio=float(np.clip(height / wide, 0.3, 2.0))
-        + 0.65 * columns / lines / WIDTHS[options.width],
+        ratio=float(np.clip(height / wide, 0.3, 2.0)) + 0.65 * columns / lines / WIDTHS[width],
     )
     fields = [length.factor * cut.values(row) for row in w]
-    peak = float(np.abs(fields).max()) or 1.0  # inside an element there may be more than at nodes
+    peak = float(np.abs(fields).max()) or 1.0  # may exceed the nodal values
     levels = np.linspace(-peak, peak, LEVELS)
     at = place.factor * cut.points
     triangles = Triangulation(at[:, 0], at[:, 1], cut.triangles)
@@ -181,7 +186,7 @@ def contour(results: Results, options: Options) -> Picture:
     fills = []
     for ax, row, values in zip(axes, rows, fields, strict=False):
         fills.append(ax.tricontourf(triangles, values, levels, cmap=SIGNED))
-        fills[-1].set(edgecolor="face", linewidth=0.2)  # no white seams between the colours
+        fills[-1].set(edgecolor="face", linewidth=0.2)  # hides white seams
         ax.plot(*where.T, "+", color="black", ms=4, mew=0.6)
         ax.set_title(f"time {clock.show(float(result['tape3/time'][row]))}", loc="left")
         ax.set_aspect("equal")
@@ -198,7 +203,7 @@ def contour(results: Results, options: Options) -> Picture:
 
 
 class _Plate:
-    """The deflected plate in an axes of three dimensions."""
+    """The deflected plate in three-dimensional axes."""
 
     def __init__(
         self, axes: Any, cut: Patches, place: Scale, length: Scale, span: tuple[float, float]
@@ -238,23 +243,23 @@ class _Plate:
         return np.concatenate([self._flat, heights[:, :, None]], axis=2)
 
     def show(self, w: Array, text: str) -> None:
-        """Deflect the plate by w at the nodes."""
+        """Show the nodal deflections w."""
         corners = self._at(self._cut.values(w))
         self.collection.set_verts(corners)
         self.collection.set_array(corners[:, :, 2].mean(axis=1))
         self._title.set_text(text)
 
 
-def surface(results: Results, options: Options) -> Picture:
-    """The deflected plate; without times at the instant when it is bent most."""
+def surface(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
+    """The deflected plate; by default at the instant of largest deflection range."""
     ((name, result),) = results.items()
     (w,) = require(result, name, "tape3/w")
-    if options.times:
-        rows = stored_rows(result, name, options.times, 1)
+    if times:
+        rows = stored_rows(result, name, times, 1)
     else:
         rows = np.array([int(np.ptp(w, axis=1).argmax())])
-    columns = 1 if options.width == "column" else min(len(rows), 2)
-    figure, plates = _plates(results, options, rows, columns, len(rows))
+    columns = 1 if width == "column" else min(len(rows), 2)
+    figure, plates = _plates(results, width, rows, columns, len(rows))
     clock = scale_of(results, "time", [result["tape3/time"]])
     for plate, row in zip(plates, rows, strict=True):
         plate.show(w[row], f"time {clock.show(float(result['tape3/time'][row]))}")
@@ -262,36 +267,32 @@ def surface(results: Results, options: Options) -> Picture:
 
 
 def _plates(
-    results: Results, options: Options, rows: Array, columns: int, count: int
+    results: Results, width: str, rows: Array, columns: int, count: int
 ) -> tuple[Figure, list[_Plate]]:
-    """Axes for `count` plates, in the scale of all rows."""
+    """Axes for `count` plates, on the common scale of all rows."""
     ((name, result),) = results.items()
     cut, w = patches(result, 2, name), result["tape3/w"][rows]
     place = scale_of(results, "length", [cut.points])
     length = scale_of(results, "length", [w])
     span = (float(w.min()), float(w.max()))
     lines = math.ceil(count / columns)
-    figure, axes = panels(
-        options.width, lines, columns, ratio=0.62, subplot_kw={"projection": "3d"}
-    )
+    figure, axes = panels(width, lines, columns, ratio=0.62, subplot_kw={"projection": "3d"})
     figure.subplots_adjust(left=0.0, right=0.91, bottom=0.07, top=1.0, wspace=0.1, hspace=0.05)
     for ax in axes[count:]:
         ax.set_axis_off()
     return figure, [_Plate(ax, cut, place, length, span) for ax in axes[:count]]
 
 
-def animation(results: Results, options: Options) -> Picture:
+def animation(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
     """The deflected plate, frame by frame; the figure shows the last frame."""
     ((name, result),) = results.items()
     (w,) = require(result, name, "tape3/w")
-    rows = stored_rows(result, name, options.times, FRAMES)
-    figure, (plate, *_) = _plates(results, options, rows, 1, 1)
+    rows = stored_rows(result, name, times, FRAMES)
+    figure, (plate, *_) = _plates(results, width, rows, 1, 1)
     clock = scale_of(results, "time", [result["tape3/time"][rows]])
-    texts = [f"time {clock.show(float(result['tape3/time'][row]))}" for row in rows]
-
-    def frame(row: int, text: str) -> Any:
-        return lambda: plate.show(w[row], text)
-
-    frames = [frame(int(row), text) for row, text in zip(rows, texts, strict=True)]
+    frames = [
+        functools.partial(plate.show, w[row], f"time {clock.show(result['tape3/time'][row])}")
+        for row in rows
+    ]
     frames[-1]()
     return Picture(figure, frames)

@@ -10,7 +10,18 @@ from matplotlib.axes import Axes
 from fecm._typing import Floats
 from fecm.deck.units import unit_of
 from fecm.plot.kinds import Picture
-from fecm.plot.style import COLOURS, RATIO, STYLES, Scale, lines_legend, panels, scale, styled
+from fecm.plot.style import (
+    COLOURS,
+    RATIO,
+    STYLES,
+    Graph,
+    Scale,
+    lines_legend,
+    panels,
+    scale,
+    scale_in,
+    styled,
+)
 from fecm.studies.indentation_test.constants import Fit
 from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING
 
@@ -22,49 +33,44 @@ LOOKS = {
 POINTS = 100
 
 
-def _scale(values: Floats, dimension: str, units: Mapping[str, str]) -> Scale:
-    top = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
-    return scale(top, unit_of(dimension, dict(units)))
-
-
 @styled
 def fit_picture(
     indentation: Floats, force: Floats, found: Fit, units: Mapping[str, str]
 ) -> Picture:
-    """A test's points with the fitted curves, and permanent against largest indentation.
+    """Points of a test with the fitted curves, and permanent against largest indentation.
 
     Parameters
     ----------
     indentation, force : ndarray (n,)
     found : Fit
     units : mapping
-        Names of the units; empty where there are none.
+        Names of the units; may be empty.
     """
-    length, pound = _scale(indentation, "length", units), _scale(force, "force", units)
+    length, pound = scale_in(units, "length", indentation), scale_in(units, "force", force)
     both = len(found.cycles) > 1
     width = "full" if both else "column"
     figure, axes = panels(width, 1, 2 if both else 1, ratio=RATIO["column"])
     curves, p = found.solution.curves, found.solution.scaled
+    graph = Graph(axes[0], length, pound)
     seen: set[str] = set()
     for number in range(len(curves.division.stretches)):
         stretch = curves.division.stretches[number]
         colour, label = LOOKS[stretch.kind]
         a = indentation[stretch.rows]
-        axes[0].plot(
-            length.factor * a, pound.factor * force[stretch.rows], ".", color=colour, alpha=0.5,
+        graph.plot(
+            a, force[stretch.rows], ".", color=colour, alpha=0.5,
             markersize=3.0, markeredgewidth=0.0,
             label="_" if stretch.kind in seen else label,
         )  # fmt: skip
         seen.add(stretch.kind)
         if number in curves.numbers(stretch.kind) and len(a):
             top = float(a.max())
-            if stretch.kind == FALLING:  # from the turn itself, which is no point of the stretch
+            if stretch.kind == FALLING:  # begin at the turning point
                 top = max(top, found.solution.values[curves.layout.corners[stretch.begin]])
             x = np.linspace(max(0.0, a.min()), top, POINTS)
             y = curves.force * curves.stretch(p, number, x / curves.length)
-            axes[0].plot(length.factor * x, pound.factor * y, color=colour)
-    axes[0].set_xlabel(length.label("Indentation"))
-    axes[0].set_ylabel(pound.label("Force"))
+            graph.plot(x, y, color=colour)
+    graph.label("Indentation", "Force")
     lines_legend(figure, axes[0])
     for handle in figure.legends[0].get_lines():
         handle.set(markersize=5.0, alpha=1.0)
@@ -89,18 +95,17 @@ def _permanent(axes: Axes, found: Fit, length: Scale) -> None:
         left = np.asarray(relation.permanent(peaks))
         axes.plot(length.factor * peaks, length.factor * left, color=COLOURS[1])
     axes.set_xlim(left=0.0)
-    axes.set_xlabel(length.label("Largest indentation"))
-    axes.set_ylabel(length.label("Permanent indentation"))
+    Graph(axes, length, length).label("Largest indentation", "Permanent indentation")
 
 
 @styled
 def path_picture(indentation: Floats, force: Floats, units: Mapping[str, str]) -> Picture:
     """Force along an indentation path."""
-    length, pound = _scale(indentation, "length", units), _scale(force, "force", units)
-    figure, axes = panels("column", ratio=RATIO["column"])
-    axes[0].plot(length.factor * indentation, pound.factor * force, color=COLOURS[0])
-    axes[0].set_xlabel(length.label("Indentation"))
-    axes[0].set_ylabel(pound.label("Force"))
+    length, pound = scale_in(units, "length", indentation), scale_in(units, "force", force)
+    figure, (axes,) = panels("column", ratio=RATIO["column"])
+    graph = Graph(axes, length, pound)
+    graph.plot(indentation, force, color=COLOURS[0])
+    graph.label("Indentation", "Force")
     return Picture(figure)
 
 
@@ -115,26 +120,24 @@ def rigidity_picture(
     peaks : ndarray (n,)
         Largest indentations (length).
     relations : mapping of str to ndarray (n,)
-        Rigidities, force/length^power, by what the legend calls them.
+        Rigidities, force/length^power, by their names in the legend.
     power : float
         q.
     units : mapping
         Names of the units.
     """
-    length = _scale(peaks, "length", units)
-    # The rigidity grows without bound towards zero: the deepest half says how high the axis is.
+    length = scale_in(units, "length", peaks)
+    # The rigidity is unbounded towards zero: the deeper half sets the height of the axis.
     top = 3.0 * max(float(s[len(s) // 2 :].max()) for s in relations.values())
     raised = f"{power:g}".translate(str.maketrans("0123456789.", "⁰¹²³⁴⁵⁶⁷⁸⁹·"))
     unit = unit_of(f"force/length{raised}", dict(units))
     stiff = Scale(scale(top, "").factor, f"{scale(top, '').unit} {unit}".strip())
-    figure, axes = panels("column", ratio=RATIO["column"])
+    figure, (axes,) = panels("column", ratio=RATIO["column"])
+    graph = Graph(axes, length, stiff)
     for (name, values), colour, style in zip(relations.items(), COLOURS, STYLES, strict=False):
-        axes[0].plot(
-            length.factor * peaks, stiff.factor * values, color=colour, linestyle=style, label=name
-        )
-    axes[0].set_ylim(0.0, stiff.factor * top)
-    axes[0].set_xlim(left=0.0)
-    axes[0].set_xlabel(length.label("Largest indentation"))
-    axes[0].set_ylabel(stiff.label("Unloading rigidity"))
-    lines_legend(figure, axes[0])
+        graph.plot(peaks, values, color=colour, linestyle=style, label=name)
+    axes.set_ylim(0.0, stiff.factor * top)
+    axes.set_xlim(left=0.0)
+    graph.label("Largest indentation", "Unloading rigidity")
+    lines_legend(figure, axes)
     return Picture(figure)

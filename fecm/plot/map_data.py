@@ -1,11 +1,11 @@
-"""What a map shows of a sweep: its cases, what they vary, their numbers, scaled and named."""
+"""Data of a map: cases of a sweep, their parameters and a quantity, scaled and named."""
 
 from __future__ import annotations
 
 import re
 import warnings
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.plot.kinds import PlotError, PlotNote
-from fecm.plot.pictures import Options
 from fecm.plot.style import COLOURS, Scale, scale
 from fecm.sweeps.cases import INTEGERS as WHOLE_VALUES
 from fecm.sweeps.cases import TEXTS
@@ -25,7 +24,7 @@ Array = NDArray[Any]
 Ints = NDArray[np.intp]
 
 INTEGERS = (*WHOLE_VALUES, *WHOLE_NUMBERS)
-# Texts that get a curve each; there are as many colours.
+# Most texts with one curve each: the number of colours.
 CURVES = len(COLOURS)
 LABELS = {
     "velocity": "Impact velocity", "k": "Contact coefficient $k$", "alpha_p": r"$\alpha_p$",
@@ -39,16 +38,16 @@ LABELS = {
 
 @dataclass(frozen=True)
 class Axis:
-    """What an axis or the colours show.
+    """A parameter or quantity, shown by an axis or by colours.
 
     Attributes
     ----------
     name : str
     scale : Scale
     values : ndarray (cases,)
-        Scaled numbers; of texts the rows of `ticks`.
+        Scaled numbers; for texts their positions in `ticks`.
     ticks : tuple of str
-        Texts in the order of the cases; none for numbers.
+        Texts in the order of the cases; empty for numbers.
     """
 
     name: str
@@ -58,34 +57,34 @@ class Axis:
 
     @property
     def label(self) -> str:
-        """Text of the axis."""
+        """Label of the axis."""
         plain = self.name.replace("_", " ").capitalize()
         return self.scale.label(LABELS.get(self.name, plain))
 
     @property
     def whole(self) -> bool:
-        """Whether the numbers count something."""
+        """Whether the numbers are counts."""
         return self.name in INTEGERS
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What a map shows.
+    """Contents of a map.
 
     Attributes
     ----------
     over : list of Axis
         One or two.
     shown : Axis
-        NaN where a case has no such number.
+        Quantity; NaN where a case has none.
     levels : list of float
         Values to mark, scaled.
     title : str
-        What picks the cases; empty for all of them.
+        Values that select the cases; empty for all cases.
     other : Axis or None
-        The one other value in which the cases of a map over one value differ.
+        Second varying parameter of a map over one.
     still : ndarray (cases,) of bool
-        Which cases ended while the projectile was on the plate.
+        Mask of the cases that ended in contact.
     """
 
     over: list[Axis]
@@ -96,34 +95,41 @@ class Choice:
     still: NDArray[np.bool_]
 
 
-def choose(sweep: SweepResult, name: str, options: Options) -> Choice:
-    """Take from a sweep what a map shows; cases without a number are told as warnings.
+def choose(
+    sweep: SweepResult,
+    name: str,
+    quantity: str,
+    over: Sequence[str],
+    where: Mapping[str, Any],
+    level: Sequence[float],
+) -> Choice:
+    """Select the contents of a map; warn of cases without a value.
 
     Raises
     ------
     PlotError
-        If the options don't fit the sweep, or nothing is left to show.
+        If the options do not fit the sweep, or no case remains.
     """
-    rows = _rows(sweep, name, options.where)
-    over = [_axis(sweep, parameter, rows) for parameter in _over(sweep, name, rows, options)]
-    if len(over) > 1:
-        _check_crossings(sweep, rows, over)
-    shown = _quantity(sweep, name, rows, options.quantity)
-    told = (f"{other} {_text(sweep, other, rows[0])}" for other in options.where)
-    others = [n for n in _varying(sweep, rows) if n not in [axis.name for axis in over]]
-    other = _axis(sweep, others[0], rows) if others and len(over) == 1 else None
-    if len(over) == 1 and (len(others) > 1 or (other is not None and len(other.ticks) > CURVES)):
+    rows = _rows(sweep, name, where)
+    axes = [_axis(sweep, parameter, rows) for parameter in _over(sweep, name, rows, over)]
+    if len(axes) > 1:
+        _check_hidden(sweep, rows, axes)
+    shown = _quantity(sweep, name, rows, quantity)
+    title = ", ".join(f"{other} {_text(sweep, other, rows[0])}" for other in where)
+    others = _others(sweep, rows, axes)
+    other = _axis(sweep, others[0], rows) if others and len(axes) == 1 else None
+    if len(axes) == 1 and (len(others) > 1 or (other is not None and len(other.ticks) > CURVES)):
         raise PlotError(
-            f"{_told(others)} {'varies' if len(others) == 1 else 'vary'} too; --where "
-            f"{others[0]}=VALUE picks some of the cases, --over {over[0].name},{others[0]} draws "
+            f"{_listed(others)} {'varies' if len(others) == 1 else 'vary'} too; --where "
+            f"{others[0]}=VALUE selects some of the cases, --over {axes[0].name},{others[0]} draws "
             "over both"
         )
     still = sweep["status"][rows] == STILL
-    return Choice(over, shown, _levels(options, shown), ", ".join(told), other, still)
+    return Choice(axes, shown, _levels(level, shown), title, other, still)
 
 
 def _rows(sweep: SweepResult, name: str, where: Mapping[str, Any]) -> Ints:
-    """Cases at given values; of numbers the nearest ones that there are."""
+    """Cases at given values; numbers select the nearest value."""
     kept = np.ones(len(sweep), dtype=bool)
     for parameter, wanted in where.items():
         values = _values(sweep, name, parameter)
@@ -131,7 +137,7 @@ def _rows(sweep: SweepResult, name: str, where: Mapping[str, Any]) -> Ints:
             chosen = values == str(wanted)
             if not chosen.any():
                 raise PlotError(
-                    f"{name} has no {parameter} {wanted}; there is {_told(dict.fromkeys(values))}"
+                    f"{name} has no {parameter} {wanted}; there is {_listed(dict.fromkeys(values))}"
                 )
         else:
             try:
@@ -142,28 +148,29 @@ def _rows(sweep: SweepResult, name: str, where: Mapping[str, Any]) -> Ints:
             room = 1e-6 * (high - low)
             if not low - room <= number <= high + room:
                 raise PlotError(
-                    f"{name} has no {parameter} {wanted}; its values reach from {low:g} to {high:g}"
+                    f"{name} has no {parameter} {wanted}; its values range from {low:g} to {high:g}"
                 )
             chosen = values == values[np.abs(values - number).argmin()]
         kept &= chosen
     if not kept.any():
-        raise PlotError(f"{name} has no case where all of {_told(where)} are as given")
+        raise PlotError(f"{name} has no case with these values of {_listed(where)}")
     return np.flatnonzero(kept)
 
 
 def _values(sweep: SweepResult, name: str, parameter: str) -> Array:
     if parameter not in sweep.cases:
-        raise PlotError(f"{parameter} is not among what {name} varies: {_told(sweep.cases)}")
+        raise PlotError(f"{name} has no parameter {parameter}; it has {_listed(sweep.cases)}")
     return sweep.cases[parameter]
 
 
-def _told(names: Any) -> str:
+def _listed(names: Iterable[Any]) -> str:
+    """Join names in words."""
     *most, last = map(str, names)
     return f"{', '.join(most)} and {last}" if most else last
 
 
 def _text(sweep: SweepResult, name: str, row: int) -> str:
-    """A value in a title."""
+    """A value for a title."""
     value = sweep[name][row]
     if name in TEXTS:
         return str(value)
@@ -171,41 +178,42 @@ def _text(sweep: SweepResult, name: str, row: int) -> str:
 
 
 def _varying(sweep: SweepResult, rows: Ints) -> list[str]:
+    """Parameters that vary among these cases."""
     return [name for name, values in sweep.cases.items() if len(np.unique(values[rows])) > 1]
 
 
-def _over(sweep: SweepResult, name: str, rows: Ints, options: Options) -> list[str]:
-    """One or two names of what the picture is over."""
+def _over(sweep: SweepResult, name: str, rows: Ints, asked: Sequence[str]) -> list[str]:
+    """One or two parameters of the axes."""
     varying = _varying(sweep, rows)
-    for parameter in options.over:
+    for parameter in asked:
         if parameter not in varying and len(_values(sweep, name, parameter)):
-            raise PlotError(
-                f"{parameter} is the same in all of the cases; a map is over what varies"
-            )
-    over = list(dict.fromkeys(options.over)) or varying
+            raise PlotError(f"{parameter} does not vary among the cases; a map needs one that does")
+    over = list(dict.fromkeys(asked)) or varying
     if not over:
-        raise PlotError(f"nothing varies in {name}: all its cases are the same")
+        raise PlotError(f"nothing varies in {name}: all cases are equal")
     if len(over) > 2:
         raise PlotError(
-            f"{_told(over)} are {len(over)} values to draw over; --over NAME or NAME,NAME says "
-            "which"
+            f"a map has at most two axes, and {_listed(over)} vary; choose with --over NAME or "
+            "NAME,NAME"
         )
     return over
 
 
 def _quantity(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
-    """The numbers to show, with a note of cases that have none."""
+    """The quantity to show, with a note about cases that lack it."""
     if quantity not in SUMMARY:
-        raise PlotError(f"there is no quantity {quantity}; there is {_told(SUMMARY)}")
+        raise PlotError(f"unknown quantity {quantity}; a sweep has {_listed(SUMMARY)}")
     status, values = sweep["status"][rows], sweep[quantity][rows].astype(float)
     run, still = np.isin(status, RUN), status == STILL
     values = np.where(run, values, np.nan)
     failed = Counter(status[~run].tolist()).most_common()
-    told = ""
+    failures = ""
     if failed:
-        more = f", and {len(failed) - 1} other reasons" if len(failed) > 1 else ""
+        more = ""
+        if len(failed) > 1:
+            more = f", and {len(failed) - 1} other reason{'s' * (len(failed) > 2)}"
         total = sum(count for _, count in failed)
-        told = f"{total} of {len(rows)} cases of {name} failed ({failed[0][0]}{more})"
+        failures = f"{total} of {len(rows)} cases of {name} failed ({failed[0][0]}{more})"
     open_ends = (
         f"{int(still.sum())} of {len(rows)} cases of {name} were still in contact at the end"
     )
@@ -213,9 +221,9 @@ def _quantity(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
         nothing = f"no case of {name} has a {quantity}"
         if still.any():
             raise PlotError(f"{nothing}: {open_ends}; a deck with a longer duration may show it")
-        raise PlotError(told or f"{nothing}: nothing was hit")
-    if told:
-        warnings.warn(f"{told}; they are gaps in the picture", PlotNote, stacklevel=2)
+        raise PlotError(failures or f"{nothing}: there was no contact")
+    if failures:
+        warnings.warn(f"{failures}; they are gaps in the picture", PlotNote, stacklevel=2)
     if still.any():
         gaps = "; they have no value in the picture" if np.isnan(values[still]).any() else ""
         warnings.warn(f"{open_ends}{gaps}", stacklevel=2)
@@ -230,7 +238,7 @@ def _quantity(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
 
 
 def _unit(sweep: SweepResult, name: str) -> str:
-    """A unit whose powers are raised."""
+    """Unit with its powers as superscripts."""
     raised = str.maketrans("0123456789.", "⁰¹²³⁴⁵⁶⁷⁸⁹·")
     return re.sub(r"\^([\d.]+)", lambda power: power[1].translate(raised), sweep.unit(name))
 
@@ -247,26 +255,32 @@ def _axis(sweep: SweepResult, name: str, rows: Ints) -> Axis:
     return Axis(name, shown, shown.factor * values)
 
 
-def _levels(options: Options, shown: Axis) -> list[float]:
-    """Scaled values to mark, with a note of those that no case comes near."""
+def _levels(levels: Sequence[float], shown: Axis) -> list[float]:
+    """Scaled values to mark, with a note about those outside the values shown."""
     low, high = np.nanmin(shown.values), np.nanmax(shown.values)
-    for level in options.level:
+    for level in levels:
         if not low <= shown.scale.factor * level <= high:
             warnings.warn(
-                f"the level {level:g} is outside of the picture's values, which reach from "
+                f"the level {level:g} is outside the picture's values, which range from "
                 f"{low / shown.scale.factor:g} to {high / shown.scale.factor:g}",
                 PlotNote,
                 stacklevel=2,
             )
-    return [shown.scale.factor * level for level in options.level]
+    return [shown.scale.factor * level for level in levels]
 
 
-def _check_crossings(sweep: SweepResult, rows: Ints, axes: list[Axis]) -> None:
-    """Refuse cases that hide one another, as they differ in what is not shown."""
-    others = [n for n in _varying(sweep, rows) if n not in [axis.name for axis in axes]]
+def _others(sweep: SweepResult, rows: Ints, axes: Sequence[Axis]) -> list[str]:
+    """Parameters that vary and are not on the axes."""
+    shown = [axis.name for axis in axes]
+    return [name for name in _varying(sweep, rows) if name not in shown]
+
+
+def _check_hidden(sweep: SweepResult, rows: Ints, axes: list[Axis]) -> None:
+    """Refuse cases at one place that differ in a parameter not shown."""
+    others = _others(sweep, rows, axes)
     points = np.column_stack([axis.values for axis in axes])
     if others and len(np.unique(points, axis=0)) < len(points):
         raise PlotError(
-            f"{_told(others)} {'varies' if len(others) == 1 else 'vary'} too, so that cases would "
-            f"hide one another; --where {others[0]}=VALUE picks some of them"
+            f"{_listed(others)} {'varies' if len(others) == 1 else 'vary'} too, so that cases "
+            f"would hide one another; --where {others[0]}=VALUE selects some of them"
         )

@@ -1,8 +1,8 @@
-"""Maps of a sweep: a number of every case over the one or two values that vary."""
+"""Maps of a sweep: a quantity of every case over one or two varying parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,32 +16,31 @@ from numpy.typing import NDArray
 from fecm._typing import Floats
 from fecm.plot.kinds import Picture
 from fecm.plot.map_data import CURVES, Axis, Choice, choose
-from fecm.plot.pictures import Options
 from fecm.plot.style import COLOURS, IN_ORDER, RATIO, lines_legend, panels
 from fecm.sweeps.result import SweepResult
 
-# Cells and points beyond which a drawing of lines holds them as an image.
+# More cells or points are stored as an image in vector formats.
 MANY = 10_000
-LINES = 8  # of equal value, about
-ROW, HEAD = 0.17, 0.75  # height of a row of texts, and of what stands around rows (in)
+LINES = 8  # contour lines, approximately
+ROW, HEAD = 0.17, 0.75  # heights of a row of texts, and of everything around the rows (in)
 DASHES = (0, (5, 1.5))
-# A level among curves, and on colours.
+# Style of a level among curves, and its colour on a map.
 LEVEL: Any = {"color": "0.2", "linestyle": DASHES, "linewidth": 1.1}
 LEVEL_COLOUR = COLOURS[1]
-SHADES = 256  # of a map of colours
+SHADES = 256  # of a colour map
 MARKERS = "osD^vP*"
 
 
 @dataclass(frozen=True)
 class MapGrid:
-    """A number on every crossing of two values' rows.
+    """A quantity on a full grid of two parameters.
 
     Attributes
     ----------
     x, y : ndarray (nx,), (ny,)
-        Rising.
+        Ascending.
     values : masked array (ny, nx)
-        Masked where a case has none.
+        Masked where a case has no value.
     """
 
     x: Floats
@@ -49,23 +48,46 @@ class MapGrid:
     values: Any = field(repr=False)
 
 
-def parameter_map(results: Mapping[str, SweepResult], options: Options) -> Picture:
-    """Draw a number of a sweep's cases over one or two of the values that vary.
+def parameter_map(
+    results: Mapping[str, SweepResult],
+    *,
+    quantity: str = "peak_force",
+    over: Sequence[str] = (),
+    where: Mapping[str, float | str] | None = None,
+    level: Sequence[float] = (),
+    width: str = "column",
+) -> Picture:
+    """Draw a quantity of a sweep's cases over one or two varying parameters.
 
-    One value: points, joined where there is one case each; texts stand as rows.  Two: cells with
-    lines of equal value where the cases are a full grid, coloured points where not; a curve a text
-    where one of them is a text, or rows of cells where there are too many curves.
+    One parameter: points, joined if each has one case; texts are rows.  Two: cells with contour
+    lines if the cases form a full grid, else coloured points; if one parameter is a text, one curve
+    per text, or rows of cells if there are too many curves.
+
+    Parameters
+    ----------
+    results : mapping of str to SweepResult
+        One sweep.
+    quantity : str
+        A name of the sweep's summary.
+    over : sequence of str
+        One or two parameters; by default all that vary.
+    where : mapping of str to float or str
+        Show only the cases with these values; numbers select the nearest value.
+    level : sequence of float
+        Values to mark (the deck's unit).
+    width : str
+        ``"column"`` or ``"full"``.
     """
     ((name, sweep),) = results.items()
-    choice = choose(sweep, name, options)
+    choice = choose(sweep, name, quantity, over, where or {}, level)
     shown = choice.shown
     if len(choice.over) == 1:
-        (over,) = choice.over
-        figure = _one(choice, options)
-        place = (shown, over) if over.ticks else (over, shown)
+        (first,) = choice.over
+        figure = _one(choice, width)
+        place = (shown, first) if first.ticks else (first, shown)
     else:
         first, second = choice.over
-        figure = _two(first, second, shown, choice.levels, options)
+        figure = _two(first, second, shown, choice.levels, width)
         first, second = (second, first) if first.ticks else (first, second)
         place = (first, shown) if 0 < len(second.ticks) <= CURVES else (first, second)
     _mark_still(figure, *place, choice.still)
@@ -75,7 +97,7 @@ def parameter_map(results: Mapping[str, SweepResult], options: Options) -> Pictu
 
 
 def _mark_still(figure: Figure, x: Axis, y: Axis, still: NDArray[np.bool_]) -> None:
-    """Cross the cases that ended in contact, and count them."""
+    """Mark the cases that ended in contact with crosses, and count them."""
     if not still.any():
         return
     mark: Any = {"marker": "x", "color": "0.25", "markersize": 3.5, "linestyle": "none"}
@@ -89,13 +111,13 @@ def _mark_still(figure: Figure, x: Axis, y: Axis, still: NDArray[np.bool_]) -> N
 # One value ---------------------------------------------------------------------------------------
 
 
-def _one(choice: Choice, options: Options) -> Figure:
-    """Points, joined where the cases differ in nothing else; texts stand as rows."""
+def _one(choice: Choice, width: str) -> Figure:
+    """Points, joined if the cases differ in nothing else; texts are rows."""
     (over,), shown, levels, other = choice.over, choice.shown, choice.levels, choice.other
     if other is not None and other.ticks and not over.ticks:
-        return _curves(over, other, shown, levels, options)
+        return _curves(over, other, shown, levels, width)
     if over.ticks:
-        figure, axes = _text_rows(options, over)
+        figure, axes = _text_rows(width, over)
         if other is None:
             axes.plot(shown.values, over.values, "o", color=COLOURS[0], markersize=3.5)
         else:
@@ -109,7 +131,7 @@ def _one(choice: Choice, options: Options) -> Figure:
         axes.grid(axis="y", linewidth=0.4, color="0.85")
         axes.set_axisbelow(True)
         return figure
-    figure, (axes,) = panels(options.width, ratio=RATIO[options.width])
+    figure, (axes,) = panels(width, ratio=RATIO[width])
     if other is not None:
         _coloured(figure, axes, over, shown, other)
     else:
@@ -120,7 +142,7 @@ def _one(choice: Choice, options: Options) -> Figure:
 
 
 def _coloured(figure: Figure, axes: Axes, x: Axis, y: Axis, other: Axis) -> None:
-    """Points whose colours show another value."""
+    """Points coloured by another parameter."""
     drawn = axes.scatter(
         x.values, y.values, c=other.values, s=9.0, cmap=IN_ORDER, norm=_colours(other),
         linewidths=0.0,
@@ -137,7 +159,7 @@ def _finish_curves(axes: Axes, over: Axis, shown: Axis, levels: list[float]) -> 
 
 
 def _name_axes(axes: Axes, x: Axis, y: Axis | None) -> None:
-    """Labels, and ticks at whole numbers where there are no others."""
+    """Label the axes; counts have ticks at integers only."""
     axes.set_xlabel(x.label)
     if x.whole:
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -147,9 +169,9 @@ def _name_axes(axes: Axes, x: Axis, y: Axis | None) -> None:
             axes.yaxis.set_major_locator(MaxNLocator(integer=True))
 
 
-def _text_rows(options: Options, over: Axis) -> tuple[Figure, Axes]:
-    """Axes whose rows are texts, the first one above."""
-    figure, (axes,) = panels(options.width, ratio=1.0)
+def _text_rows(width: str, over: Axis) -> tuple[Figure, Axes]:
+    """Axes whose rows are texts, the first at the top."""
+    figure, (axes,) = panels(width, ratio=1.0)
     figure.set_figheight(HEAD + ROW * max(len(over.ticks), 4))
     axes.set_yticks(range(len(over.ticks)), over.ticks)
     axes.set_ylim(len(over.ticks) - 0.5, -0.5)
@@ -159,17 +181,17 @@ def _text_rows(options: Options, over: Axis) -> tuple[Figure, Axes]:
 # Two values --------------------------------------------------------------------------------------
 
 
-def _two(first: Axis, second: Axis, shown: Axis, levels: list[float], options: Options) -> Figure:
+def _two(first: Axis, second: Axis, shown: Axis, levels: list[float], width: str) -> Figure:
     if first.ticks:
         first, second = second, first
     if second.ticks and len(second.ticks) <= CURVES:
-        return _curves(first, second, shown, levels, options)
+        return _curves(first, second, shown, levels, width)
     found = _grid(first, second, shown)
     if second.ticks:
-        figure, axes = _text_rows(options, second)
+        figure, axes = _text_rows(width, second)
         figure.set_figheight(figure.get_figheight() + 0.45)
     else:
-        figure, (axes,) = panels(options.width, ratio=1.35 * RATIO[options.width])
+        figure, (axes,) = panels(width, ratio=1.35 * RATIO[width])
     _name_axes(axes, first, None if second.ticks else second)
     if found is None:
         _points(figure, axes, first, second, shown, levels)
@@ -178,9 +200,9 @@ def _two(first: Axis, second: Axis, shown: Axis, levels: list[float], options: O
     return figure
 
 
-def _curves(over: Axis, texts: Axis, shown: Axis, levels: list[float], options: Options) -> Figure:
+def _curves(over: Axis, texts: Axis, shown: Axis, levels: list[float], width: str) -> Figure:
     """A curve a text."""
-    figure, (axes,) = panels(options.width, ratio=1.15 * RATIO[options.width])
+    figure, (axes,) = panels(width, ratio=1.15 * RATIO[width])
     for row, (text, colour) in enumerate(zip(texts.ticks, COLOURS, strict=False)):
         here = np.flatnonzero(texts.values == row)
         here = here[np.argsort(over.values[here], kind="stable")]
@@ -194,7 +216,7 @@ def _curves(over: Axis, texts: Axis, shown: Axis, levels: list[float], options: 
 
 
 def _colours(shown: Axis) -> Normalize:
-    """Colours of the values; a colour a number where they are whole."""
+    """Colour scale of the values; counts have one colour each."""
     low, high = float(np.nanmin(shown.values)), float(np.nanmax(shown.values))
     if shown.whole and high - low < SHADES - 1:
         return BoundaryNorm(np.arange(low - 0.5, high + 1.0), SHADES)
@@ -216,7 +238,7 @@ def _bar(figure: Figure, axes: Axes, drawn: Any, shown: Axis, levels: list[float
 def _cells(
     figure: Figure, axes: Axes, grid: MapGrid, shown: Axis, levels: list[float], *, rows: bool
 ) -> None:
-    """A cell a case, with lines of equal value; between rows of texts there are none."""
+    """One cell per case, with contour lines unless the rows are texts."""
     many = grid.values.size > MANY
     drawn = axes.pcolormesh(
         grid.x, grid.y, grid.values, shading="nearest", cmap=IN_ORDER, norm=_colours(shown),
@@ -242,7 +264,7 @@ def _cells(
 
 
 def _crossings(axes: Axes, grid: MapGrid, level: float) -> None:
-    """Mark where a row passes a level, between two cases by a straight line."""
+    """Mark where a row crosses a level, interpolated linearly between cases."""
     for row, values in zip(grid.y, grid.values.filled(np.nan) - level, strict=True):
         before, after = values[:-1], values[1:]
         passed = np.flatnonzero((before < 0.0) != (after < 0.0))
@@ -255,7 +277,7 @@ def _crossings(axes: Axes, grid: MapGrid, level: float) -> None:
 def _points(
     figure: Figure, axes: Axes, first: Axis, second: Axis, shown: Axis, levels: list[float]
 ) -> None:
-    """A coloured point a case; those above the lowest level have an edge."""
+    """One coloured point per case; those above the lowest level have an edge."""
     fine = np.isfinite(shown.values)
     drawn: Any = axes.scatter(
         first.values[fine], second.values[fine], c=shown.values[fine], s=14.0, cmap=IN_ORDER,
@@ -269,7 +291,7 @@ def _points(
 
 
 def _grid(first: Axis, second: Axis, shown: Axis) -> MapGrid | None:
-    """The cases as a full grid; None where they are none."""
+    """The cases as a full grid; None if they do not form one."""
     x, column = np.unique(first.values, return_inverse=True)
     y, row = np.unique(second.values, return_inverse=True)
     if len(x) * len(y) != len(shown.values):

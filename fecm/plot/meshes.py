@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,10 @@ from matplotlib.collections import LineCollection
 from fecm._typing import Bools
 from fecm.plot.data import patches, require, struck
 from fecm.plot.kinds import Picture
-from fecm.plot.pictures import Options
 from fecm.plot.style import COLOURS, WIDTHS, legend, panels, scale_of
 from fecm.results.result import Result
 
-# Marks of the supports: how they are called, and how they look.
+# Marks of the supports by their label.
 MARKS: dict[str, dict[str, Any]] = {
     "clamped": {"marker": "s", "color": COLOURS[0], "ms": 3.0},
     "w held": {"marker": "^", "color": COLOURS[0], "ms": 3.5, "mfc": "white", "mew": 0.7},
@@ -24,7 +23,7 @@ MARKS: dict[str, dict[str, Any]] = {
 
 
 def supports(result: Result) -> dict[str, Bools]:
-    """Which nodes are held against bending, by the kind of support; each (numnp,)."""
+    """Masks of the nodes held against bending, by kind of support; each (numnp,)."""
     held = result["mesh/equations"][:, 2:5] == 0
     w, rotations = held[:, 0], held[:, 1:]
     clamped = w & rotations.all(axis=1)
@@ -35,17 +34,20 @@ def supports(result: Result) -> dict[str, Bools]:
     }
 
 
-def mesh(results: Mapping[str, Result], options: Options) -> Picture:
-    """Elements, nodes that are held, the impact point, and the points asked for."""
+def mesh(
+    results: Mapping[str, Result],
+    *,
+    at: Sequence[tuple[float, float]] = (),
+    width: str = "column",
+) -> Picture:
+    """Elements, supports, impact point, and points to mark (`at`)."""
     ((name, result),) = results.items()
     coordinates, _ = require(result, name, "mesh/coordinates", "mesh/elements")
     cut = patches(result, 4, name)
     place = scale_of(results, "length", [coordinates])
     low, high = place.factor * cut.points.min(axis=0), place.factor * cut.points.max(axis=0)
     height = float(np.clip((high - low)[1] / (high - low)[0], 0.3, 2.0))
-    figure, (axes,) = panels(
-        options.width, ratio=height + (0.55 - 0.5 * height) / WIDTHS[options.width]
-    )
+    figure, (axes,) = panels(width, ratio=height + (0.55 - 0.5 * height) / WIDTHS[width])
     axes.add_collection(
         LineCollection(
             [place.factor * cut.points[edge] for edge in cut.edges], colors="0.4", linewidths=0.4
@@ -54,16 +56,16 @@ def mesh(results: Mapping[str, Result], options: Options) -> Picture:
     handles, labels = [], []
     for label, nodes in supports(result).items():
         if nodes.any():
-            at = place.factor * coordinates[nodes]
-            handles += axes.plot(at[:, 0], at[:, 1], ls="none", clip_on=False, **MARKS[label])
+            held = place.factor * coordinates[nodes]
+            handles += axes.plot(held[:, 0], held[:, 1], ls="none", clip_on=False, **MARKS[label])
             labels.append(label)
     where = place.factor * struck(result, name)
     if len(where):
         handles += axes.plot(*where.T, "X", color=COLOURS[1], ms=6.0, mec="white", mew=0.5, ls="")
         labels.append("impact")
-    if options.at:
-        at = place.factor * np.array(options.at)
-        handles += axes.plot(at[:, 0], at[:, 1], "D", color=COLOURS[3], ms=3.5, ls="none")
+    if at:
+        marked = place.factor * np.array(at)
+        handles += axes.plot(marked[:, 0], marked[:, 1], "D", color=COLOURS[3], ms=3.5, ls="none")
         labels.append("points")
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     axes.set(xlabel=place.label("$x$"), ylabel=place.label("$y$"))

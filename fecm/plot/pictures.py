@@ -1,127 +1,87 @@
-"""Pictures: the report's figures, drawn from one or more results.
+"""Draws and saves pictures of results: the report's figures.
 
-Nothing here is imported by a run, and matplotlib only when something is drawn.  A kind of picture
-is a row of `KINDS`; its function takes named results and options and gives a :class:`Picture`.
+matplotlib is imported when something is drawn.  A kind of picture is a row of `KINDS`; its function
+takes named results and the options of the kind as keywords, and returns a :class:`Picture`.
 """
 
 from __future__ import annotations
 
 import contextlib
+import inspect
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from fecm.plot.kinds import KINDS, MISSING, Picture, PlotError
+from fecm._files import beside
+from fecm.plot.kinds import KINDS, MISSING, Kind, Picture, PlotError
+from fecm.results.result import Result
 from fecm.results.schema import ResultFileError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from fecm.results.result import Result
     from fecm.sweeps.result import SweepResult
 
 
-# Kinds that an option is for; the others are for all of them.
-KINDS_OF_OPTION = {
-    "at": ("strain", "mesh"),
-    "gages": ("strain",),
-    "face": ("strain",),
-    "times": ("line", "contour", "surface", "animation"),
-    "along": ("line",),
-    **dict.fromkeys(("quantity", "over", "where", "level"), ("map",)),
-}
+def kind_named(name: str) -> Kind:
+    """Return the kind of this name, or raise a PlotError."""
+    if name not in KINDS:
+        raise PlotError(f"unknown kind of picture {name!r}; the kinds are {', '.join(KINDS)}")
+    return KINDS[name]
 
 
-@dataclass(frozen=True)
-class Options:
-    """What can be chosen about a picture.
-
-    Attributes
-    ----------
-    at : tuple of (float, float)
-        Points of the plate (length); the impact point if empty.
-    gages : tuple of float
-        Directions of strain in degrees from the x-axis.
-    face : str
-        ``"far"`` (z = h/2), ``"struck"`` (z = -h/2), or ``"curvature"`` for curvature instead.
-    times : tuple of float
-        Times (the deck's unit) whose nearest stored rows are drawn; some of them all if empty.
-    along : str
-        Direction of the line, ``"x"`` or ``"y"``.
-    width : str
-        ``"column"`` (3.5 in) or ``"full"`` (7.2 in).
-    quantity : str
-        What a map shows: a name of a sweep's summary.
-    over : tuple of str
-        One or two names of what varies; all that does if empty.
-    where : mapping of str to float or str
-        A map's cases alone whose values, by name, are these; of numbers the nearest ones.
-    level : tuple of float
-        Values of the quantity to mark in a map (the deck's unit).
-    """
-
-    at: tuple[tuple[float, float], ...] = ()
-    gages: tuple[float, ...] = (0.0, 90.0)
-    face: str = "far"
-    times: tuple[float, ...] = ()
-    along: str = "x"
-    width: str = "column"
-    quantity: str = "peak_force"
-    over: tuple[str, ...] = ()
-    where: Mapping[str, float | str] = field(default_factory=dict)
-    level: tuple[float, ...] = ()
+def _function(kind: str) -> Callable[..., Picture]:
+    """Return the function that draws a kind."""
+    module, _, name = kind_named(kind).function.partition(":")
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        raise ImportError(MISSING) from None
+    function: Callable[..., Picture] = getattr(import_module(f"fecm.plot.{module}"), name)
+    return function
 
 
-def check_kind(kind: str, name: str, *, sweep: bool) -> None:
-    """Refuse a kind that does not show such a result.
+def options_of(kind: str) -> list[str]:
+    """Names of the options that a kind takes."""
+    return list(inspect.signature(_function(kind)).parameters)[1:]
+
+
+def check_options(kinds: Iterable[str], options: Iterable[str]) -> None:
+    """Refuse options that none of these kinds of picture takes.
 
     Raises
     ------
     PlotError
+        If there is such an option; the message names it and the kinds that take it.
     """
-    if KINDS[kind].sweep != sweep:
-        what, fits = ("sweep", "the kind map does") if sweep else ("run", "the other kinds do")
-        raise PlotError(
-            f"{name} is the result of a {what}, which the kind {kind} can't show; {fits}"
-        )
-
-
-def check_options(kinds: Iterable[str], options: Options) -> None:
-    """Refuse an option that none of the kinds of picture shows.
-
-    Raises
-    ------
-    PlotError
-    """
-    usual = Options()
-    for option in fields(Options):
-        fit = KINDS_OF_OPTION.get(option.name, tuple(KINDS))
-        given = getattr(options, option.name) != getattr(usual, option.name)
-        if given and not set(fit) & set(kinds):
+    kinds = list(kinds)
+    taken = {option for kind in kinds for option in options_of(kind)}
+    for option in options:
+        if option not in taken:
+            takers = [kind for kind in KINDS if option in options_of(kind)]
+            if not takers:
+                raise PlotError(f"unknown option {option}")
             raise PlotError(
-                f"the option {option.name} is for the kind {' or '.join(fit)}, not for "
+                f"the option {option} is for the kind {' or '.join(takers)}, not for "
                 f"{' or '.join(kinds)}"
             )
 
 
 @contextlib.contextmanager
 def _errors_as_one(what: str) -> Iterator[None]:
-    """Turn whatever numbers without sense raise inside of matplotlib into one PlotError."""
+    """Turn any error of matplotlib about senseless numbers into one PlotError."""
     try:
         yield
     except (PlotError, ResultFileError, ImportError, OSError, MemoryError):
         raise
-    except Exception as error:  # matplotlib says nowhere what it may raise
-        told = " ".join(str(error).split())
-        raise PlotError(f"{what} can't be drawn: {type(error).__name__}: {told}") from error
+    except Exception as error:  # matplotlib does not document what it may raise
+        message = " ".join(str(error).split())
+        raise PlotError(f"{what} can't be drawn: {type(error).__name__}: {message}") from error
 
 
-def draw(
-    kind: str, results: Mapping[str, Result | SweepResult], options: Options | None = None
-) -> Picture:
+def draw(kind: str, results: Mapping[str, Result | SweepResult], **options: Any) -> Picture:
     """Draw a picture.
 
     Parameters
@@ -129,60 +89,61 @@ def draw(
     kind : str
         One of `KINDS`.
     results : mapping of str to Result or SweepResult
-        Results by the name they have in the legend.
-    options : Options, optional
+        Results by their names in the legend.
+    **options
+        Keywords of the kind's function, such as ``times`` or ``width``.
 
     Raises
     ------
     PlotError
-        If the kind is unknown, a result lacks what it shows, or the options don't fit.
+        If the kind is unknown, a result lacks what it shows, or the options do not fit.
     ImportError
         If matplotlib is not installed.
     """
-    if kind not in KINDS:
-        raise PlotError(f"there is no kind {kind!r} of picture; there is {', '.join(KINDS)}")
-    if len(results) > 1 and not KINDS[kind].several:
+    properties = kind_named(kind)
+    if len(results) > 1 and not properties.several:
         raise PlotError(f"the kind {kind} shows one result; {len(results)} were given")
-    try:
-        import matplotlib
-    except ImportError:
-        raise ImportError(MISSING) from None
-    from fecm.plot.style import RC
-    from fecm.results.result import Result
-
+    check_options([kind], options)
     for name, result in results.items():
-        check_kind(kind, name, sweep=not isinstance(result, Result))
-    module, _, function = KINDS[kind].function.partition(":")
-    drawn = getattr(import_module(f"fecm.plot.{module}"), function)
+        if properties.sweep == isinstance(result, Result):
+            source, remedy = "sweep", "the kind map does"
+            if properties.sweep:
+                source, remedy = "run", "the other kinds do"
+            raise PlotError(
+                f"{name} is the result of a {source}, which the kind {kind} can't show; {remedy}"
+            )
+    import matplotlib
+
+    from fecm.plot.style import RC
+
     with matplotlib.rc_context(RC), _errors_as_one(f"{kind} of {' and '.join(results)}"):
-        picture: Picture = drawn(results, options or Options())
-    return picture
+        return _function(kind)(results, **options)
 
 
 def figure(
     kind: str,
     results: Mapping[str, Result | SweepResult],
-    options: Options,
-    path: str | Path | None,
+    path: str | Path | None = None,
+    **options: Any,
 ) -> Figure:
-    """Draw a picture, and write it if there is a path; see :func:`draw` and :func:`save`."""
-    check_options([kind], options)
+    """Draw a picture, and write it if a path is given; see :func:`draw` and :func:`save`."""
     if path is not None:
         check_suffix(kind, Path(path))
-    picture = draw(kind, results, options)
+    picture = draw(kind, results, **options)
     if path is not None:
         save(picture, Path(path))
     return picture.figure
 
 
 def check_suffix(kind: str, path: Path) -> None:
-    """Refuse a name whose suffix is no format of the kind.
+    """Refuse a file name whose suffix is not a format of the kind.
 
     Raises
     ------
     PlotError
+        If it is not; the message names the formats.
     """
-    suffixes = KINDS[kind].suffixes
+    suffixes = kind_named(kind).suffixes
     if path.suffix.lower() not in suffixes:
         raise PlotError(f"{path}: the kind {kind} is written as {' or '.join(suffixes)}")
 
@@ -194,27 +155,26 @@ def save(
     overwrite: bool = True,
     advance: Callable[[int], object] = lambda frames: None,
 ) -> None:
-    """Write a picture in the format that its name's suffix says; the same picture, the same bytes.
+    """Write a picture in the format of the path's suffix; equal pictures give equal bytes.
 
     Parameters
     ----------
     picture : Picture
     path : Path
     overwrite : bool
-        Replace a file that exists.
+        Replace an existing file.
     advance : callable
-        Told of each frame that is written.
+        Called with 1 after each frame.
 
     Raises
     ------
     PlotError
         If matplotlib can't draw it.
     OSError
-        If the file can't be written; what was there is then untouched.
+        If the file can't be written; an existing file is then untouched.
     """
     import matplotlib
 
-    from fecm._files import beside
     from fecm.plot.style import RC, RESOLUTION, SCREEN, UNDATED
 
     suffix = path.suffix.lower()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,11 +15,14 @@ from fecm.plot.style import (
     COLOURS,
     RATIO,
     STYLES,
+    Graph,
     legend,
     lines_legend,
     literal,
     panels,
+    peak,
     scale,
+    scale_in,
     styled,
 )
 from fecm.studies.rod_test.calibration import Calibration
@@ -30,31 +32,26 @@ WIDTH = "column"
 MOST_LINES = len(COLOURS) - 1
 
 
-@dataclass(frozen=True)
-class _Line:
-    """One line of a graph against time."""
-
-    label: str
-    values: Floats
-    colour: str
-    style: Any = field(default="-")
+# Label, values, colour and style of a line.
+Line = tuple[str, Floats, str, Any]
 
 
 def _against_time(
-    axes: Axes, time: Floats, lines: Sequence[_Line], name: str, dimension: str, units: Any
+    axes: Axes,
+    time: Floats,
+    lines: Sequence[Line],
+    name: str,
+    dimension: str,
+    units: Mapping[str, str] | None,
 ) -> None:
     """Draw lines against time, both axes scaled."""
-    clock = scale(float(time[-1]), unit_of("time", units))
-    peak = max(float(np.abs(line.values).max()) for line in lines)
-    size = scale(peak, unit_of(dimension, units))
-    for line in lines:
-        axes.plot(
-            clock.factor * time, size.factor * line.values, color=line.colour,
-            linestyle=line.style, label=line.label,
-        )  # fmt: skip
-    axes.set_xlabel(clock.label("Time"))
+    clock = scale(float(time[-1]), unit_of("time", dict(units or {})))
+    size = scale_in(units, dimension, *(values for _, values, _, _ in lines))
+    graph = Graph(axes, clock, size)
+    for label, values, colour, style in lines:
+        graph.plot(time, values, color=colour, linestyle=style, label=label)
+    graph.label("Time", name)
     axes.set_xlim(clock.factor * min(0.0, float(time[0])), clock.factor * float(time[-1]))
-    axes.set_ylabel(size.label(name))
 
 
 @styled
@@ -67,26 +64,26 @@ def pulse_picture(
     ----------
     history : RodHistory
     filtered : ndarray (rows, stations), optional
-        Forces at the stations behind a filter.
+        Filtered forces at the stations.
     units : mapping, optional
         Names of the units.
     """
     figure, (above, below) = panels(WIDTH, 2, ratio=RATIO[WIDTH], sharex=True)
-    forces = [_Line("applied", history.applied, COLOURS[-1], STYLES[2])]
+    forces: list[Line] = [("applied", history.applied, COLOURS[-1], STYLES[2])]
     for number, x in enumerate(history.stations):
         colour = COLOURS[number % MOST_LINES]
-        forces.append(_Line(f"at {x:.4g}", history.forces[:, number], colour))
+        forces.append((f"at {x:.4g}", history.forces[:, number], colour, "-"))
         if filtered is not None:
-            forces.append(_Line(f"at {x:.4g}, filtered", filtered[:, number], colour, STYLES[1]))
-    _against_time(above, history.time, forces, "Force", "force", units or {})
+            forces.append((f"at {x:.4g}, filtered", filtered[:, number], colour, STYLES[1]))
+    _against_time(above, history.time, forces, "Force", "force", units)
     above.set_xlabel("")
-    ends = [
-        _Line(label, history.accelerations[:, number], COLOURS[number], STYLES[number])
+    ends: list[Line] = [
+        (label, history.accelerations[:, number], COLOURS[number], STYLES[number])
         for number, label in enumerate(("struck end", "middle", "far end"))
     ]
-    _against_time(below, history.time, ends, "Acceleration", "length/time^2", units or {})
+    _against_time(below, history.time, ends, "Acceleration", "length/time^2", units)
     lines_legend(figure, above)
-    # The legend of the lower graph stands in its free corner: the pulse is over by then.
+    # The pulse is over by then: this corner is free.
     below.legend(loc="upper right")
     return Picture(figure)
 
@@ -98,35 +95,35 @@ def filter_picture(
     units: Mapping[str, str] | None = None,
     dimension: str = "",
 ) -> Picture:
-    """A history, what a filter leaves of it, and what stands beside them, against time.
+    """A history, the filtered history, and others beside them, against time.
 
     Parameters
     ----------
     time : ndarray (rows,)
     named : mapping of str to ndarray (rows,)
-        Histories by the names they have in the legend.
+        Histories by their names in the legend.
     units : mapping, optional
         Names of the units.
     dimension : str
-        Of the histories; empty where it is not known.
+        Of the histories; empty if unknown.
     """
     figure, (axes,) = panels(WIDTH, ratio=RATIO[WIDTH])
-    lines = [
-        _Line(name, values, colour)
+    lines: list[Line] = [
+        (name, values, colour, "-")
         for (name, values), colour in zip(named.items(), COLOURS, strict=False)
     ]
     name = "Force" if dimension == "force" else next(reversed(list(named)[:-1])).capitalize()
-    _against_time(axes, time, lines, literal(name), dimension, units or {})
+    _against_time(axes, time, lines, literal(name), dimension, units)
     lines_legend(figure, axes)
     return Picture(figure)
 
 
 @styled
 def calibration_picture(time: Floats, v_f: Floats, v_a: Floats, found: Calibration) -> Picture:
-    """Both outputs against time (figure 4.5), and one against the other with the line (4.6)."""
+    """Both outputs against time (figure 4.5), and one against the other with the fit (4.6)."""
     figure, (left, right) = panels("full", 1, 2, ratio=2 * RATIO["full"])
     clock = scale(float(time[-1]), "")
-    sizes = {"V_F": scale(_peak(v_f), ""), "V_a": scale(_peak(v_a), "")}
+    sizes = {"V_F": scale(peak(v_f), ""), "V_a": scale(peak(v_a), "")}
     names = {"V_F": "$V_F$", "V_a": "$V_a$"}
     shown = {"V_F": v_f, "V_a": v_a}
     other = left.twinx()
@@ -147,7 +144,3 @@ def calibration_picture(time: Floats, v_f: Floats, v_a: Floats, found: Calibrati
     labels = ["$V_F$", "$V_a$", "measured", f"slope {found.slope:.4g} ± {found.slope_error:.2g}"]
     legend(figure, handles, labels, mathematics=True)
     return Picture(figure)
-
-
-def _peak(values: Floats) -> float:
-    return float(np.abs(values).max())

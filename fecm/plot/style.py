@@ -1,4 +1,4 @@
-"""How pictures look: sizes and colours of a journal, units on the axes, legends beside the data."""
+"""Style of the pictures: journal sizes and colours, units on the axes, legends beside the data."""
 
 from __future__ import annotations
 
@@ -9,31 +9,34 @@ from dataclasses import dataclass
 from typing import Any, ParamSpec
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
+from fecm.deck.units import unit_of
 from fecm.plot.kinds import Picture, PlotError
 from fecm.results.result import Result
 from fecm.results.schema import printable
 
-# Width of a column and of a page (in); points an inch of pictures in print and on a screen.
+# Width of a column and of a page (in).
 WIDTHS = {"column": 3.5, "full": 7.2}
 
 RATIO = {"column": 0.68, "full": 0.45}  # height over width of a graph
 
-RESOLUTION, SCREEN = 300, 150
+RESOLUTION, SCREEN = 300, 150  # dots per inch in print and on a screen
 
-# Okabe and Ito's colours, without the yellow that is lost on white.
+# Okabe and Ito's colours, without yellow, which is hard to see on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
 STYLES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))
 
-IN_ORDER = "viridis"  # quantities that grow
+IN_ORDER = "viridis"  # sequential
 
-SIGNED = "RdBu_r"  # quantities about zero
+SIGNED = "RdBu_r"  # diverging, about zero
 
-# Any, as the names that matplotlib types differ from version to version.
+# Any: matplotlib's types of these names differ between versions.
 RC: Any = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
@@ -67,7 +70,7 @@ UNDATED: dict[str, dict[str, Any]] = {
     ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
 
-# Units that take prefixes: the unit that they are of, and the power of ten.
+# Units that take prefixes: base unit and power of ten.
 _PREFIXED = {
     "s": ("s", 0), "ms": ("s", -3), "us": ("s", -6), "µs": ("s", -6),
     "m": ("m", 0), "mm": ("m", -3), "N": ("N", 0), "kN": ("N", 3), "J": ("J", 0),
@@ -82,7 +85,7 @@ Drawn = ParamSpec("Drawn")
 
 
 def styled(function: Callable[Drawn, Picture]) -> Callable[Drawn, Picture]:
-    """Have a function draw in this style."""
+    """Decorate a function to draw in this style."""
 
     @functools.wraps(function)
     def draw(*arguments: Drawn.args, **options: Drawn.kwargs) -> Picture:
@@ -93,23 +96,23 @@ def styled(function: Callable[Drawn, Picture]) -> Callable[Drawn, Picture]:
 
 
 def literal(text: str) -> str:
-    """A text of a user or a file as matplotlib shows it letter by letter, without mathematics."""
+    """Escape a text so that matplotlib shows it literally, without mathematics."""
     return printable(text).replace("$", r"\$")
 
 
 @dataclass(frozen=True)
 class Scale:
-    """How an axis shows a quantity: the factor of the numbers, and the unit's text."""
+    """Scale of an axis: factor of the numbers, and text of the unit."""
 
     factor: float
     unit: str
 
     def label(self, name: str) -> str:
-        """Text of an axis."""
+        """Label of an axis."""
         return f"{name} ({literal(self.unit)})" if self.unit else name
 
     def show(self, value: float) -> str:
-        """A value with its unit, to four figures."""
+        """A value with its unit, to four significant digits."""
         number = f"{self.factor * value:.4g}"
         if self.unit.startswith("10"):
             return f"{number} × {literal(self.unit)}"
@@ -117,9 +120,9 @@ class Scale:
 
 
 def scale(peak: float, unit: str) -> Scale:
-    """Scale for numbers up to `peak`: by thousands, unless they are near 1 as they are.
+    """Scale for numbers up to `peak`, in powers of 1000; none for numbers near 1.
 
-    Units that take prefixes take them (800 µs), others stand after the power (1.3, 10⁻³ in).
+    Some units take a prefix (800 µs), others follow the power (1.3, 10⁻³ in).
     """
     base, own = _PREFIXED.get(unit, ("", 0))
     power = 0
@@ -137,7 +140,7 @@ def _power(power: int) -> str:
 
 
 def common_unit(results: Mapping[str, Result], dimension: str) -> str:
-    """Unit of a dimension in all results; empty where one of them names none.
+    """Common unit of a dimension; empty if a result names none.
 
     Raises
     ------
@@ -147,23 +150,65 @@ def common_unit(results: Mapping[str, Result], dimension: str) -> str:
     units = {name: result.unit(dimension) for name, result in results.items()}
     named = {unit: name for name, unit in units.items() if unit}
     if len(named) > 1:
-        told = " and ".join(f"{unit} in {name}" for unit, name in named.items())
-        raise PlotError(f"the results can't share axes: the unit of {dimension} is {told}")
+        units_in = " and ".join(f"{unit} in {name}" for unit, name in named.items())
+        raise PlotError(f"the results can't share axes: the unit of {dimension} is {units_in}")
     return "" if "" in units.values() else next(iter(named))
 
 
-def scale_of(results: Mapping[str, Result], dimension: str, values: Iterable[Any]) -> Scale:
-    """Scale for arrays of one dimension."""
-    peak = max((float(abs(array).max()) for array in values if len(array)), default=0.0)
-    return scale(peak, common_unit(results, dimension))
+def peak(*arrays: Any) -> float:
+    """Largest finite absolute value of arrays; 0 if there is none."""
+    finite = (np.abs(array[np.isfinite(array)]) for array in arrays)
+    return max((float(values.max(initial=0.0)) for values in finite), default=0.0)
+
+
+def scale_of(results: Mapping[str, Result], dimension: str, arrays: Iterable[Any]) -> Scale:
+    """Scale for arrays of one dimension, in the results' common unit."""
+    return scale(peak(*arrays), common_unit(results, dimension))
+
+
+def scale_in(units: Mapping[str, str] | None, dimension: str, *arrays: Any) -> Scale:
+    """Scale for arrays of one dimension, in named units."""
+    return scale(peak(*arrays), unit_of(dimension, dict(units or {})))
+
+
+def limit_count(count: int, what: str, most: int = len(COLOURS)) -> None:
+    """Refuse more lines than there are colours or styles.
+
+    Raises
+    ------
+    PlotError
+        If `count` exceeds `most`.
+    """
+    if count > most:
+        raise PlotError(f"{count} {what} can't be told apart in one picture; at most {most} can")
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Axes whose numbers are scaled."""
+
+    axes: Axes
+    x: Scale
+    y: Scale
+
+    def plot(self, x: Any, y: Any, *style: str, **options: Any) -> list[Line2D]:
+        """Draw a line or points."""
+        return self.axes.plot(self.x.factor * x, self.y.factor * y, *style, **options)
+
+    def label(self, x: str = "", y: str = "") -> None:
+        """Label the axes that are named, with their units."""
+        if x:
+            self.axes.set_xlabel(self.x.label(x))
+        if y:
+            self.axes.set_ylabel(self.y.label(y))
 
 
 def panels(
     width: str, rows: int = 1, columns: int = 1, *, ratio: float, **options: Any
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of equal axes, each `ratio` as high as wide; row by row."""
+    """Figure with equal axes, row by row; `ratio` is height over width of each."""
     inches = WIDTHS[width]
-    # Layout engines do not know how much room an axes of three dimensions takes.
+    # Layout engines do not know the size of three-dimensional axes.
     layout: Any = None if "subplot_kw" in options else "constrained"
     figure = Figure(figsize=(inches, inches * ratio * rows / columns), layout=layout)
     FigureCanvasAgg(figure)
@@ -179,7 +224,7 @@ def legend(
     *,
     mathematics: bool = False,
 ) -> None:
-    """A legend above the axes, never over data; labels are shown as they are, or as mathematics."""
+    """Draw a legend above the axes; labels are shown literally, or as mathematics."""
     letters = max(map(len, labels), default=0)
     room = figure.get_figwidth() - (0.08 * len(title) if title else 0.0)
     columns = max(1, min(len(labels), int(room / (0.062 * letters + 0.45))))
@@ -192,11 +237,11 @@ def legend(
 
 
 def lines_legend(figure: Figure, axes: Axes, title: str = "") -> None:
-    """The legend of an axes' labelled lines."""
+    """Draw the legend of the labelled lines of axes."""
     handles = [line for line in axes.get_lines() if not _unlabelled(str(line.get_label()))]
     legend(figure, handles, [str(line.get_label()) for line in handles], title)
 
 
 def _unlabelled(label: str) -> bool:
-    """Whether a line was drawn without a label for the legend."""
+    """Whether a line has no label for the legend."""
     return label == "_" or label.startswith("_child")

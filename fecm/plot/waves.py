@@ -9,13 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from fecm.deck.units import unit_of
-from fecm.plot.kinds import Picture, PlotError
-from fecm.plot.style import COLOURS, panels, scale, styled
+from fecm.plot.kinds import Picture
+from fecm.plot.style import COLOURS, limit_count, panels, scale_in, styled
 from fecm.studies.waves import FRONTS, MODES, Cusp, Dispersion, Medium, WaveSurfaces
 
-AROUND = np.arange(1441) / 4.0  # normals of the points of a curve, degrees
-RAYS = 45.0  # degrees between the normals whose rays are drawn
+AROUND = np.arange(1441) / 4.0  # directions of the normals, degrees
+RAYS = 45.0  # degrees between the normals of the rays
 WORDS = {name: name.replace("_", " ").replace("in plane", "in-plane") for name in (*MODES, *FRONTS)}
 DASHES: tuple[Any, ...] = (
     "-", (0, (5, 1.5)), (0, (1, 1)), (0, (7, 1.5, 1, 1.5)), (0, (7, 1.5, 1, 1.5, 1, 1.5))
@@ -26,15 +25,16 @@ DASHES: tuple[Any, ...] = (
 def dispersion_picture(medium: Medium, curves: Sequence[Dispersion]) -> Picture:
     """Phase velocities and frequencies of all modes against the wavelength.
 
-    Velocities are scaled by that of transverse shear and frequencies by it over the thickness, as
-    in figures 2.4 and 2.5.  The axes end a little above the in-plane modes and the cut-off.
+    Velocities are divided by the transverse shear velocity, frequencies by that velocity over the
+    thickness, as in figures 2.4 and 2.5.  The axes end just above the in-plane modes and the
+    cut-off.
 
     Raises
     ------
     PlotError
         If there are more directions than colours.
     """
-    _within(len(curves), "directions")
+    limit_count(len(curves), "directions")
     unit = medium.shear_velocity
     velocities = [curve.phase_velocity / unit for curve in curves]
     frequencies = [c.angular_frequency * medium.laminate.thickness / unit for c in curves]
@@ -64,7 +64,7 @@ def dispersion_picture(medium: Medium, curves: Sequence[Dispersion]) -> Picture:
 
 @styled
 def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
-    """Normal velocities of in-plane and of flexural fronts, as distances in the normal's direction.
+    """Polar graphs of the normal velocities of in-plane and flexural fronts.
 
     Parameters
     ----------
@@ -73,10 +73,10 @@ def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
         As :func:`fecm.deck.units.unit_names` gives them.
     """
     fronts = surfaces.fronts(AROUND)
-    speed = scale(float(fronts.velocity.max()), unit_of("length/time", dict(units)))
+    speed = scale_in(units, "length/time", fronts.velocity)
     figure, axes = panels("full", 1, 2, ratio=1.16, subplot_kw={"projection": "polar"})
     figure.set_layout_engine("constrained")
-    graphs: Any = axes  # polar ones have methods of their own
+    graphs: Any = axes  # polar axes have additional methods
     for place, colour in enumerate(COLOURS[: len(FRONTS)]):
         graphs[0 if place < 2 else 1].plot(
             np.deg2rad(fronts.normal),
@@ -98,20 +98,20 @@ def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
 def fronts_picture(
     surfaces: WaveSurfaces, times: Sequence[float], radius: float, units: Mapping[str, str]
 ) -> Picture:
-    """Fronts at several times with rays and cusps, one graph a mode.
+    """Fronts at several times with rays and cusps, one graph per mode.
 
     Raises
     ------
     PlotError
         If there are more times than colours.
     """
-    _within(len(times), "times")
+    limit_count(len(times), "times")
     fronts, some = surfaces.fronts(AROUND), surfaces.fronts(np.arange(0.0, 360.0, RAYS))
     places = [fronts.positions(time, radius) for time in times]
     ends = some.positions(0.0, radius), some.positions(max(times), radius)
     turns = [surfaces.cusps(time, radius) for time in times]
-    length = scale(max(float(np.abs(at).max()) for at in places), unit_of("length", dict(units)))
-    clock = scale(max(times), unit_of("time", dict(units)))
+    length = scale_in(units, "length", *places)
+    clock = scale_in(units, "time", np.array(times))
     figure, axes = panels("full", 2, 3, ratio=0.95)
     for mode, ax in enumerate(axes[:5]):
         _circle(ax, length.factor * radius)
@@ -156,8 +156,3 @@ def _circle(ax: Axes, radius: float) -> None:
 
 def _dots(ax: Axes, found: Sequence[Cusp], factor: float) -> None:
     ax.plot([factor * c.x for c in found], [factor * c.y for c in found], **_DOT)
-
-
-def _within(count: int, what: str) -> None:
-    if count > len(COLOURS):
-        raise PlotError(f"more than {len(COLOURS)} {what} can't be told apart in one picture")

@@ -50,11 +50,11 @@ class Group:
 
 
 class Result:
-    """What a run gave.
+    """Result of a run.
 
-    Every dataset is at hand as ``result["tape3/w"]`` and as ``result.tape3.w``; the columns of the
+    Every dataset is available as ``result["tape3/w"]`` and ``result.tape3.w``; the columns of the
     history (``time``, ``force``, ``indentation``, ``transducer``, ``displacement``, ``velocity``,
-    ``acceleration``, ``plate_w``, ``step``) also as ``result.force``.  Units are the deck's own.
+    ``acceleration``, ``plate_w``, ``step``) also as ``result.force``.  Units are those of the deck.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Result:
     texts : mapping of str to str
         Texts by path.
     groups : mapping of str to mapping
-        Attributes of the groups; those of the result itself stand under ``""``.
+        Attributes of the groups; those of the result itself under ``""``.
     """
 
     def __init__(
@@ -89,28 +89,28 @@ class Result:
 
     @property
     def slips(self) -> tuple[str, ...]:
-        """The slips that were on, sorted."""
+        """Names of the active slips, sorted."""
         slips = self.attributes.get("slips", ())
         return tuple(map(str, slips)) if isinstance(slips, list | tuple) else ()
 
     def unit(self, dimension: str) -> str:
-        """Unit of a dimension such as ``"force/length"``; empty where the deck names no units."""
+        """Unit of a dimension such as ``"force/length"``; empty if the deck names none."""
         return unit_of(dimension, declared_units(self.attributes))
 
     @property
     def still_in_contact(self) -> bool:
-        """Whether the run ended in contact, so that what depends on the end is not known."""
+        """Whether the run ended in contact, so that its final values are unknown."""
         return f"{HISTORY}/force" in self and still_in_contact(self[f"{HISTORY}/force"])
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """The history as a pandas DataFrame: a row a step, by time; step is its first column.
+        """The history as a pandas DataFrame: one row per step, indexed by time.
 
         Raises
         ------
         ImportError
             If pandas is not installed.
         KeyError
-            If no impact step was taken.
+            If the run has no impact step.
         """
         try:
             import pandas
@@ -125,16 +125,16 @@ class Result:
         return pandas.DataFrame(columns, index=index)
 
     def plot(self, kind: str = "force", path: str | Path | None = None, **options: Any) -> Figure:
-        """Draw a picture, and write it if there is a path.
+        """Draw a picture, and write it if a path is given.
 
         Parameters
         ----------
         kind : str
-            One of :data:`fecm.plot.pictures.KINDS`.
+            Kind of picture; see :data:`fecm.plot.kinds.KINDS`.
         path : str or Path, optional
-            Where to write it, in place of what is there; its suffix is the format.
+            File to write; an existing one is replaced.  The suffix selects the format.
         **options
-            Fields of :class:`fecm.plot.pictures.Options`.
+            Options of the kind, such as ``times`` or ``width``; see docs/pictures.md.
 
         Returns
         -------
@@ -143,13 +143,13 @@ class Result:
         Raises
         ------
         PlotError
-            If the result lacks what the kind shows, or the options don't fit.
+            If the result lacks what the kind shows, or the options do not fit.
         ImportError
             If matplotlib is not installed.
         """
-        from fecm.plot.pictures import Options, figure
+        from fecm.plot.pictures import figure
 
-        return figure(kind, {self.title or "the result": self}, Options(**options), path)
+        return figure(kind, {self.title or "the result": self}, path, **options)
 
     def __getitem__(self, path: str) -> Array:
         return self._arrays[path.strip("/")]
@@ -181,7 +181,7 @@ class Result:
 
 
 def load(path: str | Path) -> Result:
-    """Read a result file; datasets are read when they are asked for.
+    """Open a result file; datasets are read on demand.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def load(path: str | Path) -> Result:
     Raises
     ------
     ResultFileError
-        If the file is no result, or a dataset's shape or type is none of a result's.
+        If the file is not a result, or a dataset has the wrong shape or type.
     OSError
         If it can't be opened.
 
@@ -207,12 +207,12 @@ def load(path: str | Path) -> Result:
 
 
 def result_of(contents: Contents) -> Result:
-    """A run's result, of what stands in its file.
+    """Build a run's result from the contents of its file.
 
     Raises
     ------
     ResultFileError
-        If a dataset's shape or type is none of a result's.
+        If a dataset has the wrong shape or type.
     """
     arrays = contents.arrays
     kinds = {name: dtype.kind for name, dtype in arrays.dtypes.items()}
@@ -222,9 +222,9 @@ def result_of(contents: Contents) -> Result:
 
 
 def still_in_contact(force: Array) -> bool:
-    """Whether a contact lasts to the end of a history.
+    """Whether a history ends in contact.
 
-    The end of the contact, the permanent indentation and the energies after it are then unknown.
+    End of contact, permanent indentation and final energies are then unknown.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def still_in_contact(force: Array) -> bool:
 
 
 def contact_intervals(force: Array, time: Array) -> list[tuple[float, float]]:
-    """First and last time of every stretch of steps with a contact force."""
+    """First and last time of every interval with a contact force."""
     touching = np.concatenate(([0], np.asarray(force) > 0.0, [0])).astype(int)
     edges = np.flatnonzero(np.diff(touching))
     return [

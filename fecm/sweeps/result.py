@@ -161,7 +161,7 @@ class SweepResult:
         path : str or Path, optional
             Output file, which is overwritten; the suffix selects the format.
         **options
-            Other fields of :class:`fecm.plot.pictures.Options`: ``where``, ``level``, ``width``.
+            Other options of the kind map: ``where``, ``level``, ``width``.
 
         Returns
         -------
@@ -174,11 +174,11 @@ class SweepResult:
         ImportError
             If matplotlib is not installed.
         """
-        from fecm.plot.pictures import Options, figure
+        from fecm.plot.pictures import figure
 
         names = (over,) if isinstance(over, str) else tuple(over)
-        chosen = Options(quantity=quantity, over=names, **options)
-        return figure("map", {self.title or "the sweep": self}, chosen, path)
+        named = {self.title or "the sweep": self}
+        return figure("map", named, path, quantity=quantity, over=names, **options)
 
 
 def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
