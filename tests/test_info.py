@@ -214,7 +214,7 @@ def put(path: str, value: Any) -> Edit:
         (put("history/force", np.zeros((10, 2))), "history/force has the shape (10, 2)"),
         (put("history/force", np.zeros(9)), "rows is"),
         (put("history/time", 3.0), "history/time has the shape ()"),
-        (put("history/force", np.zeros(10, dtype="i8")), "another type than f8"),
+        (put("history/force", np.zeros(10, dtype="i8")), "has the wrong type: expected f8"),
         (put("tape3/w", np.zeros((2, 24))), "numnp is"),
         (put("laminate/A", np.zeros((2, 2))), "but 3 is"),
         (put("history", np.zeros(3)), ""),
@@ -297,7 +297,7 @@ def test_a_dataset_that_vanishes_while_it_is_read_is_one_error(
     path = changed(lambda file: None)
     arrays = read(path).arrays
     path.write_bytes(b"gone")
-    with pytest.raises(ResultFileError, match=r"changed\.h5: this is no readable HDF5 file"):
+    with pytest.raises(ResultFileError, match=r"changed\.h5: not a readable HDF5 file"):
         arrays["tape3/w"]
 
 

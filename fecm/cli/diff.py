@@ -16,17 +16,14 @@ from fecm.results.diff import (
     Comparison,
     Difference,
     IncomparableError,
-    Listed,
-    Place,
     Tolerance,
     difference,
-    opened,
 )
-from fecm.results.schema import jsonable, printable, told_apart
+from fecm.results.schema import jsonable, printable, shown_apart
 
 
 def _tolerance(_: click.Context, option: click.Parameter, value: str) -> float:
-    """Read a tolerance, a number from 0 on, or refuse it in one line."""
+    """Read a tolerance, a number of at least 0."""
     try:
         number = float(value)
     except ValueError:
@@ -40,14 +37,14 @@ def _tolerance(_: click.Context, option: click.Parameter, value: str) -> float:
 @click.argument("a", type=FILE_PATH)
 @click.argument("b", type=FILE_PATH)
 @click.option("--rtol", default="0", show_default=True, callback=_tolerance, metavar="R",
-              help="Relative tolerance: a share of each dataset's own largest absolute value, in A "
-                   "and B together; so zero crossings of a history do not count.")  # fmt: skip
+              help="Relative tolerance: a part of the dataset's largest absolute value in A and "
+                   "B.")  # fmt: skip
 @click.option("--atol", default="0", show_default=True, callback=_tolerance, metavar="T",
-              help="Absolute tolerance, in each dataset's own unit.")  # fmt: skip
+              help="Absolute tolerance, in the dataset's unit.")  # fmt: skip
 @click.option("--only", multiple=True, metavar="PATH",
               help="Compare only this dataset (tape9/force) or group (tape9); may be "
                    "repeated.")  # fmt: skip
-@click.option("--brief", is_flag=True, help="Print only what differs, by name, and the verdict.")
+@click.option("--brief", is_flag=True, help="Print only names of differences and the verdict.")
 @FORMAT_OPTION
 @reads("a", "b")
 def diff(
@@ -57,22 +54,21 @@ def diff(
 
     A and B are result files or folders of tapes, or both results of sweeps.
 
-    Two numbers are the same if |a - b| <= T + R * max, max being the largest absolute value of the
-    whole dataset; for energy/balance_error the largest energy, for laminate/B the root of the
-    largest A times the largest D, for indentation the largest one in contact.  NaN is the same as
-    NaN, an infinity as the same infinity.  Whole numbers (steps, node numbers) must be equal at any
-    tolerance.  A dataset that only one side has, another shape and another type are differences;
-    title, mode, slips, other attributes and the deck are listed where they differ, and not judged.
+    Two numbers are equal if |a - b| <= T + R * max, where max is the largest absolute value of the
+    entire dataset; for energy/balance_error it is the largest energy, for laminate/B the square
+    root of the largest A times the largest D, for indentation the largest one in contact.  NaN
+    equals NaN, and an infinity the same infinity.  Integers (steps, node numbers) must be equal at
+    any tolerance.  A dataset that only A or B has, and another shape or type, are differences.
+    Title, mode, slips, other attributes and the deck are only listed where they differ.
 
-    A folder of tapes holds tape3, tape8 and tape9 (or tape3.txt and so on) as `fecm tapes` or the
-    original program wrote them, in either order.  Only what tapes hold is then compared, and their
+    A folder of tapes holds tape3, tape8 and tape9 (or tape3.txt etc.) as `fecm tapes` or the
+    original program wrote them, in either order.  Only datasets of tapes are then compared; their
     four digits need a tolerance: --rtol 1e-3.
 
-    Exit status: 0 the same, 1 different, 2 a file or the call can't be used.
+    Exit status: 0 equal, 1 different, 2 unusable file or call.
     """
     try:
-        with opened(a) as left, opened(b) as right:
-            found = difference(left, right, Tolerance(rtol, atol), only)
+        found = difference(a, b, Tolerance(rtol, atol), only)
     except IncomparableError as error:
         raise RefusedError(printable(str(error))) from None
     if form == "json":
@@ -86,11 +82,12 @@ def diff(
 
 
 def _brief(found: Difference) -> list[str]:
-    """Names of what differs."""
+    """Names of the datasets that differ."""
     return [printable(name) for name in sorted(_different(found))]
 
 
 def _different(found: Difference) -> list[str]:
+    """Datasets that differ or are missing."""
     return [*(c.path for c in found.compared if not c.same), *found.only[0], *found.only[1]]
 
 
@@ -104,48 +101,45 @@ def _verdict(found: Difference, rtol: float, atol: float) -> str:
 
 
 def _lines(found: Difference) -> list[str]:
-    """A line for every dataset, then what is listed."""
-    told = {c.path: ("same" if c.same else "different", _told(c)) for c in found.compared}
-    for side, names in zip("AB", found.only, strict=True):
-        told.update(dict.fromkeys(names, (f"only in {side}", "")))
-    width = max((len(printable(name)) for name in told), default=0)
+    """One line per dataset, then what is listed."""
+    rows = {c.path: ("same" if c.same else "different", _describe(c)) for c in found.compared}
+    for source, names in zip("AB", found.only, strict=True):
+        rows.update(dict.fromkeys(names, (f"only in {source}", "")))
+    width = max((len(printable(name)) for name in rows), default=0)
     lines = [
         f"{word:10} {printable(name):{width}}  {text}".rstrip()
-        for name, (word, text) in sorted(told.items())
+        for name, (word, text) in sorted(rows.items())
     ]
     return [*lines, *map(_listed, found.listed)]
 
 
-def _told(found: Comparison) -> str:
-    """What there is to say about a dataset: sizes, then where, then since when."""
-    a, b = found.layouts
+def _describe(found: Comparison) -> str:
+    """Shapes and types that differ, largest difference, number of differences and first one."""
     parts: list[str] = []
-    if a.shape != b.shape:
-        parts.append(f"shape {_shape(a.shape)} against {_shape(b.shape)}")
-    if not found.same_type:
-        parts.append(f"type {a.kind} against {b.kind}")
+    if found.shapes[0] != found.shapes[1]:
+        parts.append(f"shape {_shape(found.shapes[0])} against {_shape(found.shapes[1])}")
+    if found.types[0] != found.types[1]:
+        parts.append(f"type {found.types[0]} against {found.types[1]}")
     if found.at and found.values:
         left, right = _values(found.values)
-        if math.isinf(found.largest):
-            parts.append(f"{left} against {right}{_where(found.at)}")
-        else:
-            what = SCALE_NAMES.get(found.path, "") if found.scale != found.maximum else ""
-            share = f"{found.relative:.2g} of {what or 'max'} {found.scale:.6g}"
-            parts.append(
-                f"largest {found.largest:.3g} ({share}), {left} against {right}{_where(found.at)}"
-            )
+        text = f"{left} against {right}{_where(found.at)}"
+        if math.isfinite(found.largest):
+            name = SCALE_NAMES.get(found.path, "") if found.scale != found.maximum else ""
+            share = f"{found.relative:.2g} of {name or 'max'} {found.scale:.6g}"
+            text = f"largest {found.largest:.3g} ({share}), {text}"
+        parts.append(text)
     if found.differing:
-        what = "text" if a.holds_texts else "number"
-        parts.append(f"{found.differing} {what}{'s differ' if found.differing > 1 else ' differs'}")
+        noun = "text" if found.holds_texts else "number"
+        parts.append(f"{found.differing} {noun}{'s differ' if found.differing > 1 else ' differs'}")
     if found.first:
         parts.append(f"first{_where(found.first)}")
     return "; ".join(parts)
 
 
 def _values(values: tuple[float, float] | tuple[str, str]) -> list[str]:
-    """Two values that differ, in as many digits as it takes to see it."""
+    """Two different values, in as many digits as show it."""
     if any(isinstance(value, str) for value in values):
-        return [f"`{text}`" for text in told_apart(*values)]
+        return [f"`{text}`" for text in shown_apart(*values)]
     short = [f"{value:.6g}" for value in values]
     return short if short[0] != short[1] else list(map(repr, values))
 
@@ -154,67 +148,56 @@ def _shape(shape: tuple[int, ...]) -> str:
     return "x".join(map(str, shape)) or "single"
 
 
-def _where(place: Place) -> str:
-    """A place in words, beginning with a blank."""
+def _where(place: dict[str, Any]) -> str:
+    """A place in words, with a leading blank."""
     words: list[str] = []
-    if place.step is not None:
-        words.append(f"step {place.step} (time {place.time:.6g})")
-    words += [f"{name} {value}" for name, value in place.names.items()]
-    if not words and place.index:
-        words.append(f"index {', '.join(map(str, place.index))}")
+    if place["step"] is not None:
+        words.append(f"step {place['step']} (time {place['time']:.6g})")
+    words += [f"{n} {value}" for n, value in place.items() if n not in ("index", "step", "time")]
+    if not words and place["index"]:
+        words.append(f"index {', '.join(map(str, place['index']))}")
     return f" at {', '.join(words)}" if words else ""
 
 
-def _listed(item: Listed) -> str:
-    """A line about what differs and is not judged."""
-    texts = told_apart(*item.values)
+def _listed(item: dict[str, Any]) -> str:
+    """Line of an attribute or text that differs."""
+    values = item["a"], item["b"]
     left, right = (
         "nothing" if value is None else f"`{text}`"
-        for value, text in zip(item.values, texts, strict=True)
+        for value, text in zip(values, shown_apart(*values), strict=True)
     )
-    line = f" line {item.line}" if item.line else ""
-    return f"listed     {printable(item.name)}{line}: {left} against {right}"
+    line = f" line {item['line']}" if item["line"] else ""
+    return f"listed     {printable(item['name'])}{line}: {left} against {right}"
 
 
 def _json(found: Difference, head: dict[str, Any], brief: bool) -> dict[str, Any]:
-    """Everything for programs; numbers that JSON has none for are made plain later."""
+    """Content of the JSON output."""
     return {
         "verdict": "same" if found.same else "different",
         **head,
         "datasets": [_entry(c) for c in found.compared if not (brief and c.same)],
         "only_in_a": found.only[0],
         "only_in_b": found.only[1],
-        "listed": [
-            {"name": item.name, "a": item.values[0], "b": item.values[1], "line": item.line}
-            for item in found.listed
-        ],
+        "listed": found.listed,
     }
 
 
 def _entry(found: Comparison) -> dict[str, Any]:
-    """One dataset for programs."""
-    a, b = found.layouts
-    numbers = found.comparable and not a.holds_texts
+    """JSON of one dataset."""
+    numbers = found.comparable and not found.holds_texts
     finite = numbers and math.isfinite(found.largest)
     values = found.values or (None, None)
     return {
         "name": found.path,
         "same": found.same,
-        "shape_a": list(a.shape), "shape_b": list(b.shape),
-        "dtype_a": a.kind, "dtype_b": b.kind,
+        "shape_a": list(found.shapes[0]), "shape_b": list(found.shapes[1]),
+        "dtype_a": found.types[0], "dtype_b": found.types[1],
         "largest_difference": found.largest if finite else None,
         "relative": found.relative if finite else None,
         "maximum": found.maximum if numbers else None,
         "scale": found.scale if numbers else None,
         "tolerance": found.tolerance if numbers else None,
         "differing": found.differing if found.comparable else None,
-        "at": _place(found.at), "a": values[0], "b": values[1],
-        "first": _place(found.first),
+        "at": found.at, "a": values[0], "b": values[1],
+        "first": found.first,
     }  # fmt: skip
-
-
-def _place(place: Place | None) -> dict[str, Any] | None:
-    if place is None:
-        return None
-    told = {"index": list(place.index), "step": place.step, "time": place.time}
-    return {**told, **place.names}

@@ -13,23 +13,17 @@ import click
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION
 from fecm.cli.isolation import reads
 from fecm.results.hdf5_reader import Contents, read
-from fecm.results.info import (
-    DatasetInformation,
-    GroupInformation,
-    Information,
-    information,
-    summary_of_run,
-)
+from fecm.results.info import describe_groups, summary_of_run
 from fecm.results.result import result_of
-from fecm.results.schema import FORMAT, SWEEP, jsonable, printable, shown
+from fecm.results.schema import FORMAT, SWEEP, declared_units, jsonable, printable, shown
 from fecm.sweeps.result import summary, sweep_of
 
-# Attributes of the file that have lines of their own.
-TOLD = ("title", "mode", "slips", "fecm_version", "format", "format_version",
-        "unit_length", "unit_force", "unit_time")  # fmt: skip
+# Attributes of the file with lines of their own.
+HEADING = ("title", "mode", "slips", "fecm_version", "format", "format_version",
+           "unit_length", "unit_force", "unit_time")  # fmt: skip
 
-# Of these, what a sweep has as well.
-IN_FRONT = ("title", "fecm_version", "format", "format_version")
+# Those that are keys of the JSON output, of runs and of sweeps.
+RUN_KEYS, SWEEP_KEYS = HEADING[:6], ("title", "fecm_version", "format", "format_version")
 
 PERMANENT = "permanent_indentation"
 
@@ -39,16 +33,28 @@ PERMANENT = "permanent_indentation"
 @FORMAT_OPTION
 @reads("result")
 def info(result: Path, form: str) -> None:
-    """Show what is in RESULT, of a run or of a sweep: its units, its summary, every dataset."""
+    """Show units, summary and every dataset of RESULT, of a run or of a sweep."""
     contents = read(result, FORMAT, SWEEP)
-    about = _of_sweep(contents) if contents.form == SWEEP else _of_run(contents)
-    if about.get("still_in_contact") and PERMANENT in contents.groups["history"]:
-        contents.groups["history"][PERMANENT] = math.nan  # it depends on the end of the contact
-    told = information(contents)
+    is_sweep = contents.form == SWEEP
+    extent = _of_sweep(contents) if is_sweep else _of_run(contents)
+    if extent.get("still_in_contact") and PERMANENT in contents.groups["history"]:
+        contents.groups["history"][PERMANENT] = math.nan  # unknown before the end of the contact
+    attributes, lines = contents.attributes, extent.pop("summary")
+    about = {
+        "file": printable(str(contents.path)),
+        "size": contents.path.stat().st_size,
+        **{name: attributes.get(name) for name in (SWEEP_KEYS if is_sweep else RUN_KEYS)},
+        "units": declared_units(attributes),
+        **extent,
+        "attributes": {n: value for n, value in attributes.items() if n not in HEADING},
+        "summary": lines,
+        "groups": describe_groups(contents),
+        "texts": {n: {"lines": len(text.splitlines())} for n, text in contents.texts.items()},
+    }
     if form == "json":
-        click.echo(json.dumps(jsonable(_json(told, about))))
+        click.echo(json.dumps(jsonable(about)))
     else:
-        click.echo("\n".join(_lines(told, about)))
+        click.echo("\n".join(_page(about)))
 
 
 def _of_run(contents: Contents) -> dict[str, Any]:
@@ -66,58 +72,63 @@ def _of_run(contents: Contents) -> dict[str, Any]:
 
 
 def _of_sweep(contents: Contents) -> dict[str, Any]:
-    """Cases, failed ones among them, and summary of a sweep."""
+    """Cases, failed cases and summary of a sweep."""
     result = sweep_of(contents, history=False)
     failed = len(result) - int(result.fine.sum())
     return {"cases": len(result), "failed": failed, "summary": summary(result)}
 
 
 def _extent(about: Mapping[str, Any]) -> tuple[str, str]:
-    """How much was computed."""
+    """Number of cases of a sweep, or of steps of a run."""
     if "cases" in about:
         return "cases", f"{about['cases']}, {about['failed'] or 'none'} failed"
-    first_last = about["time"]
-    span = f", time {first_last[0]:.6g} to {first_last[1]:.6g}" if first_last else ""
-    return "steps", f"{about['steps']}{span}"
+    span = about["time"]
+    times = f", time {span[0]:.6g} to {span[1]:.6g}" if span else ""
+    return "steps", f"{about['steps']}{times}"
 
 
-def _lines(told: Information, about: Mapping[str, Any]) -> list[str]:
-    """The whole page."""
-    attributes = told.attributes
-    slips = attributes.get("slips", [])
-    listed = ", ".join(map(str, slips)) if isinstance(slips, list) and slips else "none"
-    of_a_run = [("mode", attributes.get("mode", "not told")), ("slips", listed)]
-    units = ", ".join(f"{name} {unit}" for name, unit in told.units.items())
-    rows = [
-        ("file", f"{told.path}, {told.size} bytes"),
-        *([] if "cases" in about else of_a_run),
-        ("written by", f"fecm {attributes.get('fecm_version', 'of no version')}, "
-                       f"format version {attributes.get('format_version')}"),
+def _page(about: Mapping[str, Any]) -> list[str]:
+    """Lines of the text output."""
+    rows = [("file", f"{about['file']}, {about['size']} bytes")]
+    if "cases" not in about:
+        slips = about["slips"] if isinstance(about["slips"], list) else []
+        mode = about["mode"]
+        rows += [
+            ("mode", "unknown" if mode is None else mode),
+            ("slips", ", ".join(map(str, slips)) or "none"),
+        ]
+    version = about["fecm_version"]
+    units = ", ".join(f"{name} {unit}" for name, unit in about["units"].items())
+    rows += [
+        ("written by", f"fecm {'of unknown version' if version is None else version}, "
+                       f"format version {about['format_version']}"),
         ("units", units or "the deck names none"),
         _extent(about),
-        *((name, shown(value)) for name, value in attributes.items() if name not in TOLD),
+        *((name, shown(value)) for name, value in about["attributes"].items()),
     ]  # fmt: skip
-    lines = [printable(str(attributes.get("title", "") or "(no title)"))]
+    lines = [printable(str(about["title"] or "(no title)"))]
     lines += [f"  {printable(name):17} {printable(str(value))}" for name, value in rows]
     lines += ["", "summary", *(f"  {printable(line)}" for line in about["summary"])]
-    for group in told.groups:
+    for group in about["groups"]:
         lines += ["", *_group(group)]
-    if told.texts:
+    if about["texts"]:
         lines += ["", "texts"]
-        lines += [f"  {printable(name):17} {count} lines" for name, count in told.texts.items()]
+        lines += [
+            f"  {printable(name):17} {text['lines']} lines" for name, text in about["texts"].items()
+        ]
     return lines
 
 
-def _group(group: GroupInformation) -> list[str]:
-    """A group and a line for each of its datasets."""
-    head = printable(group.name) or "/"
-    if group.description:
-        head += f": {printable(group.description)}"
-    if group.rows is not None:
-        head += f"; {group.rows} row{'s' * (group.rows != 1)}"
-    attributes = [f"{printable(name)} = {shown(v)}" for name, v in group.attributes.items()]
+def _group(group: Mapping[str, Any]) -> list[str]:
+    """A group, with one line for each of its datasets."""
+    head = printable(group["name"]) or "/"
+    if group["description"]:
+        head += f": {printable(group['description'])}"
+    if group["rows"] is not None:
+        head += f"; {group['rows']} row{'s' * (group['rows'] != 1)}"
+    attributes = [f"{printable(name)} = {shown(v)}" for name, v in group["attributes"].items()]
     lines = [head, *(f"  {text}" for text in attributes)]
-    cells = [_cells(dataset) for dataset in group.datasets]
+    cells = [_cells(dataset) for dataset in group["datasets"]]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     for row in cells:
         text = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
@@ -125,58 +136,17 @@ def _group(group: GroupInformation) -> list[str]:
     return lines
 
 
-def _cells(dataset: DatasetInformation) -> tuple[str, ...]:
+def _cells(dataset: Mapping[str, Any]) -> tuple[str, ...]:
     """Name, shape, type, dimension and unit, range."""
-    name = dataset.path.rpartition("/")[2]
-    dimension = dataset.dimension + (f" ({dataset.unit})" if dataset.unit else "")
-    if dataset.different is not None:
-        span = f"{dataset.different} different"
-    elif dataset.minimum is None:
+    name = dataset["name"].rpartition("/")[2]
+    dimension = dataset["dimension"] + (f" ({dataset['unit']})" if dataset["unit"] else "")
+    if dataset["different"] is not None:
+        span = f"{dataset['different']} different"
+    elif dataset["min"] is None:
         span = "no finite number"
     else:
-        span = f"{dataset.minimum:.6g} to {dataset.maximum:.6g}"
-    if dataset.not_finite:
-        span += f", {dataset.not_finite} not finite"
-    shape = "x".join(map(str, dataset.shape)) or "single"
-    return printable(name), shape, dataset.dtype, printable(dimension), span
-
-
-def _json(told: Information, about: Mapping[str, Any]) -> dict[str, Any]:
-    """Everything for programs."""
-    attributes = told.attributes
-    return {
-        "file": printable(str(told.path)),
-        "size": told.size,
-        **{name: attributes.get(name) for name in (IN_FRONT if "cases" in about else TOLD[:6])},
-        "units": told.units,
-        **{name: value for name, value in about.items() if name != "summary"},
-        "attributes": {n: v for n, v in attributes.items() if n not in TOLD},
-        "summary": about["summary"],
-        "groups": [
-            {
-                "name": group.name,
-                "description": group.description,
-                "rows": group.rows,
-                "attributes": group.attributes,
-                "datasets": [_entry(dataset) for dataset in group.datasets],
-            }
-            for group in told.groups
-        ],
-        "texts": {name: {"lines": count} for name, count in told.texts.items()},
-    }
-
-
-def _entry(dataset: DatasetInformation) -> dict[str, Any]:
-    """One dataset for programs."""
-    return {
-        "name": dataset.path,
-        "shape": dataset.shape,
-        "dtype": dataset.dtype,
-        "description": dataset.description,
-        "dimension": dataset.dimension,
-        "unit": dataset.unit,
-        "min": dataset.minimum,
-        "max": dataset.maximum,
-        "not_finite": dataset.not_finite,
-        "different": dataset.different,
-    }
+        span = f"{dataset['min']:.6g} to {dataset['max']:.6g}"
+    if dataset["not_finite"]:
+        span += f", {dataset['not_finite']} not finite"
+    shape = "x".join(map(str, dataset["shape"])) or "single"
+    return printable(name), shape, dataset["dtype"], printable(dimension), span

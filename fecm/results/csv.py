@@ -1,8 +1,7 @@
 """CSV: datasets of a result as tables in long form, for spreadsheets and data frames.
 
-The columns that number a row come first (step and time, then node, element or point, from 1), the
-values after them.  Numbers are written as Python's repr, from which they can be read back to the
-last bit.
+Key columns come first (step and time, then node, element or point, from 1), then values.  Numbers
+are written by Python's repr and can be read back exactly.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ from fecm.results.schema import DATASETS, SCALES, STORED_BY, ExportError
 
 Array = NDArray[Any]
 
-# What numbers a row: its instant, and of modes their own number.
+# Key columns of rows: the instant, or the number of a mode.
 CLOCK = ("step", "time", "number")
-# An axis whose places have names becomes columns.
+# Axes with named positions become columns.
 NAMED: dict[str | int, tuple[str, ...]] = {
     "ndf": DOF_NAMES,
     "ndm": AXES,
@@ -32,7 +31,7 @@ NAMED: dict[str | int, tuple[str, ...]] = {
     3: ("xx", "yy", "xy"),
     2: ("xz", "yz"),
 }
-# Lines that are made at a time.
+# Lines per block.
 BLOCK = 100_000
 
 
@@ -52,25 +51,25 @@ class Table:
     rows: Iterator[tuple[float, ...]]
 
     def lines(self) -> Iterator[str]:
-        """All lines with their ends, the header's first."""
+        """All lines with line ends, beginning with the header."""
         yield ",".join(self.header) + "\n"
         for row in self.rows:
             yield ",".join(map(repr, row)) + "\n"
 
 
 def table(result: Result, name: str = "history") -> Table:
-    """Table of one dataset, or of the datasets of a group side by side.
+    """Table of one dataset, or of all datasets of a group.
 
     Parameters
     ----------
     result : Result
     name : str
-        A dataset as ``tape3/w``, or a group as ``history``.
+        A dataset such as ``tape3/w``, or a group such as ``history``.
 
     Raises
     ------
     ExportError
-        If the result has no such dataset or group, or the group's datasets have not the same axes.
+        If there is no such dataset or group, or the group's datasets differ in shape.
     """
     members = _members(result, name.strip("/"))
     beside = [_beside(members[0], column) for column in CLOCK]
@@ -79,13 +78,15 @@ def table(result: Result, name: str = "history") -> Table:
     if clock and values and not any(map(_in_rows, values)):
         clock = []
     elif clock:
-        values = list(filter(_in_rows, values))  # the others are the same at every row
+        values = list(filter(_in_rows, values))  # the others do not change
     if name.strip("/") == "tape3":
         values = ["tape3/displacement"]  # w is one of its columns
-    if not values:  # step or time by itself
+    if not values:  # only step or time
         return Table(_names(clock), zip(*(result[path].tolist() for path in clock), strict=True))
     if len({result[path].shape for path in values}) > 1:
-        raise ExportError(f"the datasets of {name} are no one table; name {_either(values)}")
+        raise ExportError(
+            f"the datasets of {name} do not fit into one table; choose {_either(values)}"
+        )
     sizes = _sizes(values[0], result[values[0]].shape)[bool(clock) :]
     columns = _names(values)
     if len(values) == 1 and sizes and len(names := NAMED.get(sizes[-1][0], ())) >= sizes[-1][1]:
@@ -122,18 +123,18 @@ def _members(result: Result, name: str) -> list[str]:
 
 
 def _either(names: Sequence[str], word: str = "or") -> str:
-    """A list in words."""
+    """Join names in words."""
     *others, last = names
     return f"{', '.join(others)} {word} {last}" if others else last
 
 
 def _names(paths: Sequence[str]) -> tuple[str, ...]:
-    """Names of datasets in their groups."""
+    """Names of datasets within their groups."""
     return tuple(path.rpartition("/")[2] for path in paths)
 
 
 def _in_rows(path: str) -> bool:
-    """Whether a dataset of a group with a clock has an instant a row."""
+    """Whether the rows of a dataset in a group with step and time are instants."""
     return path not in DATASETS or DATASETS[path].shape[0] == "rows"
 
 
@@ -143,7 +144,7 @@ def _beside(path: str, name: str) -> str:
 
 
 def _labels(result: Result, size: str | int, length: int) -> Sequence[int]:
-    """Numbers along an axis: those of the gages' cards, from 1 elsewhere."""
+    """Numbers along an axis: those of the gage cards for gages, else from 1."""
     if size == "gages" and "gages/number" in result:
         return [int(number) for number in result["gages/number"]]
     return range(1, length + 1)
@@ -158,7 +159,7 @@ def _sizes(path: str, shape: tuple[int, ...]) -> list[tuple[str | int, int]]:
 def _rows(
     arrays: Sequence[Array], clock: Sequence[Array], keys: Sequence[Sequence[int]]
 ) -> Iterator[tuple[float, ...]]:
-    """Rows of arrays that have the axes (instants, keys, columns); the first only with a clock."""
+    """Rows of arrays with the axes (instants, keys, columns); instants only with a clock."""
     if not clock:
         arrays = [array[None] for array in arrays]
     numbers = list(itertools.product(*keys))

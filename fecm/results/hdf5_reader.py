@@ -1,8 +1,8 @@
-"""Reads result files, of runs and of sweeps: HDF5 that may come from anywhere.
+"""Reads result files of runs and sweeps: untrusted HDF5.
 
-A file is looked through once (:func:`read`); its numbers are read when they are asked for.
-Whatever makes HDF5 read another file is refused before any dataset is read: links, virtual
-datasets, external storage.  Any error of the library on a damaged file becomes one
+:func:`read` lists the contents of a file; numbers are read on demand.  Links, virtual datasets and
+external storage, through which HDF5 would read other files, are refused before any dataset is read.
+Any error of the library on a damaged file becomes a
 :class:`~fecm.results.schema.ResultFileError`.
 """
 
@@ -24,15 +24,15 @@ from fecm.results.schema import FORMAT, FORMAT_VERSION, SWEEP, NotStoredError, R
 Array = NDArray[Any]
 ELEMENTS, COORDINATES = "mesh/elements", "mesh/coordinates"
 
-# What a file of each form is the result of.
+# Source of each form of file.
 RESULT_OF = {FORMAT: "a run", SWEEP: "a sweep"}
 
-# No filter of HDF5 packs numbers more tightly than this; deflate reaches 1032.
+# Upper bound of the compression of HDF5's filters; deflate reaches 1032.
 PACKED = 2000
 
 
 class FileArrays(Mapping[str, Array]):
-    """The datasets of a result file, each read when it is asked for.
+    """Datasets of a result file, read on demand; rows are read without keeping them.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class FileArrays(Mapping[str, Array]):
     shapes : dict
         Shape of every dataset of numbers.
     dtypes : dict
-        Its type, in this machine's byte order.
+        Types, in native byte order.
     """
 
     def __init__(self, path: Path) -> None:
@@ -61,8 +61,27 @@ class FileArrays(Mapping[str, Array]):
             self._read[key] = values
         return self._read[key]
 
+    def rows(self, path: str, start: int, stop: int) -> Array:
+        """Read rows `start` to `stop` of a dataset; a single number is one row.
+
+        Raises
+        ------
+        ResultFileError
+            If the file can't be read there.
+        """
+        with _troubles(self.path), h5py.File(self.path) as file:
+            dataset = file[path]
+            if not dataset.shape:
+                return np.asarray(dataset[()]).reshape(1)[start:stop]
+            return np.asarray(dataset[start:stop])
+
+    def attributes(self, path: str) -> dict[str, Any]:
+        """Read the attributes of a dataset or group."""
+        with _troubles(self.path), h5py.File(self.path) as file:
+            return _attributes(file[path])
+
     def _check_nodes(self, elements: Array) -> None:
-        """Refuse elements with nodes that the mesh has not; whoever draws them takes their word."""
+        """Refuse elements whose nodes are not in the mesh; plotting indexes them unchecked."""
         count = self.shapes.get(COORDINATES, (0,))[0]
         if elements.size and not 0 <= elements.min() <= elements.max() <= count:
             raise ResultFileError(f"{self.path}: {ELEMENTS} names nodes outside 1 to {count}")
@@ -77,59 +96,21 @@ class FileArrays(Mapping[str, Array]):
         return len(self.shapes)
 
 
-class OpenArrays:
-    """The datasets of a result file that stays open: rows are read as they are asked for.
-
-    Used in a ``with`` statement; memory holds no more than the rows of one call.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def __enter__(self) -> OpenArrays:
-        with _troubles(self.path):
-            self._file = h5py.File(self.path)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        with contextlib.suppress(Exception):  # nothing was written that closing could lose
-            self._file.close()
-
-    def rows(self, path: str, start: int, stop: int) -> Array:
-        """Rows `start` to `stop` of a dataset; a single number is one row.
-
-        Raises
-        ------
-        ResultFileError
-            If the file can't be read there.
-        """
-        with _troubles(self.path):
-            dataset = self._file[path]
-            if not dataset.shape:
-                return np.asarray(dataset[()]).reshape(1)[start:stop]
-            return np.asarray(dataset[start:stop])
-
-    def attributes(self, path: str) -> dict[str, Any]:
-        """Attributes of a dataset or group."""
-        with _troubles(self.path):
-            return _attributes(self._file[path])
-
-
 @contextlib.contextmanager
 def _troubles(path: Path) -> Iterator[None]:
-    """Turn whatever a damaged file raises into one :class:`ResultFileError`."""
+    """Turn any error on a damaged file into a :class:`ResultFileError`."""
     try:
         yield
     except (ResultFileError, MemoryError):
         raise
-    except Exception as error:  # a damaged file may raise anything inside of HDF5
-        told = " ".join(str(error).split())
-        raise ResultFileError(f"{path}: this is no readable HDF5 file ({told})") from None
+    except Exception as error:  # HDF5 may raise anything on a damaged file
+        message = " ".join(str(error).split())
+        raise ResultFileError(f"{path}: not a readable HDF5 file ({message})") from None
 
 
 @dataclass
 class Contents:
-    """What stands in a result file.
+    """Contents of a result file.
 
     Attributes
     ----------
@@ -140,11 +121,11 @@ class Contents:
     texts : dict of str
         Single texts, by path.
     lists : dict of list of str
-        Datasets of texts, by path; only results of sweeps have them.
+        Datasets of texts, by path; sweeps only.
     attributes : dict
-        Those of the file itself; of a type that Python has no plain value for, the type's name.
+        Those of the file; a value of an unknown type is replaced by the type's name.
     groups : dict of dict
-        Those of its groups, by path.
+        Those of the groups, by path.
     """
 
     path: Path
@@ -161,26 +142,26 @@ class Contents:
 
 
 def read(path: Path, *forms: str) -> Contents:
-    """Look through a result file.
+    """List the contents of a result file.
 
     Parameters
     ----------
     path : Path
     *forms : str
-        Formats that will do; that of a run if there are none.
+        Accepted formats; by default that of a run.
 
     Raises
     ------
     ResultFileError
-        If the file is no HDF5 file, or no result of these forms.
+        If it is not an HDF5 file, or not a result of these forms.
     OSError
         If it can't be opened.
     """
     path = Path(path)
     if path.exists() and not (path.is_file() or path.is_dir()):
-        raise ResultFileError(f"{path}: this is no file but a device or a pipe")
+        raise ResultFileError(f"{path}: not a regular file")
     with path.open("rb"):
-        pass  # a missing or forbidden file says so itself
+        pass  # raises the error of a missing or forbidden file
     with _troubles(path), h5py.File(path) as file:
         attributes = _attributes(file)
         _check_form(path, attributes, forms or (FORMAT,))
@@ -191,7 +172,7 @@ def read(path: Path, *forms: str) -> Contents:
 
 
 def _check_form(path: Path, attributes: Mapping[str, Any], forms: tuple[str, ...]) -> None:
-    """Refuse a file that is none of these forms, or of another version."""
+    """Refuse a file of another form or version."""
     form, version = attributes.get("format"), attributes.get("format_version")
     if form not in forms:
         wanted = " or ".join(RESULT_OF[one] for one in forms)
@@ -200,12 +181,10 @@ def _check_form(path: Path, attributes: Mapping[str, Any], forms: tuple[str, ...
             what = f"the result of {RESULT_OF[form]}, not of {wanted}"
         raise ResultFileError(f"{path}: this HDF5 file is {what}")
     if version != FORMAT_VERSION:
-        raise ResultFileError(
-            f"{path}: format version {version} is not {FORMAT_VERSION}, which this program reads"
-        )
+        raise ResultFileError(f"{path}: format version {version} is not {FORMAT_VERSION}")
 
 
-# What a link is that is no hard link, by HDF5's number of its kind.
+# Kinds of links that are refused, by HDF5's number.
 LINKS = {
     h5py.h5l.TYPE_SOFT: "a soft link to another object",
     h5py.h5l.TYPE_EXTERNAL: "an external link to another file",
@@ -213,7 +192,7 @@ LINKS = {
 
 
 def _check_links(path: Path, file: h5py.File) -> None:
-    """Refuse links that lead elsewhere; none is followed."""
+    """Refuse all but hard links."""
 
     def found(name: str | bytes, info: Any) -> tuple[str, int] | None:
         return None if info.type == h5py.h5l.TYPE_HARD else (_text(name), info.type)
@@ -224,12 +203,12 @@ def _check_links(path: Path, file: h5py.File) -> None:
 
 
 def _check_storage(path: Path, name: str, item: h5py.Dataset) -> None:
-    """Refuse a dataset whose numbers are not in this file, before its shape is asked for."""
+    """Refuse a dataset whose numbers are in other files; its shape is not read."""
     created = item.id.get_create_plist()
     if created.get_layout() == h5py.h5d.VIRTUAL:
         raise ResultFileError(
-            f"{path}: {name} is a virtual dataset, whose numbers are read from other datasets or "
-            "files; they are not read"
+            f"{path}: {name} is a virtual dataset, whose numbers are in other datasets or files; "
+            "they are not read"
         )
     if created.get_external_count():
         raise ResultFileError(
@@ -239,7 +218,7 @@ def _check_storage(path: Path, name: str, item: h5py.Dataset) -> None:
 
 
 class _Visitor:
-    """Notes what stands in a file."""
+    """Collects the contents of a file."""
 
     def __init__(self, contents: Contents) -> None:
         self._contents = contents
@@ -248,14 +227,14 @@ class _Visitor:
     def __call__(self, name: str, item: h5py.HLObject) -> None:
         if isinstance(item, h5py.Group):
             self._contents.groups[name] = _attributes(item)
-        elif isinstance(item, h5py.Dataset):  # a named type is nothing to read
+        elif isinstance(item, h5py.Dataset):  # a named type is skipped
             self._dataset(name, item)
 
     def _dataset(self, name: str, item: h5py.Dataset) -> None:
         contents, path = self._contents, self._contents.path
         _check_storage(path, name, item)
         if "/" not in name and item.is_scale:
-            return  # it numbers an axis
+            return  # a scale numbers an axis
         if h5py.check_string_dtype(item.dtype) and item.shape == ():
             contents.texts[name] = str(_plain(item[()]))
         elif contents.form == SWEEP and h5py.check_string_dtype(item.dtype) and item.ndim == 1:
@@ -263,7 +242,7 @@ class _Visitor:
         elif item.dtype.kind in "biuf" and item.shape is not None and not item.dtype.shape:
             shape = tuple(map(int, item.shape))
             room = self._size * (PACKED if item.chunks else 1)
-            # A damaged shape would have a reader go through more rows than any disk holds.
+            # A damaged shape could have more rows than any disk holds.
             if math.prod(shape) * item.dtype.itemsize > room:
                 raise ResultFileError(
                     f"{path}: {name} has the shape {shape}, which is more than the file holds"
@@ -273,7 +252,7 @@ class _Visitor:
         elif h5py.check_ref_dtype(item.dtype) is not None:
             raise ResultFileError(f"{path}: {name} holds references; they are not followed")
         else:
-            raise ResultFileError(f"{path}: {name} holds neither numbers nor one text")
+            raise ResultFileError(f"{path}: {name} holds neither numbers nor a text")
 
 
 def _attributes(item: h5py.HLObject) -> dict[str, Any]:
@@ -282,13 +261,13 @@ def _attributes(item: h5py.HLObject) -> dict[str, Any]:
     for name in item.attrs:
         try:
             values[_text(name)] = _plain(item.attrs[name])
-        except (TypeError, OSError, ValueError):  # a type that NumPy has no counterpart of
+        except (TypeError, OSError, ValueError):  # a type without NumPy counterpart
             values[_text(name)] = "<unreadable>"
     return values
 
 
 def _plain(value: Any) -> Any:
-    """Numbers, texts and lists of them; anything else by the name of its type."""
+    """Convert to numbers, texts and lists of them; anything else to the name of its type."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, list | tuple):
@@ -299,6 +278,6 @@ def _plain(value: Any) -> Any:
 
 
 def _text(value: str | bytes) -> str:
-    """A text whose undecodable bytes are replaced, so that it can be printed."""
+    """Text with undecodable bytes replaced, so that it can be printed."""
     raw = value.encode("utf-8", "surrogateescape") if isinstance(value, str) else value
     return raw.decode("utf-8", "replace")

@@ -1,4 +1,4 @@
-"""Writes result files: HDF5, beside their final name and renamed when complete."""
+"""Writes result files: HDF5, renamed to their final name when complete."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class FileSink:
                 target.attrs[name] = value
 
     def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
-        """Make a contiguous dataset of its full shape."""
+        """Create a contiguous dataset of its full shape."""
         made = self._group(dataset.group).create_dataset(dataset.name, shape, dataset.dtype)
         made.attrs["description"] = dataset.description
         made.attrs["long_name"] = dataset.description
@@ -70,11 +70,11 @@ class FileSink:
         self._made.append(dataset)
 
     def label_axes(self) -> None:
-        """Attach scales to every axis of what is stored in rows, by which xarray knows them.
+        """Attach dimension scales to every axis of datasets stored in rows, for xarray.
 
-        HDF5's Dimension Scales Specification.  Rows have their group's times; nodes, elements,
-        points and unknowns have the file's own scales, as a netCDF reader finds dimensions in a
-        group and in those above it, and takes a dataset with all of its axes labelled or none.
+        HDF5 Dimension Scales Specification.  The scale of rows is the group's time; those of nodes,
+        elements, points and dofs belong to the file, because a netCDF reader looks for dimensions
+        in a group and its parents.  It needs all axes of a dataset labelled, or none.
         """
         made_of = [(d, self._datasets[d.path]) for d in self._made if d.path in self._datasets]
         clocks = {d.group: made for d, made in made_of if d.name == TIME}
@@ -90,7 +90,7 @@ class FileSink:
                 made.dims[axis].attach_scale(scale)
 
     def _scale(self, size: str, length: int) -> h5py.Dataset:
-        """The scale of an axis, made when it is first asked for."""
+        """Scale of an axis, created on first use."""
         name, description = SCALES.get(size, (size, ""))
         if name not in self._file:
             if size == "ndf":
@@ -110,7 +110,7 @@ class FileSink:
             If this or an earlier write failed.
         """
         self.check()
-        # By h5py's low-level interface: its slices take four times as long for a short block.
+        # Low-level interface: slices of h5py take four times as long for a short block.
         dataset = self._datasets[path]
         values = np.ascontiguousarray(rows, dataset.dtype)
         place = dataset.id.get_space()
@@ -128,11 +128,11 @@ class FileSink:
             raise self._guarded.error
 
     def stored(self, path: str, start: int, stop: int) -> Array:
-        """Rows of a dataset as they stand in the file."""
+        """Rows of a dataset, read from the file."""
         return np.asarray(self._datasets[path][start:stop])
 
     def trim(self, path: str, rows: int) -> None:
-        """Cut a dataset down to its first rows; without any it goes, and an empty group with it."""
+        """Truncate a dataset to its first rows; delete it, or an empty group, without any."""
         old = self._datasets.pop(path)
         group, name = old.parent, path.rpartition("/")[2]
         attributes = dict(old.attrs)
@@ -151,25 +151,25 @@ class FileSink:
         made.attrs["description"] = description
 
     def texts(self, path: str, values: Sequence[str], description: str) -> None:
-        """Store texts, one a row."""
+        """Store texts, one per row."""
         made = self._file.create_dataset(path, data=list(values), dtype=h5py.string_dtype())
         made.attrs["description"] = description
 
 
 @contextlib.contextmanager
 def writing(path: Path, *, overwrite: bool = True) -> Iterator[FileSink]:
-    """Open a result for writing; it gets its final name only when all went well.
+    """Open a result for writing; it gets its final name only on success.
 
     Parameters
     ----------
     path : Path
     overwrite : bool
-        Replace a file that exists.
+        Replace an existing file.
 
     Raises
     ------
     ResultWriteError
-        If the file can't be written; what was under the final name is then untouched.
+        If the file can't be written; an existing file is then untouched.
     """
     with new_hdf5(path, overwrite=overwrite) as (file, guarded):
         sink = FileSink(file, guarded)
@@ -201,11 +201,10 @@ def _unwritten(path: Path, error: OSError) -> ResultWriteError:
 
 
 class _Guarded:
-    """A file that remembers the first error of writing instead of raising it.
+    """A file that stores the first write error instead of raising it.
 
-    HDF5 can neither go on nor let go of a file once a write has failed in it: it complains at every
-    turn, and falls over at the end of the program.  So it is left in the belief that all is well,
-    until the sink asks.
+    After a failed write HDF5 can neither continue nor close the file, and crashes at exit.  It
+    therefore sees no error; the sink checks for one.
     """
 
     def __init__(self, raw: io.FileIO) -> None:

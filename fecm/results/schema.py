@@ -1,7 +1,7 @@
-"""What a result file holds: every dataset, its shape, its dimension and what it is.
+"""Schema of a result file: path, shape, dimension and description of every dataset.
 
-Shapes are given in the sizes of a run: ``rows`` of the group, ``numnp``, ``ndm``, ``ndf``,
-``numel``, ``nen``, ``npt`` and ``nps`` (points an element of tape8 and of the stresses), ``gages``.
+Shapes use the sizes of a run: ``rows`` of the group, ``numnp``, ``ndm``, ``ndf``,
+``numel``, ``nen``, ``npt`` and ``nps`` (points per element in tape8 and stresses), ``gages``.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from fecm._errors import FecmError
 
 
 class ExportError(FecmError, ValueError):
-    """A result lacks what an export needs, or the call asks for what there is not."""
+    """A result lacks what an export needs, or the request is invalid."""
 
 
 def printable(text: str) -> str:
-    """One line that any terminal takes: control characters and lone surrogates are escaped."""
+    """Escape control characters and lone surrogates, giving one line for any terminal."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def shown(value: Any, width: int = 60, *, exact: bool = False) -> str:
-    """A value in one short line; numbers to six digits, or to all that they have."""
+    """Format a value in one short line; numbers to six digits, or exactly."""
     if isinstance(value, list | tuple):
         text = "[" + ", ".join(shown(item, width, exact=exact) for item in value) + "]"
     elif isinstance(value, float):
@@ -35,8 +35,8 @@ def shown(value: Any, width: int = 60, *, exact: bool = False) -> str:
     return text if len(text) <= width else text[: width - 1] + "…"
 
 
-def told_apart(one: Any, other: Any, width: int = 60) -> tuple[str, str]:
-    """Two values that differ, each in a short line that shows where."""
+def shown_apart(one: Any, other: Any, width: int = 60) -> tuple[str, str]:
+    """Format two different values in short lines that show where they differ."""
     short = shown(one, width), shown(other, width)
     if short[0] != short[1]:
         return short
@@ -49,7 +49,7 @@ def told_apart(one: Any, other: Any, width: int = 60) -> tuple[str, str]:
 
 
 def jsonable(value: Any) -> Any:
-    """A value that :func:`json.dumps` writes as valid JSON."""
+    """Convert to a value that :func:`json.dumps` writes as valid JSON."""
     if value is None or isinstance(value, bool | int):
         return value
     if isinstance(value, float):
@@ -72,11 +72,11 @@ FORMAT_VERSION = 1
 
 
 class ResultFileError(FecmError, ValueError):
-    """A file is not a result that this program can read."""
+    """A file is not a readable result."""
 
 
 class NotStoredError(AttributeError, KeyError, ResultFileError):
-    """A result lacks a dataset that was asked for, as ``result["mesh/elements"]`` or otherwise."""
+    """A result lacks a requested dataset."""
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -97,11 +97,10 @@ class Dataset:
     shape : tuple
         Sizes by name, or numbers.
     description : str
-        What it is.
     dimension : str
-        Its physical dimension; empty where it has none.
+        Physical dimension; may be empty.
     dtype : str
-        NumPy's name of its type.
+        NumPy's name of the type.
     """
 
     path: str
@@ -240,7 +239,7 @@ DATASETS = {
     )
 }  # fmt: skip
 
-# Scales of the axes of what is stored in rows: name and description by size.
+# Dimension scales of datasets stored in rows: name and description by size.
 SCALES = {
     "numnp": ("node", "number of the node"),
     "numel": ("element", "number of the element"),
@@ -252,25 +251,23 @@ SCALES = {
 
 
 def shape_error(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str]) -> str:
-    """Say which dataset has not the shape or type that a result's has; empty where all have.
+    """Message about the first dataset with a wrong shape or type; empty if there is none.
 
     Parameters
     ----------
     shapes : mapping
         Shape of every dataset, by path.
     kinds : mapping
-        NumPy's letter for the kind of its numbers: ``"f"``, ``"i"``, ``"u"`` or ``"b"``.
+        NumPy's letter for the kind of number: ``"f"``, ``"i"``, ``"u"`` or ``"b"``.
     """
     sizes: dict[str, tuple[int, str]] = {}
     for path, shape in shapes.items():
         if (dataset := DATASETS.get(path)) is None:
             continue
         if kinds[path] not in ("f" if dataset.dtype.startswith("f") else "iu"):
-            return f"{path} holds numbers of another type than {dataset.dtype}"
+            return f"{path} has the wrong type: expected {dataset.dtype}"
         if len(shape) != len(dataset.shape):
-            return (
-                f"{path} has the shape {shape}, which is not ({', '.join(map(str, dataset.shape))})"
-            )
+            return f"{path} has the shape {shape}, not ({', '.join(map(str, dataset.shape))})"
         for name, size in zip(dataset.shape, shape, strict=True):
             if isinstance(name, int):
                 expected, source = name, "every result"
@@ -283,7 +280,7 @@ def shape_error(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str])
 
 
 def declared_units(attributes: Mapping[str, Any]) -> dict[str, str]:
-    """Names of a result's units of length, force and time; empty where the deck gave none."""
+    """Names of the units of length, force and time; empty if the deck names none."""
     names = {n: str(attributes.get(f"unit_{n}", "")) for n in ("length", "force", "time")}
     return names if all(names.values()) else {}
 
@@ -302,7 +299,7 @@ GROUP_DESCRIPTIONS = {
     "modes": "natural modes, found by EIGE",
 }
 
-# The macro that makes a group.
+# Macro that stores each group.
 STORED_BY = {
     "tape3": "DISP", "tape8": "RODP", "tape9": "RODP", "history": "RODP", "energy": "RODP",
     "gages": "RODP or EXCD",

@@ -1,7 +1,7 @@
-"""Sinks: where a run's rows go, behind one small interface.
+"""Sinks: destinations of a run's rows.
 
-A sink is given every dataset once with its full shape, then its rows in order.  The memory sink
-keeps arrays, the file sink (:mod:`fecm.results.hdf5_writer`) writes them as they come.
+Every dataset is created once with its full shape; then its rows are written in order.  The memory
+sink keeps arrays, the file sink (:mod:`fecm.results.hdf5_writer`) writes them at once.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ class Sink(Protocol):
         ...
 
     def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
-        """Make room for a dataset."""
+        """Create a dataset."""
         ...
 
     def write(self, path: str, start: int, rows: Array) -> None:
-        """Store rows of a dataset from row `start` on."""
+        """Store rows of a dataset, beginning at row `start`."""
         ...
 
     def trim(self, path: str, rows: int) -> None:
-        """Cut a dataset down to its first rows; without any it goes."""
+        """Truncate a dataset to its first rows; delete it if there are none."""
         ...
 
     def text(self, path: str, value: str, description: str) -> None:
@@ -55,7 +55,7 @@ class MemorySink:
         self.groups.setdefault(group, {}).update(values)
 
     def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
-        """Make room for a dataset."""
+        """Create a dataset."""
         self.arrays[dataset.path] = np.zeros(shape, dtype=dataset.dtype)
 
     def write(self, path: str, start: int, rows: Array) -> None:
@@ -63,7 +63,7 @@ class MemorySink:
         self.arrays[path][start : start + len(rows)] = rows
 
     def trim(self, path: str, rows: int) -> None:
-        """Cut a dataset down to its first rows."""
+        """Truncate a dataset to its first rows."""
         kept = self.arrays.pop(path)[:rows].copy()
         if rows:
             self.arrays[path] = kept
@@ -74,7 +74,7 @@ class MemorySink:
 
 
 class RowBuffer:
-    """Gathers the rows of one group and hands them to a sink in blocks.
+    """Collects the rows of one group and writes them to a sink in blocks.
 
     Parameters
     ----------
@@ -88,10 +88,10 @@ class RowBuffer:
     Attributes
     ----------
     stored : int
-        Rows handed over.
+        Rows written.
     """
 
-    # Bytes that a block may hold: enough for few writes, little enough to stay unnoticed.
+    # Most bytes of a block.
     BYTES = 1_000_000
 
     def __init__(
@@ -110,21 +110,21 @@ class RowBuffer:
         self.stored = 0
 
     def state(self) -> dict[str, Any]:
-        """What is held back, and how much was handed over."""
+        """Rows not yet written, and the number of written ones."""
         held = {name: block[: self._filled].copy() for name, block in self._blocks.items()}
         return {"stored": self.stored, **held}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Hold back again what :meth:`state` gave."""
+        """Restore a :meth:`state`."""
         self.stored = state["stored"]
         for name, block in self._blocks.items():
             self._filled = len(state[name])
             block[: self._filled] = state[name]
 
     def put(self, columns: Mapping[str, Any]) -> None:
-        """Add one row; `columns` has a value or an array for every dataset."""
+        """Add one row: a value or an array for every dataset."""
         if self._room == 1:
-            self._hand_over({name: np.asarray(columns[name])[None] for name in self._paths}, 1)
+            self._write({name: np.asarray(columns[name])[None] for name in self._paths}, 1)
             return
         for name, block in self._blocks.items():
             block[self._filled] = columns[name]
@@ -133,13 +133,13 @@ class RowBuffer:
             self.flush()
 
     def flush(self) -> None:
-        """Hand over what was gathered."""
+        """Write the collected rows."""
         if self._filled:
             blocks = {name: block[: self._filled] for name, block in self._blocks.items()}
-            self._hand_over(blocks, self._filled)
+            self._write(blocks, self._filled)
         self._filled = 0
 
-    def _hand_over(self, blocks: Mapping[str, Array], rows: int) -> None:
+    def _write(self, blocks: Mapping[str, Array], rows: int) -> None:
         for name, path in self._paths.items():
             self._sink.write(path, self.stored, blocks[name])
         self.stored += rows

@@ -1,4 +1,4 @@
-"""The few lines that a person wants at the end of a run."""
+"""Summary of a run in a few lines."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from fecm.results.result import Result, contact_intervals
 
-# Contacts that are listed one by one.
+# Most contacts and frequencies listed individually.
 LISTED = 6
 
 OPEN_END = (
@@ -16,7 +16,7 @@ OPEN_END = (
 
 
 def summary(result: Result) -> list[str]:
-    """Summarise a result: what it found, in the deck's own units."""
+    """Summarise a result, in the deck's units."""
     lines: list[str] = []
     if "history/force" in result:
         lines += _impact(result)
@@ -36,7 +36,7 @@ def summary(result: Result) -> list[str]:
 
 
 def _deflection(result: Result) -> list[str]:
-    """Largest deflection of a run without impact."""
+    """Line about the largest deflection of a run without impact."""
     w = result["tape3/w"]
     if not w.any():
         return ["largest w         0: nothing moved the plate"]
@@ -49,7 +49,7 @@ def _quantity(result: Result, value: float, dimension: str) -> str:
 
 
 def _impact(result: Result) -> list[str]:
-    """Forces, contacts, indentation and energy of an impact."""
+    """Lines about forces, contacts, indentation and energy of an impact."""
 
     def quantity(value: float, dimension: str) -> str:
         return _quantity(result, value, dimension)

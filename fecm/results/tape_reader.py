@@ -1,13 +1,12 @@
-"""Reads the tapes' text, the original program's own too.
+"""Reads tapes, including those of the original program.
 
-Numbers stand in columns of twelve characters, as Fortran's E12.4 writes them.  Lines are of two
-kinds: strains, (2I6,5E12.4) with element and point in front, and plain lines of up to six numbers,
-(6E12.4).  In the report's order tape8 holds strains with gamma_yz before gamma_xz and tape9
-contact; the listing writes contact on tape8 and strains on tape9, gamma_xz first.  Which one a file
-is, its lines tell.
+Numbers are in columns of twelve characters, as Fortran's E12.4 writes them.  A line holds strains,
+(2I6,5E12.4), beginning with element and point, or up to six numbers, (6E12.4).  In the report tape8
+holds strains with gamma_yz before gamma_xz, and tape9 contact; the listing writes contact to tape8
+and strains to tape9, gamma_xz first.  The lines show which one a file is.
 
-The text does not say how many nodes there are.  Where their number is no multiple of six the short
-lines show it; otherwise tape3 is given by its lines, and :meth:`TapeText.fitted` divides them.
+The text does not state the number of nodes.  Short lines show it unless it is a multiple of six;
+then tape3 is read as lines, and :meth:`TapeText.fitted` divides them into rows.
 """
 
 from __future__ import annotations
@@ -28,13 +27,13 @@ from fecm.results.tapes import CONTACT, CURVATURES
 Array = NDArray[Any]
 
 NAMES = ("tape3", "tape8", "tape9")
-WIDTH = 12  # characters a number
-PER_LINE = 6  # numbers of a plain line
+WIDTH = 12  # characters per number
+PER_LINE = 6  # numbers per line without labels
 SHEARS = {"tape8": ("gamma_yz", "gamma_xz"), "tape9": ("gamma_xz", "gamma_yz")}
 W = "tape3/w"
 
 _LABELS = re.compile(rb" *\d+")
-# The letters of Infinity, NaN and the exponents' E and D; all else is no tape.
+# Allowed letters are those of Infinity, NaN and the exponents' E and D.
 _FOREIGN = re.compile(rb"[^0-9+\-. EDINFTYA]", re.IGNORECASE)
 _NUMBER = re.compile(rb"([+-]?(?:\d+\.?\d*|\.\d+))(?:[ED]([+-]?\d+)|([+-]\d+))?", re.IGNORECASE)
 _SPECIAL = re.compile(rb"[+-]?(?:inf(?:inity)?|nan)", re.IGNORECASE)
@@ -42,40 +41,39 @@ _SPECIAL = re.compile(rb"[+-]?(?:inf(?:inity)?|nan)", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class TapeText:
-    """What a folder of tapes holds.
+    """Contents of a folder of tapes.
 
     Attributes
     ----------
     arrays : mapping of str to ndarray
-        By the names that a result has for them: ``tape3/w`` (rows, nodes), ``tape8/kappa_x`` and so
-        on (rows, elements, points), ``tape9/force`` and so on (rows,).
+        Datasets by their paths in a result: ``tape3/w`` (rows, nodes), ``tape8/kappa_x`` etc.
+        (rows, elements, points), ``tape9/force`` etc. (rows,).
     lines : bool
-        Whether ``tape3/w`` is given by its lines, (lines, 6), because nothing tells the number of
-        nodes.
+        Whether ``tape3/w`` has the shape (lines, 6), because the number of nodes is unknown.
     """
 
     arrays: Mapping[str, Array]
     lines: bool = False
 
     def fitted(self, nodes: int) -> TapeText:
-        """The same, the lines of ``tape3/w`` divided into rows of `nodes` where they can be."""
+        """Copy with the lines of ``tape3/w`` divided into rows of `nodes`, if possible."""
         if not self.lines or nodes < 1 or nodes % PER_LINE or self.arrays[W].size % nodes:
             return self
         return TapeText({**self.arrays, W: self.arrays[W].reshape(-1, nodes)})
 
 
 def read_tapes(folder: Path) -> TapeText:
-    """Read tape3, tape8 and tape9 of a folder, each as far as it is there.
+    """Read tape3, tape8 and tape9 of a folder; some may be missing.
 
     Parameters
     ----------
     folder : Path
-        Holds files named tape3, tape8, tape9 or tape3.txt, tape8.txt, tape9.txt.
+        Contains tape3, tape8, tape9 or tape3.txt, tape8.txt, tape9.txt.
 
     Raises
     ------
     ResultFileError
-        If there is no tape, or one can't be read as such.
+        If there is no tape, or one is invalid.
     OSError
         If a file can't be opened.
     """
@@ -88,10 +86,10 @@ def read_tapes(folder: Path) -> TapeText:
         if not found:
             continue
         if not found[0].is_file():
-            raise ResultFileError(f"{found[0]}: a tape is an ordinary file")
+            raise ResultFileError(f"{found[0]}: not a regular file")
         text = _Lines(found[0])
         if not text.lines:
-            continue  # the program opened this tape and wrote nothing
+            continue  # opened by the program, but never written
         if name == "tape3":
             arrays[W], lines = _displacements(text)
             continue
@@ -102,8 +100,7 @@ def read_tapes(folder: Path) -> TapeText:
         arrays.update(read)
     if not arrays:
         raise ResultFileError(
-            f"{folder}: this folder holds no tape; tape3, tape8 and tape9 are looked for, "
-            "with or without .txt"
+            f"{folder}: no tape3, tape8 or tape9 in this folder, with or without .txt"
         )
     return TapeText(arrays, lines)
 
@@ -114,7 +111,7 @@ class _Lines:
     def __init__(self, path: Path) -> None:
         self.path = path
         if not path.is_file():
-            raise ResultFileError(f"{path}: this is no file")
+            raise ResultFileError(f"{path}: not a regular file")
         self.lines = [line.rstrip(b" \r") for line in path.read_bytes().split(b"\n")]
         while self.lines and not self.lines[-1]:
             del self.lines[-1]
@@ -122,7 +119,7 @@ class _Lines:
         self.labelled = all(_LABELS.fullmatch(label) for label in (first[:6], first[6:12]))
 
     def refuse(self, index: int, message: str) -> ResultFileError:
-        """An error about a line."""
+        """Return an error about a line."""
         return ResultFileError(f"{self.path}:{index + 1}: {message}")
 
     def counts(self, lead: int) -> NDArray[np.int64]:
@@ -134,47 +131,47 @@ class _Lines:
             index = int(wrong.argmax())
             raise self.refuse(
                 index,
-                f"a line of {len(self.lines[index])} characters is no line of numbers in columns "
-                f"of {WIDTH}",
+                f"a line of {len(self.lines[index])} characters does not consist of columns of "
+                f"{WIDTH}",
             )
         return counts
 
     def numbers(self, lead: int) -> Floats:
-        """All numbers of all lines, one after the other."""
+        """All numbers of all lines, in order."""
         text = b"".join(line[lead:] for line in self.lines)
         fields = np.frombuffer(text, dtype=f"S{WIDTH}")
         if not _FOREIGN.search(text):
             try:
                 values = fields.astype(np.float64)
             except ValueError:
-                pass  # an exponent without its letter, or no number at all
+                pass  # an exponent without letter, or not a number
             else:
                 if not np.isinf(values).any():
                     return values
         return self._slowly(lead)
 
     def _slowly(self, lead: int) -> Floats:
-        """The same, number by number; says which one can't be read."""
+        """Read number by number; report the first that is invalid."""
         values: list[float] = []
         for index, line in enumerate(self.lines):
             for start in range(lead, len(line), WIDTH):
                 field = line[start : start + WIDTH]
                 value = fortran_number(field)
                 if value is None:
-                    told = ascii(field.decode("latin-1"))[1:-1]
-                    raise self.refuse(index, f"`{told}` is not a number")
+                    text = ascii(field.decode("latin-1"))[1:-1]
+                    raise self.refuse(index, f"`{text}` is not a number")
                 values.append(value)
         return np.array(values)
 
 
 def fortran_number(field: bytes) -> float | None:
-    """Value of a field of Fortran's format E12.4; None where it is no number or too large.
+    """Value of a field of Fortran's format E12.4; None if it is invalid or too large.
 
     Parameters
     ----------
     field : bytes
-        As in ``  0.1234E+01``, ``  0.1234+100`` (three digits in the exponent leave no room for its
-        letter), ``         NaN``, ``   -Infinity``.
+        Such as ``  0.1234E+01``, ``  0.1234+100`` (a three-digit exponent has no letter),
+        ``         NaN``, ``   -Infinity``.
     """
     text = field.strip(b" ")
     if _SPECIAL.fullmatch(text):
@@ -187,7 +184,7 @@ def fortran_number(field: bytes) -> float | None:
 
 
 def _displacements(text: _Lines) -> tuple[Array, bool]:
-    """Displacements w, (rows, nodes); or (lines, 6) and True where nodes can't be counted."""
+    """Displacements w, (rows, nodes); or (lines, 6) and True if the nodes can't be counted."""
     counts = text.counts(0)
     values = text.numbers(0)
     ends = np.flatnonzero(counts < PER_LINE)
@@ -197,7 +194,7 @@ def _displacements(text: _Lines) -> tuple[Array, bool]:
     wrong = (lengths != lengths[0]) | (counts[ends] != counts[ends[0]])
     if wrong.any():
         index = int(ends[wrong.argmax()])
-        raise text.refuse(index, "the row that ends here has not as many numbers as the first")
+        raise text.refuse(index, "the row that ends here differs in length from the first")
     if ends[-1] != len(counts) - 1:
         raise text.refuse(len(counts) - 1, "the last row is not complete")
     return values.reshape(len(ends), -1), False
@@ -208,7 +205,7 @@ def _contact(text: _Lines) -> dict[str, Array]:
     counts = text.counts(0)
     if (counts != len(CONTACT)).any():
         index = int((counts != len(CONTACT)).argmax())
-        raise text.refuse(index, f"{counts[index]} numbers stand where a line of contact has six")
+        raise text.refuse(index, f"a line of contact has six numbers, not {counts[index]}")
     table = text.numbers(0).reshape(-1, len(CONTACT))
     return {f"tape9/{name}": table[:, i].copy() for i, name in enumerate(CONTACT)}
 
@@ -219,7 +216,7 @@ def _strains(text: _Lines, shears: tuple[str, str]) -> dict[str, Array]:
     counts = text.counts(2 * PER_LINE)
     if (counts != len(names)).any():
         index = int((counts != len(names)).argmax())
-        raise text.refuse(index, f"{counts[index]} numbers stand where a line of strains has five")
+        raise text.refuse(index, f"a line of strains has five numbers, not {counts[index]}")
     labels = _labels(text)
     numel, npt = (max(1, int(size)) for size in labels.max(axis=0))
     order = np.arange(len(labels)) % (numel * npt)
@@ -228,7 +225,7 @@ def _strains(text: _Lines, shears: tuple[str, str]) -> dict[str, Array]:
     if wrong.any():
         index = int(wrong.argmax())
         element, point = expected[index]
-        raise text.refuse(index, f"element {element}, point {point} would be next")
+        raise text.refuse(index, f"expected element {element}, point {point}")
     if len(labels) % (numel * npt):
         raise text.refuse(len(labels) - 1, "the last row is not complete")
     table = text.numbers(2 * PER_LINE).reshape(-1, numel, npt, len(names))

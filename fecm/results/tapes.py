@@ -1,8 +1,7 @@
-"""The program's three tapes as text, in the formats of its own WRITE statements.
+"""Writes the three tapes as text, in the formats of the printed program.
 
-tape3 holds w of every node, (6E12.4).  In the report's order tape8 holds strains, (2I6,5E12.4), and
-tape9 contact, (6E12.4); under the slip ``tapes`` they change places and the shear strains change
-columns.
+tape3 holds w of every node, (6E12.4).  In the report tape8 holds strains, (2I6,5E12.4), and tape9
+contact, (6E12.4); the slip ``tapes`` exchanges both tapes and the columns of the shear strains.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ def fortran_e(value: float) -> str:
     sign = "-" if mantissa.startswith("-") else ""
     digits = mantissa.lstrip("-").replace(".", "")
     exponent = int(power) + (digits != "0000")
-    # A third digit of the exponent takes the place of its letter.
+    # A three-digit exponent has no letter.
     mark = f"E{exponent:+03d}" if abs(exponent) < 100 else f"{exponent:+04d}"
     return f"{sign}0.{digits}{mark}".rjust(12)
 
@@ -65,7 +64,7 @@ def _contact(result: Result) -> Iterator[str]:
 
 
 def tape_texts(result: Result) -> dict[str, Iterator[str]]:
-    """Lines of every tape that the run wrote, by the tape's name."""
+    """Lines of every tape that the run stored, by name."""
     listing = "tapes" in result.slips
     strains, contact = ("tape9", "tape8") if listing else ("tape8", "tape9")
     shears = ("gamma_xz", "gamma_yz") if listing else ("gamma_yz", "gamma_xz")
@@ -73,30 +72,30 @@ def tape_texts(result: Result) -> dict[str, Iterator[str]]:
     if "tape3/w" in result:
         texts["tape3"] = _displacements(result)
     if "tape8/kappa_x" in result:
-        _need(result, [f"tape8/{name}" for name in (*CURVATURES, *shears)])
+        _require(result, [f"tape8/{name}" for name in (*CURVATURES, *shears)])
         texts[strains] = _strains(result, shears)
     if "tape9/force" in result:
-        _need(result, [f"tape9/{name}" for name in CONTACT])
+        _require(result, [f"tape9/{name}" for name in CONTACT])
         texts[contact] = _contact(result)
     return dict(sorted(texts.items()))
 
 
-def _need(result: Result, paths: Iterable[str]) -> None:
-    """Make sure that a result has the datasets that a tape is made of."""
+def _require(result: Result, paths: Iterable[str]) -> None:
+    """Require the datasets of a tape."""
     for path in paths:
         if path not in result:
             raise ResultFileError(f"the result lacks {path}, which a tape needs")
 
 
 def write_tapes(result: Result, folder: Path, *, overwrite: bool = True) -> list[Path]:
-    """Write the tapes into a folder, which is made if it is not there: all of them, or none.
+    """Write all tapes into a folder, or none; a missing folder is created.
 
     Parameters
     ----------
     result : Result
     folder : Path
     overwrite : bool
-        Replace tapes that exist.
+        Replace existing tapes.
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """VTKHDF: a result as one file of time steps for ParaView and VTK.
 
-The format is VTK's own (VTKHDF File Format, version 2.2, type UnstructuredGrid, temporal): arrays
-of all time steps stand one after another, and offsets say where a step's part begins.  The mesh
-stands there once, all of its offsets being 0.  Point n - 1 is node n, cell n - 1 element n.
+VTKHDF File Format, version 2.2, type UnstructuredGrid, temporal: the arrays of all time steps are
+concatenated, with the offset of each step.  The mesh is stored once, with all offsets 0.  Point
+n - 1 is node n, cell n - 1 element n.
 """
 
 from __future__ import annotations
@@ -26,42 +26,42 @@ Note = Callable[[str], None]
 
 VERSION = (2, 2)
 CORNERS, TRIANGLE = 4, 3
-# VTK's cell types (vtkCellType.h) of elements whose first 3, 4, 8 or 9 nodes are there.
+# VTK's cell types (vtkCellType.h) of elements with 3, 4, 8 or 9 nodes.
 TYPES = {3: 5, 4: 9, 8: 23, 9: 28}
-# Points an element that lie at its first nodes (K = -2: corners, K = -3: all nine).
+# Numbers of points that are the first nodes of an element (K = -2: corners, K = -3: nine).
 NODAL_POINTS = (4, 9)
 CONTACT = ("force", "indentation", "transducer")
-# Numbers that stand in memory at a time while fields are written.
+# Numbers per block of a field.
 BLOCK = 4_000_000
 
 
 def write_vtkhdf(
     result: Result, path: Path, note: Note = lambda text: None, *, overwrite: bool = True
 ) -> None:
-    """Write a result as VTKHDF, a time step a row of tape3.
+    """Write a result as VTKHDF, one time step per row of tape3.
 
     Parameters
     ----------
     result : Result
     path : Path
     note : callable
-        Receives a sentence about whatever could not be exported in full.
+        Receives a sentence about fields that are exported incompletely.
     overwrite : bool
-        Replace a file that exists.
+        Replace an existing file.
 
     Raises
     ------
     ExportError
-        If the result holds no displacements.
+        If the result has no displacements.
     OSError
         If the file can't be written.
     """
     if "tape3/displacement" not in result:
         raise ExportError(
-            "the result holds no displacements (tape3), so that there is no time step to export; "
+            "the result has no displacements (tape3), and hence no time step to export; "
             "add DISP to the deck's program and run it again"
         )
-    # A state that was stored twice is one time step.
+    # A state stored twice is one time step.
     steps, rows = np.unique(result["tape3/step"], return_index=True)
     cells = _cells(result["mesh/elements"])
     with new_hdf5(path, overwrite=overwrite) as (file, _):
@@ -76,7 +76,7 @@ def write_vtkhdf(
 
 
 def _cells(elements: Array) -> tuple[Ints, Ints, Ints]:
-    """Connectivity, offsets and types; elements that VTK has no cell for are drawn by corners."""
+    """Connectivity, offsets and types; elements unknown to VTK are reduced to corners."""
     count = np.cumprod(elements > 0, axis=1).sum(axis=1)  # nodes before the first absent one
     whole = (count == (elements > 0).sum(axis=1)) & np.isin(count, list(TYPES))
     used = np.where(whole, count, np.minimum(count, CORNERS))
@@ -112,7 +112,7 @@ def _write_clock(root: h5py.Group, times: Array) -> None:
 
 
 def _field(root: h5py.Group, kind: str, name: str, steps: int, shape: tuple[int, ...]) -> Any:
-    """Make room for an array of `shape` a step, the steps one after another."""
+    """Create a field with an array of `shape` per step, concatenated."""
     dataset = root.require_group(f"{kind}Data").create_dataset(
         name, (steps * shape[0], *shape[1:]), "f8"
     )
@@ -125,7 +125,7 @@ def _field(root: h5py.Group, kind: str, name: str, steps: int, shape: tuple[int,
 
 
 def _write_displacements(root: h5py.Group, stored: Array, rows: Ints) -> None:
-    """Point data: displacement (u, v, w), w by itself, rotations (theta_x, theta_y)."""
+    """Point data: displacement (u, v, w), w alone, rotations (theta_x, theta_y)."""
     _, numnp, ndf = stored.shape
     parts: dict[str, tuple[list[int], tuple[int, ...]]] = {
         "displacement": ([0, 1, 2], (3,)),
@@ -147,7 +147,7 @@ def _write_displacements(root: h5py.Group, stored: Array, rows: Ints) -> None:
 
 
 def _write_contact(root: h5py.Group, result: Result, steps: Ints) -> None:
-    """Field data: contact at each step; before the first one there was none."""
+    """Field data: contact at each step; zero before the first step."""
     if "history/step" not in result:
         return
     at = np.searchsorted(result["history/step"], steps)
@@ -158,15 +158,15 @@ def _write_contact(root: h5py.Group, result: Result, steps: Ints) -> None:
 
 
 def _write_strains(root: h5py.Group, result: Result, steps: Ints, note: Note) -> None:
-    """Curvatures and transverse shear strains: at nodes if stored there, else means of cells."""
+    """Curvatures and transverse shear strains: at nodes if stored there, else cell means."""
     if "tape8/step" not in result:
-        note("the result holds no strains (tape8): the macro RODP stores them")
+        note("the result has no strains (tape8), which the macro RODP stores")
         return
     stored = result["tape8/step"]
     at = np.minimum(np.searchsorted(stored, steps), len(stored) - 1)
     shared = stored[at] == steps
     if not shared.any():
-        note("strains (tape8) and displacements (tape3) share no step; strains are left out")
+        note("strains (tape8) and displacements (tape3) share no step; strains are omitted")
         return
     if not shared.all():
         note(
@@ -187,12 +187,12 @@ def _write_strains(root: h5py.Group, result: Result, steps: Ints, note: Note) ->
 
 
 def _covers(elements: Array, npt: int) -> bool:
-    """Whether nodal points lie at every node of every element."""
+    """Whether the points are all nodes of every element."""
     return npt in NODAL_POINTS and not (elements[:, npt:] > 0).any()
 
 
 def _nodal_means(row: Array, elements: Array, numnp: int) -> Array:
-    """Mean of the values of all elements that meet at a node, (numnp,)."""
+    """Mean over the elements at each node, (numnp,)."""
     width = min(row.shape[1], elements.shape[1])
     nodes, values = elements[:, :width], row[:, :width]
     there = nodes > 0
