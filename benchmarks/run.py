@@ -39,6 +39,7 @@ from fecm.problem.generate import generate
 from fecm.problem.options import RunOptions
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
+from fecm.simulation.run import run
 from fecm.simulation.simulation import Simulation
 
 HERE = Path(__file__).parent
@@ -126,7 +127,7 @@ def full(problem: Problem, folder: str, threads: int = 1) -> float:
     with hdf5_writer.writing(path) as sink:
         simulation = Simulation(problem, sink, RunOptions(threads=threads))
         begin = time.perf_counter()
-        simulation.run()
+        run(simulation)
     return time.perf_counter() - begin
 
 

@@ -20,7 +20,7 @@ from fecm.problem.problem import Problem, check
 from fecm.problem.slips import LISTING, REPORT, active_slips
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
-from fecm.simulation.simulation import simulate
+from fecm.simulation.run import simulate
 
 
 @dataclass(frozen=True)

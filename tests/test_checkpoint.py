@@ -31,7 +31,9 @@ from fecm.problem.slips import active_slips
 from fecm.results import hdf5_writer
 from fecm.results.sinks import MemorySink, RowBuffer
 from fecm.simulation.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
-from fecm.simulation.simulation import Simulation, simulate
+from fecm.simulation.run import run as simulate_run
+from fecm.simulation.run import simulate
+from fecm.simulation.simulation import Simulation
 from fecm.simulation.spool import Journal, SpoolError
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, small
@@ -103,17 +105,16 @@ def run(
     problem = load_deck(text).problems[0]
     names = frozenset(slips.split())
     with hdf5_writer.writing(path) as sink:
-        journal = Journal(sink, muted=resume)
+        journal = Journal(sink)
         checkpointer = Checkpointer(path, journal)
-        started = False
-        simulation = Simulation(
-            problem, journal, RunOptions(names), look=look, urgent=lambda: macros and started
-        )
-        started = True
-        simulation._tick = 10**9 if macros else 1
+        simulation = Simulation(problem, journal, RunOptions(names))
+        if macros:
+            simulation.on_macro = look
+        else:
+            simulation.observers, simulation.interval = (look,), 1
         if resume:
             checkpointer.restore(simulation)
-        simulation.run()
+        simulate_run(simulation)
     checkpointer.clear()
     return looks
 
@@ -173,9 +174,10 @@ def test_a_run_stopped_between_any_two_macros_goes_on_to_the_same_bytes(tmp_path
     whole, path = tmp_path / "whole.h5", tmp_path / "stopped.h5"
     looks = run(text, whole, macros=True)
     # 3 passes of a static loop, left in its second pass by CONV, of 5 empty ones and of REAC; LMAS
-    # and DT; 8 macros in steps; the loops themselves. CONV that leaves is no place to stop at.
+    # and DT; 8 macros in steps; the loops themselves. CONV that leaves is the end of its loop, and
+    # so is the last of the empty passes.
     first = 4 + 2
-    assert looks == 1 + (first + 1 + 5 + 1 + 1) + 2 * (2 + 1 + 5 + 1 + 1) + 1 + 2 + 8 + 1
+    assert looks == 1 + (first + 1 + 5 + 1) + 2 * (2 + 1 + 5 + 1) + 1 + 2 + 8 + 1
     for stop in range(1, looks + 1):
         with pytest.raises(StoppedError):
             run(text, path, stop, macros=True)
@@ -252,13 +254,13 @@ def altered(path: Path, change: str) -> None:
         case "stored":
             about["values"]["recorder/steps/stored"] = -1
         case "place":
-            about["values"]["place"] = [[0, 1]]
+            about["values"]["state/position"] = [[0, 1]]
         case "words":
-            about["values"]["dt"] = "soon"
+            about["values"]["state/dt"] = "soon"
         case "shape":
-            arrays["state/padded"] = arrays["state/padded"][:1]
+            arrays["state/plate/padded"] = arrays["state/plate/padded"][:1]
         case "type":
-            arrays["state/padded"] = arrays["state/padded"].astype("S8")
+            arrays["state/plate/padded"] = arrays["state/plate/padded"].astype("S8")
         case "spool":
             line = b'{"do": "write", "path": "tape3/w", "start": -1, "rows": 1, "dtype": "<f8", '
             line += b'"shape": [-1]}\n' + b"[" * 100_000 + b"\n"
@@ -339,9 +341,9 @@ def test_a_checkpoint_that_can_not_be_written_leaves_the_one_before_in_force(
     with contextlib.suppress(StoppedError), hdf5_writer.writing(path) as sink:
         journal = Journal(sink)
         checkpointer = Checkpointer(path, journal)
-        simulation = Simulation(load_deck(deck()).problems[0], journal, look=look)
-        simulation._tick = 1
-        simulation.run()
+        simulation = Simulation(load_deck(deck()).problems[0], journal, observers=(look,))
+        simulation.interval = 1
+        simulate_run(simulation)
     assert len(looks) == 70
     run(deck(), path, resume=True)
     assert path.read_bytes() == whole.read_bytes()
@@ -411,7 +413,7 @@ def test_an_interrupted_command_says_how_to_go_on_and_does(whole: Path) -> None:
             process.send_signal(number)
             _, said = process.communicate(timeout=20)
         assert process.returncode == status
-        assert said.endswith("; the same command with --resume goes on to i.h5\n")
+        assert said.endswith("; the same command with --resume continues i.h5\n")
         assert "interrupted" not in said
         assert not (whole / "i.h5").exists()
         other = fecm_in(whole, "run", "deck.inp", "-o", "i.h5", "--resume")
@@ -472,7 +474,7 @@ def stop_at_once(problem: Problem, path: Path) -> None:
             checkpointer.write(simulation)
             raise StoppedError
 
-        Simulation(problem, journal, look=look).run()
+        simulate_run(Simulation(problem, journal, observers=(look,)))
 
 
 def test_of_two_problems_the_finished_one_is_left_alone(tmp_path: Path) -> None:
@@ -622,6 +624,9 @@ def test_a_run_that_passes_its_energy_limit_exits_1_and_leaves_no_file(tmp_path:
 def test_the_listings_rigid_target_is_warned_of_and_not_judged() -> None:
     problem = load_deck(LONG, "listing").problems[0]
     simulation = simulate(problem, MemorySink(), RunOptions(active_slips("listing")))
-    assert len([note for note in simulation.notes if "slips are on: it is not judged" in note]) == 1
+    assert (
+        len([note for note in simulation.state.notes if "slips are on: it is not judged" in note])
+        == 1
+    )
     sound = simulate(load_deck(LONG).problems[0], MemorySink())
-    assert sound.notes == []
+    assert sound.state.notes == []

@@ -12,14 +12,14 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.deck import Findings
-from fecm.deck.macros import compile_program
+from fecm.deck.macros import compile_program, estimate_work
 from fecm.deck.records import Macro
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.options import RunOptions
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
-from fecm.simulation.interpreter import Act, Course, tally
-from fecm.simulation.simulation import simulate
+from fecm.simulation.interpreter import Action, Interpreter
+from fecm.simulation.run import simulate
 from tests.decks import DATA_CARDS, PROGRAM, ready, small
 
 
@@ -44,10 +44,10 @@ def compiled(*cards: str) -> tuple[list[str], list[str]]:
     findings = Findings()
     words: list[str] = []
 
-    def bind(macro: Macro) -> Act:
-        return lambda _: words.append(macro.word)
+    def bind(macro: Macro) -> Action:
+        return lambda: words.append(macro.word)
 
-    Course(compile_program(program(*cards), findings)).run(bind)
+    Interpreter(compile_program(program(*cards), findings)).run(bind)
     return [f.code for f in findings], words
 
 
@@ -101,10 +101,10 @@ def test_an_unknown_macro_is_an_error_at_its_place() -> None:
     assert "RODP" in finding.hint
 
 
-def test_the_tally_counts_what_the_run_stores() -> None:
+def test_the_estimate_counts_what_the_run_stores() -> None:
     text = "LMAS\nDT        .5E-6\nLOOP          7\nTIME\nRODP          3\nDISP          2\nNEXT\n"
     result = run(text + text)
-    counted = tally(load_deck(small(text + text)).problems[0].program)
+    counted = estimate_work(load_deck(small(text + text)).problems[0].program)
     assert counted.steps == len(result.force) == 14
     assert counted.contact_rows == len(result.tape9.force) == 4
     assert counted.passes["DISP"] == len(result.tape3.w) == 6
@@ -251,11 +251,11 @@ def test_dt_0_takes_nine_tenths_of_the_critical_time_step_and_says_so() -> None:
     problem = load_deck(text).problems[0]
     sink = MemorySink()
     simulation = simulate(problem, sink)
-    critical = critical_time_step(simulation.setup.plate)
-    assert simulation.dt == pytest.approx(0.9 * critical, rel=5e-3)
-    assert sink.arrays["history/time"][0] == simulation.dt
-    (note,) = simulation.notes
-    assert f"{simulation.dt:g}" in note
+    critical = critical_time_step(simulation.model.plate)
+    assert simulation.state.dt == pytest.approx(0.9 * critical, rel=5e-3)
+    assert sink.arrays["history/time"][0] == simulation.state.dt
+    (note,) = simulation.state.notes
+    assert f"{simulation.state.dt:g}" in note
 
 
 def test_the_sparse_solver_gives_the_same_history_to_rounding() -> None:
@@ -292,9 +292,9 @@ def test_a_finished_run_goes_with_its_plate_at_once(threads: int) -> None:
         )
         parts = [
             simulation,
-            simulation.setup.motion,
-            simulation.setup.plate,
-            simulation.setup.impact,
+            simulation.model.motion,
+            simulation.model.plate,
+            simulation.model.impact,
         ]
         gone = [weakref.ref(part) for part in parts]
         del simulation, parts

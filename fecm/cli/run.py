@@ -39,6 +39,7 @@ from fecm.results.result import load
 from fecm.results.summary import OPEN_END, summary
 from fecm.simulation.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
 from fecm.simulation.printout import Printer
+from fecm.simulation.run import run as simulate_run
 from fecm.simulation.simulation import Simulation
 from fecm.simulation.spool import Journal, SpoolError
 
@@ -172,23 +173,23 @@ def _run_one(
     with contextlib.ExitStack() as stack:
         stack.enter_context(signals.deferred())
         stack.enter_context(_ends(path, resumes=resumes))
-        sink = stack.enter_context(hdf5_writer.writing(path, overwrite=overwrite))
-        journal = Journal(sink, muted=resumes)
+        journal = Journal(stack.enter_context(hdf5_writer.writing(path, overwrite=overwrite)))
         checkpointer = Checkpointer(path, journal)
         printer = Printer()
         if printed is not None:
             printer = Printer(stack.enter_context(writing(printed, overwrite=overwrite)))
-        advance = _Advance(stack.enter_context(progress("fecm", problem.work.steps)))
-        look = _Look(checkpointer, every)
-        simulation = Simulation(problem, journal, choices, advance, printer, look, look.urgent)
+        bar = _ProgressBar(stack.enter_context(progress("fecm", problem.work.steps)))
+        observer = _Checkpoints(checkpointer, every)
+        simulation = Simulation(
+            problem, journal, choices, printer, (bar, observer.on_step), observer.on_macro
+        )
         if resumes:
             checkpointer.restore(simulation)
-            step = simulation.plate.step
+            step = simulation.state.plate.step
             echo(f"fecm: note: {path} resumes after step {step}", err=True)
-        look.started = True
-        simulation.run()
+        simulate_run(simulation)
     checkpointer.clear()
-    for note in simulation.notes:
+    for note in simulation.state.notes:
         echo(f"fecm: note: {note}", err=True)
     result = load(path)
     if result.still_in_contact:
@@ -221,7 +222,7 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
         ) from None
     except _StoppedError as stopped:
         echo(
-            f"fecm: stopped after step {stopped.step}; the same command with --resume goes on to "
+            f"fecm: stopped after step {stopped.step}; the same command with --resume continues "
             f"{path}",
             err=True,
         )
@@ -239,44 +240,42 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
 
 
 class _StoppedError(Exception):
-    """A signal has ended the run, in good order."""
+    """A signal stopped the run; its checkpoint is written."""
 
     def __init__(self, step: int) -> None:
         self.step = step
         super().__init__(step)
 
 
-class _Look:
-    """Ends a run after a signal, and writes checkpoints.
+class _Checkpoints:
+    """Writes checkpoints, and stops a run after a signal.
 
     Parameters
     ----------
     checkpointer : Checkpointer
     every : float or None
-        Seconds between two checkpoints; None writes one only when a signal ends the run.
+        Seconds between two checkpoints; None writes one only when a signal stops the run.
     """
 
     def __init__(self, checkpointer: Checkpointer, every: float | None) -> None:
         self._checkpointer = checkpointer
         self._every = every
-        self.started = False
 
-    def urgent(self) -> bool:
-        """Whether a signal came; before the run has started there is nothing to keep."""
-        if not self.started:
-            signals.heed()
-        return signals.came()
-
-    def __call__(self, simulation: Simulation) -> None:
+    def on_macro(self, simulation: Simulation) -> None:
+        """Stop the run if a signal came."""
         if signals.came():
             self._checkpointer.write(simulation)
-            raise _StoppedError(simulation.plate.step)
+            raise _StoppedError(simulation.state.plate.step)
+
+    def on_step(self, simulation: Simulation) -> None:
+        """Write a checkpoint if one is due; stop the run if a signal came."""
+        self.on_macro(simulation)
         if self._every is not None and self._checkpointer.age >= self._every:
             self._checkpointer.write(simulation)
 
 
 def _check_room(path: Path, size: int) -> None:
-    """Refuse a result that the disk has no room for."""
+    """Refuse a result that does not fit on the disk."""
     free = shutil.disk_usage(path.parent).free
     if size > free:
         raise RefusedError(
@@ -285,13 +284,14 @@ def _check_room(path: Path, size: int) -> None:
         )
 
 
-class _Advance:
-    """Tells a progress bar of the steps that a run has taken since it was told last."""
+class _ProgressBar:
+    """Advances a progress bar by the steps taken since the last call."""
 
-    def __init__(self, move: Callable[[int], object]) -> None:
-        self._move = move
+    def __init__(self, advance: Callable[[int], object]) -> None:
+        self._advance = advance
         self._done = 0
 
-    def __call__(self, done: int, steps: int) -> None:
-        self._move(done - self._done)
+    def __call__(self, simulation: Simulation) -> None:
+        done = simulation.state.plate.step
+        self._advance(done - self._done)
         self._done = done

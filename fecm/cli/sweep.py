@@ -16,7 +16,7 @@ from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, count_errors, ec
 from fecm.deck.findings import DeckError
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
-from fecm.simulation.simulation import simulate
+from fecm.simulation.run import simulate
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.batch import deck_of
 from fecm.sweeps.cases import Case, CasesError, grid, parse_vary, read_cases

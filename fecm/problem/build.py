@@ -163,6 +163,54 @@ class ImpactModel:
     gages: GageArray | None
 
 
+@dataclass(frozen=True)
+class ProgramRules:
+    """How macros behave; the slips that concern them are parameters here.
+
+    Attributes
+    ----------
+    forces_scale_with_contact : bool
+        FORC's values are scaled by the contact force (``force-scale``).
+    prop_replaces_contact : bool
+        PROP replaces the contact force of the next step (``prop-contact``).
+    prop_at_zero : bool
+        Tables of proportional loads are evaluated at t = 0 only (``prop``).
+    clock_stands : bool
+        TIME does nothing (``time``).
+    counts_since_output : bool
+        RODP counts steps since the last output (``counter``).
+    listing_tapes : bool
+        Contact is stored at every step, strains one step late (``tapes``).
+    check_ends : bool
+        CHEC ends the program (``check-end``).
+    enforces_energy_limit : bool
+        The energy balance can end the run; not with any slip.
+    """
+
+    forces_scale_with_contact: bool = False
+    prop_replaces_contact: bool = False
+    prop_at_zero: bool = False
+    clock_stands: bool = False
+    counts_since_output: bool = False
+    listing_tapes: bool = False
+    check_ends: bool = False
+    enforces_energy_limit: bool = True
+
+
+def program_rules(slips: frozenset[str]) -> ProgramRules:
+    """Return how macros behave with the slips that are on."""
+    return ProgramRules(
+        forces_scale_with_contact="force-scale" in slips,
+        prop_replaces_contact="prop-contact" in slips,
+        prop_at_zero="prop" in slips,
+        clock_stands="time" in slips,
+        counts_since_output="counter" in slips,
+        listing_tapes="tapes" in slips,
+        check_ends="check-end" in slips,
+        enforces_energy_limit=not slips,
+    )
+
+
 def rules(material: Material) -> tuple[Quadrature, Quadrature, Quadrature]:
     """Quadrature of a MATE card: bending (L1), transverse shear (L2), stored strains (K).
 

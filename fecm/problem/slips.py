@@ -210,6 +210,11 @@ def active_slips(mode: str = REPORT, single: Iterable[str] = ()) -> frozenset[st
     return names
 
 
+def mode_of(slips: frozenset[str]) -> str:
+    """Mode that a result with these slips belongs to."""
+    return LISTING if slips == frozenset(NAMES) else REPORT
+
+
 def errata() -> str:
     """Write the errata page, in Markdown."""
     lines = [

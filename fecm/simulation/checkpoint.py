@@ -1,9 +1,9 @@
-"""Checkpoints: the whole state of a run, kept beside its result.
+"""Checkpoints: the complete state of a run, stored beside its result.
 
-Two files: the checkpoint with the state, which is written beside its name, synced and renamed, and
-the spool with everything stored so far, which only grows.  A checkpoint names the part of the spool
-that belongs to it, by length and checksum, so that whatever ends a run, the last checkpoint is
-whole.  The run that goes on from it ends in the same bytes as one that was never stopped.
+There are two files.  The checkpoint holds the state; it is written under another name, synced and
+renamed.  The spool holds everything stored so far and only grows.  A checkpoint names its part of
+the spool by length and checksum, so that the last checkpoint is valid however a run ends.  A
+resumed run gives the same bytes as one that was never stopped.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import json
 import os
 import time
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,11 +27,11 @@ from fecm._version import __version__
 from fecm.simulation.simulation import Simulation
 from fecm.simulation.spool import Journal, Part
 
-FORMAT = 1
+FORMAT = 2
 
 
 class CheckpointError(FecmError, ValueError):
-    """A checkpoint can't be used; the message says why."""
+    """The checkpoint can't be used."""
 
 
 def checkpoint_of(result: Path) -> Path:
@@ -45,21 +45,21 @@ def spool_of(result: Path) -> Path:
 
 
 def identity(simulation: Simulation) -> dict[str, Any]:
-    """What a run must have in common with the one that goes on from its checkpoint."""
-    deck, choices = simulation.checked.deck, simulation.choices
+    """Properties that a run and its checkpoint must have in common."""
+    deck, options = simulation.problem.deck, simulation.options
     text = deck.text or deck.to_text()
     return {
         "format": FORMAT,
         "version": __version__,
         "deck": hashlib.sha256(text.encode()).hexdigest(),
-        "slips": sorted(choices.slips),
-        "solver": choices.solver,
-        "rod": [choices.rod_method.mass, choices.rod_method.integrator],
+        "slips": sorted(options.slips),
+        "solver": options.solver,
+        "rod": [options.rod_method.mass, options.rod_method.integrator],
         "printed": simulation.printer.is_on,
     }
 
 
-# How a message names what differs.
+# What a message says if they differ.
 _NAMES = {
     "format": "another kind of checkpoint",
     "version": "another version of fecm",
@@ -72,14 +72,14 @@ _NAMES = {
 
 
 class Checkpointer:
-    """Keeps the checkpoints of a run.
+    """Writes and reads the checkpoints of a run.
 
     Parameters
     ----------
     result : Path
-        Where the run's result will stand.
+        Final path of the result.
     journal : Journal
-        What it was given.
+        Operations on the result.
     """
 
     def __init__(self, result: Path, journal: Journal) -> None:
@@ -89,7 +89,7 @@ class Checkpointer:
 
     @property
     def age(self) -> float:
-        """Seconds since the last checkpoint, or since the run began."""
+        """Seconds since the last checkpoint, or since the start."""
         return time.monotonic() - self._written
 
     def write(self, simulation: Simulation) -> None:
@@ -98,7 +98,7 @@ class Checkpointer:
         Raises
         ------
         OSError
-            If it can't be written; the one before is then untouched.
+            If it can't be written; the previous checkpoint then remains valid.
         """
         flags = os.O_RDWR
         if not self._journal.spooled.length:
@@ -106,16 +106,18 @@ class Checkpointer:
             flags |= os.O_CREAT | os.O_EXCL
         with naming(self._spool), open_ordinary(self._spool, flags) as spool:
             part = self._journal.spool(spool)
-        values, arrays = _split(simulation.state())
+        state = simulation.save()
+        arrays = {name: value for name, value in state.items() if isinstance(value, np.ndarray)}
+        values = {name: value for name, value in state.items() if name not in arrays}
         about = {"identity": identity(simulation), "spool": vars(part), "values": values}
-        told = np.frombuffer(json.dumps(about).encode(), np.uint8)
+        text = np.frombuffer(json.dumps(about).encode(), np.uint8)
         with beside(self._checkpoint, follow=False) as partial:
-            partial.write_bytes(packed({"about": told, **arrays}))
+            partial.write_bytes(packed({"about": text, **arrays}))
         self._journal.keep(part)
         self._written = time.monotonic()
 
     def restore(self, simulation: Simulation) -> None:
-        """Bring a new simulation, its sink muted, to where the checkpoint was written.
+        """Set a new simulation and its result to the state of the checkpoint.
 
         Raises
         ------
@@ -129,20 +131,15 @@ class Checkpointer:
             theirs, ours = about["identity"], identity(simulation)
             for name, value in ours.items():
                 if theirs.get(name) != value:
-                    told = f" ({theirs['version']}, not {value})" if name == "version" else ""
-                    raise CheckpointError(f"{self._checkpoint} belongs to {_NAMES[name]}{told}")
+                    which = f" ({theirs['version']}, not {value})" if name == "version" else ""
+                    raise CheckpointError(f"{self._checkpoint} belongs to {_NAMES[name]}{which}")
             part = Part(**about["spool"])
         self._journal.replay(self._spool, part)
         with self._reading():
-            for name, own in _split(simulation.state())[1].items():
-                theirs = arrays[name]
-                fits = own.shape == theirs.shape or not name.startswith("state/")
-                if own.dtype != theirs.dtype or own.ndim != theirs.ndim or not fits:
-                    raise ValueError(f"{name} has another shape or type")
             simulation.restore({**about["values"], **arrays})
 
     def _read(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-        """What a checkpoint says in JSON, and its arrays."""
+        """JSON values and arrays of the checkpoint."""
         if not self._checkpoint.exists():
             raise CheckpointError(f"there is no checkpoint {self._checkpoint}")
         with (
@@ -157,21 +154,15 @@ class Checkpointer:
 
     @contextlib.contextmanager
     def _reading(self) -> Iterator[None]:
-        """Say of whatever does not fit together that the checkpoint is damaged."""
+        """Turn any error in the content into a CheckpointError."""
         try:
             yield
         except (CheckpointError, OSError):
             raise
-        except Exception as error:  # whatever a file can do to zipfile, json and NumPy
+        except Exception as error:  # a damaged file raises anything in zipfile, json and NumPy
             raise CheckpointError(f"{self._checkpoint} is damaged ({error})") from None
 
     def clear(self) -> None:
-        """Throw the checkpoint away."""
+        """Delete the checkpoint."""
         self._checkpoint.unlink(missing_ok=True)
         self._spool.unlink(missing_ok=True)
-
-
-def _split(state: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """Values that JSON knows, and arrays, of a state."""
-    arrays = {name: value for name, value in state.items() if isinstance(value, np.ndarray)}
-    return {name: value for name, value in state.items() if name not in arrays}, arrays

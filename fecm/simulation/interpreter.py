@@ -1,144 +1,112 @@
-"""The interpreter of macro programs: loops carried out in order, resumable at any macro."""
+"""The interpreter of macro programs: nested loops on an explicit stack, resumable at any macro."""
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from typing import Any
 
-from fecm.deck.macros import STEPS, Body, Loop, WorkEstimate, estimate_work, every, flat
+from fecm.deck.macros import Body, Loop
 from fecm.deck.records import Macro
 
-# Given the pass; whether to leave the innermost loop.
-Act = Callable[[int], "bool | None"]
-
-Bind = Callable[[Macro], Act]
+# Carries out a macro; True leaves the innermost loop.
+Action = Callable[[], "bool | None"]
 
 
 class EndedError(Exception):
     """The program ends before its last macro."""
 
 
-class Course:
-    """A program being carried out, which knows where it is and can go on there.
+class Interpreter:
+    """Carries out a program.
 
     Parameters
     ----------
-    body : tuple
-        The program.
-
-    Attributes
-    ----------
-    place : list of (int, int)
-        From the program itself to the innermost loop: which of its items is being carried out, and
-        in which pass.
+    program : tuple
+        The nested program.
     """
 
-    def __init__(self, body: Body) -> None:
-        self.place: list[tuple[int, int]] = []
-        self._body = body
-        self._goal: list[tuple[int, int]] = []
+    def __init__(self, program: Body) -> None:
+        self._program = program
+        # A frame per open loop: actions, number of passes, index of the next action, pass.
+        self._stack: list[list[Any]] = []
+
+    @property
+    def position(self) -> list[tuple[int, int]]:
+        """Index of the next item and pass, from the program itself to the innermost loop."""
+        return [(frame[2], frame[3]) for frame in self._stack]
+
+    @property
+    def current_pass(self) -> int:
+        """Pass of the innermost loop, from 1."""
+        return int(self._stack[-1][3])
 
     def run(
         self,
-        bind: Bind,
-        after: Sequence[tuple[int, int]] = (),
-        between: Callable[[], object] = lambda: None,
+        bind: Callable[[Macro], Action],
+        start: Sequence[tuple[int, int]] = (),
+        on_macro: Callable[[], object] = lambda: None,
     ) -> None:
-        """Carry the program out.
+        """Carry out the program.
 
         Parameters
         ----------
         bind : callable
-            Gives what a macro does.  It is not kept: whoever carries out a program may hold on to
-            its course without holding on to itself.
-        after : sequence of (int, int)
-            Begin behind the macro at this place.
-        between : callable
-            Called behind each macro and each pass of a loop, when `place` tells where to go on.
+            Returns the action of a macro; called once per card.
+        start : sequence of (int, int)
+            `position` to resume from.
+        on_macro : callable
+            Called after each macro, each loop and each pass of an empty loop.
+
+        Raises
+        ------
+        ValueError
+            If the program has no such position.
         """
-        self._goal = [(int(index), int(current)) for index, current in after]
-        with contextlib.suppress(EndedError):
-            self._bound(self._body, bind, between, 0)(1)
-
-    def _bound(self, body: Body, bind: Bind, between: Callable[[], object], depth: int) -> Act:
-        """Bind a program's macros to what they do, so that a pass only has to call them."""
-        acts = [
-            self._repeated(item, bind, between, depth + 1) if isinstance(item, Loop) else bind(item)
-            for item in body
-        ]
-        self.place += [(0, 0)] * (depth + 1 - len(self.place))
-        place, count = self.place, len(acts)
-
-        def carry_out(current: int) -> bool:
-            for index in range(self._first(depth), count):
-                place[depth] = index, current
-                if acts[index](current):
-                    return True
-                between()
-            return False
-
-        return carry_out
-
-    def _repeated(self, loop: Loop, bind: Bind, between: Callable[[], object], depth: int) -> Act:
-        """Bind a loop, whose body is at a depth."""
-        carry_out = self._bound(loop.body, bind, between, depth)
-        empty = not loop.body
-
-        def repeat(_: int) -> None:
-            first = self._goal[depth][1] if self._goal else 1
-            for current in range(first, loop.count + 1):
-                if carry_out(current):
-                    break
-                if empty:
-                    between()  # an empty body has no place: the loop counts as done
-            self.place[depth:] = [(0, 0)] * (len(self.place) - depth)
-
-        return repeat
-
-    def _first(self, depth: int) -> int:
-        """Which of a body's items comes first: not the first one on the way to where to go on."""
-        if not self._goal:
-            return 0
-        index, _ = self._goal[depth]
-        if any(current for _, current in self._goal[depth + 1 :]):
-            return index  # a loop, in which it is still going on
-        self._goal = []
-        return index + 1
+        stack = self._stack
+        try:
+            stack += _frames(_bound(self._program, bind), start or [(0, 1)])
+            while True:
+                frame = stack[-1]
+                actions, count, index, current = frame
+                if index < len(actions):
+                    frame[2] = index + 1
+                    action = actions[index]
+                    if type(action) is tuple:
+                        stack.append([*action, 0, 1])
+                        continue
+                    if action():
+                        stack.pop()
+                elif current < count:
+                    frame[2:] = 0, current + 1
+                    if actions:
+                        continue
+                elif len(stack) > 1:
+                    stack.pop()
+                else:
+                    return
+                on_macro()
+        except EndedError:
+            return
+        finally:
+            stack.clear()  # the actions may refer to the owner of this interpreter
 
 
-def tally(
-    body: Body, between: Callable[[], object] = lambda: None, *, counts_anew: bool = False
-) -> WorkEstimate:
-    """Count exactly what a program does and stores; carries out its loops where it must.
+def _bound(body: Body, bind: Callable[[Macro], Action]) -> list[Any]:
+    """Actions of a body; a loop is a tuple of its actions and its number of passes."""
+    return [
+        (_bound(item.body, bind), item.count) if isinstance(item, Loop) else bind(item)
+        for item in body
+    ]
 
-    Parameters
-    ----------
-    body : tuple
-        The program.
-    between : callable
-        Called between two macros; may raise.
-    counts_anew : bool
-        Whether RODP counts the steps since the last output (the slip ``counter``): then
-        `contact_rows` is an upper bound where RODP cards differ.
-    """
-    counted = estimate_work(body)
-    if len({every(m) if m.word == "RODP" else 0 for m in flat(body) if m.word in STEPS}) <= 1:
-        return counted
-    if counts_anew:
-        least = min(every(m) for m in flat(body) if m.word == "RODP")
-        return replace(counted, contact_rows=counted.steps // least)
-    step = rows = 0
 
-    def bind(macro: Macro) -> Act:
-        steps, every_nth = macro.word in STEPS, every(macro) if macro.word == "RODP" else 0
-
-        def act(_: int) -> None:
-            nonlocal step, rows
-            step += steps
-            rows += every_nth > 0 and step % every_nth == 0
-
-        return act
-
-    Course(body).run(bind, between=between)
-    return WorkEstimate(counted.macros, counted.steps, rows, counted.passes)
+def _frames(actions: list[Any], position: Sequence[tuple[int, int]]) -> list[list[Any]]:
+    """Frames of a position."""
+    frames: list[list[Any]] = []
+    count = 1
+    for index, current in position:
+        if frames:
+            actions, count = frames[-1][0][frames[-1][2] - 1]
+        if not (0 <= index <= len(actions) and 1 <= current <= count):
+            raise ValueError(f"the program has no position {list(position)}")
+        frames.append([actions, count, index, current])
+    return frames

@@ -1,19 +1,19 @@
-"""What is noted at every time step: history, energies, and the rows of tape9 among them.
+"""The recorder of time steps: history, energies, gages, and contact for tape9.
 
-Scalars of every step are gathered in blocks; what can be computed from a block (the transducer, the
-projectile's energies, the balance) is computed when it is full.
+Scalars of every step are gathered in blocks.  What can be computed from a block (transducer,
+projectile energies, energy balance) is computed when the block is full.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from fecm._typing import Floats
 from fecm.mechanics.impact import ImpactState
-from fecm.mechanics.plate_motion import DivergenceError, DofSums, PlateState
+from fecm.mechanics.plate_motion import DofSums, PlateState
 from fecm.mechanics.projectile import Rod
 from fecm.problem.build import ImpactModel
 from fecm.results.schema import DATASETS
@@ -28,58 +28,48 @@ SCALARS = (
 CONTACT = ("force", "indentation", "transducer", "displacement", "velocity", "acceleration")
 
 
+OnBlock = Callable[[Mapping[str, Floats], float], object]
+
+
 class StepRecorder:
-    """Notes every step in a sink.
+    """Stores every step in a sink.
 
     Parameters
     ----------
     sink : Sink
-        Receives the rows; the datasets of history, energy and tape9 stand there already.
-    setup : ImpactModel
-        The run's parts; a plate alone has energies and gages only.
+        Receives the rows; the datasets of history, energy and tape9 exist already.
+    model : ImpactModel
+        The model; a plate alone has energies and gages only.
     contact_at_every_step : bool
         Store contact on tape9 at every step instead of every N-th (the slip ``tapes``).
-    limit : float or None
-        Error of the energy balance, as a part of what was given, at which the run is stopped; it is
-        stopped in any case when the energy is no longer finite.
-
-    Attributes
-    ----------
-    worst : (float, int)
-        Largest error of the energy balance so far, as a part of what was given, and its step.
+    on_block : callable
+        Called with the columns of each block and the initial energy (force*length).
     """
 
     def __init__(
-        self,
-        sink: Sink,
-        setup: ImpactModel,
-        *,
-        contact_at_every_step: bool = False,
-        limit: float | None = None,
+        self, sink: Sink, model: ImpactModel, contact_at_every_step: bool, on_block: OnBlock
     ) -> None:
         self._sink = sink
-        self._motion = setup.motion
-        self._impact = impact = setup.impact
-        self._limit = limit
-        self._most_work = self._last_work = self._jump = 0.0
-        self.worst = (0.0, 0)
+        self._motion = model.motion
+        self._impact = impact = model.impact
+        self._on_block = on_block
         self._all_contact = contact_at_every_step
         self._rows: list[tuple[float, ...]] = []
         self._contact_rows: list[int] = []
         self._stored = self._tape9_rows = 0
-        self._station = setup.station
+        self._station = model.station
         self._rod = np.empty((0, 3, 0))
         if impact is not None:
             self._rod = np.empty((BLOCK, 3, len(impact.rod_mass)))
         self._gages: DofSums | None = None
         self._strains = np.empty((0, 0))
-        if setup.gages is not None:
-            self._gages = setup.motion.dof_sums(setup.gages.dof_indices, setup.gages.weights)
-            self._strains = np.empty((BLOCK, len(setup.gages.numbers)))
+        if model.gages is not None:
+            self._gages = model.motion.dof_sums(model.gages.dof_indices, model.gages.weights)
+            self._strains = np.empty((BLOCK, len(model.gages.numbers)))
         self.initial = 0.0
 
     def begin(self, plate: PlateState, impact: ImpactState | None) -> None:
-        """Note the energy before the first step (force*length)."""
+        """Store the energy before the first step (force*length)."""
         energy = plate.strain_energy
         if self._impact is not None and impact is not None:
             energy += float(self._impact.rod.kinetic_energy(impact.rod.velocity[None])[0])
@@ -94,16 +84,16 @@ class StepRecorder:
         *,
         contact_row: bool = False,
     ) -> None:
-        """Note the state after a step.
+        """Add a row for the state after a step.
 
         Parameters
         ----------
         plate : PlateState
         impact : ImpactState or None
         factor : float
-            Load factor of nodal forces.
+            Load factor of the nodal forces.
         contact_row : bool
-            Whether the step's contact goes to tape9.
+            Whether the contact of the step goes to tape9.
         """
         point = None
         if self._impact is not None and impact is not None:
@@ -126,7 +116,7 @@ class StepRecorder:
             self.flush()
 
     def state(self) -> dict[str, Any]:
-        """What is held back, and how much was stored."""
+        """Rows that are not stored yet, and how many are."""
         count = len(self._rows)
         return {
             "rows": np.array(self._rows).reshape(count, len(SCALARS)),
@@ -136,40 +126,30 @@ class StepRecorder:
             "stored": self._stored,
             "tape9": self._tape9_rows,
             "initial": self.initial,
-            "work": [self._most_work, self._last_work, self._jump],
-            "worst": self.worst,
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Hold back again what :meth:`state` gave."""
+        """Continue from what :meth:`state` returned."""
         self._rows = [tuple(row) for row in state["rows"].tolist()]
         self._contact_rows = list(state["contact"])
         self._rod[: len(self._rows)] = state["rod"]
         self._strains[: len(self._rows)] = state["strains"]
         self._stored, self._tape9_rows = state["stored"], state["tape9"]
         self.initial = state["initial"]
-        self._most_work, self._last_work, self._jump = state["work"]
-        self.worst = (state["worst"][0], state["worst"][1])
 
     def flush(self) -> None:
-        """Store what was gathered.
-
-        Raises
-        ------
-        DivergenceError
-            If the energy has grown without bound.
-        """
+        """Store the gathered rows and pass them to `on_block`."""
         count = len(self._rows)
         if not count:
             return
         table = dict(zip(SCALARS, np.array(self._rows).T, strict=True))
         self._add_projectile(table, count)
-        held = (
+        table["held_energy"] = (
             table["plate_kinetic"] + table["plate_strain"]
             + table["projectile_kinetic"] + table["projectile_strain"] + table["contact_work"]
         )  # fmt: skip
-        table["balance_error"] = held - self.initial - table["external_work"]
-        self._watch(table, held)
+        table["balance_error"] = table["held_energy"] - self.initial - table["external_work"]
+        self._on_block(table, self.initial)
         table["strain"] = self._strains[:count]
         groups = self.rows.keys() - {"tape9"}
         for dataset in DATASETS.values():
@@ -185,12 +165,12 @@ class StepRecorder:
         self._contact_rows.clear()
 
     def _add_projectile(self, table: dict[str, Floats], count: int) -> None:
-        """Add what follows from the rod's motion over a block of steps."""
+        """Add the columns that follow from the motion of the projectile."""
         if self._impact is None:
             table["projectile_kinetic"] = table["projectile_strain"] = np.zeros(count)
             return
         u, v, a = self._rod[:count].swapaxes(0, 1)
-        u[:, 0] = 0.0  # the tip, to which the others are relative
+        u[:, 0] = 0.0  # displacements are relative to the tip
         table["transducer"] = self._transducer(table["force"], u)
         table["velocity"], table["acceleration"] = v[:, 0], a[:, 0]
         rod = self._impact.rod
@@ -205,36 +185,6 @@ class StepRecorder:
         rod = self._impact.rod
         area = float(rod.areas[min(node, rod.elements) - 1])
         return sign * rod.modulus * area * deformation[:, 2 * node - 1]
-
-    def _watch(self, table: Mapping[str, Floats], held: Floats) -> None:
-        """Stop a run that has lost all sense, or more energy than its limit allows.
-
-        The error is judged against what was given up to the end of the block: the first steps of a
-        load have done no work yet that it could be compared with.  What a load does in one step is
-        no error: the work belongs to the step, the energies to its end.
-        """
-        lost = ~np.isfinite(held)
-        if lost.any():
-            step = int(table["step"][np.flatnonzero(lost)[0]])
-            raise DivergenceError(step, "the motion is no longer finite")
-        work = table["external_work"]
-        self._most_work = max(self._most_work, float(np.abs(work).max()))
-        jump = float(np.abs(np.diff(work, prepend=self._last_work)).max())
-        self._jump, self._last_work = max(self._jump, jump), float(work[-1])
-        given = self.initial + self._most_work
-        if not given > 0.0:
-            return
-        error = np.maximum(np.abs(table["balance_error"]) - self._jump, 0.0) / given
-        row = int(error.argmax())
-        if error[row] > self.worst[0]:
-            self.worst = (float(error[row]), int(table["step"][row]))
-        if self._limit is not None and error[row] > self._limit:
-            row = int(np.flatnonzero(error > self._limit)[0])
-            raise DivergenceError(
-                int(table["step"][row]),
-                f"the energy balance is off by {error[row]:.2%} of what was given, more than the "
-                f"limit of {self._limit:.3g}",
-            )
 
     @property
     def rows(self) -> dict[str, int]:

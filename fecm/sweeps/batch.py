@@ -33,7 +33,8 @@ from fecm.problem.check_program import check_program
 from fecm.problem.generate import generate
 from fecm.problem.problem import Problem, check
 from fecm.results.sinks import MemorySink
-from fecm.simulation.simulation import ENERGY_WARNING, simulate
+from fecm.simulation.guard import ENERGY_WARNING
+from fecm.simulation.run import simulate
 from fecm.sweeps.cases import CasesError
 from fecm.sweeps.clock import Clock, critical_of, with_time_step
 from fecm.sweeps.outcome import SUMMARY, Indentation, Outcome, status_of, summarise
@@ -316,7 +317,7 @@ def _alone(number: int, checked: Problem) -> Outcome:
         [number],
         summary,
         status_of(force[:, None]),
-        np.array([simulation.dt]),
+        np.array([simulation.state.dt]),
         np.array([len(force)], dtype=np.int64),
         np.array([values.get("unsettled_steps", 0)], dtype=np.int64),
         force[None],

@@ -1,0 +1,124 @@
+"""The judge of a run: divergence, the energy balance, and the likely cause."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.mechanics.plate import UnsoundPlateError
+from fecm.mechanics.plate_motion import DivergenceError
+from fecm.mechanics.time_step import critical_time_step
+from fecm.problem.build import ImpactModel
+from fecm.problem.contact_step import contact_step
+from fecm.problem.problem import Problem
+
+# Error of the energy balance, relative to the supplied energy, that triggers a warning.
+ENERGY_WARNING = 0.01
+
+
+@dataclass
+class EnergyBalance:
+    """The energy balance of a run so far.
+
+    Attributes
+    ----------
+    largest_work, last_work, largest_jump : float
+        Largest and last work of the nodal forces, and its largest change in a step (force*length).
+    worst_error : float
+        Largest error, relative to the supplied energy.
+    worst_step : int
+        Its step.
+    """
+
+    largest_work: float = 0.0
+    last_work: float = 0.0
+    largest_jump: float = 0.0
+    worst_error: float = 0.0
+    worst_step: int = 0
+
+
+@dataclass(frozen=True)
+class EnergyGuard:
+    """Ends a run that diverges or exceeds the limit of its energy balance.
+
+    Attributes
+    ----------
+    balance : EnergyBalance
+        Updated with every block of steps.
+    limit : float or None
+        Error, relative to the supplied energy, that ends the run; None to end it only if the
+        energy is not finite.
+    """
+
+    balance: EnergyBalance
+    limit: float | None
+
+    def __call__(self, block: Mapping[str, Floats], initial: float) -> None:
+        """Judge a block of steps.
+
+        The error is relative to the energy supplied up to the end of the block: in its first steps
+        a load has done almost no work.  The work of one step is no error: the work belongs to the
+        step, the energies to its end.
+
+        Parameters
+        ----------
+        block : mapping
+            Columns ``step``, ``held_energy``, ``external_work`` and ``balance_error``.
+        initial : float
+            Energy before the first step (force*length).
+
+        Raises
+        ------
+        DivergenceError
+            If the energy is not finite, or the error exceeds the limit.
+        """
+        lost = ~np.isfinite(block["held_energy"])
+        if lost.any():
+            step = int(block["step"][np.flatnonzero(lost)[0]])
+            raise DivergenceError(step, "the motion is no longer finite")
+        balance, work = self.balance, block["external_work"]
+        balance.largest_work = max(balance.largest_work, float(np.abs(work).max()))
+        jump = float(np.abs(np.diff(work, prepend=balance.last_work)).max())
+        balance.largest_jump, balance.last_work = max(balance.largest_jump, jump), float(work[-1])
+        supplied = initial + balance.largest_work
+        if not supplied > 0.0:
+            return
+        error = np.maximum(np.abs(block["balance_error"]) - balance.largest_jump, 0.0) / supplied
+        row = int(error.argmax())
+        if error[row] > balance.worst_error:
+            balance.worst_error, balance.worst_step = float(error[row]), int(block["step"][row])
+        if self.limit is not None and error[row] > self.limit:
+            row = int(np.flatnonzero(error > self.limit)[0])
+            raise DivergenceError(
+                int(block["step"][row]),
+                f"the energy balance is off by {error[row]:.2%} of the supplied energy, more than "
+                f"the limit of {self.limit:.3g}",
+            )
+
+
+def likely_cause(problem: Problem, model: ImpactModel, dt: float) -> str:
+    """Explain a divergence, as far as the time step does."""
+    try:
+        critical = critical_time_step(model.motion.plate)
+        contact = contact_step(problem.deck, model.plate, dt) if model.impact is not None else None
+    except UnsoundPlateError as error:
+        return str(error)
+    above = dt > critical
+    cause = (
+        f"DT = {dt:.4g} is {'above' if above else 'below'} the plate's critical time step "
+        f"{critical:.4g}"
+    )
+    if above:
+        return cause
+    if contact is not None and dt >= contact.limit:
+        return (
+            f"{cause}, but not below {contact.limit:.4g}, the stable step with the contact's "
+            f"stiffness k_t of about {contact.stiffness:.3g} (the contact needs DT < "
+            f"2 (m/k_t)^(1/2), m = {contact.mass:.3g})"
+        )
+    if len({macro.value for macro in problem.deck.macros if macro.word == "DT"}) > 1:
+        return f"{cause}, but DT changes: steps that alternate diverge below the critical one"
+    return cause

@@ -1,0 +1,110 @@
+"""Carries out a run: header, macro program, footer."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from fecm._version import __version__
+from fecm.deck.model import Material
+from fecm.deck.units import unit_names
+from fecm.mechanics.plate_motion import DivergenceError
+from fecm.problem.options import RunOptions
+from fecm.problem.problem import Problem
+from fecm.problem.slips import mode_of
+from fecm.results.schema import FORMAT, FORMAT_VERSION
+from fecm.results.sinks import Sink
+from fecm.simulation.guard import ENERGY_WARNING, likely_cause
+from fecm.simulation.macros import bind
+from fecm.simulation.simulation import Simulation
+
+
+def simulate(problem: Problem, sink: Sink, options: RunOptions | None = None) -> Simulation:
+    """Run a problem into a sink and return the finished simulation.
+
+    Raises
+    ------
+    DivergenceError
+        If the motion grows without bound, or the energy balance exceeds its limit.
+    SingularStiffnessError
+        If a static solution is requested and the plate is not held.
+    """
+    simulation = Simulation(problem, sink, options or RunOptions())
+    run(simulation)
+    return simulation
+
+
+def run(simulation: Simulation) -> None:
+    """Carry out a program, from its beginning or from the restored state.
+
+    Raises
+    ------
+    DivergenceError
+        If the motion grows without bound; the message names the likely cause.
+    SingularStiffnessError
+        If a static solution is requested and the plate is not held.
+    """
+    problem, state = simulation.problem, simulation.state
+    if not state.position:
+        _write_header(simulation)
+        simulation.printer.problem(problem.deck, problem.mesh, simulation.model.plate)
+    try:
+        with np.errstate(all="ignore"):  # an overflow is reported as a divergence
+            simulation.interpreter.run(
+                partial(bind, simulation), state.position, partial(simulation.on_macro, simulation)
+            )
+            simulation.recorder.finish()
+    except DivergenceError as diverged:
+        cause = likely_cause(problem, simulation.model, state.dt)
+        raise DivergenceError(diverged.step, f"{diverged.reason}; {cause}") from None
+    _write_footer(simulation)
+    _judge(simulation)
+
+
+def _write_header(simulation: Simulation) -> None:
+    """Store the attributes of the file, the deck, and every dataset without its rows."""
+    sink, options, rules = simulation.sink, simulation.options, simulation.rules
+    deck = simulation.problem.deck
+    attributes = {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "fecm_version": __version__,
+        "title": deck.title,
+        "mode": mode_of(options.slips),
+        "slips": sorted(options.slips),
+        **options.rod_method.attributes,
+        **{f"unit_{name}": unit for name, unit in unit_names(deck).items()},
+    }
+    sink.attributes("", attributes)
+    sink.text("deck", deck.text or deck.to_text(), "the cards of the problem")
+    at_nodes = deck.require(Material).integration.points < 0 and not rules.listing_tapes
+    simulation.recorder.create("nodes" if at_nodes else "gauss")
+
+
+def _write_footer(simulation: Simulation) -> None:
+    """Store the permanent indentation, and the number of steps that did not converge."""
+    impact, system = simulation.state.impact, simulation.model.impact
+    if impact is None or system is None or not impact.plate.step:
+        return
+    values = {
+        "permanent_indentation": system.law.permanent(impact.memory, impact.contact),
+        "unsettled_steps": impact.unconverged_steps,
+    }
+    simulation.sink.attributes("history", values)
+
+
+def _judge(simulation: Simulation) -> None:
+    """Add notes on what makes the result doubtful."""
+    state, enforced = simulation.state, simulation.rules.enforces_energy_limit
+    error, step = state.balance.worst_error, state.balance.worst_step
+    if error > ENERGY_WARNING:
+        why = "" if enforced else " (slips are on: it is not judged)"
+        state.notes.append(
+            f"the energy balance is off by {error:.2%} of the supplied energy, at step {step}{why}"
+        )
+    if state.impact is not None and state.impact.unconverged_steps and enforced:
+        state.notes.append(
+            f"the contact iteration did not converge in {state.impact.unconverged_steps} "
+            "steps; a smaller DT helps"
+        )

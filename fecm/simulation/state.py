@@ -1,0 +1,143 @@
+"""The state of a run, apart from what computes it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.mechanics.impact import ImpactState
+from fecm.mechanics.plate_motion import PlateState
+from fecm.simulation.guard import EnergyBalance
+
+# Relative change of the displacement below which CONV leaves its loop.
+TOLERANCE = 1.0e-9
+
+
+@dataclass
+class RunState:
+    """What one macro hands to the next; a checkpoint stores every field.
+
+    Attributes
+    ----------
+    plate : PlateState
+        The plate.
+    impact : ImpactState or None
+        Plate, projectile and contact; shares `plate`.
+    position : list of (int, int)
+        The interpreter's position; empty before the first macro.
+    dt, clock : float
+        Time step, and the time that TIME advances.
+    load_clock : float
+        Clock at the plate's last central difference.
+    constant_factor : float
+        Load factor without a table.
+    table : int or None
+        Index of the current table of proportional loads.
+    tables_read : int
+        Tables that PROP has read.
+    tolerance : float
+        Tolerance of CONV.
+    consistent_mass : bool
+        Whether CMAS came after LMAS.
+    factorised, converged : bool
+        Whether TANG was carried out; whether the last SOLV met the tolerance.
+    residual : ndarray (neq,) or None
+        Load less internal force, formed by FORM.
+    steps_since_output : int
+        Impact steps since the last output (the slip ``counter``).
+    prop_force : float or None
+        Value of PROP that replaces the contact force (the slip ``prop-contact``).
+    first_dt : float or None
+        Time step of the rod's constants.
+    balance : EnergyBalance
+        Energy balance so far.
+    notes : list of str
+        Remarks for the user.
+    """
+
+    plate: PlateState
+    impact: ImpactState | None = None
+    position: list[tuple[int, int]] = field(default_factory=list)
+    dt: float = 0.0
+    clock: float = 0.0
+    load_clock: float = 0.0
+    constant_factor: float = 1.0
+    table: int | None = None
+    tables_read: int = 0
+    tolerance: float = TOLERANCE
+    consistent_mass: bool = False
+    factorised: bool = False
+    converged: bool = False
+    residual: Floats | None = None
+    steps_since_output: int = 0
+    prop_force: float | None = None
+    first_dt: float | None = None
+    balance: EnergyBalance = field(default_factory=EnergyBalance)
+    notes: list[str] = field(default_factory=list)
+
+
+def save(state: object, name: str) -> dict[str, Any]:
+    """Values and arrays of a dataclass and of those in it, by path; a shared one only once."""
+    return dict(_leaves(state, name, set()))
+
+
+def subset(stored: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    """Return the entries whose names have a prefix, without it."""
+    return {n.removeprefix(prefix): v for n, v in stored.items() if n.startswith(prefix)}
+
+
+def _names(value: object) -> tuple[str, ...]:
+    """Names of the fields of a dataclass or named tuple."""
+    if dataclasses.is_dataclass(value):
+        return tuple(f.name for f in dataclasses.fields(value) if f.init)
+    return getattr(value, "_fields", ())
+
+
+def _leaves(value: Any, path: str, seen: set[int]) -> Iterator[tuple[str, Any]]:
+    names = _names(value)
+    if not names:
+        yield path, value.copy() if isinstance(value, np.ndarray) else value
+    elif id(value) not in seen:
+        seen.add(id(value))
+        for name in names:
+            yield from _leaves(getattr(value, name), f"{path}/{name}", seen)
+
+
+def restore(state: object, name: str, stored: Mapping[str, Any]) -> None:
+    """Set a dataclass to what :func:`save` returned for another one of its kind.
+
+    Raises
+    ------
+    KeyError
+        If something is missing.
+    ValueError
+        If an array has another shape or type.
+    """
+    _restored(state, name, stored, set())
+
+
+def _restored(value: Any, path: str, stored: Mapping[str, Any], seen: set[int]) -> Any:
+    """Return the stored value; dataclasses and arrays are changed in place where they can be."""
+    names = _names(value)
+    if not names:
+        new = stored[path]
+        if isinstance(value, np.ndarray):
+            if new.shape != value.shape or new.dtype != value.dtype:
+                raise ValueError(f"{path} has another shape or type")
+            value[...] = new
+            return value
+        return new
+    if id(value) in seen:
+        return value
+    seen.add(id(value))
+    new = {name: _restored(getattr(value, name), f"{path}/{name}", stored, seen) for name in names}
+    if isinstance(value, tuple) or value.__dataclass_params__.frozen:
+        return type(value)(**new)
+    for name, one in new.items():
+        setattr(value, name, one)
+    return value
