@@ -450,7 +450,7 @@ def test_what_an_interrupted_run_has_left_is_not_thrown_away_unasked(whole: Path
     left = checkpoint_of(whole / "l.h5").read_bytes()
     done = fecm_in(whole, "run", "deck.inp", "-o", "l.h5")
     assert done.returncode == 2
-    assert "--resume goes on from it, --overwrite starts again" in done.stderr
+    assert "--resume continues it, --overwrite starts over" in done.stderr
     assert checkpoint_of(whole / "l.h5").read_bytes() == left
     assert fecm_in(whole, "run", "deck.inp", "-o", "l.h5", "--overwrite").returncode == 0
     assert sorted(path.name for path in whole.glob("l.h5*")) == ["l.h5"]

@@ -193,7 +193,7 @@ def test_a_terminated_run_exits_143_and_leaves_a_checkpoint_alone(deck: Path) ->
         assert b"Traceback" not in errors
         left = sorted(p.name for p in deck.parent.iterdir())
         assert left == ["small.h5.checkpoint", "small.h5.spool", "small.inp"]
-        assert b"--resume goes on to small.h5" in errors
+        assert b"--resume continues small.h5" in errors
         for name in left[:2]:
             (deck.parent / name).unlink()
 

@@ -156,7 +156,7 @@ def test_the_first_signal_ends_a_loop_without_time_steps(
         process.send_signal(number)
         _, said = process.communicate(timeout=20)
     assert process.returncode == 128 + number
-    assert "the same command with --resume goes on to d.h5" in said
+    assert "the same command with --resume continues d.h5" in said
     assert sorted(p.name for p in folder.iterdir()) == ["d.h5.checkpoint", "d.h5.spool", "d.inp"]
 
 

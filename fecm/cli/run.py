@@ -135,11 +135,11 @@ def run(
     check_outputs(outputs, True, [deck], beside)
     left = next((n for n, path in enumerate(paths) if checkpoint_of(path).exists()), None)
     if resume and left is None:
-        raise RefusedError(f"there is no checkpoint {checkpoint_of(paths[0])} to go on from")
+        raise RefusedError(f"there is no checkpoint {checkpoint_of(paths[0])} to resume from")
     if left is not None and not (resume or overwrite):
         raise RefusedError(
-            f"{checkpoint_of(paths[left])} is what an interrupted run has left: --resume goes on "
-            "from it, --overwrite starts again"
+            f"{checkpoint_of(paths[left])} belongs to an interrupted run: --resume continues it, "
+            "--overwrite starts over"
         )
     # The interrupted run had got this far; what stands beyond is not its own.
     own = left + 1 if resume and left is not None else 0
@@ -167,7 +167,7 @@ def _run_one(
     resumes: bool,
     overwrite: bool,
 ) -> None:
-    """Run one problem of a deck into a file and say the summary."""
+    """Run one problem of a deck into a file and print its summary."""
     _check_room(path, problem.output_bytes)
     check_memory(problem, solver=choices.solver)
     with contextlib.ExitStack() as stack:
@@ -204,7 +204,7 @@ def _run_one(
 
 @contextlib.contextmanager
 def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
-    """Say how a run ended that did not end well."""
+    """Turn the errors of a run into messages."""
     try:
         yield
     except SingularStiffnessError as error:
@@ -218,7 +218,7 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
         ) from None
     except (CheckpointError, SpoolError) as error:
         raise RefusedError(
-            f"{error}; --overwrite without --resume discards the checkpoint and starts again"
+            f"{error}; --overwrite without --resume discards the checkpoint and starts over"
         ) from None
     except _StoppedError as stopped:
         echo(
@@ -232,10 +232,10 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
         of_disk = isinstance(error, OSError) and (error.errno or type(error) is not OSError)
         if not resumes or of_disk or isinstance(error, MemoryError):
             raise
-        # The state of a checkpoint that was made up can fail anywhere.
+        # A forged checkpoint can fail anywhere.
         raise RefusedError(
-            f"the run can't go on from {checkpoint_of(path)} ({error}); --overwrite without "
-            "--resume discards it and starts again"
+            f"the run can't resume from {checkpoint_of(path)} ({error}); --overwrite without "
+            "--resume discards it and starts over"
         ) from None
 
 
