@@ -10,7 +10,6 @@ the indentation is -u_tip - w.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,7 +21,7 @@ from fecm.mechanics.contact_law import ContactPoint, Law, LoadingHistory, Number
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import DivergenceError, PlateMotion, PlateState, PointForce
 from fecm.mechanics.projectile import Projectile, rigid_approach
-from fecm.mechanics.rod_integrators import RodIntegrator, RodState, TipStep, WilsonStep
+from fecm.mechanics.rod_integrators import RodIntegrator, TipStep, WilsonStep
 
 # The listing's contact iteration; the number of passes affects the results.
 PASSES = 5
@@ -70,34 +69,6 @@ class ImpactState(ContactState):
     """
 
     plate: PlateState = field(kw_only=True)
-
-    def to_arrays(self) -> dict[str, Floats]:
-        """Convert the state to plain arrays, the inverse of :meth:`from_arrays`."""
-        scalars = [
-            self.rod.tip, self.contact.indentation, self.contact.force, self.plate_w,
-            self.contact_work, self.unconverged_steps,
-        ]  # fmt: skip
-        return {
-            "contact": np.array(scalars, dtype=float),
-            "memory": np.array(self.memory, dtype=float),
-            "rod": self.rod.motion.copy(),
-            **self.plate.to_arrays(),
-        }
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, Floats]) -> ImpactState:
-        """Restore a state from the arrays of :meth:`to_arrays`."""
-        tip, indentation, force, w, work, unconverged_steps = arrays["contact"].tolist()
-        branch, *curve = arrays["memory"].tolist()
-        return cls(
-            RodState(arrays["rod"].copy(), tip),
-            LoadingHistory(int(branch), *curve),
-            ContactPoint(indentation, force),
-            w,
-            work,
-            int(unconverged_steps),
-            plate=PlateState.from_arrays(arrays),
-        )
 
 
 @dataclass(frozen=True)

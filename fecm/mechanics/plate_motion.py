@@ -7,7 +7,6 @@ processed in pieces that fit the cache.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
@@ -107,26 +106,6 @@ class PlateState:
     def strain_energy(self) -> float:
         """Strain energy, half the product of displacement and internal force (force*length)."""
         return 0.5 * self.sums.strain
-
-    def to_arrays(self) -> dict[str, Floats]:
-        """Convert the state to plain arrays, the inverse of :meth:`from_arrays`."""
-        scalars = [self.step, self.time, self.dt, self.dt2, self.external_work]
-        return {
-            "plate": np.array(scalars, dtype=float),
-            "sums": np.array(self.sums),
-            "padded": self.padded.copy(),
-            "increment": self.increment.copy(),
-            "scaled_internal_force": self.scaled_internal_force.copy(),
-        }
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, Floats]) -> PlateState:
-        """Restore a state from the arrays of :meth:`to_arrays`."""
-        step, time, dt, dt2, work = arrays["plate"].tolist()
-        names = ("padded", "increment", "scaled_internal_force")
-        u, d, force = (arrays[name].copy() for name in names)
-        sums = Sums(*arrays["sums"].tolist())
-        return cls(u, d, force, int(step), time, dt, dt2, work, sums)
 
 
 class Sums(NamedTuple):
