@@ -193,7 +193,7 @@ def test_a_line_on_one_side_of_all_its_points_is_noted(share: float, side: str) 
     assert found.line is not None
     start = replace(found.line.alpha_p, value=share * found.line.alpha_p.value)
     told = "; ".join(notes(replace(found, line=replace(found.line, alpha_p=start))))
-    assert (f"lies {side} all of its points" in told) is bool(side)
+    assert (f"is {side} all of its points" in told) is bool(side)
 
 
 def test_one_unloading_tells_alpha_cr() -> None:

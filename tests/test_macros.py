@@ -160,7 +160,7 @@ def test_a_plate_that_is_not_held_has_no_static_solution(tmp_path: Path) -> None
     deck.write_text(small("TANG\nFORM\nSOLV\nDISP\n", data=DATA_CARDS + "FORC\n13, 0, 0, 0, 1\n\n"))
     done = call("run", str(deck), "-o", str(tmp_path / "x.h5"))
     assert done.exit_code == 2
-    assert "not held" in done.stderr
+    assert "the plate is not restrained" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["free.inp"]
 
 

@@ -151,9 +151,11 @@ def _shape(shape: tuple[int, ...]) -> str:
 def _where(place: dict[str, Any]) -> str:
     """A place in words, with a leading blank."""
     words: list[str] = []
-    if place["step"] is not None:
+    if place["time"] is not None:
         words.append(f"step {place['step']} (time {place['time']:.6g})")
     words += [f"{n} {value}" for n, value in place.items() if n not in ("index", "step", "time")]
+    if place["step"] is not None and place["time"] is None:  # an index of a sweep's histories
+        words.append(f"step {place['step']}")
     if not words and place["index"]:
         words.append(f"index {', '.join(map(str, place['index']))}")
     return f" at {', '.join(words)}" if words else ""
