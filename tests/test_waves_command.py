@@ -223,7 +223,7 @@ def test_the_picture_of_dispersion_shows_scaled_velocities_and_frequencies() -> 
             np.testing.assert_allclose(x, curves[n // 5].wavelength)
             expected = factor * getattr(curves[n // 5], name)[:, n % 5]
             np.testing.assert_allclose(y, expected, rtol=1e-9)
-    with pytest.raises(PlotError, match="8 directions .* at most 7"):
+    with pytest.raises(PlotError, match=r"8 directions .* at most 7"):
         dispersion_picture(medium, curves * 4)
 
 
