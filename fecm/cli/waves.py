@@ -24,7 +24,7 @@ from fecm.problem.build import laminate_of_deck
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces
 from fecm.studies.waves import dispersion as compute
 
-# Rows of a table beyond which a slip of the pen is more likely than a wish.
+# A table of more rows is certainly a typo.
 MOST = 1_000_000
 
 

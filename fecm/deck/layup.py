@@ -12,7 +12,7 @@ import re
 
 from fecm._errors import FecmError
 
-# A layup of more plies than this is a slip of the pen.
+# A layup of more plies is certainly a typo.
 MOST_PLIES = 10_000
 
 # Groups inside groups, at the most.

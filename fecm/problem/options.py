@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fecm.mechanics.rod_integrators import RodMethod
 from fecm.mechanics.stiffness_product import AUTO, SOLVERS
 
-# Error of the energy balance, as a part of what was given, that ends a run.
+# Relative error of the energy balance that ends a run.
 ENERGY_LIMIT = 0.1
 
 
@@ -27,7 +27,8 @@ class RunOptions:
     rod_method : RodMethod
         The rod's mass matrix and integrator.
     energy_limit : float
-        Error of the energy balance, as a part of what was given, that ends a run without slips.
+        Error of the energy balance, relative to the supplied energy, that ends a run without
+        slips.
 
     Raises
     ------
