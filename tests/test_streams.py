@@ -148,7 +148,10 @@ def test_the_first_signal_ends_a_loop_without_time_steps(
     text = small(program)
     (folder / "d.inp").write_text(text.replace(LAST, HELD))
     command = [sys.executable, "-m", "fecm", "run", "d.inp"]
-    with subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        command, cwd=folder, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),  # nohup ignores SIGHUP
+    ) as process:  # fmt: skip
         until = time.monotonic() + 20.0
         while not list(folder.glob(".d.partial.h5")) and time.monotonic() < until:
             time.sleep(0.01)
