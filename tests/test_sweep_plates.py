@@ -11,11 +11,12 @@ import fecm
 from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.model import Boundary
+from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import is_coupled
 from fecm.problem.generate import generate
 from fecm.sweeps.vary import apply_case
 from tests.calls import call
-from tests.decks import LONG, MESH, small
+from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, small
 
 LAYUPS = ("[0/90]2s", "[0_4/90_4]", "[45/-45]4")
 
@@ -123,3 +124,29 @@ def _run(deck: Deck) -> fecm.Result:
     result = fecm.run(deck)
     assert isinstance(result, fecm.Result)
     return result
+
+
+def in_plane_first(dt: str, program: str = PROGRAM) -> str:
+    """A plate without in-plane supports whose stiff core makes it faster in its plane."""
+    layers = "    1  90.      0.13\n    2   0.      0.80\n    3  90.      0.13\n"
+    data = DATA_CARDS[: DATA_CARDS.index("    1   0. ")].replace(".106", "1.06") + layers
+    mesh = MESH[: MESH.index("BOUN")]
+    text = small(program.replace("DT        .5E-6", f"DT,,{dt}"), mesh=mesh, data=data)
+    return text.replace("   25    4    2    2", "   25    4    3    2")
+
+
+def test_a_sweep_under_dt_0_takes_the_time_step_of_the_run() -> None:
+    # Velocities alone leave the deck's DT 0 to each of the two.
+    text = in_plane_first("0", PROGRAM.replace("         10", "        400"))
+    run, swept = fecm.run(text), fecm.sweep(text, {"velocity": [115.0]}, history=True)
+    assert isinstance(run, fecm.Result)
+    assert swept.force is not None
+    assert swept.dt[0] == run.time[0]
+    np.testing.assert_allclose(swept.force[0], run.force, rtol=0.0, atol=1e-9 * run.force.max())
+
+
+def test_in_plane_unknowns_that_rest_do_not_make_the_contact_look_unstable() -> None:
+    # All unknowns together limit the step to 1.34e-6, those that move to 1.51e-6.
+    (problem,) = load_deck(in_plane_first("1.45E-6")).problems
+    assert critical_time_step(problem.plate) < 1.45e-6 < problem.critical_time_step
+    assert "W517" not in [f.code for f in load_deck(in_plane_first("1.45E-6")).findings]

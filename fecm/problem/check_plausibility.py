@@ -266,7 +266,7 @@ def _check_units(deck: Deck, findings: Findings, *, hits: bool) -> None:
 
 def check_time_step_of_contact(problem: Problem, findings: Findings) -> None:
     """Warn of a DT that the contact makes unstable, and of one far below what is stable."""
-    deck, plate = problem.deck, problem.plate
+    deck, plate = problem.deck, problem.moving_plate
     steps = [macro for macro in deck.macros if macro.word == "DT"]
     if not steps:
         return

@@ -102,8 +102,9 @@ class EnergyGuard:
 def likely_cause(problem: Problem, model: ImpactModel, dt: float) -> str:
     """Explain a divergence, as far as the time step does."""
     try:
-        critical = critical_time_step(model.motion.plate)
-        contact = contact_step(problem.deck, model.plate, dt) if model.impact is not None else None
+        plate = model.motion.plate
+        critical = critical_time_step(plate)
+        contact = contact_step(problem.deck, plate, dt) if model.impact is not None else None
     except UnsoundPlateError as error:
         return str(error)
     above = dt > critical

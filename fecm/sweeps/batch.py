@@ -22,11 +22,10 @@ from fecm.deck.reader import ParsedProblem
 from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, stacked
 from fecm.mechanics.impact import ContactState, couple_step
 from fecm.mechanics.mesh import Mesh
-from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.projectile import Projectile as ProjectileModel
 from fecm.mechanics.rod_integrators import WilsonStep
-from fecm.mechanics.time_step import critical_time_step, taken_time_step
+from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import build_law, build_model, build_projectile
 from fecm.problem.check_impact import check_impact, check_law, check_projectile
 from fecm.problem.check_program import check_program
@@ -36,7 +35,7 @@ from fecm.results.sinks import MemorySink
 from fecm.simulation.guard import ENERGY_WARNING
 from fecm.simulation.run import simulate
 from fecm.sweeps.cases import CasesError
-from fecm.sweeps.clock import Clock, critical_of, with_time_step
+from fecm.sweeps.clock import Clock, with_time_step
 from fecm.sweeps.outcome import SUMMARY, Indentation, Outcome, status_of, summarise
 from fecm.sweeps.plan import ADVANCED, Plan, Task, shares_plate, without_output
 from fecm.sweeps.responses import BLOCK, Convolution, TipState, TipSteps, plate_response
@@ -94,7 +93,7 @@ def _timed(decks: list[Deck], clock: Clock | None) -> tuple[Problem | None, list
     checked, reason = _checked(with_time_step(decks[0], 0.0))
     if checked is None:
         return None, decks, reason
-    dt = clock.time_step(critical_of(checked))
+    dt = clock.time_step(checked.critical_time_step)
     timed = [with_time_step(deck, dt, clock.dt) for deck in decks]
     findings = Findings()
     problem = Problem(timed[0], checked.mesh, compile_program(timed[0].macros, findings))
@@ -125,10 +124,10 @@ def _refuse(number: int, deck: Deck, mesh: Mesh, lost: dict[int, str]) -> bool:
     return bool(findings.errors)
 
 
-def _time_step(checked: Problem, plate: PlateModel) -> float:
+def _time_step(checked: Problem) -> float:
     """Time step of the program; 0 means 0.9 of the critical time step, as in a run."""
     dt = next(macro.value for macro in flat(checked.program) if macro.word == "DT")
-    return dt or taken_time_step(critical_time_step(plate))
+    return dt or taken_time_step(checked.critical_time_step)
 
 
 def _together(numbers: list[int], decks: list[Deck], checked: Problem) -> Outcome:
@@ -137,7 +136,7 @@ def _together(numbers: list[int], decks: list[Deck], checked: Problem) -> Outcom
     if setup.impact is None:
         raise ValueError("the deck has no impact")
     steps = checked.work.steps
-    dt = _time_step(checked, setup.plate)
+    dt = _time_step(checked)
     projectiles = [build_projectile(deck) for deck in decks]
     kinds = {projectile: number for number, projectile in enumerate(dict.fromkeys(projectiles))}
     # Cases with the same projectile are adjacent.

@@ -47,15 +47,10 @@ def clock_of(checked: Problem) -> Clock | None:
     if len(sizes) != 1:
         return None
     (dt,) = sizes
-    critical = critical_of(checked)
+    critical = checked.critical_time_step
     if not dt:
         return Clock(taken_time_step(critical), rounded=False)
     return Clock(dt, rounded=True) if dt == rounded_time_step(critical) else None
-
-
-def critical_of(checked: Problem) -> float:
-    """Return the critical time step of a problem (time)."""
-    return checked.critical_time_step
 
 
 def with_time_step(deck: Deck, dt: float, taken: float = 0.0) -> Deck:

@@ -19,7 +19,7 @@ from fecm.problem.build import build_projectile, is_coupled
 from fecm.problem.generate import restraint_codes
 from fecm.problem.problem import check
 from fecm.sweeps.cases import NAMES, Case, CasesError, Value
-from fecm.sweeps.clock import critical_of, with_time_step
+from fecm.sweeps.clock import with_time_step
 
 # Fields of a ply card.
 PLY = ("density", "nu12", "e1", "e2", "g12", "g13", "g23")
@@ -166,7 +166,7 @@ def _taken_time_step(deck: Deck) -> float:
     if all(macro.value for macro in deck.macros if macro.word == "DT"):
         return 0.0
     checked = check(ParsedProblem(deck), Findings())
-    return 0.0 if checked is None else taken_time_step(critical_of(checked))
+    return 0.0 if checked is None else taken_time_step(checked.critical_time_step)
 
 
 _SETTERS: dict[str, Callable[[Deck, str, Value], Deck]] = {
