@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 import shutil
 from pathlib import Path
 from typing import Any
@@ -117,8 +116,6 @@ class PartialResults:
         with beside(self._path(task)) as partial, partial.open("wb") as file:
             file.write(data)
             file.write(hashlib.sha256(data).digest())
-            file.flush()
-            os.fsync(file.fileno())
 
     def clear(self) -> None:
         """Delete the folder."""
