@@ -27,7 +27,9 @@ def set_time_step(run: Simulation, dt: float) -> None:
     """DT; 0 takes a fraction of the critical time step."""
     run.state.dt = dt
     if not dt:
-        critical = critical_time_step(run.model.motion.plate)
+        plate, problem = run.model.motion.plate, run.problem
+        known = plate is problem.moving_plate  # unless a slip changes the plate
+        critical = problem.critical_time_step if known else critical_time_step(plate)
         run.state.dt = dt = taken_time_step(critical)
         run.state.notes.append(f"DT 0: took {dt:g}, {SAFE:g} of the critical {critical:.4g}")
 
@@ -72,9 +74,7 @@ def impact_step(run: Simulation, n: int) -> None:
     recorder.steps.step(plate, impact, run.force_factor(), contact_row=stores)
     if stores and not listing_tapes:
         recorder.strains(plate.step, plate.time, run.displacement_field())
-    if not plate.step % run.interval:
-        for observer in run.observers:
-            observer(run)
+    run.observe()
 
 
 def _counted(run: Simulation, n: int) -> bool:
@@ -96,9 +96,7 @@ def central_difference(run: Simulation) -> None:
     run.model.motion.central_difference(plate, state.dt, run.force_factor(state.load_clock))
     state.load_clock = state.clock
     run.recorder.steps.step(plate, state.impact, run.force_factor())
-    if not plate.step % run.interval:
-        for observer in run.observers:
-            observer(run)
+    run.observe()
 
 
 # Statics and modes -------------------------------------------------------------------------------

@@ -112,6 +112,12 @@ class Simulation:
         """Displacement of every dof of every node, (numnp, 5)."""
         return self.model.motion.field(self.state.plate, self.force_factor())
 
+    def observe(self) -> None:
+        """Call the observers after every `interval` steps."""
+        if not self.state.plate.step % self.interval:
+            for observer in self.observers:
+                observer(self)
+
     def save(self) -> dict[str, Any]:
         """Values that JSON can hold and arrays, for :meth:`restore`."""
         self.state.position = self.interpreter.position
