@@ -82,7 +82,7 @@ def test_a_number_that_is_no_number_is_marked_where_it_stands() -> None:
         ("RODP,AB,5", "E514", "AB", ""),
         ("RODP AB       5", "E514", "AB  ", ""),
         ("RODP          5    7", "E514", "    7", ""),
-        ("RODP          512345", "E514", "12345", "behind a comma"),
+        ("RODP          512345", "E514", "12345", "after a comma"),
         ("RODP,5,7", "E514", "7", ""),
         ("TIME          3", "E514", "    3", ""),
         ("TIME,3", "E514", "3", ""),

@@ -272,8 +272,8 @@ def test_the_picture_of_fronts_shows_circle_rays_fronts_and_cusps() -> None:
     [
         (("dispersion",), "give a DECK, or --layup"),
         (("speeds", "--material", "report"), "give a DECK, or --layup"),
-        (("speeds", LONG, "--layup", "0"), "--layup stands for a deck"),
-        (("speeds", LONG, "--ply-thickness", "1"), "--ply-thickness stands for a deck"),
+        (("speeds", LONG, "--layup", "0"), "--layup describes a laminate"),
+        (("speeds", LONG, "--ply-thickness", "1"), "--ply-thickness describes a laminate"),
         (("speeds", "--layup", "0"), "--layup needs a positive --ply-thickness"),
         (("speeds", *LAYUP), "give either --ply or --material"),
         (("speeds", *LAYUP, "--ply", "1,2"), "--ply takes 7 numbers"),

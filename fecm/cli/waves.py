@@ -131,7 +131,9 @@ def _laminate(
         raise RefusedError("give a DECK, or --layup, --ply-thickness and --ply or --material")
     if deck is not None and (layup is not None or given):
         option = "layup" if layup is not None else given[0]
-        raise RefusedError(f"--{option.replace('_', '-')} stands for a deck; {deck} is one already")
+        raise RefusedError(
+            f"--{option.replace('_', '-')} describes a laminate; {deck} has one already"
+        )
     if deck is not None:
         return _laminate_of_deck(deck)
 

@@ -296,7 +296,7 @@ def _is_aligned(card: Card, fields: Fields, findings: Findings, *, cut_is_meant:
             target = next(f for f in fields if f.first > column and f.kind != "A")
             findings.add(
                 "E108",
-                f"Column {column} belongs to no field, but `{data[column - 1]}` stands in it.",
+                f"Column {column} belongs to no field; it has `{data[column - 1]}`.",
                 Place(card.line, first, last, card.text),
                 _remedy(card, fields, last - first + 1, target.width)
                 or f"cols {target.first}-{target.last} are the next field: {target.name}",
@@ -366,17 +366,17 @@ def _remedy(card: Card, fields: Fields, length: int, width: int) -> str:
 def _ends_with_fields(
     card: Card, fields: Fields, pieces: Sequence[tuple[int, str]], findings: Findings
 ) -> bool:
-    """Whether no value stands behind the last field; in fixed columns that is only a warning."""
+    """Whether no value follows the last field; in fixed columns that is only a warning."""
     data = card.data
     if "," in data:
         start, rest = pieces[len(fields)] if len(pieces) > len(fields) else (0, "")
         more = rest.lstrip(", ")
         first = start + len(rest) - len(more) if more else 0
-        code, what = "E106", f"stands behind the last of the card's {len(fields)} values."
+        code, what = "E106", f"follows the last of the card's {len(fields)} values."
     else:
         tail = data[fields[-1].last :]
         first = len(data) - len(tail.lstrip()) + 1 if tail.strip() else 0
-        code, what = "W106", "stands beyond the last field of the card and is not read."
+        code, what = "W106", "is beyond the last field of the card and is not read."
     if first:
         place = Place(card.line, first, len(data), card.text)
         findings.add(code, f"`{data[first - 1 :]}` {what}", place)

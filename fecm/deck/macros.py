@@ -198,25 +198,25 @@ def _check_unused(word: Word, macro: Macro, findings: Findings) -> None:
         example = f"{word.name},{macro.option}"
         findings.add(
             "E514",
-            f"{word.name} takes no second word, but `{macro.option}` stands there.",
+            f"{word.name} takes no second word; the card has `{macro.option}`.",
             macro.place("second word"),
-            f"the number stands in columns 11-15 or behind a comma: {example}"
+            f"the number is in columns 11-15 or after a comma: {example}"
             if is_number
             else "take it out",
         )
     elif macro.value and not word.value:
         findings.add(
             "E514",
-            f"{word.name} takes no number, but {macro.value:g} stands there.",
+            f"{word.name} takes no number; the card has {macro.value:g}.",
             macro.place("value"),
             "take it out",
         )
     elif macro.second:
         findings.add(
             "E514",
-            f"{word.name} takes no second number, but {macro.second:g} stands there.",
+            f"{word.name} takes no second number; the card has {macro.second:g}.",
             macro.place("second value"),
-            f"a number of more than five digits stands behind a comma: {word.name},123456",
+            f"a number of more than five digits goes after a comma: {word.name},123456",
         )
 
 

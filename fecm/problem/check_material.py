@@ -67,7 +67,7 @@ def _check_layers(material: Material, findings: Findings) -> None:
         if layer.number != position:
             findings.add(
                 "W408",
-                f"Layer number {layer.number} stands in place {position}: layers lie in the order "
+                f"Layer {position} has the number {layer.number}: layers are stacked in the order "
                 "of their cards, whatever their numbers.",
                 layer.place("layer"),
             )
