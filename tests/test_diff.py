@@ -255,7 +255,7 @@ def test_json_tells_all_that_the_text_does(runs: Path) -> None:
 
 def test_small_blocks_of_rows_find_the_same(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = diff(runs / "report.h5", runs / "listing.h5").stdout
-    monkeypatch.setattr("fecm.results.diff.BLOCK", 1)
+    monkeypatch.setattr("fecm.results.schema.BLOCK", 1)
     assert diff(runs / "report.h5", runs / "listing.h5").stdout == whole
 
 

@@ -295,7 +295,7 @@ def test_a_dataset_that_vanishes_while_it_is_read_is_one_error(
     changed: Callable[[Edit], Path],
 ) -> None:
     path = changed(lambda file: None)
-    arrays = read(path).arrays
+    arrays = read(path)
     path.write_bytes(b"gone")
     with pytest.raises(ResultFileError, match=r"changed\.h5: not a readable HDF5 file"):
         arrays["tape3/w"]

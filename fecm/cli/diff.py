@@ -16,7 +16,6 @@ from fecm.results.diff import (
     Comparison,
     Difference,
     IncomparableError,
-    Tolerance,
     difference,
 )
 from fecm.results.schema import jsonable, printable, shown_apart
@@ -68,7 +67,7 @@ def diff(
     Exit status: 0 equal, 1 different, 2 unusable file or call.
     """
     try:
-        found = difference(a, b, Tolerance(rtol, atol), only)
+        found = difference(a, b, rtol, atol, only)
     except IncomparableError as error:
         raise RefusedError(printable(str(error))) from None
     if form == "json":

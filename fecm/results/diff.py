@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import difflib
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from fecm._errors import FecmError
 from fecm.deck.records import DOF_NAMES
 from fecm.results.hdf5_reader import Contents, read
-from fecm.results.schema import DATASETS, FORMAT, SCALES, SWEEP
-from fecm.results.tape_reader import SHEARS, TapeText, W, read_tapes
+from fecm.results.schema import DATASETS, FORMAT, SCALES, SWEEP, row_blocks
+from fecm.results.tape_reader import SHEARS, TAPES, TapeText, W, read_tapes
 from fecm.results.tapes import CONTACT, CURVATURES
 
 Array = NDArray[Any]
@@ -44,16 +44,11 @@ CASES = (("case", 0), ("step", 1))
 # Those of tape3 without a known number of nodes.
 LINES = (("line", 1), ("column", 1))
 
-TAPES = "tapes"
-
 SOURCE_NAMES = {
     FORMAT: "the result of a run",
     SWEEP: "the result of a sweep",
     TAPES: "a folder of tapes",
 }
-
-# Bytes of a block of rows.
-BLOCK = 4_000_000
 
 # Names of the indices along each size of a dataset; rows are named by their step and time.
 AXES = {size: name for size, (name, _) in SCALES.items()} | {"nen": "position", "ndm": "axis"}
@@ -79,59 +74,11 @@ class IncomparableError(FecmError, ValueError):
     """The sources have nothing in common, or lack what was asked for."""
 
 
-@dataclass
-class Source:
-    """One of the two results: a result file, or a folder of tapes.
-
-    Attributes
-    ----------
-    form : str
-        A key of `SOURCE_NAMES`.
-    rows : callable
-        Returns rows `start` to `stop` of a dataset.
-    shapes : dict
-        Shape of every dataset, by path.
-    dtypes : dict
-        Its type; objects for texts.
-    axes : mapping
-        Names and first numbers of its indices, if the schema does not name them.
-    contents : Contents or TapeText
-        The file or the tapes.
-    """
-
-    form: str
-    rows: Callable[[str, int, int], Array]
-    shapes: dict[str, tuple[int, ...]]
-    dtypes: dict[str, np.dtype[Any]]
-    axes: Mapping[str, tuple[tuple[str, int], ...]]
-    contents: Contents | TapeText
-
-    def blocks(self, path: str) -> Iterator[Array]:
-        """Yield a dataset in blocks of rows; a single number is one row."""
-        shape = self.shapes[path]
-        rows = shape[0] if shape else 1
-        step = max(1, BLOCK // (8 * max(1, int(np.prod(shape[1:], dtype=float)))))
-        for start in range(0, rows, step):
-            yield self.rows(path, start, min(start + step, rows))
-
-    def attributes(self) -> dict[str, Any]:
-        """All attributes by name: ``title``, ``energy:initial``, ``tape3/w:unit``."""
-        if isinstance(self.contents, TapeText):
-            return {}
-        named = dict(self.contents.groups)
-        named |= {path: self.contents.arrays.attributes(path) for path in self.shapes}
-        values = dict(self.contents.attributes)
-        for path, attributes in named.items():
-            values |= {f"{path}:{name}": value for name, value in attributes.items()}
-        return values
+Source = Contents | TapeText
 
 
 def open_source(path: Path) -> Source:
     """Open a result file or a folder of tapes.
-
-    Parameters
-    ----------
-    path : Path
 
     Raises
     ------
@@ -140,50 +87,7 @@ def open_source(path: Path) -> Source:
     OSError
         If it can't be opened.
     """
-    return _tape_source(read_tapes(path)) if path.is_dir() else _file_source(path)
-
-
-def _file_source(path: Path) -> Source:
-    contents = read(path, FORMAT, SWEEP)
-    arrays, lists = contents.arrays, contents.lists
-
-    def rows(path: str, start: int, stop: int) -> Array:
-        if path in lists:
-            return np.array(lists[path][start:stop], dtype=object)
-        return arrays.rows(path, start, stop)
-
-    shapes = arrays.shapes | {name: (len(values),) for name, values in lists.items()}
-    dtypes = arrays.dtypes | dict.fromkeys(lists, np.dtype(object))
-    axes = dict.fromkeys(shapes, CASES) if contents.form == SWEEP else {}
-    return Source(contents.form, rows, shapes, dtypes, axes, contents)
-
-
-def _tape_source(tapes: TapeText) -> Source:
-    arrays = tapes.arrays
-    return Source(
-        TAPES,
-        lambda path, start, stop: arrays[path][start:stop],
-        {name: values.shape for name, values in arrays.items()},
-        {name: values.dtype for name, values in arrays.items()},
-        {W: LINES} if tapes.lines else {},
-        tapes,
-    )
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """Largest difference of equal numbers.
-
-    Attributes
-    ----------
-    relative : float
-        Part of the dataset's scale.
-    absolute : float
-        In the dataset's unit.
-    """
-
-    relative: float = 0.0
-    absolute: float = 0.0
+    return read_tapes(path) if path.is_dir() else read(path, FORMAT, SWEEP)
 
 
 @dataclass
@@ -256,11 +160,9 @@ class Comparison:
 
     def blocks(self) -> Iterator[tuple[int, Array, Array]]:
         """Yield number of the first row, rows of A and rows of B."""
-        start = 0
-        a, b = (source.blocks(self.path) for source in self.sources)
-        for left, right in zip(a, b, strict=True):
-            yield start, left, right
-            start += len(left)
+        a, b = self.sources
+        for start, stop in row_blocks(self.shapes[0]):
+            yield start, a.rows(self.path, start, stop), b.rows(self.path, start, stop)
 
 
 @dataclass
@@ -287,36 +189,42 @@ class Difference:
         return not any(self.only) and all(found.same for found in self.compared)
 
 
-def difference(a: Path, b: Path, tolerance: Tolerance, only: Sequence[str] = ()) -> Difference:
+def difference(
+    a: Path, b: Path, rtol: float = 0.0, atol: float = 0.0, only: Sequence[str] = ()
+) -> Difference:
     """Compare two results.
 
     Parameters
     ----------
     a, b : Path
         Result files or folders of tapes.
-    tolerance : Tolerance
+    rtol : float
+        Largest difference of equal numbers as a fraction of the dataset's scale.
+    atol : float
+        Largest difference in the dataset's unit; both are added.
     only : sequence of str
         Datasets and groups to compare; all by default.
 
     Raises
     ------
     IncomparableError
-        If only one is the result of a sweep, or `only` names an unknown dataset.
+        If only one is the result of a sweep, or `only` names a missing dataset.
     ResultFileError
         If a file can't be read.
     OSError
         If a file can't be opened.
     """
     left, right = open_source(a), open_source(b)
+    forms = left.form, right.form
+    if left.form != right.form and SWEEP in forms:
+        names = " and B ".join(SOURCE_NAMES[form] for form in forms)
+        raise IncomparableError(f"A is {names}: they can't be compared")
     left, right = _fitted(left, right), _fitted(right, left)
-    if left.form != right.form and SWEEP in (left.form, right.form):
-        forms = " and B ".join(SOURCE_NAMES[source.form] for source in (left, right))
-        raise IncomparableError(f"A is {forms}: they can't be compared")
-    shared = ON_TAPE if TAPES in (left.form, right.form) else left.shapes.keys() | right.shapes
+    shared = ON_TAPE if TAPES in forms else left.shapes.keys() | right.shapes
     in_a, in_b = left.shapes.keys() & shared, right.shapes.keys() & shared
     chosen = _chosen(in_a | in_b, only)
     return Difference(
-        [compare(left, right, path, tolerance) for path in sorted(in_a & in_b & chosen)],
+        [_compare((left, right), path, rtol, atol) for path in sorted(in_a & in_b & chosen)],
         (sorted((in_a - in_b) & chosen), sorted((in_b - in_a) & chosen)),
         _listed(left, right),
     )
@@ -325,8 +233,8 @@ def difference(a: Path, b: Path, tolerance: Tolerance, only: Sequence[str] = ())
 def _fitted(source: Source, other: Source) -> Source:
     """Divide tape3 into rows of as many nodes as the other source has, if that is a file."""
     shape = other.shapes.get(W, ())
-    if isinstance(source.contents, TapeText) and other.form != TAPES and len(shape) == 2:
-        return _tape_source(source.contents.fitted(shape[1]))
+    if isinstance(source, TapeText) and other.form != TAPES and len(shape) == 2:
+        return source.fitted(shape[1])
     return source
 
 
@@ -359,19 +267,28 @@ def _hint(asked: str, names: set[str]) -> str:
 
 def _listed(a: Source, b: Source) -> list[dict[str, Any]]:
     """Attributes and texts that differ between two files; tapes have none."""
-    if isinstance(a.contents, TapeText) or isinstance(b.contents, TapeText):
+    if isinstance(a, TapeText) or isinstance(b, TapeText):
         return []
-    left, right = a.attributes(), b.attributes()
+    left, right = _attributes(a), _attributes(b)
     listed = [
         {"name": name, "a": left.get(name), "b": right.get(name), "line": None}
         for name in dict.fromkeys((*left, *right))
         if repr(left.get(name)) != repr(right.get(name))
     ]
-    left, right = a.contents.texts, b.contents.texts
-    for name in dict.fromkeys((*left, *right)):
-        if left.get(name) != right.get(name):
-            listed.append({"name": name, **_first_line(left.get(name), right.get(name))})
+    for name in dict.fromkeys((*a.texts, *b.texts)):
+        if a.texts.get(name) != b.texts.get(name):
+            listed.append({"name": name, **_first_line(a.texts.get(name), b.texts.get(name))})
     return listed
+
+
+def _attributes(source: Contents) -> dict[str, Any]:
+    """All attributes by name: ``title``, ``energy:initial``, ``tape3/w:unit``."""
+    named = source.groups | {path: source.attributes_of(path) for path in source}
+    return source.attributes | {
+        f"{path}:{name}": value
+        for path, attributes in named.items()
+        for name, value in attributes.items()
+    }
 
 
 def _first_line(a: str | None, b: str | None) -> dict[str, Any]:
@@ -383,25 +300,18 @@ def _first_line(a: str | None, b: str | None) -> dict[str, Any]:
     return {"a": x, "b": y, "line": line}
 
 
-def compare(a: Source, b: Source, path: str, tolerance: Tolerance) -> Comparison:
-    """Compare a dataset that both sources have.
-
-    Raises
-    ------
-    ResultFileError
-        If a file can't be read there.
-    """
-    found = Comparison(path, (a, b))
+def _compare(sources: tuple[Source, Source], path: str, rtol: float, atol: float) -> Comparison:
+    """Compare a dataset that both sources have."""
+    found = Comparison(path, sources)
     if not found.comparable:
         return found
     if found.holds_texts:
         _compare_texts(found)
         return found
     index, any_infinite = _measure(found)
-    integers = all(source.dtypes[path].kind in "biu" for source in (a, b))
+    integers = all(source.dtypes[path].kind in "biu" for source in sources)
     found.scale = _scale(found)
-    allowed = tolerance.absolute + tolerance.relative * found.scale
-    found.tolerance = 0.0 if integers else allowed
+    found.tolerance = 0.0 if integers else atol + rtol * found.scale
     if index is not None:
         found.at = _place(found, index)
     if any_infinite or found.largest > found.tolerance:
@@ -413,12 +323,13 @@ def _scale(found: Comparison) -> float:
     """Scale of the differences of a dataset; by default its maximum."""
 
     def largest(path: str, low: float = -np.inf) -> float:
-        values = [
-            block[np.isfinite(block) & (block > low)]
+        blocks = (
+            source.rows(path, *rows)
             for source in found.sources
             if path in source.shapes and source.dtypes[path].kind != "O"
-            for block in source.blocks(path)
-        ]
+            for rows in row_blocks(source.shapes[path])
+        )
+        values = (block[np.isfinite(block) & (block > low)] for block in blocks)
         return max((float(np.abs(block).max(initial=0.0)) for block in values), default=0.0)
 
     if found.path not in SCALE_NAMES:
@@ -527,7 +438,8 @@ def _index_names(
 ) -> Mapping[str, int | str]:
     """Numbers of a place by the names of its axes, from 1; a row with a clock needs none."""
     path, source = found.path, found.sources[0]
-    if axes := source.axes.get(path):
+    lines = isinstance(source, TapeText) and source.lines and path == W
+    if axes := CASES if source.form == SWEEP else LINES if lines else ():
         return {name: first + i for (name, first), i in zip(axes, index, strict=False)}
     dataset = DATASETS.get(path)
     names: dict[str, int | str] = {}

@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,28 +31,47 @@ RESULT_OF = {FORMAT: "a run", SWEEP: "a sweep"}
 PACKED = 2000
 
 
-class FileArrays(Mapping[str, Array]):
-    """Datasets of a result file, read on demand; rows are read without keeping them.
+class Contents(Mapping[str, Array]):
+    """Contents of a result file: its datasets by path, read on demand.
 
     Attributes
     ----------
     path : Path
         The file.
+    attributes : dict
+        Attributes of the file; a value of an unsupported type is replaced by the type's name.
+    groups : dict of dict
+        Attributes of the groups, by path.
     shapes : dict
-        Shape of every dataset of numbers.
+        Shape of every dataset.
     dtypes : dict
-        Types, in native byte order.
+        Type of every dataset in native byte order; objects for texts.
+    texts : dict of str
+        Single texts, by path.
+    lists : dict of list of str
+        Datasets of texts, by path; sweeps only.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, attributes: dict[str, Any]) -> None:
         self.path = path
+        self.attributes = attributes
+        self.groups: dict[str, dict[str, Any]] = {}
         self.shapes: dict[str, tuple[int, ...]] = {}
         self.dtypes: dict[str, np.dtype[Any]] = {}
+        self.texts: dict[str, str] = {}
+        self.lists: dict[str, list[str]] = {}
         self._read: dict[str, Array] = {}
+
+    @property
+    def form(self) -> str:
+        """``"fecm"`` for a run, ``"fecm-sweep"`` for a sweep."""
+        return str(self.attributes["format"])
 
     def __getitem__(self, key: str) -> Array:
         if key not in self.shapes:
             raise NotStoredError(f"{self.path}: there is no {key} in this result")
+        if key in self.lists:
+            return np.array(self.lists[key])
         if key not in self._read:
             with _troubles(self.path), h5py.File(self.path) as file:
                 values = np.asarray(file[key][()])
@@ -69,13 +88,15 @@ class FileArrays(Mapping[str, Array]):
         ResultFileError
             If the file can't be read there.
         """
+        if path in self.lists:
+            return np.array(self.lists[path][start:stop], dtype=object)
         with _troubles(self.path), h5py.File(self.path) as file:
             dataset = file[path]
             if not dataset.shape:
                 return np.asarray(dataset[()]).reshape(1)[start:stop]
             return np.asarray(dataset[start:stop])
 
-    def attributes(self, path: str) -> dict[str, Any]:
+    def attributes_of(self, path: str) -> dict[str, Any]:
         """Read the attributes of a dataset or group."""
         with _troubles(self.path), h5py.File(self.path) as file:
             return _attributes(file[path])
@@ -87,7 +108,7 @@ class FileArrays(Mapping[str, Array]):
             raise ResultFileError(f"{self.path}: {ELEMENTS} names nodes outside 1 to {count}")
 
     def __contains__(self, key: object) -> bool:
-        return key in self.shapes  # Mapping's own would read the dataset
+        return key in self.shapes  # Mapping's own method would read the dataset
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.shapes)
@@ -106,39 +127,6 @@ def _troubles(path: Path) -> Iterator[None]:
     except Exception as error:  # HDF5 may raise anything on a damaged file
         message = " ".join(str(error).split())
         raise ResultFileError(f"{path}: not a readable HDF5 file ({message})") from None
-
-
-@dataclass
-class Contents:
-    """Contents of a result file.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    arrays : FileArrays
-        Datasets of numbers, by path.
-    texts : dict of str
-        Single texts, by path.
-    lists : dict of list of str
-        Datasets of texts, by path; sweeps only.
-    attributes : dict
-        Those of the file; a value of an unknown type is replaced by the type's name.
-    groups : dict of dict
-        Those of the groups, by path.
-    """
-
-    path: Path
-    arrays: FileArrays
-    texts: dict[str, str] = field(default_factory=dict)
-    lists: dict[str, list[str]] = field(default_factory=dict)
-    attributes: dict[str, Any] = field(default_factory=dict)
-    groups: dict[str, dict[str, Any]] = field(default_factory=dict)
-
-    @property
-    def form(self) -> str:
-        """``"fecm"`` for a run, ``"fecm-sweep"`` for a sweep."""
-        return str(self.attributes["format"])
 
 
 def read(path: Path, *forms: str) -> Contents:
@@ -166,8 +154,8 @@ def read(path: Path, *forms: str) -> Contents:
         attributes = _attributes(file)
         _check_form(path, attributes, forms or (FORMAT,))
         _check_links(path, file)
-        contents = Contents(path, FileArrays(path), attributes=attributes)
-        file.visititems(_Visitor(contents))
+        contents = Contents(path, attributes)
+        file.visititems(partial(_list, contents, path.stat().st_size))
     return contents
 
 
@@ -217,42 +205,35 @@ def _check_storage(path: Path, name: str, item: h5py.Dataset) -> None:
         )
 
 
-class _Visitor:
-    """Collects the contents of a file."""
-
-    def __init__(self, contents: Contents) -> None:
-        self._contents = contents
-        self._size = contents.path.stat().st_size
-
-    def __call__(self, name: str, item: h5py.HLObject) -> None:
-        if isinstance(item, h5py.Group):
-            self._contents.groups[name] = _attributes(item)
-        elif isinstance(item, h5py.Dataset):  # a named type is skipped
-            self._dataset(name, item)
-
-    def _dataset(self, name: str, item: h5py.Dataset) -> None:
-        contents, path = self._contents, self._contents.path
-        _check_storage(path, name, item)
-        if "/" not in name and item.is_scale:
-            return  # a scale numbers an axis
-        if h5py.check_string_dtype(item.dtype) and item.shape == ():
-            contents.texts[name] = str(_plain(item[()]))
-        elif contents.form == SWEEP and h5py.check_string_dtype(item.dtype) and item.ndim == 1:
-            contents.lists[name] = [str(_plain(value)) for value in item[()].tolist()]
-        elif item.dtype.kind in "biuf" and item.shape is not None and not item.dtype.shape:
-            shape = tuple(map(int, item.shape))
-            room = self._size * (PACKED if item.chunks else 1)
-            # A damaged shape could have more rows than any disk holds.
-            if math.prod(shape) * item.dtype.itemsize > room:
-                raise ResultFileError(
-                    f"{path}: {name} has the shape {shape}, which is more than the file holds"
-                )
-            contents.arrays.shapes[name] = shape
-            contents.arrays.dtypes[name] = item.dtype.newbyteorder("=")
-        elif h5py.check_ref_dtype(item.dtype) is not None:
-            raise ResultFileError(f"{path}: {name} holds references; they are not followed")
-        else:
-            raise ResultFileError(f"{path}: {name} holds neither numbers nor a text")
+def _list(contents: Contents, file_size: int, name: str, item: h5py.HLObject) -> None:
+    """Add a group or dataset of a file to its contents."""
+    path = contents.path
+    if isinstance(item, h5py.Group):
+        contents.groups[name] = _attributes(item)
+    if not isinstance(item, h5py.Dataset):
+        return  # a named type
+    _check_storage(path, name, item)
+    is_text = h5py.check_string_dtype(item.dtype) is not None
+    if "/" not in name and item.is_scale:
+        return  # a scale numbers an axis
+    if is_text and item.shape == ():
+        contents.texts[name] = str(_plain(item[()]))
+    elif is_text and contents.form == SWEEP and item.ndim == 1:
+        contents.lists[name] = [str(_plain(value)) for value in item[()].tolist()]
+        contents.shapes[name], contents.dtypes[name] = item.shape, np.dtype(object)
+    elif item.dtype.kind in "biuf" and item.shape is not None and not item.dtype.shape:
+        shape = tuple(map(int, item.shape))
+        room = file_size * (PACKED if item.chunks else 1)
+        # A damaged shape could have more rows than any disk holds.
+        if math.prod(shape) * item.dtype.itemsize > room:
+            raise ResultFileError(
+                f"{path}: {name} has the shape {shape}, which is more than the file holds"
+            )
+        contents.shapes[name], contents.dtypes[name] = shape, item.dtype.newbyteorder("=")
+    elif h5py.check_ref_dtype(item.dtype) is not None:
+        raise ResultFileError(f"{path}: {name} holds references; they are not followed")
+    else:
+        raise ResultFileError(f"{path}: {name} holds neither numbers nor a text")
 
 
 def _attributes(item: h5py.HLObject) -> dict[str, Any]:

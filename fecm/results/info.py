@@ -10,11 +10,8 @@ import numpy as np
 
 from fecm.results.hdf5_reader import Contents
 from fecm.results.result import Result
-from fecm.results.schema import DATASETS, GROUP_DESCRIPTIONS
+from fecm.results.schema import DATASETS, GROUP_DESCRIPTIONS, row_blocks
 from fecm.results.summary import summary
-
-# Bytes of a block of rows.
-BLOCK = 4_000_000
 
 
 def describe_groups(contents: Contents) -> list[dict[str, Any]]:
@@ -34,7 +31,7 @@ def describe_groups(contents: Contents) -> list[dict[str, Any]]:
     ResultFileError
         If the file can't be read.
     """
-    datasets = [_describe(contents, path) for path in (*contents.arrays, *contents.lists)]
+    datasets = [_describe(contents, path) for path in contents]
     members: dict[str, list[dict[str, Any]]] = {name: [] for name in contents.groups}
     for dataset in datasets:
         members.setdefault(dataset["name"].rpartition("/")[0], []).append(dataset)
@@ -44,7 +41,7 @@ def describe_groups(contents: Contents) -> list[dict[str, Any]]:
             continue
         attributes = dict(contents.groups.get(name, {})) if name else {}
         description = str(attributes.pop("description", ""))
-        clock = contents.arrays.shapes.get(f"{name}/step", ())
+        clock = contents.shapes.get(f"{name}/step", ())
         groups.append(
             {
                 "name": name,
@@ -65,13 +62,13 @@ def _order(known: Mapping[str, Any], name: str) -> tuple[int, str]:
 
 def _describe(contents: Contents, path: str) -> dict[str, Any]:
     """Shape, type, attributes and range of one dataset."""
-    attributes = contents.arrays.attributes(path)
+    attributes = contents.attributes_of(path)
     texts = contents.lists.get(path)
     minimum, maximum, not_finite = (None, None, 0) if texts is not None else _range(contents, path)
     return {
         "name": path,
-        "shape": contents.arrays.shapes[path] if texts is None else (len(texts),),
-        "dtype": str(contents.arrays.dtypes[path]) if texts is None else "text",
+        "shape": contents.shapes[path],
+        "dtype": str(contents.dtypes[path]) if texts is None else "text",
         **{key: str(attributes.get(key, "")) for key in ("description", "dimension", "unit")},
         "min": minimum,
         "max": maximum,
@@ -82,12 +79,9 @@ def _describe(contents: Contents, path: str) -> dict[str, Any]:
 
 def _range(contents: Contents, path: str) -> tuple[float | None, float | None, int]:
     """Minimum and maximum of the finite numbers, and number of others, by blocks of rows."""
-    shape = contents.arrays.shapes[path]
     minimum, maximum, not_finite = math.inf, -math.inf, 0
-    rows = shape[0] if shape else 1
-    step = max(1, BLOCK // (8 * max(1, math.prod(shape[1:]))))
-    for start in range(0, rows, step):
-        block = contents.arrays.rows(path, start, min(start + step, rows))
+    for start, stop in row_blocks(contents.shapes[path]):
+        block = contents.rows(path, start, stop)
         finite = np.isfinite(block)
         not_finite += int(block.size - np.count_nonzero(finite))
         if finite.any():

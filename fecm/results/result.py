@@ -214,11 +214,10 @@ def result_of(contents: Contents) -> Result:
     ResultFileError
         If a dataset has the wrong shape or type.
     """
-    arrays = contents.arrays
-    kinds = {name: dtype.kind for name, dtype in arrays.dtypes.items()}
-    if found := shape_error(arrays.shapes, kinds):
+    kinds = {name: dtype.kind for name, dtype in contents.dtypes.items()}
+    if found := shape_error(contents.shapes, kinds):
         raise ResultFileError(f"{contents.path}: {found}")
-    return Result(arrays, contents.texts, {"": contents.attributes, **contents.groups})
+    return Result(contents, contents.texts, {"": contents.attributes, **contents.groups})
 
 
 def still_in_contact(force: Array) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,6 +61,18 @@ def jsonable(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [jsonable(item) for item in value]
     return str(value)
+
+
+# Bytes of a block of rows.
+BLOCK = 4_000_000
+
+
+def row_blocks(shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
+    """First and last + 1 row of the blocks in which a dataset is read; a number is one row."""
+    rows = shape[0] if shape else 1
+    step = max(1, BLOCK // (8 * max(1, math.prod(shape[1:]))))
+    for start in range(0, rows, step):
+        yield start, min(start + step, rows)
 
 
 FORMAT = "fecm"

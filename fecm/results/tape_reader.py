@@ -26,6 +26,8 @@ from fecm.results.tapes import CONTACT, CURVATURES
 
 Array = NDArray[Any]
 
+# Form of a folder of tapes, as `Contents.form` of a file.
+TAPES = "tapes"
 NAMES = ("tape3", "tape8", "tape9")
 WIDTH = 12  # characters per number
 PER_LINE = 6  # numbers per line without labels
@@ -54,6 +56,21 @@ class TapeText:
 
     arrays: Mapping[str, Array]
     lines: bool = False
+    form = TAPES
+
+    @property
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Shape of every dataset."""
+        return {name: values.shape for name, values in self.arrays.items()}
+
+    @property
+    def dtypes(self) -> dict[str, np.dtype[Any]]:
+        """Type of every dataset."""
+        return {name: values.dtype for name, values in self.arrays.items()}
+
+    def rows(self, path: str, start: int, stop: int) -> Array:
+        """Rows `start` to `stop` of a dataset."""
+        return self.arrays[path][start:stop]
 
     def fitted(self, nodes: int) -> TapeText:
         """Copy with the lines of ``tape3/w`` divided into rows of `nodes`, if possible."""

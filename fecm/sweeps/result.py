@@ -284,24 +284,23 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     ResultFileError
         If data are missing, or their number of cases differs.
     """
-    arrays, path = contents.arrays, contents.path
+    path = contents.path
 
     def group(prefix: str) -> dict[str, Array]:
-        found = {p.removeprefix(prefix): arrays[p] for p in arrays if p.startswith(prefix)}
-        lists = contents.lists.items()
-        texts = {p.removeprefix(prefix): np.array(v) for p, v in lists if p.startswith(prefix)}
-        return found | texts
+        # Numbers before texts.
+        names = sorted(contents, key=lambda name: name in contents.lists)
+        return {p.removeprefix(prefix): contents[p] for p in names if p.startswith(prefix)}
 
     cases, summary = group("cases/"), group("summary/")
     missing = [name for name in (*SUMMARY, "status") if name not in summary]
-    if missing or "history/dt" not in arrays or "history/steps" not in arrays:
+    if missing or "history/dt" not in contents or "history/steps" not in contents:
         raise ResultFileError(f"{path}: the result of the sweep is incomplete")
     summary = {name: summary[name] for name in (*SUMMARY, "status")} | summary  # in their order
-    count = np.shape(arrays["history/dt"])[:1]
-    rows = (*cases.values(), *summary.values(), arrays["history/dt"], arrays["history/steps"])
-    unconverged_steps = arrays.get("history/unsettled_steps")
+    count = np.shape(contents["history/dt"])[:1]
+    rows = (*cases.values(), *summary.values(), contents["history/dt"], contents["history/steps"])
+    unconverged_steps = contents.get("history/unsettled_steps")
     rows += () if unconverged_steps is None else (unconverged_steps,)
-    shape = arrays.shapes.get("history/force")
+    shape = contents.shapes.get("history/force")
     kinds = {name: summary[name].dtype.kind for name in SUMMARY}
     if (
         any(values.shape != count for values in rows)
@@ -311,13 +310,13 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
         raise ResultFileError(
             f"{path}: the data of this sweep do not match in type or number of cases"
         )
-    steps = arrays["history/steps"]
+    steps = contents["history/steps"]
     most = np.inf if shape is None else shape[1]
     if steps.dtype.kind not in "iu" or not ((steps >= 0) & (steps <= most)).all():
         raise ResultFileError(f"{path}: history/steps does not match the stored steps")
     return SweepResult(
-        cases, summary, arrays["history/dt"], steps,
-        arrays.get("history/force") if history else None,
+        cases, summary, contents["history/dt"], steps,
+        contents.get("history/force") if history else None,
         unconverged_steps,
         contents.texts.get("deck", ""), str(contents.attributes.get("title", "")),
         declared_units(contents.attributes),
