@@ -144,9 +144,9 @@ def test_a_number_that_its_last_field_cuts_short_is_an_error_where_the_value_cha
 
 
 def test_a_time_step_is_written_as_a_person_reads_it() -> None:
-    assert Macro("DT", value=2.5e-7).text() == "DT,,2.5E-7"
-    assert Macro("DT", value=5e-7).text() == "DT        5.E-7"
-    assert Macro("LOOP", value=123456.0).text() == "LOOP,,123456"
+    assert Macro("DT", value=2.5e-7).to_card() == "DT,,2.5E-7"
+    assert Macro("DT", value=5e-7).to_card() == "DT        5.E-7"
+    assert Macro("LOOP", value=123456.0).to_card() == "LOOP,,123456"
     assert "DT,,2.5E-7\n" in format_deck(small("DT         25-8\n"))
 
 

@@ -7,12 +7,13 @@ and elements between them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import ClassVar, TypeVar
 
-from fecm.deck.card import Fields, Value, layout, write_card
+from fecm.deck.card import Fields, layout
 from fecm.deck.records import (
+    AXES,
     Control,
     ElementNodes,
     Gage,
@@ -25,14 +26,13 @@ from fecm.deck.records import (
     Ply,
     Record,
     RodDiameter,
-    code_fields,
-    element_fields,
-    force_fields,
-    node_fields,
 )
 
 TITLE = "FECM"
 STOP = "STOP"
+
+# First fields of a card of a node.
+NODE = ("I5 node", "I5 increment|incr")
 
 _S = TypeVar("_S", bound="Segment")
 
@@ -42,68 +42,89 @@ class Segment(Record):
     """A keyword card and the data that follow it."""
 
     keyword: ClassVar[str]
-    fields: ClassVar[Fields]
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards: the keyword card and, by default, one card of data."""
         yield self.keyword
-        yield write_card(self.fields, self.row())
-
-
-def _numbered(keyword: str, fields: Fields, records: Sequence[Record]) -> Iterator[str]:
-    """A keyword card, one card per record and the final blank card."""
-    yield keyword
-    for record in records:
-        yield write_card(fields, record.row())
-    yield ""
+        yield self.to_card()
 
 
 @dataclass(frozen=True)
-class Coordinates(Segment):
-    """COOR: coordinates of the nodes (length)."""
+class NumberedSegment(Segment):
+    """A segment of any number of cards, ended by a blank one."""
 
-    records: tuple[NodeValues, ...]
-    keyword: ClassVar[str] = "COOR"
+    records: tuple[Record, ...]
+    record: ClassVar[type[Record]]
+
+    @classmethod
+    def card_fields(cls, control: Control) -> Fields:
+        """Fields of a card."""
+        return cls.record.fields
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
-        return _numbered("COOR", node_fields(control.ndm), self.records)
+        fields = self.card_fields(control)
+        yield self.keyword
+        for record in self.records:
+            yield record.to_card(fields)
+        yield ""
 
 
 @dataclass(frozen=True)
-class Elements(Segment):
-    """ELEM: nodes of the elements."""
+class Coordinates(NumberedSegment):
+    """COOR: (2I5,7F10.0); coordinates of the nodes (length), of which NDM are used."""
+
+    records: tuple[NodeValues, ...]
+    record = NodeValues
+    keyword = "COOR"
+
+    @classmethod
+    def card_fields(cls, control: Control) -> Fields:
+        """Fields of a card."""
+        return layout(*NODE, *(f"F10 {axis}-coordinate|{axis}" for axis in AXES[: control.ndm]))
+
+
+@dataclass(frozen=True)
+class Elements(NumberedSegment):
+    """ELEM: (16I5); nodes of the elements; the increment follows the last of the NEN nodes."""
 
     records: tuple[ElementNodes, ...]
-    keyword: ClassVar[str] = "ELEM"
+    record = ElementNodes
+    keyword = "ELEM"
 
-    def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
-        return _numbered("ELEM", element_fields(control.nen), self.records)
+    @classmethod
+    def card_fields(cls, control: Control) -> Fields:
+        """Fields of a card."""
+        nodes = (f"I5 node {i + 1}|n{i + 1}" for i in range(control.nen))
+        return layout("I5 element|elm", *nodes, "I5 increment|incr")
 
 
 @dataclass(frozen=True)
-class Boundary(Segment):
-    """BOUN: restraint codes of the nodes; a dof with a code other than 0 is restrained."""
+class Boundary(NumberedSegment):
+    """BOUN: (16I5); restraint codes of the nodes; a dof with a code other than 0 is restrained."""
 
     records: tuple[NodeCodes, ...]
-    keyword: ClassVar[str] = "BOUN"
+    record = NodeCodes
+    keyword = "BOUN"
 
-    def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
-        return _numbered("BOUN", code_fields(control.ndf), self.records)
+    @classmethod
+    def card_fields(cls, control: Control) -> Fields:
+        """Fields of a card."""
+        return layout(*NODE, *(f"I5 code {i + 1}|c{i + 1}" for i in range(control.ndf)))
 
 
 @dataclass(frozen=True)
-class Forces(Segment):
-    """FORC: nodal forces, or displacements where the dof is restrained."""
+class Forces(NumberedSegment):
+    """FORC: (2I5,7F10.0); nodal forces, or displacements where the dof is restrained."""
 
     records: tuple[NodeValues, ...]
-    keyword: ClassVar[str] = "FORC"
+    record = NodeValues
+    keyword = "FORC"
 
-    def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
-        return _numbered("FORC", force_fields(control.ndf), self.records)
+    @classmethod
+    def card_fields(cls, control: Control) -> Fields:
+        """Fields of a card."""
+        return layout(*NODE, *(f"F10 value {i + 1}" for i in range(control.ndf)))
 
 
 @dataclass(frozen=True)
@@ -117,12 +138,9 @@ class Material(Segment):
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
-        values = self.integration.row()[: None if self.integration.width else -1]
-        yield "MATE"
-        yield write_card(Integration.fields[: len(values)], values)
-        yield write_card(Ply.fields, self.ply.row())
-        for layer in self.layers:
-            yield write_card(Layer.fields, layer.row())
+        yield self.keyword
+        for record in (self.integration, self.ply, *self.layers):
+            yield record.to_card()
 
 
 @dataclass(frozen=True)
@@ -195,8 +213,8 @@ class Indentation(Segment):
         return [field.name for field in (self.acr_fields if self.word else self.fields)]
 
     def text(self) -> str:
-        """Text of the segment's two cards."""
-        return f"{f'EXPE {self.word}'.rstrip()}\n{write_card(self.fields, self.values())}"
+        """Text of the keyword card and of the card of data."""
+        return f"{f'EXPE {self.word}'.rstrip()}\n{self.to_card()}"
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
@@ -229,6 +247,7 @@ class Projectile(Segment):
     diameters: tuple[RodDiameter, ...] = ()
     keyword: ClassVar[str] = "PROJ"
 
+    optional: ClassVar[int] = 2
     fields: ClassVar[Fields] = layout(
         "I5 number of rod elements|elms", "I5 transducer node|node", "F10 length or mass|len/mass",
         "F10 rod's Young's modulus|modulus", "F10 rod's density|density",
@@ -236,16 +255,11 @@ class Projectile(Segment):
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
-        values: list[Value] = [self.elements, self.transducer, self.size]
-        if self.elements or self.modulus or self.density:
-            values += [self.modulus, self.density]
-        yield "PROJ"
-        yield write_card(self.fields[: len(values)], values)
-        if not self.elements:
-            return
-        for record in self.diameters:
-            yield write_card(RodDiameter.fields, record.row())
-        yield ""
+        yield from super().cards(control)
+        if self.elements:
+            for record in self.diameters:
+                yield record.to_card()
+            yield ""
 
 
 @dataclass(frozen=True)
@@ -265,15 +279,12 @@ class ShearCorrection(Segment):
 
 
 @dataclass(frozen=True)
-class Gages(Segment):
+class Gages(NumberedSegment):
     """GAGE: strain gages, read at every step (not in the report's program)."""
 
     records: tuple[Gage, ...]
-    keyword: ClassVar[str] = "GAGE"
-
-    def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
-        return _numbered("GAGE", Gage.fields, self.records)
+    record = Gage
+    keyword = "GAGE"
 
 
 @dataclass(frozen=True)
@@ -318,11 +329,6 @@ class Page(Segment):
     keyword: ClassVar[str] = "PAGE"
 
     fields: ClassVar[Fields] = layout("A4 carriage control")
-
-    def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
-        yield "PAGE"
-        yield self.carriage_control
 
 
 @dataclass(frozen=True)
@@ -387,10 +393,10 @@ class Deck(Record):
         """
         lines = [
             f"{TITLE} {self.title}".rstrip(),
-            write_card(Control.fields, self.control.row()),
+            self.control.to_card(),
         ]
         for segment in self.segments:
             lines.extend(segment.cards(self.control))
-        lines += ["END", "MACR", *(macro.text() for macro in self.macros), "END"]
-        lines += [*(table.text() for table in self.tables), STOP]
+        lines += ["END", "MACR", *(macro.to_card() for macro in self.macros), "END"]
+        lines += [*(table.to_card() for table in self.tables), STOP]
         return "\n".join(lines) + "\n"

@@ -5,9 +5,10 @@ The `source` of a record, its card, is ignored when records are compared.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
 from fecm.deck.card import Fields, Source, Value, layout, write_card
@@ -53,8 +54,11 @@ class Record:
     """
 
     source: Source | None = field(default=None, compare=False, repr=False)
+    fields: ClassVar[Fields]
     # Values of the card that one attribute holds as a tuple.
     packed: ClassVar[slice | None] = None
+    # Number of last values that are not written where they are 0.
+    optional: ClassVar[int] = 0
 
     @classmethod
     def from_row(cls, values: Sequence[Value], source: Source) -> Self:
@@ -67,10 +71,19 @@ class Record:
     def row(self) -> list[Value]:
         """Values in the card's order."""
         row: list[Value] = []
-        for attribute in fields(self)[1:]:  # the first is the source
+        for attribute in dataclasses.fields(self)[1:]:  # the first is the source
             value = getattr(self, attribute.name)
             row += value if isinstance(value, tuple) else (value,)
         return row
+
+    def to_card(self, fields: Fields | None = None) -> str:
+        """Text of the card; `fields` where they depend on the control card."""
+        written = fields or self.fields
+        values = self.row()[: len(written)]
+        least = len(written) - self.optional
+        while len(values) > least and not values[-1]:
+            values.pop()
+        return write_card(written[: len(values)], values)
 
     def place(self, name: str = "") -> Place | None:
         """Place of the field `name` in the deck, or of the entire card without a name."""
@@ -171,32 +184,6 @@ class ElementNodes(Record):
     packed: ClassVar[slice] = slice(1, -1)
 
 
-def node_fields(ndm: int) -> Fields:
-    """Fields of a COOR card: (2I5,7F10.0), of which `ndm` coordinates are used."""
-    return layout(
-        "I5 node", "I5 increment|incr", *(f"F10 {axis}-coordinate|{axis}" for axis in AXES[:ndm])
-    )
-
-
-def force_fields(ndf: int) -> Fields:
-    """Fields of a FORC card: (2I5,7F10.0), of which `ndf` values are used."""
-    return layout("I5 node", "I5 increment|incr", *(f"F10 value {i + 1}" for i in range(ndf)))
-
-
-def code_fields(ndf: int) -> Fields:
-    """Fields of a BOUN card: (16I5), of which `ndf` codes are used."""
-    return layout(
-        "I5 node", "I5 increment|incr", *(f"I5 code {i + 1}|c{i + 1}" for i in range(ndf))
-    )
-
-
-def element_fields(nen: int) -> Fields:
-    """Fields of an ELEM card: (16I5); the increment follows the last of the `nen` nodes."""
-    return layout(
-        "I5 element|elm", *(f"I5 node {i + 1}|n{i + 1}" for i in range(nen)), "I5 increment|incr"
-    )
-
-
 @dataclass(frozen=True)
 class Layer(Record):
     """Layer card of MATE: (I5,F5.0,F10.0); the number is not used for placing.
@@ -239,6 +226,7 @@ class Integration(Record):
     thickness: float
     width: float = 0.0
 
+    optional: ClassVar[int] = 1
     fields: ClassVar[Fields] = layout(
         "I5 bending order L1|L1", "I5 shear order L2|L2", "I5 stress-point order K|K",
         "F10 total thickness|thickness", "F10 width",
@@ -299,9 +287,9 @@ class Macro(Record):
     # With commas the second word may be left out where the value follows: LOOP,794.
     short_fields: ClassVar[Fields] = (fields[0], *fields[2:])
 
-    def text(self) -> str:
+    def to_card(self, fields: Fields | None = None) -> str:
         """Text of the card; integers have no point, trailing zeros are left out."""
-        values: list[Value] = [self.word, self.option, self.value, self.second]
+        values = self.row()
         while values and not values[-1]:
             values.pop()
         return self.card(values)
@@ -337,12 +325,7 @@ class LoadTable(Record):
     constants: tuple[float, ...]
 
     packed: ClassVar[slice] = slice(4, None)
-
     fields: ClassVar[Fields] = layout(
         "I5 type", "I5 exponent|exp", "F10 begin|t_min", "F10 end|t_max",
         *(f"F10 constant A{i}|A{i}" for i in range(1, 6)),
     )  # fmt: skip
-
-    def text(self) -> str:
-        """Text of the card."""
-        return write_card(self.fields, self.row())

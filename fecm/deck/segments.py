@@ -17,6 +17,7 @@ from fecm.deck.model import (
     Impact,
     Indentation,
     Material,
+    NumberedSegment,
     Page,
     PrintOption,
     Projectile,
@@ -27,18 +28,11 @@ from fecm.deck.model import (
 from fecm.deck.records import (
     Control,
     ElementNodes,
-    Gage,
     Integration,
     Layer,
-    NodeCodes,
-    NodeValues,
     Ply,
     Record,
     RodDiameter,
-    code_fields,
-    element_fields,
-    force_fields,
-    node_fields,
 )
 
 
@@ -141,7 +135,6 @@ def _is_comment(line: str) -> bool:
     return line.startswith("!")
 
 
-Row = tuple[list[Value], Source]
 _R = TypeVar("_R", bound=Record)
 
 
@@ -176,111 +169,82 @@ class SegmentReader:
     # Numbered cards up to a blank one ------------------------------------------------------------
 
     def _records(self, head: Card, kind: type[_R], fields: Fields) -> tuple[_R, ...]:
-        """Records of numbered cards up to the final blank card."""
+        """Records of numbered cards up to a blank card, or up to the last element's card."""
         records: list[_R] = []
-        while (card := self._stream.take()) is not None:
-            if card.is_blank:
-                return tuple(records)
+        while (card := self._stream.take()) is not None and not card.is_blank:
             if card.is_keyword:
                 self._stream.give_back()
-                self._not_ended(head, card)
-                return tuple(records)
+                break
             row = self._stream.row(card, fields)
             if row is None:
                 self.unsound.add(head.keyword)
             else:
                 records.append(kind.from_row(*row))
-        self._not_ended(head, head)
+        last = records[-1] if records else None
+        complete = isinstance(last, ElementNodes) and last.element >= self._control.numel
+        if (card is None or card.is_keyword) and not complete:
+            self._stream.findings.add(
+                "E007",
+                f"The {head.keyword} cards are not ended by a blank card.",
+                (card or head).place,
+                "put a blank card before this one" if card else "put a blank card at the end",
+            )
         return tuple(records)
 
-    def _not_ended(self, head: Card, at: Card) -> None:
-        self._stream.findings.add(
-            "E007",
-            f"The {head.keyword} cards are not ended by a blank card.",
-            at.place,
-            "put a blank card before this one" if at is not head else "put a blank card at the end",
-        )
-
-    def _coordinates(self, head: Card) -> Segment:
-        records = self._records(head, NodeValues, node_fields(self._control.ndm))
-        return Coordinates(records, source=Source(head, ()))
-
-    def _forces(self, head: Card) -> Segment:
-        records = self._records(head, NodeValues, force_fields(self._control.ndf))
-        return Forces(records, source=Source(head, ()))
-
-    def _boundary(self, head: Card) -> Segment:
-        records = self._records(head, NodeCodes, code_fields(self._control.ndf))
-        return Boundary(records, source=Source(head, ()))
-
-    def _elements(self, head: Card) -> Segment:
-        """Read ELEM cards up to a blank card, or to the last element's card without one."""
-        fields = element_fields(self._control.nen)
-        records: list[ElementNodes] = []
-        while (card := self._stream.take()) is not None and not card.is_blank:
-            if card.is_keyword:
-                self._stream.give_back()
-                if not records or records[-1].element < self._control.numel:
-                    self._not_ended(head, card)
-                break
-            row = self._stream.row(card, fields)
-            if row is None:
-                self.unsound.add("ELEM")
-            else:
-                records.append(ElementNodes.from_row(*row))
-        return Elements(tuple(records), source=Source(head, ()))
+    def _numbered(self, head: Card) -> Segment:
+        kind = NUMBERED[head.keyword]
+        records = self._records(head, kind.record, kind.card_fields(self._control))
+        return kind(records, source=Source(head, ()))
 
     # Cards of a fixed number ---------------------------------------------------------------------
 
-    def _single(self, head: Card, fields: Fields, what: str) -> Row | None:
-        """A mandatory card; None if it is missing or unreadable."""
+    def _single(self, head: Card, kind: type[_R], fields: Fields | None = None) -> _R | None:
+        """Record of a mandatory card; None if it is missing or unreadable."""
+        fields = fields or kind.fields
         card = self._stream.take()
-        if card is None or card.is_keyword:
+        row = None
+        if card is not None and not card.is_keyword:
+            row = self._stream.row(card, fields)
+        else:
             if card is not None:
                 self._stream.give_back()
             if head.keyword not in self.unsound:
-                self._stream.findings.add("E008", f"{what} is missing.", (card or head).place)
-            self.unsound.add(head.keyword)
-            return None
-        row = self._stream.row(card, fields)
+                self._stream.findings.add(
+                    "E008",
+                    f"A card of {head.keyword} is missing.",
+                    (card or head).place,
+                    f"its fields are {', '.join(field.name for field in fields)}",
+                )
         if row is None:
             self.unsound.add(head.keyword)
-        return row
+            return None
+        return kind.from_row(*row)
 
     def _impact(self, head: Card) -> Segment | None:
-        row = self._single(head, Impact.fields, "The card of the impact")
-        return None if row is None else Impact.from_row(*row)
+        return self._single(head, Impact)
+
+    def _shear_correction(self, head: Card) -> Segment | None:
+        return self._single(head, ShearCorrection)
 
     def _indentation(self, head: Card) -> Segment | None:
         word = " ".join(head.data.replace(",", " ").split()[1:]).upper()
         if word and word != Indentation.ACR:
             self._stream.findings.add(
                 "W416",
-                f"`{word}` behind EXPE is not read: the law is that of equation 3-8.",
+                f"`{word}` after EXPE is not read: the law is that of equation 3-8.",
                 head.place,
                 "EXPE ACR takes the law of equation 3-7",
             )
             word = ""
-        fields = Indentation.acr_fields if word else Indentation.fields
-        row = self._single(head, fields, "The card of the indentation law")
-        return None if row is None else replace(Indentation.from_row(*row), word=word)
+        law = self._single(head, Indentation, Indentation.acr_fields if word else None)
+        return law and replace(law, word=word)
 
     def _projectile(self, head: Card) -> Segment | None:
-        row = self._single(head, Projectile.fields, "The first card of PROJ")
-        if row is None:
-            return None
-        projectile = Projectile.from_row(*row)
-        if not projectile.elements:
+        projectile = self._single(head, Projectile)
+        if projectile is None or not projectile.elements:
             return projectile
         diameters = self._records(head, RodDiameter, RodDiameter.fields)
         return replace(projectile, diameters=diameters)
-
-    def _shear_correction(self, head: Card) -> Segment | None:
-        row = self._single(head, ShearCorrection.fields, "The card of the shear correction factor")
-        return None if row is None else ShearCorrection.from_row(*row)
-
-    def _gages(self, head: Card) -> Segment:
-        return Gages(self._records(head, Gage, Gage.fields), source=Source(head, ()))
 
     def _units(self, head: Card) -> Segment | None:
         card = self._stream.take()
@@ -305,13 +269,12 @@ class SegmentReader:
         return Page("" if card is None else card.data[:4].rstrip(), source=Source(head, ()))
 
     def _material(self, head: Card) -> Segment | None:
-        rule = self._single(head, Integration.fields, "The first card of MATE")
-        ply = self._single(head, Ply.fields, "The card of the ply's constants")
-        layers = self._layers(head) if rule or ply else None
-        if rule is None or ply is None or layers is None:
+        integration = self._single(head, Integration)
+        ply = self._single(head, Ply)
+        layers = self._layers(head) if integration or ply else None
+        if integration is None or ply is None or layers is None:
             return None
-        integration, constants = Integration.from_row(*rule), Ply.from_row(*ply)
-        return Material(integration, constants, layers, source=Source(head, ()))
+        return Material(integration, ply, layers, source=Source(head, ()))
 
     def _layers(self, head: Card) -> tuple[Layer, ...] | None:
         """Layer cards, as many as the control card says; None if one is missing or unreadable."""
@@ -334,18 +297,21 @@ class SegmentReader:
         return tuple(layers) if len(layers) == count else None
 
 
+NUMBERED: dict[str, type[NumberedSegment]] = {
+    kind.keyword: kind for kind in (Coordinates, Elements, Boundary, Forces, Gages)
+}
 # Readers of the segments, by keyword.
 READERS: dict[str, Callable[[SegmentReader, Card], Segment | None]] = {
-    "COOR": SegmentReader._coordinates,
-    "ELEM": SegmentReader._elements,
-    "BOUN": SegmentReader._boundary,
+    "COOR": SegmentReader._numbered,
+    "ELEM": SegmentReader._numbered,
+    "BOUN": SegmentReader._numbered,
     "MATE": SegmentReader._material,
     "ROD": SegmentReader._impact,
     "EXPE": SegmentReader._indentation,
-    "FORC": SegmentReader._forces,
+    "FORC": SegmentReader._numbered,
     "PROJ": SegmentReader._projectile,
     "SHEA": SegmentReader._shear_correction,
-    "GAGE": SegmentReader._gages,
+    "GAGE": SegmentReader._numbered,
     "UNIT": SegmentReader._units,
     "PRIN": SegmentReader._print_option,
     "NOPR": SegmentReader._print_option,
