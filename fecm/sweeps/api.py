@@ -11,9 +11,8 @@ from fecm.api import load_deck
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
 from fecm.problem.problem import Problem
-from fecm.sweeps.batch import merge
 from fecm.sweeps.cases import Case, CasesError, checked, grid
-from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.outcome import Outcome, merge
 from fecm.sweeps.plan import Plan, Task, check_memory, plan, tasks
 from fecm.sweeps.result import SweepResult, result_of, save
 from fecm.sweeps.schedule import Done, Idle, lost, on_dask, on_workers, run_serial

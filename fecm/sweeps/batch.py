@@ -36,7 +36,7 @@ from fecm.simulation.guard import ENERGY_WARNING
 from fecm.simulation.run import simulate
 from fecm.sweeps.cases import CasesError
 from fecm.sweeps.clock import Clock, with_time_step
-from fecm.sweeps.outcome import SUMMARY, Indentation, Outcome, status_of, summarise
+from fecm.sweeps.outcome import Indentation, Outcome, merge, status_of, summarise
 from fecm.sweeps.plan import ADVANCED, Plan, Task, shares_plate, without_output
 from fecm.sweeps.responses import BLOCK, Convolution, TipState, TipSteps, plate_response
 from fecm.sweeps.vary import apply_case
@@ -44,26 +44,32 @@ from fecm.sweeps.vary import apply_case
 
 def run(task: Task) -> Outcome:
     """Run the cases of a task; a case that cannot be run becomes a row with the reason."""
-    good: list[tuple[int, Deck]] = []
+    numbers: list[int] = []
+    decks: list[Deck] = []
     lost: dict[int, str] = {}
+    mesh: Mesh | None = None
     for number, case in zip(task.numbers, task.cases, strict=True):
         try:
-            good.append((number, apply_case(task.deck, case)))
+            deck = apply_case(task.deck, case)
+            mesh = mesh or generate(deck)  # of the plate that the cases share
+            _check_contact(deck, mesh)
         except CasesError as error:
             lost[number] = str(error)
+            continue
+        numbers.append(number)
+        decks.append(deck)
     parts: list[Outcome] = []
-    mesh = generate(good[0][1]) if good else None
-    sound = [] if mesh is None else [pair for pair in good if not _refuse(*pair, mesh, lost)]
-    if sound:
-        checked, decks, reason = _timed([deck for _, deck in sound], task.clock)
-        numbers = [number for number, _ in sound]
-        if checked is None:
-            lost |= dict.fromkeys(numbers, reason)
-        elif shares_plate(checked):
-            parts.append(_together(numbers, decks, checked))
+    if decks:
+        try:
+            checked, decks = _timed(decks, task.clock)
+        except CasesError as error:
+            lost |= dict.fromkeys(numbers, str(error))
         else:
-            pairs = zip(numbers, decks, strict=True)
-            parts += [_alone(number, replace(checked, deck=deck)) for number, deck in pairs]
+            if shares_plate(checked):
+                parts.append(_together(numbers, decks, checked))
+            else:
+                pairs = zip(numbers, decks, strict=True)
+                parts += [_alone(number, replace(checked, deck=deck)) for number, deck in pairs]
     if lost:
         parts.append(Outcome.failed(list(lost), list(lost.values())))
     outcome = merge(parts)
@@ -78,50 +84,49 @@ def deck_of(plan: Plan, case: int) -> Deck:
     CasesError
         If the case cannot be run.
     """
-    checked, (deck,), reason = _timed([apply_case(plan.deck, plan.cases[case])], plan.clock)
-    if checked is None:
-        raise CasesError(reason)
+    _, (deck,) = _timed([apply_case(plan.deck, plan.cases[case])], plan.clock)
     return deck
 
 
-def _timed(decks: list[Deck], clock: Clock | None) -> tuple[Problem | None, list[Deck], str]:
+def _timed(decks: list[Deck], clock: Clock | None) -> tuple[Problem, list[Deck]]:
     """Check the plate and program shared by decks, and set the time step of the plate."""
     if clock is None:
-        checked, reason = _checked(decks[0])
-        return checked, decks, reason
+        return _checked(decks[0]), decks
     # DT 0 is below the critical time step of any plate.
-    checked, reason = _checked(with_time_step(decks[0], 0.0))
-    if checked is None:
-        return None, decks, reason
+    checked = _checked(with_time_step(decks[0], 0.0))
     dt = clock.time_step(checked.critical_time_step)
     timed = [with_time_step(deck, dt, clock.dt) for deck in decks]
     findings = Findings()
     problem = Problem(timed[0], checked.mesh, compile_program(timed[0].macros, findings))
     check_program(problem, findings)
-    if findings.errors:
-        return None, decks, findings.errors[0].message
-    return problem, timed, ""
+    _raise_first(findings)
+    return problem, timed
 
 
-def _checked(deck: Deck) -> tuple[Problem | None, str]:
-    """Check a complete deck; return the problem and the first error message."""
+def _checked(deck: Deck) -> Problem:
+    """Check a complete deck."""
     findings = Findings()
     checked = check(ParsedProblem(deck), findings)
-    if findings.errors:
-        return None, findings.errors[0].message
-    return checked, ""
+    _raise_first(findings)
+    if checked is None:
+        raise CasesError("the deck has no problem that can be run")
+    return checked
 
 
-def _refuse(number: int, deck: Deck, mesh: Mesh, lost: dict[int, str]) -> bool:
-    """Whether the impact, law or projectile of a case is invalid; store the reason in `lost`."""
+def _check_contact(deck: Deck, mesh: Mesh) -> None:
+    """Check the impact, law and projectile of a case."""
     findings = Findings()
     check_impact(deck.require(Impact), deck, mesh, findings)
     check_law(deck.require(LawCards), findings)
     if (projectile := deck.last(Projectile)) is not None:
         check_projectile(projectile, findings)
+    _raise_first(findings)
+
+
+def _raise_first(findings: Findings) -> None:
+    """Raise the first error as that of a case."""
     if findings.errors:
-        lost[number] = findings.errors[0].message
-    return bool(findings.errors)
+        raise CasesError(findings.errors[0].message)
 
 
 def _time_step(checked: Problem) -> float:
@@ -157,16 +162,16 @@ def _together(numbers: list[int], decks: list[Deck], checked: Problem) -> Outcom
         error = balance_errors(found, tips, list(kinds), kind, speed)
     back = np.argsort(order)
     force = np.ascontiguousarray(found.force.T[back])
-    outcome = Outcome(
-        numbers,
-        {name: values[back] for name, values in summary.items()},
-        status_of(force.T),
-        np.full(len(numbers), dt),
-        np.full(len(numbers), steps, dtype=np.int64),
-        found.unconverged_steps[back],
-        force,
-    )
-    doubtful = np.flatnonzero(~(error[back] < ENERGY_WARNING) | (outcome.unconverged_steps > 0))
+    unsettled = found.unconverged_steps[back]
+    columns = {
+        **{name: values[back] for name, values in summary.items()},
+        "status": status_of(force.T),
+        "dt": np.full(len(numbers), dt),
+        "steps": np.full(len(numbers), steps, dtype=np.int64),
+        "unsettled": unsettled,
+    }
+    outcome = Outcome(numbers, columns, force)
+    doubtful = np.flatnonzero(~(error[back] < ENERGY_WARNING) | (unsettled > 0))
     if not len(doubtful):
         return outcome
     rest = np.setdiff1d(np.arange(len(numbers)), doubtful)
@@ -312,35 +317,11 @@ def _alone(number: int, checked: Problem) -> Outcome:
     permanent = values.get("permanent_indentation", 0.0)
     found = Indentation(largest, indentation[-1:], np.array([permanent]))
     summary = summarise(force[:, None], times, found, mass, np.array([speed]))
-    return Outcome(
-        [number],
-        summary,
-        status_of(force[:, None]),
-        np.array([simulation.state.dt]),
-        np.array([len(force)], dtype=np.int64),
-        np.array([values.get("unsettled_steps", 0)], dtype=np.int64),
-        force[None],
-    )
-
-
-def merge(parts: list[Outcome]) -> Outcome:
-    """Merge outcomes, ordered by the numbers of the cases."""
-    numbers = [number for part in parts for number in part.numbers]
-    order = np.argsort(numbers)
-    longest = max((0 if part.force is None else part.force.shape[1] for part in parts), default=0)
-    force = np.full((len(numbers), longest), np.nan)
-    row = 0
-    for part in parts:
-        if part.force is not None:
-            force[row : row + len(part.numbers), : part.force.shape[1]] = part.force
-        row += len(part.numbers)
-    status = [text for part in parts for text in part.status]
-    return Outcome(
-        [numbers[i] for i in order],
-        {name: np.concatenate([part.summary[name] for part in parts])[order] for name in SUMMARY},
-        [status[i] for i in order],
-        np.concatenate([part.dt for part in parts])[order],
-        np.concatenate([part.steps for part in parts])[order],
-        np.concatenate([part.unconverged_steps for part in parts])[order],
-        force[order],
-    )
+    columns = {
+        **summary,
+        "status": status_of(force[:, None]),
+        "dt": np.array([simulation.state.dt]),
+        "steps": np.array([len(force)]),
+        "unsettled": np.array([values.get("unsettled_steps", 0)]),
+    }
+    return Outcome([number], columns, force[None])

@@ -7,6 +7,7 @@ case follows from the critical time step of its plate.  Any other DT applies to 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from fecm.deck.macros import STEPS, every, flat
@@ -69,35 +70,39 @@ def with_time_step(deck: Deck, dt: float, taken: float = 0.0) -> Deck:
     Deck
         Macros that store rows keep approximately their number of rows.
     """
+    loops = _innermost_loops(deck.macros)
     ratios: dict[int, float] = {}
-    open_loops: list[int] = []
     now = 0.0
-    for place, macro in enumerate(deck.macros):
+    for macro, loop in zip(deck.macros, loops, strict=True):
         if macro.word == "DT":
             now = macro.value or taken
-        elif macro.word == "LOOP":
-            open_loops.append(place)
-        elif macro.word == "NEXT" and open_loops:
-            open_loops.pop()
-        elif macro.word in STEPS and open_loops and now > 0.0 and dt > 0.0:
-            ratios[open_loops[-1]] = now / dt
+        elif macro.word in STEPS and loop is not None and now > 0.0 and dt > 0.0:
+            ratios[loop] = now / dt
 
     def changed(place: int, macro: Macro) -> Macro:
+        loop = loops[place]
         if macro.word == "DT":
             return replace(macro, value=dt, source=None)
-        if macro.word == "LOOP":
-            open_loops.append(place)
-            if place in ratios:
-                count = min(max(1.0, macro.value) * ratios[place], LONGEST)
-                return replace(macro, value=float(max(1, math.ceil(count - 1e-9))), source=None)
-        elif macro.word == "NEXT" and open_loops:
-            open_loops.pop()
-        elif macro.word in STORING and open_loops and open_loops[-1] in ratios:
-            count = min(every(macro) * ratios[open_loops[-1]], LONGEST)
+        if macro.word == "LOOP" and place in ratios:
+            count = min(max(1.0, macro.value) * ratios[place], LONGEST)
+            return replace(macro, value=float(max(1, math.ceil(count - 1e-9))), source=None)
+        if macro.word in STORING and loop in ratios:
+            count = min(every(macro) * ratios[loop], LONGEST)
             return replace(macro, value=float(max(1, round(count))), source=None)
         return macro
 
-    open_loops.clear()
-    return replace(
-        deck, macros=tuple(changed(place, macro) for place, macro in enumerate(deck.macros))
-    )
+    macros = tuple(changed(place, macro) for place, macro in enumerate(deck.macros))
+    return replace(deck, macros=macros)
+
+
+def _innermost_loops(macros: Sequence[Macro]) -> list[int | None]:
+    """Place of the innermost LOOP around each macro."""
+    open_loops: list[int] = []
+    found: list[int | None] = []
+    for place, macro in enumerate(macros):
+        if macro.word == "NEXT" and open_loops:
+            open_loops.pop()
+        found.append(open_loops[-1] if open_loops else None)
+        if macro.word == "LOOP":
+            open_loops.append(place)
+    return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -37,6 +38,10 @@ RUN = (FINE, STILL)
 PEAKS = ("peak_force", "time_of_peak", "max_indentation")
 
 
+# Columns of an outcome.
+COLUMNS = (*SUMMARY, "status", "dt", "steps", "unsettled")
+
+
 @dataclass
 class Outcome:
     """Results of some cases.
@@ -45,46 +50,54 @@ class Outcome:
     ----------
     numbers : list of int
         Numbers of the cases, from 0.
-    summary : dict of ndarray (cases,)
-        By the names of :data:`SUMMARY`; NaN if the case failed, or if the quantity is not known
-        because the run ended in contact.
-    status : list of str
-        ``"ok"``, ``"still in contact"``, or the reason for the failure.
-    unconverged_steps : ndarray (cases,)
-        Steps whose contact iteration did not converge.
-    dt, steps : ndarray (cases,)
-        Time step and number of steps.
+    columns : dict of ndarray (cases,)
+        Values by the names of :data:`COLUMNS`.  Those of :data:`SUMMARY` are NaN if the case
+        failed, or if they are unknown because the run ended in contact.  ``status`` is ``"ok"``,
+        ``"still in contact"``, or the reason for the failure; ``unsettled`` counts the steps whose
+        contact iteration did not converge.
     force : ndarray (cases, steps) or None
         Contact force after every step.
     """
 
     numbers: list[int]
-    summary: dict[str, Floats]
-    status: list[str]
-    dt: Floats
-    steps: NDArray[np.int64]
-    unconverged_steps: NDArray[np.int64]
+    columns: dict[str, NDArray[Any]]
     force: Floats | None = field(default=None, repr=False)
+
+    @property
+    def status(self) -> list[str]:
+        """Status of each case."""
+        texts: list[str] = self.columns["status"].tolist()
+        return texts
 
     def select(self, rows: NDArray[np.intp]) -> Outcome:
         """Return the outcome of some of the cases."""
-        return Outcome(
-            [self.numbers[row] for row in rows],
-            {name: values[rows] for name, values in self.summary.items()},
-            [self.status[row] for row in rows],
-            self.dt[rows],
-            self.steps[rows],
-            self.unconverged_steps[rows],
-            None if self.force is None else self.force[rows],
-        )
+        columns = {name: values[rows] for name, values in self.columns.items()}
+        force = None if self.force is None else self.force[rows]
+        return Outcome([self.numbers[row] for row in rows], columns, force)
 
     @classmethod
-    def failed(cls, numbers: list[int], reasons: list[str]) -> Outcome:
+    def failed(cls, numbers: Sequence[int], reasons: Sequence[str]) -> Outcome:
         """Return the outcome of cases that could not be run."""
-        none = np.full(len(numbers), np.nan)
-        steps = np.zeros(len(numbers), dtype=np.int64)
-        summary = {name: none.copy() for name in SUMMARY}
-        return cls(list(numbers), summary, list(reasons), none.copy(), steps, steps.copy())
+        count = len(numbers)
+        columns: dict[str, NDArray[Any]] = {name: np.full(count, np.nan) for name in SUMMARY}
+        columns |= {"status": np.array(reasons, dtype=np.str_), "dt": np.full(count, np.nan)}
+        columns |= {name: np.zeros(count, dtype=np.int64) for name in ("steps", "unsettled")}
+        return cls(list(numbers), columns)
+
+
+def merge(parts: Sequence[Outcome]) -> Outcome:
+    """Merge outcomes, ordered by the numbers of the cases."""
+    numbers = [number for part in parts for number in part.numbers]
+    order = np.argsort(numbers)
+    longest = max((0 if part.force is None else part.force.shape[1] for part in parts), default=0)
+    force = np.full((len(numbers), longest), np.nan)
+    row = 0
+    for part in parts:
+        if part.force is not None:
+            force[row : row + len(part.numbers), : part.force.shape[1]] = part.force
+        row += len(part.numbers)
+    columns = {n: np.concatenate([part.columns[n] for part in parts])[order] for n in COLUMNS}
+    return Outcome([numbers[i] for i in order], columns, force[order])
 
 
 class Indentation(NamedTuple):
@@ -148,6 +161,6 @@ def summarise(
     }
 
 
-def status_of(force: Floats) -> list[str]:
+def status_of(force: Floats) -> NDArray[np.str_]:
     """Return the status of cases from their contact forces (steps, cases)."""
-    return [STILL if still else FINE for still in force[-1] > 0.0]
+    return np.where(force[-1] > 0.0, STILL, FINE)

@@ -53,31 +53,19 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Task:
-    """Cases run together.
+class Task(Plan):
+    """The part of a plan whose cases are run together.
 
     Attributes
     ----------
     number : int
         Number of the task.
-    deck : Deck
-        Deck that is varied.
     numbers : tuple of int
         Numbers of the cases.
-    cases : tuple of dict
-        Values of each case.
-    history : bool
-        Whether contact forces are returned.
-    clock : Clock or None
-        Rule for the time step of the plate; None if the deck's time step applies.
     """
 
-    number: int
-    deck: Deck
-    numbers: tuple[int, ...]
-    cases: tuple[Case, ...]
-    history: bool = False
-    clock: Clock | None = None
+    number: int = 0
+    numbers: tuple[int, ...] = ()
 
 
 def plan(checked: Problem, cases: Sequence[Case], *, history: bool = False) -> Plan:
@@ -122,7 +110,7 @@ def tasks(checked: Problem, made: Plan) -> list[Task]:
         for start in range(0, len(numbers), together):
             some = tuple(numbers[start : start + together])
             cases = tuple(made.cases[n] for n in some)
-            found.append(Task(len(found), made.deck, some, cases, made.history, made.clock))
+            found.append(Task(made.deck, cases, made.history, made.clock, len(found), some))
     return found
 
 

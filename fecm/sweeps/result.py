@@ -185,11 +185,10 @@ def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
     """Create the result from a plan and its outcome."""
     names = list(plan.cases[0])
     cases = {name: np.array([case[name] for case in plan.cases]) for name in names}
-    summary: dict[str, Array] = dict(outcome.summary)
-    summary["status"] = np.array(outcome.status)
-    deck = plan.deck
+    columns, deck = outcome.columns, plan.deck
     return SweepResult(
-        cases, summary, outcome.dt, outcome.steps, outcome.force, outcome.unconverged_steps,
+        cases, {name: columns[name] for name in (*SUMMARY, "status")},
+        columns["dt"], columns["steps"], outcome.force, columns["unsettled"],
         deck.text or deck.to_text(), deck.title, unit_names(deck),
     )  # fmt: skip
 

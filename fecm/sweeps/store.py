@@ -11,13 +11,12 @@ import io
 import json
 import shutil
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from fecm._errors import FecmError
 from fecm._files import beside, packed
-from fecm.sweeps.outcome import SUMMARY, Outcome
+from fecm.sweeps.outcome import COLUMNS, Outcome
 from fecm.sweeps.plan import Task
 
 MARK = "sweep.json"
@@ -90,26 +89,12 @@ class PartialResults:
         with np.load(io.BytesIO(packed_arrays), allow_pickle=False) as arrays:
             if arrays["numbers"].tolist() != list(task.numbers):
                 raise DamagedPartError(f"{path} holds other cases")
-            return Outcome(
-                arrays["numbers"].tolist(),
-                {name: arrays[name] for name in SUMMARY},
-                arrays["status"].tolist(),
-                arrays["dt"],
-                arrays["steps"],
-                arrays["unsettled"],
-                arrays.get("force", None),
-            )
+            columns = {name: arrays[name] for name in COLUMNS}
+            return Outcome(arrays["numbers"].tolist(), columns, arrays.get("force", None))
 
     def put(self, task: Task, outcome: Outcome) -> None:
         """Store the outcome of a task."""
-        arrays: dict[str, Any] = {
-            **outcome.summary,
-            "numbers": np.array(outcome.numbers),
-            "status": np.array(outcome.status, dtype=np.str_),
-            "dt": outcome.dt,
-            "steps": outcome.steps,
-            "unsettled": outcome.unconverged_steps,
-        }
+        arrays = {**outcome.columns, "numbers": np.array(outcome.numbers)}
         if outcome.force is not None:
             arrays["force"] = outcome.force
         data = packed(arrays)

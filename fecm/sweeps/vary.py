@@ -85,19 +85,18 @@ def _swap(deck: Deck, old: Segment, new: Segment) -> Deck:
     return replace(deck, segments=segments)
 
 
-def _impact(deck: Deck, name: str, value: Value) -> Deck:
-    old = deck.require(Impact)
-    new = (
-        replace(old, velocity=float(value), source=None)
-        if name == "velocity"
-        else replace(old, node=int(value), source=None)
-    )
-    return _swap(deck, old, new)
+# Segment and field of the values that are fields of a segment.
+_FIELDS: dict[str, tuple[type[Impact | Indentation], str]] = {
+    "velocity": (Impact, "velocity"),
+    "impact_node": (Impact, "node"),
+    **{name: (Indentation, name) for name in ("k", "alpha_p", "s_p", "q")},
+}
 
 
-def _law(deck: Deck, name: str, value: Value) -> Deck:
-    old = deck.require(Indentation)
-    changed: dict[str, Any] = {name: float(value), "source": None}
+def _field(deck: Deck, name: str, value: Value) -> Deck:
+    kind, field = _FIELDS[name]
+    old = deck.require(kind)
+    changed: dict[str, Any] = {field: value, "source": None}
     return _swap(deck, old, replace(old, **changed))
 
 
@@ -170,9 +169,7 @@ def _taken_time_step(deck: Deck) -> float:
 
 
 _SETTERS: dict[str, Callable[[Deck, str, Value], Deck]] = {
-    "velocity": _impact,
-    "impact_node": _impact,
-    **dict.fromkeys(("k", "alpha_p", "s_p", "q"), _law),
+    **dict.fromkeys(_FIELDS, _field),
     **dict.fromkeys(("rod_length", "rod_modulus", "rod_density", "rod_mass"), _rod),
     **dict.fromkeys(PLY, _ply),
     "thickness": _thickness,
