@@ -6,7 +6,7 @@ a page: ``1`` a new page (a form feed), ``0`` a blank line, ``-`` two of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -68,7 +68,7 @@ class Printer:
         }  # fmt: skip
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Print what :meth:`state` gave, and go on behind it."""
+        """Print again what was printed up to a :meth:`state`."""
         self._title, self._control = state["title"], state["control"]
         self._pages = state["pages"]
         if self._file is not None:
@@ -78,18 +78,18 @@ class Printer:
         if self._file is not None:
             self._file.writelines(f"{line.rstrip()}\n" for line in lines)
 
-    def _page(self, heading: str) -> None:
-        """Begin a page: carriage control, title, heading."""
+    def _page(self, heading: str, lines: Iterable[str] = ()) -> None:
+        """Begin a page: carriage control, title, heading; then print lines on it."""
         head = CARRIAGE.get(self._control, "") if self._pages else ""
         self._pages += 1
         self._write([f"{head}{self._title}", "", f"  {heading}", ""])
+        self._write(lines)
 
     def _table(self, names: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
         """A table of right-aligned columns."""
-        if self._file is not None:
-            self._write(["  " + "".join(name.rjust(13) for name in names)])
-            self._write("  " + "".join(_cell(value) for value in row) for row in rows)
-            self._write([""])
+        self._write(["  " + "".join(name.rjust(13) for name in names)])
+        self._write("  " + "".join(_cell(value) for value in row) for row in rows)
+        self._write([""])
 
     # Input ---------------------------------------------------------------------------------------
 
@@ -98,7 +98,16 @@ class Printer:
         if not self.is_on:
             return
         self._title = deck.title
-        self._control_information(deck)
+        control = deck.control
+        counts = {
+            "Nodes": control.numnp,
+            "Elements": control.numel,
+            "Layers": control.layers,
+            "Dimensions of space": control.ndm,
+            "Dofs per node": control.ndf,
+            "Largest number of nodes": control.nen,
+        }
+        self._page("Control information", _values(counts))
         echo = True
         for segment in deck.segments:
             if isinstance(segment, PrintOption):
@@ -112,87 +121,55 @@ class Printer:
             self._nodes(mesh.equations)
         self._program(deck)
 
-    def _control_information(self, deck: Deck) -> None:
-        control = deck.control
-        self._page("Control information")
-        for name, value in (
-            ("Nodes", control.numnp),
-            ("Elements", control.numel),
-            ("Layers", control.layers),
-            ("Dimensions of space", control.ndm),
-            ("Unknowns a node", control.ndf),
-            ("Nodes an element, at the most", control.nen),
-        ):
-            self._write([f"  {name:32}{value:8d}"])
-        self._write([""])
-
     def _segment(self, segment: Segment, mesh: Mesh, plate: PlateModel, echo: bool) -> None:
         """Echo one segment; mesh data only while echoing is on."""
-        if isinstance(segment, Material):
-            self._material(segment, plate)
-        elif isinstance(segment, Indentation):
-            self._page("Indentation law")
-            law = build_constants(segment)
-            for name, value in (
-                ("Contact coefficient k", law.k),
-                *(
-                    [("Critical indentation alpha_cr", segment.alpha_p)]
-                    if segment.word
-                    else [
-                        ("Critical indentation alpha_p", segment.alpha_p),
-                        ("Constant s_p", segment.s_p),
-                    ]
-                ),
-                ("Power of the unloading law q", law.q),
-            ):
-                self._write([f"  {name:32}{value:14.6g}"])
-            self._write([""])
-        elif isinstance(segment, Impact):
-            self._page("Impact")
-            self._write(
-                [
-                    f"  {'Node':32}{segment.node:8d}",
-                    f"  {'Unknown':32}{segment.dof:8d} ({DOF_NAMES[segment.dof - 1]})",
-                    f"  {'Approach velocity':32}{segment.velocity:14.6g}",
-                    "",
-                ]
-            )
-        elif not echo:
-            return
-        elif isinstance(segment, Coordinates):
-            self._page("Nodal coordinates")
-            rows = ((n, *place) for n, place in enumerate(mesh.coordinates.tolist(), start=1))
-            self._table(("node", "x", "y"), rows)
-        elif isinstance(segment, Elements):
-            self._page("Elements")
-            names = ("element", *(f"node {i + 1}" for i in range(mesh.elements.shape[1])))
-            rows_ = ((n, *nodes) for n, nodes in enumerate(mesh.elements.tolist(), start=1))
-            self._table(names, rows_)
-        elif isinstance(segment, Boundary):
-            self._page("Restraint codes")
-            self._nodes(mesh.codes, only=(mesh.codes != 0).any(axis=1))
-        elif isinstance(segment, Forces):
-            self._page("Nodal forces and displacements")
-            self._nodes(mesh.forces, only=(mesh.forces != 0).any(axis=1))
+        match segment:
+            case Material():
+                self._material(segment, plate)
+            case Indentation():
+                law = build_constants(segment)
+                values = {"Contact coefficient k": law.k}
+                if segment.word:
+                    values["Critical indentation alpha_cr"] = segment.alpha_p
+                else:
+                    values["Critical indentation alpha_p"] = segment.alpha_p
+                    values["Constant s_p"] = segment.s_p
+                values["Power of the unloading law q"] = law.q
+                self._page("Indentation law", _values(values))
+            case Impact():
+                dof = f"{segment.dof:8d} ({DOF_NAMES[segment.dof - 1]})"
+                values = {"Node": segment.node, "Dof": dof, "Approach velocity": segment.velocity}
+                self._page("Impact", _values(values))
+            case Coordinates() if echo:
+                self._page("Nodal coordinates")
+                self._table(("node", "x", "y"), _numbered(mesh.coordinates))
+            case Elements() if echo:
+                names = (f"node {i + 1}" for i in range(mesh.elements.shape[1]))
+                self._page("Elements")
+                self._table(("element", *names), _numbered(mesh.elements))
+            case Boundary() if echo:
+                self._page("Restraint codes")
+                self._nodes(mesh.codes, only=(mesh.codes != 0).any(axis=1))
+            case Forces() if echo:
+                self._page("Nodal forces and displacements")
+                self._nodes(mesh.forces, only=(mesh.forces != 0).any(axis=1))
 
     def _nodes(self, values: NDArray[np.generic], only: NDArray[np.bool_] | None = None) -> None:
-        """A table of every unknown of every node, or of some nodes."""
+        """A table of every dof of every node, or of some nodes."""
         chosen = np.arange(len(values)) if only is None else np.flatnonzero(only)
         self._table(("node", *DOF_NAMES), ((n + 1, *values[n].tolist()) for n in chosen.tolist()))
 
     def _material(self, material: Material, plate: PlateModel) -> None:
         ply, card, laminate = material.ply, material.integration, plate.laminate
-        self._page("Material")
-        self._write(
-            [
-                f"  {len(material.layers)} layers, total thickness {card.thickness:g}",
-                f"  E1 {ply.e1:g}   E2 {ply.e2:g}   NU12 {ply.nu12:g}",
-                f"  G12 {ply.g12:g}   G13 {ply.g13:g}   G23 {ply.g23:g}",
-                f"  density {ply.density:g}",
-                f"  Gauss orders L1 {card.bending}, L2 {card.shear}; stress points K {card.points}",
-                "",
-            ]
-        )
+        lines = [
+            f"  {len(material.layers)} layers, total thickness {card.thickness:g}",
+            f"  E1 {ply.e1:g}   E2 {ply.e2:g}   NU12 {ply.nu12:g}",
+            f"  G12 {ply.g12:g}   G13 {ply.g13:g}   G23 {ply.g23:g}",
+            f"  density {ply.density:g}",
+            f"  Gauss orders L1 {card.bending}, L2 {card.shear}; stress points K {card.points}",
+            "",
+        ]
+        self._page("Material", lines)
         layers = (
             (n, layer.angle, layer.thickness) for n, layer in enumerate(material.layers, start=1)
         )
@@ -216,63 +193,67 @@ class Printer:
 
     def displacements(self, field: Floats, time: float) -> None:
         """Displacements of every node."""
-        if self.is_on:
-            self._page(f"Nodal displacements at time {time:.6g}")
-            self._nodes(field)
+        self._page(f"Nodal displacements at time {time:.6g}")
+        self._nodes(field)
 
     def reactions(self, force: Floats, mesh: Mesh, time: float) -> None:
-        """Forces of the supports, and the sum of all."""
-        if self.is_on:
-            self._page(f"Reactions at time {time:.6g}")
-            supports = np.where(mesh.equations == 0, force, 0.0)
-            largest = np.abs(supports).max(axis=1)
-            self._nodes(supports, only=np.asarray(largest > 1e-12 * max(1.0, largest.max())))
-            self._table(("sum", *DOF_NAMES[:3]), [("", *supports.sum(axis=0)[:3].tolist())])
+        """Forces of the supports, and their sum."""
+        supports = np.where(mesh.equations == 0, force, 0.0)
+        largest = np.abs(supports).max(axis=1)
+        self._page(f"Reactions at time {time:.6g}")
+        self._nodes(supports, only=np.asarray(largest > 1e-12 * max(1.0, largest.max())))
+        self._table(("sum", *DOF_NAMES[:3]), [("", *supports.sum(axis=0)[:3].tolist())])
 
     def stresses(
         self, values: Mapping[str, Floats], places: tuple[Floats, Floats], clock: float
     ) -> None:
         """Strains, and below each line the stress resultants, at every point."""
-        if not self.is_on:
-            return
-        self._page(f"Element strains and stress resultants at time {clock:.6g}")
         x, y = places
-        self._write(
-            ["  " + "".join(f"{n:>13}" for n in ("element", "x", "y", *GENERALISED_STRAINS))]
-        )
-        self._write(["  " + " " * 39 + "".join(f"{n:>13}" for n in RESULTANTS)])
-        for element in range(x.shape[0]):
-            for point in range(x.shape[1]):
-                at = (element, point)
-                strains = (float(values[name][at]) for name in GENERALISED_STRAINS)
-                head = (element + 1, float(x[at]), float(y[at]))
-                self._write(["  " + "".join(_cell(v) for v in (*head, *strains))])
-                resultants = "".join(_cell(float(values[name][at])) for name in RESULTANTS)
-                self._write(["  " + " " * 39 + resultants])
-        self._write([""])
+        columns = [x, y, *(values[name] for name in (*GENERALISED_STRAINS, *RESULTANTS))]
+        split, indent = 2 + len(GENERALISED_STRAINS), "  " + " " * 39
+
+        def lines() -> Iterator[str]:
+            names = ("element", "x", "y", *GENERALISED_STRAINS)
+            yield "  " + "".join(f"{name:>13}" for name in names)
+            yield indent + "".join(f"{name:>13}" for name in RESULTANTS)
+            for element, point in np.ndindex(x.shape):
+                row = [float(column[element, point]) for column in columns]
+                yield "  " + "".join(map(_cell, (element + 1, *row[:split])))
+                yield indent + "".join(map(_cell, row[split:]))
+            yield ""
+
+        self._page(f"Element strains and stress resultants at time {clock:.6g}", lines())
 
     def modes(self, angular_frequency: Floats) -> None:
         """Natural frequencies."""
-        if self.is_on:
-            self._page("Natural modes")
-            rows = (
-                (n, omega**2, omega, omega / (2.0 * np.pi))
-                for n, omega in enumerate(angular_frequency.tolist(), start=1)
-            )
-            self._table(("mode", "eigenvalue", "angular", "frequency"), rows)
+        rows = (
+            (n, omega**2, omega, omega / (2.0 * np.pi))
+            for n, omega in enumerate(angular_frequency.tolist(), start=1)
+        )
+        self._page("Natural modes")
+        self._table(("mode", "eigenvalue", "angular", "frequency"), rows)
 
     def check(self, plate: PlateModel, profile: int) -> None:
         """Mesh and storage."""
-        if self.is_on:
-            self._page("Mesh and storage")
-            stored = plate.stiffness.nnz
-            for name, value in (
-                ("Equations", plate.neq),
-                ("Entries of the profile, JDIAG(NEQ)", profile),
-                ("Entries of the sparse stiffness", stored),
-            ):
-                self._write([f"  {name:36}{value:12d}"])
-            self._write([f"  {'Area':36}{plate.area():12.6g}", ""])
+        values = {
+            "Equations": f"{plate.neq:12d}",
+            "Entries of the profile, JDIAG(NEQ)": f"{profile:12d}",
+            "Entries of the sparse stiffness": f"{plate.stiffness.nnz:12d}",
+            "Area": f"{plate.area():12.6g}",
+        }
+        self._page("Mesh and storage", _values(values, width=36))
+
+
+def _values(values: Mapping[str, float | str], width: int = 32) -> list[str]:
+    """Lines of names and values, and a blank line."""
+    formats = {int: "8d", float: "14.6g", str: ""}
+    lines = [f"  {name:{width}}{value:{formats[type(value)]}}" for name, value in values.items()]
+    return [*lines, ""]
+
+
+def _numbered(rows: NDArray[np.generic]) -> Iterator[Sequence[object]]:
+    """Rows of a table, with their numbers from 1."""
+    return ((n, *row) for n, row in enumerate(rows.tolist(), start=1))
 
 
 def _cell(value: object) -> str:
