@@ -10,12 +10,10 @@ import pytest
 
 from fecm.mechanics import element_groups, element_matrices
 from fecm.mechanics.element_groups import SHAPES, shape_of
-from fecm.mechanics.elements import cubic, quadrilateral, triangle
 from fecm.mechanics.elements.quadrature import Quadrature
-from fecm.mechanics.elements.shape import ElementShape
+from fecm.mechanics.elements.shape import CUBIC, QUADRILATERAL, TRIANGLE, ElementShape
 from tests.builders import Bools, Floats
 
-TRIANGLE, QUADRILATERAL, CUBIC = triangle.SHAPE, quadrilateral.SHAPE, cubic.SHAPE
 BY_NAME = pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.name)
 
 # Where the report's program puts the nodes 1 to 12 of a cubic element, in thirds.
@@ -169,7 +167,7 @@ def test_a_triangle_is_the_4_node_square_with_corners_3_and_4_in_one_place() -> 
 
 
 def test_nodes_of_a_cubic_element_stand_where_the_reports_program_puts_them() -> None:
-    np.testing.assert_allclose(3.0 * np.stack([cubic.XI, cubic.ETA], axis=1), CUBIC_PLACES)
+    np.testing.assert_allclose(3.0 * np.stack([CUBIC.xi, CUBIC.eta], axis=1), CUBIC_PLACES)
 
 
 def test_twelve_node_functions_are_the_serendipity_ones_of_textbooks() -> None:
@@ -191,7 +189,7 @@ def test_twelve_node_functions_are_the_serendipity_ones_of_textbooks() -> None:
 @pytest.mark.parametrize("side", range(4))
 def test_a_cubic_along_a_side_is_exact_between_its_four_nodes(side: int) -> None:
     t = np.linspace(-1.0, 1.0, 11)
-    places = (cubic.XI, cubic.ETA)[side % 2]
+    places = (CUBIC.xi, CUBIC.eta)[side % 2]
 
     def polynomial(s: Floats) -> Floats:
         return 0.3 - 1.1 * s + 0.7 * s**2 + 2.3 * s**3

@@ -9,9 +9,8 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 from fecm.mechanics import element_groups, element_matrices, plate
-from fecm.mechanics.elements import quadrilateral
 from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
-from fecm.mechanics.elements.quadrilateral import ETA, XI
+from fecm.mechanics.elements.shape import QUADRILATERAL
 from fecm.mechanics.plate import assemble
 from fecm.mechanics.stiffness_product import stiffness_operator
 from fecm.mechanics.strains import StrainField
@@ -198,7 +197,8 @@ def test_a_free_element_has_six_rigid_modes_and_those_its_quadrature_misses(
 def test_two_shear_points_a_direction_miss_the_hourglass_of_the_9_node_element() -> None:
     mesh = one_element(SKEWED)
     hourglass = np.zeros((9, 5))
-    hourglass[:, 2] = XI**2 + ETA**2 - 3.0 * XI**2 * ETA**2
+    xi, eta = QUADRILATERAL.xi, QUADRILATERAL.eta
+    hourglass[:, 2] = xi**2 + eta**2 - 3.0 * xi**2 * eta**2
     energies = []
     for shear in (2, 3):
         K = free_stiffness(mesh, 3, shear)
@@ -324,7 +324,7 @@ def test_a_family_holds_the_elements_that_have_the_same_nodes() -> None:
     found = element_groups.element_blocks(elements, coordinates)
     assert sorted(row for family in found for row in family.rows) == list(range(12))
     for family in found:
-        assert len(family.present) == quadrilateral.NODES
+        assert len(family.present) == QUADRILATERAL.nodes
         for row, nodes in zip(family.rows, family.nodes, strict=True):
             assert np.array_equal(elements[row] > 0, family.present)
             assert np.array_equal(elements[row][elements[row] > 0], nodes + 1)

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
-from fecm.mechanics.elements.quadrilateral import ETA, XI, shape_functions
+from fecm.mechanics.elements.shape import QUADRILATERAL
 from tests.builders import Bools, Floats
 from tests.patches import PATTERNS
 
+shape_functions = QUADRILATERAL.shape_functions
+XI, ETA = QUADRILATERAL.xi, QUADRILATERAL.eta
 ORDERS = range(1, HIGHEST_ORDER + 1)
 
 

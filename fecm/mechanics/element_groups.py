@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Bools, Floats
-from fecm.mechanics.elements import cubic, quadrilateral, triangle
-from fecm.mechanics.elements.shape import ElementShape
+from fecm.mechanics.elements.shape import CUBIC, QUADRILATERAL, TRIANGLE, ElementShape
 
 # Tolerance of the relative node positions of congruent elements, relative to the largest element.
 TOLERANCE = 1.0e-9
@@ -48,7 +47,7 @@ def congruence(family: ElementBlock) -> Congruence:
 
 
 # In ascending order of their number of nodes.
-SHAPES = (triangle.SHAPE, quadrilateral.SHAPE, cubic.SHAPE)
+SHAPES = (TRIANGLE, QUADRILATERAL, CUBIC)
 
 # Number of nodes of the largest element.
 MOST_NODES = SHAPES[-1].nodes

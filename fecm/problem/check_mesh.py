@@ -13,8 +13,8 @@ from fecm.deck.findings import Findings, Place
 from fecm.deck.model import Boundary, Coordinates, Deck, Elements, Material
 from fecm.deck.records import Integration
 from fecm.mechanics import element_groups, element_matrices
-from fecm.mechanics.elements import cubic, triangle
 from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature
+from fecm.mechanics.elements.shape import CUBIC, TRIANGLE
 from fecm.mechanics.mesh import Mesh, holds_the_plane
 from fecm.problem.build import Problem, rules
 from fecm.problem.generate import place_of_element
@@ -66,7 +66,7 @@ def report_elements(
             findings.add(code, f"Elements {ranges(numbers)}: each {what}.", place, hint)
 
 
-TRIANGLE = triangle.SHAPE.corners
+CORNERS = TRIANGLE.corners
 
 W, THETA_X = 2, 3
 
@@ -114,9 +114,9 @@ def check_elements(deck: Deck, mesh: Mesh, findings: Findings) -> bool:
     empty = ~(elements != 0).any(axis=1)
     unknown = (elements < 0) | (elements > numnp)
     # Nodes behind the third make a quadrilateral, which has a fourth corner.
-    pointed = ~(elements[:, TRIANGLE:] != 0).any(axis=1)
-    three_missing = (elements[:, :TRIANGLE] == 0).any(axis=1)
-    four_missing = (elements[:, : TRIANGLE + 1] == 0).any(axis=1)
+    pointed = ~(elements[:, CORNERS:] != 0).any(axis=1)
+    three_missing = (elements[:, :CORNERS] == 0).any(axis=1)
+    four_missing = (elements[:, : CORNERS + 1] == 0).any(axis=1)
     ordered = np.sort(elements, axis=1)
     repeated = ((ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] != 0)).any(axis=1)
     report("E308", empty, "has no nodes")
@@ -170,9 +170,9 @@ def _check_side_nodes(deck: Deck, mesh: Mesh, findings: Findings) -> None:
     """Warn of nodes on sides that are off the middle or the third points, seen along the side."""
     wrong: list[int] = []
     for family in element_groups.element_blocks(mesh.elements, mesh.coordinates):
-        if family.shape is triangle.SHAPE:
+        if family.shape is TRIANGLE:
             continue
-        thirds = family.shape is cubic.SHAPE
+        thirds = family.shape is CUBIC
         for place in range(4, 12 if thirds else 8):
             if not family.present[place]:
                 continue
@@ -238,7 +238,7 @@ def _check_shapes(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool) 
 
 def _at_third_node(card: Integration, family: element_groups.ElementBlock) -> bool:
     """Whether strains are stored where a triangle's Jacobian is zero: on the side eta = 1."""
-    return family.shape is triangle.SHAPE and card.points < -1
+    return family.shape is TRIANGLE and card.points < -1
 
 
 def _check_triangles(
@@ -363,9 +363,9 @@ def _orders_without_motions(family: element_groups.ElementBlock) -> tuple[str, i
     The first order is that of a plate whose w is free, the second that of one with a support, which
     a lower order may do for: the motion of a whole mesh then meets the support.
     """
-    if family.shape is triangle.SHAPE:
+    if family.shape is TRIANGLE:
         return "triangles", 1, 1
-    if family.shape is cubic.SHAPE:
+    if family.shape is CUBIC:
         return "cubic elements", 3, 3
     if family.present[8]:
         return NINE_NODES, 3, 2

@@ -1,6 +1,10 @@
 """Element shapes: node positions and shape functions on the square -1 <= xi, eta <= 1.
 
-Shape functions are in the order of the node numbers; those of an absent node are zero.
+Shape functions are in the order of the node numbers; those of an absent node are zero.  Corners run
+counter-clockwise from (-1, -1) and are always present.  A quadrilateral stays compatible with
+neighbours that have the same nodes on the common side, and reproduces every linear field.
+
+Functions return values, d/dxi and d/deta, (3, nodes, n), at n points.
 """
 
 from __future__ import annotations
@@ -11,9 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from fecm._typing import Bools, Floats
-
-# Values (n, nodes) and derivatives (n, 2, nodes) at points xi, eta (n,) of the present nodes.
-ShapeFunctions = Callable[[Floats, Floats, Bools], tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +31,8 @@ class ElementShape:
         Number of corners, the first nodes, which are never absent.
     numbering : str
         Order of the nodes, for messages.
-    shape_functions : callable
-        ``shape_functions(xi, eta, present)`` gives the values (n, nodes) and the derivatives with
-        respect to xi and eta (n, 2, nodes).
+    functions : callable
+        ``functions(xi, eta, present)`` returns the values and derivatives, (3, nodes, n).
     """
 
     name: str
@@ -40,21 +40,143 @@ class ElementShape:
     eta: Floats
     corners: int
     numbering: str
-    shape_functions: ShapeFunctions
+    functions: Callable[[Floats, Floats, Bools], Floats]
 
     @property
     def nodes(self) -> int:
         """Largest number of nodes."""
         return len(self.xi)
 
+    def shape_functions(self, xi: Floats, eta: Floats, present: Bools) -> tuple[Floats, Floats]:
+        """Shape functions and their derivatives.
 
-def corner_functions(nodes: int, xi: Floats, eta: Floats) -> Floats:
-    """Values, d/dxi and d/deta (3, nodes, n) of the bilinear corner functions (equation 4-11).
+        Parameters
+        ----------
+        xi, eta : ndarray (n,)
+            Points.
+        present : ndarray (nodes,) of bool
+            Which nodes are present; the corners always are.
 
-    Corners run counter-clockwise from (-1, -1); the functions of other nodes are zero.
+        Returns
+        -------
+        N : ndarray (n, nodes)
+            Values.
+        dN : ndarray (n, 2, nodes)
+            Derivatives with respect to xi and eta.
+        """
+        S = self.functions(np.asarray(xi, float), np.asarray(eta, float), np.asarray(present))
+        return S[0].T.copy(), S[1:].transpose(2, 0, 1).copy()
+
+
+def _triangle(xi: Floats, eta: Floats, present: Bools) -> Floats:
+    """The 4-node quadrilateral with coincident corners 3 and 4 (the listing's SHAPE, NEL = 3).
+
+    The side eta = 1 of the square is collapsed to node 3, where the Jacobian is singular.  Strains
+    are constant: the shape functions are the area coordinates.
     """
+    zero, half = np.zeros_like(xi), np.full_like(xi, 0.5)
+    values = [(1.0 - xi) * (1.0 - eta) / 4.0, (1.0 + xi) * (1.0 - eta) / 4.0, (1.0 + eta) / 2.0]
+    along_xi = [-(1.0 - eta) / 4.0, (1.0 - eta) / 4.0, zero]
+    along_eta = [-(1.0 - xi) / 4.0, -(1.0 + xi) / 4.0, half]
+    return np.array([values, along_xi, along_eta])
+
+
+def _bilinear(nodes: int, xi: Floats, eta: Floats) -> Floats:
+    """Bilinear functions of the corners (equation 4-11); those of other nodes are zero."""
     S = np.zeros((3, nodes, len(xi)))
     for i, (x, y) in enumerate(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))):
         a, b = 1.0 + x * xi, 1.0 + y * eta
         S[:, i] = a * b / 4.0, x * b / 4.0, y * a / 4.0
     return S
+
+
+# Corners, mid-sides from node 5 between corners 1 and 2, centre.
+_XI_9 = np.array([-1.0, 1.0, 1.0, -1.0, 0.0, 1.0, 0.0, -1.0, 0.0])
+_ETA_9 = np.array([-1.0, -1.0, 1.0, 1.0, -1.0, 0.0, 1.0, 0.0, 0.0])
+# Mid-side nodes next to each corner.
+_MID_SIDES = ((7, 4), (4, 5), (5, 6), (6, 7))
+
+
+def _quadratic(xi: Floats, eta: Floats, present: Bools) -> Floats:
+    """Four to nine nodes (equations 4-7 ff.)."""
+    # First each function without the other nodes of its side.
+    S = _bilinear(9, xi, eta)
+    for i in (4, 6):  # mid-sides at eta = -1 and +1
+        a, b = 1.0 - xi**2, 1.0 + _ETA_9[i] * eta
+        S[:, i] = a * b / 2.0, -xi * b, _ETA_9[i] * a / 2.0
+    for i in (5, 7):  # mid-sides at xi = +1 and -1
+        a, b = 1.0 + _XI_9[i] * xi, 1.0 - eta**2
+        S[:, i] = a * b / 2.0, _XI_9[i] * b / 2.0, -a * eta
+    S[:, 8] = (1.0 - xi**2) * (1.0 - eta**2), -2.0 * xi * (1.0 - eta**2), -2.0 * eta * (1.0 - xi**2)
+    S[:, ~present] = 0.0
+    # Then subtract from each function its values at the mid-sides and the centre.
+    centre = S[:, 8].copy()
+    for i in range(4, 8):
+        if present[i]:
+            S[:, i] -= centre / 2.0
+    for i, (before, after) in enumerate(_MID_SIDES):
+        S[:, i] -= centre / 4.0 + (S[:, before] + S[:, after]) / 2.0
+    return S
+
+
+_THIRD = 1.0 / 3.0
+# Corners, then the nodes at the third points of the sides: counter-clockwise, nodes 5 to 8 follow
+# corners 1 to 4 and nodes 9 to 12 precede them (the listing's SHAP3).
+_XI_12 = np.array([-1.0, 1.0, 1.0, -1.0, -_THIRD, 1.0, _THIRD, -1.0, -1.0, _THIRD, 1.0, -_THIRD])
+_ETA_12 = np.array([-1.0, -1.0, 1.0, 1.0, -1.0, -_THIRD, 1.0, _THIRD, -_THIRD, -1.0, _THIRD, 1.0])
+# Near and far third points on the two sides of each corner.
+_NEAR = ((4, 8), (5, 9), (6, 10), (7, 11))
+_FAR = ((7, 9), (4, 10), (5, 11), (6, 8))
+
+
+def _cubic(xi: Floats, eta: Floats, present: Bools) -> Floats:
+    """Four to twelve nodes (the listing's SHAP3 and CSHAPE)."""
+    # First each function without the other nodes of its side.
+    S = _bilinear(12, xi, eta)
+    for i in (4, 6, 9, 11):  # third points at eta = -1 and +1
+        f, slope = _side(xi, _XI_12[i])
+        a = (1.0 + _ETA_12[i] * eta) / 2.0
+        S[:, i] = f * a, slope * a, f * _ETA_12[i] / 2.0
+    for i in (5, 7, 8, 10):  # third points at xi = +1 and -1
+        f, slope = _side(eta, _ETA_12[i])
+        a = (1.0 + _XI_12[i] * xi) / 2.0
+        S[:, i] = f * a, f * _XI_12[i] / 2.0, slope * a
+    S[:, ~present] = 0.0
+    # Then subtract from each corner function its values at the third points.
+    for i in range(4):
+        near, far = S[:, _NEAR[i]].sum(axis=1), S[:, _FAR[i]].sum(axis=1)
+        S[:, i] -= (2.0 * near + far) / 3.0
+    return S
+
+
+def _side(t: Floats, node: float) -> tuple[Floats, Floats]:
+    """Cubic along a side, 1 at one third point and 0 at the other and the ends, and its slope."""
+    f = 9.0 / 16.0 * (1.0 - t**2) * (1.0 + 9.0 * node * t)
+    slope = 9.0 / 16.0 * (9.0 * node - 2.0 * t - 27.0 * node * t**2)
+    return f, slope
+
+
+TRIANGLE = ElementShape(
+    "triangle",
+    np.array([-1.0, 1.0, 0.0]),
+    np.array([-1.0, -1.0, 1.0]),
+    3,
+    "corners run counter-clockwise",
+    _triangle,
+)
+QUADRILATERAL = ElementShape(
+    "quadrilateral",
+    _XI_9,
+    _ETA_9,
+    4,
+    "corners run counter-clockwise, mid-side 5 lies between corners 1 and 2",
+    _quadratic,
+)
+CUBIC = ElementShape(
+    "cubic quadrilateral",
+    _XI_12,
+    _ETA_12,
+    4,
+    "corners run counter-clockwise, nodes 5 and 10 divide the side from corner 1 to 2 in thirds",
+    _cubic,
+)
