@@ -50,6 +50,17 @@ class Check:
         return (got - self.expected) / abs(self.expected if self.scale is None else self.scale)
 
 
+def checks(
+    quantities: str, values: Iterable[float], source: str, tolerance: float, why: str
+) -> tuple[Check, ...]:
+    """Return checks of several quantities, separated by commas, that differ only in the value."""
+    names = quantities.split(", ")
+    return tuple(
+        Check(name, value, source, tolerance, why)
+        for name, value in zip(names, values, strict=True)
+    )
+
+
 @dataclass(frozen=True)
 class Case:
     """Quantities computed together.

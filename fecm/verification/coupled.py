@@ -12,21 +12,23 @@ from fecm.deck.grid import Grid, Section, lines, uniform
 from fecm.deck.model import (
     Boundary,
     Deck,
-    Forces,
     Gages,
     Impact,
     Indentation,
     Projectile,
     ShearCorrection,
 )
-from fecm.deck.records import Gage, LoadTable, Macro, NodeCodes, NodeValues
+from fecm.deck.records import Gage, LoadTable, Macro, NodeCodes
 from fecm.results.result import Result
-from fecm.verification.case import Case, Check, case, farthest
+from fecm.verification.case import Case, Check, case, checks
 from fecm.verification.decks import (
     ANGLE_PLY,
     CROSS_PLY,
     Supports,
+    constant_strains,
     deck,
+    farthest_of,
+    forces,
     impact_program,
     material,
     quarter_plate,
@@ -34,7 +36,7 @@ from fecm.verification.decks import (
     weights,
 )
 from fecm.verification.laminates import THICK
-from fecm.verification.plates import EXACT, IN_FIELD, STATICS
+from fecm.verification.plates import EXACT, IN_FIELD, IN_PLANE, STATICS
 from fecm.verification.series import PLY, TwoLayers, angle_ply, cross_ply, off_axis, terms
 
 # Resultants -------------------------------------------------------------------------------------
@@ -42,6 +44,7 @@ from fecm.verification.series import PLY, TwoLayers, angle_ply, cross_ply, off_a
 PAIR = off_axis(THICK)
 LOADS = (100.0, -40.0, 30.0, 0.5, 0.3, -0.2)  # N_x, N_y, N_xy (lb/in); M_x, M_y, M_xy (lb)
 CAUSED = np.linalg.solve(PAIR.stiffness, LOADS)
+RESULTANTS = ("N_x", "N_y", "N_xy", "M_x", "M_y", "M_xy")
 FACTOR = 0.8
 SHEARS = (20.0, -8.0)  # Q_x, Q_y (lb/in)
 SHEARED = np.linalg.solve(FACTOR * THICK * PAIR.shear, SHEARS)
@@ -79,50 +82,26 @@ def loaded_rectangle(x: Sequence[float], y: Sequence[float], *, shears: bool = F
     if not shears:
         codes[a] = (0, 1, 1, 0, 0)
         codes[last - a + 1] = (0, 0, 1, 0, 0)
-    forces = np.where(np.array(list(codes.values())) == 0, edge_forces(grid, x, y), 0.0)
+    loads = np.where(np.array(list(codes.values())) == 0, edge_forces(grid, x, y), 0.0)
     segments = (
         grid.coordinates(),
         Boundary(tuple(NodeCodes(n, 0, code) for n, code in codes.items() if any(code))),
-        Forces(tuple(NodeValues(n, 0, tuple(f.tolist())) for n, f in enumerate(forces, 1))),
+        forces(loads),
         material(PLY, (0.0, 45.0), THICK / 2.0),
         ShearCorrection(FACTOR) if shears else None,
     )
     return deck("resultants", grid, segments, (*STATICS, Macro("STRE")))
 
 
-def _everywhere(found: Result, names: Sequence[str], values: Sequence[float]) -> list[float]:
-    """Of every field the value farthest from what it should be everywhere."""
-    return [
-        farthest(found[f"stresses/{name}"].ravel().tolist(), value)
-        for name, value in zip(names, values, strict=True)
-    ]
-
-
 @case(
     "resultants",
     "[0/45] under uniform edge forces and couples; then under transverse shear, SHEA 0.8",
-    *(
-        Check(name, value, INVERTED, EXACT, IN_FIELD)
-        for name, value in zip(
-            ("ε_x", "ε_y", "γ_xy", "κ_x (1/in)", "κ_y (1/in)", "κ_xy (1/in)"),
-            CAUSED.tolist(), strict=True,
-        )
-    ),
-    *(
-        Check(name, value, APPLIED, EXACT, IN_FIELD)
-        for name, value in zip(
-            ("N_x (lb/in)", "N_y (lb/in)", "N_xy (lb/in)", "M_x (lb)", "M_y (lb)", "M_xy (lb)"),
-            LOADS, strict=True,
-        )
-    ),
-    *(
-        Check(name, value, "the inverse of 0.8 A* times Q", EXACT, IN_FIELD)
-        for name, value in zip(("γ_xz", "γ_yz"), SHEARED.tolist(), strict=True)
-    ),
-    *(
-        Check(name, value, APPLIED, EXACT, IN_FIELD)
-        for name, value in zip(("Q_x (lb/in)", "Q_y (lb/in)"), SHEARS, strict=True)
-    ),
+    *checks("ε_x, ε_y, γ_xy, κ_x (1/in), κ_y (1/in), κ_xy (1/in)", CAUSED.tolist(), INVERTED,
+            EXACT, IN_FIELD),
+    *checks("N_x (lb/in), N_y (lb/in), N_xy (lb/in), M_x (lb), M_y (lb), M_xy (lb)", LOADS,
+            APPLIED, EXACT, IN_FIELD),
+    *checks("γ_xz, γ_yz", SHEARED.tolist(), "the inverse of 0.8 A* times Q", EXACT, IN_FIELD),
+    *checks("Q_x (lb/in), Q_y (lb/in)", SHEARS, APPLIED, EXACT, IN_FIELD),
 )  # fmt: skip
 def resultants() -> Sequence[float]:
     """Strains and resultants, the same everywhere."""
@@ -131,18 +110,17 @@ def resultants() -> Sequence[float]:
     found = result_of(
         loaded_rectangle((n_x, n_xy, 0.0, -m_x, -m_xy), (n_xy, n_y, 0.0, -m_xy, -m_y))
     )
-    strains = ("eps_xx", "eps_yy", "gamma_xy", "kappa_x", "kappa_y", "kappa_xy")
-    names = ("N_x", "N_y", "N_xy", "M_x", "M_y", "M_xy")
     q_x, q_y = SHEARS
     sheared = result_of(
         loaded_rectangle((0.0, 0.0, q_x, 0.0, 0.0), (0.0, 0.0, q_y, 0.0, 0.0), shears=True)
     )
     return [
-        *_everywhere(found, strains, CAUSED.tolist()),
-        *_everywhere(found, names, LOADS),
-        *_everywhere(sheared, ("gamma_xz", "gamma_yz"), SHEARED.tolist()),
-        *_everywhere(sheared, ("Q_x", "Q_y"), SHEARS),
-    ]
+        *farthest_of(found, "stresses", (*IN_PLANE, *RESULTANTS), (*CAUSED.tolist(), *LOADS)),
+        *farthest_of(
+            sheared, "stresses", ("gamma_xz", "gamma_yz", "Q_x", "Q_y"),
+            (*SHEARED.tolist(), *SHEARS),
+        ),
+    ]  # fmt: skip
 
 
 # Strains on tape8 --------------------------------------------------------------------------------
@@ -157,19 +135,16 @@ def prescribed_strains() -> Deck:
     A very slow rigid mass hits the middle of the first element for one step: the other elements
     keep the field.
     """
-    k_x, k_y, k_xy, g_yz, g_xz = TAPE8
     grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
     struck, h = 2 + grid.across, 0.01
     x, y = (v.ravel() for v in np.meshgrid(lines(grid.columns), lines(grid.rows)))
-    slope_x, slope_y = -k_x * x - k_xy / 2.0 * y, -k_y * y - k_xy / 2.0 * x
-    w = -(k_x * x**2 + k_y * y**2 + k_xy * x * y) / 2.0 + g_xz * x + g_yz * y
-    field = np.stack([0.0 * x, 0.0 * x, w, slope_x, slope_y], axis=1)
+    field = constant_strains(x, y, TAPE8[:3], shear=TAPE8[3:])
     field[struck - 1, 2] = 0.0
     codes = [NodeCodes(n, 0, (1, 1, int(n != struck), 1, 1)) for n in range(1, grid.nodes + 1)]
     segments = (
         grid.coordinates(),
         Boundary(tuple(codes)),
-        Forces(tuple(NodeValues(n, 0, tuple(f.tolist())) for n, f in enumerate(field, 1))),
+        forces(field),
         Projectile(0, 0, 1e-6),
         Impact(struck, 3, 1e-12),
         Indentation(1.0, 1.0, 0.0, 1.5),
@@ -181,20 +156,12 @@ def prescribed_strains() -> Deck:
 @case(
     "tape8",
     "strains that an impact step stores, of a field that is held",
-    *(
-        Check(name, value, "the field that is held", EXACT, IN_FIELD)
-        for name, value in zip(
-            ("κ_x (1/in)", "κ_y (1/in)", "κ_xy (1/in)", "γ_yz", "γ_xz"), TAPE8, strict=True
-        )
-    ),
-)
+    *checks("κ_x (1/in), κ_y (1/in), κ_xy (1/in), γ_yz, γ_xz", TAPE8, "the field that is held",
+            EXACT, IN_FIELD),
+)  # fmt: skip
 def tape8() -> Sequence[float]:
-    """Of every strain the value farthest from what it should be, in all elements but the first."""
-    found = result_of(prescribed_strains())
-    return [
-        farthest(found[f"tape8/{name}"][0, 1:].ravel().tolist(), value)
-        for name, value in zip(ON_TAPE8, TAPE8, strict=True)
-    ]
+    """Strains of the stored row, in all elements but the first."""
+    return farthest_of(result_of(prescribed_strains()), "tape8", ON_TAPE8, TAPE8, first=1)
 
 
 # Series ------------------------------------------------------------------------------------------

@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
+from fecm._typing import Floats
 from fecm.api import run
 from fecm.deck.grid import Grid, Section, lines, uniform
 from fecm.deck.model import Deck, Forces, Impact, Indentation, Material, Projectile, Segment
 from fecm.deck.records import Control, Integration, Layer, Macro, NodeValues, Ply
 from fecm.results.result import Result
+from fecm.verification.case import farthest
 
 ORDER = 3
 NODAL_POINTS = -3
@@ -56,36 +60,47 @@ def result_of(one: Deck, mode: str = "report") -> Result:
     return result
 
 
-# Restraints of a quarter of a plate: of every node, and of the nodes of its edges.  The first
-# restrains u and v; the others are those of Navier's solutions for antisymmetric laminates.
+def farthest_of(
+    found: Result, group: str, names: Sequence[str], values: Iterable[float], first: int = 0
+) -> list[float]:
+    """Of each field of a group the value farthest from the expected one, from an element on."""
+    return [
+        farthest(found[f"{group}/{name}"][:, first:].ravel().tolist(), value)
+        for name, value in zip(names, values, strict=True)
+    ]
+
+
+def constant_strains(
+    x: Floats, y: Floats, curvature: Sequence[float], *,
+    strain: Sequence[float] = (0.0, 0.0, 0.0), shear: Sequence[float] = (0.0, 0.0),
+) -> Floats:  # fmt: skip
+    """Dofs (nodes, 5) of a field of constant midplane strains, curvatures and shear yz, xz."""
+    (ex, ey, exy), (kx, ky, kxy), (gyz, gxz) = strain, curvature, shear
+    w = -(kx * x**2 + ky * y**2 + kxy * x * y) / 2.0 + gxz * x + gyz * y
+    u, v = ex * x + exy / 2.0 * y, ey * y + exy / 2.0 * x
+    return np.stack([u, v, w, -kx * x - kxy / 2.0 * y, -ky * y - kxy / 2.0 * x], axis=1)
+
+
+def forces(field: Floats, nodes: Iterable[int] | None = None) -> Forces:
+    """Make a FORC segment of the rows of a field, of all or of some nodes from 0."""
+    chosen = range(len(field)) if nodes is None else nodes
+    return Forces(tuple(NodeValues(n + 1, 0, tuple(field[n].tolist())) for n in chosen))
+
+
+# Codes of every node of a quarter of a plate, and of the nodes of its edges.
 Supports = tuple[tuple[int, ...], dict[str, tuple[int, ...]]]
-BENDING: Supports = (
-    (1, 1, 0, 0, 0),
-    {
-        "left": (0, 0, 0, 1, 0),
-        "bottom": (0, 0, 0, 0, 1),
-        "right": (0, 0, 1, 0, 1),
-        "top": (0, 0, 1, 1, 0),
-    },
-)
-CROSS_PLY: Supports = (
-    (0, 0, 0, 0, 0),
-    {
-        "left": (1, 0, 0, 1, 0),
-        "bottom": (0, 1, 0, 0, 1),
-        "right": (0, 1, 1, 0, 1),
-        "top": (1, 0, 1, 1, 0),
-    },
-)
-ANGLE_PLY: Supports = (
-    (0, 0, 0, 0, 0),
-    {
-        "left": (0, 1, 0, 1, 0),
-        "bottom": (1, 0, 0, 0, 1),
-        "right": (1, 0, 1, 0, 1),
-        "top": (0, 1, 1, 1, 0),
-    },
-)
+
+
+def _supports(every: str, left: str, bottom: str, right: str, top: str) -> Supports:
+    edges = {"left": left, "bottom": bottom, "right": right, "top": top}
+    return tuple(map(int, every)), {name: tuple(map(int, codes)) for name, codes in edges.items()}
+
+
+# The first restrains u and v everywhere; the others are those of Navier's solutions for
+# antisymmetric laminates.
+BENDING = _supports("11000", "00010", "00001", "00101", "00110")
+CROSS_PLY = _supports("00000", "10010", "01001", "01101", "10110")
+ANGLE_PLY = _supports("00000", "01010", "10001", "10101", "01110")
 
 
 def quarter_plate(
@@ -114,8 +129,8 @@ def quarter_plate(
     """
     grid = Grid(uniform(0.5, elements), uniform(0.5, elements))
     boundary = grid.boundary(*supports)
-    forces = None if load is None else uniform_load(grid, load)
-    segments = (grid.coordinates(), boundary, forces, plate, *others)
+    loads = None if load is None else uniform_load(grid, load)
+    segments = (grid.coordinates(), boundary, loads, plate, *others)
     return deck("quarter of a simply supported plate", grid, segments, macros)
 
 

@@ -10,14 +10,23 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.deck.grid import Grid, uniform
-from fecm.deck.model import Coordinates, Deck, Forces
+from fecm.deck.model import Coordinates, Deck
 from fecm.deck.records import Macro, NodeValues
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import build_plate
 from fecm.problem.generate import generate
-from fecm.verification.case import Check, case, farthest
-from fecm.verification.decks import deck, isotropic, material, quarter_plate, result_of
+from fecm.verification.case import Check, case, checks, farthest
+from fecm.verification.decks import (
+    constant_strains,
+    deck,
+    farthest_of,
+    forces,
+    isotropic,
+    material,
+    quarter_plate,
+    result_of,
+)
 from fecm.verification.laminates import FIBRES, Q11, Q12, Q22, THICK
 
 STATICS = (Macro("TANG"), Macro("FORM"), Macro("SOLV"))
@@ -38,6 +47,7 @@ MOMENT = (
     + (Q11 + Q22) * THICK**3 / 24.0 * CURVATURE[0]
     + Q12 * THICK**3 / 12.0 * CURVATURE[1]
 )
+IN_PLANE = ("eps_xx", "eps_yy", "gamma_xy", "kappa_x", "kappa_y", "kappa_xy")
 EXACT = 1e-8
 IN_FIELD = "the field is one of the elements'; rounding of the solution"
 
@@ -49,17 +59,7 @@ def patch() -> Deck:
     fine[::2, 1::2] = (CORNERS[:, 1:] + CORNERS[:, :-1]) / 2.0
     fine[1::2] = (fine[2::2] + fine[:-2:2]) / 2.0
     x, y = fine.reshape(-1, 2).T
-    (ex, ey, exy), (kx, ky, kxy) = STRAIN, CURVATURE
-    field = np.stack(
-        [
-            ex * x + exy / 2.0 * y,
-            ey * y + exy / 2.0 * x,
-            -(kx * x**2 + ky * y**2 + kxy * x * y) / 2.0,
-            -kx * x - kxy / 2.0 * y,
-            -ky * y - kxy / 2.0 * x,
-        ],
-        axis=1,
-    )
+    field = constant_strains(x, y, CURVATURE, strain=STRAIN)
     grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
     held = (1,) * 5
     boundary = grid.boundary((0,) * 5, dict.fromkeys(("left", "right", "bottom", "top"), held))
@@ -68,9 +68,8 @@ def patch() -> Deck:
         NodeValues(n, 0, place)
         for n, place in enumerate(zip(x.tolist(), y.tolist(), strict=True), 1)
     ]
-    forces = [NodeValues(n + 1, 0, tuple(field[n].tolist())) for n in outer]
     segments = (
-        Coordinates(tuple(coordinates)), boundary, Forces(tuple(forces)),
+        Coordinates(tuple(coordinates)), boundary, forces(field, outer),
         material(FIBRES, (0.0, 90.0), THICK / 2.0),
     )  # fmt: skip
     return deck("patch", grid, segments, (*STATICS, Macro("STRE")))
@@ -79,27 +78,20 @@ def patch() -> Deck:
 @case(
     "patch",
     "constant strain and curvature on distorted elements of [0/90]",
-    *(
-        Check(name, value, "the field put on the boundary", EXACT, IN_FIELD)
-        for name, value in zip(("ε_x", "ε_y", "γ_xy"), STRAIN, strict=True)
-    ),
-    *(
-        Check(f"{name} (1/in)", value, "the field put on the boundary", EXACT, IN_FIELD)
-        for name, value in zip(("κ_x", "κ_y", "κ_xy"), CURVATURE, strict=True)
-    ),
+    *checks("ε_x, ε_y, γ_xy, κ_x (1/in), κ_y (1/in), κ_xy (1/in)", (*STRAIN, *CURVATURE),
+            "the field put on the boundary", EXACT, IN_FIELD),
     Check("γ_xz, γ_yz: the largest", 0.0, "θ is the slope of w", EXACT, IN_FIELD, scale=1e-3),
     Check("M_x (lb)", MOMENT, "B11 ε_x + D11 κ_x + D12 κ_y", EXACT, IN_FIELD),
-)
+)  # fmt: skip
 def patch_test() -> Sequence[float]:
-    """Of every strain the value farthest from what it should be everywhere."""
-    found = result_of(patch()).stresses
-    names = ("eps_xx", "eps_yy", "gamma_xy", "kappa_x", "kappa_y", "kappa_xy")
-    strains = [
-        farthest(getattr(found, name).ravel().tolist(), value)
-        for name, value in zip(names, (*STRAIN, *CURVATURE), strict=True)
+    """Of each strain the value farthest from the expected one."""
+    found = result_of(patch())
+    shears = farthest_of(found, "stresses", ("gamma_xz", "gamma_yz"), (0.0, 0.0))
+    return [
+        *farthest_of(found, "stresses", IN_PLANE, (*STRAIN, *CURVATURE)),
+        farthest(shears, 0.0),
+        *farthest_of(found, "stresses", ("M_x",), (MOMENT,)),
     ]
-    shear = farthest([*found.gamma_xz.ravel().tolist(), *found.gamma_yz.ravel().tolist()], 0.0)
-    return [*strains, shear, farthest(found.M_x.ravel().tolist(), MOMENT)]
 
 
 # Square plate of side 1, E = 1, nu = 0.3, density 1.
