@@ -25,10 +25,21 @@ class Done:
     stderr: str
 
 
-def call(*arguments: object) -> Done:
-    """Call ``fecm`` with these arguments."""
-    out, err = io.StringIO(), io.StringIO()
+def _stream() -> io.TextIOWrapper:
+    """A text stream in memory that encodes as the program's own streams do."""
+    return io.TextIOWrapper(io.BytesIO(), "utf-8", "backslashreplace", write_through=True)
+
+
+def _written(stream: io.TextIOWrapper) -> str:
+    stream.seek(0)
+    return stream.read()
+
+
+def call(*arguments: object, cwd: Path | None = None) -> Done:
+    """Call ``fecm`` with these arguments, in a folder if one is named."""
+    out, err = _stream(), _stream()
     with (
+        contextlib.chdir(cwd or Path.cwd()),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
         mock.patch.object(signals, "install"),
@@ -36,18 +47,16 @@ def call(*arguments: object) -> Done:
     ):
         main(list(map(str, arguments)))
     assert isinstance(left.value.code, int)
-    return Done(left.value.code, out.getvalue(), err.getvalue())
+    return Done(left.value.code, _written(out), _written(err))
 
 
-def program(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
-    """Run ``python -m fecm`` in a folder."""
-    return subprocess.run(
+def program(*arguments: object, cwd: Path, **options: object) -> Done:
+    """Run ``python -m fecm`` in a folder, in a process of its own."""
+    done: subprocess.CompletedProcess[str] = subprocess.run(
         [sys.executable, "-W", "error", "-m", "fecm", *map(str, arguments)],
-        cwd=cwd,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+        cwd=cwd, capture_output=True, text=True, check=False, **options,
+    )  # type: ignore[call-overload]  # fmt: skip
+    return Done(done.returncode, done.stdout, done.stderr)
 
 
 def diff(*arguments: object) -> Done:

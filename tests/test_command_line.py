@@ -5,10 +5,8 @@ from __future__ import annotations
 import os
 import re
 import resource
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import h5py
@@ -16,7 +14,7 @@ import numpy as np
 import pytest
 
 from fecm.problem import slips
-from tests.calls import program as fecm
+from tests.calls import call, program
 from tests.decks import APPENDIX, DATA_CARDS, ROOT, small
 
 
@@ -28,9 +26,23 @@ def deck(tmp_path: Path) -> Path:
     return path
 
 
+def test_a_call_in_this_process_gives_what_the_program_gives(deck: Path) -> None:
+    deck.write_text(small(stop=False) + small(data=DATA_CARDS.replace("115.0", " 90.0")))
+    for status, *arguments in (
+        (0, "run", "small.inp", "--overwrite"),
+        (0, "info", "small.h5"),
+        (1, "diff", "small.h5", "small-2.h5"),
+        (2, "tapes", "small.inp"),
+        (2, "run", "small.inp", "--slip", "other"),
+    ):
+        done = program(*arguments, cwd=deck.parent)
+        assert done.exit_code == status
+        assert call(*arguments, cwd=deck.parent) == done
+
+
 def test_a_run_writes_its_result_beside_the_user_and_says_what_came_out(tmp_path: Path) -> None:
-    done = fecm("run", APPENDIX, cwd=tmp_path)
-    assert done.returncode == 0
+    done = call("run", APPENDIX, cwd=tmp_path)
+    assert done.exit_code == 0
     assert re.findall(r"(error|warning)\[(\w+)\]", done.stderr) == [
         ("warning", "W414"),
         ("warning", "W415"),
@@ -48,7 +60,7 @@ def test_a_run_writes_its_result_beside_the_user_and_says_what_came_out(tmp_path
 
 
 def test_the_file_has_the_promised_layout(tmp_path: Path) -> None:
-    fecm("run", APPENDIX, cwd=tmp_path)
+    call("run", APPENDIX, cwd=tmp_path)
     with h5py.File(tmp_path / "appendix.h5") as file:
         attributes = dict(file.attrs)
         assert attributes["format"] == "fecm"
@@ -82,11 +94,11 @@ def test_the_file_has_the_promised_layout(tmp_path: Path) -> None:
 
 
 def test_the_deck_in_a_result_runs_again_to_the_same_numbers(deck: Path) -> None:
-    fecm("run", deck, cwd=deck.parent)
+    call("run", deck, cwd=deck.parent)
     with h5py.File(deck.parent / "small.h5") as file:
         (deck.parent / "again.inp").write_text(file["deck"].asstr()[()])
         force = file["history/force"][()]
-    assert fecm("run", "again.inp", cwd=deck.parent).returncode == 0
+    assert call("run", "again.inp", cwd=deck.parent).exit_code == 0
     with h5py.File(deck.parent / "again.h5") as file:
         np.testing.assert_array_equal(file["history/force"][()], force)
 
@@ -94,22 +106,22 @@ def test_the_deck_in_a_result_runs_again_to_the_same_numbers(deck: Path) -> None
 def test_an_existing_result_is_kept_unless_told_otherwise(deck: Path) -> None:
     target = deck.parent / "small.h5"
     target.write_text("precious")
-    refused = fecm("run", deck, cwd=deck.parent)
-    assert refused.returncode == 2
+    refused = call("run", deck, cwd=deck.parent)
+    assert refused.exit_code == 2
     assert "--overwrite" in refused.stderr
     assert target.read_text() == "precious"
-    assert fecm("run", deck, "--overwrite", cwd=deck.parent).returncode == 0
+    assert call("run", deck, "--overwrite", cwd=deck.parent).exit_code == 0
     assert h5py.is_hdf5(target)
 
 
 def test_every_output_is_checked_before_the_first_run(deck: Path) -> None:
     deck.write_text(small(stop=False) + small())
     (deck.parent / "small-2.h5").write_text("precious")
-    refused = fecm("run", deck, cwd=deck.parent)
-    assert refused.returncode == 2
+    refused = call("run", deck, cwd=deck.parent)
+    assert refused.exit_code == 2
     assert not (deck.parent / "small.h5").exists()
     (deck.parent / "small-2.h5").unlink()
-    assert fecm("run", deck, cwd=deck.parent).returncode == 0
+    assert call("run", deck, cwd=deck.parent).exit_code == 0
     assert h5py.is_hdf5(deck.parent / "small-2.h5")
 
 
@@ -132,8 +144,8 @@ def test_every_output_is_checked_before_the_first_run(deck: Path) -> None:
 def test_an_unusable_call_exits_2_with_a_message_and_no_traceback(
     deck: Path, arguments: tuple[str, ...]
 ) -> None:
-    done = fecm(*arguments, cwd=deck.parent)
-    assert done.returncode == 2
+    done = call(*arguments, cwd=deck.parent)
+    assert done.exit_code == 2
     assert "rror" in done.stderr
     assert "Traceback" not in done.stderr
     assert [p.name for p in deck.parent.iterdir()] == ["small.inp"]
@@ -141,8 +153,8 @@ def test_an_unusable_call_exits_2_with_a_message_and_no_traceback(
 
 def test_a_deck_with_errors_is_not_run(deck: Path) -> None:
     deck.write_text(small(data=DATA_CARDS.replace("     115.0", "     1l5.0")))
-    done = fecm("run", deck, cwd=deck.parent)
-    assert done.returncode == 2
+    done = call("run", deck, cwd=deck.parent)
+    assert done.exit_code == 2
     assert re.search(r"small\.inp:\d+:11: error\[E101\]: `1l5.0` is not a number\.", done.stderr)
     assert not (deck.parent / "small.h5").exists()
 
@@ -153,49 +165,23 @@ def test_a_run_that_diverges_exits_1_names_step_and_cause_and_leaves_no_file(
 ) -> None:
     program = "LMAS\nDT        .5E-5\nLOOP       2000\nTIME\nRODP\nNEXT\n"
     deck.write_text(small(program))
-    refused = fecm("run", deck, "--mode", mode, cwd=deck.parent)
-    assert refused.returncode == 2
+    refused = call("run", deck, "--mode", mode, cwd=deck.parent)
+    assert refused.exit_code == 2
     assert "error[E508]" in refused.stderr
-    done = fecm("run", deck, "--mode", mode, "--force", cwd=deck.parent)
-    assert done.returncode == 1
+    done = call("run", deck, "--mode", mode, "--force", cwd=deck.parent)
+    assert done.exit_code == 1
     assert re.search(r"diverged at step \d+", done.stderr)
     assert "DT = 5e-06 is above the plate's critical time step" in done.stderr
     assert [p.name for p in deck.parent.iterdir()] == ["small.inp"]
 
 
 def test_tapes_go_to_the_folder_that_is_asked_for(deck: Path) -> None:
-    fecm("run", deck, cwd=deck.parent)
-    done = fecm("tapes", "small.h5", "-d", "new/tapes", cwd=deck.parent)
-    assert done.returncode == 0
+    call("run", deck, cwd=deck.parent)
+    done = call("tapes", "small.h5", "-d", "new/tapes", cwd=deck.parent)
+    assert done.exit_code == 0
     names = sorted(p.name for p in (deck.parent / "new" / "tapes").iterdir())
     assert names == ["tape3", "tape8", "tape9"]
     assert len((deck.parent / "new/tapes/tape3").read_text().splitlines()) == 2 * 5
-
-
-def test_a_terminated_run_exits_143_and_leaves_a_checkpoint_alone(deck: Path) -> None:
-    deck.write_text(small("LMAS\nDT        .1E-6\nLOOP      99999\nTIME\nRODP\nNEXT\n"))
-    for number, status in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
-        process = subprocess.Popen(
-            [sys.executable, "-m", "fecm", "run", str(deck)],
-            cwd=deck.parent,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            env={**os.environ, "PYTHONUNBUFFERED": "1"},
-        )
-        for _ in range(200):
-            time.sleep(0.02)
-            if len(list(deck.parent.iterdir())) > 1:
-                break
-        time.sleep(0.3)  # until it steps
-        process.send_signal(number)
-        errors = process.communicate(timeout=20)[1]
-        assert process.returncode == status
-        assert b"Traceback" not in errors
-        left = sorted(p.name for p in deck.parent.iterdir())
-        assert left == ["small.h5.checkpoint", "small.h5.spool", "small.inp"]
-        assert b"--resume continues small.h5" in errors
-        for name in left[:2]:
-            (deck.parent / name).unlink()
 
 
 def test_a_result_that_cannot_be_written_ends_in_one_line_and_leaves_what_was_there(
@@ -220,7 +206,7 @@ def test_a_result_that_cannot_be_written_ends_in_one_line_and_leaves_what_was_th
 
 
 def test_help_names_every_slip(tmp_path: Path) -> None:
-    text = re.sub(r"\s+", "", fecm("run", "--help", cwd=tmp_path).stdout)
+    text = re.sub(r"\s+", "", call("run", "--help", cwd=tmp_path).stdout)
     for name in slips.NAMES:
         assert name in text
 
@@ -243,7 +229,7 @@ def test_a_reader_that_leaves_is_no_answer(arguments: tuple[str, ...], tmp_path:
     run_result = tmp_path / "small.h5"
     if "A" in arguments:
         (tmp_path / "small.inp").write_text(small())
-        assert fecm("run", "small.inp", cwd=tmp_path).returncode == 0
+        assert call("run", "small.inp", cwd=tmp_path).exit_code == 0
         arguments = ("diff", str(run_result), str(run_result))
     read, write = os.pipe()
     os.close(read)
@@ -269,7 +255,7 @@ def test_a_full_output_ends_in_one_line(tmp_path: Path) -> None:
 @pytest.mark.parametrize("option", ["--energy-limit", "--checkpoint"])
 @pytest.mark.parametrize("value", ["nan", "inf", "-1"])
 def test_a_limit_that_is_no_number_is_refused(option: str, value: str, deck: Path) -> None:
-    done = fecm("run", deck, option, value, cwd=deck.parent)
-    assert done.returncode == 2
+    done = call("run", deck, option, value, cwd=deck.parent)
+    assert done.exit_code == 2
     assert f"Invalid value for '{option}'" in done.stderr
     assert [path.name for path in deck.parent.iterdir()] == ["small.inp"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,7 +20,7 @@ from fecm.results.result import Result
 from fecm.results.schema import ExportError
 from fecm.results.vtkhdf import write_vtkhdf
 from tests.builders import SQUARE, one_element
-from tests.calls import program as command
+from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, ROOT, small
 
 Array = NDArray[Any]
@@ -185,9 +184,9 @@ def test_a_state_stored_twice_is_one_time_step(tmp_path: Path) -> None:
 def test_without_displacements_there_is_nothing_to_export(file: Path) -> None:
     deck = file.parent / "bare.inp"
     deck.write_text(small(PROGRAM.replace("DISP          5\n", "")))
-    command("run", deck, cwd=file.parent)
-    refused = command("export", "bare.h5", "--to", "vtkhdf", cwd=file.parent)
-    assert refused.returncode == 2
+    call("run", deck, cwd=file.parent)
+    refused = call("export", "bare.h5", "--to", "vtkhdf", cwd=file.parent)
+    assert refused.exit_code == 2
     assert "DISP" in refused.stderr
     assert not list(file.parent.glob("*vtkhdf*"))
 
@@ -292,17 +291,17 @@ def test_a_group_that_was_never_stored_names_its_macro() -> None:
 
 def test_the_command_writes_beside_the_user_and_keeps_what_is_there(file: Path) -> None:
     folder = file.parent
-    done = command("export", file, "--to", "csv", cwd=folder)
-    assert (done.returncode, done.stdout) == (0, "small-history.csv\n")
+    done = call("export", file, "--to", "csv", cwd=folder)
+    assert (done.exit_code, done.stdout) == (0, "small-history.csv\n")
     assert len((folder / "small-history.csv").read_text().splitlines()) == 11
-    done = command("export", file, "--to", "vtkhdf", cwd=folder)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "small.vtkhdf\n", "")
+    done = call("export", file, "--to", "vtkhdf", cwd=folder)
+    assert (done.exit_code, done.stdout, done.stderr) == (0, "small.vtkhdf\n", "")
     (folder / "small-history.csv").write_text("precious")
-    refused = command("export", file, "--to", "csv", cwd=folder)
-    assert refused.returncode == 2
+    refused = call("export", file, "--to", "csv", cwd=folder)
+    assert refused.exit_code == 2
     assert "--overwrite" in refused.stderr
     assert (folder / "small-history.csv").read_text() == "precious"
-    shown = command("export", file, "--to", "csv", "--dataset", "tape3/w", "-o", "-", cwd=folder)
+    shown = call("export", file, "--to", "csv", "--dataset", "tape3/w", "-o", "-", cwd=folder)
     assert len(rows(shown.stdout)) == 50
     assert sorted(p.name for p in folder.iterdir()) == [
         "small-history.csv", "small.h5", "small.vtkhdf",
@@ -324,8 +323,8 @@ def test_the_command_writes_beside_the_user_and_keeps_what_is_there(file: Path) 
 def test_what_cannot_be_exported_is_refused_in_words(
     file: Path, arguments: tuple[str, ...]
 ) -> None:
-    refused: subprocess.CompletedProcess[str] = command("export", file, *arguments, cwd=file.parent)
-    assert refused.returncode == 2
+    refused = call("export", file, *arguments, cwd=file.parent)
+    assert refused.exit_code == 2
     assert "rror: " in refused.stderr
     assert "Traceback" not in refused.stderr
     assert [p.name for p in file.parent.iterdir()] == ["small.h5"]

@@ -7,13 +7,12 @@ import resource
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import h5py
 import pytest
 
-from tests.calls import call
+from tests.calls import call, program
 from tests.decks import small
 
 FECM = f"{sys.executable} -m fecm"
@@ -24,6 +23,14 @@ def shell(command: str, folder: Path, **environment: str) -> subprocess.Complete
     return subprocess.run(
         ["bash", "-c", f'F="{FECM}"; {command}'], cwd=folder, capture_output=True, text=True,
         check=False, env={**os.environ, **environment},
+    )  # fmt: skip
+
+
+def python(code: str, *arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run Python code."""
+    return subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        cwd=cwd, capture_output=True, text=True, check=False,
     )  # fmt: skip
 
 
@@ -63,10 +70,15 @@ def test_other_commands_end_with_2_when_they_can_not_print(folder: Path, command
             shell("rm -r t", folder)
 
 
-@pytest.mark.parametrize("streams", ["2>&-", "2>/dev/full", "2>&1 | true"])
-def test_a_message_that_nobody_reads_changes_no_exit_status(folder: Path, streams: str) -> None:
-    assert shell(f"$F run none.inp {streams}; exit ${{PIPESTATUS[0]}}", folder).returncode == 2
-    assert shell(f"$F info none.h5 {streams}; exit ${{PIPESTATUS[0]}}", folder).returncode == 2
+@pytest.mark.parametrize(
+    ("command", "streams"),
+    [("info none.h5", "2>&-"), ("info none.h5", "2>&1 | true"), ("run none.inp", "2>/dev/full"),
+     ("run none.inp", "2>&-")],
+)  # fmt: skip
+def test_a_message_that_nobody_reads_changes_no_exit_status(
+    folder: Path, command: str, streams: str
+) -> None:
+    assert shell(f"$F {command} {streams}; exit ${{PIPESTATUS[0]}}", folder).returncode == 2
 
 
 @pytest.mark.parametrize("encoding", ["latin-1", "ascii"])
@@ -106,16 +118,22 @@ def test_control_characters_of_a_title_and_a_name_reach_no_terminal(
 
 
 def test_names_that_are_not_utf_8_work_in_every_command(folder: Path) -> None:
-    commands = """
-        cp d.inp $'\\xff.inp'
-        $F check $'\\xff.inp' && $F run $'\\xff.inp' -o $'\\xff1.h5' --print $'\\xff.txt' &&
-        $F run $'\\xff.inp' -o $'\\xff2.h5' && $F info $'\\xff1.h5' &&
-        $F diff $'\\xff1.h5' $'\\xff2.h5' && $F tapes $'\\xff1.h5' -d $'\\xff' &&
-        $F export $'\\xff1.h5' --to csv && $F export $'\\xff1.h5' --to vtkhdf &&
-        $F fmt $'\\xff.inp'
-    """
-    done = shell(commands, folder)
-    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
+    deck, first, second = "\udcff.inp", "\udcff1.h5", "\udcff2.h5"
+    (folder / "d.inp").rename(folder / deck)
+    for arguments in (
+        ("check", deck),
+        ("run", deck, "-o", first, "--print", "\udcff.txt"),
+        ("run", deck, "-o", second),
+        ("diff", first, second),
+        ("tapes", first, "-d", "\udcff"),
+        ("export", first, "--to", "csv"),
+        ("export", first, "--to", "vtkhdf"),
+        ("fmt", deck),
+    ):
+        done = call(*arguments, cwd=folder)
+        assert done.exit_code == 0, done.stderr
+    done = program("info", first, cwd=folder)
+    assert (done.exit_code, done.stderr) == (0, "")
     assert "\\udcff1.h5" in done.stdout
 
 
@@ -132,43 +150,49 @@ def test_two_results_whose_names_are_not_utf_8_are_drawn(
 
 # Signals -----------------------------------------------------------------------------------------
 
+IMPACT = "LMAS\nDT        .1E-6\nLOOP      99999\nTIME\nRODP\nNEXT\n"
 STATIC = "TANG\nLOOP,,3000000\nFORM\nSOLV\nNEXT\n"
 EMPTY = "LMAS\nLOOP,,30000\nLOOP,,30000\nNEXT\nNEXT\n"
 LAST = "   25    0    1    1    0    0    0\n"
 HELD = LAST + "".join(f"{node:5d}    0    1    1    1    0    0\n" for node in (1, 5, 21, 25))
 
+# The program, which gets a signal from itself after a hundred macros.
+SIGNALLED = """
+import os, signal, sys
+from fecm.__main__ import main
+from fecm.simulation.interpreter import Interpreter
+
+number, plain = int(sys.argv.pop(1)), Interpreter.run
+signal.signal(number, signal.SIG_DFL)  # nohup ignores SIGHUP
+
+def run(self, bind, start, on_macro):
+    macros = iter(range(100))
+    def counted():
+        if next(macros, None) == 99:
+            os.kill(os.getpid(), number)
+        on_macro()
+    plain(self, bind, start, counted)
+
+Interpreter.run = run
+main()
+"""
+
 
 @pytest.mark.parametrize(
-    ("program", "number"),
-    [(STATIC, signal.SIGTERM), (STATIC, signal.SIGHUP), (EMPTY, signal.SIGINT)],
-)
-def test_the_first_signal_ends_a_loop_without_time_steps(
-    folder: Path, program: str, number: signal.Signals
+    ("macros", "number", "step"),
+    [(IMPACT, signal.SIGTERM, 49), (IMPACT, signal.SIGINT, 49), (STATIC, signal.SIGHUP, 0),
+     (EMPTY, signal.SIGINT, 0)],
+)  # fmt: skip
+def test_the_first_signal_ends_a_loop_at_its_next_macro(
+    folder: Path, macros: str, number: signal.Signals, step: int
 ) -> None:
-    text = small(program)
-    (folder / "d.inp").write_text(text.replace(LAST, HELD))
-    command = [sys.executable, "-m", "fecm", "run", "d.inp"]
-    with subprocess.Popen(
-        command, cwd=folder, stderr=subprocess.PIPE, text=True,
-        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),  # nohup ignores SIGHUP
-    ) as process:  # fmt: skip
-        until = time.monotonic() + 20.0
-        while not list(folder.glob(".d.partial.h5")) and time.monotonic() < until:
-            time.sleep(0.01)
-        time.sleep(0.2)
-        process.send_signal(number)
-        _, said = process.communicate(timeout=20)
-    assert process.returncode == 128 + number
-    assert "the same command with --resume continues d.h5" in said
+    (folder / "d.inp").write_text(small(macros).replace(LAST, HELD))
+    done = python(SIGNALLED, str(int(number)), "run", "d.inp", cwd=folder)
+    assert done.returncode == 128 + number
+    last = f"fecm: stopped after step {step}; the same command with --resume continues d.h5"
+    assert done.stderr.splitlines()[-1] == last
+    assert "Traceback" not in done.stderr
     assert sorted(p.name for p in folder.iterdir()) == ["d.h5.checkpoint", "d.h5.spool", "d.inp"]
-
-
-def python(code: str, **options: object) -> subprocess.CompletedProcess[str]:
-    """Run Python code."""
-    done: subprocess.CompletedProcess[str] = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, **options
-    )  # type: ignore[call-overload]
-    return done
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
