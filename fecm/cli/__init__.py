@@ -48,8 +48,8 @@ COMMANDS = {
     "fmt": LazyCommand("fecm.cli.decks", "Align the columns of DECK."),
     "indent": LazyCommand("fecm.cli.indent", "Indentation tests and the law of contact."),
     "info": LazyCommand("fecm.cli.info", "Show what is in RESULT.", True),
-    "materials": LazyCommand("fecm.cli.decks", "List the named plies of `fecm new`."),
-    "new": LazyCommand("fecm.cli.decks", "Write a deck from plate, layup, supports and impact."),
+    "materials": LazyCommand("fecm.cli.new", "List the named plies of `fecm new`."),
+    "new": LazyCommand("fecm.cli.new", "Write a deck from plate, layup, supports and impact."),
     "plot": LazyCommand("fecm.cli.plot", "Draw the report's figures, or the map of a sweep.", True),
     "rod": LazyCommand("fecm.cli.rod", "The projectile's rod alone: pulses and calibration."),
     "run": LazyCommand("fecm.cli.run", "Run every problem in DECK and write its result."),
@@ -120,7 +120,7 @@ def _status(arguments: Sequence[str] | None, prog_name: str) -> int:
     except SystemExit as left:
         return left.code if isinstance(left.code, int) else 0
     except click.ClickException as error:
-        error.show()
+        echo(_refusal(error), err=True)
         return error.exit_code
     except (KeyboardInterrupt, click.Abort):
         echo("fecm: interrupted", err=True)
@@ -130,6 +130,16 @@ def _status(arguments: Sequence[str] | None, prog_name: str) -> int:
             echo(f"fecm: error: {_message(error)}", err=True)
         return error.exit_code if isinstance(error, FecmError) else UNUSABLE
     return 0
+
+
+def _refusal(error: click.ClickException) -> str:
+    """One line about a wrong call; the help page if the name of a command is missing."""
+    context = error.ctx if isinstance(error, click.UsageError) else None
+    if context is not None and error.message == context.get_help():
+        return error.message
+    line = " ".join(error.format_message().split()).rstrip(".")
+    see = "" if context is None else f"; see {context.command_path} --help"
+    return f"fecm: error: {line}{see}"
 
 
 def _message(error: Exception) -> str:

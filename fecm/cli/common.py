@@ -5,10 +5,10 @@ from __future__ import annotations
 import contextlib
 import signal
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 import click
 
@@ -16,10 +16,6 @@ from fecm._errors import FecmError
 from fecm._files import beside
 from fecm.problem.slips import MODES, REPORT
 from fecm.results.schema import printable
-
-if TYPE_CHECKING:
-    from fecm.api import LoadedDeck
-    from fecm.deck.findings import Finding
 
 NO, UNUSABLE, INTERRUPTED, TERMINATED = 1, 2, 130, 143
 
@@ -62,19 +58,6 @@ class CheckFailedError(FecmError):
     exit_code = NO
 
 
-def report(prepared: LoadedDeck) -> None:
-    """Print the findings of a deck on standard error."""
-    for finding in prepared.findings:
-        echo(finding.render(prepared.source), err=True)
-
-
-def count_errors(errors: Sequence[Finding]) -> str:
-    """Say how many errors a deck has."""
-    count = sum(error.code != "E000" for error in errors)
-    more = " or more" if count < len(errors) else ""
-    return f"the deck has {count} error{'s' if count != 1 else ''}{more}"
-
-
 def echo(text: object = "", *, err: bool = False) -> None:
     """Print lines to the terminal, with control characters escaped.
 
@@ -82,6 +65,11 @@ def echo(text: object = "", *, err: bool = False) -> None:
     """
     with contextlib.suppress(OSError):
         click.echo("\n".join(map(printable, str(text).split("\n"))), err=err)
+
+
+def note(text: object) -> None:
+    """Print a note on standard error."""
+    echo(f"fecm: note: {text}", err=True)
 
 
 def echo_file(text: str) -> None:

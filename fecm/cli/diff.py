@@ -11,6 +11,7 @@ import click
 
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, RefusedError
 from fecm.cli.isolation import reads
+from fecm.cli.types import NOT_NEGATIVE
 from fecm.results.diff import (
     SCALE_NAMES,
     Comparison,
@@ -21,24 +22,13 @@ from fecm.results.diff import (
 from fecm.results.schema import jsonable, printable, shown_apart
 
 
-def _tolerance(_: click.Context, option: click.Parameter, value: str) -> float:
-    """Read a tolerance, a number of at least 0."""
-    try:
-        number = float(value)
-    except ValueError:
-        number = math.nan
-    if not 0.0 <= number < math.inf:
-        raise RefusedError(f"{option.opts[0]}: `{printable(value)}` is not a number of at least 0")
-    return number
-
-
 @click.command()
 @click.argument("a", type=FILE_PATH)
 @click.argument("b", type=FILE_PATH)
-@click.option("--rtol", default="0", show_default=True, callback=_tolerance, metavar="R",
+@click.option("--rtol", type=NOT_NEGATIVE, default=0.0, show_default=True, metavar="R",
               help="Relative tolerance: a part of the dataset's largest absolute value in A and "
                    "B.")  # fmt: skip
-@click.option("--atol", default="0", show_default=True, callback=_tolerance, metavar="T",
+@click.option("--atol", type=NOT_NEGATIVE, default=0.0, show_default=True, metavar="T",
               help="Absolute tolerance, in the dataset's unit.")  # fmt: skip
 @click.option("--only", multiple=True, metavar="PATH",
               help="Compare only this dataset (tape9/force) or group (tape9); may be "

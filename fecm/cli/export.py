@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import click
 
 from fecm._files import check_outputs
-from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, writing
+from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, note
 from fecm.cli.isolation import reads
-from fecm.cli.outputs import STANDARD_OUTPUT
+from fecm.cli.outputs import STANDARD_OUTPUT, write_lines
 from fecm.results import csv
-from fecm.results.hdf5_reader import Contents, read
+from fecm.results.hdf5_reader import read
 from fecm.results.result import load, result_of
 from fecm.results.schema import FORMAT, SWEEP, ExportError
 from fecm.results.tapes import tape_texts, write_tapes
@@ -25,7 +24,7 @@ from fecm.sweeps.result import sweep_of
 @click.argument("result", type=DECK_PATH)
 @click.option("-d", "--directory", type=FILE_PATH, default=Path(), metavar="DIR",
               help="Folder for the tapes.  [default: this folder]")  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace tapes that exist.")
+@click.option("--overwrite", is_flag=True, help="Replace existing tapes.")
 @reads("result")
 def tapes(result: Path, directory: Path, overwrite: bool) -> None:
     """Write tape3, tape8 and tape9 of RESULT as text, in the original program's formats."""
@@ -43,21 +42,20 @@ def tapes(result: Path, directory: Path, overwrite: bool) -> None:
 @click.option("--to", "target", type=click.Choice(["vtkhdf", "csv"]), required=True,
               help="vtkhdf for ParaView and VTK, csv for spreadsheets.")  # fmt: skip
 @click.option("-o", "--output", type=click.Path(path_type=Path, allow_dash=True), metavar="PATH",
-              help="Where to write; - is standard output, for csv.  [default: RESULT's name with "
-                   ".vtkhdf, or with -DATASET.csv, in this folder]")  # fmt: skip
+              help="File to write; - is standard output, of csv only.  [default: RESULT's name "
+                   "with .vtkhdf or -DATASET.csv, in this folder]")  # fmt: skip
 @click.option("--dataset", metavar="NAME",
-              help="What csv holds: a dataset as tape3/w, or a group.  [default: history; cases of "
-                   "a sweep]",
-              )  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace a file that exists.")
+              help="Content of csv: a dataset such as tape3/w, or a group.  [default: history; "
+                   "cases of a sweep]")  # fmt: skip
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 @reads("result")
 def export(
     result: Path, target: str, output: Path | None, dataset: str | None, overwrite: bool
 ) -> None:
-    """Write RESULT, of a run or of a sweep, in another program's format.
+    """Write RESULT, of a run or of a sweep, in the format of another program.
 
-    vtkhdf is one file with a time step for each row that DISP stored; csv is a table with a header
-    line.  A sweep has the tables cases, with one row per case, and history if its forces
+    vtkhdf is one file with one time step per row that DISP stored; csv is a table with a header
+    line.  A sweep has the table cases, with one row per case, and the table history if its forces
     are stored.
     """
     if target == "vtkhdf" and dataset is not None:
@@ -66,42 +64,23 @@ def export(
         raise click.UsageError("vtkhdf can't go to standard output")
 
     contents = read(result, FORMAT, SWEEP)
-    name = (dataset or ("cases" if contents.form == SWEEP else "history")).strip("/")
+    is_sweep = contents.form == SWEEP
+    name = (dataset or ("cases" if is_sweep else "history")).strip("/")
     ending = ".vtkhdf" if target == "vtkhdf" else f"-{name.replace('/', '-')}.csv"
     path = output or Path(f"{result.stem}{ending}")
     if path != STANDARD_OUTPUT:
         check_outputs([path], overwrite, [result])
     try:
-        if target == "vtkhdf":
-            _write_fields(contents, path, overwrite=overwrite)
+        if target == "csv" and is_sweep:
+            cases = sweep_of(contents, history=name == sweep_csv.HISTORY)
+            write_lines(sweep_csv.lines(cases, name), path, overwrite=overwrite)
+        elif target == "csv":
+            write_lines(csv.table(result_of(contents), name).lines(), path, overwrite=overwrite)
+        elif is_sweep:
+            raise ExportError("a sweep has no fields; --to csv writes its cases")
         else:
-            _write_table(contents, name, path, overwrite=overwrite)
+            write_vtkhdf(result_of(contents), path, note, overwrite=overwrite)
     except ExportError as error:
         raise RefusedError(f"{result}: {error}") from None
     if path != STANDARD_OUTPUT:
         echo(path)
-
-
-def _write_fields(contents: Contents, path: Path, *, overwrite: bool) -> None:
-    """Write the fields of a run for ParaView."""
-    if contents.form == SWEEP:
-        raise ExportError("a sweep has no fields; --to csv writes its cases")
-    result = result_of(contents)
-
-    def note(text: str) -> None:
-        echo(f"fecm: note: {text}", err=True)
-
-    write_vtkhdf(result, path, note, overwrite=overwrite)
-
-
-def _write_table(contents: Contents, name: str, path: Path, *, overwrite: bool) -> None:
-    """Write a table of a run or of a sweep."""
-    if contents.form == SWEEP:
-        lines = sweep_csv.lines(sweep_of(contents, history=name == sweep_csv.HISTORY), name)
-    else:
-        lines = csv.table(result_of(contents), name).lines()
-    if path == STANDARD_OUTPUT:
-        sys.stdout.writelines(lines)
-        return
-    with writing(path, overwrite=overwrite) as file:
-        file.writelines(lines)

@@ -8,20 +8,18 @@ from pathlib import Path
 
 import click
 
-from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError
+from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError, note
 from fecm.cli.indent_curve import curve
 from fecm.cli.outputs import OVERWRITE, PLOT, STANDARD_OUTPUT, OutputPaths
-from fecm.cli.types import POSITIVE, Finite
-from fecm.deck.catalogue import CONTACTS
+from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, ListOf
+from fecm.deck.catalogue import CONTACTS, SYSTEM, SYSTEMS
 from fecm.deck.model import Indentation
 from fecm.mechanics.contact_law import hertz_coefficient
-from fecm.plot.kinds import Picture
 from fecm.studies.indentation_test import LIMITS_Q
 from fecm.studies.indentation_test.constants import fit as fitted
 from fecm.studies.indentation_test.cycles import NoTestError
 from fecm.studies.indentation_test.report import card, lines, notes, plain
 from fecm.studies.indentation_test.table import Test, read_test
-from fecm.studies.tables import TableError
 
 
 @click.group(short_help="Indentation tests and the law of contact.")
@@ -38,18 +36,20 @@ indent.add_command(curve)
 @indent.command()
 @click.argument("test", type=DECK_PATH, metavar="TEST.csv")
 @click.option("--acr", is_flag=True,
-              help="Find alpha_cr of the law with one unloading rigidity (q = 5/2) instead of s_p "
+              help="Fit alpha_cr of the law with one unloading rigidity (q = 5/2) instead of s_p "
                    "and alpha_p.")  # fmt: skip
-@click.option("--q", type=Finite(*LIMITS_Q), help="Unloading power, instead of finding it.")
+@click.option("--q", type=Finite(*LIMITS_Q), help="Prescribed unloading power; fitted by default.")
 @click.option("--turn", type=POSITIVE, metavar="LENGTH",
-              help="How far the indentation goes back before a turn counts.  [default: 2 % of its "
+              help="Decrease of the indentation that counts as a turn.  [default: 2 % of its "
                    "range, or 8 standard deviations of its noise]")  # fmt: skip
-@click.option("--columns", metavar="INDENTATION,FORCE",
+@click.option("--columns", type=ListOf("INDENTATION,FORCE", click.STRING, [2]),
+              metavar="INDENTATION,FORCE",
               help="Names or numbers (from 1) of the two columns.  [default: indentation, "
                    "displacement, extension, stroke or depth; force or load]")  # fmt: skip
-@click.option("--unit", "units", metavar="LENGTH,FORCE",
-              help="Units of the card; a file that names its units is converted to them.  "
-                   "[default: in,lbf or mm,N or m,N, by those of the file]")  # fmt: skip
+@click.option("--unit", "units", type=ListOf("LENGTH,FORCE", click.STRING, [2]),
+              metavar="LENGTH,FORCE",
+              help="Units of the card, to which a file that names its units is converted.  "
+                   "[default: in,lbf or mm,N or m,N, as the file's]")  # fmt: skip
 @PLOT
 @OVERWRITE
 @FORMAT_OPTION
@@ -58,45 +58,37 @@ def fit(
     acr: bool,
     q: float | None,
     turn: float | None,
-    columns: str | None,
-    units: str | None,
+    columns: tuple[str, str] | None,
+    units: tuple[str, str] | None,
     picture: Path | None,
     overwrite: bool,
     form: str,
 ) -> None:
-    """Find the constants of the indentation law from a test, and print an EXPE card.
+    """Fit the indentation law to a test, and print its parameters and EXPE card.
 
-    TEST.csv has the columns indentation and force, its rows in the order of measurement:
-    first loading, unloading, reloading, as often as was done.  Commas, semicolons or tabs separate
-    them.  Units are in brackets after the names, or in the line below.
+    TEST.csv has the columns indentation and force, with rows in the order of measurement: first
+    loading, unloading, reloading, in any number of cycles.  Commas, semicolons or tabs separate
+    the columns.  Units are in brackets after the names, or in the line below.
     """
     if acr and q not in (None, 2.5):
-        raise click.UsageError("--acr takes q = 5/2, as equation 3-7 holds for no other")
-    pair = _pair(units, "--unit", "units", "in,lbf")
-    chosen = _pair(columns, "--columns", "columns", "2,3")
-    targets = OutputPaths.checked(STANDARD_OUTPUT, picture, overwrite, test)
+        raise click.UsageError("--acr requires q = 5/2: equation 3-7 holds for no other power")
+    targets = OutputPaths(STANDARD_OUTPUT, picture, overwrite, test)
+    read = read_test(test, columns or (), units)
     try:
-        read = read_test(test, chosen or (), pair)
         found = fitted(read.indentation, read.force, retreat=turn, q=q, acr=acr)
-    except TableError as error:
-        raise RefusedError(str(error)) from None
     except NoTestError as error:
         raise RefusedError(f"{test}: {error}") from None
-
-    def draw() -> Picture:
+    if targets.picture:
         from fecm.plot.indentation import fit_picture
 
         names = {**read.units, "time": "s"} if read.units else {}
-        return fit_picture(read.indentation, read.force, found, names)
-
-    targets.draw(draw)
-    for note in notes(found):
-        click.echo(f"fecm: note: {note}", err=True)
+        targets.draw(fit_picture(read.indentation, read.force, found, names))
+    for text in notes(found):
+        note(text)
     if form == "json":
         click.echo(json.dumps({"file": str(test), "units": read.units or None, **plain(found)}))
         return
-    click.echo("\n".join(lines(found)))
-    click.echo(_units_line(read))
+    click.echo("\n".join([*lines(found), _units_line(read)]))
     if text := card(found):
         click.echo(text)
 
@@ -106,19 +98,8 @@ def _units_line(read: Test) -> str:
     if not read.units:
         return "units           those of the test, which names none"
     own = tuple(read.units.values())
-    told = "" if read.stated in (("", ""), own) else f" (the test: {', '.join(read.stated)})"
-    return f"units           {', '.join(own)}{told}"
-
-
-def _pair(text: str | None, option: str, what: str, example: str) -> tuple[str, str] | None:
-    """Two texts with a comma between them."""
-    if text is None:
-        return None
-    parts = [part.strip() for part in text.split(",")]
-    if len(parts) != 2 or not all(parts):
-        raise click.BadParameter(f"two {what} with a comma between them, as in {example}",
-                                 param_hint=option)  # fmt: skip
-    return parts[0], parts[1]
+    stated = "" if read.stated in (("", ""), own) else f" (the test: {', '.join(read.stated)})"
+    return f"units           {', '.join(own)}{stated}"
 
 
 # hertz and contacts ------------------------------------------------------------------------------
@@ -130,7 +111,7 @@ def _pair(text: str | None, option: str, what: str, example: str) -> tuple[str, 
 @click.option("--nus", "nu_s", type=float, required=True, help="Poisson's ratio of the sphere.")
 @click.option("--et", "e_t", type=float, required=True,
               help="Young's modulus of the laminate through its thickness.")  # fmt: skip
-@click.option("--alpha-p", type=Finite(min=0.0), default=0.0, show_default=True,
+@click.option("--alpha-p", type=NOT_NEGATIVE, default=0.0, show_default=True,
               help="Critical indentation for the card.")  # fmt: skip
 @click.option("--s-p", type=Finite(0.0, 1.0, max_open=True), default=0.0,
               show_default=True, help="Slope of permanent indentation for the card.")  # fmt: skip
@@ -147,16 +128,16 @@ def hertz(
     q: float,
     form: str,
 ) -> None:
-    """Print the EXPE card of Hertz' contact of a sphere, k by equation 3-2.
+    """Print the EXPE card of a sphere in Hertzian contact, with k of equation 3-2.
 
-    All in one system of units.  Without further options the law is elastic.
+    All values are in one system of units.  By default the law is elastic.
     """
     try:
         k = hertz_coefficient(radius, e_s, nu_s, e_t)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
     if not 0.0 < k < math.inf:
-        raise click.UsageError("radius and moduli are so large or small that k is no number")
+        raise click.UsageError("k is not a finite number: check radius and moduli, and their units")
     law = Indentation(float(f"{k:.6g}"), alpha_p, s_p, q)
     if form == "json":
         click.echo(json.dumps({"k": k, "card": law.text()}))
@@ -165,15 +146,12 @@ def hertz(
 
 
 @indent.command()
-@click.argument("name", required=False)
-@click.option("--units", type=click.Choice(["in-lbf-s", "m-N-s", "mm-N-s"]), default="in-lbf-s",
-              show_default=True, help="Units of the constants.")  # fmt: skip
+@click.argument("name", type=click.Choice(list(CONTACTS)), metavar="[NAME]", required=False)
+@click.option("--units", type=click.Choice(list(SYSTEMS)), default=SYSTEM, show_default=True,
+              help="Units of the parameters.")  # fmt: skip
 @FORMAT_OPTION
 def contacts(name: str | None, units: str, form: str) -> None:
-    """List the named contacts of `fecm new --contact`, or print the EXPE card of one."""
-    if name is not None and name not in CONTACTS:
-        raise click.BadParameter(f"there is {', '.join(CONTACTS)}, not `{name}`",
-                                 param_hint="NAME")  # fmt: skip
+    """List the named laws of `fecm new --contact`, or print the EXPE card of one."""
     for contact in [CONTACTS[name]] if name else list(CONTACTS.values()):
         law = contact.converted(units)
         if form == "json":

@@ -1,249 +1,231 @@
-"""From the options of ``fecm new`` to a deck."""
+"""``fecm new`` and ``fecm materials``."""
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
-from fecm._errors import FecmError
-from fecm.deck.catalogue import CONTACTS, MATERIALS, SYSTEMS
-from fecm.deck.catalogue import SYSTEM as REPORT_SYSTEM
+import click
+
+from fecm._files import check_outputs
+from fecm.api import load_deck
+from fecm.cli.common import RefusedError, echo, echo_file, note, write_text
+from fecm.cli.laminate_options import laminate_options, ply_of_options
+from fecm.cli.outputs import STANDARD_OUTPUT
+from fecm.cli.types import POSITIVE, Finite, ListOf, Parsed, assignment
+from fecm.deck.catalogue import CONTACTS, MATERIALS, SYSTEM, SYSTEMS
+from fecm.deck.format import format_deck
 from fecm.deck.grid import Grid, Section, graded, listed, uniform
-from fecm.deck.layup import LayupError, parse_layup
 from fecm.deck.model import Deck, Indentation, Projectile, Units
-from fecm.deck.records import Ply, RodDiameter
+from fecm.deck.records import RodDiameter
 from fecm.problem.new import EDGES, SUPPORTS, Specification, new_deck
 
-# Most elements in one direction.
-MOST = 2000
+# Most elements in one direction, and in all.
+MOST, MOST_ELEMENTS = 2000, 500_000
 # Elements of a rod, as many as the report's has.
 ROD_ELEMENTS = 20
 
+PROJECTILES = {"mass": "M", "rod": "LENGTH,DIAMETER,E,DENSITY"}
 
-class OptionError(FecmError, ValueError):
-    """An option is invalid."""
+
+def _projectile(text: str) -> Projectile:
+    """Read a rigid mass or a cylindrical rod."""
+    kind, _, values = text.partition(":")
+    if kind not in PROJECTILES:
+        raise ValueError(f"{text!r} is not mass:M or rod:{PROJECTILES['rod']}")
+    form = PROJECTILES[kind]
+    numbers = ListOf(f"{kind}:{form}", Finite(), [form.count(",") + 1])(values)
+    if kind == "mass":
+        return Projectile(0, 0, *numbers)
+    length, diameter, modulus, density = numbers
+    ends = (RodDiameter(1, 1, diameter), RodDiameter(ROD_ELEMENTS, 0, diameter))
+    return Projectile(ROD_ELEMENTS, 0, length, modulus, density, ends)
+
+
+def _edge(text: str) -> tuple[str, str]:
+    """Read the support of an edge."""
+    edge, kind = assignment(text)
+    if edge not in EDGES or kind not in SUPPORTS:
+        raise ValueError(
+            f"{text!r} is not one of {', '.join(EDGES)}, =, and one of {', '.join(SUPPORTS)}"
+        )
+    return edge, kind
+
+
+@click.command(short_help="Write a deck from plate, layup, supports and impact.")
+@click.argument("output", type=click.Path(path_type=Path, allow_dash=True), metavar="DECK")
+@click.option("--title", default="", help="Title of the deck.")
+@click.option("--size", type=ListOf("6x4", POSITIVE, [2], "[xX×]"), metavar="LXxLY",
+              help="Size of the plate, as in 6x4.")  # fmt: skip
+@click.option("--mesh", type=ListOf("14x10", click.IntRange(1, MOST), [2], "[xX×]"),
+              metavar="NXxNY", help="Elements along x and y, as in 14x10.")  # fmt: skip
+@click.option("--grading", type=Finite(min=1.0), default=1.0, metavar="RATIO",
+              help="Largest over smallest element; the smallest at the impact point.")  # fmt: skip
+@click.option("--columns", type=Parsed(listed), metavar="LIST",
+              help="Elements along x one by one, as in 3*0.5,8*0.375,3*0.5, instead of --size and "
+                   "--mesh.")  # fmt: skip
+@click.option("--rows", type=Parsed(listed), metavar="LIST", help="The same along y.")
+@laminate_options(required=True)
+@click.option("--support", type=click.Choice(SUPPORTS), default="free", show_default=True,
+              help="Support of all edges.")  # fmt: skip
+@click.option("--edge", "edges", type=Parsed(_edge), multiple=True, metavar="EDGE=SUPPORT",
+              help="Support of one edge: left, right, bottom or top; may be repeated.")  # fmt: skip
+@click.option("--at", type=ListOf("X,Y", Finite(), [2]), metavar="X,Y",
+              help="Impact point.  [default: the plate's centre]")  # fmt: skip
+@click.option("--velocity", type=Finite(), required=True, help="Approach velocity.")
+@click.option("--law", type=ListOf("K,ALPHA_P,S_P,Q", Finite(), [4]), metavar="K,ALPHA_P,S_P,Q",
+              help="Parameters of the indentation law.")  # fmt: skip
+@click.option("--contact", type=click.Choice(list(CONTACTS)), metavar="NAME",
+              help="Named law, instead of --law; `fecm indent contacts` lists them.")  # fmt: skip
+@click.option("--projectile", type=Parsed(_projectile), metavar="PROJECTILE",
+              help="mass:M, or rod:LENGTH,DIAMETER,E,DENSITY.  [default in lbf, in and s: the "
+                   "report's rod]")  # fmt: skip
+@click.option("--duration", type=POSITIVE, required=True, help="Simulated time.")
+@click.option("--dt", type=POSITIVE, help="Time step.  [default: 0.9 of the critical one]")
+@click.option("--every", type=click.IntRange(min=1),
+              help="Steps between stored rows.  [default: for about 200 rows]")  # fmt: skip
+@click.option("--overwrite", is_flag=True, help="Replace an existing deck.")
+def new(output: Path, overwrite: bool, **options: Any) -> None:
+    """Write a deck that is ready to run from plate, layup, supports and impact.
+
+    DECK is the file to write; - is standard output.
+    """
+    to_file = output != STANDARD_OUTPUT
+    if to_file:
+        check_outputs([output], overwrite)
+    deck, moved = deck_of_options(**options)
+    text = format_deck(deck.to_text())
+    prepared = load_deck(text)
+    if errors := prepared.errors():
+        for finding in errors:
+            echo(finding.render("the new deck"), err=True)
+        raise RefusedError("these options do not give a valid deck; nothing was written")
+    if moved:
+        note(moved)
+    for finding in prepared.findings:
+        echo(finding.render(str(output) if to_file else "the new deck"), err=True)
+    if to_file:
+        write_text(output, text, overwrite=overwrite)
+        echo(output)
+    else:
+        echo_file(text)
+
+
+@click.command()
+def materials() -> None:
+    """List the named plies of `fecm new`, with their sources."""
+    for material in MATERIALS.values():
+        ply = material.ply
+        click.echo(f"{material.name} ({material.system})")
+        click.echo(
+            f"  E1 {ply.e1:g}, E2 {ply.e2:g}, NU12 {ply.nu12:g}, G12 {ply.g12:g}, G13 {ply.g13:g}, "
+            f"G23 {ply.g23:g}, density {ply.density:g}"
+        )
+        click.echo(f"  {material.source}{'; ' + material.assumed if material.assumed else ''}")
 
 
 def deck_of_options(
     *,
     title: str,
-    size: str | None,
-    mesh: str | None,
+    size: tuple[float, float] | None,
+    mesh: tuple[int, int] | None,
     grading: float,
-    columns: str | None,
-    rows: str | None,
-    layup: str,
+    columns: list[Section] | None,
+    rows: list[Section] | None,
+    layup: Sequence[float],
     ply_thickness: float,
-    ply: str | None,
+    ply: Sequence[float] | None,
     material: str | None,
     units: str | None,
     support: str,
-    edges: Sequence[str],
-    at: str | None,
+    edges: Sequence[tuple[str, str]],
+    at: tuple[float, float] | None,
     velocity: float,
-    law: str | None,
+    law: Sequence[float] | None,
     contact: str | None,
-    projectile: str | None,
+    projectile: Projectile | None,
     duration: float,
     dt: float | None,
     every: int | None,
-) -> tuple[Deck, list[str]]:
-    """Make a deck, and notes for the user, of the command's options.
-
-    Raises
-    ------
-    OptionError
-        If an option is invalid; the message names it.
-    """
-    try:
-        angles = parse_layup(layup)
-    except LayupError as error:
-        raise OptionError(str(error)) from None
-    for name, value in (
-        ("--ply-thickness", ply_thickness),
-        ("--duration", duration),
-        ("--dt", 1.0 if dt is None else dt),
-    ):
-        if not 0.0 < value < math.inf:
-            raise OptionError(f"{name} must be positive, not {value:g}")
-    point = None if at is None else _numbers("--at", at, 2)
-    grid = _grid(size, mesh, grading, columns, rows, point)
-    x, y = point or (grid.columns[-1].end / 2.0, grid.rows[-1].end / 2.0)
-    constants, system = ply_of_options(ply, material, units)
+) -> tuple[Deck, str]:
+    """Deck of the options of ``fecm new``, and a note if the impact point was moved to a node."""
+    grid = _grid(size, mesh, grading, columns, rows, at)
+    x, y = at or (grid.columns[-1].end / 2.0, grid.rows[-1].end / 2.0)
+    constants = ply_of_options(ply, material, units)
+    system = units or (MATERIALS[material].system if material else None)
+    if projectile is None and system not in (None, SYSTEM):
+        raise click.UsageError(
+            f"give --projectile mass:M or rod:{PROJECTILES['rod']}: without it the projectile is "
+            f"the report's steel rod, whose numbers are in {SYSTEM}"
+        )
     spec = Specification(
         title=title,
         grid=grid,
-        angles=angles,
+        angles=layup,
         ply_thickness=ply_thickness,
         ply=constants,
-        supports=_supports(support, edges),
+        supports=dict.fromkeys(EDGES, support) | dict(edges),
         at=(x, y),
         velocity=velocity,
-        law=_law(law, contact, units, material),
-        projectile=_projectile(projectile),
+        law=_law(law, contact, system),
+        projectile=projectile,
         duration=duration,
         dt=dt,
         every=every,
-        units=None if system is None else Units(*SYSTEMS[system][0]),
+        units=None if units is None else Units(*SYSTEMS[units][0]),
     )
-    if projectile is None and (system or material_system(material)) not in (None, REPORT_SYSTEM):
-        raise OptionError(
-            "give --projectile mass:M or rod:LENGTH,DIAMETER,E,DENSITY: without it the projectile "
-            f"is the report's steel rod, whose numbers are in {REPORT_SYSTEM}"
-        )
-    notes: list[str] = []
     node, node_x, node_y = grid.nearest(x, y)
     distance = math.hypot(node_x - x, node_y - y)
+    moved = ""
     if distance > 1e-9 * grid.columns[-1].end:
-        asked = "the plate's middle" if at is None else "--at"
-        notes.append(
+        asked = "the plate's centre" if at is None else "--at"
+        moved = (
             f"the impact point is moved by {distance:.4g}: from {asked} at {x:g}, {y:g} to the "
             f"nearest node, {node} at {node_x:g}, {node_y:g}"
         )
-    return new_deck(spec), notes
-
-
-def material_system(name: str | None) -> str | None:
-    """System of units of a named ply; None without one."""
-    return None if name is None else MATERIALS[name].system
-
-
-def _numbers(option: str, text: str, count: int) -> list[float]:
-    """Numbers separated by commas."""
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    if len(values) != count or not all(map(math.isfinite, values)):
-        raise OptionError(f"{option} takes {count} numbers with commas between them, not `{text}`")
-    return values
-
-
-def _projectile(text: str | None) -> Projectile | None:
-    """A rigid mass, or a cylindrical rod."""
-    if text is None:
-        return None
-    kind, _, values = text.partition(":")
-    if kind == "mass":
-        (mass,) = _numbers("--projectile mass", values, 1)
-        return Projectile(0, 0, mass)
-    if kind == "rod":
-        length, diameter, modulus, density = _numbers("--projectile rod", values, 4)
-        ends = (RodDiameter(1, 1, diameter), RodDiameter(ROD_ELEMENTS, 0, diameter))
-        return Projectile(ROD_ELEMENTS, 0, length, modulus, density, ends)
-    raise OptionError(f"--projectile takes mass:M or rod:LENGTH,DIAMETER,E,DENSITY, not `{text}`")
-
-
-def _pair(option: str, text: str | None) -> tuple[float, float]:
-    """Two positive numbers with an x between them."""
-    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*[xX×]\s*([0-9.eE+-]+)\s*", text or "")
-    try:
-        a, b = (float(match[1]), float(match[2])) if match else (0.0, 0.0)
-    except ValueError:
-        a = b = 0.0
-    if not (0.0 < a < math.inf and 0.0 < b < math.inf):
-        raise OptionError(f"{option} takes two numbers as in 6x4, not `{text or ''}`")
-    return a, b
+    return new_deck(spec), moved
 
 
 def _grid(
-    size: str | None,
-    mesh: str | None,
+    size: tuple[float, float] | None,
+    mesh: tuple[int, int] | None,
     grading: float,
-    columns: str | None,
-    rows: str | None,
-    point: Sequence[float] | None,
+    columns: list[Section] | None,
+    rows: list[Section] | None,
+    at: tuple[float, float] | None,
 ) -> Grid:
-    """The grid of elements, from sizes or from lists."""
-    if (columns is None) != (rows is None):
-        raise OptionError("--columns and --rows belong together")
-    if columns is not None and rows is not None:
+    """Grid of elements from sizes or from lists."""
+    if columns and rows:
         if size or mesh or grading != 1.0:
-            raise OptionError("--columns and --rows stand for --size, --mesh and --grading")
-        try:
-            grid = Grid(listed(columns), listed(rows))
-        except ValueError as error:
-            raise OptionError(str(error)) from None
+            raise click.UsageError("--columns and --rows replace --size, --mesh and --grading")
+        grid = Grid(columns, rows)
+    elif columns or rows or not (size and mesh):
+        raise click.UsageError("give --size and --mesh, or --columns and --rows")
     else:
-        lengths = _pair("--size", size)
-        counts = _pair("--mesh", mesh)
-        if not all(n.is_integer() and n <= MOST for n in counts):
-            raise OptionError(f"--mesh takes whole numbers up to {MOST}, not `{mesh}`")
-        directions: list[list[Section]] = []
-        for axis in (0, 1):
-            length, count = lengths[axis], int(counts[axis])
-            centre = length / 2.0 if point is None else point[axis]
-            directions.append(
-                graded(length, count, centre, grading) if grading > 1.0 else uniform(length, count)
-            )
-        grid = Grid(*directions)
-    if grid.across // 2 > MOST or grid.up // 2 > MOST or grid.elements > 500_000:
-        raise OptionError(f"the mesh would have {grid.elements} elements; 500000 is the most")
-    if point is not None and not (
-        0.0 <= point[0] <= grid.columns[-1].end and 0.0 <= point[1] <= grid.rows[-1].end
-    ):
-        raise OptionError("--at lies outside the plate")
+        centre = at or (size[0] / 2.0, size[1] / 2.0)
+        grid = Grid(*(
+            graded(length, count, middle, grading) if grading > 1.0 else uniform(length, count)
+            for length, count, middle in zip(size, mesh, centre, strict=True)
+        ))  # fmt: skip
+    if max(grid.across, grid.up) // 2 > MOST or grid.elements > MOST_ELEMENTS:
+        raise click.UsageError(
+            f"the mesh would have {grid.elements} elements; at most {MOST_ELEMENTS}, and {MOST} "
+            "in one direction, are allowed"
+        )
+    if at and not (0.0 <= at[0] <= grid.columns[-1].end and 0.0 <= at[1] <= grid.rows[-1].end):
+        raise click.UsageError("--at is outside the plate")
     return grid
 
 
-def ply_of_options(
-    text: str | None, name: str | None, system: str | None
-) -> tuple[Ply, str | None]:
-    """Constants of the ply, and the system of units that the deck declares.
-
-    Parameters
-    ----------
-    text : str or None
-        The constants, as ``--ply`` takes them.
-    name : str or None
-        A named ply, as ``--material`` takes it, instead.
-    system : str or None
-        A key of :data:`fecm.deck.catalogue.SYSTEMS`.
-
-    Raises
-    ------
-    OptionError
-        If an option is invalid; the message names it.
-    """
-    if system is not None and system not in SYSTEMS:
-        raise OptionError(f"--units takes {', '.join(SYSTEMS)}, not `{system}`")
-    if (text is None) == (name is None):
-        raise OptionError("give either --ply or --material")
-    if text is not None:
-        return Ply(*_numbers("--ply", text, 7)), system
-    material = MATERIALS.get(name or "")
-    if material is None:
-        raise OptionError(f"--material takes {', '.join(MATERIALS)}, not `{name}`")
-    return material.converted(system or material.system), system
-
-
-def _law(
-    text: str | None, name: str | None, system: str | None, material: str | None
-) -> Indentation:
-    """The indentation law, a named one in the units of the ply."""
-    if (text is None) == (name is None):
-        raise OptionError("give either --law or --contact")
-    if text is not None:
-        k, alpha_p, s_p, q = _numbers("--law", text, 4)
+def _law(law: Sequence[float] | None, contact: str | None, system: str | None) -> Indentation:
+    """Indentation law; a named one in the units of the ply."""
+    if (law is None) == (contact is None):
+        raise click.UsageError("give either --law or --contact")
+    if law is not None:
+        k, alpha_p, s_p, q = law
         return Indentation(k, alpha_p, s_p, q)
-    contact = CONTACTS.get(name or "")
-    if contact is None:
-        raise OptionError(f"--contact takes {', '.join(CONTACTS)}, not `{name}`")
-    if system is None and material is None:
-        raise OptionError("--contact with --ply needs --units, which say what the ply is given in")
-    return contact.converted(system or MATERIALS[material or ""].system)
-
-
-def _supports(support: str, edges: Sequence[str]) -> dict[str, str]:
-    """Support of every edge."""
-    supports = dict.fromkeys(EDGES, support)
-    for text in edges:
-        edge, _, kind = text.partition("=")
-        if edge not in EDGES or kind not in SUPPORTS:
-            raise OptionError(
-                f"--edge takes one of {', '.join(EDGES)}, =, and one of {', '.join(SUPPORTS)}, "
-                f"not `{text}`"
-            )
-        supports[edge] = kind
-    return supports
+    if system is None:
+        raise click.UsageError("--contact with --ply needs --units, the units of the ply")
+    return CONTACTS[contact or ""].converted(system)

@@ -1,112 +1,78 @@
-"""A table and a picture of it: the options of both, their checks, their files.
-
-Used by the commands whose result is a CSV (to standard output unless a file is named) and, if asked
-for, a picture beside it.
-"""
+"""Options and files of commands that write a CSV table and draw it."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable
 from pathlib import Path
 
 import click
 
 from fecm._files import check_outputs
-from fecm.cli.common import FILE_PATH, RefusedError, echo, writing
-from fecm.plot.kinds import MISSING, SUFFIXES, Picture, PlotError
+from fecm.cli.common import FILE_PATH, RefusedError, note, writing
+from fecm.plot.kinds import MISSING, SUFFIXES, Picture
 from fecm.plot.pictures import save
 
 STANDARD_OUTPUT = Path("-")
 
 OUTPUT = click.option("-o", "--output", type=click.Path(path_type=Path, allow_dash=True),
                       metavar="FILE", default=STANDARD_OUTPUT,
-                      help="Where the CSV goes.  [default: standard output]")  # fmt: skip
+                      help="CSV file to write.  [default: standard output]")  # fmt: skip
 PLOT = click.option("--plot", "picture", type=FILE_PATH, metavar="FILE",
-                    help="Also draw it: .png, .svg or .pdf.")  # fmt: skip
-OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace files that exist.")
+                    help="Also draw a picture: .png, .svg or .pdf.")  # fmt: skip
+OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 
 
-@dataclass(frozen=True)
 class OutputPaths:
-    """Where a table and its picture go.
+    """Files of a table and its picture, checked before anything is computed.
 
-    Attributes
+    Parameters
     ----------
-    table : Path or None
-        None is standard output.
+    table : Path
+        ``-`` is standard output.
     picture : Path or None
-        None if there is none to draw.
     overwrite : bool
-        Whether files that exist may be replaced.
+        Whether existing files may be replaced.
+    source : Path, optional
+        File that the command reads; never replaced.
+
+    Raises
+    ------
+    RefusedError
+        If pictures of this format can't be drawn.
+    OutputError
+        If a file can't be written.
     """
 
-    table: Path | None
-    picture: Path | None
-    overwrite: bool
-
-    @classmethod
-    def checked(
-        cls, table: Path, picture: Path | None, overwrite: bool, source: Path | None = None
-    ) -> OutputPaths:
-        """Check, before anything is computed, that both can be written.
-
-        Parameters
-        ----------
-        table : Path
-            ``-`` is standard output.
-        picture : Path or None
-        overwrite : bool
-            Whether files that exist may be replaced.
-        source : Path, optional
-            What the table is made from; never replaced.
-
-        Raises
-        ------
-        RefusedError
-        OutputError
-        """
+    def __init__(
+        self, table: Path, picture: Path | None, overwrite: bool, source: Path | None = None
+    ) -> None:
         if picture is not None:
             _check_picture(picture)
-        target = None if table == STANDARD_OUTPUT else table
-        paths = [path for path in (target, picture) if path is not None]
-        check_outputs(paths, overwrite, [] if source is None else [source])
-        return cls(target, picture, overwrite)
+        self.table, self.picture, self._overwrite = table, picture, overwrite
+        files = [path for path in (table, picture) if path and path != STANDARD_OUTPUT]
+        check_outputs(files, overwrite, [source] if source else [])
 
-    def draw(self, draw: Callable[[], Picture]) -> None:
-        """Draw the picture, if one is asked for.
-
-        Raises
-        ------
-        RefusedError
-            If what is to be drawn does not fit a picture.
-        OSError
-            If it can't be written.
-        """
-        if self.picture is None:
-            return
-
-        try:
-            save(draw(), self.picture, overwrite=self.overwrite)
-        except PlotError as error:
-            raise RefusedError(str(error)) from None
-        echo(f"fecm: note: drew {self.picture}", err=True)
+    def draw(self, picture: Picture) -> None:
+        """Write the picture."""
+        if self.picture is not None:
+            save(picture, self.picture, overwrite=self._overwrite)
+            note(f"drew {self.picture}")
 
     def write(self, lines: Iterable[str]) -> None:
-        """Write the table, of lines with their ends.
+        """Write the lines of the table, which have line ends."""
+        write_lines(lines, self.table, overwrite=self._overwrite)
+        if self.table != STANDARD_OUTPUT:
+            note(f"wrote {self.table}")
 
-        Raises
-        ------
-        OSError
-            If it can't be written.
-        """
-        if self.table is None:
-            sys.stdout.writelines(lines)
-            return
-        with writing(self.table, overwrite=self.overwrite) as file:
-            file.writelines(lines)
-        echo(f"fecm: note: wrote {self.table}", err=True)
+
+def write_lines(lines: Iterable[str], path: Path, *, overwrite: bool) -> None:
+    """Write lines with line ends to a file, or to standard output."""
+    if path == STANDARD_OUTPUT:
+        sys.stdout.writelines(lines)
+        return
+    with writing(path, overwrite=overwrite) as file:
+        file.writelines(lines)
 
 
 def _check_picture(path: Path) -> None:

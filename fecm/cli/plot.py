@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -11,8 +10,9 @@ from typing import Any
 import click
 
 from fecm._files import check_outputs
-from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, progress
+from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, note, progress
 from fecm.cli.isolation import reads
+from fecm.cli.types import Finite, ListOf, Parsed, assignment
 from fecm.plot.kinds import KINDS, Picture, PlotError, PlotNote
 from fecm.plot.pictures import check_options, check_suffix, draw, options_of, save
 from fecm.results.hdf5_reader import read
@@ -23,47 +23,14 @@ from fecm.sweeps.result import SweepResult, sweep_of
 _KIND_HELP = "; ".join(f"{name}: {kind.summary}" for name, kind in KINDS.items())
 
 
-def _numbers(form: str, count: int = 0) -> Callable[[click.Context, click.Parameter, Any], Any]:
-    """Return a callback that reads finite numbers separated by commas, `count` of them if not 0."""
-
-    def read(value: str) -> tuple[float, ...]:
-        try:
-            numbers = tuple(float(part) for part in value.split(","))
-        except ValueError:
-            numbers = ()
-        if not numbers or not all(map(math.isfinite, numbers)) or count not in (0, len(numbers)):
-            raise click.BadParameter(f"{value} is not of the form {form}")
-        return numbers
-
-    def callback(context: click.Context, parameter: click.Parameter, value: Any) -> Any:
-        if isinstance(value, tuple):
-            return tuple(map(read, value))
-        return () if value is None else read(value)
-
-    return callback
-
-
-def _names(context: click.Context, parameter: click.Parameter, value: str) -> tuple[str, ...]:
-    """One or two names."""
-    names = tuple(part.strip() for part in value.split(",")) if value else ()
-    if len(names) > 2 or not all(names):
-        raise click.BadParameter(f"{value} is not of the form NAME or NAME,NAME")
-    return names
-
-
-def _pairs(
-    context: click.Context, parameter: click.Parameter, values: tuple[str, ...]
+def _by_name(
+    context: click.Context, option: click.Parameter, pairs: tuple[tuple[str, str], ...]
 ) -> dict[str, str]:
     """Values by name."""
-    pairs = {}
-    for value in values:
-        name, _, wanted = (part.strip() for part in value.partition("="))
-        if not name or not wanted:
-            raise click.BadParameter(f"{value} is not of the form NAME=VALUE")
-        if name in pairs:
-            raise click.BadParameter(f"{name} is given twice")
-        pairs[name] = wanted
-    return pairs
+    values = dict(pairs)
+    if len(values) < len(pairs):
+        raise click.BadParameter("a name is given twice")
+    return values
 
 
 @click.command(short_help="Draw the report's figures, or the map of a sweep.")
@@ -75,14 +42,14 @@ def _pairs(
 @click.option("-o", "--output", type=FILE_PATH, metavar="PATH",
               help="Picture (.png, .svg, .pdf; .gif for animation), or folder for several.  "
                    "[default: RESULT-KIND.png in this folder]")  # fmt: skip
-@click.option("--at", callback=_numbers("X,Y", 2), multiple=True, metavar="X,Y",
+@click.option("--at", type=ListOf("X,Y", Finite(), [2]), multiple=True, metavar="X,Y",
               help="Point of strain; may be repeated.  [default: the impact point]",
               )  # fmt: skip
-@click.option("--gage", "gages", callback=_numbers("DEGREES,..."), metavar="DEGREES,...",
+@click.option("--gage", "gages", type=ListOf("DEGREES,...", Finite()), metavar="DEGREES,...",
               help="Directions of strain, from the x-axis.  [default: 0,90]")  # fmt: skip
 @click.option("--face", type=click.Choice(["far", "struck", "curvature"]),
               help="Face of the strain, or curvature instead.  [default: far]")  # fmt: skip
-@click.option("--times", callback=_numbers("T,T,..."), metavar="T,T,...",
+@click.option("--times", type=ListOf("T,T,...", Finite()), metavar="T,T,...",
               help="Times, in the deck's unit; the nearest stored rows are drawn.")  # fmt: skip
 @click.option("--along", type=click.Choice(["x", "y"]),
               help="Direction of line.  [default: x]")  # fmt: skip
@@ -91,12 +58,14 @@ def _pairs(
 @click.option("--quantity", metavar="NAME",
               help="Quantity of map: a name of the sweep's summary.  [default: "
                    "peak_force]")  # fmt: skip
-@click.option("--over", callback=_names, metavar="NAME[,NAME]", default="",
+@click.option("--over", type=ListOf("NAME or NAME,NAME", click.STRING, [1, 2]),
+              metavar="NAME[,NAME]",
               help="Parameters on the axes of map.  [default: those that vary]")  # fmt: skip
-@click.option("--where", callback=_pairs, multiple=True, metavar="NAME=VALUE",
+@click.option("--where", type=Parsed(assignment), callback=_by_name, multiple=True,
+              metavar="NAME=VALUE",
               help="Show in map only the cases nearest to this value; may be "
                    "repeated.")  # fmt: skip
-@click.option("--level", callback=_numbers("VALUE,..."), metavar="VALUE,...",
+@click.option("--level", type=ListOf("VALUE,...", Finite()), metavar="VALUE,...",
               help="Values to mark in map, in the deck's unit.")  # fmt: skip
 @click.option("--overwrite", is_flag=True, help="Replace pictures that exist.")
 @reads("results")
@@ -182,5 +151,5 @@ def _draw(
             advance(1)
     notes = [str(one.message) for one in caught if issubclass(one.category, PlotNote)]
     for text in dict.fromkeys(notes):
-        echo(f"fecm: note: {text}", err=True)
+        note(text)
     return pictures

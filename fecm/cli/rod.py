@@ -9,31 +9,32 @@ from typing import Any
 
 import click
 
-from fecm.api import load_deck
-from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError, count_errors, report
+from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError
+from fecm.cli.decks import load_valid
 from fecm.cli.outputs import OUTPUT, OVERWRITE, PLOT, STANDARD_OUTPUT, OutputPaths
-from fecm.cli.types import POSITIVE, Finite
+from fecm.cli.types import POSITIVE, Finite, Parsed
 from fecm.deck.units import unit_names
 from fecm.mechanics.projectile import REPORT_ELEMENTS, RigidMass, Rod
 from fecm.mechanics.rod_integrators import INTEGRATORS, LUMPED, MASSES, WILSON
-from fecm.plot.kinds import Picture
 from fecm.problem.build import build_projectile, build_station
-from fecm.studies.rod_test import calibration
-from fecm.studies.rod_test.filters import filter_of
+from fecm.studies import StudyError
+from fecm.studies.rod_test.calibration import Calibration
+from fecm.studies.rod_test.calibration import calibrate as fit_sensitivity
+from fecm.studies.rod_test.filters import Filter, filter_of
 from fecm.studies.rod_test.history import recorded
 from fecm.studies.rod_test.pulse_test import RodHistory, default_time_step, simulate_pulse, table
-from fecm.studies.rod_test.pulses import pulse_of
+from fecm.studies.rod_test.pulses import Pulse, pulse_of
 from fecm.studies.tables import read_columns
 
 FILTER_HELP = ("first-order:RISE or moving-average:RISE; RISE is the time from 10 to 90 % of the "
-               "answer to a step.")  # fmt: skip
+               "step response.")  # fmt: skip
 
 
 class _PulseGroup(click.Group):
-    """A group of commands; what begins with none of their names is meant for the first."""
+    """A group whose default command is ``pulse``."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Put the first command's name where there is none."""
+        """Insert the default command's name if there is none."""
         if args and args[0] not in self.commands and args[0] not in ("-h", "--help"):
             args = ["pulse", *args]
         return super().parse_args(ctx, args)
@@ -41,7 +42,7 @@ class _PulseGroup(click.Group):
 
 @click.group(cls=_PulseGroup, short_help="The rod of the projectile by itself.")
 def rod() -> None:
-    """The projectile's rod by itself: a pulse on its end, its transducer.
+    """The projectile's rod by itself: response to a pulse, filters, calibration.
 
     `fecm rod [DECK] --pulse ...` is short for `fecm rod pulse [DECK] --pulse ...`.
     """
@@ -49,7 +50,7 @@ def rod() -> None:
 
 @rod.command()
 @click.argument("deck", type=DECK_PATH, required=False)
-@click.option("--pulse", "pulse_text", required=True, metavar="PULSE",
+@click.option("--pulse", "applied", type=Parsed(pulse_of), required=True, metavar="PULSE",
               help="gauss:F0,TAU,B (F0 exp(-(t-TAU)²/4B²)), sine:F0,B (F0 sin(πt/B), zero after "
                    "B), or a CSV of time and force, linear between its rows.")  # fmt: skip
 @click.option("--length", type=POSITIVE, help="Length of the rod, without a deck.")
@@ -59,116 +60,97 @@ def rod() -> None:
 @click.option("--elements", type=click.IntRange(1, 1000), metavar="N",
               help="Number of elements, without a deck.  [default: 20]")  # fmt: skip
 @click.option("--dt", type=POSITIVE,
-              help="Time step.  [default: the deck's DT, or 0.8 of a wave's time through an "
-                   "element]")  # fmt: skip
+              help="Time step.  [default: the deck's DT, or 0.8 of the travel time of a wave "
+                   "through an element]")  # fmt: skip
 @click.option("--duration", type=POSITIVE,
-              help="Time to cover.  [default: TAU + 10 B, 1.5 B, or the table's]")  # fmt: skip
+              help="Simulated time.  [default: TAU + 10 B, 1.5 B, or the table's]")  # fmt: skip
 @click.option("--station", "stations", type=Finite(), multiple=True, metavar="X",
-              help="Distance from the struck end at which the force is wanted; may be repeated.  "
+              help="Distance from the struck end at which to compute the force; may be repeated.  "
                    "[default: the middle]")  # fmt: skip
-@click.option("--filter", "filter_text", metavar="FILTER",
-              help=f"Also show these forces through a transducer that rises slowly: {FILTER_HELP}",
-              )  # fmt: skip
+@click.option("--filter", "transducer", type=Parsed(filter_of), metavar="FILTER",
+              help=f"Also filter these forces as a transducer does: {FILTER_HELP}")  # fmt: skip
 @click.option("--mass-matrix", type=click.Choice(MASSES), default=LUMPED, show_default=True,
-              help="The report's program lumps the mass.")  # fmt: skip
+              help="Mass matrix; the report's program lumps it.")  # fmt: skip
 @click.option("--integrator", type=click.Choice(INTEGRATORS), default=WILSON, show_default=True,
-              help="The report's is Wilson's.")  # fmt: skip
+              help="Time integration; the report's is Wilson's.")  # fmt: skip
 @OUTPUT
 @PLOT
 @OVERWRITE
 def pulse(
     deck: Path | None,
-    pulse_text: str,
+    applied: Pulse,
     dt: float | None,
     duration: float | None,
     stations: tuple[float, ...],
-    filter_text: str | None,
+    transducer: Filter | None,
     mass_matrix: str,
     integrator: str,
     output: Path,
     picture: Path | None,
     overwrite: bool,
-    **shape: float | int | None,
+    **shape: Any,
 ) -> None:
-    """Push a free rod at one end; the forces and accelerations in it as CSV.
+    """Compute forces and accelerations of a free rod under a pulse on one end, as CSV.
 
     The rod is the projectile of DECK, or uniform by --length, --modulus, --density and --diameter.
     Force is positive in compression.
     """
-    targets = OutputPaths.checked(output, picture, overwrite)
+    targets = OutputPaths(output, picture, overwrite)
     _check_shape(deck, shape)
-
     units: Mapping[str, str] = {}
     deck_dt = None
     if deck is None:
-        struck = _uniform(shape)
-        middle = struck.length / 2.0
+        diameters = (shape["diameter"],) * (shape["elements"] or REPORT_ELEMENTS)
+        struck = Rod(shape["length"], diameters, shape["modulus"], shape["density"])
+        station = struck.length / 2.0
     else:
-        struck, middle, deck_dt, units = _of_deck(deck)
+        struck, station, deck_dt, units = _of_deck(deck)
     struck = struck.with_mass(mass_matrix)
-    try:
-        push = pulse_of(pulse_text)
-        slow = None if filter_text is None else filter_of(filter_text)
-        history = simulate_pulse(
-            struck,
-            push,
-            dt or deck_dt or default_time_step(struck),
-            duration or push.duration,
-            tuple(dict.fromkeys(stations)) or (middle,),
-            integrator,
-        )
-    except ValueError as error:
-        raise RefusedError(str(error)) from None
-    filtered = None if slow is None else slow(history.time, history.forces)
-
-    def draw() -> Picture:
+    history = simulate_pulse(
+        struck,
+        applied,
+        dt or deck_dt or default_time_step(struck),
+        duration or applied.duration,
+        tuple(dict.fromkeys(stations)) or (station,),
+        integrator,
+    )
+    filtered = None if transducer is None else transducer(history.time, history.forces)
+    if targets.picture:
         from fecm.plot.rod import pulse_picture
 
-        return pulse_picture(history, filtered, units)
-
-    targets.draw(draw)
+        targets.draw(pulse_picture(history, filtered, units))
     targets.write(table(history, filtered))
-    if targets.table is not None:
+    if targets.table != STANDARD_OUTPUT:
         click.echo("\n".join(_summary(struck, history)))
 
 
-def _check_shape(deck: Path | None, shape: Mapping[str, float | int | None]) -> None:
-    """Refuse a rod that is given twice, or not wholly."""
+def _check_shape(deck: Path | None, shape: Mapping[str, Any]) -> None:
+    """Refuse a rod that is defined twice or incompletely."""
     given = [name for name, value in shape.items() if value is not None]
+    missing = [f"--{name}" for name in shape if name not in (*given, "elements")]
     if deck is not None and given:
-        raise click.UsageError(f"--{given[0]} is for a rod without a deck; {deck} has its own")
-    missing = [name for name, value in shape.items() if value is None and name != "elements"]
+        raise click.UsageError(f"--{given[0]} is for a rod without a deck; {deck} has one")
     if deck is None and missing:
-        options = ", ".join(f"--{name}" for name in missing)
-        raise click.UsageError(f"the rod lacks {options}; or name a deck whose rod it is")
-
-
-def _uniform(shape: Mapping[str, Any]) -> Rod:
-    """The rod of the options."""
-    diameters = (shape["diameter"],) * (shape["elements"] or REPORT_ELEMENTS)
-    return Rod(shape["length"], diameters, shape["modulus"], shape["density"])
+        raise click.UsageError(f"the rod lacks {', '.join(missing)}; or name a deck with a rod")
 
 
 def _of_deck(deck: Path) -> tuple[Rod, float, float | None, Mapping[str, str]]:
-    """The projectile of a deck's first problem, its transducer's x, its first DT, its units."""
-    prepared = load_deck(deck)
-    report(prepared)
-    if errors := prepared.errors(force=True):
-        raise RefusedError(count_errors(errors))
+    """Projectile of a deck's first problem, x of its transducer, its first DT, and its units."""
+    prepared = load_valid(deck)
     if not prepared.problems:
-        raise RefusedError(f"{deck} holds no problem")
+        raise RefusedError(f"{deck} contains no problem")
     first = prepared.problems[0].deck
     steps = [macro.value for macro in first.macros if macro.word == "DT" and macro.value > 0.0]
     projectile = build_projectile(first)
     if isinstance(projectile, RigidMass):
-        raise RefusedError(f"{deck}: the projectile is a rigid mass, through which no wave runs")
+        raise RefusedError(f"{deck}: the projectile is a rigid mass; a pulse needs a rod")
     node = build_station(first, projectile, frozenset()).node
     x = (node - 1) * projectile.length / projectile.elements
     return projectile, x, steps[0] if steps else None, unit_names(first)
 
 
 def _summary(struck: Rod, history: RodHistory) -> list[str]:
-    """What came out, for a person."""
+    """Lines of the summary."""
     dt, peak = history.time[1], abs(history.applied).argmax()
     lines = [
         f"rod               {struck.elements} elements, length {struck.length:g}, "
@@ -189,40 +171,30 @@ def _summary(struck: Rod, history: RodHistory) -> list[str]:
 
 @rod.command("filter")
 @click.argument("history", type=DECK_PATH, metavar="RESULT")
-@click.option("--filter", "filter_text", required=True, metavar="FILTER", help=FILTER_HELP)
+@click.option("--filter", "transducer", type=Parsed(filter_of), required=True, metavar="FILTER",
+              help=FILTER_HELP)  # fmt: skip
 @click.option("--column", metavar="NAME",
-              help="What to filter: a column of a result's history, or of a CSV.  [default: "
-                   "transducer; of a CSV without one, the second]")  # fmt: skip
+              help="Column of a result's history, or of a CSV, to filter.  [default: transducer; "
+                   "of a CSV without one, the second]")  # fmt: skip
 @OUTPUT
 @PLOT
 @OVERWRITE
 def filter_(
     history: Path,
-    filter_text: str,
+    transducer: Filter,
     column: str | None,
     output: Path,
     picture: Path | None,
     overwrite: bool,
 ) -> None:
-    """Show a history as a transducer with a rise time would.
+    """Filter a history as a transducer with a rise time does.
 
-    RESULT is what `fecm run` wrote, or a CSV with a column of times; the CSV that comes out has the
+    RESULT is a result of `fecm run`, or a CSV with a column of times.  The output is a CSV with the
     columns time, the history, and filtered.
     """
-    targets = OutputPaths.checked(output, picture, overwrite, history)
-
-    try:
-        slow = filter_of(filter_text)
-        series = recorded(history, column)
-    except ValueError as error:
-        raise RefusedError(str(error)) from None
-    filtered = slow(series.time, series.values)
-
-    def draw() -> Picture:
-        from fecm.plot.rod import filter_picture
-
-        named = {**series.beside, series.name: series.values, "filtered": filtered}
-        return filter_picture(series.time, named, series.units, series.dimension)
+    targets = OutputPaths(output, picture, overwrite, history)
+    series = recorded(history, column)
+    filtered = transducer(series.time, series.values)
 
     def lines() -> Iterable[str]:
         yield f"time,{series.name},filtered\n"
@@ -230,7 +202,11 @@ def filter_(
         for row in list(zip(*columns, strict=True))[series.first :]:
             yield ",".join(map(repr, row)) + "\n"
 
-    targets.draw(draw)
+    if targets.picture:
+        from fecm.plot.rod import filter_picture
+
+        named = {**series.beside, series.name: series.values, "filtered": filtered}
+        targets.draw(filter_picture(series.time, named, series.units, series.dimension))
     targets.write(lines())
 
 
@@ -252,36 +228,28 @@ def calibrate(
     picture: Path | None,
     overwrite: bool,
 ) -> None:
-    """Sensitivity of the impact-force transducer from TEST.csv.
+    """Calibrate the impact-force transducer with TEST.csv.
 
     TEST.csv has the columns time, V_F and V_a: outputs of the transducer on the projectile and of
     the accelerometer on a free target.  The slope of V_F over V_a gives c_F = (c_a / m) V_F / V_a.
     """
-    targets = OutputPaths.checked(STANDARD_OUTPUT, picture, overwrite)
-
+    targets = OutputPaths(STANDARD_OUTPUT, picture, overwrite)
+    columns = read_columns(test, ("time", "V_F", "V_a"), increasing="time")
+    time, v_f, v_a = columns.values()
     try:
-        columns = read_columns(test, ("time", "V_F", "V_a"), increasing="time")
-    except ValueError as error:
-        raise RefusedError(str(error)) from None
-    try:
-        found = calibration.calibrate(
-            columns["V_F"], columns["V_a"], mass, c_a, through_origin=through_origin
-        )
-    except ValueError as error:
+        found = fit_sensitivity(v_f, v_a, mass, c_a, through_origin=through_origin)
+    except StudyError as error:
         raise RefusedError(f"{test}: {error}") from None
-
-    def draw() -> Picture:
+    if targets.picture:
         from fecm.plot.rod import calibration_picture
 
-        return calibration_picture(columns["time"], columns["V_F"], columns["V_a"], found)
-
-    text = json.dumps(vars(found)) if form == "json" else "\n".join(_told(found))
-    targets.draw(draw)
+        targets.draw(calibration_picture(time, v_f, v_a, found))
+    text = json.dumps(vars(found)) if form == "json" else "\n".join(_lines(found))
     targets.write([text + "\n"])
 
 
-def _told(found: Any) -> list[str]:
-    """A calibration, for a person."""
+def _lines(found: Calibration) -> list[str]:
+    """Lines of a calibration."""
     return [
         f"points            {found.points}",
         f"slope V_F/V_a     {found.slope:.6g} ± {found.slope_error:.2g}",

@@ -11,20 +11,20 @@ import click
 
 from fecm._files import check_outputs
 from fecm._memory import format_bytes
-from fecm.api import load_deck, numbered
+from fecm.api import numbered
 from fecm.cli.common import (
     DECK_PATH,
     FILE_PATH,
     MODE_OPTION,
     CheckFailedError,
     RefusedError,
-    count_errors,
     echo,
+    note,
     progress,
-    report,
     signals,
     writing,
 )
+from fecm.cli.decks import load_valid
 from fecm.cli.types import POSITIVE, Finite
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.rod_integrators import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
@@ -123,10 +123,7 @@ def run(
     except ValueError as error:
         raise click.UsageError(str(error)) from None
 
-    prepared = load_deck(deck, mode)
-    report(prepared)
-    if errors := prepared.errors(force):
-        raise RefusedError(f"{count_errors(errors)}; nothing was run")
+    prepared = load_valid(deck, "; nothing was run", mode, force=force)
     first = output or Path(f"{deck.stem}.h5")
     paths = [numbered(first, n) for n in range(1, len(prepared.problems) + 1)]
     prints = [None if printed is None else numbered(printed, n + 1) for n in range(len(paths))]
@@ -151,7 +148,7 @@ def run(
         if number:
             echo()
         if number < own - 1 and path.exists():
-            echo(f"fecm: note: {path} is complete", err=True)
+            note(f"{path} is complete")
             continue
         _run_one(prepared.problems[number], path, prints[number], choices, every,
                  resumes=number == own - 1, overwrite=overwrite or number < own)  # fmt: skip
@@ -186,14 +183,14 @@ def _run_one(
         if resumes:
             checkpointer.restore(simulation)
             step = simulation.state.plate.step
-            echo(f"fecm: note: {path} resumes after step {step}", err=True)
+            note(f"{path} resumes after step {step}")
         simulate_run(simulation)
     checkpointer.clear()
-    for note in simulation.state.notes:
-        echo(f"fecm: note: {note}", err=True)
+    for text in simulation.state.notes:
+        note(text)
     result = load(path)
     if result.still_in_contact:
-        echo(f"fecm: note: {OPEN_END}", err=True)
+        note(OPEN_END)
     echo(problem.deck.title or "(no title)")
     for line in summary(result):
         echo(f"  {line}")

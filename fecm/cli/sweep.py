@@ -12,7 +12,9 @@ import click
 
 from fecm._files import check_outputs
 from fecm.api import load_deck
-from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, count_errors, echo, signals
+from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, note, signals
+from fecm.cli.decks import count_errors
+from fecm.cli.types import ListOf
 from fecm.deck.findings import DeckError
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
@@ -39,7 +41,7 @@ from fecm.sweeps.store import OtherSweepError, PartialResults
               help="Result.  [default: the deck's name with -sweep.h5, in this "
                    "folder]")  # fmt: skip
 @click.option("--history", is_flag=True, help="Also store the contact force of every step.")
-@click.option("--full", metavar="CASE,...", default="",
+@click.option("--full", type=ListOf("CASE,...", click.IntRange(min=0)), metavar="CASE,...",
               help="Also run these cases in full, into SWEEP-CASE.h5; cases count from "
                    "0.")  # fmt: skip
 @click.option("--workers", type=click.IntRange(1, 1024), default=1, show_default=True, metavar="N",
@@ -54,7 +56,7 @@ def sweep(
     table: Path | None,
     output: Path | None,
     history: bool,
-    full: str,
+    full: tuple[int, ...] | None,
     workers: int,
     scheduler: str | None,
     allow_failed: bool,
@@ -69,7 +71,9 @@ def sweep(
     path = output or Path(f"{deck.stem}-sweep.h5")
     try:
         cases = _cases(varied, table)
-        chosen = _chosen(full, len(cases))
+        chosen = tuple(dict.fromkeys(full or ()))
+        if chosen and max(chosen) >= len(cases):
+            raise click.UsageError(f"--full {max(chosen)}: the cases are 0 to {len(cases) - 1}")
         fulls = {case: path.with_name(f"{path.stem}-{case}{path.suffix}") for case in chosen}
         inputs = [deck] if table is None else [deck, table]
         check_outputs([path, *fulls.values()], overwrite, inputs)
@@ -77,7 +81,7 @@ def sweep(
         made = plan(problem, cases, history=history)
         check_memory(problem, made, 0 if scheduler is not None else workers)
         if count := freed(tasks(problem, made)):
-            _note(
+            note(
                 f"B is not zero in {count} case{'' if count == 1 else 's'}: u and v, which the "
                 "deck restrains at every node, are free there except where w is held"
             )
@@ -86,7 +90,7 @@ def sweep(
         raise RefusedError(str(error)) from None
     save(result, path, overwrite=overwrite)
     if lost := sum(status.startswith(LOST) for status in result["status"].tolist()):
-        _note(f"{lost} cases were lost with their workers; --overwrite runs them again")
+        note(f"{lost} cases were lost with their workers; --overwrite runs them again")
     else:
         _parts(made, path, restart=True).clear()
     echo(result.title or "sweep")
@@ -104,18 +108,6 @@ def _cases(varied: tuple[str, ...], table: Path | None) -> list[Case]:
     if bool(varied) == (table is not None):
         raise click.UsageError("give either --vary or --cases")
     return read_cases(table) if table is not None else grid([parse_vary(v) for v in varied])
-
-
-def _chosen(text: str, count: int) -> list[int]:
-    """Numbers of the cases that are run in full."""
-    try:
-        numbers = [int(part) for part in text.split(",") if part.strip()]
-    except ValueError:
-        raise click.UsageError(f"--full takes numbers of cases, not `{text}`") from None
-    for number in numbers:
-        if not 0 <= number < count:
-            raise click.UsageError(f"--full: there is no case {number}; there are 0 to {count - 1}")
-    return list(dict.fromkeys(numbers))
 
 
 def _problem(deck: Path) -> Problem:
@@ -151,7 +143,7 @@ def _carry_out(
         with signals.deferred(), _progress(len(made.cases)) as done:
             return carry_out(
                 problem, made, workers=workers, scheduler=scheduler, parts=parts, done=done,
-                idle=signals.heed, note=_note,
+                idle=signals.heed, note=note,
             )  # fmt: skip
     except SchedulerError as error:
         parts.clear()
@@ -159,10 +151,6 @@ def _carry_out(
     except (KeyboardInterrupt, SystemExit):
         echo("fecm: the same command goes on where this sweep was", err=True)
         raise
-
-
-def _note(text: str) -> None:
-    echo(f"fecm: note: {text}", err=True)
 
 
 @contextlib.contextmanager
@@ -199,6 +187,6 @@ def _run_in_full(made: Plan, fulls: dict[int, Path], *, overwrite: bool) -> None
             with hdf5_writer.writing(path, overwrite=overwrite) as sink:
                 simulate(prepared.problems[0], sink)
         except (CasesError, ArithmeticError) as error:
-            echo(f"fecm: note: case {case} was not run in full: {error}", err=True)
+            note(f"case {case} was not run in full: {error}")
             continue
         echo(f"  case {case:<12} {path}")

@@ -1,18 +1,20 @@
-"""Numbers among the options of commands: their bounds, and several in one option."""
+"""Numbers and lists among the options of commands."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
+from itertools import chain
 from typing import Any
 
 import click
 
-from fecm.cli.common import RefusedError
-
 
 class Finite(click.FloatRange):
     """A float in a range; never infinite, never NaN."""
+
+    name = "number"
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -25,51 +27,82 @@ class Finite(click.FloatRange):
 
 
 POSITIVE = Finite(min=0.0, min_open=True)
+NOT_NEGATIVE = Finite(min=0.0)
 
 
-def finite(name: str, text: str, low: float = -math.inf, *, above: bool = False) -> float:
-    """Read a finite number of at least `low`, or above it.
-
-    Parameters
-    ----------
-    name : str
-        The option's name, for the message.
-    text : str
-    low : float
-    above : bool
-        Whether `low` itself is refused.
-
-    Raises
-    ------
-    RefusedError
-    """
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if math.isfinite(value) and (value > low if above else value >= low):
-        return value
-    bound = "" if low == -math.inf else f" {'above' if above else 'of at least'} {low:g}"
-    raise RefusedError(f"{name} takes a number{bound}, not `{text}`")
-
-
-def number(low: float = -math.inf, *, above: bool = False) -> Callable[..., Any]:
-    """A callback of an option that reads its number, or of a repeated option all its numbers.
+class ListOf(click.ParamType):  # type: ignore[type-arg]
+    """A tuple of values with a separator between them.
 
     Parameters
     ----------
-    low, above
-        As :func:`finite` takes them.
+    form : str
+        How the values are written, for messages: ``X,Y``.
+    item : click.ParamType
+        Type of each value.
+    counts : sequence of int
+        Admissible numbers of values; by default any but 0.
+    separator : str
+        Regular expression.
     """
 
-    def callback(context: click.Context, parameter: click.Parameter, value: Any) -> Any:
-        name = parameter.opts[0]
+    name = "list"
+
+    def __init__(
+        self,
+        form: str,
+        item: Any,
+        counts: Sequence[int] = (),
+        separator: str = ",",
+    ) -> None:
+        self._form = form
+        self._item = item
+        self._counts = counts
+        self._separator = separator
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[Any, ...]:
+        """Read the values."""
         if isinstance(value, tuple):
-            parts = [part for text in value for part in text.split(",")]
-            return tuple(dict.fromkeys(finite(name, part, low, above=above) for part in parts))
-        return None if value is None else finite(name, value, low, above=above)
+            return value
+        parts = [part.strip() for part in re.split(self._separator, value)]
+        if not all(parts) or (self._counts and len(parts) not in self._counts):
+            self.fail(f"{value!r} is not of the form {self._form}.", param, ctx)
+        try:
+            return tuple(self._item(part, param, ctx) for part in parts)
+        except click.BadParameter as error:
+            self.fail(f"{value!r} is not of the form {self._form}: {error.message}", param, ctx)
 
-    return callback
+
+class Parsed(click.ParamType):  # type: ignore[type-arg]
+    """What a function makes of a text; the message of its ValueError says what is wrong."""
+
+    name = "text"
+
+    def __init__(self, function: Callable[[str], Any]) -> None:
+        self._function = function
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Read the text."""
+        try:
+            return self._function(value)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+def assignment(text: str) -> tuple[str, str]:
+    """Read a name and a value with an equals sign between them."""
+    name, _, value = (part.strip() for part in text.partition("="))
+    if not name or not value:
+        raise ValueError(f"{text!r} is not of the form NAME=VALUE")
+    return name, value
+
+
+def joined(
+    context: click.Context, option: click.Parameter, lists: tuple[tuple[Any, ...], ...]
+) -> tuple[Any, ...]:
+    """Callback of a repeated option of lists: join them, without repeated values."""
+    return tuple(dict.fromkeys(chain(*lists)))
 
 
 class ListCommand(click.Command):
@@ -79,26 +112,25 @@ class ListCommand(click.Command):
         """Repeat the options before click reads them."""
         options = [param for param in self.params if isinstance(param, click.Option)]
         names = {name for option in options if option.multiple for name in option.opts}
-        return super().parse_args(ctx, _spread(args, names))
+        return super().parse_args(ctx, _repeat_options(args, names))
 
 
-def _spread(args: Sequence[str], names: set[str]) -> list[str]:
-    """Arguments with an option before every number that follows one of the named options."""
-    spread: list[str] = []
+def _repeat_options(args: Sequence[str], names: set[str]) -> list[str]:
+    """Put the option before every further number that follows one of the named options."""
+    repeated: list[str] = []
     option, waits = "", False
     for place, argument in enumerate(args):
         if argument == "--":
-            return [*spread, *args[place:]]
+            return [*repeated, *args[place:]]
         if option and not waits and _is_number(argument):
-            spread += [option, argument]
+            repeated.append(option)
         elif waits:
-            spread.append(argument)
             waits = False
         else:
             name = argument.partition("=")[0]
             option, waits = (name, argument == name) if name in names else ("", False)
-            spread.append(argument)
-    return spread
+        repeated.append(argument)
+    return repeated
 
 
 def _is_number(text: str) -> bool:

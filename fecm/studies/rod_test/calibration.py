@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fecm._typing import Floats
+from fecm.studies import StudyError
 
 
 @dataclass(frozen=True)
@@ -62,15 +63,15 @@ def calibrate(
 
     Raises
     ------
-    ValueError
+    StudyError
         If there are fewer than three points, V_a or V_F is constant, or a sum overflows.
     """
     parameters = 1 if through_origin else 2
     if len(v_f) < 3:
-        raise ValueError(f"at least 3 points are required; there are {len(v_f)}")
+        raise StudyError(f"at least 3 points are required; there are {len(v_f)}")
     for name, values in (("V_a", v_a), ("V_F", v_f)):
         if float(np.ptp(values)) == 0.0:
-            raise ValueError(f"{name} is constant ({values[0]:g}): the slope is undefined")
+            raise StudyError(f"{name} is constant ({values[0]:g}): the slope is undefined")
     middle_a, middle_f = (0.0, 0.0) if through_origin else (v_a.mean(), v_f.mean())
     x, y = v_a - middle_a, v_f - middle_f
     with np.errstate(all="ignore"):
@@ -92,5 +93,5 @@ def calibrate(
         sensitivity_error=abs(factor) * slope_error,
     )
     if not np.isfinite(list(vars(found).values())).all():
-        raise ValueError("the sums overflow: check the numbers and their units")
+        raise StudyError("the sums overflow: check the numbers and their units")
     return found

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fecm._typing import Floats
+from fecm.studies import StudyError
 
 FIRST_ORDER, MOVING_AVERAGE = "first-order", "moving-average"
 KINDS = (FIRST_ORDER, MOVING_AVERAGE)
@@ -90,16 +91,16 @@ def filter_of(text: str) -> Filter:
 
     Raises
     ------
-    ValueError
+    StudyError
         If the kind is unknown, or the rise time is not a positive number.
     """
     kind, _, rise = text.partition(":")
     if kind not in KINDS:
-        raise ValueError(f"unknown filter {text}; use {USAGE}")
+        raise StudyError(f"unknown filter {text}; use {USAGE}")
     try:
         value = float(rise)
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value > 0.0):
-        raise ValueError(f"{text}: the rise time must be positive; use {USAGE}")
+        raise StudyError(f"{text}: the rise time must be positive; use {USAGE}")
     return Filter(kind, value)

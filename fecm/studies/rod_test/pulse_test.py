@@ -15,6 +15,7 @@ import numpy as np
 from fecm._typing import Floats
 from fecm.mechanics.projectile import Rod
 from fecm.mechanics.rod_integrators import STEPS, WILSON, RodState
+from fecm.studies import StudyError
 from fecm.studies.rod_test.pulses import Pulse
 
 MOST_STEPS = 2_000_000
@@ -103,15 +104,15 @@ def simulate_pulse(
 
     Raises
     ------
-    ValueError
+    StudyError
         If a station is not on the rod, the steps are more than two million, or the motion is not
         finite.
     """
     for x in stations:
         if not 0.0 <= x <= rod.length:
-            raise ValueError(f"the station {x:g} is not on the rod of length {rod.length:g}")
+            raise StudyError(f"the station {x:g} is not on the rod of length {rod.length:g}")
     if duration / dt > MOST_STEPS:
-        raise ValueError(
+        raise StudyError(
             f"{duration:g} in steps of {dt:g} is more than {MOST_STEPS:,} steps: increase the "
             "time step or reduce the duration"
         )
@@ -124,7 +125,7 @@ def simulate_pulse(
         except np.linalg.LinAlgError:
             rows = np.full((1, 1), np.nan)
     if not (np.isfinite(rows).all() and np.isfinite(applied).all()):
-        raise ValueError("the motion is not finite: check the numbers and their units")
+        raise StudyError("the motion is not finite: check the numbers and their units")
     count = len(stations)
     return RodHistory(time, applied, tuple(stations), rows[:, :count], rows[:, count:])
 

@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from fecm._typing import Floats
+from fecm.studies import StudyError
 from fecm.studies.tables import read_columns
 
 FORMS = {"gauss": ("F0", "TAU", "B"), "sine": ("F0", "B")}
@@ -120,7 +121,7 @@ def pulse_of(text: str) -> Pulse:
 
     Raises
     ------
-    ValueError
+    StudyError
         If the text has none of these forms, a width is not positive, or the table is invalid.
     OSError
         If the file cannot be read.
@@ -131,9 +132,9 @@ def pulse_of(text: str) -> Pulse:
     names = FORMS[kind]
     values = _numbers(rest)
     if len(values) != len(names):
-        raise ValueError(f"{text}: {kind} takes {len(names)} numbers, {kind}:{','.join(names)}")
+        raise StudyError(f"{text}: {kind} takes {len(names)} numbers, {kind}:{','.join(names)}")
     if not values[-1] > 0.0:
-        raise ValueError(f"{text}: the width B must be positive")
+        raise StudyError(f"{text}: the width B must be positive")
     return GaussPulse(*values) if kind == "gauss" else SinePulse(*values)
 
 
@@ -149,8 +150,8 @@ def _numbers(text: str) -> Sequence[float]:
 def _table(text: str) -> TablePulse:
     path = Path(text)
     if not path.is_file():
-        raise ValueError(f"{text} is neither a file nor a pulse; use {USAGE}")
+        raise StudyError(f"{text} is neither a file nor a pulse; use {USAGE}")
     columns = read_columns(path, ("time", "force"), increasing="time")
     if columns["time"][-1] <= 0.0:
-        raise ValueError(f"{path}: the pulse ends before time 0")
+        raise StudyError(f"{path}: the pulse ends before time 0")
     return TablePulse(columns["time"], columns["force"])

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg.lapack import dgejsv
 
 from fecm._typing import Floats
+from fecm.studies import StudyError
 from fecm.studies.waves.medium import BEYOND, Medium, best, gradients, in_normal_axes, shares
 
 # Names of the modes; flexural modes in ascending order of velocity.
@@ -58,12 +59,12 @@ def dispersion(medium: Medium, angle: float, wavelengths: ArrayLike) -> Dispersi
 
     Raises
     ------
-    ValueError
+    StudyError
         If a wavelength is outside 1e-9 to 1e9, or the laminate's constants are out of range.
     """
     ratio = np.atleast_1d(np.asarray(wavelengths, dtype=np.float64))
     if not np.all((ratio >= 1e-9) & (ratio <= 1e9)):
-        raise ValueError("wavelengths over thickness must lie between 1e-9 and 1e9")
+        raise StudyError("wavelengths over thickness must lie between 1e-9 and 1e9")
     k = 2.0 * np.pi / (ratio * medium.laminate.thickness)
     with np.errstate(all="ignore"):  # overflow raises an error below
         stiffness, inertia, back = _problem(medium, angle, k)
@@ -115,7 +116,7 @@ def graded_modes(stiffness: Floats, inertia: Floats) -> tuple[Floats, Floats]:
 
     Raises
     ------
-    ValueError
+    StudyError
         If a matrix is not positive definite or not finite.
     """
     of_k, of_m = (np.sqrt(np.diagonal(matrix, axis1=1, axis2=2)) for matrix in (stiffness, inertia))
@@ -127,7 +128,7 @@ def graded_modes(stiffness: Floats, inertia: Floats) -> tuple[Floats, Floats]:
         root = np.linalg.cholesky(turn @ stiffness @ back / _outer(of_k)).transpose(0, 2, 1)
         mass = np.linalg.cholesky(turn @ inertia @ back / _outer(of_m))
     except np.linalg.LinAlgError:
-        raise ValueError(BEYOND) from None
+        raise StudyError(BEYOND) from None
     inverse = np.linalg.inv(mass).transpose(0, 2, 1)
     rise = of_k / of_m
     # The singular values of this product are the frequencies.  Apart from the column factor `rise`
@@ -153,19 +154,19 @@ def _singular_values(matrices: Floats) -> tuple[Floats, Floats]:
 
     Raises
     ------
-    ValueError
+    StudyError
         If a number is not finite or not positive.
     """
     if not np.isfinite(matrices).all():
-        raise ValueError(BEYOND)
+        raise StudyError(BEYOND)
     values, vectors = np.empty(matrices.shape[:2]), np.empty(matrices.shape)
     for n, matrix in enumerate(matrices):
         scaled, _, vectors[n], scale, _, info = dgejsv(matrix, joba=0)
         if info:
-            raise ValueError(BEYOND)
+            raise StudyError(BEYOND)
         values[n] = scaled * (scale[0] / scale[1])
     if not np.all(np.isfinite(values) & (values > 0.0)):
-        raise ValueError(BEYOND)
+        raise StudyError(BEYOND)
     return values, vectors
 
 

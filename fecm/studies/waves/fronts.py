@@ -118,7 +118,7 @@ class WaveSurfaces:
 
     Raises
     ------
-    ValueError
+    StudyError
         If the velocities are out of the floating-point range.
     """
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fecm._typing import Floats
 from fecm.mechanics.laminate import Laminate
+from fecm.studies import StudyError
 
 BEYOND = "the laminate's constants are too large or too far apart to compute with"
 
@@ -28,7 +29,7 @@ class Medium:
 
     Raises
     ------
-    ValueError
+    StudyError
         If the stiffness or the inertia is not positive definite.
     """
 
@@ -40,10 +41,10 @@ class Medium:
             for matrix in (self.section, self.laminate.shear):
                 np.linalg.cholesky(_correlation(matrix))
         except np.linalg.LinAlgError:
-            raise ValueError("the laminate's stiffness is not positive definite") from None
+            raise StudyError("the laminate's stiffness is not positive definite") from None
         p, r, i = self.laminate.mass, self.coupling_inertia, self.laminate.rotary_inertia
         if not (p > 0.0 and i > 0.0 and abs(r) < (p * i) ** 0.5):
-            raise ValueError("the laminate's inertia is not positive definite")
+            raise StudyError("the laminate's inertia is not positive definite")
 
     @cached_property
     def section(self) -> Floats:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
+from fecm.studies import StudyError
 from fecm.studies.waves.medium import BEYOND, Medium, best, gradients, in_normal_axes, shares
 
 # Relative tolerance of equal squared velocities.
@@ -61,14 +62,14 @@ def sheets(medium: Medium, normal: Floats) -> Sheets:
 
     Raises
     ------
-    ValueError
+    StudyError
         If the velocities are out of the floating-point range.
     """
     with np.errstate(all="ignore"):
         root = np.linalg.inv(np.linalg.cholesky(medium.inertia))
         operators = [root @ matrix @ root.T for matrix in _stiffness(medium, normal)]
         if not np.isfinite(operators).all():
-            raise ValueError(BEYOND)
+            raise StudyError(BEYOND)
         square, basis = _solved(*operators)
         first, second = (basis.transpose(0, 2, 1) @ matrix @ basis for matrix in operators[1:])
         gap = square[:, :, None] - square[:, None, :]
@@ -79,7 +80,7 @@ def sheets(medium: Medium, normal: Floats) -> Sheets:
         slope = np.diagonal(first, axis1=1, axis2=2) / (2.0 * velocity)
         curvature = (bend / 2.0 - slope**2) / velocity
         if not np.isfinite(curvature).all():
-            raise ValueError(BEYOND)
+            raise StudyError(BEYOND)
     share = shares(medium.inertia, root.T @ basis)
     return Sheets(normal, velocity, slope, curvature, basis, share)
 
