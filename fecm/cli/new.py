@@ -49,7 +49,8 @@ def _edge(text: str) -> tuple[str, str]:
     edge, kind = assignment(text)
     if edge not in EDGES or kind not in SUPPORTS:
         raise ValueError(
-            f"{text!r} is not one of {', '.join(EDGES)}, =, and one of {', '.join(SUPPORTS)}"
+            f"{text!r} is not EDGE=SUPPORT with an edge of {', '.join(EDGES)} and a support of "
+            f"{', '.join(SUPPORTS)}"
         )
     return edge, kind
 
