@@ -14,10 +14,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fecm._typing import Floats
-from fecm.mechanics.contact_law import ContactPoint, Law, LoadingHistory, Number
+from fecm.mechanics.contact_law import ContactPoint, Law, LoadingHistory, Number, Truth
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import DivergenceError, PlateMotion, PlateState, PointForce
 from fecm.mechanics.projectile import Projectile, rigid_approach
@@ -221,62 +219,22 @@ def couple_step(step: TipStep, law: Law, state: ContactState, w: Number) -> None
     last = state.contact
     motion, base, drift, acceleration = step.begin(state.rod)
     carried = (1.0 - step.theta) * last.force
-    iterate = _iterate_cases if isinstance(w, np.ndarray) else _iterate
-    guess = drift + step.weight * acceleration
-    force, state.memory, converged = iterate(step, law, state, w, guess, base, drift, carried)
-    state.unconverged_steps += 1 - converged
+    memory, tip = state.memory, drift + step.weight * acceleration
+    force: Number = last.force
+    # The force of a case is kept once its iteration has converged.
+    many = isinstance(w, np.ndarray)
+    iterating: Truth = np.ones(len(w), dtype=bool) if many else True
+    for _ in range(PASSES):
+        trial, memory = law.trial(memory, last, -tip - w)
+        force = np.where(iterating, trial, force) if many else trial
+        before, tip = tip, drift + step.weight * (base + step.gain * (carried + step.theta * force))
+        iterating = iterating & ((abs(tip - before) < TOLERANCE * abs(tip)) ^ True)
+        if not (iterating.any() if many else iterating):
+            break
+    state.unconverged_steps += iterating
     state.rod = step.end(state.rod, motion, carried + step.theta * force)
     indentation = -state.rod.tip - w
-    state.memory = law.accept(state.memory, last, indentation)
+    state.memory = law.accept(memory, last, indentation)
     state.contact = ContactPoint(indentation, force)
     state.plate_w = w
     state.contact_work += (last.force + force) / 2.0 * (indentation - last.indentation)
-
-
-def _iterate(
-    step: TipStep,
-    law: Law,
-    state: ContactState,
-    w: float,
-    tip: float,
-    base: float,
-    drift: float,
-    carried: float,
-) -> tuple[float, LoadingHistory, bool]:
-    """Contact force of one case, the history after its trials, and whether it converged."""
-    memory, last = state.memory, state.contact
-    theta, gain, weight = step.theta, step.gain, step.weight
-    force = last.force
-    for _ in range(PASSES):
-        before = tip
-        force, memory = law.trial(memory, last, -before - w)
-        tip = drift + weight * (base + gain * (carried + theta * force))
-        if abs(tip - before) < TOLERANCE * abs(tip):
-            return force, memory, True
-    return force, memory, False
-
-
-def _iterate_cases(
-    step: TipStep,
-    law: Law,
-    state: ContactState,
-    w: Floats,
-    tip: Floats,
-    base: Floats,
-    drift: Floats,
-    carried: Floats,
-) -> tuple[Floats, LoadingHistory, NDArray[np.int_]]:
-    """:func:`_iterate` for many cases; the force of a case is kept once it has converged."""
-    last, memory = state.contact, state.memory
-    force: Floats = last.force
-    open_cases = np.ones(len(w), dtype=bool)
-    for _ in range(PASSES):
-        before = tip
-        trial, memory = law.trial(memory, last, -before - w)
-        force = np.asarray(np.where(open_cases, trial, force))
-        moved = drift + step.weight * (base + step.gain * (carried + step.theta * force))
-        open_cases &= ~(np.abs(moved - before) < TOLERANCE * np.abs(moved))
-        tip = moved
-        if not open_cases.any():
-            break
-    return force, memory, np.where(open_cases, 0, 1)
