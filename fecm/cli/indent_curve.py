@@ -14,7 +14,7 @@ import numpy as np
 from fecm.cli.common import DECK_PATH, RefusedError, echo, note
 from fecm.cli.outputs import OUTPUT, OVERWRITE, PLOT, OutputPaths
 from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, ListOf
-from fecm.deck.catalogue import ALPHA_CR, ALPHA_P, S_P, SYSTEM, SYSTEMS, lengths
+from fecm.deck.catalogue import ALPHA_CR, ALPHA_P, S_P, SYSTEM, SYSTEMS, convert
 from fecm.deck.model import Deck, Indentation
 from fecm.deck.reader import Reader, load_text
 from fecm.deck.units import unit_names
@@ -157,13 +157,13 @@ def _rigidities(
 def _report_length(deck: Deck, value: float, name: str, option: str) -> float:
     """Convert a length of the report to the deck's unit, by default inches, and note it."""
     unit = unit_names(deck).get("length", "in")
-    system = {names[0]: key for key, (names, _) in SYSTEMS.items()}.get(unit)
+    system = {names["length"]: key for key, names in SYSTEMS.items()}.get(unit)
     if system is None:
         raise RefusedError(
             f"the report's {name} is in inches and the deck's in {unit}: give {option}"
         )
     note(f"{name} is the report's {value:g} in; {option} replaces it")
-    return value * (1.0 if system == SYSTEM else lengths(system))
+    return convert(value, "length", SYSTEM, system)
 
 
 def _alpha_cr(deck: Deck, own: ContactParameters) -> float:

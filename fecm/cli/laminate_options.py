@@ -70,5 +70,4 @@ def laminate_of_options(
     check_material(segment, findings)
     if findings.errors:
         raise click.UsageError(findings.errors[0].message)
-    names = () if units is None else SYSTEMS[units][0]
-    return laminate_of(segment), dict(zip(("length", "force", "time"), names, strict=False))
+    return laminate_of(segment), {} if units is None else SYSTEMS[units]

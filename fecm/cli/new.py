@@ -20,7 +20,7 @@ from fecm.deck.format import format_deck
 from fecm.deck.grid import Grid, Section, graded, listed, uniform
 from fecm.deck.model import Deck, Indentation, Projectile, Units
 from fecm.deck.records import RodDiameter
-from fecm.problem.new import EDGES, SUPPORTS, Specification, new_deck
+from fecm.problem.new import EDGES, SUPPORTS, new_deck
 
 # Most elements in one direction, and in all.
 MOST, MOST_ELEMENTS = 2000, 500_000
@@ -161,7 +161,7 @@ def deck_of_options(
             f"give --projectile mass:M or rod:{PROJECTILES['rod']}: without it the projectile is "
             f"the report's steel rod, whose numbers are in {SYSTEM}"
         )
-    spec = Specification(
+    deck = new_deck(
         title=title,
         grid=grid,
         angles=layup,
@@ -175,7 +175,7 @@ def deck_of_options(
         duration=duration,
         dt=dt,
         every=every,
-        units=None if units is None else Units(*SYSTEMS[units][0]),
+        units=None if units is None else Units(*SYSTEMS[units].values()),
     )
     node, node_x, node_y = grid.nearest(x, y)
     distance = math.hypot(node_x - x, node_y - y)
@@ -186,7 +186,7 @@ def deck_of_options(
             f"the impact point is moved by {distance:.4g}: from {asked} at {x:g}, {y:g} to the "
             f"nearest node, {node} at {node_x:g}, {node_y:g}"
         )
-    return new_deck(spec), moved
+    return deck, moved
 
 
 def _grid(

@@ -8,15 +8,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from fecm.deck.model import Indentation
+from fecm.deck.model import Indentation, Units
 from fecm.deck.records import Ply
+from fecm.deck.units import DENSITY, MODULUS, in_si
 
-# Systems of units: names of length, force and time, and one of each in m, N and s.
+# Systems of units: names of length, force and time.
 SYSTEMS = {
-    "in-lbf-s": (("in", "lbf", "s"), (0.0254, 4.4482216152605, 1.0)),
-    "m-N-s": (("m", "N", "s"), (1.0, 1.0, 1.0)),
-    "mm-N-s": (("mm", "N", "s"), (1e-3, 1.0, 1.0)),
+    name: dict(zip(Units.NAMES, name.split("-"), strict=True))
+    for name in ("in-lbf-s", "m-N-s", "mm-N-s")
 }
+
+
+def convert(value: float, dimension: str, system: str, other: str) -> float:
+    """A value in another system of units, with as many digits as the field of a card has."""
+    before, after = in_si(dimension, SYSTEMS[system]), in_si(dimension, SYSTEMS[other])
+    if before is None or after is None:
+        raise LookupError(f"no unit of {dimension}")
+    return value if system == other else float(f"{value * (before / after):.6g}")
+
 
 NU23 = 0.4
 
@@ -46,21 +55,12 @@ class NamedPly:
 
     def converted(self, system: str) -> Ply:
         """Constants in another system of units; unchanged in their own."""
-        if system == self.system:
-            return self.ply
-        (_, (l0, f0, t0)), (_, (l1, f1, t1)) = SYSTEMS[self.system], SYSTEMS[system]
-        modulus = (f0 / f1) * (l1 / l0) ** 2
-        # Density is force time^2/length^4.
-        density = (f0 / f1) * (t0 / t1) ** 2 * (l1 / l0) ** 4
         ply = self.ply
-
-        def short(value: float) -> float:
-            return float(f"{value:.6g}")  # as many digits as a card's field has
-
+        moduli = (ply.e1, ply.e2, ply.g12, ply.g13, ply.g23)
         return Ply(
-            short(ply.density * density),
+            convert(ply.density, DENSITY, self.system, system),
             ply.nu12,
-            *(short(value * modulus) for value in (ply.e1, ply.e2, ply.g12, ply.g13, ply.g23)),
+            *(convert(value, MODULUS, self.system, system) for value in moduli),
         )
 
 
@@ -101,11 +101,7 @@ ALPHA_P, S_P, ALPHA_CR = 6.564e-4, 0.094, 3.16e-3
 
 # System of units of the report.
 SYSTEM = "in-lbf-s"
-
-
-def lengths(system: str) -> float:
-    """How many of a system's units of length an inch is."""
-    return SYSTEMS[SYSTEM][1][0] / SYSTEMS[system][1][0]
+COEFFICIENT = "force/length^1.5"
 
 
 @dataclass(frozen=True)
@@ -127,14 +123,10 @@ class NamedContact:
 
     def converted(self, system: str) -> Indentation:
         """Constants in a system of units, a key of :data:`~fecm.deck.catalogue.SYSTEMS`."""
-        if system == SYSTEM:
-            return self.law
-        force = SYSTEMS[SYSTEM][1][1] / SYSTEMS[system][1][1]
-        length = lengths(system)
         return replace(
             self.law,
-            k=float(f"{self.law.k * force / length**1.5:.6g}"),
-            alpha_p=float(f"{self.law.alpha_p * length:.6g}"),
+            k=convert(self.law.k, COEFFICIENT, SYSTEM, system),
+            alpha_p=convert(self.law.alpha_p, "length", SYSTEM, system),
         )
 
 

@@ -19,6 +19,8 @@ KNOWN = {
     "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6},
 }  # fmt: skip
 MASS = "force*time^2/length"
+MODULUS = "force/length^2"
+DENSITY = "force*time^2/length^4"
 
 
 def unit_names(deck: Deck) -> dict[str, str]:

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from fecm import _memory
 from fecm.deck.macros import every, flat
-from fecm.deck.model import Material, Projectile
+from fecm.deck.model import Projectile
 from fecm.mechanics import element_matrices
 from fecm.mechanics.element_groups import congruence
-from fecm.mechanics.elements.quadrature import HIGHEST_ORDER
 from fecm.mechanics.natural_modes import DENSE
 from fecm.mechanics.plate import ASSEMBLED, BLOCK, PlateModel
 from fecm.mechanics.projectile import REPORT_ELEMENTS
@@ -59,14 +60,17 @@ def needed_bytes(
         Count congruent elements once, instead of taking all elements as different.
     """
     words = {macro.word for macro in flat(checked.program)}
-    output, model = checked.output_bytes, checked.plate
-    total = NODE * checked.deck.control.numnp + _strains(checked)
+    output, model, control = checked.output_bytes, checked.plate, checked.deck.control
+    bending, _, strains = checked.rules
+    total = NODE * control.numnp + POINT * control.numel * max(len(strains.xi), len(bending.xi))
     if solver == CSR or words & STATIC:
         total += ASSEMBLED * model.entries
     if solver != CSR:
         total += _product(model, exact=exact)
     total += _factors(model, words) + _modes(checked)
-    total += 8 * 6 * (2 * _rod_elements(checked) + 2) ** 2
+    card = checked.deck.last(Projectile)
+    rod_elements = REPORT_ELEMENTS if card is None else card.elements
+    total += 8 * 6 * (2 * rod_elements + 2) ** 2
     if in_memory:
         return total + output
     held = output if "CONV" in words else 0  # rows that never came are cut off in memory
@@ -89,12 +93,6 @@ def check_memory(checked: Problem, *, solver: str = AUTO, in_memory: bool = Fals
     )
 
 
-def _strains(checked: Problem) -> int:
-    card = checked.deck.require(Material).integration
-    points = len(checked.rules[2].xi)
-    return POINT * checked.deck.control.numel * max(points, min(card.bending, HIGHEST_ORDER) ** 2)
-
-
 def _product(model: PlateModel, *, exact: bool) -> int:
     """Element matrices of the product K u, and the vectors that it gathers and sums."""
     points = max(len(rule.xi) for rule in (model.rules.bending, model.rules.shear))
@@ -103,12 +101,9 @@ def _product(model: PlateModel, *, exact: bool) -> int:
         count, n = len(family.rows), element_matrices.NDOF * family.nodes.shape[1]
         alone, shared = count, 0
         if exact:
-            same = congruence(family)
-            sizes = [0] * len(same.representatives)
-            for group in same.group.tolist():
-                sizes[group] += 1
-            shared = sum(size >= WORTH_GROUPING for size in sizes)
-            alone = sum(size for size in sizes if size < WORTH_GROUPING)
+            sizes = np.bincount(congruence(family).group)
+            shared = int((sizes >= WORTH_GROUPING).sum())
+            alone = int(sizes[sizes < WORTH_GROUPING].sum())
         at_once = max(shared, min(alone, BLOCK))
         total += (alone + shared) * n * n * KEPT + count * n * PLACE
         total += at_once * points * ROWS * n * INTEGRATED
@@ -127,13 +122,7 @@ def _factors(model: PlateModel, words: set[str]) -> int:
 def _modes(checked: Problem) -> int:
     """Matrices of EIGE, dense where it looks for many modes."""
     n = checked.mesh.number_of_equations
-    counts = [min(n, every(m)) for m in flat(checked.program) if m.word == "EIGE"]
-    if not counts:
+    most = max((min(n, every(m)) for m in flat(checked.program) if m.word == "EIGE"), default=0)
+    if not most:
         return 0
-    most = max(counts)
     return 8 * n * (5 * n if n < DENSE or most >= n // 2 else 6 * most + 60)
-
-
-def _rod_elements(checked: Problem) -> int:
-    card = checked.deck.last(Projectile)
-    return REPORT_ELEMENTS if card is None else card.elements
