@@ -11,8 +11,7 @@ from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, load_text
 from fecm.mechanics.rod_integrators import LUMPED, WILSON, RodMethod
 from fecm.mechanics.stiffness_product import AUTO
-from fecm.problem.check_listing import check_listing
-from fecm.problem.check_mesh import HOURGLASS
+from fecm.problem.check_mesh import HOURGLASS, check_listing
 from fecm.problem.check_program import UNSTABLE
 from fecm.problem.memory import check_memory
 from fecm.problem.options import ENERGY_LIMIT, RunOptions

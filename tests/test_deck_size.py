@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import h5py
 import pytest
@@ -13,11 +14,10 @@ from fecm._memory import NotEnoughMemoryError
 from fecm.api import load_deck
 from fecm.deck import Finding, reader, segments
 from fecm.deck.card import Card, parse_integer
-from fecm.deck.findings import MOST, Findings
+from fecm.deck.findings import MOST, Findings, Place
 from fecm.deck.layup import LayupError, parse_layup
 from fecm.deck.macros import estimate_work
 from fecm.deck.reader import MOST_PROBLEMS, load_text
-from fecm.mechanics.mesh import Ints
 from fecm.problem import check_impact, generate
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, MESH, OWN_FINDINGS, PROGRAM, small
@@ -149,15 +149,15 @@ def test_blank_lines_between_segments_make_no_cards(monkeypatch: pytest.MonkeyPa
 def test_cards_that_generate_the_same_nodes_again_and_again_are_refused(
     keyword: str, pair: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run, nodes = generate._run, 0
+    covers, nodes = generate._Budget.covers, 0
 
-    def counted(start: int, end: int, increment: int) -> Ints:
+    def counted(budget: Any, count: int, place: Place | None) -> bool:
         nonlocal nodes
-        numbers = run(start, end, increment)
-        nodes += len(numbers)
-        return numbers
+        covered = covers(budget, count, place)
+        nodes += count * covered
+        return covered
 
-    monkeypatch.setattr(generate, "_run", counted)
+    monkeypatch.setattr(generate._Budget, "covers", counted)
     text = f"FECM\n9000,1,1,2,5,3\n{keyword}\n{pair * 500}\nEND\nMACR\nEND\nSTOP\n"
     assert "E012" in codes(text)
     assert 5 * 9000 < nodes <= 10 * 9000 + 10_000

@@ -163,9 +163,8 @@ class ImpactModel:
     gages: GageArray | None
 
 
-@dataclass(frozen=True)
 class ProgramRules:
-    """How macros behave; the slips that concern them are parameters here.
+    """Behaviour of the macros with the slips that are on.
 
     Attributes
     ----------
@@ -187,28 +186,15 @@ class ProgramRules:
         The energy balance can end the run; not with any slip.
     """
 
-    forces_scale_with_contact: bool = False
-    prop_replaces_contact: bool = False
-    prop_at_zero: bool = False
-    clock_stands: bool = False
-    counts_since_output: bool = False
-    listing_tapes: bool = False
-    check_ends: bool = False
-    enforces_energy_limit: bool = True
-
-
-def program_rules(slips: frozenset[str]) -> ProgramRules:
-    """Return how macros behave with the slips that are on."""
-    return ProgramRules(
-        forces_scale_with_contact="force-scale" in slips,
-        prop_replaces_contact="prop-contact" in slips,
-        prop_at_zero="prop" in slips,
-        clock_stands="time" in slips,
-        counts_since_output="counter" in slips,
-        listing_tapes="tapes" in slips,
-        check_ends="check-end" in slips,
-        enforces_energy_limit=not slips,
-    )
+    def __init__(self, slips: frozenset[str]) -> None:
+        self.forces_scale_with_contact = "force-scale" in slips
+        self.prop_replaces_contact = "prop-contact" in slips
+        self.prop_at_zero = "prop" in slips
+        self.clock_stands = "time" in slips
+        self.counts_since_output = "counter" in slips
+        self.listing_tapes = "tapes" in slips
+        self.check_ends = "check-end" in slips
+        self.enforces_energy_limit = not slips
 
 
 def rules(material: Material) -> tuple[Quadrature, Quadrature, Quadrature]:
@@ -272,14 +258,6 @@ def build_station(deck: Deck, projectile: Projectile, slips: frozenset[str]) -> 
     card = deck.last(ProjectileCard)
     middle = projectile.elements // 2 + (2 if "station" in slips else 1)
     return Transducer(middle if card is None or not card.transducer else card.transducer, sign)
-
-
-def build_gages(deck: Deck, mesh: Mesh, plate: PlateModel) -> GageArray | None:
-    """Build the strain gages of a deck; None without a GAGE segment."""
-    segment = deck.last(GageCards)
-    if segment is None:
-        return None
-    return gages(mesh, segment.records, transposed_jacobian=plate.rules.transposed_jacobian)
 
 
 def build_law(deck: Deck, slips: frozenset[str] = frozenset()) -> Law:
@@ -346,6 +324,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     impact = None
     if problem.has_impact:
         impact = build_impact(deck, motion, rod, slips, method.integrator, share)
+    cards, transposed = deck.last(GageCards), plate.rules.transposed_jacobian
     return ImpactModel(
         plate=plate,
         motion=motion,
@@ -353,7 +332,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         station=build_station(deck, rod, slips),
         strains=plate.strain_field(plate.rules.strains),
         stress_points=plate.strain_field(problem.rules[2]),
-        gages=build_gages(deck, mesh, plate),
+        gages=None if cards is None else gages(mesh, cards.records, transposed_jacobian=transposed),
     )
 
 

@@ -25,6 +25,10 @@ SHOWN = 4
 # Runs of numbers that are written out.
 RUNS = 8
 
+# Layers that the listing's arrays hold (CNPD: QBR(3,3,25), TH(25)).
+LISTING_LAYERS = 25
+ANOTHER_MODE = "run the deck in report mode"
+
 
 def ranges(numbers: Sequence[int] | NDArray[np.int_]) -> str:
     """Write ascending numbers shortly: ``3, 7-9, 12``."""
@@ -372,3 +376,32 @@ def _orders_without_motions(family: element_groups.ElementBlock) -> tuple[str, i
     if family.present[4:].any():
         return "elements with mid-sides", 2, 2
     return FOUR_NODES, 2, 1
+
+
+def check_listing(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+    """Refuse meshes of several kinds of elements, and more layers than the listing's arrays hold.
+
+    The listing's LMAS takes element 1's node list for all elements (MASS01 hands IX, not IX(1,N),
+    to SHAPE), so that an element that lacks other nodes gets wrong masses or none.
+    """
+    present = mesh.elements != 0
+    other = np.flatnonzero((present != present[:1]).any(axis=1))
+    if len(other):
+        number = int(other[0]) + 1
+        findings.add(
+            "E601",
+            f"Element {number} has other nodes than element 1 ({present[number - 1].sum()} against "
+            f"{present[0].sum()}): the printed program takes element 1's node list for the mass of "
+            "every element.",
+            place_of_element(deck, number),
+            ANOTHER_MODE,
+        )
+    material = deck.require(Material)
+    if len(material.layers) > LISTING_LAYERS:
+        findings.add(
+            "E602",
+            f"{len(material.layers)} layers are more than the {LISTING_LAYERS} that the printed "
+            "program has room for.",
+            material.layers[LISTING_LAYERS].place("layer"),
+            ANOTHER_MODE,
+        )

@@ -1,8 +1,9 @@
-"""From the cards of a deck to its mesh: the generation of nodes, elements, restraints and loads."""
+"""Generate nodes, elements, restraints and loads of the mesh from a deck's cards."""
 
 from __future__ import annotations
 
 import bisect
+import operator
 from collections.abc import Sequence
 from typing import TypeVar
 
@@ -137,7 +138,7 @@ def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floa
         elif known and record.element <= known[-1].node:
             noted.add(
                 "E421",
-                f"Rod element {record.element} stands after element {known[-1].node}; elements "
+                f"Rod element {record.element} follows element {known[-1].node}; elements "
                 "must ascend.",
                 record.place("element"),
             )
@@ -154,10 +155,7 @@ def _existing(
     records: Sequence[_R], what: str, count: int, code: str, findings: Findings
 ) -> list[_R]:
     """Records whose node or element exists; the others are reported together."""
-
-    def number(record: _R) -> int:
-        return record.element if isinstance(record, ElementNodes) else record.node
-
+    number = operator.attrgetter(what)
     outside = [record for record in records if not 1 <= number(record) <= count]
     if outside:
         more = f" (and {len(outside) - 1} more)" if len(outside) > 1 else ""
@@ -170,15 +168,10 @@ def _existing(
     return [record for record in records if 1 <= number(record) <= count]
 
 
-def _steps(first: NodeValues | NodeCodes, last: NodeValues | NodeCodes) -> int:
-    """Number of nodes from one card up to the next."""
-    return -(-abs(last.node - first.node) // abs(first.increment))
-
-
-def _run(start: int, end: int, increment: int) -> Ints:
-    """Node numbers from `start` towards `end`, `end` left out, at steps of `increment`."""
-    step = abs(increment) if end >= start else -abs(increment)
-    return np.arange(start, end, step, dtype=np.int32)
+def _rows(first: NodeValues | NodeCodes, last: NodeValues | NodeCodes) -> range:
+    """Rows of the nodes from one card up to the next, without that of the next."""
+    step = abs(first.increment) if last.node >= first.node else -abs(first.increment)
+    return range(first.node - 1, last.node - 1, step)
 
 
 def _interpolate(
@@ -194,18 +187,17 @@ def _interpolate(
                     "E302",
                     f"Node {record.node} follows itself, so that nothing can be generated.",
                     record.place("node"),
-                    "a generation increment stands on the card before",
+                    "the card before has a generation increment",
                 )
-            elif not budget.covers(_steps(last, record), record.place("node")):
+            run = _rows(last, record)
+            if not budget.covers(len(run), record.place("node")):
                 return
-            else:
-                run = _run(last.node, record.node, last.increment) - 1
-                if len(run) > 1:
-                    ends = values[record.node - 1] - values[last.node - 1]
-                    steps = np.tile(ends / len(run), (len(run), 1))
-                    steps[0] = values[last.node - 1]
-                    # Summed one by one, so that each node has the listing's own rounding.
-                    values[run[1:]] = np.add.accumulate(steps, axis=0)[1:]
+            if len(run) > 1:
+                ends = values[record.node - 1] - values[last.node - 1]
+                steps = np.tile(ends / len(run), (len(run), 1))
+                steps[0] = values[last.node - 1]
+                # Summed one by one, so that each node has the listing's rounding.
+                values[run[1:]] = np.add.accumulate(steps, axis=0)[1:]
         last = record
 
 
@@ -218,12 +210,13 @@ def _carry(codes: Ints, records: Sequence[NodeCodes], findings: Findings, budget
         if last is not None:
             before = codes[last.node - 1]
             row[(row == 0) & (before < 0)] = -1
-            if last.increment != 0 and record.node != last.node:
-                if not budget.covers(_steps(last, record), record.place("node")):
+            if last.increment != 0:
+                run = _rows(last, record)
+                if not budget.covers(len(run), record.place("node")):
                     return
-                run = _run(last.node, record.node, last.increment) - 1
-                carried = np.logical_or.accumulate(codes[run] < 0, axis=0)[:-1]
-                codes[run[1:]] = np.where(carried, -1, codes[run[1:]])
+                if len(run) > 1:
+                    carried = np.logical_or.accumulate(codes[run] < 0, axis=0)[:-1]
+                    codes[run[1:]] = np.where(carried, -1, codes[run[1:]])
         last = record
 
 
@@ -237,7 +230,7 @@ def _step(elements: Ints, records: Sequence[ElementNodes], findings: Findings) -
         if number <= previous:
             findings.add(
                 "E304",
-                f"Element {number} stands after element {previous}; elements must ascend.",
+                f"Element {number} follows element {previous}; elements must ascend.",
                 record.place("element"),
             )
             continue

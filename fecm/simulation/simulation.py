@@ -12,7 +12,7 @@ import numpy as np
 from fecm._typing import Floats
 from fecm.deck.records import load_factor
 from fecm.mechanics.statics import Tangent
-from fecm.problem.build import ImpactModel, ProgramRules, build_model, program_rules
+from fecm.problem.build import ImpactModel, ProgramRules, build_model
 from fecm.problem.options import RunOptions
 from fecm.problem.problem import Problem
 from fecm.results.sinks import Sink
@@ -69,7 +69,7 @@ class Simulation:
 
     def __post_init__(self) -> None:
         problem, options = self.problem, self.options
-        self.rules = program_rules(options.slips)
+        self.rules = ProgramRules(options.slips)
         with np.errstate(all="ignore"):
             self.model = build_model(problem, options)
         self.state = state = RunState(self.model.motion.start())
