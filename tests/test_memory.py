@@ -173,7 +173,7 @@ def test_many_small_problems_with_large_counts_are_refused() -> None:
     told = [f.message for f in prepared.findings if "together" in f.message]
     assert len(told) == 49
     assert told[0] == (
-        "The file's problems have together NUMNP 1800000; it may be 1000000 at the most."
+        "The file's problems have together NUMNP 1800000; at most 1000000 is allowed."
     )
 
 

@@ -18,6 +18,8 @@ from itertools import pairwise
 
 from fecm.deck.findings import Findings, Place
 
+JUSTIFY = "right-justify each number in its own columns"
+
 # Characters of the longest number that is read.
 LONGEST = 100
 
@@ -73,7 +75,7 @@ def format_real(value: float, width: int) -> str | None:
     """
     for letter in ("E", "") if width >= _LETTERLESS else ("E",):
         forms = list(_forms(value, letter))
-        for room in (width - 1, width):  # a blank between two numbers where it can be had
+        for room in (width - 1, width):  # with a blank between two numbers if it fits
             for text in forms:
                 if len(text) <= room:
                     return text
@@ -82,11 +84,9 @@ def format_real(value: float, width: int) -> str | None:
 
 def _forms(value: float, letter: str) -> Iterator[str]:
     """Forms of a number, the most readable first, with `letter` before an exponent."""
-    if not math.isfinite(value):
-        raise ValueError(f"{value} can't be written on a card")
     number = Decimal(repr(value)).normalize()
     sign, numerals, exponent = number.as_tuple()
-    if not isinstance(exponent, int):  # never for a finite number
+    if not isinstance(exponent, int):  # infinite or no number
         raise ValueError(f"{value} can't be written on a card")
     if value == 0.0:
         exponent = 0
@@ -259,7 +259,7 @@ def read_values(
         column = card.data.index("\t") + 1
         findings.add(
             "E103",
-            "A tab stands on the card, so its columns can't be told.",
+            "The card has a tab, so its columns are ambiguous.",
             Place(card.line, column, column, card.text),
             "write blanks instead of tabs",
         )
@@ -288,56 +288,49 @@ def _is_aligned(card: Card, fields: Fields, findings: Findings, *, cut_is_meant:
     report's machine did.
     """
     data = card.data
+
+    def refuse(code: str, message: str, run: tuple[int, int], width: int, hint: str) -> bool:
+        first, last = run
+        touched = [f for f in fields if f.first <= last and f.last >= first]
+        names = ", ".join(f"cols {f.first}-{f.last}: {f.name}" for f in touched)
+        place = Place(card.line, first, last, card.text, names)
+        findings.add(code, message, place, _remedy(card, fields, last - first + 1, width) or hint)
+        return False
+
     for field, following in pairwise(fields):
         gap = data[field.last : following.first - 1]
-        column = field.last + 1 + len(gap) - len(gap.lstrip())
-        first, last = _run_around(data, column) if gap.strip() else (0, 0)
-        if first and not data[first - 1 : last].isalpha():  # a word may have more than four letters
+        if gap.strip():
+            column = field.last + 1 + len(gap) - len(gap.lstrip())
+            first, last = _run_around(data, column)
+            if data[first - 1 : last].isalpha():  # a word may have more than four letters
+                continue
             target = next(f for f in fields if f.first > column and f.kind != "A")
-            findings.add(
-                "E108",
-                f"Column {column} belongs to no field; it has `{data[column - 1]}`.",
-                Place(card.line, first, last, card.text),
-                _remedy(card, fields, last - first + 1, target.width)
-                or f"cols {target.first}-{target.last} are the next field: {target.name}",
-            )
-            return False
-        if cut_is_meant or following.kind == "A" or following.first != field.last + 1:
-            continue
-        if data[field.last - 1 : following.first].count(" ") or len(data) < following.first:
+            message = f"Column {column} belongs to no field; it has `{data[column - 1]}`."
+            hint = f"cols {target.first}-{target.last} are the next field: {target.name}"
+            return refuse("E108", message, (first, last), target.width, hint)
+        if gap or cut_is_meant or following.kind == "A" or not _is_joined(data, field.last):
             continue
         first, last = _run_around(data, field.last)
         if last < following.last:
-            findings.add(
-                "E105",
-                f"The number `{data[first - 1 : last]}` straddles two fields.",
-                Place(card.line, first, last, card.text, _neighbours(fields, first, last)),
-                _remedy(card, fields, last - first + 1, max(field.width, following.width))
-                or "right-justify each number in its own columns",
-            )
-            return False
-    return cut_is_meant or _is_whole(card, fields[-1], fields, findings)
-
-
-def _is_whole(card: Card, field: Field, fields: Fields, findings: Findings) -> bool:
-    """Whether the number in the last field means the same without what crosses the field's end."""
-    data = card.data
-    if data[field.last - 1 : field.last + 1].count(" ") or len(data) <= field.last:
+            message = f"The number `{data[first - 1 : last]}` straddles two fields."
+            width = max(field.width, following.width)
+            return refuse("E105", message, (first, last), width, JUSTIFY)
+    field = fields[-1]
+    if cut_is_meant or not _is_joined(data, field.last):
         return True
     first, last = _run_around(data, field.last)
     first = max(first, field.first)
     if last - first < LONGEST:
-        whole = parse_real(data[first - 1 : last])
-        if whole is None or whole == parse_real(data[first - 1 : field.last]):
+        value = parse_real(data[first - 1 : last])
+        if value is None or value == parse_real(data[first - 1 : field.last]):
             return True
-    findings.add(
-        "E105",
-        f"The number `{data[first - 1 : last]}` crosses the end of its field.",
-        Place(card.line, first, last, card.text, _neighbours(fields, first, last)),
-        _remedy(card, fields, last - first + 1, field.width)
-        or "right-justify each number in its own columns",
-    )
-    return False
+    message = f"The number `{data[first - 1 : last]}` crosses the end of its field."
+    return refuse("E105", message, (first, last), field.width, JUSTIFY)
+
+
+def _is_joined(data: str, column: int) -> bool:
+    """Whether no blank separates a column from the next."""
+    return len(data) > column and " " not in data[column - 1 : column + 1]
 
 
 def _run_around(data: str, column: int) -> tuple[int, int]:
@@ -442,7 +435,7 @@ def _why(field: Field, text: str) -> str:
     if field.kind == "I" and parse_real(text) is not None:
         return "this field takes no decimal point"
     if re.search("[A-Za-z]", text):
-        return "a letter stands where a digit belongs"
+        return "it has a letter in place of a digit"
     return ""
 
 
@@ -451,23 +444,17 @@ def _refuse_blank(
 ) -> None:
     """Report a blank that would change a value, with the card as it was meant."""
     was = "no number" if padded is None else f"{padded:g}"
-    where = "inside" if " " in text.strip() else "behind"
+    where = "inside" if " " in text.strip() else "after"
     line = source.card.data.ljust(field.last)
     justified = text.replace(" ", "").rjust(field.width)
     meant = (line[: field.first - 1] + justified + line[field.last :]).rstrip()
     findings.add(
         "E104",
-        f"A blank stands {where} the number `{text.strip()}`; on the report's machine it was a "
-        f"zero and the value {was}.",
+        f"There is a blank {where} the number `{text.strip()}`; the report's machine read it as a "
+        f"zero and the value as {was}.",
         source.place(field.name),
-        "take the blank out" if "," in line else f"right-justified, the card is `{meant}`",
+        "remove the blank" if "," in line else f"right-justified, the card is `{meant}`",
     )
-
-
-def _neighbours(fields: Fields, first: int, last: int) -> str:
-    """Describe the fields that the columns `first` to `last` touch."""
-    touched = [f for f in fields if f.first <= last and f.last >= first]
-    return ", ".join(f"cols {f.first}-{f.last}: {f.name}" for f in touched)
 
 
 def write_card(fields: Fields, values: Sequence[Value]) -> str:
@@ -508,9 +495,7 @@ def _free(value: Value) -> str:
 
 def _written(field: Field, value: Value) -> str | None:
     """A value's text in its columns; None when it does not fit."""
-    if isinstance(value, str):
-        return value if len(value) <= field.width else None
-    if isinstance(value, int):
-        text = str(value)
-        return text if len(text) <= field.width else None
-    return format_real(float(value), field.width)
+    if isinstance(value, float):
+        return format_real(float(value), field.width)
+    text = str(value)
+    return text if len(text) <= field.width else None

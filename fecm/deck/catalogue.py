@@ -1,4 +1,4 @@
-"""Named contacts: what was measured of an indenter on the report's laminate, for EXPE.
+"""Named plies, and named contacts: measured constants of EXPE for an indenter on a laminate.
 
 The report gives k for two indenters and two groups of specimens (Table 3.1), alpha_p and s_p for
 all of them (section 3.2.2 and the input listing), and q for each indenter.
@@ -42,9 +42,9 @@ class NamedPly:
     system : str
         A key of :data:`SYSTEMS`.
     source : str
-        Where the constants were published.
+        Publication of the constants.
     assumed : str
-        What the source does not give.
+        Values that the source does not give.
     """
 
     name: str
@@ -114,7 +114,7 @@ class NamedContact:
     law : Indentation
         Constants in in, lbf and s.
     source : str
-        What was pressed into what, and who did.
+        Indenter, target and publication.
     """
 
     name: str

@@ -121,7 +121,7 @@ def _excerpt(place: Place) -> tuple[str, int, int]:
 
 
 def _shortened(text: str) -> str:
-    """A text without its middle where it quotes too much."""
+    """A long text without its middle."""
     return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
 
 

@@ -1,7 +1,7 @@
 """A deck rewritten with aligned columns and a ruler above each kind of card.
 
 Comments and blank cards stay where they are; the model does not change.  Rulers begin with ``!:``
-and are made anew each time.
+and are replaced each time.
 """
 
 from __future__ import annotations
@@ -86,6 +86,6 @@ def _aligned(card: Card, fields: Fields, values: list[Value]) -> str:
 
 
 def _with_comment(text: str, line: str) -> str:
-    """Text with the comment that stood behind it."""
+    """Text with the comment of its line."""
     _, mark, comment = line.partition("!")
     return f"{text}  !{comment.rstrip()}" if mark else text.rstrip()

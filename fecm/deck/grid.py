@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from fecm.deck.model import Boundary, Coordinates, Elements
 from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
 
-# Coordinates are rounded to this part of the plate's size, so that they fit their columns.
+# Significant digits of coordinates, relative to the plate's size, so that they fit their columns.
 DIGITS = 6
 
 
@@ -21,9 +21,9 @@ class Section:
     Attributes
     ----------
     start, end : float
-        Where it begins and ends (length).
+        Coordinates of its ends (length).
     elements : int
-        How many elements it has.
+        Number of elements.
     """
 
     start: float
@@ -42,7 +42,7 @@ def listed(text: str) -> list[Section]:
     Raises
     ------
     ValueError
-        If the text is no such list.
+        If the text is not such a list.
     """
     sections: list[Section] = []
     start = 0.0
@@ -63,13 +63,13 @@ def graded(length: float, elements: int, centre: float, ratio: float) -> list[Se
     Parameters
     ----------
     length : float
-        Whole length.
+        Total length.
     elements : int
         Number of elements.
     centre : float
         Where they are smallest; becomes a corner of elements.
     ratio : float
-        Largest over smallest element of a side.
+        Ratio of the largest to the smallest element of a side.
     """
     if not 0.0 < centre < length or elements < 2:
         side = _series(length, elements, ratio)
@@ -107,7 +107,7 @@ def _round(value: float, scale: float) -> float:
 
 
 def lines(sections: Sequence[Section]) -> list[float]:
-    """Coordinates of the lines of nodes: two a element, and the last."""
+    """Coordinates of the lines of nodes: two per element, and the last."""
     found: list[float] = []
     for section in sections:
         count = 2 * section.elements

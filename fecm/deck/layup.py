@@ -1,8 +1,8 @@
 """Layups in the usual notation: ``[0/45/0/-45/0]2s``.
 
 Angles in degrees, from the struck face on, separated by ``/``.  ``_2`` or ``_{2}`` repeats a ply,
-``±45`` (or ``+-45``) is 45/-45, a number behind a group repeats it, ``s`` mirrors it, ``T`` says
-that it is the total.  Groups may stand inside groups.
+``±45`` (or ``+-45``) is 45/-45, a number after a group repeats it, ``s`` mirrors it, ``T``
+marks a total layup.  Groups may be nested.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fecm._errors import FecmError
 # A layup of more plies is certainly a typo.
 MOST_PLIES = 10_000
 
-# Groups inside groups, at the most.
+# Deepest nesting of groups.
 NESTING = 32
 # Characters of a layup that a message quotes.
 QUOTED = 60
@@ -39,7 +39,7 @@ def parse_layup(text: str) -> list[float]:
     Raises
     ------
     LayupError
-        If the text is no layup; the message shows where.
+        If the text is not a layup; the message shows where.
     """
     compact = re.sub(r"\s", "", text)
     if not compact.startswith("["):
@@ -95,7 +95,7 @@ def _group(text: str, start: int, depth: int = 1) -> tuple[list[float], int]:
     suffix = _SUFFIX.match(text, position)
     if suffix is not None:
         angles = angles * _times(suffix[1] or "1", len(angles), text, position)
-        if suffix[2] in ("s", "S") and suffix[2]:
+        if suffix[2] in ("s", "S"):
             angles = angles + angles[::-1]
         position = suffix.end()
     _bound(angles, text, position)
@@ -103,11 +103,11 @@ def _group(text: str, start: int, depth: int = 1) -> tuple[list[float], int]:
 
 
 def _times(digits: str, plies: int, text: str, position: int) -> int:
-    """A number of repeats that does not exhaust the memory."""
+    """Number of repeats, limited to :data:`MOST_PLIES` plies."""
     if len(digits) > 5 or int(digits) * plies > MOST_PLIES or int(digits) < 1:
         raise LayupError(
             f"the layup `{_quoted(text)}` repeats {_quoted(digits)} times at "
-            f"`{text[position : position + 10]}`; 1 to {MOST_PLIES} plies can be made"
+            f"`{text[position : position + 10]}`; 1 to {MOST_PLIES} plies are possible"
         )
     return int(digits)
 

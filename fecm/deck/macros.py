@@ -7,6 +7,7 @@ any loop it is 1.  LOOP 0 runs once.
 from __future__ import annotations
 
 import difflib
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -16,7 +17,7 @@ from fecm.deck.records import Macro
 
 NESTING = 64
 
-# A program of more macros than this would run for days.
+# A program of more macros would run for days.
 MOST_MACROS = 10**9
 
 
@@ -50,26 +51,30 @@ class Word:
 WORDS = {
     word.name: word
     for word in (
-        Word("LOOP", "Carries out N times what stands before its NEXT.", "count"),
+        Word("LOOP", "Repeats the macros up to its NEXT N times.", "count"),
         Word("NEXT", "Ends a loop."),
         Word("DT", "Sets the time step; 0 takes 0.9 of the critical one.", "time step"),
         Word("TIME", "Advances the clock by DT."),
         Word(
-            "PROP", "Reads a proportional load from a card behind END, or takes it anew.", "count"
+            "PROP",
+            "Reads a proportional load from a card after END, or evaluates it again.",
+            "count",
         ),
         Word("LMAS", "Forms the lumped mass."),
         Word("CMAS", "Forms the consistent mass."),
         Word("TANG", "Forms and factorises the stiffness."),
-        Word("FORM", "Forms what is out of balance: the loads less the internal forces."),
-        Word("SOLV", "Solves for the displacement that balances it.", "", ("TANG", "FORM")),
+        Word("FORM", "Forms the residual: the loads less the internal forces."),
+        Word(
+            "SOLV", "Solves for the displacement that removes the residual.", "", ("TANG", "FORM")
+        ),
         Word("TOL", "Sets the tolerance of CONV.", "tolerance"),
-        Word("CONV", "Leaves the loop once the solution stands still.", "", ("SOLV",), True),
+        Word("CONV", "Leaves the loop once the solution has converged.", "", ("SOLV",), True),
         Word("REAC", "Stores and prints the reactions.", "", ("SOLV|EXCD|RODP",)),
         Word("EIGE", "Finds the N lowest natural modes.", "every", ("LMAS|CMAS",)),
         Word("EXCD", "Takes one step of central differences.", "", ("LMAS", "DT")),
         Word(
             "RODP",
-            "Takes one impact step; stores contact and strains at every N-th.",
+            "Takes one impact step; stores contact and strains at every N-th step.",
             "every",
             ("LMAS", "DT"),
         ),
@@ -130,7 +135,7 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
         _check_order(word, macro, done, findings)
         if word.inside and not open_loops:
             findings.add(
-                "E513", f"{word.name} stands outside any loop.", macro.place("macro"),
+                "E513", f"{word.name} is outside any loop.", macro.place("macro"),
                 "put it between LOOP and NEXT",
             )  # fmt: skip
         if word.name == "LOOP":
@@ -143,7 +148,7 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
                 return ()
         elif word.name == "NEXT":
             if not open_loops:
-                findings.add("E503", "NEXT stands without a LOOP.", macro.place("macro"))
+                findings.add("E503", "NEXT has no LOOP.", macro.place("macro"))
                 continue
             head, outer = open_loops.pop()
             count = max(1, int(head.value)) if head.value >= 0 else 1
@@ -154,12 +159,12 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
     for head, _ in open_loops:
         findings.add(
             "E502", "The LOOP is not closed by a NEXT.", head.place("macro"),
-            "put a NEXT card behind the loop's last macro",
+            "put a NEXT card after the loop's last macro",
         )  # fmt: skip
     if open_loops:
         return ()
     program = tuple(body)
-    _warn_of_standing_clock(program, findings)
+    _warn_of_stopped_clock(program, findings)
     return program
 
 
@@ -181,12 +186,8 @@ def _check_order(word: Word, macro: Macro, done: set[str], findings: Findings) -
         choices = require.split("|")
         if not done.intersection(choices):
             names = " or ".join(choices)
-            findings.add(
-                "E504",
-                f"{names} must come before {word.name}.",
-                macro.place("macro"),
-                f"put {names} before it",
-            )
+            message = f"{names} must come before {word.name}."
+            findings.add("E504", message, macro.place("macro"), f"put {names} before it")
             done.add(choices[0])
     done.add(word.name)
 
@@ -202,14 +203,14 @@ def _check_unused(word: Word, macro: Macro, findings: Findings) -> None:
             macro.place("second word"),
             f"the number is in columns 11-15 or after a comma: {example}"
             if is_number
-            else "take it out",
+            else "remove it",
         )
     elif macro.value and not word.value:
         findings.add(
             "E514",
             f"{word.name} takes no number; the card has {macro.value:g}.",
             macro.place("value"),
-            "take it out",
+            "remove it",
         )
     elif macro.second:
         findings.add(
@@ -221,27 +222,18 @@ def _check_unused(word: Word, macro: Macro, findings: Findings) -> None:
 
 
 def _check_value(word: Word, macro: Macro, findings: Findings) -> None:
-    value = macro.value
-    if word.value in ("count", "every") and (value < 0 or not value.is_integer()):
-        findings.add(
-            "E505",
-            f"{word.name} takes a whole number that is not negative, not {value:g}.",
-            macro.place("value"),
-        )
-    elif word.value in ("count", "every") and value > MOST_MACROS:
-        findings.add(
-            "E505",
-            f"{word.name} takes a whole number up to {MOST_MACROS:g}, not {value:g}.",
-            macro.place("value"),
-        )
-    elif (word.value == "time step" and value < 0) or (word.value == "tolerance" and value <= 0):
-        findings.add(
-            "E505", f"{word.name} takes a positive {word.value}, not {value:g}.",
-            macro.place("value"),
-        )  # fmt: skip
+    value, kind = macro.value, word.value
+    is_count = kind in ("count", "every")
+    if is_count and not (0 <= value <= MOST_MACROS and value.is_integer()):
+        must = f"whole number from 0 to {MOST_MACROS:g}"
+    elif (kind == "time step" and value < 0) or (kind == "tolerance" and value <= 0):
+        must = f"positive {kind}"
+    else:
+        return
+    findings.add("E505", f"{word.name} takes a {must}, not {value:g}.", macro.place("value"))
 
 
-def _warn_of_standing_clock(body: Body, findings: Findings) -> None:
+def _warn_of_stopped_clock(body: Body, findings: Findings) -> None:
     """Warn of the loops that step without TIME."""
     for item in body:
         if isinstance(item, Loop):
@@ -249,13 +241,13 @@ def _warn_of_standing_clock(body: Body, findings: Findings) -> None:
             if words & STEPS and "TIME" not in words:
                 findings.add(
                     "W507",
-                    "The loop steps without TIME, so that the clock of time-dependent loads "
-                    "stands still.",
+                    "The loop steps without TIME, so the clock of time-dependent loads does not "
+                    "advance.",
                     item.macro.place("macro"),
                     "put TIME before the step",
                 )
             else:
-                _warn_of_standing_clock(item.body, findings)
+                _warn_of_stopped_clock(item.body, findings)
 
 
 def flat(body: Body) -> Iterator[Macro]:
@@ -293,20 +285,14 @@ class WorkEstimate:
         Time steps, impact steps and central differences.
     contact_rows : int
         Steps at which contact and strains are stored.
-    passes : dict of str to int
+    passes : Counter
         Times that DISP, STRE, REAC and EIGE store something, by word.
     """
 
     macros: int
     steps: int
     contact_rows: int
-    passes: dict[str, int]
-
-
-# Words that store a row at every N-th pass, and at every one.
-_EVERY = ("DISP", "STRE")
-
-_ALWAYS = ("REAC", "EIGE")
+    passes: Counter[str]
 
 
 def estimate_work(body: Body) -> WorkEstimate:
@@ -325,36 +311,26 @@ def estimate_work(body: Body) -> WorkEstimate:
     return WorkEstimate(macros, total, contact, passes)
 
 
-def _entry(body: Body, count: int) -> tuple[int, dict[str, int], dict[int, int]]:
-    """Macros, stored rows by word, and steps by RODP's number, of a body run `count` times on end.
+def _entry(body: Body, count: int) -> tuple[int, Counter[str], Counter[int]]:
+    """Macros, stored rows by word, and steps by RODP's number, of `count` consecutive passes.
 
-    Steps of EXCD stand under 0.
+    Steps of EXCD count under 0.
     """
-    macros = 0
-    passes = dict.fromkeys((*_EVERY, *_ALWAYS), 0)
-    steps: dict[int, int] = {}
-
-    def step(n: int, more: int) -> None:
-        steps[n] = steps.get(n, 0) + more
-
+    macros, passes, steps = 0, Counter[str](), Counter[int]()
     for item in body:
         if isinstance(item, Loop):
             inner, rows, taken = _entry(item.body, item.count)
             macros += count * (inner + item.count)
-            for word, more in rows.items():
-                passes[word] += count * more
-            for n, more in taken.items():
-                step(n, count * more)
+            passes.update({word: count * more for word, more in rows.items()})
+            steps.update({n: count * more for n, more in taken.items()})
             continue
         macros += count
-        if item.word in _EVERY:
+        if item.word in ("DISP", "STRE"):
             passes[item.word] += count // every(item)
         elif item.word == "REAC":
             passes["REAC"] += count
         elif item.word == "EIGE":
             passes["EIGE"] += count * every(item)
-        elif item.word == "RODP":
-            step(every(item), count)
-        elif item.word == "EXCD":
-            step(0, count)
+        elif item.word in STEPS:
+            steps[every(item) if item.word == "RODP" else 0] += count
     return macros, passes, steps

@@ -7,6 +7,7 @@ from unreadable cards.
 from __future__ import annotations
 
 import difflib
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -29,7 +30,7 @@ MOST_PROBLEMS = 1000
 MOST_SEGMENTS = 20_000
 MOST_MACRO_CARDS = 100_000
 
-# Bytes of a file that no such deck needs.
+# No deck needs more bytes.
 LARGEST_FILE = 1_000_000_000
 # Largest memory of a deck per byte of text and per line, measured at 10 MB.
 BYTES_A_BYTE, BYTES_A_LINE = 12, 1100
@@ -62,7 +63,7 @@ class Reader:
     Parameters
     ----------
     text : str
-        The whole file.
+        The file's text.
     blanks_are_zeros : bool
         Read blanks inside numbers as the zeros that they were on the report's machine.
     keeps_values : bool
@@ -75,7 +76,7 @@ class Reader:
         self.stream = Stream(text, blanks_are_zeros=blanks_are_zeros, keeps_values=keeps_values)
         self._unsound: set[str] = set()
         self._segments = 0
-        self._counted = {"NUMNP": 0, "NUMEL": 0}
+        self._counted = Counter[str]()
 
     @property
     def findings(self) -> Findings:
@@ -92,7 +93,7 @@ class Reader:
                 break
             if card.keyword == TITLE:
                 if len(problems) == MOST_PROBLEMS:
-                    self._end(f"The file holds more than {MOST_PROBLEMS} problems.", card)
+                    self._end(f"The file contains more than {MOST_PROBLEMS} problems.", card)
                     break
                 problems.append(self._problem(card))
             else:
@@ -100,7 +101,7 @@ class Reader:
         last = self.stream.last
         if not problems and not self.findings.errors:
             self.findings.add(
-                "E001", "The file holds no problem.", None, "a problem begins with a FECM card"
+                "E001", "The file contains no problem.", None, "a problem begins with a FECM card"
             )
         elif last is not None and not stopped and not self.findings.counts["E004"]:
             self.findings.add("W002", "The deck does not end with a STOP card.", last.place)
@@ -155,9 +156,9 @@ class Reader:
     def _is_sound(self, control: Control) -> bool:
         """Whether counts and dimensions are valid; report those that are not."""
         before = len(self.findings)
-        values = control.row()
         if control.nen == 0:
-            missing = [f.name for f, value in zip(Control.fields, values, strict=True) if not value]
+            named = zip(Control.fields, control.row(), strict=True)
+            missing = [field.name for field, value in named if not value]
             self.findings.add(
                 "E201",
                 f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing on the "
@@ -172,28 +173,24 @@ class Reader:
             ("NUMEL", control.numel, 1, MOST, ""),
             ("LAYER", control.layers, 1, MOST_LAYERS, ""),
             ("NDM", control.ndm, 2, 2, "the plate lies in 2 dimensions"),
-            ("NDF", control.ndf, 5, 5, f"a node has the unknowns {', '.join(DOF_NAMES)}"),
-            ("NEN", control.nen, low, high, "nodes an element"),
+            ("NDF", control.ndf, 5, 5, f"a node has the dofs {', '.join(DOF_NAMES)}"),
+            ("NEN", control.nen, low, high, "nodes per element"),
         ):
             if not least <= value <= most:
                 must = f"{least}" if least == most else f"{least} to {most}"
                 self.findings.add(
                     "E201", f"{name} is {value}; it must be {must}.", control.place(name), hint
                 )
-        return len(self.findings) == before and self._is_few(control)
-
-    def _is_few(self, control: Control) -> bool:
-        """Whether all problems of the file together keep the limits of nodes and elements."""
-        before = len(self.findings)
-        for name, value in (("NUMNP", control.numnp), ("NUMEL", control.numel)):
-            self._counted[name] += value
-            if self._counted[name] > MOST:
+        if len(self.findings) > before:
+            return False
+        self._counted.update(NUMNP=control.numnp, NUMEL=control.numel)
+        for name, count in self._counted.items():
+            if count > MOST:
                 self.findings.add(
                     "E201",
-                    f"The file's problems have together {name} {self._counted[name]}; it may be "
-                    f"{MOST} at the most.",
+                    f"The file's problems have together {name} {count}; at most {MOST} is allowed.",
                     control.place(name),
-                    "give the problems files of their own",
+                    "put each problem in a separate file",
                 )
         return len(self.findings) == before
 
@@ -252,7 +249,7 @@ class Reader:
         else:
             self.findings.add(
                 "E006",
-                "A card of data stands where a keyword is expected.",
+                "A keyword is expected, not a card of data.",
                 card.place,
                 "a segment has more cards than its counts say, or a blank card ended it too early",
             )
@@ -272,11 +269,11 @@ class Reader:
             if card.is_keyword and not _close(card.keyword, [MACROS]):
                 self.stream.give_back()
                 self.findings.add(
-                    "E009", "No MACR card stands before the macro program.", card.place
+                    "E009", "The MACR card before the macro program is missing.", card.place
                 )
                 return self._macros(card)
             self._stray(card, [MACROS])
-            if card.is_keyword:  # MACR misspelt: the program follows all the same
+            if card.is_keyword:  # misspelt MACR: the program follows nevertheless
                 return self._macros(card)
         self.findings.add(
             "E009", "The problem has no macro program.", title.place, "it begins with a MACR card"
@@ -327,7 +324,7 @@ class Reader:
                     self.stream.give_back()
                 self.findings.add(
                     "E011",
-                    "The card of PROP's load table is missing behind the macro program's END.",
+                    "The card of PROP's load table is missing after the macro program's END.",
                     macro.place("macro"),
                     "(2I5,7F10.0): type, exponent, t_min, t_max, A1 to A5",
                 )
@@ -404,7 +401,7 @@ def read_deck(path_or_text: str | Path) -> Deck | list[Deck]:
     Returns
     -------
     Deck or list of Deck
-        The problem, or a list where the file holds several.
+        The problem, or a list if the file contains several.
 
     Raises
     ------

@@ -42,7 +42,7 @@ class Stream:
     Parameters
     ----------
     text : str
-        The whole file.
+        The file's text.
     blanks_are_zeros : bool
         Read blanks inside numbers as the zeros that they were on the report's machine.
     keeps_values : bool
@@ -78,7 +78,7 @@ class Stream:
 
     @property
     def last(self) -> Card | None:
-        """The last card of the file; None of an empty one."""
+        """The last card of the file; None if it is empty."""
         for number in range(len(self.lines), 0, -1):
             if not _is_comment(self.lines[number - 1]):
                 return Card(number, self.lines[number - 1])
