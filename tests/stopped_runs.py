@@ -1,0 +1,73 @@
+"""Runs that stop with a checkpoint when a test says so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fecm.api import load_deck
+from fecm.problem.options import RunOptions
+from fecm.problem.problem import Problem
+from fecm.results import hdf5_writer
+from fecm.simulation.checkpoint import Checkpointer
+from fecm.simulation.run import run as simulate_run
+from fecm.simulation.simulation import Simulation
+from fecm.simulation.spool import Journal
+
+
+class StoppedError(Exception):
+    """The run is stopped for the test's sake."""
+
+
+def run(
+    text: str,
+    path: Path,
+    stop: int = 0,
+    *,
+    resume: bool = False,
+    slips: str = "",
+    macros: bool = False,
+) -> int:
+    """Run a deck into a file; stop with a checkpoint at the n-th look, between steps or macros.
+
+    Returns
+    -------
+    int
+        Looks that there were.
+    """
+    looks = 0
+
+    def look(simulation: Simulation) -> None:
+        nonlocal looks
+        looks += 1
+        if looks == stop:
+            checkpointer.write(simulation)
+            raise StoppedError
+
+    problem = load_deck(text).problems[0]
+    names = frozenset(slips.split())
+    with hdf5_writer.writing(path) as sink:
+        journal = Journal(sink)
+        checkpointer = Checkpointer(path, journal)
+        simulation = Simulation(problem, journal, RunOptions(names))
+        if macros:
+            simulation.on_macro = look
+        else:
+            simulation.observers, simulation.interval = (look,), 1
+        if resume:
+            checkpointer.restore(simulation)
+        simulate_run(simulation)
+    checkpointer.clear()
+    return looks
+
+
+def stop_at_once(problem: Problem, path: Path) -> None:
+    """Stop a run with a checkpoint, as soon as it looks up."""
+    with hdf5_writer.writing(path) as sink:
+        journal = Journal(sink)
+        checkpointer = Checkpointer(path, journal)
+
+        def look(simulation: Simulation) -> None:
+            checkpointer.write(simulation)
+            raise StoppedError
+
+        simulate_run(Simulation(problem, journal, observers=(look,)))

@@ -1,0 +1,295 @@
+"""Runs that are killed, interrupted or starved of disk: what they leave, and how they go on."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+import fecm
+from fecm.api import load_deck
+from fecm.problem.options import RunOptions
+from fecm.problem.slips import active_slips
+from fecm.results.sinks import MemorySink
+from fecm.simulation.checkpoint import checkpoint_of
+from fecm.simulation.interpreter import Interpreter
+from fecm.simulation.run import simulate
+from tests.calls import call, program
+from tests.decks import DATA_CARDS, LONG, PROGRAM, small
+from tests.kill_runs import FECM, SWEEP, SWEPT, sweep_trial, trial, verdict
+from tests.stopped_runs import StoppedError, stop_at_once
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the long deck and the result of a run that nothing disturbed."""
+    folder = tmp_path_factory.mktemp("whole")
+    shutil.copy(LONG, folder / "deck.inp")
+    assert call("run", "deck.inp", "-o", "whole.h5", cwd=folder).exit_code == 0
+    return folder
+
+
+def begun(folder: Path, *arguments: str) -> subprocess.Popen[str]:
+    """Start a command and wait until it has written a checkpoint of ``i.h5``."""
+    command = [*FECM, *arguments, "-o", "i.h5", "--checkpoint", "0"]
+    process = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + 60.0
+    while not (folder / "i.h5.checkpoint").exists() and time.monotonic() < until:
+        time.sleep(0.01)
+    return process
+
+
+def test_a_killed_run_resumes_to_the_same_bytes(whole: Path) -> None:
+    with begun(whole, "run", "deck.inp") as process:
+        process.kill()
+    assert process.returncode == -signal.SIGKILL
+    assert not (whole / "i.h5").exists()
+    assert call("run", "deck.inp", "-o", "i.h5", "--resume", cwd=whole).exit_code == 0
+    assert verdict(whole, "i.h5", whole / "whole.h5") == "same"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(4))
+def test_a_run_killed_at_any_moment_resumes_to_the_same_bytes(whole: Path, seed: int) -> None:
+    assert trial(whole, whole / "whole.h5", 1.2, seed).startswith("same")
+
+
+@pytest.mark.long
+def test_killed_sweeps_with_damaged_parts_end_in_the_same_bytes(tmp_path: Path) -> None:
+    (tmp_path / "sweep.inp").write_text(SWEPT)
+    subprocess.run([*SWEEP, "whole.h5"], cwd=tmp_path, check=True, capture_output=True)
+    trials = (sweep_trial(tmp_path, tmp_path / "whole.h5", 2.0, seed) for seed in range(4))
+    counts: Counter[str] = sum(trials, Counter())
+    assert counts["kills"] > 0
+    assert counts["same"] == 4
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_command_says_how_to_go_on_and_does(
+    whole: Path, number: signal.Signals
+) -> None:
+    command = ("run", "deck.inp", "-o", "i.h5", "--print", "i.txt")
+    with begun(whole, "run", "deck.inp", "--print", "i.txt") as process:
+        process.send_signal(number)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 128 + number
+    assert said.endswith("; the same command with --resume continues i.h5\n")
+    assert "interrupted" not in said
+    assert not (whole / "i.h5").exists()
+    other = call("run", "deck.inp", "-o", "i.h5", "--resume", cwd=whole)
+    assert other.exit_code == 2
+    assert "another choice of --print" in other.stderr
+    assert call(*command, "--resume", cwd=whole).exit_code == 0
+    assert (whole / "i.h5").read_bytes() == (whole / "whole.h5").read_bytes()
+    printed = (whole / "i.txt").read_text()
+    call(*command, "--overwrite", cwd=whole)
+    assert (whole / "i.txt").read_text() == printed
+    (whole / "i.h5").unlink()
+    (whole / "i.txt").unlink()
+
+
+def test_a_second_signal_stops_at_once(tmp_path: Path) -> None:
+    program = "LMAS\nDT        .1E-6\nLOOP      99999\nTIME\nRODP       9999\nNEXT\n"
+    (tmp_path / "d.inp").write_text(small(program))
+    command = [*FECM, "run", "d.inp"]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL) as process:
+        until = time.monotonic() + 60.0
+        while not list(tmp_path.glob(".d.partial.h5")) and time.monotonic() < until:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60) == 130
+    assert not (tmp_path / "d.h5").exists()
+
+
+def test_what_an_interrupted_run_has_left_is_not_thrown_away_unasked(tmp_path: Path) -> None:
+    text = small(PROGRAM.replace("     10", "     90"))
+    (tmp_path / "d.inp").write_text(text)
+    with pytest.raises(StoppedError):
+        stop_at_once(load_deck(text).problems[0], tmp_path / "d.h5")
+    left = checkpoint_of(tmp_path / "d.h5").read_bytes()
+    done = call("run", "d.inp", cwd=tmp_path)
+    assert done.exit_code == 2
+    assert "--resume continues it, --overwrite starts over" in done.stderr
+    assert checkpoint_of(tmp_path / "d.h5").read_bytes() == left
+    assert call("run", "d.inp", "--overwrite", cwd=tmp_path).exit_code == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["d.h5", "d.inp"]
+
+
+def test_resuming_without_a_checkpoint_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(small())
+    done = call("run", "d.inp", "--resume", cwd=tmp_path)
+    assert done.exit_code == 2
+    assert "there is no checkpoint d.h5.checkpoint" in done.stderr
+
+
+def test_of_two_problems_the_finished_one_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(
+        small(stop=False) + small(PROGRAM.replace("     10", "     90"))
+    )
+    assert call("run", "d.inp", cwd=tmp_path).exit_code == 0
+    first, second = (tmp_path / "d.h5").read_bytes(), (tmp_path / "d-2.h5").read_bytes()
+    (tmp_path / "d-2.h5").unlink()
+    problem = load_deck((tmp_path / "d.inp").read_text()).problems[1]
+    with pytest.raises(StoppedError):
+        stop_at_once(problem, tmp_path / "d-2.h5")
+    done = call("run", "d.inp", "--resume", cwd=tmp_path)
+    assert done.exit_code == 0
+    assert "d.h5 is complete" in done.stderr
+    assert (tmp_path / "d.h5").read_bytes() == first
+    assert (tmp_path / "d-2.h5").read_bytes() == second
+
+
+def test_what_stands_beyond_the_interrupted_problem_is_not_taken_for_done(tmp_path: Path) -> None:
+    longer = PROGRAM.replace("     10", "     90")
+    (tmp_path / "d.inp").write_text(small(longer, stop=False) + small(longer))
+    problem = load_deck((tmp_path / "d.inp").read_text()).problems[0]
+    with pytest.raises(StoppedError):
+        stop_at_once(problem, tmp_path / "d.h5")
+    (tmp_path / "d-2.h5").write_text("of last week")
+    refused = call("run", "d.inp", "--resume", cwd=tmp_path)
+    assert refused.exit_code == 2
+    assert "d-2.h5 exists already; --overwrite replaces it" in refused.stderr
+    assert (tmp_path / "d-2.h5").read_text() == "of last week"
+    done = call("run", "d.inp", "--resume", "--overwrite", cwd=tmp_path)
+    assert done.exit_code == 0
+    assert "d.h5 resumes after step" in done.stderr
+    assert (tmp_path / "d-2.h5").read_bytes() == (tmp_path / "d.h5").read_bytes()
+
+
+# Faults ------------------------------------------------------------------------------------------
+
+
+def small_files(limit: int) -> None:
+    """Let no file grow beyond a size, as a full disk does."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+
+def test_a_disk_that_fills_leaves_the_last_checkpoint_usable(whole: Path) -> None:
+    (whole / "f.h5").write_text("precious")
+    done = program(
+        "run", "deck.inp", "-o", "f.h5", "--overwrite", "--checkpoint", "0",
+        cwd=whole, preexec_fn=lambda: small_files(2_000_000),
+    )  # fmt: skip
+    assert done.exit_code == 2
+    assert "Traceback" not in done.stderr
+    assert "File too large" in done.stderr
+    assert (whole / "f.h5").read_text() == "precious"
+    again = call("run", "deck.inp", "-o", "f.h5", "--resume", cwd=whole)
+    assert again.exit_code == 0
+    assert "resumes after step" in again.stderr
+    assert (whole / "f.h5").read_bytes() == (whole / "whole.h5").read_bytes()
+
+
+@contextlib.contextmanager
+def mounted(folder: Path, size: str) -> Iterator[None]:
+    """Mount a small disk in memory over a folder, where this user may do so."""
+    folder.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
+    if subprocess.run(command, check=False, capture_output=True).returncode:
+        pytest.skip("nothing can be mounted here")
+    try:
+        yield
+    finally:
+        subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+def test_a_read_only_folder_is_told_and_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(small())
+    folder = tmp_path / "out"
+    with contextlib.ExitStack() as stack:
+        if os.geteuid() == 0:  # who may write into any folder, but not onto a read-only disk
+            stack.enter_context(mounted(folder, "1m"))
+            subprocess.run(["mount", "-o", "remount,ro", str(folder)], check=True)
+        else:
+            folder.mkdir(mode=0o555)
+        done = call("run", "d.inp", "-o", "out/d.h5", cwd=tmp_path)
+        assert not list(folder.iterdir())
+    assert done.exit_code == 2
+    assert re.search("out/.*(Read-only file system|Permission denied)", done.stderr)
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+
+
+def test_a_small_disk_that_fills_is_told_and_what_was_there_stays(tmp_path: Path) -> None:
+    shutil.copy(LONG, tmp_path / "deck.inp")
+    with mounted(tmp_path / "out", "20m"):  # enough to begin with, not for checkpoints as well
+        (tmp_path / "out" / "d.h5").write_text("precious")
+        options = ("-o", "out/d.h5", "--overwrite", "--checkpoint", "0")
+        done = call("run", "deck.inp", *options, cwd=tmp_path)
+        assert done.exit_code == 2
+        assert "No space left on device" in done.stderr
+        assert "Traceback" not in done.stderr
+        assert (tmp_path / "out" / "d.h5").read_text() == "precious"
+        left = {path.name for path in (tmp_path / "out").iterdir()}
+        assert left <= {"d.h5", "d.h5.checkpoint", "d.h5.spool"}
+
+
+def test_a_folder_that_goes_away_during_the_run_ends_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "d.inp").write_text(small())
+    (tmp_path / "out").mkdir()
+    plain = Interpreter.run
+
+    def run(self: Interpreter, *arguments: Any) -> None:
+        plain(self, *arguments)
+        shutil.rmtree(tmp_path / "out")
+
+    monkeypatch.setattr(Interpreter, "run", run)
+    done = call("run", "d.inp", "-o", "out/d.h5", cwd=tmp_path)
+    assert done.exit_code == 2
+    assert "Traceback" not in done.stderr
+    assert "out" in done.stderr.splitlines()[-1]
+    assert [path.name for path in tmp_path.iterdir()] == ["d.inp"]
+
+
+def test_a_result_that_a_reader_has_open_is_replaced_without_disturbing_it(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(small())
+    assert call("run", "d.inp", cwd=tmp_path).exit_code == 0
+    with h5py.File(tmp_path / "d.h5") as reader:
+        before = reader["history/force"][:]
+        (tmp_path / "d.inp").write_text(small(data=DATA_CARDS.replace("115.0", " 90.0")))
+        assert call("run", "d.inp", "--overwrite", cwd=tmp_path).exit_code == 0
+        np.testing.assert_array_equal(reader["history/force"][:], before)
+    found = fecm.load(tmp_path / "d.h5")
+    assert found.force.max() < before.max()
+
+
+# Energy ------------------------------------------------------------------------------------------
+
+
+def test_a_run_that_passes_its_energy_limit_exits_1_and_leaves_no_file(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(small(PROGRAM.replace("     10", "    400")))
+    done = call("run", "d.inp", "--energy-limit", "1e-9", cwd=tmp_path)
+    assert done.exit_code == 1
+    assert "the energy balance is off by" in done.stderr
+    assert "more than the limit of 1e-09" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["d.inp"]
+    assert call("run", "d.inp", cwd=tmp_path).exit_code == 0
+    with pytest.raises(fecm.DivergenceError, match="limit"):
+        fecm.run(tmp_path / "d.inp", energy_limit=1e-9)
+
+
+def test_the_listings_rigid_target_is_warned_of_and_not_judged() -> None:
+    problem = load_deck(LONG, "listing").problems[0]
+    simulation = simulate(problem, MemorySink(), RunOptions(active_slips("listing")))
+    assert (
+        len([note for note in simulation.state.notes if "slips are on: it is not judged" in note])
+        == 1
+    )
+    sound = simulate(load_deck(LONG).problems[0], MemorySink())
+    assert sound.state.notes == []
