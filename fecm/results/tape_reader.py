@@ -12,7 +12,7 @@ then tape3 is read as lines, and :meth:`TapeText.fitted` divides them into rows.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -135,23 +135,30 @@ class _Lines:
         first = self.lines[0] if self.lines else b""
         self.labelled = all(_LABELS.fullmatch(label) for label in (first[:6], first[6:12]))
 
-    def refuse(self, index: int, message: str) -> ResultFileError:
-        """Return an error about a line."""
-        return ResultFileError(f"{self.path}:{index + 1}: {message}")
+    def refuse(self, wrong: NDArray[np.bool_], message: Callable[[int], str]) -> None:
+        """Raise an error about the first wrong line, if any; the message gets its index."""
+        if wrong.any():
+            index = int(wrong.argmax())
+            raise ResultFileError(f"{self.path}:{index + 1}: {message(index)}")
 
     def counts(self, lead: int) -> NDArray[np.int64]:
         """Numbers of every line, (lines,), after `lead` characters of labels."""
         lengths = np.fromiter(map(len, self.lines), dtype=np.int64, count=len(self.lines)) - lead
         counts, rest = np.divmod(lengths, WIDTH)
-        wrong = (rest != 0) | (counts < 1) | (counts > PER_LINE)
-        if wrong.any():
-            index = int(wrong.argmax())
-            raise self.refuse(
-                index,
-                f"a line of {len(self.lines[index])} characters does not consist of columns of "
-                f"{WIDTH}",
-            )
+        self.refuse(
+            (rest != 0) | (counts < 1) | (counts > PER_LINE),
+            lambda n: f"a line of {lengths[n] + lead} characters does not consist of columns of "
+            f"{WIDTH}",
+        )
         return counts
+
+    def table(self, lead: int, width: int, what: str) -> Floats:
+        """Numbers of lines of equal length, (lines, width)."""
+        counts = self.counts(lead)
+        self.refuse(
+            counts != width, lambda n: f"a line of {what} has {width} numbers, not {counts[n]}"
+        )
+        return self.numbers(lead).reshape(-1, width)
 
     def numbers(self, lead: int) -> Floats:
         """All numbers of all lines, in order."""
@@ -176,7 +183,7 @@ class _Lines:
                 value = fortran_number(field)
                 if value is None:
                     text = ascii(field.decode("latin-1"))[1:-1]
-                    raise self.refuse(index, f"`{text}` is not a number")
+                    raise ResultFileError(f"{self.path}:{index + 1}: `{text}` is not a number")
                 values.append(value)
         return np.array(values)
 
@@ -208,53 +215,43 @@ def _displacements(text: _Lines) -> tuple[Array, bool]:
     if not len(ends):
         return values.reshape(-1, PER_LINE), True
     lengths = np.diff(ends, prepend=-1)
-    wrong = (lengths != lengths[0]) | (counts[ends] != counts[ends[0]])
-    if wrong.any():
-        index = int(ends[wrong.argmax()])
-        raise text.refuse(index, "the row that ends here differs in length from the first")
-    if ends[-1] != len(counts) - 1:
-        raise text.refuse(len(counts) - 1, "the last row is not complete")
+    wrong = np.zeros(len(counts), dtype=bool)
+    wrong[ends] = (lengths != lengths[0]) | (counts[ends] != counts[ends[0]])
+    text.refuse(wrong, lambda n: "the row that ends here differs in length from the first")
+    _require_complete(text, ends[-1] == len(counts) - 1)
     return values.reshape(len(ends), -1), False
+
+
+def _require_complete(text: _Lines, complete: bool) -> None:
+    """Require that the last line ends a row."""
+    wrong = np.zeros(len(text.lines), dtype=bool)
+    wrong[-1] = not complete
+    text.refuse(wrong, lambda n: "the last row is not complete")
 
 
 def _contact(text: _Lines) -> dict[str, Array]:
     """Columns of the contact tape, (rows,) each."""
-    counts = text.counts(0)
-    if (counts != len(CONTACT)).any():
-        index = int((counts != len(CONTACT)).argmax())
-        raise text.refuse(index, f"a line of contact has six numbers, not {counts[index]}")
-    table = text.numbers(0).reshape(-1, len(CONTACT))
+    table = text.table(0, len(CONTACT), "contact")
     return {f"tape9/{name}": table[:, i].copy() for i, name in enumerate(CONTACT)}
 
 
 def _strains(text: _Lines, shears: tuple[str, str]) -> dict[str, Array]:
     """Columns of the strain tape, (rows, elements, points) each."""
     names = (*CURVATURES, *shears)
-    counts = text.counts(2 * PER_LINE)
-    if (counts != len(names)).any():
-        index = int((counts != len(names)).argmax())
-        raise text.refuse(index, f"a line of strains has five numbers, not {counts[index]}")
-    labels = _labels(text)
+    table = text.table(2 * PER_LINE, len(names), "strains")
+    pairs = [(line[:6], line[6:12]) for line in text.lines]
+    unlabelled = [not all(map(_LABELS.fullmatch, pair)) for pair in pairs]
+    text.refuse(
+        np.array(unlabelled), lambda n: "a line of strains begins with its element and point"
+    )
+    labels = np.array([(int(element), int(point)) for element, point in pairs])
     numel, npt = (max(1, int(size)) for size in labels.max(axis=0))
     order = np.arange(len(labels)) % (numel * npt)
     expected = np.stack(np.divmod(order, npt), axis=1) + 1
-    wrong = (labels != expected).any(axis=1)
-    if wrong.any():
-        index = int(wrong.argmax())
-        element, point = expected[index]
-        raise text.refuse(index, f"expected element {element}, point {point}")
-    if len(labels) % (numel * npt):
-        raise text.refuse(len(labels) - 1, "the last row is not complete")
-    table = text.numbers(2 * PER_LINE).reshape(-1, numel, npt, len(names))
+    text.refuse(
+        (labels != expected).any(axis=1),
+        lambda n: f"expected element {expected[n, 0]}, point {expected[n, 1]}",
+    )
+    _require_complete(text, not len(labels) % (numel * npt))
+    table = table.reshape(-1, numel, npt, len(names))
     return {f"tape8/{name}": table[..., i].copy() for i, name in enumerate(names)}
-
-
-def _labels(text: _Lines) -> NDArray[np.int64]:
-    """Element and point of every line, (lines, 2)."""
-    labels = np.empty((len(text.lines), 2), dtype=np.int64)
-    for index, line in enumerate(text.lines):
-        pair = line[:6], line[6:12]
-        if not all(_LABELS.fullmatch(label) for label in pair):
-            raise text.refuse(index, "a line of strains begins with its element and point")
-        labels[index] = int(pair[0]), int(pair[1])
-    return labels
