@@ -273,7 +273,7 @@ def test_modes_are_numbered() -> None:
         ("w", "tape3/w"),
         ("histry", "history"),
         ("laminate", "laminate/A, laminate/B, laminate/D or laminate/shear"),
-        ("zzz", "tape8 and tape9"),
+        ("zzz", "there are energy, history, laminate, mesh, tape3, tape8, tape9"),
     ],
 )
 def test_an_unknown_name_is_answered_with_near_ones(result: Result, name: str, hint: str) -> None:

@@ -6,7 +6,6 @@ are written by Python's repr and can be read back exactly.
 
 from __future__ import annotations
 
-import difflib
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from fecm.deck.records import AXES, DOF_NAMES
 from fecm.results.result import Result
-from fecm.results.schema import DATASETS, SCALES, STORED_BY, ExportError
+from fecm.results.schema import DATASETS, SCALES, STORED_BY, ExportError, suggestion
 
 Array = NDArray[Any]
 
@@ -84,9 +83,8 @@ def table(result: Result, name: str = "history") -> Table:
     if not values:  # only step or time
         return Table(_names(clock), zip(*(result[path].tolist() for path in clock), strict=True))
     if len({result[path].shape for path in values}) > 1:
-        raise ExportError(
-            f"the datasets of {name} do not fit into one table; choose {_either(values)}"
-        )
+        names = f"{', '.join(values[:-1])} or {values[-1]}"
+        raise ExportError(f"the datasets of {name} do not fit into one table; choose {names}")
     sizes = _sizes(values[0], result[values[0]].shape)[bool(clock) :]
     columns = _names(values)
     if len(values) == 1 and sizes and len(names := NAMED.get(sizes[-1][0], ())) >= sizes[-1][1]:
@@ -109,23 +107,12 @@ def _members(result: Result, name: str) -> list[str]:
         known = list(DATASETS)
         return sorted(members, key=lambda path: known.index(path) if path in known else len(known))
     group = name.partition("/")[0]
-    groups = sorted({path.partition("/")[0] for path in result})
-    if group in STORED_BY and group not in groups:
+    if group in STORED_BY and not any(path.startswith(f"{group}/") for path in result):
         macro = STORED_BY[group]
         raise ExportError(
             f"the result has no {name}; add {macro} to the deck's program and run it again"
         )
-    names = sorted({*result, *groups})
-    near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
-    near = near or [path for path in names if path.rpartition("/")[2] == name]
-    hint = f"did you mean {_either(near)}?" if near else f"it has {_either(groups, 'and')}"
-    raise ExportError(f"the result has no dataset {name}; {hint}")
-
-
-def _either(names: Sequence[str], word: str = "or") -> str:
-    """Join names in words."""
-    *others, last = names
-    return f"{', '.join(others)} {word} {last}" if others else last
+    raise ExportError(f"the result has no dataset {name}{suggestion(name, result)}")
 
 
 def _names(paths: Sequence[str]) -> tuple[str, ...]:

@@ -11,7 +11,6 @@ Datasets are read in blocks of rows: memory does not grow with the results.
 
 from __future__ import annotations
 
-import difflib
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -24,7 +23,7 @@ from numpy.typing import NDArray
 from fecm._errors import FecmError
 from fecm.deck.records import DOF_NAMES
 from fecm.results.hdf5_reader import Contents, read
-from fecm.results.schema import DATASETS, FORMAT, SCALES, SWEEP, row_blocks
+from fecm.results.schema import DATASETS, FORMAT, SCALES, SWEEP, row_blocks, suggestion
 from fecm.results.tape_reader import SHEARS, TAPES, TapeText, W, read_tapes
 from fecm.results.tapes import CONTACT, CURVATURES
 
@@ -247,22 +246,9 @@ def _chosen(names: set[str], only: Sequence[str]) -> set[str]:
         plain = asked.strip("/")
         found = {name for name in names if name == plain or name.startswith(f"{plain}/")}
         if not found:
-            raise IncomparableError(f"there is no `{asked}` to compare{_hint(plain, names)}")
+            raise IncomparableError(f"there is no `{asked}` to compare{suggestion(plain, names)}")
         chosen |= found
     return chosen
-
-
-def _hint(asked: str, names: set[str]) -> str:
-    """Similar names."""
-    known = sorted(names | {name.rpartition("/")[0] for name in names} - {""})
-    last_parts = [name.rpartition("/")[2] for name in known]
-    close = difflib.get_close_matches(asked, last_parts, n=3) if "/" not in asked else []
-    alike = [name for name, last in zip(known, last_parts, strict=True) if last in (asked, *close)]
-    alike = alike or difflib.get_close_matches(asked, known, n=3)
-    if alike:
-        return f"; did you mean {' or '.join(alike)}?"
-    groups = sorted({name.partition("/")[0] for name in names})
-    return f"; there are {', '.join(groups)}" if groups else ""
 
 
 def _listed(a: Source, b: Source) -> list[dict[str, Any]]:

@@ -6,9 +6,10 @@ Shapes use the sizes of a run: ``rows`` of the group, ``numnp``, ``ndm``, ``ndf`
 
 from __future__ import annotations
 
+import difflib
 import math
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,6 +47,18 @@ def shown_apart(one: Any, other: Any, width: int = 60) -> tuple[str, str]:
     begin = max(0, same - width // 2)
     texts = [("…" if begin else "") + text[begin:] for text in whole]
     return shown(texts[0], width), shown(texts[1], width)
+
+
+def suggestion(asked: str, paths: Iterable[str]) -> str:
+    """End of a message about a missing dataset or group: similar names, or the groups."""
+    known = sorted({name for path in paths for name in (path, path.rpartition("/")[0])} - {""})
+    last_parts = [name.rpartition("/")[2] for name in known]
+    close = difflib.get_close_matches(asked, last_parts, n=3) if "/" not in asked else []
+    alike = [name for name, last in zip(known, last_parts, strict=True) if last in (asked, *close)]
+    if alike := alike or difflib.get_close_matches(asked, known, n=3):
+        return f"; did you mean {' or '.join(alike)}?"
+    groups = sorted({name.partition("/")[0] for name in known})
+    return f"; there are {', '.join(groups)}" if groups else ""
 
 
 def jsonable(value: Any) -> Any:

@@ -147,8 +147,9 @@ class _Lines:
         counts, rest = np.divmod(lengths, WIDTH)
         self.refuse(
             (rest != 0) | (counts < 1) | (counts > PER_LINE),
-            lambda n: f"a line of {lengths[n] + lead} characters does not consist of columns of "
-            f"{WIDTH}",
+            lambda n: (
+                f"a line of {lengths[n] + lead} characters does not consist of columns of {WIDTH}"
+            ),
         )
         return counts
 

@@ -210,46 +210,33 @@ def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
     """
     from fecm.results.hdf5_writer import writing
 
-    count = len(result)
+    units = {f"unit_{name}": unit for name, unit in result.units.items()}
+    columns = [
+        *((f"cases/{name}", values, f"{name} of every case", DIMENSIONS.get(name, ""))
+          for name, values in result.cases.items()),
+        *((f"summary/{name}", result.summary[name], *about) for name, about in SUMMARY.items()),
+        ("summary/status", result.summary["status"],
+         "ok, still in contact, or why the case failed", ""),
+        ("history/dt", result.dt, "time step of every case", "time"),
+        ("history/steps", result.steps, "number of steps of every case", ""),
+    ]  # fmt: skip
+    if (unconverged := result.unconverged_steps) is not None:
+        text = "steps whose contact iteration did not converge"
+        columns.append(("history/unsettled_steps", unconverged, text, ""))
+    if result.force is not None and len(result):
+        text = "contact force after every step"
+        columns.append(("history/force", result.force, text, "force"))
     with writing(path, overwrite=overwrite) as sink:
-        sink.attributes(
-            "",
-            {
-                "format": SWEEP,
-                "format_version": FORMAT_VERSION,
-                "fecm_version": __version__,
-                "title": result.title,
-                **{f"unit_{name}": unit for name, unit in result.units.items()},
-            },
-        )
+        about = {"format": SWEEP, "format_version": FORMAT_VERSION, "fecm_version": __version__}
+        sink.attributes("", {**about, "title": result.title, **units})
         sink.text("deck", result.deck, "the cards of the deck that was varied")
-
-        def store(path: str, values: Array, text: str, dimension: str = "") -> None:
+        for name, values, text, dimension in columns:
             if values.dtype.kind in "US":
-                sink.texts(path, values.tolist(), text)
-                return
+                sink.texts(name, values.tolist(), text)
+                continue
             dtype = "i8" if values.dtype.kind in "iu" else "f8"
-            dataset = Dataset(path, ("cases",), text, dimension, dtype)
-            sink.create(dataset, values.shape)
-            sink.write(path, 0, values)
-
-        for name, values in result.cases.items():
-            dimension = DIMENSIONS.get(name, "")
-            store(f"cases/{name}", values, f"{name} of every case", dimension)
-        for name, (text, dimension) in SUMMARY.items():
-            store(f"summary/{name}", result.summary[name], text, dimension)
-        store(
-            "summary/status",
-            result.summary["status"],
-            "ok, still in contact, or why the case failed",
-        )
-        store("history/dt", result.dt, "time step of every case", "time")
-        store("history/steps", result.steps, "number of steps of every case")
-        if result.unconverged_steps is not None:
-            text = "steps whose contact iteration did not converge"
-            store("history/unsettled_steps", result.unconverged_steps, text)
-        if result.force is not None and count:
-            store("history/force", result.force, "contact force after every step", "force")
+            sink.create(Dataset(name, ("cases",), text, dimension, dtype), values.shape)
+            sink.write(name, 0, values)
         for group, text in GROUPS.items():
             sink.attributes(group, {"description": text})
 

@@ -11,8 +11,8 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 from urllib.parse import urlsplit
@@ -50,7 +50,7 @@ def attempt(task: Task) -> Outcome:
         return run(task)
     except Exception as error:  # a failed case must not end the sweep
         reason = f"{type(error).__name__}: {error}"
-        return Outcome.failed(list(task.numbers), [reason] * len(task.numbers))
+        return Outcome.failed(task.numbers, [reason] * len(task.numbers))
 
 
 def run_serial(tasks: Sequence[Task], done: Done, idle: Idle) -> None:
@@ -71,10 +71,11 @@ def _end_with(parent: int) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def _finished(
-    running: dict[Future[Outcome], Task], idle: Idle
+def _run_on(
+    executor: Executor, tasks: Iterable[Task], idle: Idle
 ) -> Iterator[tuple[Task, Future[Outcome]]]:
-    """Yield tasks with their futures as they finish."""
+    """Run tasks on an executor; yield them with their futures as they finish."""
+    running = {executor.submit(attempt, task): task for task in tasks}
     while running:
         idle()
         for future in wait(running, timeout=LOOK, return_when=FIRST_COMPLETED).done:
@@ -87,14 +88,10 @@ def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> Non
     deaths = 0
     while left and deaths < DEATHS:
         before = len(left)
-        pool = ProcessPoolExecutor(
-            count, multiprocessing.get_context("spawn"), _end_with, (os.getpid(),)
-        )
+        context = multiprocessing.get_context("spawn")
+        pool = ProcessPoolExecutor(count, context, _end_with, (os.getpid(),))
         try:
-            running: dict[Future[Outcome], Task] = {
-                pool.submit(attempt, task): task for task in left.values()
-            }
-            for task, future in _finished(running, idle):
+            for task, future in _run_on(pool, list(left.values()), idle):
                 done(task, future.result())
                 del left[task.number]
         except BrokenProcessPool:
@@ -102,7 +99,7 @@ def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> Non
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
     for task in left.values():
-        done(task, Outcome.failed(list(task.numbers), [LOST] * len(task.numbers)))
+        done(task, Outcome.failed(task.numbers, [LOST] * len(task.numbers)))
 
 
 def _check_address(address: str) -> None:
@@ -143,11 +140,10 @@ def on_dask(tasks: Sequence[Task], address: str, done: Done, idle: Idle) -> None
     except (OSError, ValueError, TimeoutError) as error:
         raise SchedulerError(f"no Dask scheduler answers at {address} ({error})") from None
     with client:
-        executor = client.get_executor(pure=False)
-        for task, future in _finished({executor.submit(attempt, t): t for t in tasks}, idle):
+        for task, future in _run_on(client.get_executor(pure=False), tasks, idle):
             try:
                 outcome = future.result()
             except Exception as error:
                 reason = f"{LOST} ({type(error).__name__})"
-                outcome = Outcome.failed(list(task.numbers), [reason] * len(task.numbers))
+                outcome = Outcome.failed(task.numbers, [reason] * len(task.numbers))
             done(task, outcome)
