@@ -52,7 +52,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name when it is first asked for, so that `import fecm` costs nothing."""
+    """Import a public name on first access, so that `import fecm` is fast."""
     if name not in _HOMES:
         raise AttributeError(f"module 'fecm' has no attribute {name!r}")
     module, _, own = _HOMES[name].partition(":")

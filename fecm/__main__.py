@@ -10,23 +10,23 @@ from typing import NoReturn
 
 
 def _leave(number: int, frame: FrameType | None) -> None:
-    """End the program while it loads its parts, when there is nothing to tidy up."""
+    """End the program during imports, when there is nothing to clean up."""
     os._exit(128 + number)
 
 
-# Address space with which NumPy and SciPy load.  With less, OpenBLAS may not come back.
+# Address space that NumPy and SciPy need.  With less, OpenBLAS may hang.
 LEAST_SPACE = 600_000_000
 
 
 def _refuse(message: str) -> NoReturn:
-    """End the program before it has loaded what it needs for more."""
+    """Print an error and end the program, without the command line's modules."""
     with contextlib.suppress(OSError):
         os.write(2, f"fecm: error: {message}\n".encode())
     os._exit(2)
 
 
 def _address_space() -> int | None:
-    """Bytes of address space that the process may have (``ulimit -v``); None without a limit."""
+    """Limit of the address space in bytes (``ulimit -v``); None without a limit."""
     try:
         import resource
     except ImportError:  # Windows
@@ -36,8 +36,8 @@ def _address_space() -> int | None:
 
 
 def main() -> NoReturn:
-    """Run the command line and leave with its exit status."""
-    with contextlib.suppress(ValueError):  # only the main thread may do so
+    """Run the command line and exit with its status."""
+    with contextlib.suppress(ValueError):  # only in the main thread
         signal.signal(signal.SIGINT, _leave)
         signal.signal(signal.SIGTERM, _leave)
     space = _address_space()

@@ -1,8 +1,8 @@
-"""Output files: each is complete under its name, or what was there before is untouched.
+"""Output files: each is written completely, or an existing file is left unchanged.
 
-A file is written beside its final name, synced, and renamed when it is complete.  The partial file
-is locked while it is written, so that two processes never write the same output at a time; one
-without a lock was left by a process that has ended, and is removed.
+A file is written under a temporary name, synced, and renamed when it is complete.  This partial
+file is locked, so that two processes never write the same output at the same time; one without a
+lock was left by a process that has ended, and is removed.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 
 from fecm._errors import FecmError
 
-# Windows has neither.
+# Not available on Windows.
 NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
 NO_WAIT = getattr(os, "O_NONBLOCK", 0)
 
@@ -30,7 +30,7 @@ ATTEMPTS = 10
 
 
 class OutputError(FecmError, OSError):
-    """An output can't be written where it was asked for; the message says why."""
+    """An output can't be written; the message says why."""
 
 
 def check_outputs(
@@ -39,7 +39,7 @@ def check_outputs(
     inputs: Iterable[Path] = (),
     own: Iterable[Path] = (),
 ) -> None:
-    """Refuse outputs that clash, exist, or can't be written, before anything is computed.
+    """Refuse outputs that conflict, exist, or can't be written, before the computation.
 
     Parameters
     ----------
@@ -48,9 +48,9 @@ def check_outputs(
     overwrite : bool
         Whether files that exist may be replaced.
     inputs : iterable of Path
-        What the command reads; never replaced.
+        Files that the command reads; never replaced.
     own : iterable of Path
-        What the command writes besides, as checkpoints; no output may have such a name.
+        Other files that the command writes, such as checkpoints; no output may have their names.
 
     Raises
     ------
@@ -63,14 +63,14 @@ def check_outputs(
         if read & keys:
             raise OutputError(f"{path} is an input of this command; give the output another name")
         if taken & keys:
-            raise OutputError(f"{path} is named for two outputs; give each a name of its own")
+            raise OutputError(f"{path} is the name of two outputs; give them different names")
         taken |= keys
     for path in paths:
         _check(path, overwrite)
 
 
 def _keys(path: Path) -> set[object]:
-    """What two paths of one file have in common: its real path, and its identity if it exists."""
+    """Real path, and device and inode of an existing file: common to all paths of a file."""
     keys: set[object] = {os.path.realpath(path)}
     with contextlib.suppress(OSError):
         found = path.stat()
@@ -89,14 +89,14 @@ def _check(path: Path, overwrite: bool) -> None:
         raise OutputError(f"{path} exists already; --overwrite replaces it")
     if path.is_symlink() and not overwrite:
         raise OutputError(
-            f"{path} is a link to {target}, which does not exist; --overwrite makes it"
+            f"{path} is a link to {target}, which does not exist; --overwrite creates it"
         )
     if not _discard(partial_of(target)):
         raise OutputError(f"{path} is being written by another process")
 
 
 def _mode(path: Path) -> int | None:
-    """Kind and permissions of what a path leads to; None if there is nothing."""
+    """Type and permissions of a file, following links; None if it does not exist."""
     try:
         return path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):
@@ -108,50 +108,50 @@ def _refuse_special(path: Path, mode: int | None) -> None:
     if mode is not None and stat.S_ISDIR(mode):
         raise OutputError(f"{path} is a folder")
     if mode is not None and not stat.S_ISREG(mode):
-        raise OutputError(f"{path} is not an ordinary file")
+        raise OutputError(f"{path} is not a regular file")
 
 
 def final(path: Path) -> Path:
-    """The file that a path leads to: of a symbolic link its target, which need not exist.
+    """Target of a symbolic link, which need not exist; any other path itself.
 
     Raises
     ------
     OutputError
-        If links lead back to themselves.
+        If the links form a loop.
     """
     if not path.is_symlink():
         return path
     target = Path(os.path.realpath(path))
     if target.is_symlink():
-        raise OutputError(f"{path} is a link that leads back to itself")
+        raise OutputError(f"{path} is a link to itself")
     return target
 
 
 def partial_of(path: Path) -> Path:
-    """Where a file is written before it gets its name."""
+    """Temporary name under which a file is written."""
     return path.with_name(f".{path.stem}.partial{path.suffix}")
 
 
 @contextlib.contextmanager
 def beside(path: Path, *, overwrite: bool = True, follow: bool = True) -> Iterator[Path]:
-    """Give the path of an empty partial file that takes the final name if the block ends well.
+    """Yield the path of an empty partial file, which is renamed if the block succeeds.
 
-    It has the final name's suffix, by which some writers choose their format.  A file that is
-    replaced keeps its permissions, and where the user may set them its owner and group; other hard
-    links to it keep the old contents.
+    It has the suffix of the final name, by which some writers choose their format.  A replaced file
+    keeps its permissions and, where the user may set them, its owner and group; other hard links to
+    it keep the old contents.
 
     Parameters
     ----------
     path : Path
     overwrite : bool
-        Replace a file that exists, even one that was made meanwhile.
+        Replace an existing file, even one created during the block.
     follow : bool
-        Of a symbolic link replace the target and keep the link, instead of the other way round.
+        Replace the target of a symbolic link instead of the link.
 
     Raises
     ------
     OSError
-        If the file can't be written; what was under the final name is then untouched.
+        If the file can't be written; an existing one is then unchanged.
     """
     target = final(path) if follow else path
     partial = partial_of(target)
@@ -173,7 +173,7 @@ def beside(path: Path, *, overwrite: bool = True, follow: bool = True) -> Iterat
 
 @contextlib.contextmanager
 def naming(path: Path, partial: Path | None = None) -> Iterator[None]:
-    """Name a file in errors of the system that name nothing, or its partial file."""
+    """Add the file's name to operating system errors without one, or with its temporary name."""
     try:
         yield
     except OSError as error:
@@ -199,7 +199,7 @@ def _create(path: Path, partial: Path, mode: int) -> int:
 
 
 def _discard(partial: Path) -> bool:
-    """Remove a partial file unless somebody is writing it; tell whether it is gone."""
+    """Remove a partial file unless it is being written; return whether it is removed."""
     try:
         handle = os.open(partial, os.O_RDONLY | NO_FOLLOW | NO_WAIT)
     except FileNotFoundError:
@@ -222,7 +222,10 @@ def _discard(partial: Path) -> bool:
 
 
 def _lock(handle: int, *, wait: bool = False) -> bool:
-    """Lock a file; False if another process holds it.  Some systems have no locks."""
+    """Lock a file; return False if another process holds the lock.
+
+    Some file systems have no locks.
+    """
     try:
         import fcntl
 
@@ -243,9 +246,9 @@ def _is(handle: int, path: Path) -> bool:
 
 
 def _finish(handle: int, partial: Path, target: Path, overwrite: bool) -> None:
-    """Bring a partial file to the disk and give it its final name."""
+    """Sync a partial file and give it its final name."""
     if not _is(handle, partial):
-        raise OutputError(f"{target}: its partial file {partial} was removed while it was written")
+        raise OutputError(f"{target}: its partial file {partial} was removed during writing")
     sync(handle)
     if overwrite:
         with contextlib.suppress(FileNotFoundError):
@@ -264,7 +267,7 @@ def _finish(handle: int, partial: Path, target: Path, overwrite: bool) -> None:
 
 
 def sync(handle: int) -> None:
-    """Bring an open file to the disk, as far as its file system can."""
+    """Sync an open file, if its file system supports that."""
     try:
         os.fsync(handle)
     except OSError as error:
@@ -273,7 +276,7 @@ def sync(handle: int) -> None:
 
 
 def _keep_permissions(handle: int, old: os.stat_result) -> None:
-    """Give an open file the owner, group and permissions of another one, as far as possible."""
+    """Copy owner, group and permissions to an open file, as far as possible."""
     if not stat.S_ISREG(old.st_mode):
         return
     for owner, group in ((old.st_uid, -1), (-1, old.st_gid)):
@@ -284,7 +287,7 @@ def _keep_permissions(handle: int, old: os.stat_result) -> None:
 
 
 def _rename_exclusively(partial: Path, target: Path) -> None:
-    """Rename a file, but never onto one that exists."""
+    """Rename a file without replacing an existing one."""
     try:
         try:
             os.link(partial, target)
@@ -295,12 +298,12 @@ def _rename_exclusively(partial: Path, target: Path) -> None:
             partial.replace(target)
     except FileExistsError:
         raise OutputError(
-            f"{target} was made by another program meanwhile and is not replaced"
+            f"{target} was created by another program meanwhile and is not replaced"
         ) from None
 
 
 def open_ordinary(path: Path, flags: int = os.O_RDONLY) -> BinaryIO:
-    """Open an ordinary file that the program itself has named; never through a link.
+    """Open a regular file named by the program itself; links are not followed.
 
     Raises
     ------
@@ -310,15 +313,15 @@ def open_ordinary(path: Path, flags: int = os.O_RDONLY) -> BinaryIO:
     handle = os.open(path, flags | NO_FOLLOW | NO_WAIT, 0o666)
     if not stat.S_ISREG(os.fstat(handle).st_mode):
         os.close(handle)
-        raise OutputError(f"{path} is not an ordinary file")
+        raise OutputError(f"{path} is not a regular file")
     return os.fdopen(handle, "rb" if flags == os.O_RDONLY else "r+b")
 
 
 def packed(arrays: Mapping[str, Any]) -> memoryview:
-    """Arrays as the bytes of an .npz file.
+    """Contents of an .npz file of arrays.
 
-    They are put together in memory: where a disk is full, NumPy before version 2 leaves the archive
-    open, which complains once more at the end of the program.
+    Built in memory: if the disk is full, NumPy before version 2 leaves the archive open, which
+    reports the error again when the program ends.
     """
     import numpy as np
 
@@ -328,7 +331,7 @@ def packed(arrays: Mapping[str, Any]) -> memoryview:
 
 
 def clear_partials(folders: Iterable[Path]) -> None:
-    """Remove the partial files in some folders that nobody is writing."""
+    """Remove the partial files in some folders that no process is writing."""
     for folder in folders:
         for partial in folder.glob(".*.partial*"):
             with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""Memory that is free, as far as the system tells."""
+"""Free memory, as the operating system reports it."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ CGROUP = Path("/proc/self/cgroup")
 CGROUPS = Path("/sys/fs/cgroup")
 
 
-# Bytes that may be taken without a look at what is free.
+# Bytes that are allocated without a check.
 UNNOTICED = 100_000_000
 
 
 class NotEnoughMemoryError(FecmError, MemoryError):
-    """Something takes more memory than is free; the message says how much."""
+    """More memory is needed than is free; the message contains both numbers."""
 
 
 def available() -> int | None:
-    """Bytes that can be taken without swapping; None where the system does not tell.
+    """Bytes that can be allocated without swapping; None if the system does not report them.
 
-    The least of what the kernel estimates (MemAvailable, proc(5)) and what the limits of the own
-    control group leave, as those of a container or a batch job (memory.max, cgroups(7)).
+    The smallest of the kernel's estimate (MemAvailable, proc(5)) and the remainders of the limits
+    of the control groups, such as those of a container or a batch job (memory.max, cgroups(7)).
     """
     known = [count for count in (_of_machine(), *_of_groups()) if count is not None]
     return max(0, min(known)) if known else None
 
 
 def require(count: int, what: str) -> None:
-    """Refuse to take more memory than is free.
+    """Refuse to allocate more memory than is free.
 
     Raises
     ------
@@ -50,17 +50,16 @@ def require(count: int, what: str) -> None:
 
 
 def check(what: str, needed: Callable[[bool], int], remedy: Callable[[int], str]) -> None:
-    """Refuse to begin something that takes more memory than is free.
+    """Refuse a computation that needs more memory than is free.
 
     Parameters
     ----------
     what : str
-        What it is.
+        Its name.
     needed : callable
-        Gives the bytes that it takes: a quick bound for False, asked for first, or all that is
-        known for True.
+        Returns the bytes that it needs: a quick bound for False, the best estimate for True.
     remedy : callable
-        Given the bytes that are free, what to do about it.
+        Returns advice for a number of free bytes.
 
     Raises
     ------
@@ -94,21 +93,21 @@ def _of_machine() -> int | None:
 
 
 def _of_groups() -> list[int]:
-    """What the own control group and those around it leave."""
+    """Remaining bytes of the process's control group and of those around it."""
     left: list[int] = []
     with contextlib.suppress(OSError, ValueError, IndexError):
         (own,) = [line[3:] for line in CGROUP.read_text().splitlines() if line.startswith("0::")]
         folder = CGROUPS / own.strip("/")
         while folder != CGROUPS.parent:
             with contextlib.suppress(OSError, ValueError):
-                most = int((folder / "memory.max").read_text())  # "max" is no number
+                most = int((folder / "memory.max").read_text())  # "max" is not a number
                 left.append(most - int((folder / "memory.current").read_text()))
             folder = folder.parent
     return left
 
 
 def format_bytes(count: float) -> str:
-    """A number of bytes as a person says it."""
+    """Format a number of bytes with a unit."""
     for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
         if count >= size:
             return f"{count / size:.3g} {unit}"

@@ -1,4 +1,4 @@
-"""What Python users call: read a deck, run it, load a result."""
+"""Python interface: load and check a deck, run it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class LoadedDeck:
     problems : list of Problem
         The problems that could be read.
     findings : list of Finding
-        Everything that was found, in the deck's order.
+        All findings, in the deck's order.
     """
 
     source: str
@@ -55,10 +55,10 @@ def load_deck(path_or_text: str | Path | Deck, mode: str = REPORT) -> LoadedDeck
     Parameters
     ----------
     path_or_text : str, Path or Deck
-        A file's path, a deck's text, or a model made in Python.
+        A file's path, a deck's text, or a model built in Python.
     mode : str
-        In listing mode blanks inside numbers are zeros, and what the printed program can't compute
-        is an error.
+        In listing mode blanks inside numbers are zeros, and decks that the printed program can't
+        compute are errors.
 
     Raises
     ------
@@ -100,21 +100,20 @@ def run(
     Parameters
     ----------
     deck : str, Path or Deck
-        A file's path, a deck's text, or a model made in Python.
+        A file's path, a deck's text, or a model built in Python.
     mode : str
         ``"report"`` or ``"listing"``.
     slips : iterable of str
-        Single slips to add to report mode.
+        Slips to add to report mode.
     output : str or Path, optional
-        Result file to write, in place of an earlier one; a second problem goes to ``-2.h5``, and so
-        on.  Without it nothing is written.
+        Result file, which is overwritten; a second problem goes to ``-2.h5``, and so on.  Nothing
+        is written by default.
     force : bool
-        Run with a time step above the critical one, or with a checkerboard motion (E321), all the
-        same.
+        Run even if the time step is above the critical one, or with a checkerboard motion (E321).
     solver : str
-        How K·u is computed: ``"auto"`` as suits the mesh, ``"csr"`` by a sparse matrix.
+        How K·u is computed: ``"auto"`` depends on the mesh, ``"csr"`` uses a sparse matrix.
     threads : int
-        Threads that share the work of a step; 0 takes every core for a large mesh. The result does
+        Threads that share the work of a step; 0 uses every core for a large mesh.  The result does
         not depend on it.
     rod_mass : str
         The projectile's mass matrix: ``"lumped"`` as in the report's program, or ``"consistent"``.
@@ -122,24 +121,24 @@ def run(
         The projectile's integration: ``"wilson"`` as in the report's program, or
         ``"average-acceleration"``.
     energy_limit : float
-        Relative error of the energy balance that ends a run without slips.
+        Relative error of the energy balance above which a run without slips ends.
 
     Returns
     -------
     Result or list of Result
-        A list where the deck holds several problems.
+        A list if the deck has several problems.
 
     Raises
     ------
     DeckError
         If the deck has errors.
     DivergenceError
-        If the motion grows without bound, or the energy balance passes its limit.
+        If the motion grows without bound, or the energy balance exceeds its limit.
     ValueError
         If the mode, a slip, the solver, the rod's mass or its integrator is unknown, or a number
         is invalid.
     NotEnoughMemoryError
-        If the run takes more memory than is free: a MemoryError.
+        If the run needs more memory than is free; a MemoryError.
     OSError
         If a file can't be read or written.
 

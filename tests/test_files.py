@@ -58,7 +58,7 @@ def test_outputs_are_neither_each_other_nor_inputs(
     before = names(folder)
     done = call(*arguments, "--overwrite")
     assert done.exit_code == 2
-    assert "an input of this command" in done.stderr or "named for two outputs" in done.stderr
+    assert "an input of this command" in done.stderr or "the name of two outputs" in done.stderr
     assert done.stdout == ""
     assert names(folder) == before
     assert Path("d.inp").read_text() == small()
@@ -89,7 +89,7 @@ def test_what_is_no_ordinary_file_is_never_replaced(
     before = Path("out").lstat()
     done = call(*arguments, "out")
     assert done.exit_code == 2
-    assert "out is not an ordinary file" in done.stderr or "out is a folder" in done.stderr
+    assert "out is not a regular file" in done.stderr or "out is a folder" in done.stderr
     assert Path("out").lstat() == before
     assert names(folder) == ["d.inp", "out", "two.inp"]
     with pytest.raises(OutputError), beside(Path("out")):
@@ -105,7 +105,7 @@ def test_of_a_link_the_target_is_replaced_and_a_dangling_one_is_refused(folder: 
     Path("dangling.h5").symlink_to("far.h5")
     refused = call("run", "d.inp", "-o", "dangling.h5")
     assert refused.exit_code == 2
-    assert "does not exist; --overwrite makes it" in refused.stderr
+    assert "does not exist; --overwrite creates it" in refused.stderr
     assert not Path("far.h5").exists()
     assert call("run", "d.inp", "-o", "dangling.h5", "--overwrite").exit_code == 0
     assert Path("dangling.h5").is_symlink()
@@ -177,7 +177,7 @@ def test_a_file_made_meanwhile_is_not_replaced_unasked(
     with contextlib.ExitStack() as stack:
         stack.enter_context(beside(Path("x.h5"), overwrite=False)).write_text("mine")
         Path("x.h5").write_text("theirs")
-        with pytest.raises(OutputError, match=r"x\.h5 was made by another program meanwhile"):
+        with pytest.raises(OutputError, match=r"x\.h5 was created by another program meanwhile"):
             stack.close()
     assert Path("x.h5").read_text() == "theirs"
     with beside(Path("y.h5"), overwrite=False) as partial:
@@ -240,7 +240,7 @@ def test_a_partial_file_that_somebody_removes_is_an_error(folder: Path) -> None:
         partial = stack.enter_context(beside(Path("x.h5")))
         partial.unlink()
         partial.write_text("another one")
-        with pytest.raises(OutputError, match="was removed while"):
+        with pytest.raises(OutputError, match="was removed during"):
             stack.close()
     assert not Path("x.h5").exists()
 
@@ -328,5 +328,5 @@ def test_the_advice_after_another_choice_of_options_can_be_followed(folder: Path
 def test_of_many_outputs_the_one_that_is_named_twice_is_found(folder: Path) -> None:
     paths = [Path(f"x-{n}.h5") for n in range(300)]
     check_outputs(paths, overwrite=False, inputs=[Path("d.inp")])
-    with pytest.raises(OutputError, match=r"x-7\.h5 is named for two"):
+    with pytest.raises(OutputError, match=r"x-7\.h5 is the name of two"):
         check_outputs([*paths, paths[7]], overwrite=False)

@@ -119,7 +119,7 @@ def test_a_list_names_the_cases_without_computing_them(monkeypatch: pytest.Monke
 def test_what_can_not_be_meant_is_refused() -> None:
     done = call("verify", "patches")
     assert_unusable(done)
-    assert "no case patches; the cases are isotropic-ply, cross-ply" in done.stderr
+    assert "unknown case patches; the cases are isotropic-ply, cross-ply" in done.stderr
     for options in (("--list",), ("--format", "json")):
         assert_unusable(call("verify", "--markdown", *options))
 

@@ -299,7 +299,7 @@ def test_the_picture_of_fronts_shows_circle_rays_fronts_and_cusps() -> None:
         (("fronts", LONG, "--time", "1e308"), "overflow"),
         (("fronts", LONG, "--time", "1", "--radius", "x"), "'--radius': 'x' is not a valid number"),
         (("speeds", LONG, "--plot", "x.jpg"), "written as .png, .svg, .pdf"),
-        (("speeds", LONG, "--plot", "x.png", "-o", "x.png"), "named for two outputs"),
+        (("speeds", LONG, "--plot", "x.png", "-o", "x.png"), "the name of two outputs"),
         (("speeds", LONG, "-o", "no/such/folder.csv"), "there is no folder"),
         (("fronts", LONG, *("--time", "1e-6,2e-6,3e-6,4e-6,5e-6,6e-6,7e-6,8e-6"),
           "--plot", "x.png"), "at most 7 can"),

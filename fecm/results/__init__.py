@@ -1,1 +1,1 @@
-"""Results: what a run gives, in memory, in HDF5 and as the program's own tapes."""
+"""Results of runs: in memory, in HDF5 files and on the printed program's tapes."""

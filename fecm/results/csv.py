@@ -83,8 +83,8 @@ def table(result: Result, name: str = "history") -> Table:
     if not values:  # only step or time
         return Table(_names(clock), zip(*(result[path].tolist() for path in clock), strict=True))
     if len({result[path].shape for path in values}) > 1:
-        names = f"{', '.join(values[:-1])} or {values[-1]}"
-        raise ExportError(f"the datasets of {name} do not fit into one table; choose {names}")
+        choice = f"{', '.join(values[:-1])} or {values[-1]}"
+        raise ExportError(f"the datasets of {name} do not fit into one table; choose {choice}")
     sizes = _sizes(values[0], result[values[0]].shape)[bool(clock) :]
     columns = _names(values)
     if len(values) == 1 and sizes and len(names := NAMED.get(sizes[-1][0], ())) >= sizes[-1][1]:

@@ -70,7 +70,7 @@ SCALE_NAMES = {
 
 
 class IncomparableError(FecmError, ValueError):
-    """The sources have nothing in common, or lack what was asked for."""
+    """The sources can't be compared, or lack the requested datasets."""
 
 
 Source = Contents | TapeText

@@ -186,7 +186,7 @@ def _check_links(path: Path, file: h5py.File) -> None:
         return None if info.type == h5py.h5l.TYPE_HARD else (_text(name), info.type)
 
     if link := file.id.links.visit(found, info=True):
-        what = LINKS.get(link[1], "a link of unknown kind")
+        what = LINKS.get(link[1], "a link of unsupported kind")
         raise ResultFileError(f"{path}: {link[0]} is {what}; links are not followed")
 
 

@@ -99,7 +99,7 @@ class Result:
 
     @property
     def still_in_contact(self) -> bool:
-        """Whether the run ended in contact, so that its final values are unknown."""
+        """Whether the run ended in contact, so that its final values are not known."""
         return f"{HISTORY}/force" in self and still_in_contact(self[f"{HISTORY}/force"])
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -143,7 +143,7 @@ class Result:
         Raises
         ------
         PlotError
-            If the result lacks what the kind shows, or the options do not fit.
+            If the result lacks the data, or the options are invalid.
         ImportError
             If matplotlib is not installed.
         """
@@ -223,7 +223,7 @@ def result_of(contents: Contents) -> Result:
 def still_in_contact(force: Array) -> bool:
     """Whether a history ends in contact.
 
-    End of contact, permanent indentation and final energies are then unknown.
+    End of contact, permanent indentation and final energies are then not known.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from fecm._errors import FecmError
 
 
 class ExportError(FecmError, ValueError):
-    """A result lacks what an export needs, or the request is invalid."""
+    """A result lacks the data for an export, or the request is invalid."""
 
 
 def printable(text: str) -> str:

@@ -51,7 +51,7 @@ class TapeText:
         Datasets by their paths in a result: ``tape3/w`` (rows, nodes), ``tape8/kappa_x`` etc.
         (rows, elements, points), ``tape9/force`` etc. (rows,).
     lines : bool
-        Whether ``tape3/w`` has the shape (lines, 6), because the number of nodes is unknown.
+        Whether ``tape3/w`` has the shape (lines, 6), because the number of nodes is not known.
     """
 
     arrays: Mapping[str, Array]

@@ -76,7 +76,7 @@ def write_vtkhdf(
 
 
 def _cells(elements: Array) -> tuple[Ints, Ints, Ints]:
-    """Connectivity, offsets and types; elements unknown to VTK are reduced to corners."""
+    """Connectivity, offsets and types; elements that VTK lacks are reduced to corners."""
     count = np.cumprod(elements > 0, axis=1).sum(axis=1)  # nodes before the first absent one
     whole = (count == (elements > 0).sum(axis=1)) & np.isin(count, list(TYPES))
     used = np.where(whole, count, np.minimum(count, CORNERS))

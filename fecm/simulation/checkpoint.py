@@ -3,7 +3,7 @@
 There are two files.  The checkpoint holds the state; it is written under another name, synced and
 renamed.  The spool holds everything stored so far and only grows.  A checkpoint names its part of
 the spool by length and checksum, so that the last checkpoint is valid however a run ends.  A
-resumed run gives the same bytes as one that was never stopped.
+resumed run gives the same bytes as an uninterrupted one.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def identity(simulation: Simulation) -> dict[str, Any]:
     }
 
 
-# What a message says if they differ.
+# Messages if they differ.
 _NAMES = {
     "format": "another kind of checkpoint",
     "version": "another version of fecm",
@@ -122,7 +122,7 @@ class Checkpointer:
         Raises
         ------
         CheckpointError
-            If there is no checkpoint, it is damaged, or belongs to another run.
+            If the checkpoint is missing, damaged, or belongs to another run.
         OSError
             If it can't be read.
         """

@@ -1,4 +1,4 @@
-"""The judge of a run: divergence, the energy balance, and the likely cause."""
+"""Checks of a run: divergence, the energy balance, and the likely cause."""
 
 from __future__ import annotations
 
@@ -57,11 +57,11 @@ class EnergyGuard:
     limit: float | None
 
     def __call__(self, block: Mapping[str, Floats], initial: float) -> None:
-        """Judge a block of steps.
+        """Check a block of steps.
 
         The error is relative to the energy supplied up to the end of the block: in its first steps
-        a load has done almost no work.  The work of one step is no error: the work belongs to the
-        step, the energies to its end.
+        a load has done almost no work.  The work of one step is not counted as an error: the
+        work belongs to the step, the energies to its end.
 
         Parameters
         ----------

@@ -187,7 +187,7 @@ def store_stresses(run: Simulation, n: int) -> None:
 
 
 def check(run: Simulation) -> None:
-    """CHEC; ends the program under its slip."""
+    """CHEC: store and print sizes; ends the program under its slip."""
     plate = run.model.plate
     profile = plate.profile()
     run.sink.attributes("mesh", {"equations": plate.neq, "profile": profile})
@@ -218,7 +218,7 @@ ACTIONS: dict[str, Callable[..., bool | None]] = {
 
 
 def bind(run: Simulation, macro: Macro) -> Action:
-    """Return what a macro does."""
+    """Return the action of a macro."""
     action = ACTIONS[macro.word]
     if WORDS[macro.word].value:
         return partial(action, run, number(macro))

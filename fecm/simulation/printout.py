@@ -1,6 +1,6 @@
-"""The printed output: what the original program sent to its printer, in a readable layout.
+"""The printed output of the original program, in a readable layout.
 
-PRIN and NOPR switch the echo of the mesh on and off, PAGE gives the carriage control at the head of
+PRIN and NOPR switch the echo of the mesh on and off, PAGE sets the carriage control at the head of
 a page: ``1`` a new page (a form feed), ``0`` a blank line, ``-`` two of them.
 """
 
@@ -43,7 +43,7 @@ class Printer:
     Parameters
     ----------
     file : text file, optional
-        Where to; without one nothing is printed.
+        Output file; nothing is printed by default.
     """
 
     def __init__(self, file: TextIO | None = None) -> None:
@@ -58,7 +58,7 @@ class Printer:
         return self._file is not None
 
     def state(self) -> dict[str, Any]:
-        """What was printed so far, and what the next page needs."""
+        """Text printed so far, and the head of the next page."""
         text = ""
         if self._file is not None:
             self._file.flush()

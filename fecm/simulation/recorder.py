@@ -150,7 +150,7 @@ class Recorder:
         return state
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Continue from what :meth:`state` returned."""
+        """Continue from a :meth:`state`."""
         self.steps.restore(subset(state, "steps/"))
         for group, buffer in self._buffers.items():
             buffer.restore(subset(state, f"rows/{group}/"))

@@ -95,11 +95,11 @@ def _write_footer(simulation: Simulation) -> None:
 
 
 def _judge(simulation: Simulation) -> None:
-    """Add notes on what makes the result doubtful."""
+    """Add notes on reasons to doubt the result."""
     state, enforced = simulation.state, simulation.rules.enforces_energy_limit
     error, step = state.balance.worst_error, state.balance.worst_step
     if error > ENERGY_WARNING:
-        why = "" if enforced else " (slips are on: it is not judged)"
+        why = "" if enforced else " (not a failure, as slips are active)"
         state.notes.append(
             f"the energy balance is off by {error:.2%} of the supplied energy, at step {step}{why}"
         )

@@ -49,7 +49,7 @@ class Simulation:
     model : ImpactModel
         Plate, projectile and contact.
     state : RunState
-        What a checkpoint stores.
+        State that a checkpoint stores.
     interval : int
         Steps between two calls of the observers.
     """
@@ -129,7 +129,7 @@ class Simulation:
         }  # fmt: skip
 
     def restore(self, stored: dict[str, Any]) -> None:
-        """Continue from what another simulation of the same problem saved."""
+        """Continue from the saved state of another simulation of the same problem."""
         run_state.restore(self.state, "state", stored)
         if self.model.impact is not None:
             self.model.impact.first_dt = self.state.first_dt

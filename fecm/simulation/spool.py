@@ -1,7 +1,7 @@
 """A journal of the operations on a result file, from which an identical file can be built.
 
 Each operation is appended to a second file, the spool: a line of JSON, followed by the bytes of its
-rows if it has any.  Replaying the spool gives a file of the same bytes.
+rows if it has any.  Replaying the spool produces a file of the same bytes.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The state of a run, apart from what computes it."""
+"""The state of a run, as stored in a checkpoint."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TOLERANCE = 1.0e-9
 
 @dataclass
 class RunState:
-    """What one macro hands to the next; a checkpoint stores every field.
+    """State passed from one macro to the next; a checkpoint stores every field.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class RunState:
 
 
 def save(state: object, name: str) -> dict[str, Any]:
-    """Values and arrays of a dataclass and of those in it, by path; a shared one only once."""
+    """Values and arrays of a dataclass and its members, by path; shared members only once."""
     return dict(_leaves(state, name, set()))
 
 
@@ -109,7 +109,7 @@ def _leaves(value: Any, path: str, seen: set[int]) -> Iterator[tuple[str, Any]]:
 
 
 def restore(state: object, name: str, stored: Mapping[str, Any]) -> None:
-    """Set a dataclass to what :func:`save` returned for another one of its kind.
+    """Set a dataclass to the state that :func:`save` returned for another of the same type.
 
     Raises
     ------

@@ -129,7 +129,7 @@ class StepRecorder:
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Continue from what :meth:`state` returned."""
+        """Continue from a :meth:`state`."""
         self._rows = [tuple(row) for row in state["rows"].tolist()]
         self._contact_rows = list(state["contact"])
         self._rod[: len(self._rows)] = state["rod"]

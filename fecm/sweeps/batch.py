@@ -1,7 +1,7 @@
 """Run cases of a sweep: together if they share a plate, otherwise one by one.
 
 Cases share a plate if they differ only in projectile, impact velocity or contact law.  The plate is
-then stepped once under a unit force; the convolution of its response gives every case.
+then stepped once under a unit force; every case follows by convolution with its response.
 """
 
 from __future__ import annotations

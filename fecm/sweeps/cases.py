@@ -132,7 +132,7 @@ def checked(cases: Iterable[Mapping[str, Value]]) -> list[Case]:
         for case in cases
     ]  # fmt: skip
     if not made:
-        raise CasesError("there are no cases")
+        raise CasesError("a sweep needs at least one case")
     for number, case in enumerate(made):
         for name in case:
             _known(name, f"case {number}")

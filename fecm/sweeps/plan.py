@@ -79,7 +79,7 @@ def plan(checked: Problem, cases: Sequence[Case], *, history: bool = False) -> P
     if not any(macro.word == "RODP" for macro in checked.deck.macros):
         raise CasesError("the deck has no impact step (RODP); there is nothing to sweep")
     if not cases:
-        raise CasesError("there are no cases")
+        raise CasesError("a sweep needs at least one case")
     own = "dt" not in cases[0] and not {"impact_node", *CONTACT}.issuperset(cases[0])
     clock = clock_of(checked) if own else None
     return Plan(checked.deck, tuple(cases), history, clock)

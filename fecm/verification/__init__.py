@@ -59,5 +59,5 @@ def chosen(names: Iterable[str] = ()) -> list[Case]:
     known = [one.name for one in CASES]
     for name in wanted:
         if name not in known:
-            raise UnknownCaseError(f"there is no case {name}; the cases are {', '.join(known)}")
+            raise UnknownCaseError(f"unknown case {name}; the cases are {', '.join(known)}")
     return [one for one in CASES if not wanted or one.name in wanted]

@@ -70,7 +70,7 @@ def edge_forces(grid: Grid, x: Sequence[float], y: Sequence[float]) -> Floats:
 
 
 def loaded_rectangle(x: Sequence[float], y: Sequence[float], *, shears: bool = False) -> Deck:
-    """Make a rectangle of [0/45] under edge tractions, on supports that bear no load.
+    """Build a rectangle of [0/45] under edge tractions, on supports that bear no load.
 
     With `shears` only w moves, and a shear correction factor acts.
     """
@@ -130,7 +130,7 @@ ON_TAPE8 = ("kappa_x", "kappa_y", "kappa_xy", "gamma_yz", "gamma_xz")
 
 
 def prescribed_strains() -> Deck:
-    """Make a plate whose nodes are held in a field of constant strains, but for one w that is hit.
+    """Build a plate whose nodes are held in a field of constant strains, but for one w that is hit.
 
     A very slow rigid mass hits the middle of the first element for one step: the other elements
     keep the field.
@@ -262,7 +262,7 @@ DEFLECTION, STRAIN = _forced(STEPS * DT)
 
 
 def forced_plate() -> Deck:
-    """Make the plate of [0/90] under a uniform load that PROP varies as sin²."""
+    """Build the plate of [0/90] under a uniform load that PROP varies as sin²."""
     steps = (
         Macro("LMAS"), Macro("DT", value=DT), Macro("PROP", value=1.0),
         Macro("LOOP", value=float(STEPS)), Macro("TIME"), Macro("EXCD"),

@@ -1,4 +1,4 @@
-"""Decks of the verification cases, made in Python."""
+"""Decks of the verification cases, built in Python."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NODAL_POINTS = -3
 
 
 def isotropic(e: float, nu: float, rho: float, shear_factor: float = 1.0) -> Ply:
-    """Make an isotropic ply; the factor multiplies its transverse shear moduli."""
+    """Build an isotropic ply; the factor multiplies its transverse shear moduli."""
     g = e / (2.0 * (1.0 + nu))
     return Ply(rho, nu, e, e, g, shear_factor * g, shear_factor * g)
 
@@ -28,7 +28,7 @@ def isotropic(e: float, nu: float, rho: float, shear_factor: float = 1.0) -> Ply
 def material(
     ply: Ply, angles: Sequence[float], thickness: float, shear_order: int = ORDER
 ) -> Material:
-    """Make a MATE segment of layers of one thickness."""
+    """Build a MATE segment of layers of one thickness."""
     layers = tuple(Layer(n, angle, thickness) for n, angle in enumerate(angles, start=1))
     total = float(f"{len(layers) * thickness:.9g}")
     return Material(Integration(ORDER, shear_order, NODAL_POINTS, total), ply, layers)
@@ -37,7 +37,7 @@ def material(
 def deck(
     title: str, grid: Grid, segments: Iterable[Segment | None], macros: Iterable[Macro]
 ) -> Deck:
-    """Make a deck of 9-node elements on a grid's numbering."""
+    """Build a deck of 9-node elements on a grid's numbering."""
     given = tuple(segment for segment in segments if segment is not None)
     layers = next(len(s.layers) for s in given if isinstance(s, Material))
     control = Control(grid.nodes, grid.elements, layers, 2, 5, 9)
@@ -82,7 +82,7 @@ def constant_strains(
 
 
 def forces(field: Floats, nodes: Iterable[int] | None = None) -> Forces:
-    """Make a FORC segment of the rows of a field, of all or of some nodes from 0."""
+    """Build a FORC segment of the rows of a field, of all or of some nodes from 0."""
     chosen = range(len(field)) if nodes is None else nodes
     return Forces(tuple(NodeValues(n + 1, 0, tuple(field[n].tolist())) for n in chosen))
 
@@ -111,7 +111,7 @@ def quarter_plate(
     supports: Supports = BENDING,
     others: Sequence[Segment] = (),
 ) -> Deck:
-    """Make a quarter of a simply supported square plate of side 1.
+    """Build a quarter of a simply supported square plate of side 1.
 
     x = 0 and y = 0 are lines of symmetry, so that node 1 is the middle.
 
@@ -125,7 +125,7 @@ def quarter_plate(
         Uniform load, force/area.
     supports : Supports
     others : sequence of Segment
-        Further segments: what hits the plate, gages.
+        Further segments, such as impact and gages.
     """
     grid = Grid(uniform(0.5, elements), uniform(0.5, elements))
     boundary = grid.boundary(*supports)
@@ -145,7 +145,7 @@ def weights(coordinates: Sequence[float]) -> list[float]:
 
 
 def uniform_load(grid: Grid, load: float) -> Forces:
-    """Make consistent nodal forces of a uniform load: Simpson's weights in both directions.
+    """Build consistent nodal forces of a uniform load: Simpson's weights in both directions.
 
     The last line in each direction is held, so that a value there would be a displacement.
     """
@@ -163,7 +163,7 @@ def struck_plate(
     grid: Grid, plate: Material, projectile: Projectile | None, velocity: float,
     law: Indentation, dt: float, steps: int,
 ) -> Deck:  # fmt: skip
-    """Make a plate on no supports that is struck in its middle."""
+    """Build a plate on no supports that is struck in its middle."""
     middle = grid.nearest(grid.columns[-1].end / 2.0, grid.rows[-1].end / 2.0)[0]
     boundary = grid.boundary((1, 1, 0, 0, 0), {})
     segments = (
@@ -173,7 +173,7 @@ def struck_plate(
 
 
 def report_impact(steps: int = 4000) -> Deck:
-    """Make the report's experiment: 115 in/s on a plate of 20 layers (lb, in, s)."""
+    """Build the report's experiment: 115 in/s on a plate of 20 layers (lb, in, s)."""
     grid = Grid(
         [Section(0.0, 1.5, 3), Section(1.5, 4.5, 8), Section(4.5, 6.0, 3)],
         [Section(0.0, 0.5, 1), Section(0.5, 3.5, 8), Section(3.5, 4.0, 1)],

@@ -31,12 +31,12 @@ STIFF = "8450 steps; the error falls with the square of the step"
 
 
 def elastic(k: float) -> Indentation:
-    """Make Hertz' law, which leaves nothing behind."""
+    """Build Hertz' law, without permanent indentation."""
     return Indentation(k, 1.0, 0.0, 1.5)
 
 
 def rigid_target() -> Deck:
-    """Make a rigid mass that hits a plate a thousand times as stiff and heavy as any."""
+    """Build a rigid mass that hits a plate a thousand times as stiff and heavy as any."""
     grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
     ply = Ply(1.48e6, 0.3, 1.75e16, 1.75e16, 5e15, 5e15, 5e15)
     plate = material(ply, (0.0, 90.0), 0.053)
@@ -45,7 +45,7 @@ def rigid_target() -> Deck:
 
 @case(
     "rigid-target",
-    "rigid mass on a target that stands still",
+    "rigid mass on a fixed target",
     Check("deepest indentation (in)", DEEPEST, "Hertz: (5 m v²/4 k)^0.4", 1e-6, STIFF),
     Check("largest force (lb)", LARGEST, "Hertz: k a^1.5", 1e-6, STIFF),
     Check("contact (s)", DURATION, "Hertz: 2.9432 a/v", 1.2e-4, "one step"),
@@ -66,7 +66,7 @@ ZENER = "Zener 1941, w' = F/8√(Dρh)"
 
 
 def large_plate() -> Deck:
-    """Make a rigid mass that hits a thin plate of 12 x 12 in, stiff in transverse shear."""
+    """Build a rigid mass that hits a thin plate of 12 x 12 in, stiff in transverse shear."""
     grid = Grid(uniform(12.0, 48), uniform(12.0, 48))
     plate = material(isotropic(1.0e7, 0.3, 2.5e-4, 13.0), [0.0], 0.1)
     return struck_plate(grid, plate, Projectile(0, 0, LIGHT), V, elastic(SOFT), 5e-8, 4000)
@@ -94,7 +94,7 @@ IMPULSE = "the logarithm of the point force: 0.2 % between 16 and 24 elements a 
 
 
 def supported_plate() -> Deck:
-    """Make a quarter of the plate, hit by a quarter of the mass on a quarter of the contact."""
+    """Build a quarter of the plate, hit by a quarter of the mass on a quarter of the contact."""
     plate = material(isotropic(1.0e7, 0.3, 2.5e-4), [0.0], SLENDER)
     quarter = elastic(SUPPORTED_K / 4.0)
     hit = (Projectile(0, 0, HEAVY / 4.0), Impact(1, 3, V), quarter)
@@ -121,7 +121,7 @@ def supported() -> Sequence[float]:
 ORIGINAL = "the original program, slips mended"
 SAME = "the same steps in another order of sums"
 OWN = "this program"
-DIGITS = "the digits that are given"
+DIGITS = "to the digits stated"
 
 
 def _guard(quantity: str, expected: float, source: str, tolerance: float, why: str) -> Check:
@@ -163,7 +163,7 @@ def _at(result: Result, name: str, time: float) -> float:
 
 @case(
     "listing-impact",
-    "the same by the printed program, whose target stands still",
+    "the same in listing mode, whose target is fixed",
     _guard("force at 46 µs (lb)", 395.179758, "the original program", 1e-7, SAME),
     _guard("transducer at 46 µs (lb)", -208.981648, "the original program", 1e-7, SAME),
     _guard("end of the contact (s)", 90.6e-6, OWN, 1e-3, DIGITS),

@@ -43,7 +43,7 @@ def _forces(
     "indentation",
     "loading, unloading and reloading of the report's laminate",
     Check("F(α_p), 0.5 in indenter (lb)", 22.4, "this program; the report: about 20 lb",
-          2e-3, "three digits are given", AGAINST_CHANGE),
+          2e-3, "stated to three digits", AGAINST_CHANGE),
     Check("F at the peak (lb)", FORCE, "k α^1.5, equation 3-1", 1e-12, ROUNDING),
     Check("F halfway down to α₀ (lb)", FORCE / 2.0**Q, "equations 3-3 and 3-8", 1e-12, ROUNDING),
     Check("F at α₀ (lb)", 0.0, "equation 3-3", 1e-12, ROUNDING, scale=FORCE),

@@ -22,7 +22,7 @@ G = E / (2.0 * (1.0 + NU))
 PLATE = E / (1.0 - NU**2)
 TURNED = 30.0
 
-# A ply of the report's kind, with a G23 of its own, and the plane-stress stiffness of two layers.
+# A ply of the report's kind, with a different G23, and the plane-stress stiffness of two layers.
 E1, E2, NU12, G12, G13, G23 = 17.5e6, 1.15e6, 0.3, 0.8e6, 0.8e6, 0.5e6
 FULL = 1.0 - NU12**2 * E2 / E1
 Q11, Q22, Q12, Q66 = E1 / FULL, E2 / FULL, NU12 * E2 / FULL, G12
@@ -36,7 +36,7 @@ BAR16 = (Q11 - Q22) / 4.0
 
 
 def exact(quantity: str, expected: float, source: str, scale: float | None = None) -> Check:
-    """Make a check of a closed form that is evaluated in another order."""
+    """Build a check of a closed form that is evaluated in another order."""
     return Check(quantity, expected, source, EXACT, ROUNDING, scale=scale)
 
 

@@ -53,7 +53,7 @@ IN_FIELD = "the field is one of the elements'; rounding of the solution"
 
 
 def patch() -> Deck:
-    """Make four distorted elements of [0/90] whose outer nodes move as a constant strain."""
+    """Build four distorted elements of [0/90] whose outer nodes move as a constant strain."""
     fine = np.empty((5, 5, 2))
     fine[::2, ::2] = CORNERS
     fine[::2, 1::2] = (CORNERS[:, 1:] + CORNERS[:, :-1]) / 2.0
@@ -174,7 +174,7 @@ def _shear_frequency() -> float:
     return math.sqrt(float(ones @ (model.stiffness @ ones)) / float(model.mass @ ones))
 
 
-# A single square element of which one unknown of the centre node is free: its shape function is
+# A single square element of which one dof of the centre node is free: its shape function is
 # (1 - xi^2)(1 - eta^2), and its lumped mass 4/9 of the element's.
 SIDE, THIN = 0.3, 0.1
 PLY = isotropic(1.0e7, 0.3, 2.5e-4)
@@ -187,7 +187,7 @@ INTEGRATED = "the rule integrates these polynomials exactly"
 
 @case(
     "time-step",
-    "critical time step of a 9-node square with one free unknown at its centre",
+    "critical time step of a 9-node square with one free dof at its centre",
     Check(
         "w free (s)", math.sqrt(5.0) / 4.0 * SIDE * math.sqrt(PLY.density / PLY.g13),
         "2/ω = (√5/4) a √(ρ/G)", 1e-10, INTEGRATED,
@@ -201,14 +201,14 @@ def time_step() -> Sequence[float]:
     """2 over the angular frequency of the only mode."""
     grid = Grid(uniform(SIDE, 1), uniform(SIDE, 1))
     made = deck("element", grid, (grid.coordinates(), material(PLY, [0.0], THIN)), ())
-    return [_critical(made, unknown) for unknown in (2, 3)]
+    return [_critical(made, dof) for dof in (2, 3)]
 
 
-def _critical(made: Deck, unknown: int) -> float:
-    """Critical time step where one unknown of node 5, the centre, is free."""
+def _critical(made: Deck, dof: int) -> float:
+    """Critical time step where one dof of node 5, the centre, is free."""
     mesh = generate(made)
     codes, equations = np.ones_like(mesh.codes), np.zeros_like(mesh.equations)
-    codes[4, unknown], equations[4, unknown] = 0, 1
+    codes[4, dof], equations[4, dof] = 0, 1
     held: Mesh = replace(mesh, codes=codes, equations=equations)
     return critical_time_step(build_plate(made, held))
 

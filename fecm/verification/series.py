@@ -114,15 +114,15 @@ def terms(most: int) -> tuple[Floats, Floats, Floats]:
 
 
 def cross_ply(h: float) -> TwoLayers:
-    """Make [0/90]."""
+    """Build [0/90]."""
     return TwoLayers(AT_0, AT_90, (SHEAR_0 + SHEAR_90) / 2.0, h)
 
 
 def angle_ply(h: float) -> TwoLayers:
-    """Make [45/-45], whose couplings of transverse shear cancel."""
+    """Build [45/-45], whose couplings of transverse shear cancel."""
     return TwoLayers(AT_45, AT_MINUS_45, np.diag([MEAN, MEAN]), h, twists=True)
 
 
 def off_axis(h: float) -> TwoLayers:
-    """Make [0/45], of which no stiffness vanishes; not for the series."""
+    """Build [0/45], of which no stiffness vanishes; not for the series."""
     return TwoLayers(AT_0, AT_45, (SHEAR_0 + SHEAR_45) / 2.0, h)

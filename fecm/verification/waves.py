@@ -10,7 +10,7 @@ from fecm.mechanics.laminate import Laminate, laminate
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from fecm.verification.case import Check, case
 
-CLOSED = "closed form; digits that are given"
+CLOSED = "closed form, to the digits stated"
 
 
 def report_laminate() -> Laminate:
