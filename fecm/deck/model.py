@@ -163,7 +163,7 @@ class Impact(Segment):
     keyword: ClassVar[str] = "ROD"
 
     fields: ClassVar[Fields] = layout(
-        "I5 impact node|node", "I5 impact unknown|dof", "F10 impact velocity|velocity"
+        "I5 impact node|node", "I5 impact dof|dof", "F10 impact velocity|velocity"
     )
 
 

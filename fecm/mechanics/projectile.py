@@ -17,17 +17,11 @@ from fecm.mechanics.rod_integrators import CONSISTENT, RodState
 
 # The report's steel rod, in lb, in and s: a spherical cap of five steps, then the cylinder.
 REPORT_CAP = (0.22, 0.36, 0.43, 0.48, 0.50)
-
 REPORT_DIAMETER = 0.625
-
 REPORT_ELEMENTS = 20
-
 REPORT_LENGTH = 1.0
-
 REPORT_MODULUS = 30.0e6
-
 REPORT_DENSITY = 0.0006875
-
 LISTING_DENSITY = 0.0003225
 
 
@@ -81,11 +75,7 @@ class Rod:
                 [3.0 * L, -(L**2), -3.0 * L, 4.0 * L**2],
             ]
         )
-        K = np.zeros((2 * self.elements + 2, 2 * self.elements + 2))
-        for element, area in enumerate(self.areas):
-            dofs = slice(2 * element, 2 * element + 4)
-            K[dofs, dofs] += self.modulus * area / (30.0 * L) * shape
-        return K
+        return self._assemble(self.modulus * self.areas / (30.0 * L), shape)
 
     def with_mass(self, mass: str) -> Rod:
         """The same rod with another mass matrix, ``"lumped"`` or ``"consistent"``."""
@@ -106,11 +96,15 @@ class Rod:
                 [-13.0 * L, -3.0 * L**2, -22.0 * L, 4.0 * L**2],
             ]
         )
-        M = np.zeros((2 * self.elements + 2, 2 * self.elements + 2))
-        for element, area in enumerate(self.areas):
+        return self._assemble(self.density * self.areas * L / 420.0, shape)
+
+    def _assemble(self, factors: Floats, shape: Floats) -> Floats:
+        """Sum of the element matrices `factors` times `shape`."""
+        matrix = np.zeros((2 * self.elements + 2, 2 * self.elements + 2))
+        for element, factor in enumerate(factors):
             dofs = slice(2 * element, 2 * element + 4)
-            M[dofs, dofs] += self.density * area * L / 420.0 * shape
-        return M
+            matrix[dofs, dofs] += factor * shape
+        return matrix
 
     def lumped_mass(self) -> Floats:
         """Lumped mass of each dof, (n,): rho A L/2 for u and rho A L^3/420 for du/dx (listing)."""

@@ -276,7 +276,7 @@ def build_impact(
 ) -> ImpactSystem:
     """Build projectile, contact law and contact with the active slips.
 
-    The plate feels the given share of the contact force.
+    `share` is the fraction of the contact force that acts on the plate.
     """
     card = deck.require(ImpactCard)
     contact = ImpactConditions(
@@ -358,8 +358,8 @@ def laminate_of(
         )  # fmt: skip
     angles = [layer.angle for layer in material.layers]
     thicknesses = [layer.thickness for layer in material.layers]
-    made = laminate(ply, angles, thicknesses, material.integration.thickness)
-    return replace(made, shear=shear_factor * made.shear)
+    built = laminate(ply, angles, thicknesses, material.integration.thickness)
+    return replace(built, shear=shear_factor * built.shear)
 
 
 def laminate_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> Laminate:

@@ -19,7 +19,7 @@ from fecm.problem.build import Problem, build_projectile
 from fecm.problem.generate import rod_diameters
 
 W = 3
-# A rod's step is a full matrix of three times as many rows and columns as it has unknowns.
+# A rod's step is a full matrix of three times as many rows and columns as it has dofs.
 MOST_ROD_ELEMENTS = 500
 # Each gage is compared with every element.
 MOST_GAGES, MOST_GAGE_PAIRS = 10_000, 10**8
@@ -27,7 +27,7 @@ MOST_GAGES, MOST_GAGE_PAIRS = 10_000, 10**8
 LEAST_PER_WAVE, ENOUGH_PER_WAVE = 4, 8
 # Mesh error of the peak that is warned of, and the largest that is estimated.
 WORTH_SAYING, MOST_ERROR = 0.03, 0.5
-# Shear order under which 9-node elements have no motion without energy.
+# Shear order at which 9-node elements have no zero-energy modes.
 FULL = 3
 
 
@@ -41,40 +41,31 @@ def check_impact(impact: Impact, deck: Deck, mesh: Mesh, findings: Findings) -> 
             f"{deck.control.numnp}.",
             impact.place("impact node"),
         )
+    dof = impact.place("impact dof")
     if not 1 <= impact.dof <= deck.control.ndf:
-        findings.add(
-            "E409",
-            f"The impact unknown is {impact.dof}; it must be 1 to {deck.control.ndf}.",
-            impact.place("impact unknown"),
-            "3 is w",
-        )
+        message = f"The impact dof is {impact.dof}; it must be 1 to {deck.control.ndf}."
+        findings.add("E409", message, dof, "3 is w")
     elif known and mesh.equations[impact.node - 1, impact.dof - 1] == 0:
         findings.add(
             "E410",
-            f"Unknown {impact.dof} of the impact node {impact.node} is restrained.",
+            f"Dof {impact.dof} of the impact node {impact.node} is restrained.",
             impact.place("impact node"),
             "a BOUN card restrains it",
         )
     elif impact.dof > W:
         findings.add(
             "E413",
-            f"The impact unknown {impact.dof} is a rotation: a projectile pushes a displacement.",
-            impact.place("impact unknown"),
+            f"The impact dof {impact.dof} is a rotation: a projectile pushes a displacement.",
+            dof,
             "3 is w",
         )
     elif impact.dof != W:
-        findings.add(
-            "W413",
-            f"The impact unknown is {impact.dof}, not 3: the projectile does not push w.",
-            impact.place("impact unknown"),
-        )
+        message = f"The impact dof is {impact.dof}, not 3: the projectile does not push w."
+        findings.add("W413", message, dof)
     if impact.velocity < 0.0:
-        findings.add(
-            "E411",
-            f"The impact velocity is {impact.velocity:g}; it must be positive.",
-            impact.place("impact velocity"),
-            "an approach is positive on this card",
-        )
+        message = f"The impact velocity is {impact.velocity:g}; it must be positive."
+        hint = "an approach is positive on this card"
+        findings.add("E411", message, impact.place("impact velocity"), hint)
     elif impact.velocity == 0.0:
         findings.add(
             "W411",
@@ -86,34 +77,33 @@ def check_impact(impact: Impact, deck: Deck, mesh: Mesh, findings: Findings) -> 
 
 def check_projectile(projectile: Projectile, findings: Findings) -> None:
     """Check a PROJ segment."""
-
-    def needs(code: str, sound: bool, what: str, name: str, hint: str = "") -> None:
-        if not sound:
-            findings.add(code, what, projectile.place(name), hint)
-
     count = projectile.elements
-    needs(
-        "E418", 0 <= count <= MOST_ROD_ELEMENTS,
-        f"The projectile has {count} rod elements; it must have 0 (a rigid mass) to "
-        f"{MOST_ROD_ELEMENTS}.", "number of rod elements",
-    )  # fmt: skip
     if not 0 <= count <= MOST_ROD_ELEMENTS:
+        findings.add(
+            "E418",
+            f"The projectile has {count} rod elements; it must have 0 (a rigid mass) to "
+            f"{MOST_ROD_ELEMENTS}.",
+            projectile.place("number of rod elements"),
+        )
         return
-    what = "length" if count else "mass"
-    needs(
-        "E419", projectile.size > 0.0,
-        f"The projectile's {what} is {projectile.size:g}; it must be positive.", "length or mass",
-    )  # fmt: skip
+    rules = [(f"projectile's {'length' if count else 'mass'}", projectile.size, "length or mass")]
+    if count:
+        rules.append(("rod's modulus", projectile.modulus, "rod's Young's modulus"))
+        rules.append(("rod's density", projectile.density, "rod's density"))
+    for what, value, name in rules:
+        if not value > 0.0:
+            message = f"The {what} is {value:g}; it must be positive."
+            findings.add("E419", message, projectile.place(name))
     if not count:
         return
-    for name, value in (("modulus", projectile.modulus), ("density", projectile.density)):
-        field = "rod's Young's modulus" if name == "modulus" else "rod's density"
-        needs("E419", value > 0.0, f"The rod's {name} is {value:g}; it must be positive.", field)
-    needs(
-        "E423", 0 <= projectile.transducer <= count + 1,
-        f"The transducer node {projectile.transducer} does not exist; the rod has nodes 1 to "
-        f"{count + 1}.", "transducer node", "blank is the middle",
-    )  # fmt: skip
+    if not 0 <= projectile.transducer <= count + 1:
+        findings.add(
+            "E423",
+            f"The transducer node {projectile.transducer} does not exist; the rod has nodes 1 to "
+            f"{count + 1}.",
+            projectile.place("transducer node"),
+            "blank is the middle",
+        )
     before = findings.error_count
     diameters = rod_diameters(projectile, findings)
     if findings.error_count > before:
@@ -136,12 +126,12 @@ def check_projectile(projectile: Projectile, findings: Findings) -> None:
             "E429",
             "The rod's mass or stiffness is beyond the range of numbers.",
             projectile.place("length or mass"),
-            "look at the units of length, diameters, modulus and density",
+            "check the units of length, diameters, modulus and density",
         )
 
 
 def _is_computable(projectile: Projectile, diameters: NDArray[np.float64]) -> bool:
-    """Whether mass and stiffness of every unknown of a rod are positive and finite."""
+    """Whether mass and stiffness of every dof of a rod are positive and finite."""
     rod = Rod(projectile.size, tuple(diameters.tolist()), projectile.modulus, projectile.density)
     try:
         with np.errstate(all="ignore"):
@@ -152,7 +142,7 @@ def _is_computable(projectile: Projectile, diameters: NDArray[np.float64]) -> bo
 
 
 def check_gages(segment: Gages, mesh: Mesh, deck: Deck, findings: Findings) -> None:
-    """Check a GAGE segment on a sound mesh."""
+    """Check a GAGE segment on a mesh without errors."""
     count = len(segment.records)
     if count > MOST_GAGES or count * len(mesh.elements) > MOST_GAGE_PAIRS:
         findings.add(
@@ -167,8 +157,8 @@ def check_gages(segment: Gages, mesh: Mesh, deck: Deck, findings: Findings) -> N
     for record in segment.records:
         if record.number in seen:
             findings.add(
-                "E425", f"Gage {record.number} is given twice.", record.place("gage"),
-                "give each gage a number of its own",
+                "E425", f"Gage {record.number} is defined twice.", record.place("gage"),
+                "give each gage its own number",
             )  # fmt: skip
         seen.add(record.number)
         if not locate(families, record.x, record.y):
@@ -182,7 +172,7 @@ def check_gages(segment: Gages, mesh: Mesh, deck: Deck, findings: Findings) -> N
         if material is not None and abs(record.z) > half * (1.0 + 1e-9):
             findings.add(
                 "W426",
-                f"Gage {record.number} at z = {record.z:g} is outside of the laminate, whose faces "
+                f"Gage {record.number} at z = {record.z:g} is outside the laminate, whose faces "
                 f"are at {half:g} from the mid-plane.", record.place("gage's z"),
             )  # fmt: skip
 
@@ -206,11 +196,11 @@ def warn_of_the_reports_rod(impact: Impact, findings: Findings) -> None:
     rod = report_rod()
     findings.add(
         "W414",
-        f"No projectile is given: the report's steel rod is assumed, in lb, in and s whatever the "
-        f"deck's units (length {rod.length:g}, diameter {rod.diameters[-1]:g}, E {rod.modulus:g}, "
-        f"density {rod.density:g}, mass {rod.total_mass:.5g}).",
+        f"No projectile is defined: the report's steel rod is assumed, in lb, in and s whatever "
+        f"the deck's units (length {rod.length:g}, diameter {rod.diameters[-1]:g}, "
+        f"E {rod.modulus:g}, density {rod.density:g}, mass {rod.total_mass:.5g}).",
         impact.place("impact node"),
-        "give the projectile by a PROJ segment",
+        "define the projectile in a PROJ segment",
     )
 
 
@@ -240,7 +230,7 @@ def check_law(law: Indentation, findings: Findings) -> None:
 
 @dataclass(frozen=True)
 class Resolution:
-    """How the mesh resolves an impact.
+    """Resolution of an impact by the mesh.
 
     Attributes
     ----------

@@ -21,7 +21,9 @@ def _check_orders(card: Integration, findings: Findings) -> None:
     for name, order in (("bending order L1", card.bending), ("shear order L2", card.shear)):
         if not 1 <= order <= HIGHEST_ORDER:
             used = min(HIGHEST_ORDER, max(1, order))
-            findings.add("W401", f"The {name} is {order} and is taken as {used}.", card.place(name))
+            findings.add(
+                "W401", f"The {name} is {order} ; {used} is used instead.", card.place(name)
+            )
     if not 1 <= abs(card.points) <= HIGHEST_ORDER:
         findings.add(
             "E402",

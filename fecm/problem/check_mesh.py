@@ -19,10 +19,10 @@ from fecm.mechanics.mesh import Mesh, holds_the_plane
 from fecm.problem.build import Problem, rules
 from fecm.problem.generate import place_of_element
 
-# Findings of one kind about elements are gathered beyond this number of cards.
+# Findings of one kind about elements are grouped beyond this number of cards.
 SHOWN = 4
 
-# Runs of numbers that are written out.
+# Largest number of runs of numbers in a message.
 RUNS = 8
 
 # Layers that the listing's arrays hold (CNPD: QBR(3,3,25), TH(25)).
@@ -31,7 +31,7 @@ ANOTHER_MODE = "run the deck in report mode"
 
 
 def ranges(numbers: Sequence[int] | NDArray[np.int_]) -> str:
-    """Write ascending numbers shortly: ``3, 7-9, 12``."""
+    """Write ascending numbers as runs: ``3, 7-9, 12``."""
     array = np.asarray(numbers)
     runs = np.split(array, np.flatnonzero(np.diff(array) != 1) + 1)
     parts = [str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs[:RUNS]]
@@ -39,12 +39,12 @@ def ranges(numbers: Sequence[int] | NDArray[np.int_]) -> str:
 
 
 def describe_nodes(rows: NDArray[np.intp]) -> str:
-    """Begin a sentence about nodes, given by their rows: ``Nodes 3, 7-9 are``."""
+    """Beginning of a sentence about the nodes in some rows: ``Nodes 3, 7-9 are``."""
     return f"Node {rows[0] + 1} is" if len(rows) == 1 else f"Nodes {ranges(rows + 1)} are"
 
 
 def describe_elements(rows: NDArray[np.intp]) -> str:
-    """Name elements by their rows, how many and which: ``3 elements (1, 4-5)``."""
+    """Number and list of the elements in some rows: ``3 elements (1, 4-5)``."""
     count = len(rows)
     return f"{count} element{'' if count == 1 else 's'} ({ranges(rows + 1)})"
 
@@ -52,9 +52,9 @@ def describe_elements(rows: NDArray[np.intp]) -> str:
 def report_elements(
     findings: Findings, code: str, rows: NDArray[np.intp], deck: Deck, what: str, hint: str = ""
 ) -> None:
-    """Report what is wrong with elements, given by their rows: one finding a card that gives them.
+    """Report an error of the elements in some rows, one finding per card that generates them.
 
-    Beyond :data:`SHOWN` cards a single finding tells of all.
+    Beyond :data:`SHOWN` cards a single finding covers all of them.
     """
     by_card: dict[Place | None, list[int]] = {}
     for row in rows[: 100 * SHOWN].tolist():
@@ -82,7 +82,7 @@ OFF_PLACE = 0.05
 
 
 def check_mesh(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool = False) -> None:
-    """Check nodes, and the shapes of elements whose node numbers are sound.
+    """Check nodes, and the shapes of elements with valid node numbers.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def check_mesh(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool = Fa
     mesh : Mesh
     findings : Findings
     listing : bool
-        Whether the deck is for listing mode, which takes L1 for L2.
+        Whether the deck is for listing mode, which uses L1 instead of L2.
     """
     missing = np.flatnonzero(~mesh.given)
     if len(missing):
@@ -101,14 +101,14 @@ def check_mesh(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool = Fa
         place = deck.require(Elements).place()
         findings.add("E307", f"{describe_nodes(unused)} in no element.", place)
     if not mesh.number_of_equations:
-        findings.add("E311", "Every unknown of the plate is restrained.", deck.place())
+        findings.add("E311", "Every dof of the plate is restrained.", deck.place())
     if not len(missing):
         _check_coincidence(deck, mesh, findings)
         _check_shapes(deck, mesh, findings, listing=listing)
 
 
 def check_elements(deck: Deck, mesh: Mesh, findings: Findings) -> bool:
-    """Whether the node numbers of all elements are sound, whatever the coordinates are."""
+    """Whether the node numbers of all elements are valid, whatever the coordinates are."""
     elements, numnp = mesh.elements, len(mesh.coordinates)
     before = findings.error_count
 
@@ -117,7 +117,7 @@ def check_elements(deck: Deck, mesh: Mesh, findings: Findings) -> bool:
 
     empty = ~(elements != 0).any(axis=1)
     unknown = (elements < 0) | (elements > numnp)
-    # Nodes behind the third make a quadrilateral, which has a fourth corner.
+    # Nodes after the third make a quadrilateral, which has a fourth corner.
     pointed = ~(elements[:, CORNERS:] != 0).any(axis=1)
     three_missing = (elements[:, :CORNERS] == 0).any(axis=1)
     four_missing = (elements[:, : CORNERS + 1] == 0).any(axis=1)
@@ -180,7 +180,7 @@ def _check_side_nodes(deck: Deck, mesh: Mesh, findings: Findings) -> None:
         for place in range(4, 12 if thirds else 8):
             if not family.present[place]:
                 continue
-            start = place % 4 if place < 8 else (place - 1) % 4  # 9 to 12 stand before a corner
+            start = place % 4 if place < 8 else (place - 1) % 4  # 9 to 12 precede a corner
             end = (start + 1) % 4
             share = 0.5 if not thirds else 1.0 / 3.0 if place < 8 else 2.0 / 3.0
             corners = mesh.coordinates[mesh.elements[family.rows][:, [start, end]] - 1]
@@ -225,7 +225,7 @@ def _loads_a_node(deck: Deck, mesh: Mesh, *, supported: bool) -> bool:
 
 
 def _check_shapes(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool) -> None:
-    """Jacobians at every point that is used, the lumped masses, motions without energy."""
+    """Check Jacobians at every quadrature point, lumped masses and zero-energy modes."""
     material = deck.last(Material)
     if material is None or not 1 <= abs(material.integration.points) <= HIGHEST_ORDER:
         return
@@ -307,7 +307,7 @@ def _check_shear(
     nodal: bool,
     findings: Findings,
 ) -> None:
-    """Find motions that the transverse shear's points do not see, and elements that lock."""
+    """Find zero-energy modes of the transverse shear's quadrature, and elements that lock."""
     card, order = material.integration, math.isqrt(len(rules(material)[1].xi))
     weak: dict[int, list[str]] = {}
     for family in families:
@@ -336,24 +336,17 @@ def _check_shear(
 
 
 def _report_hourglass(card: Integration, supported: bool, findings: Findings) -> None:
+    message = (
+        f"Under the shear order L2 = {card.shear} a force on single nodes excites a checkerboard "
+        "motion of the 9-node elements, which "
+    )
     place = card.place("shear order L2")
     if supported:
-        findings.add(
-            "W322",
-            f"Under the shear order L2 = {card.shear} a force on single nodes excites a "
-            "checkerboard motion of the 9-node elements, which only the supports resist.",
-            place,
-            "take L2 = 3",
-        )
+        findings.add("W322", f"{message}only the supports resist.", place, "take L2 = 3")
     else:
-        findings.add(
-            HOURGLASS,
-            f"Under the shear order L2 = {card.shear} a force on single nodes excites a "
-            "checkerboard motion of the 9-node elements, which nothing resists in a plate "
-            "without supports.",
-            place,
-            "take L2 = 3; --force runs the deck all the same",
-        )
+        message += "nothing resists in a plate without supports."
+        hint = "take L2 = 3; --force runs the deck nevertheless"
+        findings.add(HOURGLASS, message, place, hint)
 
 
 FOUR_NODES, NINE_NODES = "4-node elements", "9-node elements"
@@ -362,10 +355,10 @@ HOURGLASS = "E321"
 
 
 def _orders_without_motions(family: element_groups.ElementBlock) -> tuple[str, int, int]:
-    """What a family is called, and the shear order that leaves it no motion without energy.
+    """Name of a block's elements, and the least shear orders without zero-energy modes.
 
-    The first order is that of a plate whose w is free, the second that of one with a support, which
-    a lower order may do for: the motion of a whole mesh then meets the support.
+    The first order is for a plate whose w is free; the second, which may be lower, for a plate
+    whose supports prevent the modes.
     """
     if family.shape is TRIANGLE:
         return "triangles", 1, 1
@@ -379,10 +372,10 @@ def _orders_without_motions(family: element_groups.ElementBlock) -> tuple[str, i
 
 
 def check_listing(deck: Deck, mesh: Mesh, findings: Findings) -> None:
-    """Refuse meshes of several kinds of elements, and more layers than the listing's arrays hold.
+    """Refuse what listing mode can't compute: mixed elements, and too many layers.
 
     The listing's LMAS takes element 1's node list for all elements (MASS01 hands IX, not IX(1,N),
-    to SHAPE), so that an element that lacks other nodes gets wrong masses or none.
+    to SHAPE), so an element that lacks other nodes gets wrong masses or none.
     """
     present = mesh.elements != 0
     other = np.flatnonzero((present != present[:1]).any(axis=1))

@@ -85,7 +85,7 @@ def _check_ply(ply: Ply, findings: Findings) -> None:
     if abs(nu) > 1.0:
         findings.add(
             "W434",
-            f"Poisson's ratio NU12 = {nu:g} is beyond 1: no ply has it.",
+            f"Poisson's ratio NU12 = {nu:g} is beyond 1: no ply has such a value.",
             place,
             "NU12 of fibre composites is 0.2 to 0.4",
         )
@@ -155,15 +155,14 @@ def _check_law(deck: Deck, findings: Findings) -> None:
     if law.word != Indentation.ACR and not LEAST_POWER <= law.q <= GREATEST_POWER:
         findings.add(
             "W437",
-            f"The unloading power q = {law.q:g} is outside of {LEAST_POWER:g} to "
-            f"{GREATEST_POWER:g}.",
+            f"The unloading power q = {law.q:g} is outside {LEAST_POWER:g} to {GREATEST_POWER:g}.",
             law.place(law.names()[3]),
             "measured powers are 1.5 to 2.5",
         )
 
 
 def _check_neighbours(impact: Impact, mesh: Mesh, findings: Findings) -> None:
-    """Warn where all neighbours of the impact node are restrained, nodes inside the plate too."""
+    """Warn if all neighbours of the impact node, inside the plate too, are restrained."""
     touching = mesh.elements[(mesh.elements == impact.node).any(axis=1)]
     around = np.setdiff1d(touching, [0, impact.node]) - 1
     places = mesh.coordinates
@@ -172,7 +171,7 @@ def _check_neighbours(impact: Impact, mesh: Mesh, findings: Findings) -> None:
         findings.add(
             "W441",
             f"Every other node of the elements at the impact node {impact.node} is restrained in "
-            f"the unknown {impact.dof}.",
+            f"dof {impact.dof}.",
             impact.place("impact node"),
             "restrain the supports only",
         )
@@ -265,7 +264,7 @@ def _check_units(deck: Deck, findings: Findings, *, hits: bool) -> None:
 
 
 def check_time_step_of_contact(problem: Problem, findings: Findings) -> None:
-    """Warn of a DT that the contact makes unstable, and of one far below what is stable."""
+    """Warn of a DT that the contact makes unstable, and of one far below the stable step."""
     deck, plate = problem.deck, problem.moving_plate
     steps = [macro for macro in deck.macros if macro.word == "DT"]
     if not steps:
@@ -283,7 +282,7 @@ def check_time_step_of_contact(problem: Problem, findings: Findings) -> None:
                 f"step with the contact's stiffness of about {contact.stiffness:.3g} on a mass "
                 f"of {contact.mass:.3g}: the contact may diverge.",
                 macro.place("value"),
-                f"look at k and the masses, or take a DT of {0.9 * contact.limit:.2g}",
+                f"check k and the masses, or take a DT of {0.9 * contact.limit:.2g}",
             )
         if 0.0 < dt < WASTEFUL * stable:
             findings.add(
@@ -301,7 +300,7 @@ OF_AN_IMPACT: tuple[type[Segment], ...] = (Impact, Indentation, Projectile)
 
 
 def check_purpose(deck: Deck, mesh: Mesh, findings: Findings) -> None:
-    """Compare the segments of an impact with what the program does."""
+    """Compare the segments of an impact with the program."""
     words = {macro.word: macro for macro in deck.macros}
     movers = MOVE & words.keys()
     segment = next((s for kind in OF_AN_IMPACT if (s := deck.last(kind)) is not None), None)
@@ -319,7 +318,7 @@ def check_purpose(deck: Deck, mesh: Mesh, findings: Findings) -> None:
     if {"RODP", "EXCD"} <= movers:
         findings.add(
             "W518",
-            "EXCD moves the plate but not the projectile, which stands still during the step.",
+            "EXCD moves the plate but not the projectile, which is at rest during the step.",
             words["EXCD"].place("macro"),
             "RODP applies the loads of FORC too",
         )

@@ -1,4 +1,4 @@
-"""Checks of what a run would do: its time step, its length, what it stores."""
+"""Checks of a program: its time step, length and output."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from fecm.mechanics.time_step import safe_time_step
 from fecm.problem.build import Problem
 
 LARGE_OUTPUT = 10**9
-# Part of the critical time step below which a step's change, of its square, is lost by rounding.
+# Fraction of the critical time step below which a step's change, of its square, is rounded off.
 LEAST_STEP = math.sqrt(sys.float_info.epsilon)
 
 UNSTABLE = "E508"
 
 
 def check_program(problem: Problem, findings: Findings) -> None:
-    """Check the length of a program, and that it reaches the steps that it is to store."""
+    """Check the length of a program, and that its loops reach the steps to be stored."""
     deck, sizes = problem.deck, problem.work
     if sizes.macros > MOST_MACROS:
         count = Decimal(sizes.macros).normalize(Context(prec=3))  # may be beyond all floats
         findings.add(
             "E509",
-            f"The program carries out {count:g} macros, more than {MOST_MACROS:g}.",
+            f"The program executes {count:g} macros, more than {MOST_MACROS:g}.",
             deck.macros[0].place("macro"),
             "nested LOOPs multiply",
         )
@@ -45,7 +45,7 @@ def check_program(problem: Problem, findings: Findings) -> None:
         if macro.word in ("DISP", "STRE") and not sizes.passes[macro.word]:
             findings.add(
                 "W510",
-                f"{macro.word} stores every {every(macro)} passes, but no loop has as many: "
+                f"{macro.word} stores every {every(macro)} passes, but no loop has so many: "
                 "nothing is stored.",
                 macro.place("value"),
             )
@@ -56,7 +56,7 @@ def check_program(problem: Problem, findings: Findings) -> None:
 
 
 def check_time_step(problem: Problem, findings: Findings) -> None:
-    """Compare every DT with the plate's critical time step, where the program steps at all."""
+    """Compare every DT with the plate's critical time step if the program takes steps."""
     deck = problem.deck
     steps = [macro for macro in deck.macros if macro.word == "DT"]
     if not steps or not STEPS.intersection(macro.word for macro in deck.macros):
@@ -72,7 +72,7 @@ def check_time_step(problem: Problem, findings: Findings) -> None:
             "E417",
             f"The plate has no critical time step: {error}.",
             deck.require(Material).place(),
-            "look at the units of the ply's constants, the thickness and the coordinates",
+            "check the units of the ply's constants, the thickness and the coordinates",
         )
         return
     for macro in steps:
@@ -82,12 +82,12 @@ def check_time_step(problem: Problem, findings: Findings) -> None:
                 f"DT = {macro.value:.4g} is not below the plate's critical time step "
                 f"{critical:.4g}: the motion would grow without bound.",
                 macro.place("value"),
-                f"take {_below(critical)} or less; --force runs the deck all the same",
+                f"take {0.95 * critical:.2g} or less; --force runs the deck nevertheless",
             )
 
 
 def _check_least_step(steps: Sequence[Macro], safe: float, findings: Findings) -> None:
-    """Report every DT that is so small that the motion is lost by rounding."""
+    """Report every DT at which the motion is lost by rounding."""
     for macro in steps:
         if 0.0 < macro.value < LEAST_STEP * safe:
             findings.add(
@@ -95,13 +95,8 @@ def _check_least_step(steps: Sequence[Macro], safe: float, findings: Findings) -
                 f"DT = {macro.value:.4g} is so far below the plate's critical time step (about "
                 f"{safe:.4g}) that the motion is lost by rounding.",
                 macro.place("value"),
-                "look at the unit of time; DT without a number takes 0.9 of the critical step",
+                "check the unit of time; DT without a number takes 0.9 of the critical step",
             )
-
-
-def _below(critical: float) -> str:
-    """A round number a little below the critical time step."""
-    return f"{0.95 * critical:.2g}"
 
 
 def _check_output(problem: Problem, findings: Findings) -> None:

@@ -1,6 +1,6 @@
 """The largest stable time step of plate and contact together.
 
-The plate moves explicitly under the contact force of the last step, so that the contact acts on it
+The plate moves explicitly under the contact force of the last step, so the contact acts on it
 as a spring with the tangent stiffness of the indentation law.
 """
 
@@ -38,7 +38,7 @@ def wave_impedance(laminate: Laminate) -> float:
 
 
 def expected_peak(deck: Deck, plate: PlateModel) -> float:
-    """Estimate the peak force, rather too high than too low.
+    """Estimate the peak force, from above.
 
     The minimum of the Hertz contact on a rigid target, k^(2/5) (5 m v^2/4)^(3/5), and of the
     response of the plate: the bending wave for a light projectile, the stiffness of a clamped plate
@@ -74,7 +74,7 @@ class ContactStep:
     stiffness : float
         Tangent stiffness of the contact, force/length.
     mass : float
-        The smaller of the plate's mass at the impact unknown and the projectile's at its tip.
+        The smaller of the plate's mass at the impact dof and the projectile's at its tip.
     limit : float
         Largest stable time step; infinite where the time step is certainly stable.
     """
@@ -90,7 +90,7 @@ def contact_step(deck: Deck, plate: PlateModel, dt: float) -> ContactStep:
     Parameters
     ----------
     deck : Deck
-        A sound deck with an impact.
+        A deck without errors, with an impact.
     plate : PlateModel
     dt : float
         Time step of the deck; 0 for 0.9 of the critical one.  The limit is computed only where a
@@ -114,6 +114,6 @@ def contact_step(deck: Deck, plate: PlateModel, dt: float) -> ContactStep:
         return ContactStep(stiffness, mass, math.inf)
     try:
         critical = critical_time_step(plate, (row, stiffness))
-    except UnsoundPlateError:  # the contact is stiffer than numbers reach
+    except UnsoundPlateError:  # the contact's stiffness is out of range
         critical = iterated
     return ContactStep(stiffness, mass, min(iterated, critical))

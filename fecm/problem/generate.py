@@ -111,7 +111,7 @@ def restraint_codes(
 
 
 def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floats:
-    """Diameter of every element of a rod, generated from PROJ's cards as coordinates are.
+    """Diameter of every element of a rod, generated from PROJ's cards like coordinates.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floa
     Returns
     -------
     ndarray (elements,)
-        Length; NaN where no card gives the element.
+        Length; NaN for elements without a card.
     """
     noted = Findings() if findings is None else findings
     values = np.full((segment.elements, 1), np.nan)
@@ -131,7 +131,7 @@ def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floa
         if not 1 <= record.element <= segment.elements:
             noted.add(
                 "E420",
-                f"Rod element {record.element} does not exist; PROJ gives the rod elements 1 to "
+                f"Rod element {record.element} does not exist; PROJ defines the rod elements 1 to "
                 f"{segment.elements}.",
                 record.place("element"),
             )
@@ -162,7 +162,7 @@ def _existing(
         findings.add(
             code,
             f"{what.capitalize()} {number(outside[0])}{more} does not exist; the control card "
-            f"gives the deck {what}s 1 to {count}.",
+            f"defines the {what}s 1 to {count}.",
             outside[0].place(what),
         )
     return [record for record in records if 1 <= number(record) <= count]
@@ -185,7 +185,7 @@ def _interpolate(
             if record.node == last.node:
                 findings.add(
                     "E302",
-                    f"Node {record.node} follows itself, so that nothing can be generated.",
+                    f"Node {record.node} follows itself, so nothing can be generated.",
                     record.place("node"),
                     "the card before has a generation increment",
                 )
@@ -237,7 +237,7 @@ def _step(elements: Ints, records: Sequence[ElementNodes], findings: Findings) -
         if last is None and number > 1:
             findings.add(
                 "E305",
-                f"Element {number} comes first, so that elements before it are not given.",
+                f"Element {number} is the first; the elements before it are missing.",
                 record.place("element"),
             )
         if last is not None:
@@ -255,14 +255,14 @@ def _fill(elements: Ints, record: ElementNodes, end: int) -> None:
         nodes = np.asarray(record.nodes, dtype=np.int64)
         steps = np.arange(1, count + 1)[:, None] * (record.increment or 1)
         generated = np.where(nodes == 0, 0, nodes + steps)
-        # A node that falls to 0 or beyond the integers is no node; the checks report it.
+        # Nodes that become 0 or exceed the integers are invalid; the checks report them.
         generated = np.where((nodes != 0) & (generated == 0), -1, generated)
         limits = np.iinfo(np.int32)
         elements[record.element : end - 1] = np.clip(generated, limits.min, limits.max)
 
 
 def place_of_element(deck: Deck, number: int) -> Place | None:
-    """Place of the card that gives or generates an element."""
+    """Place of the card that defines or generates an element."""
     segment = deck.last(Elements)
     if segment is None:
         return None

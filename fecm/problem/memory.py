@@ -24,7 +24,7 @@ from fecm.mechanics.stiffness_product import AUTO, CSR, WORTH_GROUPING
 from fecm.problem.build import Problem
 from fecm.results.sinks import RowBuffer
 
-# Bytes per node: mesh, state, fields, rows on their way to the file.
+# Bytes per node: mesh, state, fields, buffered rows.
 NODE = 800
 # Bytes per dof of an element: its indices, its forces, and the matrix that sums them.
 PLACE = 60
@@ -73,7 +73,7 @@ def needed_bytes(
     total += 8 * 6 * (2 * rod_elements + 2) ** 2
     if in_memory:
         return total + output
-    held = output if "CONV" in words else 0  # rows that never came are cut off in memory
+    held = output if "CONV" in words else 0  # CONV may leave rows empty; they are removed in memory
     return total + held + STEP * checked.work.steps + 5 * RowBuffer.BYTES
 
 

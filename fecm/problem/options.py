@@ -1,4 +1,4 @@
-"""What can be chosen about a run, beside its deck; naming it imports nothing heavy."""
+"""Options of a run."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ ENERGY_LIMIT = 0.1
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How a problem is run; the default is the report's way.
+    """Options of a run; the defaults are the report's.
 
     Attributes
     ----------
     slips : frozenset of str
         Slips of the printed program that are on: see :func:`~fecm.problem.slips.active_slips`.
     solver : str
-        How K·u is computed, one of ``SOLVERS``: as suits the mesh, or by a sparse matrix.
+        Computation of K·u, one of ``SOLVERS``: chosen for the mesh, or by a sparse matrix.
     threads : int
         Threads that share the work of a step; 0 takes every core for a large mesh.  The result does
         not depend on it.
@@ -33,7 +33,7 @@ class RunOptions:
     Raises
     ------
     ValueError
-        If a value is none of these.
+        If a value is not valid.
     """
 
     slips: frozenset[str] = frozenset()

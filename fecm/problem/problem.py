@@ -1,7 +1,7 @@
 """Checks of a deck.
 
-Findings about missing data of a segment are suppressed where one of its cards is unreadable, so
-that one mistake makes one finding.
+Findings about missing data of a segment are suppressed if one of its cards is unreadable, so that
+one mistake gives one finding.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
         check_gages(segment, mesh, deck, findings)
     checked = Problem(deck, mesh, program)
     if findings.error_count == before and not unsound:
-        with np.errstate(all="ignore"):  # numbers beyond all range end in a finding
+        with np.errstate(all="ignore"):  # numbers out of range end in a finding
             check_time_step(checked, findings)
             check_program(checked, findings)
             check_purpose(deck, mesh, findings)
@@ -144,7 +144,7 @@ def _check_segments(deck: Deck, unsound: set[str], findings: Findings) -> None:
                 "W204",
                 f"A second {kind.keyword} segment replaces the first.",
                 segment.place(),
-                "take one of them out",
+                "remove one of them",
             )
     if len(deck.all(Boundary)) > 1:
         findings.add(

@@ -1,7 +1,7 @@
-"""Slips: where the report's printed program leaves the report's text, or its own sense.
+"""Slips: differences between the report's printed program and its text or evident intent.
 
-This table is the only place that knows them: the two modes, the single slips of a run, the
-parameters that they change and the errata page are all made from it.
+Modes, single slips of a run and the errata page all come from this table;
+:mod:`fecm.problem.build` turns slips into parameters.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ class Slip:
     Attributes
     ----------
     name : str
-        What a user calls it by.
+        Its name on the command line.
     listing : str
-        What the printed program does.
+        Behaviour of the printed program.
     report : str
-        What the report says, or means.
+        What the report says or means.
     """
 
     name: str
@@ -37,7 +37,7 @@ SLIPS = (
     Slip(
         "target",
         "The impact node's equation number is looked up before equations are numbered, so the "
-        "contact law sees a plate that stands still, though the plate does feel the force.",
+        "contact law sees a plate at rest, although the force acts on the plate.",
         "The indentation is the projectile's approach less the plate's own displacement.",
     ),
     Slip(
@@ -47,14 +47,14 @@ SLIPS = (
     ),
     Slip(
         "rod-start",
-        "The rod's strain unknowns start at the impact velocity too, which makes a force of "
-        "109 lb in the transducer out of nothing.",
-        "The rod starts as a rigid body: its strain unknowns start at zero.",
+        "The rod's strain dofs start at the impact velocity too, which causes a spurious force of "
+        "109 lb in the transducer.",
+        "The rod starts as a rigid body: its strain dofs start at zero.",
     ),
     Slip(
         "reload",
-        "The first fall of the force, however small, ends loading for good, and the first rise "
-        "after it begins reloading for good.",
+        "The first fall of the force, however small, ends loading permanently, and the first rise "
+        "after it starts reloading permanently.",
         "Loading, unloading and reloading may follow each other any number of times; the force "
         "is continuous at every turn.",
     ),
@@ -88,47 +88,46 @@ SLIPS = (
     ),
     Slip(
         "time",
-        "The macro TIME is skipped, so that the clock of PROP and STRE stands at 0.",
+        "The macro TIME is skipped, so the clock of PROP and STRE stays at 0.",
         "TIME advances the clock by DT.",
     ),
     Slip(
         "prop",
-        "The proportional load is only ever taken at t = 0, and reading its table returns none.",
-        "The proportional load is taken at the clock's time.",
+        "The proportional load is evaluated at t = 0 only, and reading its table returns none.",
+        "The proportional load is evaluated at the clock's time.",
     ),
     Slip(
         "force-scale",
         "Every FORC value is scaled by the contact force, prescribed displacements too.",
-        "FORC has its proportional load; the contact force acts on the impact unknown alone.",
+        "FORC has its proportional load; the contact force acts on the impact dof alone.",
     ),
     Slip(
         "rod-force",
         "ROD writes the contact force's unit load into FORC's array: it replaces FORC's value of "
-        "the impact unknown, and a FORC segment after ROD replaces it. The plate feels the contact "
-        "force times what is left there.",
-        "The plate feels the contact force, and FORC's value as well, in whatever order the "
-        "segments stand.",
+        "the impact dof, and a FORC segment after ROD replaces it. The contact force on the "
+        "plate is scaled by the value left there.",
+        "The contact force and FORC's value both act on the plate, in any order of the segments.",
     ),
     Slip(
         "prop-contact",
         "PROP and the contact force share one variable: a PROP between two impact steps replaces "
-        "the contact force that the plate feels in the next step.",
-        "PROP scales FORC's values; the contact force acts as it is.",
+        "the contact force on the plate in the next step.",
+        "PROP scales FORC's values; the contact force is not scaled.",
     ),
     Slip(
         "counter",
         "RODP counts the steps since the last output, and compares them with the N of its own "
-        "card: where N changes, other rows are stored, or none.",
+        "card: where N changes, different rows are stored, or none.",
         "RODP stores at every N-th impact step since the problem began.",
     ),
     Slip(
         "small-stiffness",
         "Every entry of A, B and D below 1e-6 is set to 0, whatever the units are.",
-        "A, B and D are what the layers give.",
+        "A, B and D are those of the layers.",
     ),
     Slip(
         "rod-dt",
-        "The rod's integration keeps the constants of the first DT for good.",
+        "The rod's integration always uses the constants of the first DT.",
         "The rod's integration follows DT.",
     ),
     Slip(
@@ -142,16 +141,16 @@ NAMES = tuple(slip.name for slip in SLIPS)
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A statement of the report that the computation does not bear out; no slip is behind it.
+    """A statement of the report that the computation does not confirm, and that no slip explains.
 
     Attributes
     ----------
     place : str
-        Where the report makes it.
+        Its section of the report.
     report : str
         What the report says.
     found : str
-        What the computation gives.
+        Result of the computation.
     """
 
     place: str
@@ -211,7 +210,7 @@ def active_slips(mode: str = REPORT, single: Iterable[str] = ()) -> frozenset[st
 
 
 def mode_of(slips: frozenset[str]) -> str:
-    """Mode that a result with these slips belongs to."""
+    """Mode of a result with these slips."""
     return LISTING if slips == frozenset(NAMES) else REPORT
 
 
@@ -222,13 +221,13 @@ def errata() -> str:
         "",
         "`fecm run` follows the report's text (`--mode report`) or its printed program",
         "(`--mode listing`). They differ in the slips below. `--slip NAME`, which may be repeated,",
-        "adds single ones to report mode, so that you can see what each of them does.",
+        "adds single ones to report mode, to show the effect of each.",
         "",
         "| slip | the printed program | the report |",
         "|---|---|---|",
         *(f"| `{slip.name}` | {slip.listing} | {slip.report} |" for slip in SLIPS),
         "",
-        "## Statements that the computation does not bear out",
+        "## Statements that the computation does not confirm",
         "",
         "Text and program agree here, and both modes give the same.",
         "",

@@ -1,4 +1,4 @@
-"""What a deck would run: the summary of ``fecm check``."""
+"""Summary of a checked deck for ``fecm check``."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ class ProblemSummary:
     A, B, D, shear : ndarray
         Laminate stiffnesses.
     plate_mass, projectile_mass : float
-        Mass of the plate, and of the projectile whether it hits or not.
+        Mass of the plate, and of the projectile even without impact.
     critical_time_step : float
     time_steps : list of float
         Every DT of the program.
     output_bytes : int
-        About what the result will take.
+        Approximate size of the result.
     elements_per_wave : float or None
         Elements at the impact node per bending wave of the contact; None without impact.
     mesh_error : float or None
         Estimated mesh error of the peak force, relative to it.
     units : dict
-        Names of the units; empty where the deck gives none.
+        Names of the units; empty if the deck has none.
     """
 
     title: str
@@ -68,7 +68,7 @@ class ProblemSummary:
         }
 
     def lines(self) -> list[str]:
-        """Lines that a person reads."""
+        """Lines of text."""
 
         def quantity(value: float, dimension: str) -> str:
             return f"{value:.4g} {unit_of(dimension, self.units)}".rstrip()
@@ -122,7 +122,7 @@ def summarise(problem: Problem) -> ProblemSummary:
     deck, plate, laminate = problem.deck, problem.plate, problem.laminate
     try:
         critical = problem.critical_time_step
-    except UnsoundPlateError:  # found by the check wherever the program steps
+    except UnsoundPlateError:  # the check reports it if the program takes steps
         critical = float("nan")
     resolved = resolution(problem) if problem.has_impact else None
     return ProblemSummary(
