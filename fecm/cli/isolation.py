@@ -1,20 +1,20 @@
 """Commands that read result files run in a child process.
 
-HDF5 can crash on a damaged file, or never return from it.  The program forks before it imports
-anything heavy; the child is the command, under limits, and the parent waits for it and hands on its
+HDF5 can crash on a damaged file or never return from it.  The program forks before it imports large
+libraries; the child runs the command under limits, and the parent waits for it and ends with its
 exit status.  A child that crashes, hangs or takes too much memory becomes one line.
 
 Limits of the child:
 
-- memory: three quarters of what is free, and at most ``ROOM`` plus ``ROOM_A_BYTE`` bytes per byte
-  of the files;
-- one call of a library, in which no Python runs: ``PATIENCE`` seconds plus one per ``SPEED`` bytes
-  of the files; the variable FECM_PATIENCE replaces ``PATIENCE``;
+- memory: three quarters of the free memory, and at most ``ROOM`` plus ``ROOM_A_BYTE`` bytes per
+  byte of the files;
+- one call of a library, during which no Python code runs: ``PATIENCE`` seconds plus one per
+  ``SPEED`` bytes of the files; the variable FECM_PATIENCE replaces ``PATIENCE``;
 - processor time of the command: ``TOTAL`` seconds plus one per ``TOTAL_SPEED`` bytes.
 
-A timer makes the child write to a pipe while Python runs, also while it waits for a reader of its
-output; the parent measures the time without a byte.  The child is killed when its parent ends.
-Where the system has no fork, the command reads the files itself.
+A timer makes the child write to a pipe while Python code runs, also while it waits for a reader of
+its output; the parent measures the time without a byte.  The child is killed when its parent ends.
+On systems without fork, the command reads the files in its own process.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ import select
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import FrameType
@@ -48,17 +48,16 @@ PATIENCE, SPEED = 30.0, 5_000_000
 TOTAL, TOTAL_SPEED = 600.0, 100_000
 FREE_SHARE = 0.75
 
-# Parts of a silence; a stop of parent and child (Ctrl-Z) spoils one of them.
-PARTS = 4
-
-# Seconds that a child has to end after a signal, first by itself, then when told.
+# Time between two looks at the child (s).
+WAIT = 0.1
+# Time that a child has to end after a signal, first by itself, then after it gets the signal (s).
 GRACE = 0.3, 2.0
 
 Command = TypeVar("Command", bound=Callable[..., None])
 
 
 class _State:
-    """Whether commands are isolated, which the program turns on, and the pipe of a child."""
+    """Whether commands are isolated, which `main` turns on, and the pipe of a child."""
 
     on = False
     pipe: int | None = None
@@ -84,16 +83,6 @@ class Limits:
     memory: int
     call: float
     total: float
-
-
-@dataclass(frozen=True)
-class _Job:
-    """What a child tells its parent: names of its files, limits, folders that it may write to."""
-
-    files: str
-    call: float
-    total: float
-    folders: list[str]
 
 
 def limits_for(size: int, free: int | None) -> Limits:
@@ -152,8 +141,8 @@ def reads(*names: str) -> Callable[[Command], Command]:
                 files += value if isinstance(value, tuple) else [value]
             limits = limits_for(sum(map(_size, files)), available())
             label = printable(" or ".join(map(str, dict.fromkeys(files))))
-            job = _Job(label, limits.call, limits.total, _folders(values))
-            os.write(switch.pipe, json.dumps(asdict(job)).encode() + b"\n")
+            job = {"files": label, "folders": _folders(values), **asdict(limits)}
+            os.write(switch.pipe, json.dumps(job).encode() + b"\n")
             _confine(limits, switch.pipe)
             try:
                 function(**values)
@@ -210,7 +199,7 @@ def _confine(limits: Limits, pipe: int) -> None:
     # Python runs a handler between two of its instructions, and when a signal interrupts its own
     # reading or writing; inside a call of a library it does not.
     signal.signal(signal.SIGALRM, beat)
-    every = min(1.0, limits.call / (2.0 * PARTS))
+    every = min(1.0, limits.call / 8.0)
     signal.setitimer(signal.ITIMER_REAL, every, every)
     atexit.register(signal.setitimer, signal.ITIMER_REAL, 0.0)
 
@@ -229,96 +218,78 @@ def _quieten() -> None:
 # The parent -------------------------------------------------------------------------------------
 
 
-class _SignalledError(Exception):
-    """A signal arrived while the parent waited for the child."""
-
-
-@contextlib.contextmanager
-def _signals_raise() -> Iterator[None]:
-    """Turn signals that end the program into an exception."""
-
-    def came(number: int, frame: FrameType | None) -> None:
-        raise _SignalledError(number)
-
-    old = {number: signal.signal(number, came) for number in SIGNALS}
-    try:
-        yield
-    finally:
-        for number, handler in old.items():
-            signal.signal(number, handler)
-
-
 def _wait(child: int, pipe: int) -> NoReturn:
-    """Wait for a child and end as it does; kill it if it is silent for too long."""
-    job: list[_Job] = []
-    try:
-        with _signals_raise():
-            hangs = not _watch(pipe, job)
-            if hangs:
-                os.kill(child, signal.SIGKILL)
-            status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    except _SignalledError as signalled:
-        hangs, status = False, 128 + int(signalled.args[0])
-        _end(child, status - 128)
-    files = job[0].files if job else "the command"
-    if job and (status < 0 or status in SIGNALLED):
-        clear_partials(map(Path, job[0].folders))
+    """Wait for a child and end as it does."""
+    received: list[int] = []
+    handlers = {n: signal.signal(n, lambda number, frame: received.append(number)) for n in SIGNALS}
+    job, hangs = _watch(child, pipe, received)
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+    if job and (received or status < 0 or status in SIGNALLED):
+        clear_partials(map(Path, job["folders"]))
+    if received:
+        if status == -signal.SIGKILL:
+            echo("fecm: interrupted", err=True)
+        raise SystemExit(128 + received[0])
     if status >= 0:
         raise SystemExit(status)
-    if hangs and status == -signal.SIGKILL:
-        raise RefusedError(
-            f"{files} can't be read: the HDF5 library did not return within {job[0].call:.3g} s, "
-            "as happens with damaged files and with disks that hang (FECM_PATIENCE=SECONDS allows "
-            "more)"
-        )
     if -status in SIGNALS:
         raise SystemExit(128 - status)
-    raise RefusedError(f"{files} can't be read: {_death(-status, job[0].total if job else TOTAL)}")
+    files = job["files"] if job else "the command"
+    raise RefusedError(f"{files} can't be read: {_death(-status, job, hangs=hangs)}")
 
 
-def _watch(pipe: int, job: list[_Job]) -> bool:
-    """Wait until a child closes its pipe; False if it is silent for too long."""
-    start, silent = b"", 0
-    while silent < PARTS:
-        if not select.select([pipe], [], [], job[0].call / PARTS if job else None)[0]:
+def _watch(child: int, pipe: int, received: Sequence[int]) -> tuple[dict[str, Any] | None, bool]:
+    """Wait until a child closes its pipe; kill it if it hangs, or after a signal.
+
+    Silence is counted in waits instead of seconds: a stop of both processes (Ctrl-Z) is one wait.
+
+    Parameters
+    ----------
+    child, pipe : int
+        Process id, and file descriptor.
+    received : sequence of int
+        Signals that this process has received.
+
+    Returns
+    -------
+    tuple
+        What the child said about its job, and whether it was killed because it hung.
+    """
+    job: dict[str, Any] | None = None
+    start, silent, hangs = b"", 0, False
+    orders: list[tuple[float, int]] = []  # when the child gets which signal
+    while True:
+        if received and not orders:
+            orders = [(time.monotonic() + GRACE[0], received[0])]
+            orders += [(orders[0][0] + GRACE[1], signal.SIGKILL)]
+        if orders and time.monotonic() > orders[0][0]:
+            os.kill(child, orders[0][1])
+            orders = orders[1:] or [(math.inf, signal.SIGKILL)]
+        if job and silent * WAIT >= job["call"] and not hangs:
+            os.kill(child, signal.SIGKILL)
+            hangs = True
+        if not select.select([pipe], [], [], WAIT)[0]:
             silent += 1
             continue
-        silent, data = 0, os.read(pipe, 4096)
-        if not data:
-            return True
-        if not job:
-            start += data
-            if b"\n" in start:
-                job.append(_Job(**json.loads(start.partition(b"\n")[0])))
-    return False
+        silent = 0
+        if not (data := os.read(pipe, 4096)):
+            return job, hangs
+        start += b"" if job else data
+        if not job and b"\n" in start:
+            job = json.loads(start.partition(b"\n")[0])
 
 
-def _end(child: int, number: int) -> None:
-    """End a child after a signal, which Ctrl-C also sends to it; kill one that hangs."""
-    for seconds, then in zip(GRACE, (number, signal.SIGKILL), strict=True):
-        until = time.monotonic() + seconds
-        while time.monotonic() < until:
-            if _ended(child):
-                return
-            time.sleep(0.01)
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(child, then)
-    with contextlib.suppress(ChildProcessError):
-        os.waitpid(child, 0)
-    echo("fecm: interrupted", err=True)
-
-
-def _ended(child: int) -> bool:
-    try:
-        return os.waitpid(child, os.WNOHANG)[0] == child
-    except ChildProcessError:
-        return True
-
-
-def _death(number: int, total: float) -> str:
-    """How a signal ended a child."""
+def _death(number: int, job: dict[str, Any] | None, *, hangs: bool) -> str:
+    """Say how a signal ended a child."""
+    if hangs and job and number == signal.SIGKILL:
+        return (
+            f"the HDF5 library did not return within {job['call']:.3g} s, as happens with damaged "
+            "files and with disks that hang (FECM_PATIENCE=SECONDS allows more)"
+        )
     if number == signal.SIGXCPU:
-        return f"it took more than {total:.3g} s of processor time"
+        return f"it took more than {job['total'] if job else TOTAL:.3g} s of processor time"
     if number == signal.SIGKILL:
         return "the reading process was killed, as the system does when memory runs out"
     name = signal.Signals(number).name if number in set(signal.Signals) else f"signal {number}"
