@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 import fecm
 from fecm.plot.data import patches, strain_points
 from fecm.plot.deflection import profile
-from fecm.plot.kinds import KINDS, MISSING, Picture, PlotError
+from fecm.plot.kinds import KINDS, MISSING, Picture, PlotError, PlotNote
 from fecm.plot.meshes import supports
 from fecm.plot.pictures import draw, save
 from fecm.plot.style import COLOURS, scale
@@ -200,7 +200,7 @@ def test_strain_points_are_nodes_or_gauss_points(result: Result) -> None:
 
 def test_a_plate_that_stretches_is_said_to_show_bending_alone() -> None:
     free = MESH[: MESH.index("BOUN")] + "BOUN\n    1    0    1    1    1    1    1\n\n"
-    with pytest.warns(UserWarning, match="bending alone"):
+    with pytest.warns(PlotNote, match="bending alone"):
         run(small(mesh=free)).plot("strain")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -12,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from fecm.deck.model import Material
 from fecm.plot.data import Array, deck_of, impact_point, nearest, require, strain_points
-from fecm.plot.kinds import Picture, PlotError, PlotNote
+from fecm.plot.kinds import Picture, PlotError, warn
 from fecm.plot.style import (
     COLOURS,
     RATIO,
@@ -203,11 +202,9 @@ def _strains(
         thickness = sum(a.thickness for a in deck_of(result, name).require(Material).layers)
         height = thickness / 2.0 if face == "far" else -thickness / 2.0
         if result["mesh/equations"][:, :2].any():
-            warnings.warn(
+            warn(
                 f"the midplane of {name} may stretch; its strains are not stored, and the "
-                "picture shows those of bending alone",
-                PlotNote,
-                stacklevel=2,
+                "picture shows those of bending alone"
             )
     found: dict[str, Array] = {}
     for place in places:

@@ -21,6 +21,7 @@ from fecm.plot.style import (
     scale,
     scale_in,
     styled,
+    superscript,
 )
 from fecm.studies.indentation_test.constants import Fit
 from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING
@@ -129,8 +130,7 @@ def rigidity_picture(
     length = scale_in(units, "length", peaks)
     # The rigidity is unbounded towards zero: the deeper half sets the height of the axis.
     top = 3.0 * max(float(s[len(s) // 2 :].max()) for s in relations.values())
-    raised = f"{power:g}".translate(str.maketrans("0123456789.", "⁰¹²³⁴⁵⁶⁷⁸⁹·"))
-    unit = unit_of(f"force/length{raised}", dict(units))
+    unit = unit_of(f"force/length{superscript(f'{power:g}')}", dict(units))
     stiff = Scale(scale(top, "").factor, f"{scale(top, '').unit} {unit}".strip())
     figure, (axes,) = panels("column", ratio=RATIO["column"])
     graph = Graph(axes, length, stiff)

@@ -5,6 +5,7 @@ Imports no matplotlib: the command line lists the kinds without it.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -25,6 +26,11 @@ class PlotError(FecmError, ValueError):
 
 class PlotNote(UserWarning):
     """Something a user should know about a picture; other warnings come from libraries."""
+
+
+def warn(text: str) -> None:
+    """Warn with a :class:`PlotNote`."""
+    warnings.warn(text, PlotNote, stacklevel=3)
 
 
 @dataclass(frozen=True)

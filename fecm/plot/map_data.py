@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.plot.kinds import PlotError, PlotNote
-from fecm.plot.style import COLOURS, Scale, scale
+from fecm.plot.kinds import PlotError, warn
+from fecm.plot.style import COLOURS, Scale, peak, scale, superscript
 from fecm.sweeps.cases import INTEGERS as WHOLE_VALUES
 from fecm.sweeps.cases import TEXTS
 from fecm.sweeps.outcome import INTEGERS as WHOLE_NUMBERS
@@ -111,19 +110,14 @@ def choose(
         If the options do not fit the sweep, or no case remains.
     """
     rows = _rows(sweep, name, where)
-    axes = [_axis(sweep, parameter, rows) for parameter in _over(sweep, name, rows, over)]
-    if len(axes) > 1:
-        _check_hidden(sweep, rows, axes)
+    varying = [n for n, values in sweep.cases.items() if len(np.unique(values[rows])) > 1]
+    axes = [_parameter(sweep, parameter, rows) for parameter in _over(sweep, name, varying, over)]
+    others = [parameter for parameter in varying if parameter not in [axis.name for axis in axes]]
+    other = _parameter(sweep, others[0], rows) if others and len(axes) == 1 else None
+    if others:
+        _check_others(axes, others, other)
     shown = _quantity(sweep, name, rows, quantity)
-    title = ", ".join(f"{other} {_text(sweep, other, rows[0])}" for other in where)
-    others = _others(sweep, rows, axes)
-    other = _axis(sweep, others[0], rows) if others and len(axes) == 1 else None
-    if len(axes) == 1 and (len(others) > 1 or (other is not None and len(other.ticks) > CURVES)):
-        raise PlotError(
-            f"{_listed(others)} {'varies' if len(others) == 1 else 'vary'} too; --where "
-            f"{others[0]}=VALUE selects some of the cases, --over {axes[0].name},{others[0]} draws "
-            "over both"
-        )
+    title = ", ".join(f"{held} {_text(sweep, held, rows[0])}" for held in where)
     still = sweep["status"][rows] == STILL
     return Choice(axes, shown, _levels(level, shown), title, other, still)
 
@@ -177,14 +171,8 @@ def _text(sweep: SweepResult, name: str, row: int) -> str:
     return scale(abs(float(value)), _unit(sweep, name)).show(float(value))
 
 
-def _varying(sweep: SweepResult, rows: Ints) -> list[str]:
-    """Parameters that vary among these cases."""
-    return [name for name, values in sweep.cases.items() if len(np.unique(values[rows])) > 1]
-
-
-def _over(sweep: SweepResult, name: str, rows: Ints, asked: Sequence[str]) -> list[str]:
+def _over(sweep: SweepResult, name: str, varying: list[str], asked: Sequence[str]) -> list[str]:
     """One or two parameters of the axes."""
-    varying = _varying(sweep, rows)
     for parameter in asked:
         if parameter not in varying and len(_values(sweep, name, parameter)):
             raise PlotError(f"{parameter} does not vary among the cases; a map needs one that does")
@@ -197,6 +185,19 @@ def _over(sweep: SweepResult, name: str, rows: Ints, asked: Sequence[str]) -> li
             "NAME,NAME"
         )
     return over
+
+
+def _check_others(axes: list[Axis], others: list[str], other: Axis | None) -> None:
+    """Refuse parameters that vary and are not shown, if cases would hide one another."""
+    vary = f"{_listed(others)} {'varies' if len(others) == 1 else 'vary'} too"
+    selects = f"--where {others[0]}=VALUE selects some of"
+    points = np.column_stack([axis.values for axis in axes])
+    if len(axes) > 1 and len(np.unique(points, axis=0)) < len(points):
+        raise PlotError(f"{vary}, so that cases would hide one another; {selects} them")
+    if len(axes) == 1 and (len(others) > 1 or (other is not None and len(other.ticks) > CURVES)):
+        raise PlotError(
+            f"{vary}; {selects} the cases, --over {axes[0].name},{others[0]} draws over both"
+        )
 
 
 def _quantity(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
@@ -223,35 +224,35 @@ def _quantity(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
             raise PlotError(f"{nothing}: {open_ends}; a deck with a longer duration may show it")
         raise PlotError(failures or f"{nothing}: there was no contact")
     if failures:
-        warnings.warn(f"{failures}; they are gaps in the picture", PlotNote, stacklevel=2)
+        warn(f"{failures}; they are gaps in the picture")
     if still.any():
         gaps = "; they have no value in the picture" if np.isnan(values[still]).any() else ""
-        warnings.warn(f"{open_ends}{gaps}", stacklevel=2)
+        warn(f"{open_ends}{gaps}")
     if lacking := int((np.isnan(values) & run & ~still).sum()):
-        warnings.warn(
-            f"{lacking} cases of {name} without contact have no {quantity}", PlotNote, stacklevel=2
-        )
-    if quantity in INTEGERS:
-        return Axis(quantity, Scale(1.0, ""), values)
-    shown = scale(float(np.nanmax(np.abs(values))), _unit(sweep, quantity))
-    return Axis(quantity, shown, shown.factor * values)
+        warn(f"{lacking} cases of {name} without contact have no {quantity}")
+    return _scaled(sweep, quantity, values)
 
 
 def _unit(sweep: SweepResult, name: str) -> str:
     """Unit with its powers as superscripts."""
-    raised = str.maketrans("0123456789.", "⁰¹²³⁴⁵⁶⁷⁸⁹·")
-    return re.sub(r"\^([\d.]+)", lambda power: power[1].translate(raised), sweep.unit(name))
+    return re.sub(r"\^([\d.]+)", lambda power: superscript(power[1]), sweep.unit(name))
 
 
-def _axis(sweep: SweepResult, name: str, rows: Ints) -> Axis:
+def _parameter(sweep: SweepResult, name: str, rows: Ints) -> Axis:
+    """Axis of a parameter."""
     values = sweep[name][rows]
-    if name in TEXTS:
-        ticks = tuple(dict.fromkeys(values.tolist()))
-        places = {text: place for place, text in enumerate(ticks)}
-        return Axis(name, Scale(1.0, ""), np.array([places[v] for v in values.tolist()]), ticks)
+    if name not in TEXTS:
+        return _scaled(sweep, name, values)
+    ticks = tuple(dict.fromkeys(values.tolist()))
+    places = {text: place for place, text in enumerate(ticks)}
+    return Axis(name, Scale(1.0, ""), np.array([places[v] for v in values.tolist()]), ticks)
+
+
+def _scaled(sweep: SweepResult, name: str, values: Array) -> Axis:
+    """Axis of numbers; counts are not scaled."""
     if name in INTEGERS:
         return Axis(name, Scale(1.0, ""), values)
-    shown = scale(float(np.abs(values).max()), _unit(sweep, name))
+    shown = scale(peak(values), _unit(sweep, name))
     return Axis(name, shown, shown.factor * values)
 
 
@@ -260,27 +261,8 @@ def _levels(levels: Sequence[float], shown: Axis) -> list[float]:
     low, high = np.nanmin(shown.values), np.nanmax(shown.values)
     for level in levels:
         if not low <= shown.scale.factor * level <= high:
-            warnings.warn(
+            warn(
                 f"the level {level:g} is outside the picture's values, which range from "
-                f"{low / shown.scale.factor:g} to {high / shown.scale.factor:g}",
-                PlotNote,
-                stacklevel=2,
+                f"{low / shown.scale.factor:g} to {high / shown.scale.factor:g}"
             )
     return [shown.scale.factor * level for level in levels]
-
-
-def _others(sweep: SweepResult, rows: Ints, axes: Sequence[Axis]) -> list[str]:
-    """Parameters that vary and are not on the axes."""
-    shown = [axis.name for axis in axes]
-    return [name for name in _varying(sweep, rows) if name not in shown]
-
-
-def _check_hidden(sweep: SweepResult, rows: Ints, axes: list[Axis]) -> None:
-    """Refuse cases at one place that differ in a parameter not shown."""
-    others = _others(sweep, rows, axes)
-    points = np.column_stack([axis.values for axis in axes])
-    if others and len(np.unique(points, axis=0)) < len(points):
-        raise PlotError(
-            f"{_listed(others)} {'varies' if len(others) == 1 else 'vary'} too, so that cases "
-            f"would hide one another; --where {others[0]}=VALUE selects some of them"
-        )

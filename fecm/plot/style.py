@@ -79,7 +79,7 @@ _PREFIXED = {
 
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_SUPERSCRIPTS = str.maketrans("-0123456789.", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹·")
 
 Drawn = ParamSpec("Drawn")
 
@@ -132,11 +132,13 @@ def scale(peak: float, unit: str) -> Scale:
         return Scale(10.0**-power, _PREFIXES[power + own] + base)
     text = f"{unit[2:]}⁻¹" if unit.startswith("1/") else unit
     text = text.replace("*", "·").replace("^2", "²")
-    return Scale(10.0**-power, f"{_power(power)} {text}".strip())
+    power_of_ten = f"10{superscript(power)} " if power else ""
+    return Scale(10.0**-power, f"{power_of_ten}{text}".strip())
 
 
-def _power(power: int) -> str:
-    return f"10{str(power).translate(_SUPERSCRIPTS)}" if power else ""
+def superscript(number: object) -> str:
+    """A number in superscript."""
+    return str(number).translate(_SUPERSCRIPTS)
 
 
 def common_unit(results: Mapping[str, Result], dimension: str) -> str:

@@ -93,6 +93,11 @@ class Result:
         slips = self.attributes.get("slips", ())
         return tuple(map(str, slips)) if isinstance(slips, list | tuple) else ()
 
+    @property
+    def has_listing_tapes(self) -> bool:
+        """Whether tape8 and tape9 are those of the printed program: the slip ``tapes``."""
+        return "tapes" in self.slips
+
     def unit(self, dimension: str) -> str:
         """Unit of a dimension such as ``"force/length"``; empty if the deck names none."""
         return unit_of(dimension, declared_units(self.attributes))

@@ -65,7 +65,7 @@ def _contact(result: Result) -> Iterator[str]:
 
 def tape_texts(result: Result) -> dict[str, Iterator[str]]:
     """Lines of every tape that the run stored, by name."""
-    listing = "tapes" in result.slips
+    listing = result.has_listing_tapes
     strains, contact = ("tape9", "tape8") if listing else ("tape8", "tape9")
     shears = ("gamma_xz", "gamma_yz") if listing else ("gamma_yz", "gamma_xz")
     texts: dict[str, Iterator[str]] = {}
