@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import click
@@ -62,15 +62,14 @@ from fecm.simulation.spool import Journal, SpoolError
     type=click.Choice(SOLVERS),
     default=AUTO,
     show_default=True,
-    help="How K·u is computed: as suits the mesh, or always by a sparse matrix.",
+    help="Computation of K·u: by the method that suits the mesh, or by a sparse matrix.",
 )
 @click.option(
     "--threads",
     type=click.IntRange(0, 1024),
     default=0,
     metavar="N",
-    help="Threads that share the work of a step; 0 takes every core for a large mesh.  "
-    "[default: 0]",
+    help="Threads that share the work of a step; 0 uses every core for a large mesh.  [default: 0]",
 )
 @click.option("--rod-mass", type=click.Choice(MASSES), default=LUMPED, show_default=True,
               help="The projectile's mass matrix; the report's program lumps it.")  # fmt: skip
@@ -82,9 +81,8 @@ from fecm.simulation.spool import Journal, SpoolError
 @click.option("--resume", is_flag=True,
               help="Resume from the checkpoint of an interrupted run.")  # fmt: skip
 @click.option("--energy-limit", type=POSITIVE, default=ENERGY_LIMIT,
-              show_default=True, metavar="PART",
-              help="Relative error of the energy balance that ends a run without "
-                   "slips.")  # fmt: skip
+              show_default=True, metavar="RATIO",
+              help="Relative energy error that ends a run without slips.")  # fmt: skip
 @click.option(
     "--force",
     is_flag=True,
@@ -95,7 +93,7 @@ from fecm.simulation.spool import Journal, SpoolError
     "printed",
     type=FILE_PATH,
     metavar="OUT.txt",
-    help="Also write what the original program sent to its printer.",
+    help="Also write the printed output of the original program.",
 )
 def run(
     deck: Path,
@@ -115,43 +113,47 @@ def run(
 ) -> None:
     """Run every problem in DECK and write its result.
 
-    A second problem in the deck goes to OUT-2.h5, and so on.  An interrupted run leaves a
+    The result of a second problem goes to OUT-2.h5, and so on.  An interrupted run leaves a
     checkpoint beside its output; --resume with the same options gives the same bytes.
     """
     try:
         active = active_slips(mode, slips)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
-
-    prepared = load_valid(deck, "; nothing was run", mode, force=force)
+    problems = load_valid(deck, "; nothing was run", mode, force=force).problems
     first = output or Path(f"{deck.stem}.h5")
-    paths = [numbered(first, n) for n in range(1, len(prepared.problems) + 1)]
-    prints = [None if printed is None else numbered(printed, n + 1) for n in range(len(paths))]
-    outputs = [p for p in (*paths, *prints) if p is not None]
-    beside = [p for path in paths if path.name for p in (checkpoint_of(path), spool_of(path))]
-    check_outputs(outputs, True, [deck], beside)
-    left = next((n for n, path in enumerate(paths) if checkpoint_of(path).exists()), None)
-    if resume and left is None:
-        raise RefusedError(f"there is no checkpoint {checkpoint_of(paths[0])} to resume from")
-    if left is not None and not (resume or overwrite):
-        raise RefusedError(
-            f"{checkpoint_of(paths[left])} belongs to an interrupted run: --resume continues it, "
-            "--overwrite starts over"
-        )
-    # The interrupted run had got this far; what stands beyond is not its own.
-    own = left + 1 if resume and left is not None else 0
-    check_outputs([p for p in (*paths[own:], *prints[own:]) if p is not None], overwrite)
+    paths = [numbered(first, n) for n in range(1, len(problems) + 1)]
+    prints = [numbered(printed, n) if printed else None for n in range(1, len(problems) + 1)]
+    partial = [p for path in paths if path.name for p in (checkpoint_of(path), spool_of(path))]
+    check_outputs([*paths, *filter(None, prints)], True, [deck], partial)
+    interrupted = _interrupted(paths, resume=resume, overwrite=overwrite)
+    # Outputs up to the interrupted problem belong to the run that is resumed.
+    own = interrupted + 1 if resume else 0
+    check_outputs([*paths[own:], *filter(None, prints[own:])], overwrite)
     choices = RunOptions(
         active, solver, threads, RodMethod(rod_mass, rod_integrator), energy_limit
     )  # fmt: skip
-    for number, path in enumerate(paths):
+    for number, (problem, path, print_to) in enumerate(zip(problems, paths, prints, strict=True)):
         if number:
             echo()
         if number < own - 1 and path.exists():
             note(f"{path} is complete")
             continue
-        _run_one(prepared.problems[number], path, prints[number], choices, every,
-                 resumes=number == own - 1, overwrite=overwrite or number < own)  # fmt: skip
+        _run_one(problem, path, print_to, choices, every, resumes=number == own - 1,
+                 overwrite=overwrite or number < own)  # fmt: skip
+
+
+def _interrupted(paths: Sequence[Path], *, resume: bool, overwrite: bool) -> int:
+    """Number of the problem whose run was interrupted; 0 if none was."""
+    number = next((n for n, path in enumerate(paths) if checkpoint_of(path).exists()), None)
+    if number is None and resume:
+        raise RefusedError(f"there is no checkpoint {checkpoint_of(paths[0])} to resume from")
+    if number is not None and not (resume or overwrite):
+        raise RefusedError(
+            f"{checkpoint_of(paths[number])} belongs to an interrupted run: --resume continues it, "
+            "--overwrite starts over"
+        )
+    return number or 0
 
 
 def _run_one(
@@ -175,10 +177,10 @@ def _run_one(
         printer = Printer()
         if printed is not None:
             printer = Printer(stack.enter_context(writing(printed, overwrite=overwrite)))
-        bar = _ProgressBar(stack.enter_context(progress("fecm", problem.work.steps)))
-        observer = _Checkpoints(checkpointer, every)
+        advance = stack.enter_context(progress("fecm", problem.work.steps))
+        observer = _Observer(checkpointer, every, advance)
         simulation = Simulation(
-            problem, journal, choices, printer, (bar, observer.on_step), observer.on_macro
+            problem, journal, choices, printer, (observer.on_step,), observer.on_macro
         )
         if resumes:
             checkpointer.restore(simulation)
@@ -229,7 +231,7 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
         of_disk = isinstance(error, OSError) and (error.errno or type(error) is not OSError)
         if not resumes or of_disk or isinstance(error, MemoryError):
             raise
-        # A forged checkpoint can fail anywhere.
+        # A forged checkpoint can fail at any place.
         raise RefusedError(
             f"the run can't resume from {checkpoint_of(path)} ({error}); --overwrite without "
             "--resume discards it and starts over"
@@ -244,19 +246,25 @@ class _StoppedError(Exception):
         super().__init__(step)
 
 
-class _Checkpoints:
-    """Writes checkpoints, and stops a run after a signal.
+class _Observer:
+    """Shows the progress of a run, writes its checkpoints, and stops it after a signal.
 
     Parameters
     ----------
     checkpointer : Checkpointer
     every : float or None
         Seconds between two checkpoints; None writes one only when a signal stops the run.
+    advance : callable
+        Advances the progress bar by a number of steps.
     """
 
-    def __init__(self, checkpointer: Checkpointer, every: float | None) -> None:
+    def __init__(
+        self, checkpointer: Checkpointer, every: float | None, advance: Callable[[int], object]
+    ) -> None:
         self._checkpointer = checkpointer
         self._every = every
+        self._advance = advance
+        self._shown = 0
 
     def on_macro(self, simulation: Simulation) -> None:
         """Stop the run if a signal came."""
@@ -265,7 +273,10 @@ class _Checkpoints:
             raise _StoppedError(simulation.state.plate.step)
 
     def on_step(self, simulation: Simulation) -> None:
-        """Write a checkpoint if one is due; stop the run if a signal came."""
+        """Advance the progress bar, and write a checkpoint if one is due."""
+        step = simulation.state.plate.step
+        self._advance(step - self._shown)
+        self._shown = step
         self.on_macro(simulation)
         if self._every is not None and self._checkpointer.age >= self._every:
             self._checkpointer.write(simulation)
@@ -279,16 +290,3 @@ def _check_room(path: Path, size: int) -> None:
             f"{path}: the result takes about {format_bytes(size)}, and the disk has "
             f"{format_bytes(free)} left"
         )
-
-
-class _ProgressBar:
-    """Advances a progress bar by the steps taken since the last call."""
-
-    def __init__(self, advance: Callable[[int], object]) -> None:
-        self._advance = advance
-        self._done = 0
-
-    def __call__(self, simulation: Simulation) -> None:
-        done = simulation.state.plate.step
-        self._advance(done - self._done)
-        self._done = done
