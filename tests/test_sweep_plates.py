@@ -16,7 +16,7 @@ from fecm.problem.build import is_coupled
 from fecm.problem.generate import generate
 from fecm.sweeps.vary import apply_case
 from tests.calls import call
-from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, small
+from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, model, small
 
 LAYUPS = ("[0/90]2s", "[0_4/90_4]", "[45/-45]4")
 
@@ -31,13 +31,6 @@ def new(layup: str, *options: str) -> str:
     )  # fmt: skip
     assert made.exit_code == 0
     return made.stdout
-
-
-def model(text: str | Path) -> Deck:
-    """Model of a deck of one problem."""
-    deck = fecm.read_deck(text)
-    assert isinstance(deck, Deck)
-    return deck
 
 
 @pytest.mark.parametrize("support", ["free", "simple", "clamped"])

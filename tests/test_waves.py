@@ -319,7 +319,7 @@ def test_fronts_that_pass_one_another_closely_are_not_taken_to_cross() -> None:
     normals = np.arange(0.0, 180.0, 0.5)
     one, other = surfaces.fronts(normals), surfaces.fronts(normals + 180.0)
     np.testing.assert_allclose(one.velocity, other.velocity, rtol=1e-9)
-    coupled = np.sort(surfaces.fronts(np.arange(0.0, 180.0, 0.002)).velocity[:, :4], axis=1)
+    coupled = np.sort(surfaces.fronts(np.arange(99.0, 99.4, 0.002)).velocity[:, :4], axis=1)
     assert 0.0 < np.diff(coupled, axis=1).min() < 2e-3 * coupled.max()
 
 
