@@ -6,6 +6,9 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
 
 from fecm.deck.model import Boundary, Coordinates, Elements
 from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
@@ -192,28 +195,18 @@ class Grid:
         edges : dict
             Codes of the nodes of the edges ``left``, ``right``, ``bottom`` and ``top``.
         """
-        a, u = self.across, self.up
-        members = {
-            "left": lambda i, j: i == 0,
-            "right": lambda i, j: i == a - 1,
-            "bottom": lambda i, j: j == 0,
-            "top": lambda i, j: j == u - 1,
-        }
-        runs: list[tuple[int, int, tuple[int, ...]]] = []
-        for j in range(u):
-            for i in range(a):
-                held = [codes for name, codes in edges.items() if members[name](i, j)]
-                code = tuple(max(c) for c in zip(everywhere, *held, strict=True))
-                node = 1 + i + j * a
-                if runs and runs[-1][2] == code:
-                    runs[-1] = (runs[-1][0], node, code)
-                else:
-                    runs.append((node, node, code))
+        codes = np.tile(np.array(everywhere), (self.up, self.across, 1))
+        parts = {"left": codes[:, 0], "right": codes[:, -1], "bottom": codes[0], "top": codes[-1]}
+        for name, held in edges.items():
+            np.maximum(parts[name], held, out=parts[name])
+        rows = codes.reshape(self.nodes, -1)
+        starts = [0, *(np.flatnonzero((np.diff(rows, axis=0) != 0).any(axis=1)) + 1).tolist()]
         records: list[NodeCodes] = []
-        for first, last, code in runs:
+        for start, end in pairwise([*starts, self.nodes]):
+            code = tuple(rows[start].tolist())
             if not any(code):
                 continue
-            if first < last:  # a negative code carries on up to the next card
-                records.append(NodeCodes(first, 1, tuple(-c for c in code)))
-            records.append(NodeCodes(last, 0, code))
+            if end - start > 1:  # a negative code carries on up to the next card
+                records.append(NodeCodes(start + 1, 1, tuple(-c for c in code)))
+            records.append(NodeCodes(end, 0, code))
         return Boundary(tuple(records)) if records else None

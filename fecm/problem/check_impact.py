@@ -235,9 +235,10 @@ class Resolution:
     Attributes
     ----------
     contact : float
-        Duration of a Hertz contact on a rigid target, 2.94 (5 m v^2/4 k)^(2/5)/v.
+        Duration of a Hertz contact on a rigid target, 2.94 (5 m v^2/4 k)^(2/5)/v: S. P. Timoshenko
+        and J. N. Goodier, Theory of Elasticity, on the impact of spheres.
     wave : float
-        Length of the bending wave whose half period that is.
+        Length of the bending wave of that half period, 2 pi (D/(m (pi/contact)^2))^(1/4).
     side : float
         Longest side of the elements at the impact node, length.
     error : float or None

@@ -6,14 +6,12 @@ All are warnings, except that a program which cannot move the plate is an error.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
 from fecm.deck.findings import Findings, Place
 from fecm.deck.model import Deck, Impact, Indentation, Material, Projectile, Segment
-from fecm.deck.records import Layer, Ply
+from fecm.deck.records import Layer, Ply, Record
 from fecm.deck.units import in_si, unit_names
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.plate import PlateModel
@@ -49,13 +47,8 @@ REAL = {
 }
 
 
-class Value(NamedTuple):
-    """A value to compare with :data:`REAL`: its kind, name and place."""
-
-    kind: str
-    name: str
-    value: float
-    place: Place | None
+# Kind in REAL, card, name and value of a field.
+Value = tuple[str, Record, str, float]
 
 
 def check_plausibility(problem: Problem, findings: Findings) -> None:
@@ -211,54 +204,47 @@ def _check_projectile(deck: Deck, plate: PlateModel, findings: Findings) -> None
         )
 
 
-def _values(deck: Deck, *, hits: bool) -> Iterator[Value]:
+def _values(deck: Deck, *, hits: bool) -> list[Value]:
     """Values that :data:`REAL` has a range for."""
     material = deck.require(Material)
-    ply = material.ply
-    for kind, name, value in (
-        ("density", "mass density", ply.density),
-        ("fibre modulus", "Young's modulus E1", ply.e1),
-        ("matrix modulus", "Young's modulus E2", ply.e2),
-        ("matrix modulus", "shear modulus G12", ply.g12),
-        ("matrix modulus", "shear modulus G13", ply.g13),
-        ("matrix modulus", "shear modulus G23", ply.g23),
-    ):
-        yield Value(kind, name, value, ply.place(name))
-    layer = max(material.layers, key=lambda layer: layer.thickness)
-    name = "layer thickness"
-    yield Value("ply thickness", name, layer.thickness, layer.place(name))
+    ply, layer = material.ply, max(material.layers, key=lambda layer: layer.thickness)
+    values: list[Value] = [
+        ("density", ply, "mass density", ply.density),
+        ("fibre modulus", ply, "Young's modulus E1", ply.e1),
+        ("matrix modulus", ply, "Young's modulus E2", ply.e2),
+        ("matrix modulus", ply, "shear modulus G12", ply.g12),
+        ("matrix modulus", ply, "shear modulus G13", ply.g13),
+        ("matrix modulus", ply, "shear modulus G23", ply.g23),
+        ("ply thickness", layer, "layer thickness", layer.thickness),
+    ]
     if not hits:
-        return
+        return values
     impact, law, card = deck.require(Impact), deck.require(Indentation), deck.last(Projectile)
     if impact.velocity > 0.0:
-        name = "impact velocity"
-        yield Value("velocity", name, impact.velocity, impact.place(name))
-    name = law.names()[0]
-    yield Value("contact coefficient", name, law.k, law.place(name))
+        values.append(("velocity", impact, "impact velocity", impact.velocity))
+    values.append(("contact coefficient", law, law.names()[0], law.k))
     if card is not None and card.elements:
-        for kind, name, value in (
-            ("rod modulus", "rod's Young's modulus", card.modulus),
-            ("density", "rod's density", card.density),
-        ):
-            yield Value(kind, name, value, card.place(name))
+        values.append(("rod modulus", card, "rod's Young's modulus", card.modulus))
+        values.append(("density", card, "rod's density", card.density))
+    return values
 
 
 def _check_units(deck: Deck, findings: Findings, *, hits: bool) -> None:
-    """Warn of values that no real material has in the units that UNIT names: one finding."""
+    """Warn in one finding of values that no real material has in the units of UNIT."""
     names = unit_names(deck)
-    wrong: list[tuple[Value, str]] = []
-    for value in _values(deck, hits=hits):
-        dimension, least, greatest, unit = REAL[value.kind]
+    wrong: list[tuple[Place | None, str]] = []
+    for kind, record, name, value in _values(deck, hits=hits):
+        dimension, least, greatest, unit = REAL[kind]
         factor = in_si(dimension, names)
-        if factor is not None and not least <= value.value * factor <= greatest:
-            what = f"{value.name} {value.value:g} is {value.value * factor:.3g} {unit}"
-            wrong.append((value, f"{what}, outside {least:g} to {greatest:g}"))
+        if factor is not None and not least <= value * factor <= greatest:
+            what = f"{name} {value:g} is {value * factor:.3g} {unit}"
+            wrong.append((record.place(name), f"{what}, outside {least:g} to {greatest:g}"))
     if wrong:
         findings.add(
             "W435",
             f"In the units of UNIT ({' '.join(names.values())}) the "
             f"{'; the '.join(what for _, what in wrong)}.",
-            wrong[0][0].place,
+            wrong[0][0],
             "either the values or the names on UNIT are wrong; nothing is converted",
         )
 
