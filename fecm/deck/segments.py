@@ -220,12 +220,6 @@ class SegmentReader:
             return None
         return kind.from_row(*row)
 
-    def _impact(self, head: Card) -> Segment | None:
-        return self._single(head, Impact)
-
-    def _shear_correction(self, head: Card) -> Segment | None:
-        return self._single(head, ShearCorrection)
-
     def _indentation(self, head: Card) -> Segment | None:
         word = " ".join(head.data.replace(",", " ").split()[1:]).upper()
         if word and word != Indentation.ACR:
@@ -306,11 +300,11 @@ READERS: dict[str, Callable[[SegmentReader, Card], Segment | None]] = {
     "ELEM": SegmentReader._numbered,
     "BOUN": SegmentReader._numbered,
     "MATE": SegmentReader._material,
-    "ROD": SegmentReader._impact,
+    "ROD": lambda reader, head: reader._single(head, Impact),
     "EXPE": SegmentReader._indentation,
     "FORC": SegmentReader._numbered,
     "PROJ": SegmentReader._projectile,
-    "SHEA": SegmentReader._shear_correction,
+    "SHEA": lambda reader, head: reader._single(head, ShearCorrection),
     "GAGE": SegmentReader._numbered,
     "UNIT": SegmentReader._units,
     "PRIN": SegmentReader._print_option,

@@ -308,11 +308,7 @@ class HystereticLaw(Law):
         permanent = _select(leaves, c.permanent(last.indentation), m.permanent)
         # Unloading starts on the first loading curve, or at the last point of a reloading curve.
         begin = _select(leaves, peak_force, last.force)
-        width = last.indentation - permanent
-        down = LoadingHistory(
-            UNLOADING, _select(width > 0.0, begin, 0.0), permanent,
-            _select(width > 0.0, width, 1.0), c.q, peak, peak_force, permanent,
-        )  # fmt: skip
+        down = _unloading(c.q, last.indentation, begin, peak, peak_force, permanent)
         up = self._reloading(m, last)
         first = LoadingHistory(
             VIRGIN, c.k, 0.0, 1.0, LOADING_POWER, m.peak, m.peak_force, m.permanent
@@ -354,13 +350,8 @@ class ListingLaw(Law):
         force = m.force(indentation)
         leaves = (m.branch == VIRGIN) & (force < last.force)
         if _any(leaves):
-            permanent = c.permanent(last.indentation)
-            width = last.indentation - permanent
-            down = LoadingHistory(
-                UNLOADING, _select(width > 0.0, last.force, 0.0), permanent,
-                _select(width > 0.0, width, 1.0), c.q, last.indentation, last.force, permanent,
-            )  # fmt: skip
-            m = _choose(leaves, down, m)
+            a, f = last
+            m = _choose(leaves, _unloading(c.q, a, f, a, f, c.permanent(a)), m)
             force = m.force(indentation)
         turns = (m.branch == UNLOADING) & (indentation > m.permanent) & (force >= last.force)
         if _any(turns):
@@ -377,6 +368,17 @@ class ListingLaw(Law):
     ) -> LoadingHistory:
         """Loading history after a step, which its trials have already changed."""
         return memory
+
+
+def _unloading(
+    q: Number, a: Number, f: Number, peak: Number, peak_force: Number, permanent: Number
+) -> LoadingHistory:
+    """Unloading from the point (a, f), equation 3-3."""
+    width = a - permanent
+    return LoadingHistory(
+        UNLOADING, _select(width > 0.0, f, 0.0), permanent, _select(width > 0.0, width, 1.0), q,
+        peak, peak_force, permanent,
+    )  # fmt: skip
 
 
 def follow(
