@@ -71,7 +71,8 @@ def table(result: Result, name: str = "history") -> Table:
         If there is no such dataset or group, or the group's datasets differ in shape.
     """
     members = _members(result, name.strip("/"))
-    beside = [_beside(members[0], column) for column in CLOCK]
+    group = members[0].rpartition("/")[0]
+    beside = [f"{group}/{column}" for column in CLOCK]
     clock = [path for path in beside if path in result and _in_rows(path)]
     values = [path for path in members if path not in clock]
     if clock and values and not any(map(_in_rows, values)):
@@ -80,21 +81,21 @@ def table(result: Result, name: str = "history") -> Table:
         values = list(filter(_in_rows, values))  # the others do not change
     if name.strip("/") == "tape3":
         values = ["tape3/displacement"]  # w is one of its columns
+    instants = [result[path] for path in clock]
     if not values:  # only step or time
-        return Table(_names(clock), zip(*(result[path].tolist() for path in clock), strict=True))
-    if len({result[path].shape for path in values}) > 1:
+        return Table(_names(clock), zip(*(times.tolist() for times in instants), strict=True))
+    arrays = [result[path] for path in values]
+    shape = arrays[0].shape
+    if any(array.shape != shape for array in arrays):
         choice = f"{', '.join(values[:-1])} or {values[-1]}"
         raise ExportError(f"the datasets of {name} do not fit into one table; choose {choice}")
-    sizes = _sizes(values[0], result[values[0]].shape)[bool(clock) :]
+    known = DATASETS[values[0]].shape if values[0] in DATASETS else shape
+    axes = list(zip(known, shape, strict=True))[bool(clock) :]
     columns = _names(values)
-    if len(values) == 1 and sizes and len(names := NAMED.get(sizes[-1][0], ())) >= sizes[-1][1]:
-        columns = names[: sizes.pop()[1]]
-    keys = tuple(SCALES[str(size)][0] if str(size) in SCALES else "row" for size, _ in sizes)
-    rows = _rows(
-        [result[path] for path in values],
-        [result[path] for path in clock],
-        [_labels(result, size, length) for size, length in sizes],
-    )
+    if len(values) == 1 and axes and len(names := NAMED.get(axes[-1][0], ())) >= axes[-1][1]:
+        columns = names[: axes.pop()[1]]
+    keys = tuple(SCALES[str(size)][0] if str(size) in SCALES else "row" for size, _ in axes)
+    rows = _rows(arrays, instants, [_labels(result, *axis) for axis in axes])
     return Table((*_names(clock), *keys, *columns), rows)
 
 
@@ -125,22 +126,11 @@ def _in_rows(path: str) -> bool:
     return path not in DATASETS or DATASETS[path].shape[0] == "rows"
 
 
-def _beside(path: str, name: str) -> str:
-    """Path of another dataset of the same group."""
-    return f"{path.rpartition('/')[0]}/{name}"
-
-
 def _labels(result: Result, size: str | int, length: int) -> Sequence[int]:
     """Numbers along an axis: those of the gage cards for gages, else from 1."""
     if size == "gages" and "gages/number" in result:
         return [int(number) for number in result["gages/number"]]
     return range(1, length + 1)
-
-
-def _sizes(path: str, shape: tuple[int, ...]) -> list[tuple[str | int, int]]:
-    """Name and length of every axis."""
-    known = DATASETS[path].shape if path in DATASETS else shape
-    return list(zip(known, shape, strict=True))
 
 
 def _rows(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -145,14 +145,9 @@ class FileSink:
         elif not len(group):
             del self._file[path.rpartition("/")[0]]
 
-    def text(self, path: str, value: str, description: str) -> None:
-        """Store a text."""
+    def text(self, path: str, value: str | list[str], description: str) -> None:
+        """Store a text, or one text per row."""
         made = self._file.create_dataset(path, data=value, dtype=h5py.string_dtype())
-        made.attrs["description"] = description
-
-    def texts(self, path: str, values: Sequence[str], description: str) -> None:
-        """Store texts, one per row."""
-        made = self._file.create_dataset(path, data=list(values), dtype=h5py.string_dtype())
         made.attrs["description"] = description
 
 

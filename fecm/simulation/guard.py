@@ -39,25 +39,10 @@ class EnergyBalance:
     worst_error: float = 0.0
     worst_step: int = 0
 
-
-@dataclass(frozen=True)
-class EnergyGuard:
-    """Ends a run that diverges or exceeds the limit of its energy balance.
-
-    Attributes
-    ----------
-    balance : EnergyBalance
-        Updated with every block of steps.
-    limit : float or None
-        Error, relative to the supplied energy, that ends the run; None to end it only if the
-        energy is not finite.
-    """
-
-    balance: EnergyBalance
-    limit: float | None
-
-    def __call__(self, block: Mapping[str, Floats], initial: float) -> None:
-        """Check a block of steps.
+    def add(
+        self, block: Mapping[str, Floats], initial: float, *, limit: float | None = None
+    ) -> None:
+        """Add a block of steps; end the run if it diverges or exceeds the limit.
 
         The error is relative to the energy supplied up to the end of the block: in its first steps
         a load has done almost no work.  The work of one step is not counted as an error: the
@@ -69,6 +54,9 @@ class EnergyGuard:
             Columns ``step``, ``held_energy``, ``external_work`` and ``balance_error``.
         initial : float
             Energy before the first step (force*length).
+        limit : float, optional
+            Error, relative to the supplied energy, that ends the run; by default only an energy
+            that is not finite does.
 
         Raises
         ------
@@ -79,23 +67,23 @@ class EnergyGuard:
         if lost.any():
             step = int(block["step"][np.flatnonzero(lost)[0]])
             raise DivergenceError(step, "the motion is no longer finite")
-        balance, work = self.balance, block["external_work"]
-        balance.largest_work = max(balance.largest_work, float(np.abs(work).max()))
-        jump = float(np.abs(np.diff(work, prepend=balance.last_work)).max())
-        balance.largest_jump, balance.last_work = max(balance.largest_jump, jump), float(work[-1])
-        supplied = initial + balance.largest_work
+        work = block["external_work"]
+        self.largest_work = max(self.largest_work, float(np.abs(work).max()))
+        jump = float(np.abs(np.diff(work, prepend=self.last_work)).max())
+        self.largest_jump, self.last_work = max(self.largest_jump, jump), float(work[-1])
+        supplied = initial + self.largest_work
         if not supplied > 0.0:
             return
-        error = np.maximum(np.abs(block["balance_error"]) - balance.largest_jump, 0.0) / supplied
+        error = np.maximum(np.abs(block["balance_error"]) - self.largest_jump, 0.0) / supplied
         row = int(error.argmax())
-        if error[row] > balance.worst_error:
-            balance.worst_error, balance.worst_step = float(error[row]), int(block["step"][row])
-        if self.limit is not None and error[row] > self.limit:
-            row = int(np.flatnonzero(error > self.limit)[0])
+        if error[row] > self.worst_error:
+            self.worst_error, self.worst_step = float(error[row]), int(block["step"][row])
+        if limit is not None and error[row] > limit:
+            row = int(np.flatnonzero(error > limit)[0])
             raise DivergenceError(
                 int(block["step"][row]),
                 f"the energy balance is off by {error[row]:.2%} of the supplied energy, more than "
-                f"the limit of {self.limit:.3g}",
+                f"the limit of {limit:.3g}",
             )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,6 @@ from fecm.problem.options import RunOptions
 from fecm.problem.problem import Problem
 from fecm.results.sinks import Sink
 from fecm.simulation import state as run_state
-from fecm.simulation.guard import EnergyGuard
 from fecm.simulation.interpreter import Interpreter
 from fecm.simulation.printout import Printer
 from fecm.simulation.recorder import Recorder
@@ -85,7 +84,7 @@ class Simulation:
             self.model,
             problem.work,
             contact_at_every_step=self.rules.listing_tapes,
-            on_block=EnergyGuard(state.balance, limit),
+            on_block=partial(state.balance.add, limit=limit),
         )
 
     @cached_property

@@ -232,7 +232,7 @@ def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
         sink.text("deck", result.deck, "the cards of the deck that was varied")
         for name, values, text, dimension in columns:
             if values.dtype.kind in "US":
-                sink.texts(name, values.tolist(), text)
+                sink.text(name, values.tolist(), text)
                 continue
             dtype = "i8" if values.dtype.kind in "iu" else "f8"
             sink.create(Dataset(name, ("cases",), text, dimension, dtype), values.shape)
