@@ -60,17 +60,17 @@ def edge_forces(grid: Grid, x: Sequence[float], y: Sequence[float]) -> Floats:
     ----------
     grid : Grid
     x, y : sequence of float
-        Force per length of the five unknowns on an edge whose normal is x or y.
+        Force per length of the five dofs on an edge with normal x or y.
     """
-    forces = np.zeros((grid.up, grid.across, 5))
+    total = np.zeros((grid.up, grid.across, 5))
     for place, sign in ((-1, 1.0), (0, -1.0)):
-        forces[:, place] += sign * np.outer(weights(lines(grid.rows)), x)
-        forces[place] += sign * np.outer(weights(lines(grid.columns)), y)
-    return forces.reshape(-1, 5)
+        total[:, place] += sign * np.outer(weights(lines(grid.rows)), x)
+        total[place] += sign * np.outer(weights(lines(grid.columns)), y)
+    return total.reshape(-1, 5)
 
 
 def loaded_rectangle(x: Sequence[float], y: Sequence[float], *, shears: bool = False) -> Deck:
-    """Build a rectangle of [0/45] under edge tractions, on supports that bear no load.
+    """Build a rectangle of [0/45] under edge tractions, on supports without reactions.
 
     With `shears` only w moves, and a shear correction factor acts.
     """
@@ -104,7 +104,7 @@ def loaded_rectangle(x: Sequence[float], y: Sequence[float], *, shears: bool = F
     *checks("Q_x (lb/in), Q_y (lb/in)", SHEARS, APPLIED, EXACT, IN_FIELD),
 )  # fmt: skip
 def resultants() -> Sequence[float]:
-    """Strains and resultants, the same everywhere."""
+    """Uniform strains and resultants."""
     n_x, n_y, n_xy, m_x, m_y, m_xy = LOADS
     # A couple M does work on -theta.
     found = result_of(
@@ -130,10 +130,10 @@ ON_TAPE8 = ("kappa_x", "kappa_y", "kappa_xy", "gamma_yz", "gamma_xz")
 
 
 def prescribed_strains() -> Deck:
-    """Build a plate whose nodes are held in a field of constant strains, but for one w that is hit.
+    """Build a plate whose nodes are held in a field of constant strains, except one w.
 
-    A very slow rigid mass hits the middle of the first element for one step: the other elements
-    keep the field.
+    A very slow rigid mass hits this dof, in the middle of the first element, for one step: the
+    other elements keep the field.
     """
     grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
     struck, h = 2 + grid.across, 0.01
@@ -201,7 +201,7 @@ def _series_plate(
         Check("w in the middle, L2 = 3 (in)", middle, SERIES, 1e-4, LOCKS),
     )
     def plate() -> Sequence[float]:
-        """Lowest frequencies of the plate's doubly symmetric modes; statics of a uniform load."""
+        """Lowest frequencies of the doubly symmetric modes; deflections under a uniform load."""
 
         def made(shear_order: int, load: float | None, macros: Sequence[Macro]) -> Result:
             card = material(PLY, angles, H / 2.0, shear_order)
@@ -235,14 +235,14 @@ angle_ply_plate = _series_plate(
 PLATE = cross_ply(H)
 DT, STEPS = 1.08e-7, 600
 PULSE = 5.0e4  # sin²(PULSE t), 1/s
-# A point where the strains of 9-node elements are most exact, of 2 x 2 in the element; the face
-# away from the load.
+# One of the 2 x 2 points where the strains of a 9-node element are most accurate; the face away
+# from the load.
 ROOT = (1.0 - 1.0 / np.sqrt(3.0)) / 2.0 * 0.5 / ELEMENTS
 GAGE = Gage(1, float(f"{1 / 12 + ROOT:.9g}"), float(f"{0.25 + ROOT:.9g}"), H / 2.0, 30.0)
 
 
 def _forced(time: float) -> tuple[float, float]:
-    """Deflection of the middle and the gage's strain under a uniform load of sin²(PULSE t)."""
+    """Deflection in the middle and strain of the gage under a uniform load of sin²(PULSE t)."""
     a, b, loads = terms(MOST)
     omega, shapes = PLATE.modes(a, b)
     twice = 2.0 * PULSE  # sin² is half of 1 - cos
@@ -262,7 +262,7 @@ DEFLECTION, STRAIN = _forced(STEPS * DT)
 
 
 def forced_plate() -> Deck:
-    """Build the plate of [0/90] under a uniform load that PROP varies as sin²."""
+    """Build the plate of [0/90] under a uniform load that varies as sin² (PROP)."""
     steps = (
         Macro("LMAS"), Macro("DT", value=DT), Macro("PROP", value=1.0),
         Macro("LOOP", value=float(STEPS)), Macro("TIME"), Macro("EXCD"),
@@ -283,7 +283,7 @@ def forced_plate() -> Deck:
           "12 × 12 elements; a strain falls with the 3rd power of their size"),
 )  # fmt: skip
 def forced() -> Sequence[float]:
-    """The last row of tape3, and of the gage."""
+    """Last rows of tape3 and of the gage."""
     found = result_of(forced_plate())
     return [found.tape3.w[-1, 0], found.gages.strain[-1, 0]]
 

@@ -28,7 +28,7 @@ def isotropic(e: float, nu: float, rho: float, shear_factor: float = 1.0) -> Ply
 def material(
     ply: Ply, angles: Sequence[float], thickness: float, shear_order: int = ORDER
 ) -> Material:
-    """Build a MATE segment of layers of one thickness."""
+    """Build a MATE segment of layers of equal thickness."""
     layers = tuple(Layer(n, angle, thickness) for n, angle in enumerate(angles, start=1))
     total = float(f"{len(layers) * thickness:.9g}")
     return Material(Integration(ORDER, shear_order, NODAL_POINTS, total), ply, layers)
@@ -45,7 +45,7 @@ def deck(
 
 
 def impact_program(dt: float, steps: int) -> tuple[Macro, ...]:
-    """Steps of an impact, with nothing stored but the history."""
+    """Macros of an impact that stores only the history."""
     return (
         Macro("LMAS"), Macro("DT", value=dt), Macro("LOOP", value=float(steps)), Macro("TIME"),
         Macro("RODP", value=float(steps)), Macro("NEXT"),
@@ -63,7 +63,7 @@ def result_of(one: Deck, mode: str = "report") -> Result:
 def farthest_of(
     found: Result, group: str, names: Sequence[str], values: Iterable[float], first: int = 0
 ) -> list[float]:
-    """Of each field of a group the value farthest from the expected one, from an element on."""
+    """Value farthest from the expected one of each field of a group, without `first` elements."""
     return [
         farthest(found[f"{group}/{name}"][:, first:].ravel().tolist(), value)
         for name, value in zip(names, values, strict=True)
@@ -118,7 +118,7 @@ def quarter_plate(
     Parameters
     ----------
     elements : int
-        Elements a side.
+        Elements per side.
     plate : Material
     macros : iterable of Macro
     load : float, optional
@@ -145,9 +145,9 @@ def weights(coordinates: Sequence[float]) -> list[float]:
 
 
 def uniform_load(grid: Grid, load: float) -> Forces:
-    """Build consistent nodal forces of a uniform load: Simpson's weights in both directions.
+    """Build consistent nodal forces of a uniform load by Simpson's weights in both directions.
 
-    The last line in each direction is held, so that a value there would be a displacement.
+    The last line in each direction is restrained; a value there would be a displacement.
     """
     xs, ys = weights(lines(grid.columns))[:-1], weights(lines(grid.rows))[:-1]
     return Forces(
@@ -163,7 +163,7 @@ def struck_plate(
     grid: Grid, plate: Material, projectile: Projectile | None, velocity: float,
     law: Indentation, dt: float, steps: int,
 ) -> Deck:  # fmt: skip
-    """Build a plate on no supports that is struck in its middle."""
+    """Build a plate without supports that is hit in the middle."""
     middle = grid.nearest(grid.columns[-1].end / 2.0, grid.rows[-1].end / 2.0)[0]
     boundary = grid.boundary((1, 1, 0, 0, 0), {})
     segments = (
@@ -187,7 +187,7 @@ def report_impact(steps: int = 4000) -> Deck:
 
 
 def hertz(mass: float, velocity: float, k: float) -> tuple[float, float, float]:
-    """Deepest indentation, largest force and duration of an impact on a rigid target.
+    """Largest indentation, largest force and duration of an impact on a rigid target.
 
     m v²/2 = 2 k a^2.5/5; the contact lasts 2.9432 a/v (H. Hertz; the integral of
     2 dx/sqrt(1 - x^2.5) from 0 to 1 in closed form by gamma functions).

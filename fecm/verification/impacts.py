@@ -36,7 +36,7 @@ def elastic(k: float) -> Indentation:
 
 
 def rigid_target() -> Deck:
-    """Build a rigid mass that hits a plate a thousand times as stiff and heavy as any."""
+    """Build the impact of a rigid mass on a plate of extreme stiffness and density."""
     grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
     ply = Ply(1.48e6, 0.3, 1.75e16, 1.75e16, 5e15, 5e15, 5e15)
     plate = material(ply, (0.0, 90.0), 0.053)
@@ -52,21 +52,21 @@ def rigid_target() -> Deck:
     Check("velocity after it (in/s)", V, "energy", 1e-6, STIFF),
 )
 def rigid() -> Sequence[float]:
-    """Extremes of a history, and its end."""
+    """Extremes of the history, and its end."""
     found = result_of(rigid_target())
     touching = found.time[found.force > 0.0]
     return [found.indentation.max(), found.force.max(), touching[-1], found.velocity[-1]]
 
 
-# A plate so large that no reflexion is back before 200 us.  Zener's two equations, integrated to 12
-# digits, give the figures.
+# A plate so large that no reflection returns within 200 us.  The expected values are those of
+# Zener's two equations, integrated to 12 digits.
 LIGHT, SOFT = 2.0e-5, 5.0e4
 MESH = "elements of 0.25 in under a point force; falls with their square"
 ZENER = "Zener 1941, w' = F/8√(Dρh)"
 
 
 def large_plate() -> Deck:
-    """Build a rigid mass that hits a thin plate of 12 x 12 in, stiff in transverse shear."""
+    """Build the impact of a rigid mass on a thin plate of 12 x 12 in, stiff in transverse shear."""
     grid = Grid(uniform(12.0, 48), uniform(12.0, 48))
     plate = material(isotropic(1.0e7, 0.3, 2.5e-4, 13.0), [0.0], 0.1)
     return struck_plate(grid, plate, Projectile(0, 0, LIGHT), V, elastic(SOFT), 5e-8, 4000)
@@ -85,8 +85,8 @@ def infinite_plate() -> Sequence[float]:
     return [found.force.max(), found.time[found.force.argmax()], found.velocity[-1]]
 
 
-# A simply supported plate of side 1, and a mass on its middle.  The figures are those of Mindlin's
-# series of 20 x 20 terms, stepped mode by mode, each by its exact solution.
+# A simply supported plate of side 1, hit in the middle.  The expected values are those of Mindlin's
+# series of 20 x 20 terms; each mode is integrated by its exact solution.
 HEAVY, SLENDER, SUPPORTED_K = 5.0e-6, 0.03, 1.0e5
 MODES = "Mindlin's series, 20 × 20 modes, and Hertz' law"
 LOGARITHM = "a point force: 0.4 % between 16 and 24 elements a side, and between 40 and 100 terms"
@@ -94,7 +94,7 @@ IMPULSE = "the logarithm of the point force: 0.2 % between 16 and 24 elements a 
 
 
 def supported_plate() -> Deck:
-    """Build a quarter of the plate, hit by a quarter of the mass on a quarter of the contact."""
+    """Build a quarter of the plate with a quarter of mass and contact coefficient."""
     plate = material(isotropic(1.0e7, 0.3, 2.5e-4), [0.0], SLENDER)
     quarter = elastic(SUPPORTED_K / 4.0)
     hit = (Projectile(0, 0, HEAVY / 4.0), Impact(1, 3, V), quarter)

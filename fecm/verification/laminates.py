@@ -16,7 +16,7 @@ from fecm.verification.case import Check, case
 ROUNDING = "rounding"
 EXACT = 1e-12
 
-# An isotropic ply, turned, which is none the less isotropic.
+# An isotropic ply; rotation does not change its stiffness.
 E, NU, RHO, H = 1.0e7, 0.3, 2.5e-4, 0.1
 G = E / (2.0 * (1.0 + NU))
 PLATE = E / (1.0 - NU**2)
@@ -36,7 +36,7 @@ BAR16 = (Q11 - Q22) / 4.0
 
 
 def exact(quantity: str, expected: float, source: str, scale: float | None = None) -> Check:
-    """Build a check of a closed form that is evaluated in another order."""
+    """Build a check against a closed form, which is evaluated in a different order."""
     return Check(quantity, expected, source, EXACT, ROUNDING, scale=scale)
 
 

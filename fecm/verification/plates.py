@@ -31,7 +31,7 @@ from fecm.verification.laminates import FIBRES, Q11, Q12, Q22, THICK
 
 STATICS = (Macro("TANG"), Macro("FORM"), Macro("SOLV"))
 
-# Patch: strains of the midplane and curvatures, the same everywhere.
+# Patch: uniform midplane strains and curvatures.
 STRAIN = (1e-3, 2e-3, 3e-3)
 CURVATURE = (0.4, -0.5, 0.6)
 # Corners of its four elements: no side is parallel to another or to an axis.
@@ -53,7 +53,7 @@ IN_FIELD = "the field is one of the elements'; rounding of the solution"
 
 
 def patch() -> Deck:
-    """Build four distorted elements of [0/90] whose outer nodes move as a constant strain."""
+    """Build four distorted elements of [0/90] whose outer nodes have a constant-strain field."""
     fine = np.empty((5, 5, 2))
     fine[::2, ::2] = CORNERS
     fine[::2, 1::2] = (CORNERS[:, 1:] + CORNERS[:, :-1]) / 2.0
@@ -118,7 +118,7 @@ COARSE = "16 × 16 elements; falls with the 4th power of their size"
     ),
 )  # fmt: skip
 def static_bending() -> Sequence[float]:
-    """Deflections; transverse shear integrated with order 2, which does not lock, and with 3."""
+    """Deflections, with transverse shear integrated by order 2, which does not lock, and 3."""
     macros = (*STATICS, Macro("DISP"))
 
     def w(thickness: float, factor: float = 1.0, shear_order: int = 2) -> Floats:
@@ -152,19 +152,19 @@ CUTOFF = math.sqrt(12.0 / (2.0 * (1.0 + NU))) / 0.1
     Check("cut-off ω, free plate, E = ρ = 1", CUTOFF, "√(12 G/ρ)/h", 1e-9, UNIFORM),
 )
 def frequencies() -> Sequence[float]:
-    """Of a quarter of the plate, so of its symmetric modes; and of uniform transverse shear."""
+    """Frequencies of the symmetric modes, on a quarter of the plate, and of uniform shear."""
     plate = material(isotropic(E, NU, 1.0), [0.0], 0.1, 2)
     macros = (
         Macro("LMAS"), Macro("EIGE", value=4.0), Macro("CMAS"), Macro("EIGE", value=4.0),
     )  # fmt: skip
     found = result_of(quarter_plate(ELEMENTS, plate, macros)).modes.angular_frequency
     scaled = found * math.sqrt(0.1 / RIGIDITY)
-    # 11; 13 and 31; 33 of the one mass, then of the other.
+    # Modes 11, 13 and 31, 33 with the lumped mass, then with the consistent mass.
     return [scaled[0], scaled[1], scaled[4], scaled[7], _shear_frequency()]
 
 
 def _shear_frequency() -> float:
-    """Rayleigh's quotient of a free plate that is sheared uniformly through its thickness."""
+    """Rayleigh quotient of a free plate in uniform transverse shear."""
     grid = Grid(uniform(0.7, 2), uniform(1.3, 2))
     plate = material(isotropic(E, NU, 1.0), [0.0], 0.1)
     held = grid.boundary((1, 1, 1, 0, 1), {})
@@ -198,7 +198,7 @@ INTEGRATED = "the rule integrates these polynomials exactly"
     ),
 )  # fmt: skip
 def time_step() -> Sequence[float]:
-    """2 over the angular frequency of the only mode."""
+    """Time step 2/ω of the only mode."""
     grid = Grid(uniform(SIDE, 1), uniform(SIDE, 1))
     made = deck("element", grid, (grid.coordinates(), material(PLY, [0.0], THIN)), ())
     return [_critical(made, dof) for dof in (2, 3)]

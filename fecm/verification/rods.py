@@ -87,7 +87,7 @@ def rod_waves() -> Sequence[float]:
 
 
 def _first_frequency(rod: Rod) -> float:
-    """Lowest angular frequency but for the rigid motion."""
+    """Lowest angular frequency after that of the rigid motion."""
     mass = rod.mass()
     squares = eigh(rod.stiffness(), np.diag(mass) if mass.ndim == 1 else mass, eigvals_only=True)
     return math.sqrt(float(squares[1]))

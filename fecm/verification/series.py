@@ -4,7 +4,7 @@ A simply supported square plate of side 1 has its middle at x = y = 0.  The defl
 w = W cos(alpha x) cos(beta y), with alpha and beta odd multiples of pi; K and M of its five
 amplitudes U, V, W, X (of theta_x) and Y (of theta_y) follow from the energy of these fields, per
 quarter of the plate's area (J. N. Reddy, Mechanics of Laminated Composite Plates, chapter 7).
-Nothing here uses the elements, nor the laminate theory that they use.
+This module uses neither the elements nor their laminate theory.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class TwoLayers:
 
 
 def terms(most: int) -> tuple[Floats, Floats, Floats]:
-    """Wave numbers alpha and beta of the terms up to a number, and a uniform load's amplitudes."""
+    """Wave numbers alpha and beta of the terms up to `most`, and amplitudes of a uniform load."""
     odd = np.arange(1.0, most + 1.0, 2.0)
     m, n = (grid.ravel() for grid in np.meshgrid(odd, odd, indexing="ij"))
     signs = np.where((m + n) % 4 == 2.0, 1.0, -1.0)
@@ -119,10 +119,10 @@ def cross_ply(h: float) -> TwoLayers:
 
 
 def angle_ply(h: float) -> TwoLayers:
-    """Build [45/-45], whose couplings of transverse shear cancel."""
+    """Build [45/-45], in which the coupling of the transverse shears cancels."""
     return TwoLayers(AT_45, AT_MINUS_45, np.diag([MEAN, MEAN]), h, twists=True)
 
 
 def off_axis(h: float) -> TwoLayers:
-    """Build [0/45], of which no stiffness vanishes; not for the series."""
+    """Build [0/45], in which no stiffness vanishes; not for the series."""
     return TwoLayers(AT_0, AT_45, (SHEAR_0 + SHEAR_45) / 2.0, h)
