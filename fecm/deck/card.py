@@ -101,10 +101,10 @@ def _forms(value: float, letter: str) -> Iterator[str]:
             yield minus + fixed
             yield minus + fixed.removeprefix("0")
     marked = "" if letter else "+"
-    for whole in (1, *range(2, len(digits) + 1), 0):
-        power = exponent + len(digits) - whole
+    for before in (1, *range(2, len(digits) + 1), 0):
+        power = exponent + len(digits) - before
         if power or letter:
-            yield f"{minus}{digits[:whole]}.{digits[whole:]}{letter}{power:{marked}d}"
+            yield f"{minus}{digits[:before]}.{digits[before:]}{letter}{power:{marked}d}"
     if not letter:
         yield f"{minus}{digits}{exponent:+d}" if exponent else f"{minus}{digits}"
 
@@ -188,7 +188,7 @@ class Card:
 
     @property
     def keyword(self) -> str:
-        """The first four columns, in capitals, without trailing blanks: all of it that counts."""
+        """The first four columns, in capitals, without trailing blanks: the significant part."""
         return self.data[:4].upper().rstrip()
 
     @property
@@ -277,8 +277,8 @@ def read_values(
             values.append(_word(field, text, source, findings))
         else:
             values.append(_number(field, text, source, findings, fixed and blanks_are_zeros))
-    sound = [value for value in values if value is not None]
-    return sound if len(sound) == len(values) else None
+    valid = [value for value in values if value is not None]
+    return valid if len(valid) == len(values) else None
 
 
 def _is_aligned(card: Card, fields: Fields, findings: Findings, *, cut_is_meant: bool) -> bool:
@@ -377,7 +377,7 @@ def _ends_with_fields(
 
 
 def _word(field: Field, text: str, source: Source, findings: Findings) -> str | None:
-    """A field's word, or None after noting that it is too long."""
+    """A field's word, or None after reporting that it is too long."""
     word = text.rstrip()
     if len(word) <= field.width:
         return word
@@ -393,7 +393,7 @@ def _word(field: Field, text: str, source: Source, findings: Findings) -> str | 
 def _number(
     field: Field, text: str, source: Source, findings: Findings, zeros: bool
 ) -> int | float | None:
-    """A field's number, or None after noting what is wrong with it."""
+    """A field's number, or None after reporting an error."""
     parse = parse_integer if field.kind == "I" else parse_real
     written = text.strip()
     if not written:
@@ -442,7 +442,7 @@ def _why(field: Field, text: str) -> str:
 def _refuse_blank(
     field: Field, text: str, padded: float | None, source: Source, findings: Findings
 ) -> None:
-    """Report a blank that would change a value, with the card as it was meant."""
+    """Report a blank that would change a value, with the intended card."""
     was = "no number" if padded is None else f"{padded:g}"
     where = "inside" if " " in text.strip() else "after"
     line = source.card.data.ljust(field.last)

@@ -182,7 +182,7 @@ class Indentation(Segment):
     s_p : float
         Slope of the permanent over the maximum indentation; 0 with ACR.
     q : float
-        Power of the unloading curve; 5/2 or 0 (which stands for it) with ACR.
+        Power of the unloading curve; 5/2 or 0 (the same) with ACR.
     word : str
         The keyword card's second word: ``""`` for equation 3-8, ``"ACR"`` for 3-7.
     """
@@ -323,7 +323,7 @@ class PrintOption(Segment):
 
 @dataclass(frozen=True)
 class Page(Segment):
-    """PAGE: the printer's carriage control at the head of each page, on a card of its own."""
+    """PAGE: the printer's carriage control at the head of each page, on a separate card."""
 
     carriage_control: str
     keyword: ClassVar[str] = "PAGE"

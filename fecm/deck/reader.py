@@ -421,5 +421,5 @@ def read_deck(path_or_text: str | Path) -> Deck | list[Deck]:
     decks = [problem.deck for problem in reader.problems()]
     if reader.findings.errors:
         raise DeckError(list(reader.findings), name)
-    sound = [deck for deck in decks if deck is not None]
-    return sound[0] if len(sound) == 1 else sound
+    complete = [deck for deck in decks if deck is not None]
+    return complete[0] if len(complete) == 1 else complete

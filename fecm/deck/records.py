@@ -50,7 +50,7 @@ class Record:
     Attributes
     ----------
     source : Source or None
-        The card; None for a record made in Python.
+        The card; None for a record built in Python.
     """
 
     source: Source | None = field(default=None, compare=False, repr=False)

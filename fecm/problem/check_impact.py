@@ -223,8 +223,8 @@ def check_law(law: Indentation, findings: Findings) -> None:
             (0.0 <= law.s_p < 1.0, "at least 0 and below 1"),
             (law.q > 0.0, "positive"),
         )
-    for name, value, (sound, rule) in zip(law.names(), law.values(), rules, strict=True):
-        if not sound:
+    for name, value, (valid, rule) in zip(law.names(), law.values(), rules, strict=True):
+        if not valid:
             findings.add("E412", f"The {name} is {value:g}; it must be {rule}.", law.place(name))
 
 

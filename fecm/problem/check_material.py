@@ -34,7 +34,7 @@ def _check_orders(card: Integration, findings: Findings) -> None:
 
 
 def _check_ply(ply: Ply, findings: Findings) -> None:
-    sound = True
+    valid = True
     for name, value in (
         ("mass density", ply.density),
         ("Young's modulus E1", ply.e1),
@@ -44,10 +44,10 @@ def _check_ply(ply: Ply, findings: Findings) -> None:
         ("shear modulus G23", ply.g23),
     ):
         if value <= 0.0:
-            sound = False
+            valid = False
             findings.add("E403", f"The {name} is {value:g}; it must be positive.", ply.place(name))
     # The square of nu12 against E1/E2, written so that no number overflows.
-    if sound and abs(ply.nu12) >= (ply.e1 / ply.e2) ** 0.5:
+    if valid and abs(ply.nu12) >= (ply.e1 / ply.e2) ** 0.5:
         findings.add(
             "E404",
             f"Poisson's ratio NU12 = {ply.nu12:g} is too large: its square must stay below "

@@ -38,7 +38,7 @@ def wave_impedance(laminate: Laminate) -> float:
 
 
 def expected_peak(deck: Deck, plate: PlateModel) -> float:
-    """Estimate the peak force, from above.
+    """Estimate the peak force, high rather than low.
 
     The minimum of the Hertz contact on a rigid target, k^(2/5) (5 m v^2/4)^(3/5), and of the
     response of the plate: the bending wave for a light projectile, the stiffness of a clamped plate

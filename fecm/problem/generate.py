@@ -86,23 +86,23 @@ def generate(deck: Deck, findings: Findings | None = None, *, unit_force: bool =
 
 
 def restraint_codes(
-    boundaries: Sequence[Boundary], nodes: int, unknowns: int, findings: Findings | None = None
+    boundaries: Sequence[Boundary], nodes: int, dofs: int, findings: Findings | None = None
 ) -> Ints:
     """Generate the restraint codes of BOUN segments.
 
     Parameters
     ----------
     boundaries : sequence of Boundary
-    nodes, unknowns : int
+    nodes, dofs : int
         Number of nodes, and of dofs of a node.
     findings : Findings, optional
         Receives the errors.
 
     Returns
     -------
-    ndarray (nodes, unknowns)
+    ndarray (nodes, dofs)
     """
-    codes = np.zeros((nodes, unknowns), dtype=np.int32)
+    codes = np.zeros((nodes, dofs), dtype=np.int32)
     noted = Findings() if findings is None else findings
     budget = _Budget(nodes, noted)
     for segment in boundaries:

@@ -88,8 +88,8 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
     complete = findings.error_count == generated and not unsound & {"COOR", "ELEM"}
     given = _element_errors(findings) == elements_generated and "ELEM" not in unsound
     if given and deck.has(Elements):
-        sound = check_elements(deck, mesh, findings)
-        if sound and complete and deck.has(Coordinates):
+        valid = check_elements(deck, mesh, findings)
+        if valid and complete and deck.has(Coordinates):
             check_mesh(deck, mesh, findings, listing=listing)
     if (material := deck.last(Material)) is not None:
         check_material(material, findings)

@@ -116,7 +116,7 @@ SLIPS = (
     ),
     Slip(
         "counter",
-        "RODP counts the steps since the last output, and compares them with the N of its own "
+        "RODP counts the steps since the last output, and compares them with the N on its "
         "card: where N changes, different rows are stored, or none.",
         "RODP stores at every N-th impact step since the problem began.",
     ),
