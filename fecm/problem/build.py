@@ -15,7 +15,6 @@ from fecm.deck.model import Deck, Indentation, Material, ShearCorrection
 from fecm.deck.model import Gages as GageCards
 from fecm.deck.model import Impact as ImpactCard
 from fecm.deck.model import Projectile as ProjectileCard
-from fecm.deck.records import Ply
 from fecm.mechanics.contact_law import (
     ContactParameters,
     HystereticLaw,
@@ -40,7 +39,7 @@ from fecm.mechanics.projectile import (
     Transducer,
     report_rod,
 )
-from fecm.mechanics.rod_integrators import STEPS, WILSON
+from fecm.mechanics.rod_integrators import STEPS
 from fecm.mechanics.stiffness_product import CSR, Workers, available
 from fecm.mechanics.strains import StrainField
 from fecm.mechanics.symmetry import restrain_resting_dofs, symmetry_reduction
@@ -266,30 +265,6 @@ def build_law(deck: Deck, slips: frozenset[str] = frozenset()) -> Law:
     return ListingLaw(constants) if "reload" in slips else HystereticLaw(constants)
 
 
-def build_impact(
-    deck: Deck,
-    motion: PlateMotion,
-    rod: Projectile,
-    slips: frozenset[str],
-    integrator: str = WILSON,
-    share: float = 1.0,
-) -> ImpactSystem:
-    """Build projectile, contact law and contact with the active slips.
-
-    `share` is the fraction of the contact force that acts on the plate.
-    """
-    card = deck.require(ImpactCard)
-    contact = ImpactConditions(
-        equation=motion.equation(card.node - 1, card.dof - 1),
-        velocity=card.velocity,
-        plate_moves="target" not in slips,
-        strains_start_moving="rod-start" in slips,
-        keeps_first_step="rod-dt" in slips,
-        share=share,
-    )
-    return ImpactSystem(motion, rod, build_law(deck, slips), contact, STEPS[integrator])
-
-
 def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactModel:
     """Build the model of a checked problem.
 
@@ -323,7 +298,17 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     motion = PlateMotion(mobile, chosen.solver, reduced, workers)
     impact = None
     if problem.has_impact:
-        impact = build_impact(deck, motion, rod, slips, method.integrator, share)
+        card = deck.require(ImpactCard)
+        contact = ImpactConditions(
+            equation=motion.equation(card.node - 1, card.dof - 1),
+            velocity=card.velocity,
+            plate_moves="target" not in slips,
+            strains_start_moving="rod-start" in slips,
+            keeps_first_step="rod-dt" in slips,
+            share=share,
+        )
+        law = build_law(deck, slips)
+        impact = ImpactSystem(motion, rod, law, contact, STEPS[method.integrator])
     cards, transposed = deck.last(GageCards), plate.rules.transposed_jacobian
     return ImpactModel(
         plate=plate,
@@ -352,10 +337,7 @@ def laminate_of(
     """
     ply = material.ply
     if isotropic_g12 and ply.e1 == ply.e2:
-        ply = Ply(
-            ply.density, ply.nu12, ply.e1, ply.e2, ply.e1 / (2.0 * (1.0 + ply.nu12)),
-            ply.g13, ply.g23,
-        )  # fmt: skip
+        ply = replace(ply, g12=ply.e1 / (2.0 * (1.0 + ply.nu12)))
     angles = [layer.angle for layer in material.layers]
     thicknesses = [layer.thickness for layer in material.layers]
     built = laminate(ply, angles, thicknesses, material.integration.thickness)

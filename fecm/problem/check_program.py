@@ -52,7 +52,14 @@ def check_program(problem: Problem, findings: Findings) -> None:
     if not sizes.steps and not any(sizes.passes.values()):
         place = deck.macros[0].place("macro") if deck.macros else None
         findings.add("W511", "The program takes no step and stores nothing.", place)
-    _check_output(problem, findings)
+    if problem.output_bytes > LARGE_OUTPUT:
+        storing = next((m for m in flat(problem.program) if m.word in ("RODP", "DISP")), None)
+        findings.add(
+            "W512",
+            f"The result will take {problem.output_bytes / 1e9:.3g} GB.",
+            storing.place("value") if storing else None,
+            "RODP and DISP store every N steps: take a larger N",
+        )
 
 
 def check_time_step(problem: Problem, findings: Findings) -> None:
@@ -97,16 +104,3 @@ def _check_least_step(steps: Sequence[Macro], safe: float, findings: Findings) -
                 macro.place("value"),
                 "check the unit of time; DT without a number takes 0.9 of the critical step",
             )
-
-
-def _check_output(problem: Problem, findings: Findings) -> None:
-    """Warn of a large result."""
-    size = problem.output_bytes
-    if size > LARGE_OUTPUT:
-        macro = next((m for m in flat(problem.program) if m.word in ("RODP", "DISP")), None)
-        findings.add(
-            "W512",
-            f"The result will take {size / 1e9:.3g} GB.",
-            macro.place("value") if macro else None,
-            "RODP and DISP store every N steps: take a larger N",
-        )
