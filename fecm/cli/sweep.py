@@ -12,33 +12,33 @@ import click
 
 from fecm._files import check_outputs
 from fecm.api import load_deck
-from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, note, signals
+from fecm.cli.common import DECK_PATH, FILE_PATH, NO, RefusedError, echo, note, signals
 from fecm.cli.decks import count_errors
-from fecm.cli.types import ListOf
+from fecm.cli.types import ListOf, Parsed
 from fecm.deck.findings import DeckError
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
 from fecm.simulation.run import simulate
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.batch import deck_of
-from fecm.sweeps.cases import Case, CasesError, grid, parse_vary, read_cases
+from fecm.sweeps.cases import CasesError, Value, grid, parse_vary, read_cases
 from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.plan import Plan, Task, check_memory, freed, plan, tasks
 from fecm.sweeps.result import SweepResult, save, summary, verdict
 from fecm.sweeps.schedule import LOST, SchedulerError
-from fecm.sweeps.store import OtherSweepError, PartialResults
+from fecm.sweeps.store import PartialResults
 
 
 @click.command()
 @click.argument("deck", type=DECK_PATH)
-@click.option("--vary", "varied", multiple=True, metavar="NAME=VALUES",
+@click.option("--vary", "varied", type=Parsed(parse_vary), multiple=True, metavar="NAME=VALUES",
               help="FROM:TO:N or A,B,C; may be repeated, for a full grid.  Names: velocity, k, "
                    "alpha_p, s_p, q, rod_length, rod_modulus, rod_density, rod_mass; impact_node, "
                    "thickness, density, nu12, e1, e2, g12, g13, g23, layup, dt.")  # fmt: skip
 @click.option("--cases", "table", type=DECK_PATH, metavar="CASES.csv",
-              help="A table instead: a header of names, one row per case.")  # fmt: skip
+              help="A table instead of --vary: a header of names, one row per case.")  # fmt: skip
 @click.option("-o", "--output", type=FILE_PATH, metavar="SWEEP.h5",
-              help="Result.  [default: the deck's name with -sweep.h5, in this "
+              help="Result file.  [default: the deck's name with -sweep.h5, in this "
                    "folder]")  # fmt: skip
 @click.option("--history", is_flag=True, help="Also store the contact force of every step.")
 @click.option("--full", type=ListOf("CASE,...", click.IntRange(min=0)), metavar="CASE,...",
@@ -47,12 +47,12 @@ from fecm.sweeps.store import OtherSweepError, PartialResults
 @click.option("--workers", type=click.IntRange(1, 1024), default=1, show_default=True, metavar="N",
               help="Worker processes on this machine.")  # fmt: skip
 @click.option("--scheduler", metavar="ADDRESS",
-              help="A running Dask scheduler instead, as in tcp://host:8786.")  # fmt: skip
-@click.option("--allow-failed", is_flag=True, help="Exit with 0 although cases failed.")
-@click.option("--overwrite", is_flag=True, help="Replace results that exist.")
+              help="Running Dask scheduler, as in tcp://host:8786, instead of --workers.")  # fmt: skip
+@click.option("--allow-failed", is_flag=True, help="Exit with 0 even if cases failed.")
+@click.option("--overwrite", is_flag=True, help="Replace existing results.")
 def sweep(
     deck: Path,
-    varied: tuple[str, ...],
+    varied: tuple[tuple[str, list[Value]], ...],
     table: Path | None,
     output: Path | None,
     history: bool,
@@ -62,52 +62,43 @@ def sweep(
     allow_failed: bool,
     overwrite: bool,
 ) -> None:
-    """Run DECK many times with other values.
+    """Run DECK many times with varied parameters.
 
-    Cases that differ in the projectile, its velocity or the indentation law alone share one run of
+    Cases that differ only in the projectile, its velocity or the indentation law share one run of
     the plate.  The same command resumes an interrupted sweep.  The last line counts the cases that
-    failed, whose exit status is 1, and those that ended in contact.
+    failed, for which the exit status is 1, and those that ended in contact.
     """
     path = output or Path(f"{deck.stem}-sweep.h5")
-    try:
-        cases = _cases(varied, table)
-        chosen = tuple(dict.fromkeys(full or ()))
-        if chosen and max(chosen) >= len(cases):
-            raise click.UsageError(f"--full {max(chosen)}: the cases are 0 to {len(cases) - 1}")
-        fulls = {case: path.with_name(f"{path.stem}-{case}{path.suffix}") for case in chosen}
-        inputs = [deck] if table is None else [deck, table]
-        check_outputs([path, *fulls.values()], overwrite, inputs)
-        problem = _problem(deck)
-        made = plan(problem, cases, history=history)
-        check_memory(problem, made, 0 if scheduler is not None else workers)
-        if count := freed(tasks(problem, made)):
-            note(
-                f"B is not zero in {count} case{'' if count == 1 else 's'}: u and v, which the "
-                "deck restrains at every node, are free there except where w is held"
-            )
-        result = _carry_out(problem, made, path, workers, scheduler, overwrite=overwrite)
-    except CasesError as error:
-        raise RefusedError(str(error)) from None
+    if bool(varied) == (table is not None):
+        raise click.UsageError("give either --vary or --cases")
+    cases = grid(varied) if table is None else read_cases(table)
+    chosen = tuple(dict.fromkeys(full or ()))
+    if chosen and max(chosen) >= len(cases):
+        raise click.UsageError(f"--full {max(chosen)}: the cases are 0 to {len(cases) - 1}")
+    fulls = {case: path.with_name(f"{path.stem}-{case}{path.suffix}") for case in chosen}
+    check_outputs([path, *fulls.values()], overwrite, [deck] if table is None else [deck, table])
+    problem = _problem(deck)
+    planned = plan(problem, cases, history=history)
+    check_memory(problem, planned, 0 if scheduler is not None else workers)
+    if count := freed(tasks(problem, planned)):
+        note(
+            f"B is not zero in {count} case{'' if count == 1 else 's'}: u and v, which the deck "
+            "restrains at every node, are free there except where w is held"
+        )
+    result = _carry_out(problem, planned, path, workers, scheduler, overwrite=overwrite)
     save(result, path, overwrite=overwrite)
     if lost := sum(status.startswith(LOST) for status in result["status"].tolist()):
         note(f"{lost} cases were lost with their workers; --overwrite runs them again")
     else:
-        _parts(made, path, restart=True).clear()
+        PartialResults(path, planned.fingerprint(), restart=True).clear()
     echo(result.title or "sweep")
     for line in summary(result):
         echo(f"  {line}")
     echo(f"  result            {path}")
-    _run_in_full(made, fulls, overwrite=overwrite)
+    _run_in_full(planned, fulls, overwrite=overwrite)
     echo(verdict(result))
     if not (allow_failed or result.fine.all()):
-        raise SystemExit(1)
-
-
-def _cases(varied: tuple[str, ...], table: Path | None) -> list[Case]:
-
-    if bool(varied) == (table is not None):
-        raise click.UsageError("give either --vary or --cases")
-    return read_cases(table) if table is not None else grid([parse_vary(v) for v in varied])
+        raise SystemExit(NO)
 
 
 def _problem(deck: Path) -> Problem:
@@ -120,36 +111,28 @@ def _problem(deck: Path) -> Problem:
         raise RefusedError(f"{count_errors(errors)}; nothing was run") from None
 
 
-def _parts(made: Plan, path: Path, *, restart: bool) -> PartialResults:
-
-    try:
-        return PartialResults(path, made.fingerprint(), restart=restart)
-    except OtherSweepError as error:
-        raise RefusedError(str(error)) from None
-
-
 def _carry_out(
     problem: Problem,
-    made: Plan,
+    planned: Plan,
     path: Path,
     workers: int,
     scheduler: str | None,
     *,
     overwrite: bool,
 ) -> SweepResult:
-    """Run the plan with a progress bar; what is finished survives whatever happens."""
-    parts = _parts(made, path, restart=overwrite)
+    """Run the plan with a progress bar; finished cases survive any interruption."""
+    parts = PartialResults(path, planned.fingerprint(), restart=overwrite)
     try:
-        with signals.deferred(), _progress(len(made.cases)) as done:
+        with signals.deferred(), _progress(len(planned.cases)) as done:
             return carry_out(
-                problem, made, workers=workers, scheduler=scheduler, parts=parts, done=done,
+                problem, planned, workers=workers, scheduler=scheduler, parts=parts, done=done,
                 idle=signals.heed, note=note,
             )  # fmt: skip
-    except SchedulerError as error:
+    except SchedulerError:
         parts.clear()
-        raise RefusedError(str(error)) from None
+        raise
     except (KeyboardInterrupt, SystemExit):
-        echo("fecm: the same command goes on where this sweep was", err=True)
+        echo("fecm: the same command resumes this sweep", err=True)
         raise
 
 
@@ -177,11 +160,11 @@ def _progress(count: int) -> Iterator[Callable[[Task, Outcome], None]]:
         yield done
 
 
-def _run_in_full(made: Plan, fulls: dict[int, Path], *, overwrite: bool) -> None:
-    """Run chosen cases with everything that their deck stores."""
+def _run_in_full(planned: Plan, fulls: dict[int, Path], *, overwrite: bool) -> None:
+    """Run chosen cases with all rows that their deck stores."""
     for case, path in fulls.items():
         try:
-            prepared = load_deck(deck_of(made, case))
+            prepared = load_deck(deck_of(planned, case))
             if errors := prepared.errors(force=True):
                 raise CasesError(errors[0].message)
             with hdf5_writer.writing(path, overwrite=overwrite) as sink:
