@@ -424,7 +424,7 @@ def test_a_sweep_that_is_interrupted_from_outside_ends_in_the_same_file(tmp_path
     )  # fmt: skip
     folder = tmp_path / ".s.h5.parts"
     assert done.returncode == 130
-    assert "goes on where this sweep was" in done.stderr
+    assert "resumes this sweep" in done.stderr
     assert not (tmp_path / "s.h5").exists()
     assert len(list(folder.glob("task-*.npz"))) == 2
     assert call(*command, "s.h5", cwd=tmp_path).exit_code == 0

@@ -47,15 +47,15 @@ COMMANDS = {
     "export": LazyCommand("fecm.cli.export", "Write RESULT for ParaView or a spreadsheet.", True),
     "fmt": LazyCommand("fecm.cli.decks", "Align the columns of DECK."),
     "indent": LazyCommand("fecm.cli.indent", "Indentation tests and the law of contact."),
-    "info": LazyCommand("fecm.cli.info", "Show what is in RESULT.", True),
+    "info": LazyCommand("fecm.cli.info", "Describe the contents of RESULT.", True),
     "materials": LazyCommand("fecm.cli.new", "List the named plies of `fecm new`."),
     "new": LazyCommand("fecm.cli.new", "Write a deck from plate, layup, supports and impact."),
     "plot": LazyCommand("fecm.cli.plot", "Draw the report's figures, or the map of a sweep.", True),
     "rod": LazyCommand("fecm.cli.rod", "The projectile's rod alone: pulses and calibration."),
     "run": LazyCommand("fecm.cli.run", "Run every problem in DECK and write its result."),
-    "sweep": LazyCommand("fecm.cli.sweep", "Run DECK many times with other values."),
+    "sweep": LazyCommand("fecm.cli.sweep", "Run DECK many times with varied parameters."),
     "tapes": LazyCommand("fecm.cli.export", "Write tape3, tape8 and tape9 as text.", True),
-    "verify": LazyCommand("fecm.cli.verify", "Compare fecm with closed forms and known figures."),
+    "verify": LazyCommand("fecm.cli.verify", "Compare fecm with closed forms and the literature."),
     "waves": LazyCommand("fecm.cli.waves", "Waves in a laminate."),
 }
 

@@ -74,10 +74,10 @@ def load_valid(
 @MODE_OPTION
 @FORMAT_OPTION
 def check(deck: Path, mode: str, form: str) -> None:
-    """Read and check DECK without running it: findings, then a summary.
+    """Check DECK without running it; print its findings and a summary.
 
-    With --format json, one JSON object per finding and per problem, each on a line.  Exit status 1
-    if the deck has errors.
+    With --format json, each finding and each problem is a JSON object on a line.  The exit status
+    is 1 if the deck has errors.
     """
     prepared = load_deck(deck, mode)
     errors = prepared.errors()
@@ -99,10 +99,10 @@ def check(deck: Path, mode: str, form: str) -> None:
 @click.command(short_help="Align the columns of DECK.")
 @click.argument("deck", type=DECK_PATH)
 @click.option("-o", "--output", type=click.Path(path_type=Path, allow_dash=True), metavar="FILE",
-              help="Where to write; - is standard output.  [default: DECK itself]")  # fmt: skip
+              help="File to write; - is standard output.  [default: DECK itself]")  # fmt: skip
 @click.option("--check", "only_check", is_flag=True,
               help="Write nothing; exit with 1 if the deck would change.")  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace another FILE that exists.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing FILE other than DECK.")
 def fmt(deck: Path, output: Path | None, only_check: bool, overwrite: bool) -> None:
     """Align the columns of DECK and put a ruler above each kind of card.
 

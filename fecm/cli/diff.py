@@ -26,8 +26,7 @@ from fecm.results.schema import jsonable, printable, shown_apart
 @click.argument("a", type=FILE_PATH)
 @click.argument("b", type=FILE_PATH)
 @click.option("--rtol", type=NOT_NEGATIVE, default=0.0, show_default=True, metavar="R",
-              help="Relative tolerance: a part of the dataset's largest absolute value in A and "
-                   "B.")  # fmt: skip
+              help="Relative tolerance, of the dataset's largest absolute value.")  # fmt: skip
 @click.option("--atol", type=NOT_NEGATIVE, default=0.0, show_default=True, metavar="T",
               help="Absolute tolerance, in the dataset's unit.")  # fmt: skip
 @click.option("--only", multiple=True, metavar="PATH",
@@ -47,8 +46,8 @@ def diff(
     entire dataset; for energy/balance_error it is the largest energy, for laminate/B the square
     root of the largest A times the largest D, for indentation the largest one in contact.  NaN
     equals NaN, and an infinity the same infinity.  Integers (steps, node numbers) must be equal at
-    any tolerance.  A dataset that only A or B has, and another shape or type, are differences.
-    Title, mode, slips, other attributes and the deck are only listed where they differ.
+    any tolerance.  A dataset that only A or B has, or that has another shape or type, is a
+    difference.  Differing titles, modes, slips, other attributes and decks are only listed.
 
     A folder of tapes holds tape3, tape8 and tape9 (or tape3.txt etc.) as `fecm tapes` or the
     original program wrote them, in either order.  Only datasets of tapes are then compared; their

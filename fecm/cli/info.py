@@ -28,12 +28,12 @@ RUN_KEYS, SWEEP_KEYS = HEADING[:6], ("title", "fecm_version", "format", "format_
 PERMANENT = "permanent_indentation"
 
 
-@click.command(short_help="Show what is in RESULT.")
+@click.command(short_help="Describe the contents of RESULT.")
 @click.argument("result", type=FILE_PATH)
 @FORMAT_OPTION
 @reads("result")
 def info(result: Path, form: str) -> None:
-    """Show units, summary and every dataset of RESULT, of a run or of a sweep."""
+    """Describe units, summary and every dataset of RESULT, of a run or of a sweep."""
     contents = read(result, FORMAT, SWEEP)
     is_sweep = contents.form == SWEEP
     extent = _of_sweep(contents) if is_sweep else _of_run(contents)

@@ -37,7 +37,7 @@ def _by_name(
 @click.argument("results", type=DECK_PATH, nargs=-1, required=True, metavar="RESULT...")
 @click.option("--kind", "kinds", type=click.Choice(list(KINDS)), multiple=True,
               metavar="KIND",
-              help=f"What to draw; may be repeated.  {_KIND_HELP}.  [default: force; map of a "
+              help=f"Picture to draw; may be repeated.  {_KIND_HELP}.  [default: force; map of a "
                    "sweep]")  # fmt: skip
 @click.option("-o", "--output", type=FILE_PATH, metavar="PATH",
               help="Picture (.png, .svg, .pdf; .gif for animation), or folder for several.  "
@@ -67,7 +67,7 @@ def _by_name(
                    "repeated.")  # fmt: skip
 @click.option("--level", type=ListOf("VALUE,...", Finite()), metavar="VALUE,...",
               help="Values to mark in map, in the deck's unit.")  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace pictures that exist.")
+@click.option("--overwrite", is_flag=True, help="Replace existing pictures.")
 @reads("results")
 def plot(
     results: tuple[Path, ...],

@@ -47,7 +47,7 @@ from fecm.sweeps.store import PartialResults
 @click.option("--workers", type=click.IntRange(1, 1024), default=1, show_default=True, metavar="N",
               help="Worker processes on this machine.")  # fmt: skip
 @click.option("--scheduler", metavar="ADDRESS",
-              help="Running Dask scheduler, as in tcp://host:8786, instead of --workers.")  # fmt: skip
+              help="Running Dask scheduler, as in tcp://host:8786, to use instead.")  # fmt: skip
 @click.option("--allow-failed", is_flag=True, help="Exit with 0 even if cases failed.")
 @click.option("--overwrite", is_flag=True, help="Replace existing results.")
 def sweep(

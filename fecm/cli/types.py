@@ -25,6 +25,10 @@ class Finite(click.FloatRange):
             self.fail(f"{value!r} is not a finite number.", param, ctx)
         return number
 
+    def _describe_range(self) -> str:
+        """Range on help pages; empty without bounds."""
+        return "" if self.min is None and self.max is None else super()._describe_range()
+
 
 POSITIVE = Finite(min=0.0, min_open=True)
 NOT_NEGATIVE = Finite(min=0.0)

@@ -13,13 +13,13 @@ from fecm.verification import Case, Row, UnknownCaseError, carry_out, chosen, ta
 
 @click.command()
 @click.argument("cases", nargs=-1, metavar="[CASE]...")
-@click.option("--list", "listing", is_flag=True, help="Name the cases and compute nothing.")
-@click.option("--markdown", is_flag=True, help="Write the documentation's page instead.")
+@click.option("--list", "listing", is_flag=True, help="List the cases without computing them.")
+@click.option("--markdown", is_flag=True, help="Write the page of the documentation instead.")
 @FORMAT_OPTION
 def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: str) -> None:
-    """Compare this program with closed forms and known figures.
+    """Compare this program with closed forms and the literature.
 
-    All cases are computed, or those named. Exit status 1 if a row is beyond its tolerance.
+    By default all cases are computed.  The exit status is 1 if a row is beyond its tolerance.
     """
     if markdown and (listing or form == "json"):
         raise RefusedError("--markdown goes with neither --list nor --format json")
@@ -40,10 +40,10 @@ def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: str) -> 
 
 
 def _name(cases: Sequence[Case], form: str) -> None:
-    """Tell which cases there are."""
+    """List the cases."""
     if form == "json":
-        told = [{"case": c.name, "title": c.title, "rows": len(c.checks)} for c in cases]
-        click.echo(json.dumps({"cases": told}, ensure_ascii=False))
+        listed = [{"case": c.name, "title": c.title, "rows": len(c.checks)} for c in cases]
+        click.echo(json.dumps({"cases": listed}, ensure_ascii=False))
         return
     width = max(len(one.name) for one in cases)
     for one in cases:
@@ -63,9 +63,9 @@ def _printed(cases: Sequence[Case], form: str, markdown: bool) -> list[Row]:
     if markdown:
         click.echo(table.page(rows()), nl=False)
     elif form == "json":
-        told = [table.values(row) for row in rows()]
+        values = [table.values(row) for row in rows()]
         fine = all(row.within for row in found)
-        click.echo(json.dumps({"ok": fine, "rows": told}, ensure_ascii=False, allow_nan=False))
+        click.echo(json.dumps({"ok": fine, "rows": values}, ensure_ascii=False, allow_nan=False))
     else:
         for line in table.lines(cases, rows()):
             click.echo(line)

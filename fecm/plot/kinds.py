@@ -69,12 +69,12 @@ class Kind:
 KINDS = {
     "force": Kind("histories:force", "contact force and transducer against time", True),
     "loop": Kind("histories:loop", "contact force against indentation", True),
-    "energy": Kind("histories:energy", "where the energy is, against time", True),
-    "strain": Kind("histories:strain", "surface strain at points, against time", True),
+    "energy": Kind("histories:energy", "energies of plate and projectile against time", True),
+    "strain": Kind("histories:strain", "surface strain at points against time", True),
     "line": Kind("deflection:line", "deflection along a line through the impact point", True),
     "contour": Kind("deflection:contour", "deflection of the plate, seen from above"),
     "surface": Kind("deflection:surface", "the deflected plate"),
     "mesh": Kind("meshes:mesh", "mesh, supports and impact point"),
     "animation": Kind("deflection:animation", "the moving plate", suffixes=(".gif",)),
-    "map": Kind("maps:parameter_map", "a number of a sweep over what varies", sweep=True),
+    "map": Kind("maps:parameter_map", "a quantity of a sweep over its parameters", sweep=True),
 }
