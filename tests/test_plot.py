@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +20,6 @@ from fecm.plot.pictures import draw, save
 from fecm.plot.style import COLOURS, scale
 from fecm.results.result import Result
 from tests.builders import distorted_square
-from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, MESH, PROGRAM, small
 
 Array = NDArray[Any]
@@ -50,13 +46,6 @@ def run(deck: str) -> Result:
 def result() -> Result:
     """The small plate in in, lbf and s."""
     return run(NAMED)
-
-
-@pytest.fixture
-def file(tmp_path: Path) -> Path:
-    """The small plate's result file."""
-    fecm.run(NAMED, output=tmp_path / "small.h5")
-    return tmp_path / "small.h5"
 
 
 def lines(axes: Any) -> dict[str, tuple[Array, Array]]:
@@ -312,7 +301,7 @@ def test_without_matplotlib_one_line_says_what_to_install(
     assert str(refused.value) == MISSING == "pictures need matplotlib: pip install 'fecm[plot]'"
 
 
-# The command ------------------------------------------------------------------------------------
+# Files, open ends, names -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
@@ -329,63 +318,6 @@ def test_the_same_picture_has_the_same_bytes(result: Result, tmp_path: Path, suf
     assert b"dc:date" not in written[0]
 
 
-def test_the_command_writes_every_kind_and_keeps_what_is_there(file: Path) -> None:
-    asked = [part for kind in OF_RUNS for part in ("--kind", kind)]
-    done = call("plot", file, *asked, cwd=file.parent)
-    expected = [f"small-{k}.{'gif' if k == 'animation' else 'png'}" for k in OF_RUNS]
-    assert (done.exit_code, done.stdout.split(), done.stderr) == (0, expected, "")
-    assert sorted(p.name for p in file.parent.iterdir()) == sorted([*expected, "small.h5"])
-    (file.parent / "small-loop.png").write_text("precious")
-    (file.parent / "small-force.png").unlink()
-    refused = call("plot", file, "--kind", "force", "--kind", "loop", cwd=file.parent)
-    assert refused.exit_code == 2
-    assert "small-loop.png exists already" in refused.stderr
-    assert (file.parent / "small-loop.png").read_text() == "precious"
-    assert not (file.parent / "small-force.png").exists()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("-o", "picture.jpg"), ".png or .svg or .pdf"),
-        (("--kind", "animation", "-o", "plate.png"), ".gif"),
-        (("--kind", "force", "--kind", "loop", "-o", "both.png"), "is not a folder"),
-        (("--kind", "contour", "--times", "1"), "at time 1"),
-        (("--times", "soon"), "T,T"),
-        (("--at", "1"), "X,Y"),
-        (("small.h5",), "given twice"),
-    ],
-)
-def test_a_call_that_makes_no_picture_is_refused_in_words(
-    file: Path, arguments: tuple[str, ...], words: str
-) -> None:
-    refused = call("plot", "small.h5", *arguments, cwd=file.parent)
-    assert refused.exit_code == 2
-    assert words in refused.stderr
-    assert "Traceback" not in refused.stderr
-    assert [p.name for p in file.parent.iterdir()] == ["small.h5"]
-
-
-def test_nothing_but_a_picture_imports_matplotlib(file: Path) -> None:
-    program = (
-        "import sys, fecm, fecm.cli, fecm.plot.pictures, fecm.cli.plot\n"
-        "for command in 'tapes small.h5', 'export small.h5 --to csv', '--help':\n"
-        "    try: fecm.cli.main(command.split())\n"
-        "    except SystemExit as end: assert not end.code\n"
-        "print([n for n in ('matplotlib', 'pandas', 'vtk') if n in sys.modules])\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=file.parent, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.splitlines()[-1] == "[]"
-    assert (file.parent / "small-history.csv").exists()
-    assert "Commands:" in done.stdout
-    assert PROGRAM in fecm.load(file).deck
-
-
-# Open ends, and results without sense ----------------------------------------------------------
-
-
 @pytest.mark.parametrize("kind", ["force", "loop", "energy"])
 def test_pictures_of_a_contact_without_an_end_say_so(result: Result, kind: str) -> None:
     closed = run(small(data=DATA_CARDS + "UNIT\nin lbf s\n", program=LONG_PROGRAM))
@@ -398,73 +330,9 @@ def test_pictures_of_a_contact_without_an_end_say_so(result: Result, kind: str) 
     assert marks(a=closed, b=result) == "still in contact at the end (b)"
 
 
-def zero(file: h5py.File) -> None:
-    file["mesh/coordinates"][...] = 0.0
-
-
-def infinite(file: h5py.File) -> None:
-    file["tape3/w"][...] = np.inf
-    file["history/force"][...] = np.inf
-    file["energy/plate_kinetic"][...] = np.nan
-    file["tape8/kappa_x"][...] = np.inf
-
-
-def huge(file: h5py.File) -> None:
-    file["history/force"][...] = np.linspace(-0.8e308, 0.8e308, 10)
-    file["mesh/coordinates"][...] *= 0.5e308
-    file["tape3/w"][...] = 1e308
-
-
-def tiny(file: h5py.File) -> None:
-    for path in ("history/force", "history/time", "tape3/w", "tape3/time", "mesh/coordinates"):
-        file[path][...] *= 1e-310
-
-
-def without_rows(file: h5py.File) -> None:
-    for group in ("history", "energy", "tape3", "tape8"):
-        for name, dataset in list(file[group].items()):
-            del file[group][name]
-            file[group][name] = np.zeros((0, *dataset.shape[1:]), dataset.dtype)
-
-
-@pytest.mark.parametrize(
-    ("edit", "undrawn"),
-    [
-        (zero, "strain line contour surface mesh"),
-        (infinite, "force loop energy strain line contour surface"),
-        (huge, "force loop strain line contour surface mesh"),
-        (tiny, "contour"),
-        (without_rows, "force loop energy strain line contour surface"),
-    ],
-)
-def test_a_result_without_sense_is_drawn_or_is_one_line(
-    file: Path, edit: Callable[[h5py.File], None], undrawn: str
-) -> None:
-    with h5py.File(file, "r+") as stored:
-        edit(stored)
-    refused = []
-    for kind in ("force", "loop", "energy", "strain", "line", "contour", "surface", "mesh"):
-        picture = file.with_name(f"{kind}.png")
-        done = call("plot", file, "--kind", kind, "-o", picture)
-        if done.exit_code:
-            refused.append(kind)
-            assert_unusable(done)
-            assert not picture.exists()
-        else:
-            assert done.stderr == ""
-    assert refused == undrawn.split()
-
-
-def test_what_is_wrong_with_a_result_is_named(file: Path) -> None:
-    with h5py.File(file, "r+") as stored:
-        zero(stored)
-        infinite(stored)
-    assert "the mesh of small has no area" in call("plot", file, "--kind", "mesh").stderr
-    assert "history/force of small holds numbers beyond" in call("plot", file).stderr
-
-
-def test_units_and_names_are_shown_as_they_are(file: Path) -> None:
-    names = [r"_a$x$", r"$\sqrt{$"]
+def test_units_and_names_are_shown_as_they_are(tmp_path: Path) -> None:
+    names, file = [r"_a$x$", r"$\sqrt{$"], tmp_path / "small.h5"
+    fecm.run(NAMED, output=file)
     with h5py.File(file, "r+") as stored:
         stored.attrs["unit_length"] = r"$\sqrt{$"
     result = fecm.load(file)
@@ -475,29 +343,3 @@ def test_units_and_names_are_shown_as_they_are(file: Path) -> None:
         assert not any(text.get_parse_math() for text in figure.legends[0].get_texts())
     (axes,) = draw("mesh", {"a": result}).figure.axes
     assert axes.get_xlabel() == r"$x$ (\$\sqrt{\$)"
-
-
-def test_a_name_that_is_no_text_is_escaped(file: Path) -> None:
-    strange = file.with_name("b\udcff.h5")
-    shutil.copy(file, strange)
-    done = call("plot", file, strange, "-o", file.with_name("x.png"))
-    assert (done.exit_code, done.stderr) == (0, "")
-
-
-@pytest.mark.parametrize(
-    ("options", "name"),
-    [(["--times", "1e-6"], "times"), (["--at", "1,1"], "at"), (["--along", "y"], "along"),
-     (["--level", "3"], "level"), (["--face", "struck"], "face")],
-)  # fmt: skip
-def test_an_option_of_another_kind_is_refused(file: Path, options: list[str], name: str) -> None:
-    done = call("plot", file, "--kind", "force", *options, "-o", file.with_name("x.png"))
-    assert_unusable(done)
-    assert f"the option {name} is for the kind " in done.stderr
-
-
-def test_an_option_needs_one_kind_that_shows_it(result: Result, file: Path) -> None:
-    kinds = ["--kind", "force", "--kind", "line"]
-    done = call("plot", file, *kinds, "--times", "1e-6", "-o", file.parent)
-    assert done.exit_code == 0
-    with pytest.raises(PlotError, match="the option times is for"):
-        result.plot("force", times=(1e-6,))

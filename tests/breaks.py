@@ -1,0 +1,225 @@
+"""Ways of breaking physics on purpose, for a test alone."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fecm.mechanics import element_matrices, strains
+from fecm.mechanics import laminate as laminates
+from fecm.mechanics.contact_law import (
+    HystereticLaw,
+)
+from fecm.mechanics.strains import StrainField
+from fecm.sweeps.responses import BLOCK
+
+Break = Callable[[pytest.MonkeyPatch], None]
+
+
+def instead(owner: Any, name: str, broken: Callable[..., Any]) -> Break:
+    """Make a function compute something else: `broken` gets the right function and its arguments.
+
+    A function of a module is replaced wherever it was imported.
+    """
+
+    def apply(monkeypatch: pytest.MonkeyPatch) -> None:
+        found = inspect.getattr_static(owner, name)
+        right = found.fget if isinstance(found, property) else found
+
+        def wrapper(*args: Any, **kwargs: Any) -> Any:
+            return broken(right, *args, **kwargs)
+
+        if isinstance(owner, type):
+            monkeypatch.setattr(
+                owner, name, property(wrapper) if isinstance(found, property) else wrapper
+            )
+            return
+        for module in [m for n, m in sys.modules.items() if n.partition(".")[0] == "fecm"]:
+            for own, kept in list(vars(module).items()):
+                if kept is right:
+                    monkeypatch.setattr(module, own, wrapper)
+
+    return apply
+
+
+def changed(owner: Any, name: str, change: Callable[[Any], Any]) -> Break:
+    """Make a function give another result: `change` of the right one."""
+    return instead(owner, name, lambda right, *args, **kwargs: change(right(*args, **kwargs)))
+
+
+def value(owner: Any, name: str, new: object) -> Break:
+    """Make a constant another one."""
+    return lambda monkeypatch: monkeypatch.setattr(owner, name, new)
+
+
+def entry(rows: Any, columns: Any, factor: float) -> Callable[[Any], Any]:
+    """Multiply an entry of a symmetric matrix."""
+
+    def change(matrix: Any) -> Any:
+        other = matrix.copy()
+        other[..., rows, columns] *= factor
+        if rows != columns:
+            other[..., columns, rows] *= factor
+        return other
+
+    return change
+
+
+def in_laminate(**changes: Callable[[Any], Any]) -> Break:
+    """Change parts of every laminate."""
+    return changed(
+        laminates, "laminate",
+        lambda made: replace(made, **{n: new(getattr(made, n)) for n, new in changes.items()}),
+    )  # fmt: skip
+
+
+def in_stiffness(**changes: Callable[[Any], Any]) -> Break:
+    """Change parts of the laminate that the elements' stiffness is made of, and nothing else."""
+
+    def broken(right: Any, family: Any, laminate: Any, *rules: Any, **kwargs: Any) -> Any:
+        other = {name: change(getattr(laminate, name)) for name, change in changes.items()}
+        return right(family, replace(laminate, **other), *rules, **kwargs)
+
+    return instead(element_matrices, "stiffness", broken)
+
+
+def in_strains(component: int, unknown: int) -> Break:
+    """Change the sign of what an unknown adds to a component of the strains."""
+
+    def broken(right: Any, self: Any, displacement: Any) -> Any:
+        strains, other = right(self, displacement), displacement.copy()
+        other[..., unknown] *= -1.0
+        strains[component] = right(self, other)[component]
+        return strains
+
+    return instead(StrainField, "evaluate", broken)
+
+
+def without_coupling(names: str) -> Break:
+    """Forget B in some of the stress resultants."""
+
+    def broken(right: Any, strains: Any, laminate: Any, field: Any) -> Any:
+        poor = right(strains, replace(laminate, B=0.0 * laminate.B), field)
+        rich = right(strains, laminate, field)
+        return rich | {name: found for name, found in poor.items() if name[0] == names}
+
+    return instead(strains, "strains_and_resultants", broken)
+
+
+def of_q16(right: Any, q: Any, angle: float) -> Any:
+    m, n = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
+    made, second = right(q, angle), (q[0, 1] - q[1, 1] + 2.0 * q[2, 2]) * m * n**3
+    made[0, 2] -= 2.0 * second
+    made[2, 0] -= 2.0 * second
+    return made
+
+
+def plane_stress_of_strain(right: Any, ply: Any) -> Any:
+    made = right(ply)
+    made[:2, :2] *= 1.0 - ply.nu12**2 * ply.e2 / ply.e1
+    return made
+
+
+def moved_midplane(made: Any) -> Any:
+    d = made.thickness / 6.0
+    return replace(made, B=made.B + d * made.A, D=made.D + 2.0 * d * made.B + d**2 * made.A)
+
+
+def equal_shares(right: Any, *args: Any) -> Any:
+    lumped = right(*args)
+    return np.broadcast_to(lumped.mean(axis=1, keepdims=True), lumped.shape)
+
+
+def rotary_for_mass(right: Any, family: Any, *args: Any) -> Any:
+    ne, nn = family.nodes.shape
+    M = right(family, *args).reshape(ne, nn, 5, nn, 5)
+    M[:, :, 2, :, 2] = M[:, :, 3, :, 3]
+    return M.reshape(ne, 5 * nn, 5 * nn)
+
+
+def rotations_reversed(B: Any) -> Any:
+    parts = B.reshape(*B.shape[:-1], -1, 5)
+    parts[..., 3:] *= -1.0
+    return parts.reshape(B.shape)
+
+
+def ray_without_slope(right: Any, fronts: Any) -> Any:
+    return right(replace(fronts, slope=0.0 * fronts.slope))
+
+
+def quarter_of_mass(masses: Any) -> Any:
+    return masses * np.where(np.arange(len(masses)) % 2, 1.0, 0.5)
+
+
+def lighter_begin(right: Any, rod: Any) -> Any:
+    M = right(rod)
+    for element, area in enumerate(rod.areas):
+        M[2 * element, 2 * element] -= rod.density * area * rod.length / rod.elements * 16.0 / 420.0
+    return M
+
+
+def turned(of: Callable[[Any, Any], bool], **factors: float) -> Break:
+    """Multiply parts of the curve that the law turns to, given the memories before and after."""
+
+    def broken(right: Any, law: Any, before: Any, *args: Any) -> Any:
+        after = right(law, before, *args)
+        if after is before or not of(before, after):
+            return after
+        return after._replace(**{n: times * getattr(after, n) for n, times in factors.items()})
+
+    return instead(HystereticLaw, "_turned", broken)
+
+
+def standing_plate(right: Any, impact: Any, motion: Any, rod: Any, law: Any, contact: Any,
+                   *args: Any) -> None:  # fmt: skip
+    right(impact, motion, rod, law, replace(contact, plate_moves=False), *args)
+
+
+def work_of_the_new_force(right: Any, step: Any, law: Any, state: Any, w: Any) -> None:
+    last = state.contact
+    right(step, law, state, w)
+    force, indentation = state.contact
+    state.contact_work += (force - last.force) / 2.0 * (indentation - last.indentation)
+
+
+def partly_given(right: Any, convolution: Any, values: Any) -> None:
+    right(convolution, values)
+    if row := convolution._step % BLOCK:
+        convolution._block[row:] -= 1e-6 * convolution._near[: BLOCK - row] * values
+
+
+def exchanged_on_tape8(
+    right: Any, recorder: Any, group: str, step: Any, time: Any, columns: Any
+) -> None:
+    if group == "tape8":
+        other = ("kappa_y", "kappa_x", "kappa_xy", "gamma_xz", "gamma_yz")
+        columns = dict(zip(other, columns.values(), strict=True))
+    right(recorder, group, step, time, columns)
+
+
+def other_power(right: Any, constants: Any, *args: Any) -> None:
+    right(constants, *args)
+    object.__setattr__(constants, "q", 2.0)
+
+
+def resultants(**factors: float) -> Callable[[Any], Any]:
+    """Multiply some stress resultants."""
+    return lambda found: found | {name: times * found[name] for name, times in factors.items()}
+
+
+def halved(number: float) -> float:
+    return number / 2.0
+
+
+def negative(matrix: Any) -> Any:
+    return -matrix
+
+
+def nothing(matrix: Any) -> Any:
+    return 0.0 * matrix
