@@ -19,6 +19,7 @@ from fecm.studies.indentation_test.curves import (
     Curves,
     Estimate,
     Solution,
+    influence,
     r_squared,
     scaled,
     solve,
@@ -62,10 +63,8 @@ def free_power(curves: Curves) -> FreePower:
     c, n = found.x
     fitted = c * a**n
     jacobian = np.stack([a**n, fitted * log], axis=1)
-    inverse = np.linalg.pinv(jacobian)
-    leverage = np.clip(np.einsum("ij,ji->i", jacobian, inverse), 0.0, 0.999)
-    influence = inverse * ((f - fitted) / np.sqrt(1.0 - leverage))
-    covariance = influence @ influence.T
+    _, of_points = influence(jacobian, f - fitted)
+    covariance = of_points @ of_points.T
     k = c * curves.force / curves.length**n
     by = np.array([k / c, -k * np.log(curves.length)])
     return FreePower(

@@ -41,6 +41,16 @@ def r_squared(fitted: Floats, measured: Floats) -> float | None:
     return 1.0 - float(((measured - fitted) ** 2).sum()) / total
 
 
+def influence(jacobian: Floats, residual: Floats) -> tuple[Floats, Floats]:
+    """Return the pseudo-inverse, and the influence of every point on the fitted parameters.
+
+    Residuals are divided by the square root of 1 minus the leverage of the point.
+    """
+    inverse = np.asarray(np.linalg.pinv(jacobian), dtype=np.float64)
+    leverage = np.clip(np.einsum("ij,ji->i", jacobian, inverse), 0.0, 0.999)
+    return inverse, inverse * (residual / np.sqrt(1.0 - leverage))
+
+
 Ints = NDArray[np.int64]
 
 # Fewest points of a curve.
@@ -364,16 +374,14 @@ def _covariance(curves: Curves, p: Floats, free: Bools) -> Floats:
     by_k[ParameterLayout.K] = 1.0
     if free.any():
         jacobian = _derivatives(lambda x: curves.of(x, FALLING, RISING)[0], p)
-        inverse = np.linalg.pinv(jacobian[:, free])
         fitted, measured = curves.of(p, FALLING, RISING)
-        leverage = np.clip(np.einsum("ij,ji->i", jacobian[:, free], inverse), 0.0, 0.999)
-        influence = inverse * ((measured - fitted) / np.sqrt(1.0 - leverage))
+        inverse, of_points = influence(jacobian[:, free], measured - fitted)
         by_k[free] = -inverse @ jacobian[:, ParameterLayout.K]
-        covariance[np.ix_(free, free)] = influence @ influence.T
-        if np.linalg.matrix_rank(jacobian[:, free], tol=1e-9 * len(fitted)) < np.count_nonzero(
-            free
-        ):
-            covariance[np.ix_(free, free)] += np.diag(np.full(np.count_nonzero(free), np.inf))
+        count = np.count_nonzero(free)
+        block = of_points @ of_points.T
+        if np.linalg.matrix_rank(jacobian[:, free], tol=1e-9 * len(fitted)) < count:
+            block += np.diag(np.full(count, np.inf))
+        covariance[np.ix_(free, free)] = block
     return covariance + np.outer(by_k, by_k) * float(on_k @ on_k)
 
 
