@@ -1,4 +1,4 @@
-"""What the commands share: exit status, options, files, signals."""
+"""Exit statuses, options, output and signals of all commands."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class CheckFailedError(FecmError):
 def echo(text: object = "", *, err: bool = False) -> None:
     """Print lines to the terminal, with control characters escaped.
 
-    An error of standard output does not end the command: the exit status tells of it.
+    An error of standard output does not end the command; the exit status reports it.
     """
     with contextlib.suppress(OSError):
         click.echo("\n".join(map(printable, str(text).split("\n"))), err=err)
@@ -82,7 +82,7 @@ def echo_file(text: str) -> None:
 
 @contextlib.contextmanager
 def progress(label: str, length: int) -> Iterator[Callable[[int], object]]:
-    """Show a progress bar where standard error is a terminal; gives what moves it on."""
+    """Show a progress bar if standard error is a terminal; yield the function that advances it."""
     if length < 2 or not sys.stderr.isatty():
         yield lambda steps: None
         return
@@ -92,7 +92,7 @@ def progress(label: str, length: int) -> Iterator[Callable[[int], object]]:
 
 @contextlib.contextmanager
 def writing(path: Path, *, overwrite: bool) -> Iterator[TextIO]:
-    """Open a text file that gets its final name only when all went well."""
+    """Open a text file that gets its final name when it is complete."""
     with (
         beside(path, overwrite=overwrite) as partial,
         partial.open("w", encoding="utf-8", newline="\n") as file,
@@ -101,7 +101,7 @@ def writing(path: Path, *, overwrite: bool) -> Iterator[TextIO]:
 
 
 def write_text(path: Path, text: str, *, overwrite: bool) -> None:
-    """Write a text file whole, or leave what is there."""
+    """Write a complete text file, or leave an existing one untouched."""
     with writing(path, overwrite=overwrite) as file:
         file.write(text)
 
@@ -141,7 +141,7 @@ class Signals:
 
     @contextlib.contextmanager
     def deferred(self) -> Iterator[None]:
-        """Leave it to the block to :meth:`heed` signals."""
+        """Defer signals; the block calls :meth:`heed`."""
         self._deferred = True
         try:
             yield
@@ -150,12 +150,12 @@ class Signals:
         self.heed()
 
     def came(self) -> bool:
-        """Whether a signal came that asks for the program's end."""
+        """Whether a signal was received."""
         return bool(self._received)
 
     @property
     def status(self) -> int:
-        """Exit status of a program that a signal has ended."""
+        """Exit status after the signal."""
         return 128 + self._received
 
     def heed(self) -> None:

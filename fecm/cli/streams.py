@@ -24,7 +24,7 @@ class _Guarded(io.FileIO):
         self._raises = raises
 
     def write(self, data: object) -> int:
-        """Write bytes; tell how many."""
+        """Write bytes; return their number."""
         view = memoryview(data)  # type: ignore[arg-type]
         if self.error is None:
             try:

@@ -79,7 +79,7 @@ class ListOf(click.ParamType):  # type: ignore[type-arg]
 
 
 class Parsed(click.ParamType):  # type: ignore[type-arg]
-    """What a function makes of a text; the message of its ValueError says what is wrong."""
+    """Result of a function of the text, whose ValueError is the message of the option."""
 
     name = "text"
 

@@ -154,7 +154,7 @@ def line(
     return Picture(figure)
 
 
-# The whole plate --------------------------------------------------------------------------------
+# The entire plate -------------------------------------------------------------------------------
 
 
 def contour(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
