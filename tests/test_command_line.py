@@ -30,10 +30,8 @@ def test_a_call_in_this_process_gives_what_the_program_gives(deck: Path) -> None
     deck.write_text(small(stop=False) + small(data=DATA_CARDS.replace("115.0", " 90.0")))
     for status, *arguments in (
         (0, "run", "small.inp", "--overwrite"),
-        (0, "info", "small.h5"),
         (1, "diff", "small.h5", "small-2.h5"),
         (2, "tapes", "small.inp"),
-        (2, "run", "small.inp", "--slip", "other"),
     ):
         done = program(*arguments, cwd=deck.parent)
         assert done.exit_code == status

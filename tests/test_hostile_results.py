@@ -142,7 +142,9 @@ def test_the_exit_status_of_the_child_is_the_programs(tmp_path: Path) -> None:
     assert ended(tmp_path, "no") == (1, "", "")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number", [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGTERM]
+)
 def test_a_signal_ends_a_command_whose_child_hangs(tmp_path: Path, number: signal.Signals) -> None:
     program = start(tmp_path, "hang", patience="50")
     assert program.stderr is not None

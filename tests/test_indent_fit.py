@@ -81,10 +81,12 @@ def test_constants_lie_inside_their_errors_as_often_as_they_should() -> None:
     assert np.mean(everything < 2.0) == pytest.approx(0.954, abs=0.03)
 
 
+@pytest.mark.long
 def test_errors_hold_for_a_scatter_that_grows_with_the_force() -> None:
     assert_fair(deviations(indentation=0.0, proportional=True))
 
 
+@pytest.mark.long
 def test_errors_hold_where_the_indentation_is_noisy_too() -> None:
     found = deviations(indentation=0.005)
     assert_fair(found)

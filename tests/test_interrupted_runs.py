@@ -77,7 +77,9 @@ def test_killed_sweeps_with_damaged_parts_end_in_the_same_bytes(tmp_path: Path) 
     assert counts["same"] == 4
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number", [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGTERM]
+)
 def test_an_interrupted_command_says_how_to_go_on_and_does(
     whole: Path, number: signal.Signals
 ) -> None:

@@ -117,7 +117,10 @@ print(peak() - base)
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="Linux tells the peak")
-@pytest.mark.parametrize(("steps", "cases", "history"), [(3000, 700, False), (1500, 1100, True)])
+@pytest.mark.parametrize(
+    ("steps", "cases", "history"),
+    [pytest.param(3000, 700, False, marks=pytest.mark.long), (1500, 1100, True)],
+)
 def test_the_estimate_of_a_sweep_bounds_what_is_measured(
     steps: int, cases: int, history: bool
 ) -> None:

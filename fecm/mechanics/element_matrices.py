@@ -9,12 +9,14 @@ kappa_y = -theta_y,y.  Arrays over elements have the element first, then the qua
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from fecm._typing import Floats
 from fecm.mechanics.element_groups import ElementBlock
 from fecm.mechanics.elements.quadrature import Quadrature
+from fecm.mechanics.elements.shape import ElementShape
 from fecm.mechanics.laminate import Laminate
 
 NDOF = 5
@@ -41,8 +43,18 @@ class Interpolation:
 
 def local_shape_functions(family: ElementBlock, rule: Quadrature) -> tuple[Floats, Floats]:
     """Shape functions of the nodes present: values (npt, nn), d/dxi and d/deta (npt, 2, nn)."""
-    values, local = family.shape.shape_functions(rule.xi, rule.eta, family.present)
-    return values[:, family.present], local[:, :, family.present]
+    return _shape_functions_at(family.shape, rule, tuple(family.present.tolist()))
+
+
+@lru_cache(maxsize=64)
+def _shape_functions_at(
+    shape: ElementShape, rule: Quadrature, present: tuple[bool, ...]
+) -> tuple[Floats, Floats]:
+    given = np.array(present)
+    values, local = shape.shape_functions(rule.xi, rule.eta, given)
+    values, local = values[:, given], local[:, :, given]
+    values.flags.writeable = local.flags.writeable = False  # shared by all callers
+    return values, local
 
 
 def inverse_jacobian(

@@ -43,7 +43,7 @@ from fecm.mechanics.rod_integrators import STEPS
 from fecm.mechanics.stiffness_product import CSR, Workers, available
 from fecm.mechanics.strains import StrainField
 from fecm.mechanics.symmetry import restrain_resting_dofs, symmetry_reduction
-from fecm.mechanics.time_step import critical_time_step
+from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.problem.generate import generate, rod_diameters
 from fecm.problem.options import RunOptions
 
@@ -94,6 +94,11 @@ class Problem:
         if not moves_only(self.program):
             return self.plate
         return restrain_resting_dofs(self.plate, self.impact_dof)
+
+    @cached_property
+    def safe_time_step(self) -> float:
+        """Lower bound of the critical time step, from the elements alone."""
+        return safe_time_step(self.moving_plate)
 
     @cached_property
     def critical_time_step(self) -> float:

@@ -17,7 +17,6 @@ from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.projectile import Rod
 from fecm.mechanics.stiffness_product import SAFE
-from fecm.mechanics.time_step import safe_time_step
 from fecm.problem.build import Problem, build_projectile
 from fecm.problem.contact_step import contact_step
 
@@ -255,9 +254,9 @@ def check_time_step_of_contact(problem: Problem, findings: Findings) -> None:
     steps = [macro for macro in deck.macros if macro.word == "DT"]
     if not steps:
         return
-    bound = safe_time_step(plate)
+    bound = problem.safe_time_step
     largest = max(macro.value or SAFE * bound for macro in steps)
-    contact = contact_step(deck, plate, largest) if problem.has_impact else None
+    contact = contact_step(deck, plate, largest, bound) if problem.has_impact else None
     stable = bound if contact is None else min(bound, contact.limit)
     for macro in steps:
         dt = macro.value

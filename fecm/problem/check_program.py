@@ -12,7 +12,6 @@ from fecm.deck.macros import MOST_MACROS, STEPS, every, flat
 from fecm.deck.model import Material
 from fecm.deck.records import Macro
 from fecm.mechanics.plate import UnsoundPlateError
-from fecm.mechanics.time_step import safe_time_step
 from fecm.problem.build import Problem
 
 LARGE_OUTPUT = 10**9
@@ -69,7 +68,7 @@ def check_time_step(problem: Problem, findings: Findings) -> None:
     if not steps or not STEPS.intersection(macro.word for macro in deck.macros):
         return
     try:
-        safe = safe_time_step(problem.moving_plate)
+        safe = problem.safe_time_step
         _check_least_step(steps, safe, findings)
         if min(m.value for m in steps) > 0.0 and max(m.value for m in steps) < safe:
             return

@@ -16,7 +16,7 @@ from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError
 from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.stiffness_product import SAFE
-from fecm.mechanics.time_step import critical_time_step, safe_time_step
+from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import build_constants, build_projectile
 
 # A clamped square plate under a central force has the stiffness D/(0.0056 a^2): Timoshenko and
@@ -84,7 +84,7 @@ class ContactStep:
     limit: float
 
 
-def contact_step(deck: Deck, plate: PlateModel, dt: float) -> ContactStep:
+def contact_step(deck: Deck, plate: PlateModel, dt: float, bound: float) -> ContactStep:
     """Largest time step at which plate and contact are stable together.
 
     Parameters
@@ -94,7 +94,9 @@ def contact_step(deck: Deck, plate: PlateModel, dt: float) -> ContactStep:
     plate : PlateModel
     dt : float
         Time step of the deck; 0 for 0.9 of the critical one.  The limit is computed only where a
-        bound from the elements does not show that this step is stable.
+        bound does not show that this step is stable.
+    bound : float
+        Lower bound of the plate's critical time step.
     """
     impact = deck.require(Impact)
     row = int(plate.mesh.equations[impact.node - 1, impact.dof - 1]) - 1
@@ -108,7 +110,6 @@ def contact_step(deck: Deck, plate: PlateModel, dt: float) -> ContactStep:
         return ContactStep(stiffness, mass, math.inf)
     # The projectile's implicit step is iterated: a fixed point only below this (beta is 1/6).
     iterated = math.sqrt(6.0 * tip / stiffness)
-    bound = safe_time_step(plate)
     step = dt or SAFE * bound
     if step < iterated and (step / bound) ** 2 + step**2 * stiffness / (4.0 * at_node) < 1.0:
         return ContactStep(stiffness, mass, math.inf)

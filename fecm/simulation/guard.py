@@ -92,7 +92,8 @@ def likely_cause(problem: Problem, model: ImpactModel, dt: float) -> str:
     try:
         plate = model.motion.plate
         critical = critical_time_step(plate)
-        contact = contact_step(problem.deck, plate, dt) if model.impact is not None else None
+        hits = model.impact is not None
+        contact = contact_step(problem.deck, plate, dt, critical) if hits else None
     except UnsoundPlateError as error:
         return str(error)
     above = dt > critical

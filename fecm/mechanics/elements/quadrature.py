@@ -8,6 +8,7 @@ and of the small square.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -20,7 +21,7 @@ _XI = np.array([-1, 1, 1, -1, 0, 1, 0, -1, 0])
 _ETA = np.array([-1, -1, 1, 1, -1, 0, 1, 0, 0])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Quadrature:
     """Points and weights of a quadrature rule.
 
@@ -37,6 +38,7 @@ class Quadrature:
     weights: Floats
 
 
+@cache
 def gauss(order: int) -> Quadrature:
     """Gauss rule with `order` points in each direction (1 to 4).
 
@@ -48,6 +50,7 @@ def gauss(order: int) -> Quadrature:
     return _rule(order, *np.polynomial.legendre.leggauss(_known(order)))
 
 
+@cache
 def nodal(order: int) -> Quadrature:
     """Grid of `order` equally spaced points in each direction, including the edges.
 
