@@ -18,6 +18,11 @@ from tests.decks import small
 FECM = f"{sys.executable} -m fecm"
 
 
+def long(*values: object) -> object:
+    """Values of a test that runs only with ``-m long``."""
+    return pytest.param(*values, marks=pytest.mark.long)
+
+
 def shell(command: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """Run a command line of the shell; ``F`` is the program."""
     return subprocess.run(
@@ -43,8 +48,8 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize(
     ("streams", "status"),
-    [(">&-", 2), ("2>&-", 0), (">&- 2>&-", 2), ("<&- >&- 2>&-", 2), (">/dev/full", 2),
-     ("2>/dev/full", 0), (">/dev/full 2>/dev/full", 2), ("| true", 2)],
+    [(">&-", 2), ("2>&-", 0), long(">&- 2>&-", 2), ("<&- >&- 2>&-", 2), (">/dev/full", 2),
+     long("2>/dev/full", 0), long(">/dev/full 2>/dev/full", 2), ("| true", 2)],
 )  # fmt: skip
 def test_a_run_is_done_whatever_becomes_of_its_streams(
     folder: Path, streams: str, status: int
@@ -76,8 +81,8 @@ def test_other_commands_end_with_2_when_they_can_not_print(
 
 @pytest.mark.parametrize(
     ("command", "streams"),
-    [("info none.h5", "2>&-"), ("info none.h5", "2>&1 | true"), ("run none.inp", "2>/dev/full"),
-     ("run none.inp", "2>&-")],
+    [long("info none.h5", "2>&-"), ("info none.h5", "2>&1 | true"), ("run none.inp", "2>/dev/full"),
+     long("run none.inp", "2>&-")],
 )  # fmt: skip
 def test_a_message_that_nobody_reads_changes_no_exit_status(
     folder: Path, command: str, streams: str

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg, sparse
-from scipy.sparse.linalg import eigsh
 
 from fecm._typing import Floats
 from fecm.mechanics.plate import PlateModel
@@ -45,6 +43,9 @@ def modes(plate: PlateModel, count: int, *, consistent: bool) -> Modes:
     consistent : bool
         Use the consistent mass instead of the lumped one.
     """
+    from scipy import linalg, sparse  # slow to import
+    from scipy.sparse.linalg import eigsh
+
     K = plate.stiffness
     M = plate.consistent_mass if consistent else sparse.diags_array(plate.mass, format="csr")
     count = min(count, plate.neq)

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from fecm._errors import FecmError
 from fecm._memory import require
@@ -23,6 +23,9 @@ from fecm.mechanics.elements.quadrature import Quadrature
 from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.strains import StrainField
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 Indices = NDArray[np.intp]
 
@@ -139,6 +142,8 @@ class PlateModel:
         self, matrices_of: Callable[[element_groups.ElementBlock], Floats]
     ) -> sparse.csr_array:
         """Assembled matrix (neq, neq + restrained); columns of restrained dofs come last."""
+        from scipy import sparse  # slow to import, and not needed by most runs
+
         neq, ndof = self.neq, self._numbers.size
         require(ASSEMBLED * self.entries, "to assemble the plate's matrices")
         total = sparse.csr_array((neq, ndof))

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import warnings
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse.linalg import MatrixRankWarning, SuperLU, splu
 
 from fecm._errors import FecmError
 from fecm._typing import Floats
 from fecm.mechanics.plate import PlateModel
+
+if TYPE_CHECKING:
+    from scipy.sparse.linalg import SuperLU
 
 # Residual relative to the load above which the stiffness is considered singular.
 SINGULAR = 1.0e-6
@@ -33,6 +36,8 @@ class Tangent:
     """
 
     def __init__(self, plate: PlateModel) -> None:
+        from scipy.sparse.linalg import MatrixRankWarning, splu  # slow to import
+
         self._stiffness = plate.stiffness
         try:
             with warnings.catch_warnings():

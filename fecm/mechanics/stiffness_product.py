@@ -15,16 +15,18 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from fecm._typing import Floats
 from fecm.mechanics.element_groups import congruence
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.symmetry import SymmetryReduction, unreduced
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 # Chosen by the mesh, or always the sparse matrix.
 AUTO, CSR = "auto", "csr"
@@ -209,6 +211,8 @@ class _Domain:
 
     def prepare_sums(self) -> None:
         """Build the matrix that sums the elements' forces, for the equations of the domain."""
+        from scipy import sparse  # slow to import, and not needed by small plates
+
         turned = (self.dof_indices >= self._count) & (self.dof_indices < self._last)
         equations = np.where(turned, self.dof_indices - self._count, self.dof_indices)
         entries = np.flatnonzero(self.dof_indices < self._last)
