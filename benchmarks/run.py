@@ -137,13 +137,14 @@ def plain(problem: Problem, steps: int) -> float:
     impact, K, m = setup.impact, setup.plate.stiffness, setup.plate.mass
     if impact is None:
         raise ValueError("nothing hits in this deck")
-    state, equation = impact.start(), impact.contact.equation
+    state, load = impact.start(), impact.contact.load
     displacement, velocity = state.plate.displacement, np.zeros(setup.plate.neq)
+    ones = np.ones(setup.plate.neq)
     dt = time_step(problem.deck)
     begin = time.perf_counter()
     for _ in range(steps):
         force = -(K @ displacement)
-        force[equation] += state.contact.force
+        load.subtract(-state.contact.force, ones, force)
         velocity += dt * (force / m)
         displacement += dt * velocity
         impact.move_projectile(state, dt)

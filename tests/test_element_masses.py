@@ -9,7 +9,7 @@ import pytest
 from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
-from fecm.mechanics import element_groups, element_matrices
+from fecm.mechanics import element_groups, element_matrices, interpolation
 from fecm.mechanics.elements.quadrature import gauss
 from fecm.mechanics.plate import PlateModel, assemble
 from tests.builders import (
@@ -210,7 +210,7 @@ def test_bending_converges_on_ever_finer_distorted_meshes_of_triangles_and_cubic
     for n in (4, 8, 16):
         coordinates, elements = mesh = distorted_square(n, n, kind)
         (family,) = element_groups.element_blocks(elements, coordinates)
-        at = element_matrices.interpolate(family, gauss(3))
+        at = interpolation.interpolate(family, gauss(3))
         loads = summed(family.nodes, at.jxw @ at.N, len(coordinates))
         errors.append(1.0 - deflections(mesh, loads, 0.1, orders)[0] / exact)
     assert errors[0] > errors[1] > errors[2] > 0.0  # too stiff, less and less

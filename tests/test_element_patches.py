@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fecm.mechanics import element_groups, element_matrices
+from fecm.mechanics import element_groups, interpolation
 from fecm.mechanics.elements.quadrature import Quadrature, gauss, nodal
 from fecm.mechanics.plate import assemble
 from fecm.mechanics.stiffness_product import stiffness_operator
@@ -160,7 +160,7 @@ def test_strains_of_linear_curvature_are_exact_in_12_node_parallelograms(
     field[:, 4] = b * x**2 + 2 * c * x * y + 3 * d * y**2
     strains = StrainField(elements, coordinates, rule).evaluate(field)
     (family,) = element_groups.element_blocks(elements, coordinates)
-    values, _ = element_matrices.local_shape_functions(family, rule)
+    values, _ = interpolation.local_shape_functions(family, rule)
     px, py = np.einsum("pn,enk->kep", values, family.coordinates)
     expected = [-6 * a * px - 2 * b * py, -2 * c * px - 6 * d * py, -4 * (b * px + c * py)]
     np.testing.assert_allclose(strains[:3], expected, atol=1e-12)

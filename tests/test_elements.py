@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fecm.mechanics import element_groups, element_matrices
+from fecm.mechanics import element_groups, interpolation
 from fecm.mechanics.element_groups import SHAPES, shape_of
 from fecm.mechanics.elements.quadrature import Quadrature
 from fecm.mechanics.elements.shape import CUBIC, QUADRILATERAL, TRIANGLE, ElementShape
@@ -333,6 +333,6 @@ def test_an_element_without_one_of_its_corners_is_named(nodes: list[int], messag
 def test_shape_functions_of_a_family_come_for_the_nodes_it_has() -> None:
     rule = Quadrature(np.array([0.1, 0.3]), np.array([-0.2, 0.5]), np.ones(2))
     (family,) = sorted_elements([1, 2, 3, 4, 5, 0, 0, 0, 0, 10])
-    values, local = element_matrices.local_shape_functions(family, rule)
+    values, local = interpolation.local_shape_functions(family, rule)
     assert (values.shape, local.shape) == ((2, 6), (2, 2, 6))
     np.testing.assert_allclose(values.sum(axis=1), 1.0, atol=1e-14)

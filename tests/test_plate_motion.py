@@ -8,7 +8,7 @@ from scipy import sparse
 from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
 
-from fecm.mechanics import element_groups, element_matrices
+from fecm.mechanics import element_groups, element_matrices, interpolation
 from fecm.mechanics.elements.quadrature import gauss
 from fecm.mechanics.plate import PlateModel, assemble
 from fecm.mechanics.time_step import critical_time_step
@@ -248,7 +248,7 @@ def test_bending_converges_on_ever_finer_distorted_meshes(
     for n in (4, 8, 16):
         coordinates, elements = mesh = distorted_square(n, n, kind)
         (family,) = element_groups.element_blocks(elements, coordinates)
-        at = element_matrices.interpolate(family, gauss(3))
+        at = interpolation.interpolate(family, gauss(3))
         loads = summed(family.nodes, at.jxw @ at.N, len(coordinates))
         errors.append(abs(deflections(mesh, loads, 0.1, orders)[0] / expected - 1.0))
     assert errors[2] < errors[1] / 2.0 < errors[0] / 4.0

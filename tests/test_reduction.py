@@ -16,6 +16,7 @@ from fecm.mechanics.stiffness_product import ElementProduct, Workers, stiffness_
 from fecm.mechanics.symmetry import SymmetryReduction, symmetry_reduction
 from fecm.problem.build import build_plate
 from fecm.results.result import Result
+from tests.builders import Floats
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, small
 
 # The middle node of the small plate, hit in w.
@@ -39,7 +40,16 @@ def found(text: str, hit: tuple[int, int] = MIDDLE) -> SymmetryReduction:
     """Reduction of a small deck."""
     deck = fecm.read_deck(text)
     assert isinstance(deck, Deck)
-    return symmetry_reduction(build_plate(deck, fecm.problem.generate.generate(deck)), hit)
+    return symmetry_reduction(
+        build_plate(deck, fecm.problem.generate.generate(deck)), unit(hit, deck.control.numnp)
+    )
+
+
+def unit(hit: tuple[int, int], count: int = 25) -> Floats:
+    """Unit force on one dof of a node of the small plate."""
+    contact = np.zeros((count, 5))
+    contact[hit] = 1.0
+    return contact
 
 
 def worst(a: Result, b: Result) -> float:
@@ -107,7 +117,7 @@ def test_a_load_on_one_side_needs_the_whole_plate() -> None:
     aside = Forces((NodeValues(8, 0, (0.0, 0.0, 1.0, 0.0, 0.0)),))
     loaded = replace(deck, segments=(*segments[:where], aside, *segments[where:]), text="")
     plate = build_plate(loaded, fecm.problem.generate.generate(loaded))
-    assert symmetry_reduction(plate, MIDDLE).weights.tolist() == [1, 1, 1, 1]
+    assert symmetry_reduction(plate, unit(MIDDLE)).weights.tolist() == [1, 1, 1, 1]
     assert worst(*both(loaded)) < 1e-11
 
 

@@ -21,7 +21,7 @@ import fecm
 from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, LinearPermanent, stacked
-from fecm.mechanics.plate_motion import PointForce
+from fecm.mechanics.plate_motion import AppliedForce
 from fecm.problem.build import build_law, build_model, build_projectile
 from fecm.sweeps import schedule
 from fecm.sweeps.api import carry_out, problem_of
@@ -67,14 +67,16 @@ def test_a_plates_displacement_is_the_sum_of_its_impulse_responses() -> None:
     # An unsymmetric laminate, clamped on one corner only, hit beside its middle.
     data = DATA_CARDS.replace("    2  90. ", "    2  30. ").replace("   13    3", "    8    3")
     corner = MESH[: MESH.index("BOUN")] + "BOUN\n    1    0    1    1    1    1    1\n\n"
-    motion = build_model(load_deck(small(mesh=corner, data=data)).problems[0]).motion
-    equation, dt, steps = motion.equation(7, 2), 2e-7, 300
+    problem = load_deck(small(mesh=corner, data=data)).problems[0]
+    motion, contact = build_model(problem).motion, problem.contact
+    assert contact is not None
+    load, dt, steps = motion.load(contact), 2e-7, 300
     force = np.random.default_rng(5).standard_normal(steps)
     state, direct = motion.start(), np.empty(steps)
     for step in range(steps):
-        motion.advance(state, dt, 0.0, PointForce(equation, float(force[step])))
-        direct[step] = state.displacement[equation]
-    response = plate_response(motion, equation, dt, steps)
+        motion.advance(state, dt, 0.0, AppliedForce(load, float(force[step])))
+        direct[step] = load.dot(state.displacement)
+    response = plate_response(motion, load, dt, steps)
     sums = np.convolve(response, force)[:steps]
     np.testing.assert_allclose(sums, direct, atol=1e-12 * np.abs(direct).max())
     blocks = Convolution(response, np.zeros(1, dtype=np.intp))

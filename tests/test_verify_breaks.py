@@ -321,7 +321,7 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
          "report-impact": ("worst",)},
     ),
     "action without equal reaction": (
-        changed(ImpactSystem, "point_force", lambda p: p._replace(force=1.01 * p.force)),
+        changed(ImpactSystem, "applied", lambda p: p._replace(force=1.01 * p.force)),
         {"report-impact": ("worst",)},
     ),
     "work of the new force alone": (

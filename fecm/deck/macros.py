@@ -39,6 +39,8 @@ class Word:
         Words that must come before; ``"LMAS|CMAS"`` is one or the other.
     inside : bool
         Whether it belongs inside a loop.
+    second : bool
+        Whether it takes a second number, an integer of at least 0.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Word:
     value: str = ""
     needs: tuple[str, ...] = ()
     inside: bool = False
+    second: bool = False
 
 
 WORDS = {
@@ -81,6 +84,12 @@ WORDS = {
         Word("DISP", "Stores displacements at every N-th pass of the loop.", "every"),
         Word(
             "STRE", "Stores and prints strains and stress resultants at every N-th pass.", "every"
+        ),
+        Word(
+            "PLYS",
+            "Stores ply stresses at every N-th pass, in the M elements nearest to the load or all.",
+            "every",
+            second=True,
         ),
         Word("CHEC", "Reports mesh and storage."),
     )
@@ -212,7 +221,7 @@ def _check_unused(word: Word, macro: Macro, findings: Findings) -> None:
             macro.place("value"),
             "remove it",
         )
-    elif macro.second:
+    elif macro.second and not word.second:
         findings.add(
             "E514",
             f"{word.name} takes no second number; the card has {macro.second:g}.",
@@ -223,6 +232,9 @@ def _check_unused(word: Word, macro: Macro, findings: Findings) -> None:
 
 def _check_value(word: Word, macro: Macro, findings: Findings) -> None:
     value, kind = macro.value, word.value
+    if word.second and not (macro.second >= 0 and macro.second.is_integer()):
+        must = f"takes a second whole number from 0, not {macro.second:g}"
+        findings.add("E505", f"{word.name} {must}.", macro.place("second value"))
     is_count = kind in ("count", "every")
     if is_count and not (0 <= value <= MOST_MACROS and value.is_integer()):
         must = f"whole number from 0 to {MOST_MACROS:g}"
@@ -325,7 +337,7 @@ def _entry(body: Body, count: int) -> tuple[int, Counter[str], Counter[int]]:
             steps.update({n: count * more for n, more in taken.items()})
             continue
         macros += count
-        if item.word in ("DISP", "STRE"):
+        if item.word in ("DISP", "STRE", "PLYS"):
             passes[item.word] += count // every(item)
         elif item.word == "REAC":
             passes["REAC"] += count

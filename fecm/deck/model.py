@@ -7,11 +7,11 @@ and elements between them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, TypeVar
+from typing import ClassVar, Self, TypeVar
 
-from fecm.deck.card import Fields, layout
+from fecm.deck.card import Fields, Source, Value, layout, write_card
 from fecm.deck.records import (
     AXES,
     Control,
@@ -263,19 +263,79 @@ class Projectile(Segment):
 
 
 @dataclass(frozen=True)
-class ShearCorrection(Segment):
-    """SHEA: (F10.0); factor on the transverse shear stiffness (not in the report's program).
+class Patch(Segment):
+    """PATC: (A4,6X,4F10.0); the contact force acts on a circle (not in the report's program).
+
+    Attributes
+    ----------
+    shape : str
+        ``"DISC"``, a uniform pressure, or ``"HERT"``, Hertz's.
+    radius : float or None
+        Length; None takes :data:`~fecm.mechanics.patch.RADIUS_PER_THICKNESS` times the thickness.
+    x, y : float or None
+        Centre, length; None takes the node of ROD.
+    load : float
+        Static force on the patch, scaled by PROP.
+    """
+
+    shape: str = "DISC"
+    radius: float | None = None
+    x: float | None = None
+    y: float | None = None
+    load: float = 0.0
+    keyword: ClassVar[str] = "PATC"
+
+    optional: ClassVar[int] = 4
+    fields: ClassVar[Fields] = layout(
+        "A4 shape", "X6", "F10 radius c|c", "F10 centre x0|x0", "F10 centre y0|y0",
+        "F10 static load|load",
+    )  # fmt: skip
+
+    @classmethod
+    def from_row(cls, values: Sequence[Value], source: Source) -> Self:
+        """Build the segment from the card's values; a blank radius or centre is None."""
+        texts = [text.strip() for _, text in source.card.cut(source.fields)]
+        blank = [not text for text in texts] + [True] * len(values)
+        shape = str(values[0]).upper() or "DISC"
+        radius, x, y = (None if blank[n] else float(values[n]) for n in (1, 2, 3))
+        return cls(shape, radius, x, y, float(values[4]), source=source)
+
+    def row(self) -> list[Value]:
+        """Values in the card's order; None is a blank."""
+        return ["" if value is None else value for value in super().row()]
+
+
+@dataclass(frozen=True)
+class Shear(Segment):
+    """SHEA: (F10.0); treatment of transverse shear (not in the report's program).
 
     Attributes
     ----------
     factor : float
-        1 in the report's program; its page on cut-off frequencies recommends pi^2/12.
+        Shear correction factor: 1 in the report's program; its page on cut-off frequencies
+        recommends pi^2/12.
+    assumed : bool
+        Assumed strains, ``MITC`` on the keyword card; otherwise quadrature of the order L2.
+    equilibrium : bool
+        Stiffness from the equilibrium of the plies, ``EQUI`` on the keyword card; otherwise their
+        sum, equation 2-19.
     """
 
-    factor: float
+    factor: float = 1.0
+    assumed: bool = False
+    equilibrium: bool = False
     keyword: ClassVar[str] = "SHEA"
 
     fields: ClassVar[Fields] = layout("F10 shear correction factor|factor")
+    WORDS: ClassVar[tuple[str, ...]] = ("MITC", "EQUI")
+
+    def cards(self, control: Control) -> Iterator[str]:
+        """Text of the segment's cards; with a word the factor's card may be missing."""
+        given = (self.assumed, self.equilibrium)
+        words = [word for word, used in zip(self.WORDS, given, strict=True) if used]
+        yield " ".join([self.keyword, *words])
+        if not words or self.factor != 1.0:
+            yield write_card(self.fields, [self.factor])
 
 
 @dataclass(frozen=True)

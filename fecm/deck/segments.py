@@ -19,10 +19,11 @@ from fecm.deck.model import (
     Material,
     NumberedSegment,
     Page,
+    Patch,
     PrintOption,
     Projectile,
     Segment,
-    ShearCorrection,
+    Shear,
     Units,
 )
 from fecm.deck.records import (
@@ -220,6 +221,39 @@ class SegmentReader:
             return None
         return kind.from_row(*row)
 
+    def _patch(self, head: Card) -> Segment | None:
+        # The card begins with a word, but not with that of another segment.
+        card = self._stream.take()
+        if card is not None and card.keyword not in (*READERS, "END"):
+            row = self._stream.row(card, Patch.fields)
+            return None if row is None else Patch.from_row(*row)
+        if card is not None:
+            self._stream.give_back()
+        self._stream.findings.add(
+            "E008",
+            "A card of PATC is missing.",
+            (card or head).place,
+            "a blank card takes a disc of 0.327 times the thickness at the node of ROD",
+        )
+        return None
+
+    def _shear(self, head: Card) -> Segment | None:
+        words = head.data.replace(",", " ").upper().split()[1:]
+        for word in words:
+            if word not in Shear.WORDS:
+                self._stream.findings.add(
+                    "E446", f"`{word}` after SHEA is unknown.", head.place,
+                    "SHEA takes MITC (assumed strains) and EQUI (stiffness from equilibrium)",
+                )  # fmt: skip
+        assumed, equilibrium = (word in words for word in Shear.WORDS)
+        following = self._stream.take()
+        if following is not None:
+            self._stream.give_back()
+        if words and (following is None or following.is_keyword or following.is_blank):
+            return Shear(1.0, assumed, equilibrium, source=Source(head, ()))
+        found = self._single(head, Shear)
+        return found and replace(found, assumed=assumed, equilibrium=equilibrium)
+
     def _indentation(self, head: Card) -> Segment | None:
         word = " ".join(head.data.replace(",", " ").split()[1:]).upper()
         if word and word != Indentation.ACR:
@@ -304,7 +338,8 @@ READERS: dict[str, Callable[[SegmentReader, Card], Segment | None]] = {
     "EXPE": SegmentReader._indentation,
     "FORC": SegmentReader._numbered,
     "PROJ": SegmentReader._projectile,
-    "SHEA": lambda reader, head: reader._single(head, ShearCorrection),
+    "SHEA": SegmentReader._shear,
+    "PATC": SegmentReader._patch,
     "GAGE": SegmentReader._numbered,
     "UNIT": SegmentReader._units,
     "PRIN": SegmentReader._print_option,

@@ -150,3 +150,11 @@ def element_blocks(elements: Ints, coordinates: Floats) -> list[ElementBlock]:
             ElementBlock(rows, members, coordinates[members], present[: shape.nodes], shape)
         )
     return found
+
+
+def element_centres(elements: Ints, coordinates: Floats) -> Floats:
+    """Mean of the corners of every element, (numel, 2)."""
+    centres = np.empty((len(elements), 2))
+    for block in element_blocks(elements, coordinates):
+        centres[block.rows] = block.coordinates[:, : block.shape.corners].mean(axis=1)
+    return centres

@@ -8,107 +8,20 @@ kappa_y = -theta_y,y.  Arrays over elements have the element first, then the qua
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
-
 import numpy as np
 
 from fecm._typing import Floats
+from fecm.mechanics import assumed_shear
 from fecm.mechanics.element_groups import ElementBlock
 from fecm.mechanics.elements.quadrature import Quadrature
-from fecm.mechanics.elements.shape import ElementShape
+from fecm.mechanics.interpolation import (
+    NDOF,
+    Interpolation,
+    interpolate,
+    jacobian_determinants,
+    local_shape_functions,
+)
 from fecm.mechanics.laminate import Laminate
-
-NDOF = 5
-
-
-@dataclass(frozen=True)
-class Interpolation:
-    """Shape functions of an element block at the points of a rule.
-
-    Attributes
-    ----------
-    N : ndarray (npt, nn)
-        Values.
-    dN : ndarray (ne, npt, 2, nn)
-        Derivatives with respect to x and y, 1/length.
-    jxw : ndarray (ne, npt)
-        Jacobian determinant times weight, length squared.
-    """
-
-    N: Floats
-    dN: Floats
-    jxw: Floats
-
-
-def local_shape_functions(family: ElementBlock, rule: Quadrature) -> tuple[Floats, Floats]:
-    """Shape functions of the nodes present: values (npt, nn), d/dxi and d/deta (npt, 2, nn)."""
-    return _shape_functions_at(family.shape, rule, tuple(family.present.tolist()))
-
-
-@lru_cache(maxsize=64)
-def _shape_functions_at(
-    shape: ElementShape, rule: Quadrature, present: tuple[bool, ...]
-) -> tuple[Floats, Floats]:
-    given = np.array(present)
-    values, local = shape.shape_functions(rule.xi, rule.eta, given)
-    values, local = values[:, given], local[:, :, given]
-    values.flags.writeable = local.flags.writeable = False  # shared by all callers
-    return values, local
-
-
-def inverse_jacobian(
-    family: ElementBlock, local: Floats, *, transposed_jacobian: bool = False
-) -> tuple[Floats, Floats]:
-    """Inverse and determinant of the Jacobian.
-
-    Parameters
-    ----------
-    family : ElementBlock
-        The elements.
-    local : ndarray (npt, 2, nn)
-        Derivatives of the shape functions with respect to xi and eta.
-    transposed_jacobian : bool
-        Transpose the inverse (the slip ``jacobian``).
-
-    Returns
-    -------
-    inverse : ndarray (ne, npt, 2, 2)
-        dxi_a/dx_i in row i and column a, 1/length.
-    determinant : ndarray (ne, npt)
-        Length squared.
-    """
-    jacobian = np.einsum("pan,eni->epai", local, family.coordinates)  # dx_i/dxi_a
-    inverse = np.linalg.inv(jacobian)
-    if transposed_jacobian:
-        inverse = inverse.swapaxes(-1, -2)
-    return inverse, np.linalg.det(jacobian)
-
-
-def jacobian_determinants(family: ElementBlock, rule: Quadrature) -> Floats:
-    """Determinant of the Jacobian at the points of a rule, (ne, npt), length squared."""
-    _, local = local_shape_functions(family, rule)
-    return np.asarray(np.linalg.det(np.einsum("pan,eni->epai", local, family.coordinates)))
-
-
-def interpolate(
-    family: ElementBlock, rule: Quadrature, *, transposed_jacobian: bool = False
-) -> Interpolation:
-    """Evaluate shape functions and their derivatives in x and y.
-
-    Parameters
-    ----------
-    family : ElementBlock
-        The elements.
-    rule : Quadrature
-        The points.
-    transposed_jacobian : bool
-        Transpose the inverse Jacobian (the slip ``jacobian``).
-    """
-    values, local = local_shape_functions(family, rule)
-    inverse, determinant = inverse_jacobian(family, local, transposed_jacobian=transposed_jacobian)
-    derivatives = np.einsum("epia,pan->epin", inverse, local)
-    return Interpolation(values, derivatives, determinant * rule.weights)
 
 
 def _membrane_and_bending(at: Interpolation) -> Floats:
@@ -151,6 +64,7 @@ def stiffness(
     shear: Quadrature,
     *,
     transposed_jacobian: bool = False,
+    assumes_shear: bool = False,
 ) -> Floats:
     """Element stiffness matrices, K_p of equation 4-14.
 
@@ -163,7 +77,9 @@ def stiffness(
     bending, shear : Quadrature
         Rules for membrane and bending energy, and for transverse shear energy.
     transposed_jacobian : bool
-        See :func:`interpolate`.
+        See :func:`~fecm.mechanics.interpolation.interpolate`.
+    assumes_shear : bool
+        Take the transverse shear strains of :mod:`~fecm.mechanics.assumed_shear`, with its rule.
 
     Returns
     -------
@@ -172,6 +88,10 @@ def stiffness(
     ABD = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
     at = interpolate(family, bending, transposed_jacobian=transposed_jacobian)
     K = _integrate(_membrane_and_bending(at), ABD, at.jxw)
+    if assumes_shear:
+        rule = assumed_shear.quadrature(family)
+        jxw = jacobian_determinants(family, rule) * rule.weights
+        return K + _integrate(assumed_shear.strain_matrix(family, rule), laminate.shear, jxw)
     at = interpolate(family, shear, transposed_jacobian=transposed_jacobian)
     return K + _integrate(_transverse_shear(at), laminate.shear, at.jxw)
 

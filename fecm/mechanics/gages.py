@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from fecm._errors import FecmError
 from fecm._typing import Floats
-from fecm.mechanics import element_groups, element_matrices
+from fecm.mechanics import element_groups, interpolation
 from fecm.mechanics.element_groups import ElementBlock
-from fecm.mechanics.element_matrices import NDOF
 from fecm.mechanics.elements.quadrature import Quadrature
+from fecm.mechanics.interpolation import NDOF
 from fecm.mechanics.mesh import Mesh
 
 Indices = NDArray[np.intp]
@@ -79,7 +79,7 @@ def gages(
     mesh : Mesh
     records : sequence of GagePlace
     transposed_jacobian : bool
-        See :func:`fecm.mechanics.element_matrices.interpolate`.
+        See :func:`fecm.mechanics.interpolation.interpolate`.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def _local(element: ElementBlock, point: Floats) -> tuple[float, float] | None:
     xi = np.zeros(2)
     for _ in range(PASSES):
         rule = _at(xi)
-        values, local = element_matrices.local_shape_functions(element, rule)
+        values, local = interpolation.local_shape_functions(element, rule)
         miss = point - values[0] @ element.coordinates[0]
         jacobian = np.einsum("an,ni->ia", local[0], element.coordinates[0])
         step = np.linalg.solve(jacobian, miss)
@@ -132,7 +132,7 @@ def _local(element: ElementBlock, point: Floats) -> tuple[float, float] | None:
     if np.abs(xi).max() > 1.0 + MARGIN:
         return None
     size = np.ptp(element.coordinates[0], axis=0).max()
-    values, _ = element_matrices.local_shape_functions(element, _at(xi))
+    values, _ = interpolation.local_shape_functions(element, _at(xi))
     miss = np.abs(point - values[0] @ element.coordinates[0]).max()
     return (float(xi[0]), float(xi[1])) if miss <= MARGIN * size else None
 
@@ -152,7 +152,7 @@ def _functional(
     dof_indices: list[Indices] = []
     weights: list[Floats] = []
     for element, xi, eta in found:
-        at = element_matrices.interpolate(
+        at = interpolation.interpolate(
             element, _at(np.array([xi, eta])), transposed_jacobian=transposed_jacobian
         )
         along = c * at.dN[0, 0, 0] + s * at.dN[0, 0, 1]  # derivative in the gage's direction

@@ -17,7 +17,7 @@ import numpy as np
 
 from fecm.mechanics.contact_law import ContactPoint, Law, LoadingHistory, Number, Truth
 from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.plate_motion import DivergenceError, PlateMotion, PlateState, PointForce
+from fecm.mechanics.plate_motion import AppliedForce, DivergenceError, Load, PlateMotion, PlateState
 from fecm.mechanics.projectile import Projectile, rigid_approach
 from fecm.mechanics.rod_integrators import RodIntegrator, TipStep, WilsonStep
 
@@ -75,8 +75,8 @@ class ImpactConditions:
 
     Attributes
     ----------
-    equation : int
-        Equation of the impact dof, from 0.
+    load : Load
+        The impact dof, or the nodal weights of a patch.
     velocity : float
         Approach velocity, length/time.
     plate_moves : bool
@@ -90,7 +90,7 @@ class ImpactConditions:
         Fraction of the contact force that acts on the plate; 1 without the slip ``rod-force``.
     """
 
-    equation: int
+    load: Load
     velocity: float
     plate_moves: bool = True
     strains_start_moving: bool = False
@@ -153,10 +153,10 @@ class ImpactSystem:
         state = self.motion.start() if plate is None else plate
         return ImpactState(rod, self.law.start(), ContactPoint(0.0, 0.0), plate=state)
 
-    def point_force(self, state: ImpactState, force: float | None = None) -> PointForce:
+    def applied(self, state: ImpactState, force: float | None = None) -> AppliedForce:
         """Force on the plate: the contact force unless another is passed."""
-        applied = state.contact.force if force is None else force
-        return PointForce(self.contact.equation, self.contact.share * applied)
+        value = state.contact.force if force is None else force
+        return AppliedForce(self.contact.load, self.contact.share * value)
 
     def advance(
         self, state: ImpactState, dt: float, factor: float = 1.0, force: float | None = None
@@ -179,7 +179,7 @@ class ImpactSystem:
         DivergenceError
             If indentation or force is no longer finite.
         """
-        self.motion.advance(state.plate, dt, factor, self.point_force(state, force))
+        self.motion.advance(state.plate, dt, factor, self.applied(state, force))
         step = state.plate.step
         try:
             self.move_projectile(state, dt)
@@ -198,8 +198,7 @@ class ImpactSystem:
 
     def move_projectile(self, state: ImpactState, dt: float) -> None:
         """Advance projectile and contact to the plate's time."""
-        moves = self.contact.plate_moves
-        w = state.plate.displacement_at(self.contact.equation) if moves else 0.0
+        w = self.contact.load.dot(state.plate.padded) if self.contact.plate_moves else 0.0
         couple_step(self._rod_step(dt), self.law, state, w)
 
 

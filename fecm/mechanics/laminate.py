@@ -42,6 +42,34 @@ class PlyConstants(Protocol):
 
 
 @dataclass(frozen=True)
+class Plies:
+    """Plies of a laminate, from z = -h/2 on.
+
+    Attributes
+    ----------
+    angles : ndarray (n,)
+        Fibre angles in degrees.
+    faces : ndarray (n + 1,)
+        z of the faces, length.
+    stiffness : ndarray (n, 3, 3)
+        Plane-stress stiffness in the laminate's axes, force/area.
+    shear : ndarray (n, 2, 2)
+        Transverse shear stiffness in the laminate's axes, order xz, yz, force/area.
+    """
+
+    angles: Floats
+    faces: Floats
+    stiffness: Floats
+    shear: Floats
+
+    @property
+    def z(self) -> Floats:
+        """Lower, middle and upper z of each ply, (n, 3)."""
+        lower, upper = self.faces[:-1], self.faces[1:]
+        return np.stack([lower, (lower + upper) / 2.0, upper], axis=1)
+
+
+@dataclass(frozen=True)
 class Laminate:
     """Stiffness and inertia of a laminate, per area.
 
@@ -59,6 +87,7 @@ class Laminate:
         I of equation 2-24: density times thickness cubed over 12.
     thickness : float
         Total thickness.
+    plies : Plies
     """
 
     A: Floats
@@ -68,6 +97,7 @@ class Laminate:
     mass: float
     rotary_inertia: float
     thickness: float
+    plies: Plies
 
     @property
     def is_coupled(self) -> bool:
@@ -188,4 +218,5 @@ def laminate(
         mass=ply.density * h,
         rotary_inertia=ply.density * h**3 / 12.0,
         thickness=h,
+        plies=Plies(np.array(angles, dtype=float), faces, bars, shears),
     )

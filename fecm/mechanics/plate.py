@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fecm._errors import FecmError
 from fecm._memory import require
 from fecm._typing import Floats
-from fecm.mechanics import element_groups, element_matrices
+from fecm.mechanics import element_groups, element_matrices, interpolation
 from fecm.mechanics.element_groups import congruence
 from fecm.mechanics.elements.quadrature import Quadrature
 from fecm.mechanics.laminate import Laminate
@@ -51,12 +51,15 @@ class IntegrationRules:
         Points of the stored strains.
     transposed_jacobian : bool
         Transpose the inverse Jacobian (the slip ``jacobian``).
+    assumes_shear : bool
+        Take the transverse shear strains of :mod:`~fecm.mechanics.assumed_shear`.
     """
 
     bending: Quadrature
     shear: Quadrature
     strains: Quadrature
     transposed_jacobian: bool = False
+    assumes_shear: bool = False
 
 
 @dataclass(frozen=True)
@@ -110,6 +113,7 @@ class PlateModel:
             rules.bending,
             rules.shear,
             transposed_jacobian=rules.transposed_jacobian,
+            assumes_shear=rules.assumes_shear,
         )
 
     def _dofs(self, family: element_groups.ElementBlock) -> Indices:
@@ -134,8 +138,7 @@ class PlateModel:
     def entries(self) -> int:
         """Number of entries of all element matrices."""
         return sum(
-            f.nodes.shape[0] * (element_matrices.NDOF * f.nodes.shape[1]) ** 2
-            for f in self.families
+            f.nodes.shape[0] * (interpolation.NDOF * f.nodes.shape[1]) ** 2 for f in self.families
         )
 
     def _assembled(
@@ -192,7 +195,7 @@ class PlateModel:
         """Area of the plate, length squared."""
         rule = self.rules.bending
         return sum(
-            float((element_matrices.jacobian_determinants(family, rule) @ rule.weights).sum())
+            float((interpolation.jacobian_determinants(family, rule) @ rule.weights).sum())
             for family in self.families
         )
 
@@ -249,9 +252,12 @@ class PlateModel:
 
     def strain_field(self, points: Quadrature) -> StrainField:
         """Strains at points of every element."""
-        mesh, transposed_jacobian = self.mesh, self.rules.transposed_jacobian
         return StrainField(
-            mesh.elements, mesh.coordinates, points, transposed_jacobian=transposed_jacobian
+            self.mesh.elements,
+            self.mesh.coordinates,
+            points,
+            transposed_jacobian=self.rules.transposed_jacobian,
+            assumes_shear=self.rules.assumes_shear,
         )
 
 

@@ -22,6 +22,11 @@ from fecm.mechanics.symmetry import SymmetryReduction, unreduced
 
 Indices = NDArray[np.intp]
 
+# Length of a product for which BLAS uses one thread, whatever the number of threads.
+SERIAL = 8192
+# Equations are taken as a slice if it is at most so many times longer: that is faster.
+NEAR = 8
+
 
 class DivergenceError(FecmError, ArithmeticError):
     """The solution diverged.
@@ -93,10 +98,6 @@ class PlateState:
         """Displacement of the independent dofs, (n,); a view."""
         return self.padded[: len(self.increment)]
 
-    def displacement_at(self, equation: int) -> float:
-        """Displacement of one equation, from 0."""
-        return self.padded.item(equation)
-
     @property
     def velocity(self) -> Floats:
         """Velocity in the middle of the last step, (n,)."""
@@ -122,10 +123,71 @@ class Sums(NamedTuple):
     load_force: float  # P s
 
 
-class PointForce(NamedTuple):
-    """A force on one equation, in addition to the nodal forces."""
+@dataclass(frozen=True, slots=True)
+class PointLoad:
+    """A unit force on one equation.
+
+    Attributes
+    ----------
+    equation : int
+    inverse_mass : float
+    nodal_load : float
+        Nodal load of the equation at a load factor of 1.
+    """
 
     equation: int
+    inverse_mass: float
+    nodal_load: float
+
+    def dot(self, vector: Floats) -> float:
+        """Product with a vector over equations, which may be padded."""
+        return vector.item(self.equation)
+
+    def subtract(self, force: float, scale: Floats, internal: Floats) -> None:
+        """Subtract a force from a scaled internal force."""
+        internal[self.equation] -= force * scale[self.equation]
+
+
+@dataclass(frozen=True, slots=True)
+class DistributedLoad:
+    """A unit force distributed over equations.
+
+    Attributes
+    ----------
+    equations : ndarray (m,) or slice
+    weights : ndarray (m,)
+        Shares g of the equations.
+    inverse_mass : float
+        g M^-1 g.
+    nodal_load : float
+        g M^-1 P over g M^-1 g, with the nodal loads P at a load factor of 1.
+    """
+
+    equations: Indices | slice
+    weights: Floats
+    inverse_mass: float
+    nodal_load: float
+
+    def dot(self, vector: Floats) -> float:
+        """Product with a vector over equations, which may be padded."""
+        if len(self.weights) > SERIAL:
+            return float((self.weights * vector[self.equations]).sum())
+        return float(self.weights.dot(vector[self.equations]))
+
+    def subtract(self, force: float, scale: Floats, internal: Floats) -> None:
+        """Subtract a force from a scaled internal force."""
+        part = scale[self.equations] * self.weights
+        part *= force
+        internal[self.equations] -= part
+
+
+Load = PointLoad | DistributedLoad
+
+
+class AppliedForce(NamedTuple):
+    """A force in addition to the nodal forces, and its distribution."""
+
+    load: Load
     force: float
 
 
@@ -175,6 +237,7 @@ class PlateMotion:
     ) -> None:
         kept = unreduced(plate) if reduced is None or solver == CSR else reduced
         self.plate = plate
+        self._reduction = kept
         self.product = stiffness_operator(plate, solver, kept, workers)
         self.mass = kept.gather(kept.sign * plate.field(plate.mass, 0.0))
         self._dof_indices = kept.dof_indices
@@ -197,18 +260,28 @@ class PlateMotion:
         count = len(self.mass)
         return PlateState(np.zeros(self.product.size), np.zeros(count), np.zeros(count))
 
-    def equation(self, node: int, dof: int) -> int:
-        """Equation of a dof of a node, all from 0.
+    def load(self, distribution: Floats) -> Load:
+        """Prepare a unit force with shares of all dofs, (numnp, 5).
 
         Raises
         ------
         ValueError
-            If the dof is restrained or follows another one.
+            If it acts on restrained dofs only.
         """
-        equation = int(self._dof_indices[node, dof])
-        if equation >= len(self.mass):
-            raise ValueError(f"dof {dof + 1} of node {node + 1} has no equation")
-        return equation
+        shares = self._reduction.gather(distribution)
+        (equations,) = np.nonzero(shares)
+        if not len(equations):
+            raise ValueError("the force acts on restrained dofs only")
+        first, stop = int(equations[0]), int(equations[-1]) + 1
+        near = stop - first <= NEAR * len(equations)
+        chosen = slice(first, stop) if near else equations
+        weights, inverse = shares[chosen], self._inverse_mass[chosen]
+        loads = np.zeros_like(weights) if self._loads is None else self._loads[chosen]
+        if len(equations) == 1:
+            return PointLoad(first, float(inverse[0]), float(loads[0]))
+        mobility = weights * inverse
+        square = float((mobility * weights).sum())
+        return DistributedLoad(chosen, weights, square, float((mobility * loads).sum()) / square)
 
     def field(self, state: PlateState, factor: float) -> Floats:
         """All dofs of all nodes, (numnp, 5).
@@ -283,7 +356,7 @@ class PlateMotion:
         state: PlateState,
         dt: float,
         factor: float,
-        point: PointForce | None = None,
+        applied: AppliedForce | None = None,
         *,
         velocity_dt: float | None = None,
     ) -> None:
@@ -297,7 +370,7 @@ class PlateMotion:
             Time step.
         factor : float
             Load factor of the nodal forces.
-        point : PointForce, optional
+        applied : AppliedForce, optional
         velocity_dt : float, optional
             Time between the middles of the last step and of this one; `dt` by default.
         """
@@ -308,9 +381,8 @@ class PlateMotion:
         if state.dt != dt:
             state.increment *= dt / state.dt if state.dt else 1.0
             state.dt = dt
-        if point is not None:
-            equation, force = point
-            state.scaled_internal_force[equation] -= force * self._scale[equation]
+        if applied is not None:
+            applied.load.subtract(applied.force, self._scale, state.scaled_internal_force)
         for (u, d, internal), (scale, _, _, loads) in zip(state.views, self._views, strict=True):
             d -= internal
             if loads is not None:
@@ -322,7 +394,7 @@ class PlateMotion:
         state.time += dt
 
     def kinetic_energy(
-        self, state: PlateState, factor: float, point: PointForce | None = None
+        self, state: PlateState, factor: float, applied: AppliedForce | None = None
     ) -> float:
         """Kinetic energy at the time of the displacement (force*length).
 
@@ -334,24 +406,24 @@ class PlateMotion:
         state : PlateState
         factor : float
             Load factor of the nodal forces.
-        point : PointForce, optional
+        applied : AppliedForce, optional
         """
         dt2 = state.dt**2
         if not dt2:
             return 0.0
-        inertia, power, _, internal, load, load_force = state.sums
+        inertia, power, _, internal, nodal, nodal_force = state.sums
         to_step = dt2 / state.dt2
-        work = factor * load - power  # d (P - K u)
-        force = factor * (factor * self._loads_square * dt2 - 2.0 * load_force * to_step)
+        work = factor * nodal - power  # d (P - K u)
+        force = factor * (factor * self._loads_square * dt2 - 2.0 * nodal_force * to_step)
         force += internal * to_step  # dt^2 (P - K u) M^-1 (P - K u)
-        if point is not None:
-            equation, F = point
-            inverse = float(self._inverse_mass[equation]) * dt2
-            p = float(state.scaled_internal_force[equation]) * to_step
-            work += F * float(state.increment[equation])
+        if applied is not None:
+            load, F = applied
+            inverse = load.inverse_mass * dt2
+            p = load.dot(state.scaled_internal_force) * to_step
+            work += F * load.dot(state.increment)
             force += F * (F * inverse - 2.0 * p)
             if self._loads is not None:
-                force += 2.0 * factor * F * float(self._loads[equation]) * inverse
+                force += 2.0 * factor * F * load.nodal_load * inverse
         return 0.5 * (inertia / dt2 + work + 0.25 * force)
 
     def central_difference(self, state: PlateState, dt: float, factor: float) -> None:

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
+from fecm.mechanics.assumed_shear import TiedStrains
 from fecm.mechanics.element_groups import ElementBlock, Ints, element_blocks
-from fecm.mechanics.element_matrices import NDOF, inverse_jacobian, local_shape_functions
 from fecm.mechanics.elements.quadrature import Quadrature
+from fecm.mechanics.interpolation import NDOF, inverse_jacobian, local_shape_functions
 from fecm.mechanics.laminate import Laminate
 
 GENERALISED_STRAINS = (
@@ -69,7 +70,9 @@ class StrainField:
     rule : Quadrature
         The points.
     transposed_jacobian : bool
-        See :func:`~fecm.mechanics.element_matrices.interpolate`.
+        See :func:`~fecm.mechanics.interpolation.interpolate`.
+    assumes_shear : bool
+        Take the transverse shear strains of :mod:`~fecm.mechanics.assumed_shear`.
     """
 
     def __init__(
@@ -79,10 +82,13 @@ class StrainField:
         rule: Quadrature,
         *,
         transposed_jacobian: bool = False,
+        assumes_shear: bool = False,
     ) -> None:
         self.shape = (len(elements), len(rule.xi))
         self._families: list[tuple[ElementBlock, Floats]] = []
-        self._blocks: list[tuple[NDArray[np.intp], NDArray[np.intp], Floats, Floats]] = []
+        self._blocks: list[
+            tuple[NDArray[np.intp], NDArray[np.intp], Floats, Floats, TiedStrains | None]
+        ] = []
         for family in element_blocks(elements, coordinates):
             values, local = local_shape_functions(family, rule)
             self._families.append((family, values))
@@ -92,14 +98,12 @@ class StrainField:
             for start in range(0, len(family.rows), STRAIN_BLOCK):
                 cut = slice(start, start + STRAIN_BLOCK)
                 places = family.nodes[cut].T[:, None] * NDOF + np.array([2, 3, 4])[:, None]
-                self._blocks.append(
-                    (
-                        family.rows[cut],
-                        places,
-                        table,
-                        inverse[cut].transpose(2, 3, 1, 0)[:, :, :, None].copy(),
-                    )
-                )
+                metric = inverse[cut].transpose(2, 3, 1, 0)[:, :, :, None].copy()
+                tied = None
+                if assumes_shear:
+                    block = family.take(np.arange(len(family.rows))[cut])
+                    tied = TiedStrains(block, rule)
+                self._blocks.append((family.rows[cut], places, table, metric, tied))
 
     def places(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """Coordinates x and y of the points, (numel, npt)."""
@@ -126,20 +130,21 @@ class StrainField:
         fields = displacement.reshape(math.prod(leading), -1)
         strains = np.empty((len(STRAINS), len(fields), *self.shape))
         npt = self.shape[1]
-        for rows, places, table, inverse in self._blocks:
+        for rows, places, table, inverse, tied in self._blocks:
             q = fields.take(places, axis=1).reshape(len(fields), len(places), -1)
             at = (table @ q).reshape(len(fields), 3, npt, 3, len(rows))
             xi, eta, values = at.swapaxes(0, 1)  # each: field, point, dof, element
             dx = inverse[0, 0] * xi + inverse[0, 1] * eta
             dy = inverse[1, 0] * xi + inverse[1, 1] * eta
+            gamma_xz, gamma_yz = dx[:, :, 0] - values[:, :, 1], dy[:, :, 0] - values[:, :, 2]
+            if tied is not None:
+                e_xi, e_eta = tied.covariant(q)
+                gamma_xz, gamma_yz = (
+                    inverse[:, 0, None, :, 0] * e_xi + inverse[:, 1, None, :, 0] * e_eta
+                )
             # 0.0 - a avoids negative zeros of a plate at rest.
-            parts = (
-                0.0 - dx[:, :, 1],
-                0.0 - dy[:, :, 2],
-                0.0 - dy[:, :, 1] - dx[:, :, 2],
-                dy[:, :, 0] - values[:, :, 2],
-                dx[:, :, 0] - values[:, :, 1],
-            )
+            kappa_xy = 0.0 - dy[:, :, 1] - dx[:, :, 2]
+            parts = (0.0 - dx[:, :, 1], 0.0 - dy[:, :, 2], kappa_xy, gamma_yz, gamma_xz)
             for component, part in enumerate(parts):
                 strains[component][:, rows] = part.swapaxes(1, 2)
         return strains.reshape(len(STRAINS), *leading, *self.shape)

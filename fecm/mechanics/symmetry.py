@@ -78,20 +78,20 @@ def unreduced(plate: PlateModel) -> SymmetryReduction:
     return _numbered(free, np.arange(free.size).reshape(free.shape), free.astype(float), ones)
 
 
-def symmetry_reduction(plate: PlateModel, impact_dof: tuple[int, int] | None) -> SymmetryReduction:
-    """Find the independent dofs under the plate's loads and a force on one dof.
+def symmetry_reduction(plate: PlateModel, contact: Floats | None) -> SymmetryReduction:
+    """Find the independent dofs under the plate's loads and a contact force.
 
     Parameters
     ----------
     plate : PlateModel
         Starts at rest.
-    impact_dof : tuple of int, optional
-        Node and dof that the force acts on, from 0.
+    contact : ndarray (numnp, 5), optional
+        Distribution of the contact force.
     """
-    free = restrain_resting_dofs(plate, impact_dof).mesh.equations > 0
+    free = restrain_resting_dofs(plate, contact).mesh.equations > 0
     dof_indices = np.arange(free.size).reshape(free.shape)
     sign, weights = free.astype(float), np.ones(len(plate.mesh.elements), dtype=int)
-    images = _images(plate, free, impact_dof)
+    images = _images(plate, free, contact)
     if images is not None:
         nodes, elements = images
         own = np.arange(len(elements))
@@ -104,7 +104,25 @@ def symmetry_reduction(plate: PlateModel, impact_dof: tuple[int, int] | None) ->
     return _numbered(sign != 0.0, dof_indices, sign, weights)
 
 
-def restrain_resting_dofs(plate: PlateModel, impact_dof: tuple[int, int] | None) -> PlateModel:
+def half_turn_images(coordinates: Floats) -> Indices | None:
+    """Return the image of each node under the half turn about the centre; None if one has none."""
+    if np.isnan(coordinates).any():
+        return None
+    low, high = coordinates.min(axis=0), coordinates.max(axis=0)
+    pitch = TOLERANCE * float((high - low).max())
+    centred = (coordinates - (low + high) / 2.0) / pitch
+    # An uncommon offset keeps the positions away from the edges of the grid.
+    here, there = (np.floor(c + 1.0 / np.pi).astype(np.int64) for c in (centred, -centred))
+    order, images = np.lexsort(here.T), np.lexsort(there.T)
+    if not np.array_equal(here[order], there[images]):
+        return None
+    partners = np.empty(len(coordinates), dtype=np.intp)
+    partners[images] = order
+    # The images of coincident nodes are ambiguous.
+    return partners if np.array_equal(partners[partners], np.arange(len(partners))) else None
+
+
+def restrain_resting_dofs(plate: PlateModel, contact: Floats | None) -> PlateModel:
     """Restrain the in-plane dofs of a plate if they stay at rest.
 
     Their modes are not excited, and their frequencies do not limit the time step.
@@ -113,12 +131,12 @@ def restrain_resting_dofs(plate: PlateModel, impact_dof: tuple[int, int] | None)
     ----------
     plate : PlateModel
         Starts at rest.
-    impact_dof : tuple of int, optional
-        Node and dof that the force acts on, from 0.
+    contact : ndarray (numnp, 5), optional
+        Distribution of the contact force.
     """
     mesh = plate.mesh
     in_plane, others = mesh.equations[:, :2].any(), mesh.equations[:, 2:].any()
-    if not (in_plane and others) or not _in_plane_rests(plate, impact_dof):
+    if not (in_plane and others) or not _in_plane_rests(plate, contact):
         return plate
     codes = mesh.codes.copy()
     codes[:, :2] = 1
@@ -137,20 +155,20 @@ def _numbered(
     return SymmetryReduction(count, index, sign, weights)
 
 
-def _in_plane_rests(plate: PlateModel, impact_dof: tuple[int, int] | None) -> bool:
-    pulled = plate.mesh.forces[:, :2].any() or (impact_dof is not None and impact_dof[1] < 2)
+def _in_plane_rests(plate: PlateModel, contact: Floats | None) -> bool:
+    pulled = plate.mesh.forces[:, :2].any() or (contact is not None and contact[:, :2].any())
     return not (plate.laminate.is_coupled or pulled)
 
 
 def _images(
-    plate: PlateModel, free: NDArray[np.bool_], impact_dof: tuple[int, int] | None
+    plate: PlateModel, free: NDArray[np.bool_], contact: Floats | None
 ) -> tuple[Indices, Indices] | None:
     """Images of nodes and elements under the half turn, if it maps the plate onto itself."""
     mesh = plate.mesh
-    if impact_dof is not None and impact_dof[1] != 2:
+    nodes = half_turn_images(mesh.coordinates)
+    if nodes is None:
         return None
-    nodes = _partners(mesh.coordinates)
-    if nodes is None or (impact_dof is not None and nodes[impact_dof[0]] != impact_dof[0]):
+    if contact is not None and not np.allclose(contact, TURNED * contact[nodes], 0.0, TOLERANCE):
         return None
     same_supports = (free == free[nodes]).all()
     same_loads = (mesh.forces == TURNED * mesh.forces[nodes]).all()
@@ -168,24 +186,6 @@ def _images(
             return None
         elements[family.rows[images]] = family.rows[order]
     return nodes, elements
-
-
-def _partners(coordinates: Floats) -> Indices | None:
-    """Image of each node under the half turn about the centre."""
-    if np.isnan(coordinates).any():
-        return None
-    low, high = coordinates.min(axis=0), coordinates.max(axis=0)
-    pitch = TOLERANCE * float((high - low).max())
-    centred = (coordinates - (low + high) / 2.0) / pitch
-    # An uncommon offset keeps the positions away from the edges of the grid.
-    here, there = (np.floor(c + 1.0 / np.pi).astype(np.int64) for c in (centred, -centred))
-    order, images = np.lexsort(here.T), np.lexsort(there.T)
-    if not np.array_equal(here[order], there[images]):
-        return None
-    partners = np.empty(len(coordinates), dtype=np.intp)
-    partners[images] = order
-    # The images of coincident nodes are ambiguous.
-    return partners if np.array_equal(partners[partners], np.arange(len(partners))) else None
 
 
 def _opposite(family: ElementBlock) -> Indices | None:

@@ -60,7 +60,7 @@ def rounded_time_step(critical: float) -> float:
     return float(f"{math.floor(limit / unit) * unit:.1e}")
 
 
-def critical_time_step(model: PlateModel, spring: tuple[int, float] | None = None) -> float:
+def critical_time_step(model: PlateModel, spring: tuple[Floats, float] | None = None) -> float:
     """Critical time step of the central differences: 2 over the largest angular frequency.
 
     Computed by Lanczos iteration without assembling the stiffness; the relative error is at most
@@ -69,8 +69,9 @@ def critical_time_step(model: PlateModel, spring: tuple[int, float] | None = Non
     Parameters
     ----------
     model : PlateModel
-    spring : (int, float), optional
-        Equation, from 0, and stiffness (force/length) of a spring to ground.
+    spring : (ndarray (neq,), float), optional
+        Weights of a spring to ground, 1 on one equation or those of a patch, and its stiffness
+        (force/length).
 
     Raises
     ------
@@ -87,8 +88,8 @@ def critical_time_step(model: PlateModel, spring: tuple[int, float] | None = Non
         with np.errstate(all="ignore"):
             y = np.asarray(scale * product(scale * x.ravel()))
             if spring is not None:
-                equation, stiffness = spring
-                y[equation] += stiffness * scale[equation] ** 2 * x.ravel()[equation]
+                weights = scale * spring[0]
+                y += spring[1] * float((weights * x.ravel()).sum()) * weights
             return y
 
     start = np.random.default_rng(0).standard_normal(model.neq)

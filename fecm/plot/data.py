@@ -15,8 +15,8 @@ from fecm._typing import Bools, Floats
 from fecm.deck.model import Deck, Impact
 from fecm.deck.reader import Reader
 from fecm.mechanics.element_groups import ElementBlock, element_blocks
-from fecm.mechanics.element_matrices import local_shape_functions
 from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
+from fecm.mechanics.interpolation import local_shape_functions
 from fecm.plot.kinds import PlotError
 from fecm.problem.slips import LISTING
 from fecm.results.result import Result

@@ -9,9 +9,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fecm.deck.macros import Body, WorkEstimate, estimate_work, hits, moves_only
-from fecm.deck.model import Deck, Indentation, Material, ShearCorrection
+from fecm._typing import Floats
+from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, moves_only
+from fecm.deck.model import Deck, Indentation, Material, Shear
 from fecm.deck.model import Gages as GageCards
 from fecm.deck.model import Impact as ImpactCard
 from fecm.deck.model import Projectile as ProjectileCard
@@ -23,6 +25,7 @@ from fecm.mechanics.contact_law import (
     ListingLaw,
     YangSunPermanent,
 )
+from fecm.mechanics.element_groups import element_centres
 from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.gages import GageArray, gages
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
@@ -30,6 +33,7 @@ from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.plate import IntegrationRules, PlateModel, assemble
 from fecm.mechanics.plate_motion import PlateMotion
+from fecm.mechanics.ply_stresses import PlyStresses, equilibrium_shear_stiffness
 from fecm.mechanics.projectile import (
     LISTING_DENSITY,
     REPORT_DENSITY,
@@ -46,6 +50,7 @@ from fecm.mechanics.symmetry import restrain_resting_dofs, symmetry_reduction
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.problem.generate import generate, rod_diameters
 from fecm.problem.options import RunOptions
+from fecm.problem.patch import ContactPatch, W, contact_patch
 
 # Number of equations above which threads save more than they cost.
 WORTH_SHARING = 100_000
@@ -93,7 +98,7 @@ class Problem:
         """The plate with only the dofs free that the program moves."""
         if not moves_only(self.program):
             return self.plate
-        return restrain_resting_dofs(self.plate, self.impact_dof)
+        return restrain_resting_dofs(self.plate, self.contact)
 
     @cached_property
     def safe_time_step(self) -> float:
@@ -110,18 +115,59 @@ class Problem:
         """Whether the program takes impact steps."""
         return hits(self.program)
 
-    @property
-    def impact_dof(self) -> tuple[int, int] | None:
-        """Impact node and its dof, from 0; None without impact."""
+    @cached_property
+    def patch(self) -> ContactPatch | None:
+        """Contact patch; None without a PATC segment."""
+        return contact_patch(self.deck, self.mesh)
+
+    @cached_property
+    def load_place(self) -> tuple[float, float] | None:
+        """Centre of the patch, or the impact node; None without either."""
+        if self.patch is not None:
+            return self.patch.x, self.patch.y
         if not self.has_impact:
             return None
-        card = self.deck.require(ImpactCard)
-        return card.node - 1, card.dof - 1
+        x, y = self.mesh.coordinates[self.deck.require(ImpactCard).node - 1].tolist()
+        return x, y
+
+    @cached_property
+    def distances(self) -> Floats:
+        """Distance of the centre of every element from the load, (numel,); 0 without a load."""
+        if self.load_place is None:
+            return np.zeros(len(self.mesh.elements))
+        centres = element_centres(self.mesh.elements, self.mesh.coordinates)
+        return np.asarray(np.hypot(*(centres - self.load_place).T))
+
+    @cached_property
+    def by_distance(self) -> NDArray[np.intp]:
+        """Rows of the elements, those nearest to the load first."""
+        return np.argsort(self.distances.round(9), kind="stable")
+
+    @cached_property
+    def contact(self) -> Floats | None:
+        """Distribution of a unit contact force over the dofs, (numnp, 5); None without impact."""
+        if not self.has_impact:
+            return None
+        contact = np.zeros(self.mesh.equations.shape)
+        if self.patch is not None:
+            contact[:, W] = self.patch.weights
+        else:
+            card = self.deck.require(ImpactCard)
+            contact[card.node - 1, card.dof - 1] = 1.0
+        return contact
 
     @cached_property
     def work(self) -> WorkEstimate:
         """Number of macros, steps and stored rows."""
         return estimate_work(self.program)
+
+    @property
+    def _ply_values(self) -> int:
+        """Number of values that PLYS stores at a time."""
+        cards = [macro for macro in flat(self.program) if macro.word == "PLYS"]
+        count = (int(cards[0].second) if cards else 0) or self.deck.control.numel
+        layers = len(self.deck.require(Material).layers)
+        return count * (layers * (6 * len(self.rules[2].xi) + 6) + 2)
 
     @cached_property
     def output_bytes(self) -> int:
@@ -135,6 +181,7 @@ class Problem:
             work.passes["DISP"] * (field + control.numnp)
             + work.passes["STRE"] * points * 16
             + (work.passes["REAC"] + work.passes["EIGE"]) * field
+            + work.passes["PLYS"] * self._ply_values
             + work.contact_rows * (points * 5 + 8)
             + work.steps * (18 + gages)
         )
@@ -156,6 +203,10 @@ class ImpactModel:
         Points of tape8 and of the stresses.
     gages : GageArray or None
         Strain gages.
+    patch : ContactPatch or None
+        Contact patch.
+    plies : PlyStresses or None
+        Elements whose ply stresses are stored; None without PLYS.
     """
 
     plate: PlateModel
@@ -165,6 +216,8 @@ class ImpactModel:
     strains: StrainField
     stress_points: StrainField
     gages: GageArray | None
+    patch: ContactPatch | None
+    plies: PlyStresses | None
 
 
 class ProgramRules:
@@ -232,6 +285,7 @@ def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> 
             shear=bending if "shear-order" in slips else shear,
             strains=bending if "tapes" in slips else points,
             transposed_jacobian="jacobian" in slips,
+            assumes_shear=has_assumed_shear(deck),
         ),
     )
 
@@ -270,6 +324,17 @@ def build_law(deck: Deck, slips: frozenset[str] = frozenset()) -> Law:
     return ListingLaw(constants) if "reload" in slips else HystereticLaw(constants)
 
 
+def build_plies(problem: Problem, plate: PlateModel) -> PlyStresses | None:
+    """Build the elements whose ply stresses PLYS stores: the M nearest to the load, or all."""
+    card = next((macro for macro in flat(problem.program) if macro.word == "PLYS"), None)
+    if card is None:
+        return None
+    nearest = problem.by_distance[: int(card.second) or None]
+    reach = 0.0 if problem.load_place is None else plate.laminate.thickness / 2.0
+    near = problem.distances < reach + (0.0 if problem.patch is None else problem.patch.radius)
+    return PlyStresses(problem.mesh, plate.laminate, problem.rules[2], np.sort(nearest), near)
+
+
 def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactModel:
     """Build the model of a checked problem.
 
@@ -284,9 +349,11 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     chosen = options or RunOptions()
     deck, slips, method = problem.deck, chosen.slips, chosen.rod_method
     rod = build_projectile(deck, slips).with_mass(method.mass)
-    hit, share = problem.impact_dof, 1.0
+    contact, share = problem.contact, 1.0
     mesh = problem.mesh
-    if hit is not None and "rod-force" in slips:
+    if contact is not None and "rod-force" in slips:
+        card = deck.require(ImpactCard)
+        hit = card.node - 1, card.dof - 1
         forces = generate(deck, unit_force=True).forces
         share = float(forces[hit])
         forces[hit] = 0.0
@@ -294,18 +361,18 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     only_moves = moves_only(problem.program)
     if slips & PLATE_SLIPS:
         plate = build_plate(deck, mesh, slips)
-        mobile = restrain_resting_dofs(plate, hit) if only_moves else plate
+        mobile = restrain_resting_dofs(plate, contact) if only_moves else plate
     else:
         plate, mobile = problem.plate, problem.moving_plate
-    reduced = symmetry_reduction(mobile, hit) if only_moves and chosen.solver != CSR else None
+    reduced = symmetry_reduction(mobile, contact) if only_moves and chosen.solver != CSR else None
     count = mobile.neq if reduced is None else reduced.count
     workers = Workers(chosen.threads or (available() if count >= WORTH_SHARING else 1))
     motion = PlateMotion(mobile, chosen.solver, reduced, workers)
     impact = None
-    if problem.has_impact:
+    if contact is not None:
         card = deck.require(ImpactCard)
-        contact = ImpactConditions(
-            equation=motion.equation(card.node - 1, card.dof - 1),
+        conditions = ImpactConditions(
+            load=motion.load(contact),
             velocity=card.velocity,
             plate_moves="target" not in slips,
             strains_start_moving="rod-start" in slips,
@@ -313,7 +380,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
             share=share,
         )
         law = build_law(deck, slips)
-        impact = ImpactSystem(motion, rod, law, contact, STEPS[method.integrator])
+        impact = ImpactSystem(motion, rod, law, conditions, STEPS[method.integrator])
     cards, transposed = deck.last(GageCards), plate.rules.transposed_jacobian
     return ImpactModel(
         plate=plate,
@@ -323,6 +390,8 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         strains=plate.strain_field(plate.rules.strains),
         stress_points=plate.strain_field(problem.rules[2]),
         gages=None if cards is None else gages(mesh, cards.records, transposed_jacobian=transposed),
+        patch=problem.patch,
+        plies=build_plies(problem, plate),
     )
 
 
@@ -357,9 +426,16 @@ def laminate_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> Laminate:
     LookupError
         If the deck has no MATE segment.
     """
-    correction = deck.last(ShearCorrection)
-    factor = 1.0 if correction is None else correction.factor
-    return laminate_of(deck.require(Material), factor, isotropic_g12=isotropic_g12)
+    shear = deck.last(Shear) or Shear()
+    plain = laminate_of(deck.require(Material), isotropic_g12=isotropic_g12)
+    stiffness = equilibrium_shear_stiffness(plain) if shear.equilibrium else plain.shear
+    return replace(plain, shear=shear.factor * stiffness)
+
+
+def has_assumed_shear(deck: Deck) -> bool:
+    """Whether the transverse shear strains of a deck are assumed (``SHEA MITC``)."""
+    shear = deck.last(Shear)
+    return shear is not None and shear.assumed
 
 
 @lru_cache(maxsize=256)

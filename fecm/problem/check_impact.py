@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.deck.findings import Findings
-from fecm.deck.model import Deck, Gages, Impact, Indentation, Material, Projectile, ShearCorrection
+from fecm.deck.model import Deck, Gages, Impact, Indentation, Material, Projectile, Shear
 from fecm.mechanics import element_groups
 from fecm.mechanics.contact_law import ACR_POWER
 from fecm.mechanics.gages import locate
@@ -177,7 +177,7 @@ def check_gages(segment: Gages, mesh: Mesh, deck: Deck, findings: Findings) -> N
             )  # fmt: skip
 
 
-def check_shear_correction(segment: ShearCorrection, findings: Findings) -> None:
+def check_shear_correction(segment: Shear, findings: Findings) -> None:
     """Check a SHEA segment."""
     if not segment.factor > 0.0:
         findings.add(
@@ -284,7 +284,9 @@ def resolution(problem: Problem) -> Resolution | None:
         return None
     quadratic = bool((mesh.elements[touching, 4:8] > 0).all()) and mesh.elements.shape[1] <= 9
     shear = deck.require(Material).integration.shear
-    error = mesh_error(wave / side, side / laminate.thickness, shear) if quadratic else None
+    # Fitted to point forces and shear strains by quadrature.
+    fitted = quadratic and problem.patch is None and not problem.plate.rules.assumes_shear
+    error = mesh_error(wave / side, side / laminate.thickness, shear) if fitted else None
     return Resolution(float(contact), float(wave), side, error)
 
 

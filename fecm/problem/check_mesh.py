@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.deck.findings import Findings, Place
-from fecm.deck.model import Boundary, Coordinates, Deck, Elements, Material
+from fecm.deck.model import Boundary, Coordinates, Deck, Elements, Material, Patch, Shear
 from fecm.deck.records import Integration
-from fecm.mechanics import element_groups, element_matrices
+from fecm.mechanics import assumed_shear, element_groups, interpolation
 from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature
 from fecm.mechanics.elements.shape import CUBIC, TRIANGLE
 from fecm.mechanics.mesh import Mesh, holds_the_plane
@@ -135,6 +135,19 @@ def check_elements(deck: Deck, mesh: Mesh, findings: Findings) -> bool:
     report("E310", four_missing & ~pointed, "lacks one of its four corners")
     report("E312", repeated, "has a node twice")
     return findings.error_count == before
+
+
+def check_assumed_shear(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+    """Refuse elements of a sound mesh that have no assumed shear strains."""
+    if not deck.require(Shear).assumed:
+        return
+    wrong = np.zeros(len(mesh.elements), dtype=bool)
+    for family in element_groups.element_blocks(mesh.elements, mesh.coordinates):
+        wrong[family.rows] = not assumed_shear.supports(family)
+    report_elements(
+        findings, "E451", np.flatnonzero(wrong), deck, "has no assumed shear strains (SHEA MITC)",
+        "quadrilaterals with 4 or with 9 nodes have; without MITC any element will do",
+    )  # fmt: skip
 
 
 def _check_coincidence(deck: Deck, mesh: Mesh, findings: Findings) -> None:
@@ -270,7 +283,7 @@ def _check_jacobians(
     for family in families:
         for block in family.blocks(4096):
             for rule in used[:2] if _at_third_node(card, family) else used:
-                found = element_matrices.jacobian_determinants(block, rule)
+                found = interpolation.jacobian_determinants(block, rule)
                 rows = block.rows[~(found > 0.0).all(axis=1)]
                 folded.setdefault(family.shape.numbering, []).extend(rows.tolist())
     for numbering, wrong in folded.items():
@@ -286,8 +299,7 @@ def _check_masses(
         family.rows
         for family in families
         if (
-            np.square(element_matrices.local_shape_functions(family, bending)[0]).sum(axis=0)
-            < 1e-12
+            np.square(interpolation.local_shape_functions(family, bending)[0]).sum(axis=0) < 1e-12
         ).any()
     ]
     if massless:
@@ -372,7 +384,7 @@ def _orders_without_motions(family: element_groups.ElementBlock) -> tuple[str, i
 
 
 def check_listing(deck: Deck, mesh: Mesh, findings: Findings) -> None:
-    """Refuse what listing mode can't compute: mixed elements, and too many layers.
+    """Refuse what the printed program cannot compute: mixed meshes, many layers, later words.
 
     The listing's LMAS takes element 1's node list for all elements (MASS01 hands IX, not IX(1,N),
     to SHAPE), so an element that lacks other nodes gets wrong masses or none.
@@ -398,3 +410,12 @@ def check_listing(deck: Deck, mesh: Mesh, findings: Findings) -> None:
             material.layers[LISTING_LAYERS].place("layer"),
             ANOTHER_MODE,
         )
+    macro = next((macro for macro in deck.macros if macro.word == "PLYS"), None)
+    words = [] if macro is None else [("PLYS", macro.place("macro"))]
+    if (patch := deck.last(Patch)) is not None:
+        words.append(("PATC", patch.place()))
+    shear = deck.last(Shear)
+    if shear is not None and (shear.assumed or shear.equilibrium):
+        words.append(("SHEA MITC" if shear.assumed else "SHEA EQUI", shear.place()))
+    for word, place in words:
+        findings.add("E603", f"The printed program has no {word}.", place, ANOTHER_MODE)

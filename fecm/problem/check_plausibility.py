@@ -256,7 +256,10 @@ def check_time_step_of_contact(problem: Problem, findings: Findings) -> None:
         return
     bound = problem.safe_time_step
     largest = max(macro.value or SAFE * bound for macro in steps)
-    contact = contact_step(deck, plate, largest, bound) if problem.has_impact else None
+    distribution = problem.contact
+    contact = None
+    if distribution is not None:
+        contact = contact_step(deck, plate, distribution, largest, bound)
     stable = bound if contact is None else min(bound, contact.limit)
     for macro in steps:
         dt = macro.value

@@ -7,11 +7,14 @@ import sys
 from collections.abc import Sequence
 from decimal import Context, Decimal
 
+import numpy as np
+
 from fecm.deck.findings import Findings
 from fecm.deck.macros import MOST_MACROS, STEPS, every, flat
 from fecm.deck.model import Material
 from fecm.deck.records import Macro
 from fecm.mechanics.plate import UnsoundPlateError
+from fecm.mechanics.ply_stresses import is_complete
 from fecm.problem.build import Problem
 
 LARGE_OUTPUT = 10**9
@@ -41,7 +44,7 @@ def check_program(problem: Problem, findings: Findings) -> None:
                 f"{sizes.steps}: no strains are stored.",
                 macro.place("value"),
             )
-        if macro.word in ("DISP", "STRE") and not sizes.passes[macro.word]:
+        if macro.word in ("DISP", "STRE", "PLYS") and not sizes.passes[macro.word]:
             findings.add(
                 "W510",
                 f"{macro.word} stores every {every(macro)} passes, but no loop has so many: "
@@ -51,6 +54,7 @@ def check_program(problem: Problem, findings: Findings) -> None:
     if not sizes.steps and not any(sizes.passes.values()):
         place = deck.macros[0].place("macro") if deck.macros else None
         findings.add("W511", "The program takes no step and stores nothing.", place)
+    _check_ply_stresses(problem, findings)
     if problem.output_bytes > LARGE_OUTPUT:
         storing = next((m for m in flat(problem.program) if m.word in ("RODP", "DISP")), None)
         findings.add(
@@ -58,6 +62,43 @@ def check_program(problem: Problem, findings: Findings) -> None:
             f"The result will take {problem.output_bytes / 1e9:.3g} GB.",
             storing.place("value") if storing else None,
             "RODP and DISP store every N steps: take a larger N",
+        )
+
+
+def _check_ply_stresses(problem: Problem, findings: Findings) -> None:
+    """Check the PLYS cards of a program."""
+    cards = [macro for macro in flat(problem.program) if macro.word == "PLYS"]
+    if not cards:
+        return
+    numel = problem.deck.control.numel
+    for card in cards:
+        if card.second > numel:
+            findings.add(
+                "E448", f"PLYS takes {card.second:g} elements; the deck has {numel}.",
+                card.place("second value"), "0 or a blank takes all elements",
+            )  # fmt: skip
+        elif card.second != cards[0].second:
+            findings.add(
+                "E448", "The PLYS cards take different numbers of elements.",
+                card.place("second value"), "give each the same number",
+            )  # fmt: skip
+    if cards[0].second and problem.has_impact is False and problem.patch is None:
+        findings.add(
+            "E448", "PLYS takes the elements nearest to the load, but nothing hits the plate.",
+            cards[0].place("second value"), "leave the number blank for all elements",
+        )  # fmt: skip
+    if problem.has_impact and problem.patch is None:
+        findings.add(
+            "W449", "Ply stresses under a point force grow without bound as the mesh is refined.",
+            cards[0].place("macro"), "a PATC segment gives the contact force an area",
+        )  # fmt: skip
+    others = np.flatnonzero(~is_complete(problem.mesh.elements))
+    if len(others):
+        findings.add(
+            "W450",
+            f"Interlaminar stresses of {len(others)} elements without nine nodes are not computed "
+            f"(element {others[0] + 1} first): they are NaN.",
+            cards[0].place("macro"),
         )
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fecm._typing import Floats
 from fecm.deck.model import Deck, Impact, Indentation
 from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError
@@ -84,7 +85,9 @@ class ContactStep:
     limit: float
 
 
-def contact_step(deck: Deck, plate: PlateModel, dt: float, bound: float) -> ContactStep:
+def contact_step(
+    deck: Deck, plate: PlateModel, contact: Floats, dt: float, bound: float
+) -> ContactStep:
     """Largest time step at which plate and contact are stable together.
 
     Parameters
@@ -92,19 +95,20 @@ def contact_step(deck: Deck, plate: PlateModel, dt: float, bound: float) -> Cont
     deck : Deck
         A deck without errors, with an impact.
     plate : PlateModel
+    contact : ndarray (numnp, 5)
+        Distribution of a unit contact force.
     dt : float
         Time step of the deck; 0 for 0.9 of the critical one.  The limit is computed only where a
         bound does not show that this step is stable.
     bound : float
         Lower bound of the plate's critical time step.
     """
-    impact = deck.require(Impact)
-    row = int(plate.mesh.equations[impact.node - 1, impact.dof - 1]) - 1
+    weights = contact[plate.mesh.equations > 0]
     stiffness = contact_stiffness(deck, plate)
     projectile = build_projectile(deck)
     rigid = isinstance(projectile, RigidMass)
     tip = projectile.total_mass if rigid else float(projectile.mass()[0])
-    at_node = float(plate.mass[row])
+    at_node = 1.0 / float((weights**2 / plate.mass).sum())
     mass = min(tip, at_node)
     if not stiffness > 0.0:
         return ContactStep(stiffness, mass, math.inf)
@@ -114,7 +118,7 @@ def contact_step(deck: Deck, plate: PlateModel, dt: float, bound: float) -> Cont
     if step < iterated and (step / bound) ** 2 + step**2 * stiffness / (4.0 * at_node) < 1.0:
         return ContactStep(stiffness, mass, math.inf)
     try:
-        critical = critical_time_step(plate, (row, stiffness))
+        critical = critical_time_step(plate, (weights, stiffness))
     except UnsoundPlateError:  # the contact's stiffness is out of range
         critical = iterated
     return ContactStep(stiffness, mass, min(iterated, critical))

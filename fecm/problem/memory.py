@@ -15,7 +15,7 @@ import numpy as np
 from fecm import _memory
 from fecm.deck.macros import every, flat
 from fecm.deck.model import Projectile
-from fecm.mechanics import element_matrices
+from fecm.mechanics import interpolation
 from fecm.mechanics.element_groups import congruence
 from fecm.mechanics.natural_modes import DENSE
 from fecm.mechanics.plate import ASSEMBLED, BLOCK, PlateModel
@@ -98,7 +98,7 @@ def _product(model: PlateModel, *, exact: bool) -> int:
     points = max(len(rule.xi) for rule in (model.rules.bending, model.rules.shear))
     total = 0
     for family in model.families:
-        count, n = len(family.rows), element_matrices.NDOF * family.nodes.shape[1]
+        count, n = len(family.rows), interpolation.NDOF * family.nodes.shape[1]
         alone, shared = count, 0
         if exact:
             sizes = np.bincount(congruence(family).group)

@@ -19,9 +19,10 @@ from fecm.deck.model import (
     Impact,
     Indentation,
     Material,
+    Patch,
     Projectile,
     Segment,
-    ShearCorrection,
+    Shear,
     Units,
 )
 from fecm.deck.reader import ParsedProblem
@@ -37,6 +38,7 @@ from fecm.problem.check_impact import (
 )
 from fecm.problem.check_material import check_material
 from fecm.problem.check_mesh import (
+    check_assumed_shear,
     check_elements,
     check_geometry,
     check_in_plane_supports,
@@ -49,6 +51,7 @@ from fecm.problem.check_plausibility import (
 )
 from fecm.problem.check_program import check_program, check_time_step
 from fecm.problem.generate import generate
+from fecm.problem.patch import check_patch, with_patch_load
 
 __all__ = ["Problem", "check"]
 
@@ -56,7 +59,7 @@ ALWAYS: tuple[type[Segment], ...] = (Coordinates, Elements, Material)
 IN_AN_IMPACT: tuple[type[Segment], ...] = (Impact, Indentation)
 # Segments of which only the last is effective.
 SINGLE: tuple[type[Segment], ...] = (
-    Coordinates, Elements, Material, Impact, Indentation, Projectile, ShearCorrection, Gages, Units
+    Coordinates, Elements, Material, Impact, Indentation, Projectile, Shear, Patch, Gages, Units,
 )  # fmt: skip
 
 
@@ -99,10 +102,17 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
         check_law(law, findings)
     if (projectile := deck.last(Projectile)) is not None:
         check_projectile(projectile, findings)
-    if (correction := deck.last(ShearCorrection)) is not None:
+    if (correction := deck.last(Shear)) is not None:
         check_shear_correction(correction, findings)
     if (segment := deck.last(Gages)) is not None and findings.error_count == before and not unsound:
         check_gages(segment, mesh, deck, findings)
+    if findings.error_count == before and not unsound:
+        if deck.has(Shear):
+            check_assumed_shear(deck, mesh, findings)
+        if deck.has(Patch):
+            check_patch(deck, mesh, findings)
+    if findings.error_count == before and not unsound:
+        mesh = with_patch_load(deck, mesh)
     checked = Problem(deck, mesh, program)
     if findings.error_count == before and not unsound:
         with np.errstate(all="ignore"):  # numbers out of range end in a finding

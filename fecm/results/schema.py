@@ -249,6 +249,36 @@ DATASETS = {
             ("Q_x", "transverse shear force", "force/length"),
             ("Q_y", "transverse shear force", "force/length"),
         ),
+        Dataset(
+            "patch/node", ("patch_nodes",), "node numbers from 1 that share the contact force",
+            dtype="i4",
+        ),
+        Dataset("patch/weight", ("patch_nodes",), "share of every node in the contact force"),
+        *_clock("plies"),
+        Dataset(
+            "plies/element", ("members",), "number of every element with ply stresses", dtype="i4"
+        ),
+        Dataset("plies/z", ("layers", 3), "lower, middle and upper z of every ply", "length"),
+        Dataset(
+            "plies/under_load", ("members",),
+            "1 where plate theory does not hold: nearer than the patch's radius + h/2 to the load",
+            dtype="i4",
+        ),
+        *_group(
+            "plies", ("rows", "members", "npp", "layers", 2),
+            ("sigma_1", "normal stress along the fibres, at both faces", "force/length^2"),
+            ("sigma_2", "normal stress across the fibres", "force/length^2"),
+            ("tau_12", "shear stress in the axes of the ply", "force/length^2"),
+        ),
+        *_group(
+            "plies", ("rows", "members", "layers", 3),
+            ("tau_xz", "interlaminar shear stress at the element's centre", "force/length^2"),
+            ("tau_yz", "interlaminar shear stress at the element's centre", "force/length^2"),
+        ),
+        Dataset(
+            "plies/residual", ("rows", "members", 2),
+            "tau_xz and tau_yz of equilibrium at z = h/2, removed linearly in z", "force/length^2",
+        ),
         *_clock("reactions"),
         Dataset(
             "reactions/force", ("rows", "numnp", "ndf"),
@@ -271,6 +301,8 @@ SCALES = {
     "npt": ("point", "number of the point in its element"),
     "nps": ("stress_point", "number of the stress point in its element"),
     "ndf": ("unknown", "name of the unknown"),
+    "npp": ("ply_point", "number of the point in its element"),
+    "layers": ("ply", "number of the ply, from z = -h/2"),
     "gages": ("gage", "position of the gage among the gages, from 1"),
 }
 
@@ -320,6 +352,8 @@ GROUP_DESCRIPTIONS = {
     "energy": "energies at every step",
     "gages": "strain gages, read at every step",
     "stresses": "strains and stress resultants, stored by STRE",
+    "patch": "nodal weights of the contact force",
+    "plies": "stresses ply by ply, stored by PLYS",
     "reactions": "forces of the supports, stored by REAC",
     "modes": "natural modes, found by EIGE",
 }
@@ -328,5 +362,5 @@ GROUP_DESCRIPTIONS = {
 STORED_BY = {
     "tape3": "DISP", "tape8": "RODP", "tape9": "RODP", "history": "RODP", "energy": "RODP",
     "gages": "RODP or EXCD",
-    "stresses": "STRE", "reactions": "REAC", "modes": "EIGE",
+    "stresses": "STRE", "plies": "PLYS", "patch": "PATC", "reactions": "REAC", "modes": "EIGE",
 }  # fmt: skip

@@ -92,8 +92,9 @@ def likely_cause(problem: Problem, model: ImpactModel, dt: float) -> str:
     try:
         plate = model.motion.plate
         critical = critical_time_step(plate)
-        hits = model.impact is not None
-        contact = contact_step(problem.deck, plate, dt, critical) if hits else None
+        distribution, contact = problem.contact, None
+        if distribution is not None:
+            contact = contact_step(problem.deck, plate, distribution, dt, critical)
     except UnsoundPlateError as error:
         return str(error)
     above = dt > critical

@@ -186,6 +186,14 @@ def store_stresses(run: Simulation, n: int) -> None:
     run.printer.stresses(values, places, run.state.clock)
 
 
+def store_ply_stresses(run: Simulation, n: int) -> None:
+    """PLYS."""
+    if run.model.plies is None or run.interpreter.current_pass % n:
+        return
+    plate, values = run.state.plate, run.model.plies.evaluate(run.displacement_field())
+    run.recorder.row("plies", plate.step, plate.time, values)
+
+
 def check(run: Simulation) -> None:
     """CHEC: store and print sizes; ends the program under its slip."""
     plate = run.model.plate
@@ -213,6 +221,7 @@ ACTIONS: dict[str, Callable[..., bool | None]] = {
     "RODP": impact_step,
     "DISP": store_displacements,
     "STRE": store_stresses,
+    "PLYS": store_ply_stresses,
     "CHEC": check,
 }
 

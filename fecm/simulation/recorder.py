@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
@@ -16,7 +17,7 @@ from fecm.results.sinks import RowBuffer, Sink
 from fecm.simulation.state import subset
 from fecm.simulation.step_recorder import OnBlock, StepRecorder
 
-BUFFERED = ("tape3", "tape8", "stresses", "reactions", "modes")
+BUFFERED = ("tape3", "tape8", "stresses", "plies", "reactions", "modes")
 
 
 class Recorder:
@@ -71,6 +72,8 @@ class Recorder:
             "energy": sizes.steps,
             "gages": sizes.steps if self._model.gages is not None else 0,
             "stresses": sizes.passes["STRE"],
+            "plies": sizes.passes["PLYS"],
+            "patch": int(self._model.patch is not None),
             "reactions": sizes.passes["REAC"],
             "modes": sizes.passes["EIGE"],
         }
@@ -86,6 +89,10 @@ class Recorder:
             "nps": self._model.stress_points.shape[1],
             "gages": 0 if gages is None else len(gages.numbers),
         }  # fmt: skip
+        if self._model.plies is not None:
+            numbers |= zip(("members", "npp", "layers"), self._model.plies.shape, strict=True)
+        if self._model.patch is not None:
+            numbers["patch_nodes"] = np.count_nonzero(self._model.patch.weights)
         return tuple(numbers[n] if isinstance(n, str) else n for n in dataset.shape)
 
     def create(self, location: str) -> None:
@@ -110,6 +117,16 @@ class Recorder:
         }
         if self._room["gages"] and model.gages is not None:
             constants["gages/number"] = model.gages.numbers
+        if (patch := model.patch) is not None:
+            (nodes,) = np.nonzero(patch.weights)
+            constants |= {"patch/node": nodes + 1, "patch/weight": patch.weights[nodes]}
+            values = {"shape": patch.shape, "radius": patch.radius, "x": patch.x, "y": patch.y}
+            self._sink.attributes("patch", values)
+        if self._room["plies"] and model.plies is not None:
+            constants |= {
+                "plies/element": model.plies.members + 1, "plies/z": model.plies.z,
+                "plies/under_load": model.plies.under_load.astype(int),
+            }  # fmt: skip
         for path, array in constants.items():
             self._sink.write(path, 0, array)
         if self._room["tape8"]:

@@ -95,10 +95,10 @@ class StepRecorder:
         contact_row : bool
             Whether the contact of the step goes to tape9.
         """
-        point = None
+        applied = None
         if self._impact is not None and impact is not None:
-            point = self._impact.point_force(impact)
-        kinetic = self._motion.kinetic_energy(plate, factor, point)
+            applied = self._impact.applied(impact)
+        kinetic = self._motion.kinetic_energy(plate, factor, applied)
         strain = plate.strain_energy
         own = (plate.step, plate.time, kinetic, strain, plate.external_work)
         if self._gages is not None:

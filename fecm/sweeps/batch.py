@@ -149,11 +149,11 @@ def _together(numbers: list[int], decks: list[Deck], checked: Problem) -> Outcom
     kind = np.array([kinds[projectiles[case]] for case in order], dtype=np.intp)
     require(ADVANCED * steps * len(decks), f"{len(decks)} cases of {steps} steps")
     with np.errstate(all="ignore"):
-        response = plate_response(setup.motion, setup.impact.contact.equation, dt, steps)
+        response = plate_response(setup.motion, setup.impact.contact.load, dt, steps)
         rods = [WilsonStep(rod.stiffness(), rod.mass(), dt) for rod in kinds]
         law = HystereticLaw(stacked([build_law(decks[case]).constants for case in order]))
         speed = np.array([decks[case].require(Impact).velocity for case in order])
-        node_mass = float(setup.motion.mass[setup.impact.contact.equation])
+        node_mass = 1.0 / setup.impact.contact.load.inverse_mass
         tips = TipSteps(rods, kind, steps)
         found = impacts(response, tips, law, speed, node_mass)
         times = np.add.accumulate(np.full(steps, dt))
@@ -223,7 +223,8 @@ def impacts(
     speed : ndarray (cases,)
         Approach velocities.
     node_mass : float
-        Lumped mass of the impact node.
+        Mass that the contact force accelerates: the lumped mass of the impact node, or
+        1/(g M^-1 g) of a patch with the weights g.
     """
     steps, cases = len(response), len(speed)
     none = np.zeros(cases)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
-from fecm.mechanics.plate_motion import PlateMotion, PointForce
+from fecm.mechanics.plate_motion import AppliedForce, Load, PlateMotion
 from fecm.mechanics.rod_integrators import RodIntegrator, RodState
 
 # Steps of a block, and steps and cases of a matrix product with earlier blocks: small enough for
@@ -27,15 +27,14 @@ BLOCK = 64
 SMALL = BLOCK**3
 
 
-def plate_response(motion: PlateMotion, equation: int, dt: float, steps: int) -> Floats:
-    """Compute the displacement of one dof after 1 to `steps` steps, the first under a unit force.
+def plate_response(motion: PlateMotion, load: Load, dt: float, steps: int) -> Floats:
+    """Compute the displacement under a load after 1 to `steps` steps, the first with a unit force.
 
     Parameters
     ----------
     motion : PlateMotion
         A plate without nodal loads.
-    equation : int
-        Equation of the dof, from 0.
+    load : Load
     dt : float
         Time step.
     steps : int
@@ -48,8 +47,8 @@ def plate_response(motion: PlateMotion, equation: int, dt: float, steps: int) ->
     state = motion.start()
     response = np.empty(steps)
     for step in range(steps):
-        motion.advance(state, dt, 0.0, PointForce(equation, 1.0) if step == 0 else None)
-        response[step] = state.displacement_at(equation)
+        motion.advance(state, dt, 0.0, AppliedForce(load, 1.0) if step == 0 else None)
+        response[step] = load.dot(state.padded)
     return response
 
 

@@ -16,7 +16,7 @@ from fecm.deck.model import (
     Impact,
     Indentation,
     Projectile,
-    ShearCorrection,
+    Shear,
 )
 from fecm.deck.records import Gage, LoadTable, Macro, NodeCodes
 from fecm.results.result import Result
@@ -88,7 +88,7 @@ def loaded_rectangle(x: Sequence[float], y: Sequence[float], *, shears: bool = F
         Boundary(tuple(NodeCodes(n, 0, code) for n, code in codes.items() if any(code))),
         forces(loads),
         material(PLY, (0.0, 45.0), THICK / 2.0),
-        ShearCorrection(FACTOR) if shears else None,
+        Shear(FACTOR) if shears else None,
     )
     return deck("resultants", grid, segments, (*STATICS, Macro("STRE")))
 

@@ -1,0 +1,226 @@
+"""Stresses ply by ply, and the transverse shear stiffness that follows from equilibrium.
+
+z runs from the struck face, -h/2, to h/2; ply 1 is at the struck face.  Stresses of a ply are in
+its own axes; interlaminar shear stresses are in the axes of the plate.  Both are linear in the
+midplane strains eps and the curvatures kappa, eps(z) = eps + z kappa, or in their derivatives.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._typing import Bools, Floats
+from fecm.mechanics.element_groups import ElementBlock, element_blocks
+from fecm.mechanics.elements.quadrature import Quadrature, gauss
+from fecm.mechanics.interpolation import interpolate, inverse_jacobian, local_shape_functions
+from fecm.mechanics.laminate import Laminate
+from fecm.mechanics.mesh import Ints, Mesh
+
+
+def in_plane_stresses(laminate: Laminate) -> Floats:
+    """Stresses sigma_1, sigma_2, tau_12 of every ply, T Qbar (eps + z kappa).
+
+    Returns
+    -------
+    ndarray (plies, 2, 3, 6)
+        At the lower and the upper z of each ply, per unit of eps_xx, eps_yy, gamma_xy (force/area)
+        and kappa_x, kappa_y, kappa_xy (force/length).
+    """
+    plies = laminate.plies
+    m, n = np.cos(np.deg2rad(plies.angles)), np.sin(np.deg2rad(plies.angles))
+    T = np.array(
+        [[m * m, n * n, 2 * m * n], [n * n, m * m, -2 * m * n], [-m * n, m * n, m * m - n * n]]
+    )
+    stiffness = T.transpose(2, 0, 1) @ plies.stiffness
+    z = np.stack([plies.faces[:-1], plies.faces[1:]], axis=1)[:, :, None, None]
+    parts = np.broadcast_arrays(stiffness[:, None], z * stiffness[:, None])
+    return np.concatenate(parts, axis=3)
+
+
+def _moments(laminate: Laminate, z: Floats) -> Floats:
+    """Integrals of Qbar and Qbar zeta from the struck face to z, (2, n, 3, 3)."""
+    plies = laminate.plies
+    upper = np.clip(z[:, None], plies.faces[:-1], plies.faces[1:])
+    lower = plies.faces[:-1]
+    powers = np.stack([upper - lower, (upper**2 - lower**2) / 2.0])
+    return np.asarray(np.einsum("azk,kij->azij", powers, plies.stiffness))
+
+
+def interlaminar_stresses(laminate: Laminate) -> tuple[Floats, Floats]:
+    """Shear stresses tau_xz, tau_yz from the equilibrium of the plies, without inertia.
+
+    Integrated from the struck face: tau_xz,z = -sigma_x,x - tau_xy,y and
+    tau_yz,z = -sigma_y,y - tau_xy,x.  What is left at z = h/2 is removed linearly in z.
+
+    Returns
+    -------
+    stresses : ndarray (plies, 3, 2, 2, 6)
+        At the lower, middle and upper z of each ply; tau_xz and tau_yz per unit of the derivatives
+        with respect to x and y of the strains eps and kappa.
+    residual : ndarray (2, 2, 6)
+        The stress removed at z = h/2.
+    """
+    faces, z = laminate.plies.faces, laminate.plies.z
+
+    def shear(z: Floats) -> Floats:
+        strips = -np.concatenate(_moments(laminate, z), axis=2)  # (n, 3, 6)
+        return np.stack([strips[:, [0, 2]], strips[:, [2, 1]]], axis=2)  # (n, tau, d/dx d/dy, 6)
+
+    residual = shear(faces[-1:])[0]
+    share = (z - faces[0]) / (faces[-1] - faces[0])
+    stresses = (
+        shear(z.ravel()).reshape(*z.shape, 2, 2, 6) - share[:, :, None, None, None] * residual
+    )
+    return stresses, residual
+
+
+def equilibrium_shear_stiffness(laminate: Laminate) -> Floats:
+    """Transverse shear stiffness of equal energy under the stresses of equilibrium.
+
+    Cylindrical bending in x and in y without membrane forces: H^-1 is the integral of
+    F2' G^-1 F2, where F2 gives tau_xz and tau_yz per unit of Q_x and Q_y.  The two bendings are
+    taken along the plate's axes: of an angle-ply laminate the result depends on these.
+
+    Returns
+    -------
+    ndarray (2, 2)
+        Force/length, order xz, yz.
+    """
+    plies = laminate.plies
+    inverse_A = np.linalg.inv(laminate.A)
+    bending = np.linalg.inv(laminate.D - laminate.B @ inverse_A @ laminate.B)
+    points, weights = np.polynomial.legendre.leggauss(3)  # exact: quartic in each ply
+    half = np.diff(plies.faces)[:, None] / 2.0
+    z = (plies.faces[:-1, None] + half * (1.0 + points)).ravel()
+    A, B = _moments(laminate, z)
+    F = (A @ inverse_A @ laminate.B - B) @ bending
+    F2 = np.stack([F[:, [0, 2], [0, 1]], F[:, [2, 1], [0, 1]]], axis=1)
+    G = np.linalg.inv(np.repeat(plies.shear, 3, axis=0))
+    compliance = np.einsum("p,pki,pkl,plj->ij", (half * weights).ravel(), F2, G, F2)
+    return np.asarray(np.linalg.inv(compliance))
+
+
+# Second derivatives d2/dxi2, d2/deta2 and d2/dxi deta of the 9-node shape functions at the centre.
+_CURVED = np.array(
+    [
+        [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, -2.0],
+        [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, -2.0],
+        [0.25, -0.25, 0.25, -0.25, 0.0, 0.0, 0.0, 0.0, 0.0],
+    ]
+)
+
+
+def second_derivatives(family: ElementBlock) -> Floats:
+    """d2N/dx2, d2N/dy2 and d2N/dxdy at the centre of 9-node elements, (ne, 3, 9)."""
+    _, local = local_shape_functions(family, gauss(1))
+    inverse, _ = inverse_jacobian(family, local)
+    xi, eta = np.linalg.inv(inverse[:, 0]).swapaxes(0, 1)  # x and y by xi, by eta: (ne, 2)
+    # d2N/dxi2 = x,xi^2 N,xx + y,xi^2 N,yy + 2 x,xi y,xi N,xy + x,xixi N,x + y,xixi N,y, and so on.
+    chain = np.stack(
+        [
+            np.stack(
+                [a[:, 0] * b[:, 0], a[:, 1] * b[:, 1], a[:, 0] * b[:, 1] + a[:, 1] * b[:, 0]], 1
+            )
+            for a, b in ((xi, xi), (eta, eta), (xi, eta))
+        ],
+        axis=1,
+    )
+    slopes = np.einsum("eia,an->ein", inverse[:, 0], local[0])
+    curved = np.einsum("an,eni->eai", _CURVED, family.coordinates)  # of x and y
+    return np.linalg.solve(chain, _CURVED - curved @ slopes)
+
+
+class PlyStresses:
+    """Stresses of the plies of some elements.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    laminate : Laminate
+    rule : Quadrature
+        Points of the in-plane stresses; the interlaminar ones belong to the element's centre.
+    members : ndarray (m,), optional
+        Rows of the elements, ascending; all by default.
+    under_load : ndarray (numel,), optional
+        Whether each element of the mesh is so near to the load that plate theory does not hold.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Numbers of elements, points of an element, and plies.
+    z : ndarray (plies, 3)
+        Lower, middle and upper z of each ply, length.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        laminate: Laminate,
+        rule: Quadrature,
+        members: NDArray[np.intp] | None = None,
+        under_load: Bools | None = None,
+    ) -> None:
+        self.members = np.arange(len(mesh.elements)) if members is None else members
+        elements = mesh.elements[self.members]
+        near = np.zeros(len(mesh.elements), dtype=bool) if under_load is None else under_load
+        self.under_load = near[self.members]
+        self.z = laminate.plies.z
+        self.shape = (len(elements), len(rule.xi), len(laminate.plies.angles))
+        self._families = [
+            (
+                family,
+                interpolate(family, rule).dN,
+                second_derivatives(family) if is_complete(elements[family.rows]).all() else None,
+            )
+            for family in element_blocks(elements, mesh.coordinates)
+        ]
+        self._in_plane = in_plane_stresses(laminate)
+        self._interlaminar, self._residual = interlaminar_stresses(laminate)
+
+    def evaluate(self, field: Floats) -> dict[str, Floats]:
+        """Stresses of a displacement field, (numnp, 5).
+
+        Returns
+        -------
+        dict of ndarray
+            sigma_1, sigma_2, tau_12 (elements, points, plies, 2); tau_xz, tau_yz (elements, plies,
+            3) and residual (elements, 2), NaN in elements without 9 nodes.
+        """
+        count, points, plies = self.shape
+        stress = np.empty((3, count, points, plies, 2))
+        shear = np.full((2, count, plies, 3), np.nan)
+        residual = np.full((count, 2), np.nan)
+        for family, slopes, curved in self._families:
+            q = field[family.nodes][:, :, [0, 1, 3, 4]]
+            q[:, :, 2:] *= -1.0  # curvatures are the strains of the rotations' negatives
+            stress[:, family.rows] = np.einsum(
+                "lfcs,eps->ceplf", self._in_plane, _strains(np.einsum("epin,end->epid", slopes, q))
+            )
+            if curved is None:
+                continue
+            xx, yy, xy = np.einsum("ein,end->ied", curved, q)
+            along = np.stack(
+                [np.stack([xx, xy], 1), np.stack([xy, yy], 1)], 1
+            )  # (e, d/dx d/dy, i, dof)
+            gradients = _strains(along)
+            shear[:, family.rows] = np.einsum("lptds,eds->telp", self._interlaminar, gradients)
+            residual[family.rows] = np.einsum("tds,eds->et", self._residual, gradients)
+        names = ("sigma_1", "sigma_2", "tau_12")
+        return dict(zip(names, stress, strict=True)) | {
+            "tau_xz": shear[0], "tau_yz": shear[1], "residual": residual
+        }  # fmt: skip
+
+
+def _strains(slopes: Floats) -> Floats:
+    """Strains (..., 6) from d/dx and d/dy (..., 2, 4) of u, v and the rotations' negatives."""
+    x, y = slopes[..., 0, :], slopes[..., 1, :]
+    parts = [(x[..., i], y[..., i + 1], y[..., i] + x[..., i + 1]) for i in (0, 2)]
+    return np.stack([*parts[0], *parts[1]], axis=-1)
+
+
+def is_complete(elements: Ints) -> Bools:
+    """Whether elements, (ne, nen), are quadrilaterals with all of their nine nodes."""
+    nodes = np.zeros((len(elements), 12), dtype=bool)
+    nodes[:, : elements.shape[1]] = elements > 0
+    return np.asarray(nodes[:, :9].all(axis=1) & ~nodes[:, 9:].any(axis=1))
