@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,14 +11,13 @@ from numpy.typing import NDArray
 
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Deck, Impact
-from fecm.deck.reader import Reader
 from fecm.mechanics.element_groups import ElementBlock, element_blocks
-from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
+from fecm.mechanics.elements.quadrature import Quadrature
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.plot.kinds import PlotError
-from fecm.problem.slips import LISTING
+from fecm.results.plies import model_of, points_of, rows_at
 from fecm.results.result import Result
-from fecm.results.schema import STORED_BY
+from fecm.results.schema import NotStoredError, ResultFileError, remedy
 
 Array = NDArray[Any]
 Ints = NDArray[np.intp]
@@ -43,9 +40,7 @@ def require(result: Result, name: str, *paths: str) -> list[Array]:
     """
     for path in paths:
         if path not in result:
-            macro = STORED_BY.get(path.partition("/")[0], "")
-            remedy = f"; add {macro} to the deck's program and run it again" if macro else ""
-            raise PlotError(f"{name} has no {path}{remedy}")
+            raise PlotError(f"{name} has no {path}{remedy(path)}")
     return [_shown(name, path, result[path]) for path in paths]
 
 
@@ -87,17 +82,10 @@ def deck_of(result: Result, name: str) -> Deck:
     PlotError
         If the result holds no readable deck.
     """
-    deck = _parsed(result.deck, result.mode == LISTING)
-    if deck is None:
-        raise PlotError(f"{name} holds no deck that can be read")
-    return deck
-
-
-@functools.lru_cache(maxsize=8)
-def _parsed(text: str, blanks_are_zeros: bool) -> Deck | None:
-    """Parse a deck's text once, however many pictures need it."""
-    problems = Reader(text, blanks_are_zeros=blanks_are_zeros).problems()
-    return next((problem.deck for problem in problems if problem.deck is not None), None)
+    try:
+        return model_of(result)
+    except ResultFileError:
+        raise PlotError(f"{name} holds no deck that can be read") from None
 
 
 def struck(result: Result, name: str) -> Floats:
@@ -142,14 +130,10 @@ def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -
     if not times:
         ends = np.arange(1, min(count, len(stored)) + 1) / min(count, len(stored))
         return (ends * len(stored)).round().astype(np.intp) - 1
-    spacing = float(np.diff(stored).max()) if len(stored) > 1 else float(stored[0])
-    for time in times:
-        if not stored[0] - spacing <= time <= stored[-1] + spacing:
-            raise PlotError(
-                f"{name} has no displacements at time {time:g}: its rows cover "
-                f"{stored[0]:g} to {stored[-1]:g}"
-            )
-    return np.array([np.abs(stored - time).argmin() for time in times])
+    try:
+        return rows_at(stored, times, "displacements")
+    except NotStoredError as error:
+        raise PlotError(f"{name} has {error}") from None
 
 
 @dataclass(frozen=True)
@@ -223,17 +207,13 @@ def strain_points(result: Result, name: str) -> Floats:
         If the result holds no strains at such points.
     """
     (stored,) = require(result, name, "tape8/kappa_x")
-    order = math.isqrt(stored.shape[2])
-    if order**2 != stored.shape[2] or order > HIGHEST_ORDER:
-        raise PlotError(f"{name} has {stored.shape[2]} strain points per element, which is invalid")
+    elements, _ = mesh_of(result, name)
     at_nodes = result.tape8.attributes.get("location") == "nodes"
-    rule = nodal(order) if at_nodes else gauss(order)
-    elements, coordinates = mesh_of(result, name)
-    found = np.empty((len(elements), len(rule.xi), 2))
-    for family in element_blocks(elements, coordinates):
-        N = local_shape_functions(family, rule)[0]
-        found[family.rows] = np.einsum("pn,eni->epi", N, family.coordinates)
-    return found
+    try:
+        places = points_of(result, 1 + np.arange(len(elements)), stored.shape[2], at_nodes)
+    except ResultFileError as error:
+        raise PlotError(f"{name}: {error}") from None
+    return np.stack(places, axis=-1)
 
 
 def nearest(points: Floats, at: Floats, name: str) -> Bools:

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.deck.records import AXES, DOF_NAMES
+from fecm.results.plies import IN_PLANE, INTERLAMINAR
 from fecm.results.result import Result
-from fecm.results.schema import DATASETS, SCALES, STORED_BY, ExportError, suggestion
+from fecm.results.schema import DATASETS, SCALES, STORED_BY, ExportError, remedy, suggestion
 
 Array = NDArray[Any]
 
@@ -29,7 +30,18 @@ NAMED: dict[str | int, tuple[str, ...]] = {
     "nen": tuple(f"node_{n}" for n in range(1, 13)),
     3: ("xx", "yy", "xy"),
     2: ("xz", "yz"),
+    "faces": ("lower", "upper"),
+    "levels": ("lower", "middle", "upper"),
+    "directions": ("xz", "yz"),
 }
+# Names of the other axes' columns.
+KEYS = {size: name for size, (name, _) in SCALES.items()} | {
+    "members": "element", "npp": "point", "patch_nodes": "node"
+}  # fmt: skip
+# Datasets that number the positions along an axis.
+LABELS = {"gages": "gages/number", "members": "plies/element", "patch_nodes": "patch/node"}
+# Datasets of the table of ply stresses.
+PLIES = tuple(f"plies/{name}" for name in (*IN_PLANE, *INTERLAMINAR))
 # Lines per block.
 BLOCK = 100_000
 
@@ -84,7 +96,10 @@ def table(result: Result, name: str = "history") -> Table:
     instants = [result[path] for path in clock]
     if not values:  # only step or time
         return Table(_names(clock), zip(*(times.tolist() for times in instants), strict=True))
+    values = [path for path in values if path not in LABELS.values()] or values
     arrays = [result[path] for path in values]
+    if name.strip("/") == "plies" and len(values) > len(PLIES):
+        arrays, values = _at_faces(result), list(PLIES)
     shape = arrays[0].shape
     if any(array.shape != shape for array in arrays):
         choice = f"{', '.join(values[:-1])} or {values[-1]}"
@@ -94,7 +109,7 @@ def table(result: Result, name: str = "history") -> Table:
     columns = _names(values)
     if len(values) == 1 and axes and len(names := NAMED.get(axes[-1][0], ())) >= axes[-1][1]:
         columns = names[: axes.pop()[1]]
-    keys = tuple(SCALES[str(size)][0] if str(size) in SCALES else "row" for size, _ in axes)
+    keys = tuple(KEYS.get(str(size), "row") for size, _ in axes)
     rows = _rows(arrays, instants, [_labels(result, *axis) for axis in axes])
     return Table((*_names(clock), *keys, *columns), rows)
 
@@ -109,10 +124,7 @@ def _members(result: Result, name: str) -> list[str]:
         return sorted(members, key=lambda path: known.index(path) if path in known else len(known))
     group = name.partition("/")[0]
     if group in STORED_BY and not any(path.startswith(f"{group}/") for path in result):
-        macro = STORED_BY[group]
-        raise ExportError(
-            f"the result has no {name}; add {macro} to the deck's program and run it again"
-        )
+        raise ExportError(f"the result has no {name}{remedy(name)}")
     raise ExportError(f"the result has no dataset {name}{suggestion(name, result)}")
 
 
@@ -126,11 +138,19 @@ def _in_rows(path: str) -> bool:
     return path not in DATASETS or DATASETS[path].shape[0] == "rows"
 
 
+def _at_faces(result: Result) -> list[Array]:
+    """Ply stresses at both faces; interlaminar ones are the same at every point of an element."""
+    *in_plane, tau_xz, tau_yz = (result[path] for path in PLIES)
+    shape = in_plane[0].shape
+    return [
+        *in_plane, *(np.broadcast_to(tau[:, :, None, :, ::2], shape) for tau in (tau_xz, tau_yz))
+    ]  # fmt: skip
+
+
 def _labels(result: Result, size: str | int, length: int) -> Sequence[int]:
-    """Numbers along an axis: those of the gage cards for gages, else from 1."""
-    if size == "gages" and "gages/number" in result:
-        return [int(number) for number in result["gages/number"]]
-    return range(1, length + 1)
+    """Numbers along an axis: those of gages, elements or nodes that are stored, else from 1."""
+    path = LABELS.get(str(size), "")
+    return result[path].tolist() if path in result else range(1, length + 1)
 
 
 def _rows(

@@ -64,6 +64,7 @@ ENERGIES = [
 SCALE_NAMES = {
     "energy/balance_error": "the largest energy",
     "laminate/B": "sqrt(max A * max D)",
+    "plies/residual": "the largest interlaminar stress",
     "history/indentation": "the largest indentation in contact",
     "tape9/indentation": "the largest indentation in contact",
 }
@@ -323,6 +324,8 @@ def _scale(found: Comparison) -> float:
     group = found.path.partition("/")[0]
     if found.path == "energy/balance_error":
         scale = max(map(largest, ENERGIES))
+    elif found.path == "plies/residual":
+        scale = max(largest("plies/tau_xz"), largest("plies/tau_yz"))
     elif found.path == "laminate/B":
         # With the thickness h, A h and D / h have the order of B.
         scale = (largest("laminate/A") * largest("laminate/D")) ** 0.5

@@ -82,7 +82,7 @@ class FileSink:
             clock.make_scale(TIME)
         for dataset, made in made_of:
             clock = clocks.get(dataset.group)
-            if clock is None or made == clock:
+            if made == clock or (clock is None and dataset.group != "patch"):
                 continue
             for axis, size in enumerate(dataset.shape):
                 rows = size == "rows"

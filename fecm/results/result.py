@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fecm.results.hdf5_reader import Contents
+    from fecm.results.plies import Plies
 
 Array = NDArray[Any]
 HISTORY = "history"
@@ -47,6 +48,44 @@ class Group:
     def __dir__(self) -> list[str]:
         own = [p.rpartition("/")[2] for p in self._arrays if p.startswith(f"{self._name}/")]
         return [*super().__dir__(), *own]
+
+
+class PlyGroup(Group):
+    """The datasets of ``plies``; called, the stresses and strains of some plies."""
+
+    def __init__(self, result: Result) -> None:
+        super().__init__("plies", result._arrays, result._groups.get("plies", {}))
+        self._result = result
+
+    def __call__(
+        self,
+        time: float | Sequence[float] | None = None,
+        elements: int | Sequence[int] | None = None,
+    ) -> Plies:
+        """Stresses and strains ply by ply.
+
+        Parameters
+        ----------
+        time : float or sequence of float, optional
+            Times, for which the nearest stored rows are taken; all rows by default.
+        elements : int or sequence of int, optional
+            Numbers of elements; by default all with ply stresses.
+
+        Raises
+        ------
+        NotStoredError
+            If the result has no ply stresses, or not at such a time or of such an element.
+        ResultFileError
+            If the result's deck can't be read or does not fit its ply stresses.
+
+        Examples
+        --------
+        >>> plies = result.plies(time=4e-5, elements=[61, 62])  # doctest: +SKIP
+        >>> plies.sigma_1.max(), plies.eps_1.max()  # doctest: +SKIP
+        """
+        from fecm.results.plies import plies_of
+
+        return plies_of(self._result, time, elements)
 
 
 class Result:
@@ -101,6 +140,11 @@ class Result:
     def unit(self, dimension: str) -> str:
         """Unit of a dimension such as ``"force/length"``; empty if the deck names none."""
         return unit_of(dimension, declared_units(self.attributes))
+
+    @property
+    def plies(self) -> PlyGroup:
+        """Ply stresses: ``result.plies(time, elements)``, or a dataset ``result.plies.sigma_1``."""
+        return PlyGroup(self)
 
     @property
     def still_in_contact(self) -> bool:

@@ -1,7 +1,8 @@
 """Schema of a result file: path, shape, dimension and description of every dataset.
 
 Shapes use the sizes of a run: ``rows`` of the group, ``numnp``, ``ndm``, ``ndf``,
-``numel``, ``nen``, ``npt`` and ``nps`` (points per element in tape8 and stresses), ``gages``.
+``numel``, ``nen``, ``npt`` and ``nps`` (points per element in tape8 and stresses), ``gages``;
+of ply stresses ``members`` (elements), ``npp`` (points per element), ``layers`` and :data:`FIXED`.
 """
 
 from __future__ import annotations
@@ -258,25 +259,27 @@ DATASETS = {
         Dataset(
             "plies/element", ("members",), "number of every element with ply stresses", dtype="i4"
         ),
-        Dataset("plies/z", ("layers", 3), "lower, middle and upper z of every ply", "length"),
+        Dataset(
+            "plies/z", ("layers", "levels"), "lower, middle and upper z of every ply", "length"
+        ),
         Dataset(
             "plies/under_load", ("members",),
             "1 where plate theory does not hold: nearer than the patch's radius + h/2 to the load",
             dtype="i4",
         ),
         *_group(
-            "plies", ("rows", "members", "npp", "layers", 2),
+            "plies", ("rows", "members", "npp", "layers", "faces"),
             ("sigma_1", "normal stress along the fibres, at both faces", "force/length^2"),
             ("sigma_2", "normal stress across the fibres", "force/length^2"),
             ("tau_12", "shear stress in the axes of the ply", "force/length^2"),
         ),
         *_group(
-            "plies", ("rows", "members", "layers", 3),
+            "plies", ("rows", "members", "layers", "levels"),
             ("tau_xz", "interlaminar shear stress at the element's centre", "force/length^2"),
             ("tau_yz", "interlaminar shear stress at the element's centre", "force/length^2"),
         ),
         Dataset(
-            "plies/residual", ("rows", "members", 2),
+            "plies/residual", ("rows", "members", "directions"),
             "tau_xz and tau_yz of equilibrium at z = h/2, removed linearly in z", "force/length^2",
         ),
         *_clock("reactions"),
@@ -294,6 +297,9 @@ DATASETS = {
     )
 }  # fmt: skip
 
+# Sizes of axes that every result has.
+FIXED = {"faces": 2, "levels": 3, "directions": 2}
+
 # Dimension scales of datasets stored in rows: name and description by size.
 SCALES = {
     "numnp": ("node", "number of the node"),
@@ -301,8 +307,13 @@ SCALES = {
     "npt": ("point", "number of the point in its element"),
     "nps": ("stress_point", "number of the stress point in its element"),
     "ndf": ("unknown", "name of the unknown"),
+    "patch_nodes": ("patch_node", "position of the node among those of the patch, from 1"),
+    "members": ("member", "position of the element among those with ply stresses, from 1"),
     "npp": ("ply_point", "number of the point in its element"),
     "layers": ("ply", "number of the ply, from z = -h/2"),
+    "faces": ("face", "face of the ply: 1 at its lower z, 2 at its upper z"),
+    "levels": ("level", "level in the ply: 1 at its lower z, 2 at its middle, 3 at its upper z"),
+    "directions": ("direction", "1 is xz, 2 is yz"),
     "gages": ("gage", "position of the gage among the gages, from 1"),
 }
 
@@ -317,7 +328,7 @@ def shape_error(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str])
     kinds : mapping
         NumPy's letter for the kind of number: ``"f"``, ``"i"``, ``"u"`` or ``"b"``.
     """
-    sizes: dict[str, tuple[int, str]] = {}
+    sizes = {name: (size, "every result") for name, size in FIXED.items()}
     for path, shape in shapes.items():
         if (dataset := DATASETS.get(path)) is None:
             continue
@@ -362,5 +373,11 @@ GROUP_DESCRIPTIONS = {
 STORED_BY = {
     "tape3": "DISP", "tape8": "RODP", "tape9": "RODP", "history": "RODP", "energy": "RODP",
     "gages": "RODP or EXCD",
-    "stresses": "STRE", "plies": "PLYS", "patch": "PATC", "reactions": "REAC", "modes": "EIGE",
+    "stresses": "STRE", "plies": "PLYS", "reactions": "REAC", "modes": "EIGE",
 }  # fmt: skip
+
+
+def remedy(path: str) -> str:
+    """End of a message about a missing dataset: what stores it; empty if no macro does."""
+    word = STORED_BY.get(path.partition("/")[0])
+    return f"; add {word} to the deck's program and run it again" if word else ""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from fecm.mechanics.strains import STRAINS
 from fecm.results.hdf5_writer import new_hdf5
+from fecm.results.plies import IN_PLANE, INTERLAMINAR
 from fecm.results.result import Result
 from fecm.results.schema import ExportError
 
@@ -73,6 +74,7 @@ def write_vtkhdf(
         _write_displacements(root, result["tape3/displacement"], rows)
         _write_contact(root, result, steps)
         _write_strains(root, result, steps, note)
+        _write_plies(root, result, steps, note)
 
 
 def _cells(elements: Array) -> tuple[Ints, Ints, Ints]:
@@ -162,17 +164,9 @@ def _write_strains(root: h5py.Group, result: Result, steps: Ints, note: Note) ->
     if "tape8/step" not in result:
         note("the result has no strains (tape8), which the macro RODP stores")
         return
-    stored = result["tape8/step"]
-    at = np.minimum(np.searchsorted(stored, steps), len(stored) - 1)
-    shared = stored[at] == steps
+    at, shared = _rows_of(result, "tape8", steps, "strains", note)
     if not shared.any():
-        note("strains (tape8) and displacements (tape3) share no step; strains are omitted")
         return
-    if not shared.all():
-        note(
-            f"strains (tape8) were stored at {shared.sum()} of {len(steps)} time steps; at the "
-            "others they are NaN"
-        )
     elements, numnp = result["mesh/elements"], len(result["mesh/coordinates"])
     npt = result["tape8/kappa_x"].shape[2]
     at_nodes = result.tape8.attributes.get("location") == "nodes" and _covers(elements, npt)
@@ -184,6 +178,52 @@ def _write_strains(root: h5py.Group, result: Result, steps: Ints, note: Note) ->
             row = values[at[number]] if shared[number] else np.full(values.shape[1:], np.nan)
             step = _nodal_means(row, elements, numnp) if at_nodes else row.mean(axis=1)
             field[number * length : (number + 1) * length] = step
+
+
+def _rows_of(
+    result: Result, group: str, steps: Ints, what: str, note: Note
+) -> tuple[Ints, NDArray[np.bool_]]:
+    """Rows of a group at the time steps, and which of these have one."""
+    stored = result[f"{group}/step"]
+    at, shared = np.searchsorted(stored, steps), np.isin(steps, stored)
+    if not shared.any():
+        note(f"{what} ({group}) and displacements (tape3) share no step; {what} are omitted")
+    elif not shared.all():
+        note(
+            f"{what} ({group}) were stored at {shared.sum()} of {len(steps)} time steps; at the "
+            "others they are NaN"
+        )
+    return at, shared
+
+
+def _write_plies(root: h5py.Group, result: Result, steps: Ints, note: Note) -> None:
+    """Cell data: of each component the value of largest magnitude, and the ply that has it."""
+    if "plies/step" not in result:
+        return
+    at, shared = _rows_of(result, "plies", steps, "ply stresses", note)
+    if not shared.any():
+        return
+    cells, length = result["plies/element"] - 1, len(result["mesh/elements"])
+    for name in (*IN_PLANE, *INTERLAMINAR):
+        values = result[f"plies/{name}"]
+        largest = _field(root, "Cell", name, len(steps), (length,))
+        ply = _field(root, "Cell", f"{name}_ply", len(steps), (length,))
+        for number in range(len(steps)):
+            step = np.full((2, length), np.nan)
+            if shared[number]:
+                step[:, cells] = _largest(values[at[number]])
+            largest[number * length : (number + 1) * length] = step[0]
+            ply[number * length : (number + 1) * length] = step[1]
+
+
+def _largest(row: Array) -> Array:
+    """Value of largest magnitude in (..., plies, levels) of every element, and its ply, (2, n)."""
+    values = np.moveaxis(row, -2, 1)
+    flat = values.reshape(len(values), -1)
+    place = np.abs(flat).argmax(axis=1)  # the first NaN, if there is one
+    found = flat[np.arange(len(flat)), place]
+    ply = place // (flat.shape[1] // values.shape[1]) + 1.0
+    return np.stack([found, np.where(np.isnan(found), np.nan, ply)])
 
 
 def _covers(elements: Array, npt: int) -> bool:

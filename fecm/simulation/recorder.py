@@ -12,7 +12,7 @@ from fecm._typing import Floats
 from fecm.deck.macros import WorkEstimate
 from fecm.mechanics.strains import STRAINS
 from fecm.problem.build import ImpactModel
-from fecm.results.schema import DATASETS, Dataset
+from fecm.results.schema import DATASETS, FIXED, Dataset
 from fecm.results.sinks import RowBuffer, Sink
 from fecm.simulation.state import subset
 from fecm.simulation.step_recorder import OnBlock, StepRecorder
@@ -87,7 +87,7 @@ class Recorder:
             "numel": mesh.elements.shape[0], "nen": mesh.elements.shape[1],
             "ndf": mesh.equations.shape[1], "npt": self._model.strains.shape[1],
             "nps": self._model.stress_points.shape[1],
-            "gages": 0 if gages is None else len(gages.numbers),
+            "gages": 0 if gages is None else len(gages.numbers), **FIXED,
         }  # fmt: skip
         if self._model.plies is not None:
             numbers |= zip(("members", "npp", "layers"), self._model.plies.shape, strict=True)

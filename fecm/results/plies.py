@@ -1,0 +1,232 @@
+"""Ply stresses and strains of a result."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._typing import Bools, Floats
+from fecm.deck.model import Deck, Material
+from fecm.deck.reader import Reader
+from fecm.mechanics.element_groups import element_blocks
+from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, gauss, nodal
+from fecm.mechanics.interpolation import local_shape_functions
+from fecm.results.schema import NotStoredError, ResultFileError, remedy
+
+Array = NDArray[Any]
+Ints = NDArray[np.intp]
+
+IN_PLANE = ("sigma_1", "sigma_2", "tau_12")
+INTERLAMINAR = ("tau_xz", "tau_yz")
+
+
+class Stored(Protocol):
+    """What is needed of a :class:`~fecm.results.result.Result`."""
+
+    deck: str
+
+    @property
+    def mode(self) -> str:
+        """``"report"`` or ``"listing"``."""
+
+    @property
+    def slips(self) -> tuple[str, ...]:
+        """Names of the active slips."""
+
+    def __getitem__(self, path: str) -> Array: ...
+
+    def __contains__(self, path: str) -> bool: ...
+
+
+@dataclass(frozen=True)
+class Plies:
+    """Stresses and strains of plies, in the deck's units.
+
+    In-plane values are in the axes of the ply, at the points of each element and both faces of each
+    ply, (rows, elements, points, plies, 2).  Interlaminar stresses are in the axes of the plate,
+    from equilibrium, at the centre of each element and three levels of each ply, (rows, elements,
+    plies, 3).  sigma_z is not computed.
+
+    Attributes
+    ----------
+    step, time : ndarray (rows,)
+        Step and time of every row.
+    element : ndarray (elements,)
+        Numbers of the elements.
+    x, y : ndarray (elements, points)
+        Places of the points, length.
+    z : ndarray (plies, 3)
+        Lower, middle and upper z of every ply, from the struck face at -h/2, length.
+    angles : ndarray (plies,)
+        Fibre angles, degrees.
+    under_load : ndarray (elements,)
+        Whether the element is so near to the load that plate theory does not hold.
+    sigma_1, sigma_2, tau_12 : ndarray (rows, elements, points, plies, 2)
+        Stresses along and across the fibres, and shear stress.
+    eps_1, eps_2, gamma_12 : ndarray (rows, elements, points, plies, 2)
+        Strains by the compliance of the ply.
+    tau_xz, tau_yz : ndarray (rows, elements, plies, 3)
+        Interlaminar shear stresses; NaN in elements without nine nodes.
+    residual : ndarray (rows, elements, 2)
+        tau_xz and tau_yz of equilibrium at z = h/2, which were removed linearly in z.
+    """
+
+    step: Array
+    time: Floats
+    element: Array
+    x: Floats
+    y: Floats
+    z: Floats
+    angles: Floats
+    under_load: Bools
+    sigma_1: Floats
+    sigma_2: Floats
+    tau_12: Floats
+    eps_1: Floats
+    eps_2: Floats
+    gamma_12: Floats
+    tau_xz: Floats
+    tau_yz: Floats
+    residual: Floats
+
+
+def plies_of(
+    result: Stored,
+    time: float | Sequence[float] | None = None,
+    elements: int | Sequence[int] | None = None,
+) -> Plies:
+    """Stresses and strains of a result's plies; see :meth:`fecm.results.result.PlyGroup.__call__`.
+
+    Raises
+    ------
+    NotStoredError
+        If the result has no ply stresses, or not at such a time or in such an element.
+    ResultFileError
+        If the result's deck can't be read or does not fit its ply stresses.
+    """
+    if "plies/sigma_1" not in result:
+        raise NotStoredError(f"the result has no ply stresses{remedy('plies')}")
+    stored = {name: result[f"plies/{name}"] for name in (*IN_PLANE, *INTERLAMINAR, "residual")}
+    times, numbers, z = (result[f"plies/{name}"] for name in ("time", "element", "z"))
+    rows = np.arange(len(times))
+    if time is not None:
+        rows = rows_at(times, np.atleast_1d(time), "ply stresses")
+    members = np.arange(len(numbers))
+    if elements is not None:
+        members = _members(numbers, np.atleast_1d(elements))
+    chosen = {name: values[np.ix_(rows, members)] for name, values in stored.items()}
+    material = _material(result, len(z))
+    ply, g12 = material.ply, material.ply.g12
+    if "g12" in result.slips and ply.e1 == ply.e2:
+        g12 = ply.e1 / (2.0 * (1.0 + ply.nu12))
+    one, two, shear = (chosen[name] for name in IN_PLANE)
+    x, y = points_of(result, numbers[members], one.shape[2], material.integration.points < 0)
+    return Plies(
+        step=result["plies/step"][rows], time=times[rows], element=numbers[members], x=x, y=y, z=z,
+        angles=np.array([layer.angle for layer in material.layers]),
+        under_load=result["plies/under_load"][members] != 0,
+        eps_1=(one - ply.nu12 * two) / ply.e1,
+        eps_2=two / ply.e2 - ply.nu12 * one / ply.e1,
+        gamma_12=shear / g12, **chosen,
+    )  # fmt: skip
+
+
+def model_of(result: Stored) -> Deck:
+    """Model of a result's deck.
+
+    Raises
+    ------
+    ResultFileError
+        If the result holds no readable deck.
+    """
+    deck = _parsed(result.deck, result.mode == "listing")
+    if deck is None:
+        raise ResultFileError("the result holds no deck that can be read")
+    return deck
+
+
+@functools.lru_cache(maxsize=8)
+def _parsed(text: str, blanks_are_zeros: bool) -> Deck | None:
+    """Parse a deck's text once, however often it is needed."""
+    problems = Reader(text, blanks_are_zeros=blanks_are_zeros).problems()
+    return next((problem.deck for problem in problems if problem.deck is not None), None)
+
+
+def _material(result: Stored, plies: int) -> Material:
+    """Material of a result's deck, which must have as many layers as there are plies."""
+    material = model_of(result).last(Material)
+    if material is None or len(material.layers) != plies:
+        raise ResultFileError(f"the result's deck does not have the {plies} plies of its stresses")
+    return material
+
+
+def points_of(result: Stored, numbers: Array, count: int, at_nodes: bool) -> tuple[Floats, Floats]:
+    """Coordinates x and y of the points of some elements.
+
+    Parameters
+    ----------
+    result : Stored
+    numbers : ndarray (m,)
+        Numbers of the elements.
+    count : int
+        Points of an element.
+    at_nodes : bool
+        Whether the points are nodes, not Gauss points.
+
+    Returns
+    -------
+    x, y : ndarray (m, count)
+        Length.
+
+    Raises
+    ------
+    ResultFileError
+        If there is no such element or no rule of so many points.
+    """
+    order = math.isqrt(count)
+    if order**2 != count or not 1 <= order <= HIGHEST_ORDER:
+        raise ResultFileError(f"there are {count} points per element, which is invalid")
+    elements, coordinates = result["mesh/elements"], result["mesh/coordinates"][:, :2]
+    if len(numbers) and not 1 <= numbers.min() <= numbers.max() <= len(elements):
+        raise ResultFileError(f"elements outside 1 to {len(elements)} have stored values")
+    rule = nodal(order) if at_nodes else gauss(order)
+    found = np.empty((2, len(numbers), count))
+    for family in element_blocks(elements[numbers - 1], coordinates):
+        N = local_shape_functions(family, rule)[0]
+        found[:, family.rows] = np.einsum("pn,eni->iep", N, family.coordinates)
+    return found[0], found[1]
+
+
+def rows_at(stored: Floats, times: Sequence[float] | Floats, what: str) -> Ints:
+    """Rows nearest to the given times.
+
+    Raises
+    ------
+    NotStoredError
+        If a time is outside of the rows.
+    """
+    spacing = float(np.diff(stored).max()) if len(stored) > 1 else float(stored[0])
+    for time in times:
+        if not stored[0] - spacing <= time <= stored[-1] + spacing:
+            raise NotStoredError(
+                f"no {what} at time {time:g}: the rows cover {stored[0]:g} to {stored[-1]:g}"
+            )
+    return np.array([np.abs(stored - time).argmin() for time in times], dtype=np.intp)
+
+
+def _members(numbers: Array, wanted: Array) -> Ints:
+    """Positions of elements among those with ply stresses."""
+    place = {int(number): position for position, number in enumerate(numbers)}
+    for number in wanted:
+        if int(number) not in place:
+            raise NotStoredError(
+                f"no ply stresses of element {number}: they are stored for {len(numbers)} elements "
+                f"from {min(place)} to {max(place)}"
+            )
+    return np.array([place[int(number)] for number in wanted], dtype=np.intp)

@@ -1,0 +1,176 @@
+"""Ply stresses of a result: in Python, as tables, in VTKHDF and in xarray."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import fecm
+from fecm.results.csv import table
+from fecm.results.result import Result
+from fecm.results.schema import NotStoredError, ResultFileError
+from fecm.results.vtkhdf import write_vtkhdf
+from tests.builders import REPORT_PLY, turned_stiffness
+from tests.calls import call
+from tests.decks import DATA_CARDS, PROGRAM, small
+
+# The disc lies in element 4, whose centre is nearest to it.
+PATCH = "PATC\nDISC             .2       1.5       1.5\n"
+STORED = PROGRAM.replace("DISP          5\n", "DISP          5\nPLYS          5    2\n")
+DECK = small(STORED, data=PATCH + DATA_CARDS)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The small plate under a patch: stresses of two elements at steps 5 and 10."""
+    path = tmp_path_factory.mktemp("plies") / "small.h5"
+    fecm.run(DECK, output=path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def result(file: Path) -> Result:
+    return fecm.load(file)
+
+
+def test_strains_of_plies_times_the_stiffness_of_the_ply_are_their_stresses(result: Result) -> None:
+    plies = result.plies()
+    strains = np.stack([plies.eps_1, plies.eps_2, plies.gamma_12], axis=-1)
+    stresses = np.stack([plies.sigma_1, plies.sigma_2, plies.tau_12], axis=-1)
+    assert stresses.shape == (2, 2, 9, 2, 2, 3)
+    found = strains @ turned_stiffness(REPORT_PLY, 0.0)
+    np.testing.assert_allclose(found, stresses, rtol=1e-9, atol=1e-12 * np.abs(stresses).max())
+    np.testing.assert_array_equal(plies.sigma_1, result["plies/sigma_1"])
+    np.testing.assert_array_equal(plies.angles, [0.0, 90.0])
+
+
+def test_strains_on_the_far_face_are_those_of_the_curvatures(result: Result) -> None:
+    # u and v are restrained: the strain along the fibres of the 90 degree ply is z kappa_y.
+    plies, z = result.plies(), 0.053
+    kappa_y = result["tape8/kappa_y"][:, plies.element - 1]
+    np.testing.assert_allclose(plies.eps_1[:, :, :, 1, 1], z * kappa_y, rtol=1e-9, atol=1e-15)
+
+
+def test_points_of_plies_are_the_nodes_where_the_deck_stores_strains_at_nodes(
+    result: Result,
+) -> None:
+    plies = result.plies()
+    nodes = result["mesh/coordinates"][result["mesh/elements"][plies.element - 1] - 1]
+    np.testing.assert_allclose(np.stack([plies.x, plies.y], -1), nodes, atol=1e-14)
+
+
+def test_times_and_elements_select_the_nearest_row_and_the_element_of_the_number(
+    result: Result,
+) -> None:
+    number = int(result["plies/element"][1])
+    plies = result.plies(time=4.4e-6, elements=number)
+    assert (plies.step.tolist(), plies.element.tolist()) == ([10], [number])
+    np.testing.assert_array_equal(plies.sigma_2[0, 0], result["plies/sigma_2"][1, 1])
+    np.testing.assert_array_equal(plies.tau_xz[0, 0], result["plies/tau_xz"][1, 1])
+
+
+def test_what_is_not_stored_is_answered_with_the_remedy_or_the_range(result: Result) -> None:
+    with pytest.raises(NotStoredError, match="no ply stresses at time 1: the rows cover 2"):
+        result.plies(time=1.0)
+    with pytest.raises(NotStoredError, match="no ply stresses of element 9"):
+        result.plies(elements=[9])
+    without = fecm.run(small())
+    assert isinstance(without, Result)
+    with pytest.raises(NotStoredError, match="add PLYS to the deck's program"):
+        without.plies()
+    other = Result({path: result[path] for path in result}, {"deck": small()}, {})
+    other.deck = small().replace("    2  90.     0.053\n", "")
+    with pytest.raises(ResultFileError, match="2 plies"):
+        other.plies()
+
+
+def test_the_table_of_plies_has_a_line_for_each_face_with_the_shear_of_the_element(
+    result: Result,
+) -> None:
+    header, *lines = "".join(table(result, "plies").lines()).splitlines()
+    assert header == ("step,time,element,point,ply,face,sigma_1,sigma_2,tau_12,tau_xz,tau_yz")
+    assert len(lines) == 2 * 2 * 9 * 2 * 2
+    step, _, element, point, ply, face, *values = lines[-3].split(",")
+    assert (step, point, ply, face) == ("10", "9", "1", "2")
+    assert int(element) == result["plies/element"][1]
+    stored = [result[f"plies/{name}"] for name in ("sigma_1", "sigma_2", "tau_12")]
+    shear = [result[f"plies/{name}"][1, 1, 0, 2] for name in ("tau_xz", "tau_yz")]
+    assert [*map(float, values)] == [*(array[1, 1, 8, 0, 1] for array in stored), *shear]
+
+
+@pytest.mark.parametrize(
+    ("name", "header"),
+    [
+        ("plies/sigma_1", "step,time,element,point,ply,lower,upper"),
+        ("plies/tau_xz", "step,time,element,ply,lower,middle,upper"),
+        ("plies/residual", "step,time,element,xz,yz"),
+        ("plies/z", "ply,lower,middle,upper"),
+        ("patch", "node,weight"),
+    ],
+)
+def test_axes_of_plies_and_patch_have_their_names(result: Result, name: str, header: str) -> None:
+    assert next(table(result, name).lines()) == header + "\n"
+
+
+def test_cells_have_the_stress_of_largest_magnitude_and_its_ply(
+    result: Result, tmp_path: Path
+) -> None:
+    notes: list[str] = []
+    write_vtkhdf(result, tmp_path / "plate.vtkhdf", notes.append)
+    assert not notes
+    members = result["plies/element"] - 1
+    with h5py.File(tmp_path / "plate.vtkhdf") as file:
+        data = {name: field[()].reshape(2, 4) for name, field in file["VTKHDF/CellData"].items()}
+    for name, axes in (("sigma_2", (1, 3)), ("tau_xz", (2,))):
+        stored = result[f"plies/{name}"]
+        by_ply = np.abs(stored).max(axis=tuple(axis + 1 for axis in axes))
+        np.testing.assert_array_equal(np.abs(data[name][:, members]), by_ply.max(axis=2))
+        np.testing.assert_array_equal(data[f"{name}_ply"][:, members], by_ply.argmax(axis=2) + 1)
+        others = np.setdiff1d(np.arange(4), members)
+        assert np.isnan(data[name][:, others]).all()
+        assert np.isnan(data[f"{name}_ply"][:, others]).all()
+    assert (data["sigma_2"][:, members] < 0.0).any()
+
+
+def test_cells_without_nine_nodes_have_no_interlaminar_stress(
+    result: Result, tmp_path: Path
+) -> None:
+    arrays = {path: result[path] for path in result}
+    arrays["plies/tau_xz"] = np.full_like(arrays["plies/tau_xz"], np.nan)
+    write_vtkhdf(Result(arrays, {}, {}), tmp_path / "plate.vtkhdf")
+    with h5py.File(tmp_path / "plate.vtkhdf") as file:
+        assert np.isnan(file["VTKHDF/CellData/tau_xz_ply"][()]).all()
+        assert np.isfinite(file["VTKHDF/CellData/sigma_1_ply"][()]).any()
+
+
+def test_xarray_opens_plies_and_patch_beside_the_other_groups(file: Path, result: Result) -> None:
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    with xarray.open_datatree(file, engine="h5netcdf", phony_dims="sort") as tree:
+        assert tree["plies"].sigma_1.dims == ("time", "member", "ply_point", "ply", "face")
+        assert tree["plies"].tau_xz.dims == ("time", "member", "ply", "level")
+    for path in ("plies/element", "patch/node"):
+        group, _, name = path.partition("/")
+        with xarray.open_dataset(file, group=group, engine="h5netcdf") as opened:
+            np.testing.assert_array_equal(opened[name], result[path])
+
+
+def test_info_and_diff_show_patch_and_plies(file: Path, tmp_path: Path) -> None:
+    shown = call("info", file).stdout
+    assert "plies: stresses ply by ply" in shown
+    assert "radius = 0.2" in shown
+    fecm.run(DECK.replace("115.0", "116.0"), output=tmp_path / "faster.h5")
+    found = call("diff", file, tmp_path / "faster.h5", "--rtol", ".05")
+    assert found.exit_code == 0, found.stdout
+
+
+def test_the_residual_is_compared_on_the_scale_of_the_stresses(file: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "copy.h5"
+    copy.write_bytes(file.read_bytes())
+    with h5py.File(copy, "r+") as opened:
+        opened["plies/residual"][...] += 1e-9 * np.abs(opened["plies/tau_xz"][()]).max()
+    assert call("diff", file, copy, "--rtol", "1e-8").exit_code == 0
+    assert call("diff", file, copy, "--rtol", "1e-10").exit_code == 1
