@@ -4,7 +4,8 @@
 
 Cases are the report's deck (`report`), its mesh refined 3, 10 and 20 times in each direction (`x3`,
 `x10`, `x20`), the mesh refined 10 times and hit beside its middle (`off-centre`), so that all of it
-has to be stepped, and the report's mesh with its inner nodes moved at random (`distorted`).  The
+has to be stepped, the report's mesh with its inner nodes moved at random (`distorted`), and the
+report's deck with a contact patch (`patch`), compared with the deck without, run in turns.  The
 plain loop is the product with scipy's CSR matrix, the update of the plate and the same contact
 code; the other one is what ``fecm run`` does: energies, history and stored rows included, written
 to a file, on one thread and on every core.
@@ -31,9 +32,9 @@ import fecm
 from fecm.deck import Deck
 from fecm.deck.grid import Grid, Section
 from fecm.deck.macros import compile_program
-from fecm.deck.model import Boundary, Coordinates, Elements, Impact
+from fecm.deck.model import Boundary, Coordinates, Elements, Impact, Patch
 from fecm.deck.records import Control, NodeValues
-from fecm.mechanics.stiffness_product import available
+from fecm.mechanics.stiffness_product import CSR, available
 from fecm.problem.build import build_model
 from fecm.problem.generate import generate
 from fecm.problem.options import RunOptions
@@ -96,6 +97,12 @@ def distorted() -> Deck:
     return replace(deck, segments=tuple(segments), text="")
 
 
+def patched() -> Deck:
+    """The report's deck with a contact patch."""
+    deck = report()
+    return replace(deck, segments=(*deck.segments, Patch()), text="")
+
+
 CASES: dict[str, Callable[[], Deck]] = {
     "report": report,
     "x3": lambda: refined(3),
@@ -103,6 +110,7 @@ CASES: dict[str, Callable[[], Deck]] = {
     "x20": lambda: refined(20),
     "off-centre": off_centre,
     "distorted": distorted,
+    "patch": patched,
 }
 
 
@@ -133,22 +141,30 @@ def full(problem: Problem, folder: str, threads: int = 1) -> float:
 
 def plain(problem: Problem, steps: int) -> float:
     """Seconds of the plain loop."""
-    setup = build_model(problem)
-    impact, K, m = setup.impact, setup.plate.stiffness, setup.plate.mass
+    setup = build_model(problem, RunOptions(solver=CSR))
+    impact, plate = setup.impact, setup.motion.plate
+    K, m = plate.stiffness, plate.mass
     if impact is None:
         raise ValueError("nothing hits in this deck")
     state, load = impact.start(), impact.contact.load
-    displacement, velocity = state.plate.displacement, np.zeros(setup.plate.neq)
-    ones = np.ones(setup.plate.neq)
+    displacement, velocity = state.plate.displacement, np.zeros(plate.neq)
     dt = time_step(problem.deck)
     begin = time.perf_counter()
     for _ in range(steps):
         force = -(K @ displacement)
-        load.subtract(-state.contact.force, ones, force)
         velocity += dt * (force / m)
+        load.subtract(-state.contact.force, dt, velocity)
         displacement += dt * velocity
         impact.move_projectile(state, dt)
     return time.perf_counter() - begin
+
+
+def patch_over_point(folder: str) -> float:
+    """Cost of a step with a patch over one without; the best of many short runs in turns."""
+    problems = [checked(deck, 1000) for deck in (patched(), report())]
+    times = [[full(problem, folder) for problem in problems] for _ in range(12 * ROUNDS)]
+    patch, point = np.min(times, axis=0)
+    return float(patch / point)
 
 
 def measure(name: str) -> dict[str, float | str | int]:
@@ -163,6 +179,7 @@ def measure(name: str) -> dict[str, float | str | int]:
         pairs = [(plain(problem, steps), first)]
         pairs += [(plain(problem, steps), full(problem, folder)) for _ in range(ROUNDS - 1)]
         shared = [full(problem, folder, available()) for _ in range(ROUNDS)]
+        over_point = patch_over_point(folder) if name == "patch" else None
     neq = problem.mesh.number_of_equations
     ours = statistics.median(b for _, b in pairs) / steps
     together = statistics.median(shared) / steps
@@ -179,6 +196,7 @@ def measure(name: str) -> dict[str, float | str | int]:
         "million_unknown_steps_a_second_on_every_core": round(neq / together / 1e6, 1),
         "us_an_element": round(ours * 1e6 / deck.control.numel, 4),
         "peak_memory_mb": round(peak, 1),
+        **({} if over_point is None else {"over_point_force": round(over_point, 3)}),
     }
 
 
@@ -205,6 +223,8 @@ def main() -> None:
             f"{row['million_unknown_steps_a_second_on_every_core']:10}{row['peak_memory_mb']:8}",
             flush=True,
         )
+        if "over_point_force" in row:
+            print(f"{'':12}a step with a patch costs {row['over_point_force']} of one without")
     if options.write:
         print(keep({"cases": figures}))
 

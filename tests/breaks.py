@@ -213,6 +213,12 @@ def resultants(**factors: float) -> Callable[[Any], Any]:
     return lambda found: found | {name: times * found[name] for name, times in factors.items()}
 
 
+def in_plate_axes(right: Any, laminate: Any) -> Any:
+    return right(
+        replace(laminate, plies=replace(laminate.plies, angles=0.0 * laminate.plies.angles))
+    )
+
+
 def halved(number: float) -> float:
     return number / 2.0
 

@@ -278,3 +278,35 @@ def test_figures_of_series_and_of_waves_are_those_of_the_reference_files() -> No
     given = [float(value) for value in list(along.values())[1:6]]
     fronts = [check.expected for check in chosen(["wave-fronts"])[0].checks[:5]]
     assert fronts == pytest.approx(given, rel=1e-13)
+
+
+def test_figures_of_patches_and_plies_are_those_of_the_reference_files() -> None:
+    def at(name: str, laminate: str, columns: list[str], **where: str) -> list[float]:
+        (row,) = (
+            row
+            for row in reference(name)
+            if row[next(iter(row))].startswith(laminate)
+            and all(row[column] == value for column, value in where.items())
+        )
+        return [float(row[column]) for column in columns]
+
+    for shape in ("disc", "hertz"):
+        given = at("static_patch.csv", "[0/90]5s", ["W/F conjugate mean"], K="1", shape=shape,
+                   **{"c (radius or half side)": "0.5"})  # fmt: skip
+        found = check_of("patch-compliance", f"W, {shape.replace('h', 'H')}").expected
+        assert found == pytest.approx(given[0], rel=4e-6)
+    given = at("patch_impact_summary.csv", "report-ply", ["peak force", "time of peak"], c="0.125",
+               **{"law alpha_p s_p q": ""})  # fmt: skip
+    assert [check.expected for check in chosen(["patch-impact"])[0].checks] == given
+    given = at("shear_stiffness.csv", "[0/90/0] Pagano", ["H xz,xz", "H yz,yz"])
+    expected = [check.expected for check in chosen(["equilibrium-shear"])[0].checks[1:]]
+    assert expected == pytest.approx(given, rel=1e-8)
+    columns = ["sx(a/2,b/2,+h/2)/(q0 S^2)", "txy(0,0,+h/2)/(q0 S^2)", "txz(0,b/2,0)/(q0 S)",
+               "tyz(a/2,0,0)/(q0 S)", "sy(a/2,b/2,90-ply upper face)/(q0 S^2)"]  # fmt: skip
+    given = at("pagano_sinusoidal.csv", "[0/90/0]", columns, theory="FSDT K=1",
+               **{"b/a": "1", "S=a/h": "10"})  # fmt: skip
+    # The origin of the rows is in the middle, that of the file in a corner.
+    signs = np.array([100.0, 100.0, -10.0, -10.0, 100.0])
+    quantities = ("σ1 at z = h/2", "τ12", "τ_xz", "τ_yz", "σ1 at z = h/6")
+    found_ = [check_of("ply-stresses", quantity).expected for quantity in quantities]
+    assert found_ == pytest.approx((signs * given).tolist(), rel=1e-8)

@@ -10,7 +10,16 @@ import pytest
 
 import fecm
 from fecm.deck import records
-from fecm.mechanics import element_matrices, gages, projectile, rod_integrators, strains
+from fecm.mechanics import (
+    element_matrices,
+    gages,
+    interpolation,
+    patch,
+    ply_stresses,
+    projectile,
+    rod_integrators,
+    strains,
+)
 from fecm.mechanics import impact as impacts
 from fecm.mechanics import laminate as laminates
 from fecm.mechanics.contact_law import (
@@ -37,6 +46,7 @@ from tests.breaks import (
     exchanged_on_tape8,
     halved,
     in_laminate,
+    in_plate_axes,
     in_stiffness,
     in_strains,
     instead,
@@ -197,7 +207,7 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
         {"tape8": ("κ_x ", "κ_y ", "γ_yz", "γ_xz")},
     ),
     "Jacobian transposed": (
-        instead(element_matrices, "inverse_jacobian",
+        instead(interpolation, "inverse_jacobian",
                 lambda right, *args, **other: right(
                     *args, transposed_jacobian=not other.get("transposed_jacobian", False))),
         {"patch": ("ε_x", "ε_y", "γ_xy", "κ_x", "κ_y", "κ_xy", "γ_xz", "M_x")},
@@ -326,6 +336,41 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
     ),
     "work of the new force alone": (
         instead(impacts, "couple_step", work_of_the_new_force), {"report-impact": ("worst",)},
+    ),
+    "a patch of half the radius": (
+        instead(patch, "patch_weights",
+                lambda right, mesh, shape, c, *place: right(mesh, shape, c / 2.0, *place)),
+        {"patch-compliance": ("W",), "patch-impact": ("largest", "its time")},
+    ),
+    "Hertz's pressure taken for a uniform one": (
+        instead(patch, "patch_weights",
+                lambda right, mesh, shape, *circle: right(mesh, patch.DISC, *circle)),
+        {"patch-compliance": ("W, Hertz",)},
+    ),
+    "MITC ignored": (
+        changed(build, "has_assumed_shear", lambda found: False), {"assumed-shear": ("w",)},
+    ),
+    "EQUI ignored": (
+        instead(ply_stresses, "equilibrium_shear_stiffness", lambda right, plate: plate.shear),
+        {"equilibrium-shear": ("A*",)},
+    ),
+    "faces of a ply exchanged": (
+        changed(ply_stresses, "in_plane_stresses", lambda found: found[:, ::-1]),
+        {"ply-stresses": ("σ", "τ12")},
+    ),
+    "stresses of a ply in the plate's axes": (
+        instead(ply_stresses, "in_plane_stresses", in_plate_axes),
+        {"ply-stresses": ("σ1 at z = h/6",)},
+    ),
+    "interlaminar stresses of x and y exchanged": (
+        changed(ply_stresses, "interlaminar_stresses",
+                lambda found: (found[0][:, :, ::-1], found[1])),
+        {"ply-stresses": ("τ_xz", "τ_yz"), "ply-shear": ("τ_xz at z = 0", "τ_xz at z = h")},
+    ),
+    "interlaminar stresses that do not begin at 0": (
+        changed(ply_stresses, "interlaminar_stresses",
+                lambda found: (found[0] + 0.1 * found[0].max(), found[1])),
+        {"ply-stresses": ("τ_xz", "τ_yz"), "ply-shear": ("τ_xz at z = ±h/2",)},
     ),
     "a millionth of a step's force missing in the convolution": (
         instead(Convolution, "give", partly_given), {"convolution": ("largest",)},

@@ -24,8 +24,8 @@ Indices = NDArray[np.intp]
 
 # Length of a product for which BLAS uses one thread, whatever the number of threads.
 SERIAL = 8192
-# Equations are taken as a slice if it is at most so many times longer: that is faster.
-NEAR = 8
+# Equations are taken as a slice if it is at most so long, or so many times longer: that is faster.
+SHORT, NEAR = 2048, 8
 
 
 class DivergenceError(FecmError, ArithmeticError):
@@ -143,9 +143,9 @@ class PointLoad:
         """Product with a vector over equations, which may be padded."""
         return vector.item(self.equation)
 
-    def subtract(self, force: float, scale: Floats, internal: Floats) -> None:
-        """Subtract a force from a scaled internal force."""
-        internal[self.equation] -= force * scale[self.equation]
+    def subtract(self, force: float, dt2: float, internal: Floats) -> None:
+        """Subtract a force from an internal force scaled by M^-1 dt2."""
+        internal[self.equation] -= force * (self.inverse_mass * dt2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +157,8 @@ class DistributedLoad:
     equations : ndarray (m,) or slice
     weights : ndarray (m,)
         Shares g of the equations.
+    mobility : ndarray (m,)
+        M^-1 g.
     inverse_mass : float
         g M^-1 g.
     nodal_load : float
@@ -165,6 +167,7 @@ class DistributedLoad:
 
     equations: Indices | slice
     weights: Floats
+    mobility: Floats
     inverse_mass: float
     nodal_load: float
 
@@ -174,11 +177,10 @@ class DistributedLoad:
             return float((self.weights * vector[self.equations]).sum())
         return float(self.weights.dot(vector[self.equations]))
 
-    def subtract(self, force: float, scale: Floats, internal: Floats) -> None:
-        """Subtract a force from a scaled internal force."""
-        part = scale[self.equations] * self.weights
-        part *= force
-        internal[self.equations] -= part
+    def subtract(self, force: float, dt2: float, internal: Floats) -> None:
+        """Subtract a force from an internal force scaled by M^-1 dt2."""
+        if force:
+            internal[self.equations] -= self.mobility * (force * dt2)
 
 
 Load = PointLoad | DistributedLoad
@@ -273,7 +275,7 @@ class PlateMotion:
         if not len(equations):
             raise ValueError("the force acts on restrained dofs only")
         first, stop = int(equations[0]), int(equations[-1]) + 1
-        near = stop - first <= NEAR * len(equations)
+        near = stop - first <= max(SHORT, NEAR * len(equations))
         chosen = slice(first, stop) if near else equations
         weights, inverse = shares[chosen], self._inverse_mass[chosen]
         loads = np.zeros_like(weights) if self._loads is None else self._loads[chosen]
@@ -281,7 +283,8 @@ class PlateMotion:
             return PointLoad(first, float(inverse[0]), float(loads[0]))
         mobility = weights * inverse
         square = float((mobility * weights).sum())
-        return DistributedLoad(chosen, weights, square, float((mobility * loads).sum()) / square)
+        nodal = float((mobility * loads).sum()) / square
+        return DistributedLoad(chosen, weights, mobility, square, nodal)
 
     def field(self, state: PlateState, factor: float) -> Floats:
         """All dofs of all nodes, (numnp, 5).
@@ -382,7 +385,7 @@ class PlateMotion:
             state.increment *= dt / state.dt if state.dt else 1.0
             state.dt = dt
         if applied is not None:
-            applied.load.subtract(applied.force, self._scale, state.scaled_internal_force)
+            applied.load.subtract(applied.force, dt2, state.scaled_internal_force)
         for (u, d, internal), (scale, _, _, loads) in zip(state.views, self._views, strict=True):
             d -= internal
             if loads is not None:
@@ -416,7 +419,7 @@ class PlateMotion:
         work = factor * nodal - power  # d (P - K u)
         force = factor * (factor * self._loads_square * dt2 - 2.0 * nodal_force * to_step)
         force += internal * to_step  # dt^2 (P - K u) M^-1 (P - K u)
-        if applied is not None:
+        if applied is not None and applied.force:
             load, F = applied
             inverse = load.inverse_mass * dt2
             p = load.dot(state.scaled_internal_force) * to_step

@@ -8,7 +8,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from fecm._errors import FecmError
-from fecm.verification import coupled, impacts, indentations, laminates, plates, rods, waves
+from fecm.verification import (
+    coupled,
+    impacts,
+    indentations,
+    laminates,
+    patches,
+    plates,
+    plies,
+    rods,
+    waves,
+)
 from fecm.verification.case import (
     AGAINST_CHANGE,
     CONSISTENCY,
@@ -40,6 +50,8 @@ CASES: tuple[Case, ...] = (
     *rods.CASES,
     *indentations.CASES,
     *impacts.CASES,
+    *patches.CASES,
+    *plies.CASES,
 )
 
 

@@ -102,9 +102,10 @@ natural scale of the quantity. The tolerance follows from the theory of the disc
 reason stated. Each row of the first two kinds fails if the physics that it tests is broken on
 purpose: `tests/test_verify_breaks.py` does so, and requires that every such row is covered.
 
-Units are lb, in and s, except for the square plates of `static-bending` and `frequencies`, whose
-sides, moduli and densities are 1. Plates have L2 = 2 unless stated otherwise; `patch`,
-`resultants`, `time-step` and the impacts have L2 = 3, as the deck of the report."""
+Units are lb, in and s, except for the square plates of `static-bending`, `frequencies`,
+`assumed-shear`, `equilibrium-shear`, `ply-stresses` and `ply-shear`, whose sides and least moduli
+are of the order of 1. Plates have L2 = 2 unless stated otherwise; `patch`, `resultants`,
+`time-step` and the impacts have L2 = 3, as the deck of the report. MITC is the word of `SHEA`."""
 
 COLUMNS = ("quantity", "source", "expected", "got", "error", "allowed", "because", "label")
 
