@@ -215,3 +215,12 @@ def with_load(program: str, segment: str) -> Result:
     found = fecm.run(small(program, mesh=clamped).replace("MATE", f"{segment}MATE"))
     assert isinstance(found, Result)
     return found
+
+
+def test_assumed_shear_strains_take_the_half_plate_of_four_elements() -> None:
+    # Half a turn leaves blocks without elements.
+    shear = small().replace("EXPE", "SHEA MITC\nEXPE")
+    half, whole = fecm.run(shear), fecm.run(shear, solver="csr")
+    assert isinstance(half, Result)
+    assert isinstance(whole, Result)
+    np.testing.assert_allclose(half.force, whole.force, rtol=1e-9)
