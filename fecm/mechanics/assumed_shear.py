@@ -62,7 +62,8 @@ def strain_matrix(family: ElementBlock, rule: Quadrature) -> Floats:
         B = np.zeros((ne, len(values), nn, NDOF))
         B[..., 2] = local[:, axis]
         B[..., 3:] = -values[:, :, None] * slope[:, :, None, :]
-        covariant[:, :, axis] = tying_weights(nn, axis, rule) @ B.reshape(ne, len(values), nn * NDOF)
+        weights = tying_weights(nn, axis, rule)
+        covariant[:, :, axis] = weights @ B.reshape(ne, len(values), nn * NDOF)
     return np.asarray(inverse @ covariant)
 
 
