@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fecm
@@ -14,9 +14,9 @@ from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.catalogue import MATERIALS
 from fecm.deck.format import format_deck
-from fecm.deck.grid import Grid, graded, lines, listed, uniform
+from fecm.deck.grid import Grid, graded, lines, listed, longest_at, refined, uniform
 from fecm.deck.layup import LayupError, parse_layup
-from fecm.deck.model import Impact, Material, Projectile
+from fecm.deck.model import Impact, Material, Patch, Projectile, Shear
 from fecm.deck.records import Control
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import build_projectile
@@ -29,7 +29,7 @@ REPORT = [
     "--columns", "3*.5,8*.375,3*.5", "--rows", "1*.5,8*.375,1*.5",
     "--layup", "[0/45/0/-45/0]2s", "--ply-thickness", ".0053", "--material", "report",
     "--velocity", "115", "--law", "1912000,.0006564,.094,2.0",
-    "--duration", "800e-6", "--dt", "2e-7", "--every", "20",
+    "--duration", "800e-6", "--dt", "2e-7", "--every", "20", "--patch", "none", "--shear", "full",
 ]  # fmt: skip
 PLATE = [
     "--size", "0.3x0.2", "--mesh", "6x4", "--layup", "[0/90]s", "--ply-thickness", "0.25e-3",
@@ -92,6 +92,68 @@ def test_a_new_deck_is_sound_and_declares_its_units() -> None:
     assert 0.8 < ratio <= 0.9
 
 
+@pytest.mark.parametrize(
+    ("options", "patch", "shear", "note"),
+    [
+        ([], Patch(), Shear(assumed=True), "a uniform pressure of radius 0.000327 (0.327 of the "),
+        (["--patch", "hertz"], Patch("HERT"), Shear(assumed=True),
+         "Hertz's pressure of radius 0.000377 (0.377 of the thickness) instead of a point force"),
+        (["--patch", "disc:0.04"], Patch("DISC", 0.04), Shear(assumed=True), "of radius 0.04 ins"),
+        (["--patch", "none"], None, Shear(assumed=True), "note: the deck has assumed shear strai"),
+        (["--shear", "full"], Patch(), None, "point force (PATC); --patch none"),
+        (["--patch", "none", "--shear", "full"], None, None, ""),
+    ],
+)  # fmt: skip
+def test_a_new_deck_has_patch_and_assumed_shear_and_says_so_in_a_line(
+    options: list[str], patch: Patch | None, shear: Shear | None, note: str
+) -> None:
+    made = new(*PLATE, *options)
+    deck = fecm.read_deck(made.stdout)
+    assert isinstance(deck, Deck)
+    assert (deck.last(Patch), deck.last(Shear)) == (patch, shear)
+    notes = [line for line in made.stderr.splitlines() if line.startswith("fecm: note")]
+    assert sum("SHEA MITC" in line or "PATC" in line for line in notes) == bool(note)
+    assert note in "".join(notes)
+    assert "W447" not in made.stderr
+
+
+@pytest.mark.parametrize("options", [[], ["--grading", "2"], ["--at", "0.1,0.075"]])
+def test_the_mesh_is_refined_to_the_radius_of_a_patch(options: list[str]) -> None:
+    made = new(*PLATE, "--patch", "hertz:0.01", *options)
+    assert "elements instead of 6x4: their sides at the patch are at most its radius 0.01" in (
+        made.stderr
+    )
+    assert "W447" not in made.stderr
+    deck = fecm.read_deck(made.stdout)
+    assert isinstance(deck, Deck)
+    mesh = generate(deck)
+    at = mesh.coordinates[deck.require(Impact).node - 1]
+    beside = np.abs(mesh.coordinates - at)
+    for axis in (0, 1):
+        on_line = beside[beside[:, 1 - axis] < 1e-9, axis]
+        assert (on_line < 0.01 * (1 + 1e-9)).sum() >= 5  # two elements of three nodes
+    assert deck.control.numel < 8 * 24
+
+
+@pytest.mark.parametrize("options", [["--patch", "disc:0.2"], ["--at", "0,0.1"]])
+def test_a_patch_beyond_an_edge_is_refused_with_the_way_out(options: list[str]) -> None:
+    made = new(*PLATE, *options)
+    assert (made.exit_code, made.stdout) == (2, "")
+    assert "E445" in made.stderr
+    assert "fecm new --patch none" in made.stderr
+
+
+@settings(max_examples=30)
+@given(st.floats(0.1, 100.0), st.integers(2, 12), st.floats(0.1, 0.9), st.floats(0.001, 0.9))
+def test_a_side_is_refined_to_what_is_asked_and_not_much_further(
+    length: float, count: int, part: float, share: float
+) -> None:
+    side = share * length / count
+    made = refined(length, count, part * length, 1.0, side)
+    assert count <= len(made) < count * (1.0 - np.log(share)) + 8
+    assert longest_at(made, part * length) <= side
+
+
 def test_a_named_ply_is_converted_between_systems_of_units() -> None:
     ply = MATERIALS["T300/5208"].converted("in-lbf-s")
     assert ply.e1 == pytest.approx(181e9 / 6894.757, rel=1e-5)  # Pa in a psi
@@ -130,7 +192,9 @@ def test_a_coupled_laminate_keeps_its_in_plane_unknowns() -> None:
         ["--layup", "[0/"], ["--size", "6"], ["--mesh", "2.5x3"], ["--law", "1,2,3"],
         ["--at", "9,9"], ["--units", "cubits"], ["--material", "cheese"], ["--edge", "left=glued"],
         ["--columns", "3*1"], ["--duration", "-1"], ["--mesh", "2000x2000"], ["--velocity", "x"],
-        ["--ply", "1,2,3,4,5,6,7"], ["--grading", "0.5"],
+        ["--ply", "1,2,3,4,5,6,7"], ["--grading", "0.5"], ["--patch", "square:0.1"],
+        ["--patch", "disc:0"], ["--patch", "disc:"], ["--patch", "disc:1e-6"],
+        ["--shear", "reduced"],
     ],
 )  # fmt: skip
 def test_options_that_cannot_be_meant_exit_2(options: list[str]) -> None:

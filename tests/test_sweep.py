@@ -157,7 +157,8 @@ def test_momentum_and_energy_of_the_summary_are_those_of_the_rods_centre() -> No
     [
         {"thickness": 0.08}, {"e1": 2.0e7}, {"layup": "[0/45/-45/90]"}, {"dt": 3e-7},
         {"impact_node": 8}, {"rod_length": 2.0}, {"rod_modulus": 1.0e7}, {"rod_density": 1e-3},
-        {"nu12": 0.2}, {"density": 2e-4}, {"alpha_p": 1e-5},
+        {"nu12": 0.2}, {"density": 2e-4}, {"alpha_p": 1e-5}, {"patch": 0.2},
+        {"x0": 0.7, "y0": 1.2}, {"patch": 0.4, "impact_node": 7},
     ],
 )  # fmt: skip
 def test_whatever_varies_the_case_is_the_changed_decks_run(case: Case) -> None:
@@ -169,6 +170,30 @@ def test_whatever_varies_the_case_is_the_changed_decks_run(case: Case) -> None:
     difference = np.abs(found.force[0] - result.force).max()
     assert difference < 1e-9 * result.force.max()
     assert abs(result.force.max() / plain.force.max() - 1.0) > 1e-5
+
+
+def test_cases_of_velocity_and_patch_equal_their_full_runs() -> None:
+    shear = "SHEA MITC\nPATC\nHERT\n"
+    deck = model(small(STEPS, data=shear + DATA_CARDS))
+    vary = {"velocity": [60.0, 115.0], "patch": [0.1, 0.5]}
+    found = fecm.sweep(deck, vary, history=True)
+    assert found.force is not None
+    for force, case in zip(found.force, grid(list(vary.items())), strict=True):
+        patch = f"HERT,{case['patch']}\n"
+        cards = DATA_CARDS.replace("     115.0", f"{case['velocity']:10.1f}")
+        result = full(model(small(STEPS, data=shear.replace("HERT\n", patch) + cards)))
+        assert np.abs(force - result.force).max() < 1e-9 * result.force.max()
+
+
+def test_values_of_the_patch_that_cannot_be_are_cases_with_a_reason() -> None:
+    patches = [(0.0, 1.0, 1.0), (0.1, 2.0, 1.0), (0.1, 1.0, 1.0)]
+    cases = [dict(zip(("patch", "x0", "y0"), values, strict=True)) for values in patches]
+    found = fecm.sweep(model(small(STEPS)), cases=cases)
+    assert "must be positive" in found["status"][0]
+    assert "not on the plate" in found["status"][1]
+    assert found["status"][2] == "ok"
+    alone = fecm.sweep(model(small(STEPS)), {"x0": [1.0]})
+    assert alone["status"].tolist() == ["The centre of the patch has x0, but no y0."]
 
 
 def test_a_layup_keeps_the_plys_thickness_and_a_thickness_scales_all() -> None:

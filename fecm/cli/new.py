@@ -17,15 +17,23 @@ from fecm.cli.outputs import STANDARD_OUTPUT
 from fecm.cli.types import POSITIVE, Finite, ListOf, Parsed, assignment
 from fecm.deck.catalogue import CONTACTS, MATERIALS, SYSTEM, SYSTEMS
 from fecm.deck.format import format_deck
-from fecm.deck.grid import Grid, Section, graded, listed, uniform
-from fecm.deck.model import Deck, Indentation, Projectile, Units
+from fecm.deck.grid import Grid, Section, graded, listed, longest_at, refined, uniform
+from fecm.deck.model import Deck, Indentation, Material, Patch, Projectile, Shear, Units
 from fecm.deck.records import RodDiameter
+from fecm.mechanics.patch import DISC, HERTZ, RADIUS_PER_THICKNESS
 from fecm.problem.new import EDGES, SUPPORTS, new_deck
 
 # Most elements in one direction, and in all.
 MOST, MOST_ELEMENTS = 2000, 500_000
+# Least radius of a patch to which a mesh is refined, over the plate's side.
+LEAST_RADIUS = 1e-3
 # Elements of a rod, as many as the report's has.
 ROD_ELEMENTS = 20
+
+# Shapes of the contact patch; "none" is a point force.
+PATCHES = {"disc": DISC, "hertz": HERTZ}
+NO_PATCH = "none"
+MITC, FULL = "mitc", "full"
 
 PROJECTILES = {"mass": "M", "rod": "LENGTH,DIAMETER,E,DENSITY"}
 
@@ -42,6 +50,16 @@ def _projectile(text: str) -> Projectile:
     length, diameter, modulus, density = numbers
     ends = (RodDiameter(1, 1, diameter), RodDiameter(ROD_ELEMENTS, 0, diameter))
     return Projectile(ROD_ELEMENTS, 0, length, modulus, density, ends)
+
+
+def _patch(text: str) -> Patch | None:
+    """Read a contact patch; None for a point force."""
+    shape, colon, radius = text.partition(":")
+    if text == NO_PATCH:
+        return None
+    if shape not in PATCHES:
+        raise ValueError(f"{text!r} is not none, disc, hertz, disc:RADIUS or hertz:RADIUS")
+    return Patch(PATCHES[shape], POSITIVE(radius) if colon else None)
 
 
 def _edge(text: str) -> tuple[str, str]:
@@ -83,6 +101,11 @@ def _edge(text: str) -> tuple[str, str]:
 @click.option("--projectile", type=Parsed(_projectile), metavar="PROJECTILE",
               help="mass:M, or rod:LENGTH,DIAMETER,E,DENSITY.  [default in lbf, in and s: the "
                    "report's rod]")  # fmt: skip
+@click.option("--patch", type=Parsed(_patch), default="disc", show_default=True, metavar="PATCH",
+              help="Area of the contact force: disc or hertz, with :RADIUS, to which the mesh is "
+                   "then refined; or none, a point force.")  # fmt: skip
+@click.option("--shear", type=click.Choice([MITC, FULL]), default=MITC, show_default=True,
+              help="Transverse shear: assumed strains, or full quadrature.")  # fmt: skip
 @click.option("--duration", type=POSITIVE, required=True, help="Simulated time.")
 @click.option("--dt", type=POSITIVE, help="Time step.  [default: 0.9 of the critical one]")
 @click.option("--every", type=click.IntRange(min=1),
@@ -96,15 +119,15 @@ def new(output: Path, overwrite: bool, **options: Any) -> None:
     to_file = output != STANDARD_OUTPUT
     if to_file:
         check_outputs([output], overwrite)
-    deck, moved = deck_of_options(**options)
+    deck, notes = deck_of_options(**options)
     text = format_deck(deck.to_text())
     prepared = load_deck(text)
     if errors := prepared.errors():
         for finding in errors:
             echo(finding.render("the new deck"), err=True)
         raise RefusedError("these options do not give a valid deck; nothing was written")
-    if moved:
-        note(moved)
+    for line in notes:
+        note(line)
     for finding in prepared.findings:
         echo(finding.render(str(output) if to_file else "the new deck"), err=True)
     if to_file:
@@ -147,12 +170,15 @@ def deck_of_options(
     law: Sequence[float] | None,
     contact: str | None,
     projectile: Projectile | None,
+    patch: Patch | None,
+    shear: str,
     duration: float,
     dt: float | None,
     every: int | None,
-) -> tuple[Deck, str]:
-    """Deck of the options of ``fecm new``, and a note if the impact point was moved to a node."""
-    grid = _grid(size, mesh, grading, columns, rows, at)
+) -> tuple[Deck, list[str]]:
+    """Deck of the options of ``fecm new``, and notes about what they do not state."""
+    radius = None if patch is None else patch.radius
+    grid = _grid(size, mesh, grading, columns, rows, at, radius)
     x, y = at or (grid.columns[-1].end / 2.0, grid.rows[-1].end / 2.0)
     constants = ply_of_options(ply, material, units)
     system = units or (MATERIALS[material].system if material else None)
@@ -176,17 +202,41 @@ def deck_of_options(
         dt=dt,
         every=every,
         units=None if units is None else Units(*SYSTEMS[units].values()),
+        patch=patch,
+        shear=Shear(assumed=True) if shear == MITC else None,
     )
+    notes: list[str] = []
     node, node_x, node_y = grid.nearest(x, y)
     distance = math.hypot(node_x - x, node_y - y)
-    moved = ""
     if distance > 1e-9 * grid.columns[-1].end:
         asked = "the plate's centre" if at is None else "--at"
-        moved = (
+        notes.append(
             f"the impact point is moved by {distance:.4g}: from {asked} at {x:g}, {y:g} to the "
             f"nearest node, {node} at {node_x:g}, {node_y:g}"
         )
-    return deck, moved
+    if mesh and grid.elements > mesh[0] * mesh[1]:
+        notes.append(
+            f"the mesh has {grid.across // 2}x{grid.up // 2} elements instead of {mesh[0]}x"
+            f"{mesh[1]}: their sides at the patch are at most its radius {radius:g}"
+        )
+    if patch is not None or shear == MITC:
+        notes.append(_additions(deck))
+    return deck, notes
+
+
+def _additions(deck: Deck) -> str:
+    """Say what a deck has besides the cards of the report's program."""
+    parts: list[str] = []
+    if (patch := deck.last(Patch)) is not None:
+        share = RADIUS_PER_THICKNESS[patch.shape]
+        thickness = deck.require(Material).integration.thickness
+        radius = patch.radius or share * thickness
+        about = "" if patch.radius else f" ({share:g} of the thickness)"
+        pressure = "a uniform pressure" if patch.shape == DISC else "Hertz's pressure"
+        parts.append(f"{pressure} of radius {radius:.4g}{about} instead of a point force (PATC)")
+    if deck.has(Shear):
+        parts.append("assumed shear strains (SHEA MITC)")
+    return f"the deck has {' and '.join(parts)}; --patch none and --shear full leave them out"
 
 
 def _grid(
@@ -196,8 +246,9 @@ def _grid(
     columns: list[Section] | None,
     rows: list[Section] | None,
     at: tuple[float, float] | None,
+    radius: float | None,
 ) -> Grid:
-    """Grid of elements from sizes or from lists."""
+    """Grid of elements from sizes, refined to the radius of a patch, or from lists."""
     if columns and rows:
         if size or mesh or grading != 1.0:
             raise click.UsageError("--columns and --rows replace --size, --mesh and --grading")
@@ -207,7 +258,7 @@ def _grid(
     else:
         centre = at or (size[0] / 2.0, size[1] / 2.0)
         grid = Grid(*(
-            graded(length, count, middle, grading) if grading > 1.0 else uniform(length, count)
+            _sections(length, count, middle, grading, radius)
             for length, count, middle in zip(size, mesh, centre, strict=True)
         ))  # fmt: skip
     if max(grid.across, grid.up) // 2 > MOST or grid.elements > MOST_ELEMENTS:
@@ -218,6 +269,21 @@ def _grid(
     if at and not (0.0 <= at[0] <= grid.columns[-1].end and 0.0 <= at[1] <= grid.rows[-1].end):
         raise click.UsageError("--at is outside the plate")
     return grid
+
+
+def _sections(
+    length: float, count: int, centre: float, grading: float, radius: float | None
+) -> list[Section]:
+    """Elements in one direction."""
+    made = graded(length, count, centre, grading) if grading > 1.0 else uniform(length, count)
+    if radius is None or longest_at(made, centre) <= radius:
+        return made
+    if radius < LEAST_RADIUS * length:
+        raise click.UsageError(
+            f"the mesh is not refined to a radius of {radius:g}, less than {LEAST_RADIUS:g} times "
+            f"the plate's side of {length:g}; give --columns and --rows"
+        )
+    return refined(length, count, centre, grading, radius)
 
 
 def _law(law: Sequence[float] | None, contact: str | None, system: str | None) -> Indentation:

@@ -34,7 +34,8 @@ from fecm.sweeps.store import PartialResults
 @click.option("--vary", "varied", type=Parsed(parse_vary), multiple=True, metavar="NAME=VALUES",
               help="FROM:TO:N or A,B,C; may be repeated, for a full grid.  Names: velocity, k, "
                    "alpha_p, s_p, q, rod_length, rod_modulus, rod_density, rod_mass; impact_node, "
-                   "thickness, density, nu12, e1, e2, g12, g13, g23, layup, dt.")  # fmt: skip
+                   "patch, x0, y0, thickness, density, nu12, e1, e2, g12, g13, g23, layup, "
+                   "dt.")  # fmt: skip
 @click.option("--cases", "table", type=DECK_PATH, metavar="CASES.csv",
               help="A table instead of --vary: a header of names, one row per case.")  # fmt: skip
 @click.option("-o", "--output", type=FILE_PATH, metavar="SWEEP.h5",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -96,6 +97,31 @@ def graded(length: float, elements: int, centre: float, ratio: float) -> list[Se
         sections.append(Section(start, end, 1))
         start = end
     return sections
+
+
+def longest_at(sections: Sequence[Section], place: float) -> float:
+    """Length of the longest element at a place; 0 beside the sections."""
+    here = (s for s in sections if s.start <= place <= s.end)
+    return max(((s.end - s.start) / s.elements for s in here), default=0.0)
+
+
+def refined(
+    length: float, elements: int, centre: float, ratio: float, side: float
+) -> list[Section]:
+    """Graded elements that are at most `side` long at `centre`.
+
+    There are `elements` of them or as many more as that takes; the ratio of the largest to the
+    smallest is at least that of `elements` equal ones to `side`.
+    """
+    ratio = max(ratio, length / elements / side)
+    # Geometric series that end at equal ones take R ln R/(R - 1) < 1 + ln R times as many.
+    counts = range(elements, int(elements * (1.0 + math.log(ratio))) + 8)
+
+    def fits(count: int) -> bool:
+        return longest_at(graded(length, count, centre, ratio), centre) <= side
+
+    more = bisect_left(counts, True, key=fits)
+    return graded(length, elements + more, centre, ratio)
 
 
 def _series(length: float, count: int, ratio: float) -> list[float]:

@@ -31,6 +31,7 @@ LABELS = {
     "rod_modulus": "Modulus of the rod", "rod_density": "Density of the rod",
     "rod_mass": "Mass of the projectile", "nu12": r"$\nu_{12}$", "e1": "$E_1$", "e2": "$E_2$",
     "g12": "$G_{12}$", "g13": "$G_{13}$", "g23": "$G_{23}$", "dt": "Time step",
+    "patch": "Radius of the patch", "x0": "$x_0$", "y0": "$y_0$",
     "max_indentation": "Largest indentation",
 }  # fmt: skip
 

@@ -7,7 +7,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fecm.deck.grid import Grid
-from fecm.deck.model import Deck, Impact, Indentation, Material, Projectile, Units
+from fecm.deck.model import (
+    Deck,
+    Impact,
+    Indentation,
+    Material,
+    Patch,
+    Projectile,
+    Shear,
+    Units,
+)
 from fecm.deck.records import Control, Integration, Layer, Macro, Ply
 from fecm.mechanics.laminate import laminate
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
@@ -40,6 +49,8 @@ def new_deck(
     dt: float | None = None,
     every: int | None = None,
     units: Units | None = None,
+    patch: Patch | None = None,
+    shear: Shear | None = None,
 ) -> Deck:
     """Build the deck of an impact.
 
@@ -72,6 +83,10 @@ def new_deck(
         Steps between stored rows; None for about 200 rows.
     units : Units or None
         Names of the units.
+    patch : Patch or None
+        Contact patch; None for a point force.
+    shear : Shear or None
+        Treatment of transverse shear; None for quadrature.
     """
     total = float(f"{len(angles) * ply_thickness:.9g}")
     layers = tuple(
@@ -94,7 +109,7 @@ def new_deck(
     node = grid.nearest(*at)[0]
     segments = (
         units, grid.coordinates(), grid.element_cards(), boundary, projectile,
-        Impact(node, 3, velocity), law, material,
+        Impact(node, 3, velocity), patch, law, shear, material,
     )  # fmt: skip
     control = Control(grid.nodes, grid.elements, len(layers), 2, 5, 9)
     deck = Deck(title, control, tuple(s for s in segments if s is not None), ())

@@ -16,13 +16,15 @@ from fecm.studies.tables import TableError, read_rows
 Value = float | int | str
 Case = dict[str, Value]
 
-# Names that change the projectile, its velocity or the contact law; names that change the plate.
+# Names that change the projectile, its velocity or the contact law; where the force acts, which
+# needs another response of the plate; and the plate.
 CONTACT = (
     "velocity", "k", "alpha_p", "s_p", "q",
     "rod_length", "rod_modulus", "rod_density", "rod_mass",
 )  # fmt: skip
+LOAD = ("impact_node", "patch", "x0", "y0")
 PLATE = (
-    "impact_node", "thickness", "density", "nu12", "e1", "e2", "g12", "g13", "g23", "layup", "dt",
+    *LOAD, "thickness", "density", "nu12", "e1", "e2", "g12", "g13", "g23", "layup", "dt",
 )  # fmt: skip
 NAMES = (*CONTACT, *PLATE)
 TEXTS = ("layup",)

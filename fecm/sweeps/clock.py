@@ -19,7 +19,7 @@ from fecm.problem.problem import Problem
 # Longest loop; the checks reject much shorter programs.
 LONGEST = 1e15
 # Macros that store every N-th step or pass.
-STORING = ("RODP", "DISP", "STRE")
+STORING = ("RODP", "DISP", "STRE", "PLYS")
 
 
 @dataclass(frozen=True)

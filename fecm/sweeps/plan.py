@@ -15,7 +15,7 @@ from fecm.deck.macros import Body, Loop, flat
 from fecm.deck.model import Boundary, Deck
 from fecm.problem.memory import needed_bytes
 from fecm.problem.problem import Problem
-from fecm.sweeps.cases import CONTACT, PLATE, Case, CasesError
+from fecm.sweeps.cases import CONTACT, LOAD, PLATE, Case, CasesError
 from fecm.sweeps.clock import Clock, clock_of
 from fecm.sweeps.vary import apply_case
 
@@ -80,7 +80,7 @@ def plan(checked: Problem, cases: Sequence[Case], *, history: bool = False) -> P
         raise CasesError("the deck has no impact step (RODP); there is nothing to sweep")
     if not cases:
         raise CasesError("a sweep needs at least one case")
-    own = "dt" not in cases[0] and not {"impact_node", *CONTACT}.issuperset(cases[0])
+    own = "dt" not in cases[0] and not {*LOAD, *CONTACT}.issuperset(cases[0])
     clock = clock_of(checked) if own else None
     return Plan(checked.deck, tuple(cases), history, clock)
 
@@ -133,7 +133,7 @@ def without_output(body: Body) -> Body:
             kept.append(replace(item, body=without_output(item.body)))
         elif item.word == "RODP":
             kept.append(replace(item, value=1e9))
-        elif item.word not in ("DISP", "STRE", "REAC", "EIGE"):
+        elif item.word not in ("DISP", "STRE", "PLYS", "REAC", "EIGE"):
             kept.append(item)
     return tuple(kept)
 

@@ -66,7 +66,8 @@ DIMENSIONS = {
     "velocity": "length/time", "k": "force/length^1.5", "alpha_p": "length",
     "rod_length": "length", "rod_modulus": "force/length^2",
     "rod_density": "force*time^2/length^4", "rod_mass": "force*time^2/length",
-    "thickness": "length", "density": "force*time^2/length^4", "dt": "time",
+    **dict.fromkeys(("patch", "x0", "y0", "thickness"), "length"),
+    "density": "force*time^2/length^4", "dt": "time",
     **dict.fromkeys(("e1", "e2", "g12", "g13", "g23"), "force/length^2"),
 }  # fmt: skip
 

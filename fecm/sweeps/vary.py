@@ -9,7 +9,16 @@ from typing import Any
 
 from fecm.deck.findings import Findings
 from fecm.deck.layup import LayupError, parse_layup
-from fecm.deck.model import Boundary, Deck, Impact, Indentation, Material, Projectile, Segment
+from fecm.deck.model import (
+    Boundary,
+    Deck,
+    Impact,
+    Indentation,
+    Material,
+    Patch,
+    Projectile,
+    Segment,
+)
 from fecm.deck.reader import ParsedProblem
 from fecm.deck.records import Layer, NodeCodes, Ply, RodDiameter
 from fecm.mechanics.mesh import holds_the_plane
@@ -34,6 +43,8 @@ def apply_case(deck: Deck, case: Case) -> Deck:
 
     A deck with B = 0 may restrain u and v at every node, because they are zero anyway.  If the case
     has B != 0, they are restrained only at the nodes that restrain w, as in a deck of ``fecm new``.
+
+    A deck without a patch gets a disc.
 
     Raises
     ------
@@ -93,6 +104,10 @@ _FIELDS: dict[str, tuple[type[Impact | Indentation], str]] = {
 }
 
 
+# Fields of the contact patch.
+_PATCH = {"patch": "radius", "x0": "x", "y0": "y"}
+
+
 def _field(deck: Deck, name: str, value: Value) -> Deck:
     kind, field = _FIELDS[name]
     old = deck.require(kind)
@@ -120,6 +135,16 @@ def _rod(deck: Deck, name: str, value: Value) -> Deck:
             new = replace(new, density=number)
         else:
             new = replace(new, density=rod.density * number / rod.total_mass)
+    if old is None:
+        return replace(deck, segments=(*deck.segments, new))
+    return _swap(deck, old, new)
+
+
+def _patch(deck: Deck, name: str, value: Value) -> Deck:
+    """Change the contact patch; add the segment if the deck has none."""
+    old = deck.last(Patch)
+    field: dict[str, Any] = {_PATCH[name]: float(value), "source": None}
+    new = replace(old or Patch(), **field)
     if old is None:
         return replace(deck, segments=(*deck.segments, new))
     return _swap(deck, old, new)
@@ -171,6 +196,7 @@ def _taken_time_step(deck: Deck) -> float:
 _SETTERS: dict[str, Callable[[Deck, str, Value], Deck]] = {
     **dict.fromkeys(_FIELDS, _field),
     **dict.fromkeys(("rod_length", "rod_modulus", "rod_density", "rod_mass"), _rod),
+    **dict.fromkeys(_PATCH, _patch),
     **dict.fromkeys(PLY, _ply),
     "thickness": _thickness,
     "layup": _layup,
