@@ -18,12 +18,16 @@ from fecm.cli.common import (
     RefusedError,
     echo,
     echo_file,
+    progress,
     write_text,
 )
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.format import format_deck
 from fecm.deck.reader import load_text
-from fecm.problem.slips import REPORT
+from fecm.deck.units import unit_names, unit_of
+from fecm.problem.options import RunOptions
+from fecm.problem.problem import Problem
+from fecm.problem.slips import REPORT, active_slips
 from fecm.problem.summary import summarise
 
 
@@ -73,7 +77,10 @@ def load_valid(
 @click.argument("deck", type=DECK_PATH)
 @MODE_OPTION
 @FORMAT_OPTION
-def check(deck: Path, mode: str, form: str) -> None:
+@click.option("--mesh-error", is_flag=True,
+              help="Run DECK twice, with its elements and with those around the load bisected, and "
+                   "compare the peak forces.")  # fmt: skip
+def check(deck: Path, mode: str, form: str, mesh_error: bool) -> None:
     """Check DECK without running it; print its findings and a summary.
 
     With --format json, each finding and each problem is a JSON object on a line.  The exit status
@@ -94,6 +101,37 @@ def check(deck: Path, mode: str, form: str) -> None:
             echo("\n".join(view.lines()))
     if errors:
         raise CheckFailedError(count_errors(errors))
+    if mesh_error:
+        _compare_meshes(prepared.problems, mode, form)
+
+
+def _compare_meshes(problems: Sequence[Problem], mode: str, form: str) -> None:
+    """Print the mesh error of the peak force of every problem."""
+    from fecm.sweeps.mesh_error import bisected, mesh_error
+
+    for problem in problems:
+        units = unit_names(problem.deck)
+        force, length = (unit_of(name, units) for name in ("force", "length"))
+        fine = bisected(problem)
+        with progress("fecm", problem.work.steps + fine.work.steps) as advance:
+            found = mesh_error(problem, fine, RunOptions(active_slips(mode, ())), advance)
+        if form == "json":
+            changes = {"change": found.change, "relative_change": found.relative_change}
+            click.echo(json.dumps(
+                {"kind": "mesh_error", **found.__dict__, **changes, "units": units}
+            ))  # fmt: skip
+            continue
+        share = found.relative_change
+        about = "no contact" if share is None else f"{share:+.2%}"
+        for line in (
+            f"peak force          {found.peak_force:.5g} {force}".rstrip()
+            + f" on {found.elements} elements",
+            f"  bisected          {found.refined_peak_force:.5g} {force}".rstrip()
+            + f" on {found.refined_elements}, within {found.distance:.3g} {length}".rstrip()
+            + " of the load",
+            f"  change            {found.change:+.3g} {force}".rstrip() + f" ({about})",
+        ):
+            echo(f"  {line}")
 
 
 @click.command(short_help="Align the columns of DECK.")

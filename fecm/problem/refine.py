@@ -54,7 +54,10 @@ def refined(deck: Deck, mesh: Mesh, marked: Bools | None = None) -> Deck:
     for block in element_blocks(mesh.elements, mesh.coordinates):
         count = block.nodes.shape[1]
         if count not in (4, 9) or block.shape.nodes != 9:
-            raise RefineError(f"element {block.rows[0] + 1} does not have four or nine nodes")
+            raise RefineError(
+                f"element {block.rows[0] + 1} cannot be bisected: it does not have four or nine "
+                "nodes"
+            )
         local = np.stack([block.shape.xi, block.shape.eta], axis=1)[:count]
         for row in block.rows.tolist():
             cuts = [2 if split[row, axis] else 1 for axis in (0, 1)]

@@ -91,9 +91,9 @@ def deck_of(plan: Plan, case: int) -> Deck:
 def _timed(decks: list[Deck], clock: Clock | None) -> tuple[Problem, list[Deck]]:
     """Check the plate and program shared by decks, and set the time step of the plate."""
     if clock is None:
-        return _checked(decks[0]), decks
+        return check_deck(decks[0]), decks
     # DT 0 is below the critical time step of any plate.
-    checked = _checked(with_time_step(decks[0], 0.0))
+    checked = check_deck(with_time_step(decks[0], 0.0))
     dt = clock.time_step(checked.critical_time_step)
     timed = [with_time_step(deck, dt, clock.dt) for deck in decks]
     findings = Findings()
@@ -103,8 +103,14 @@ def _timed(decks: list[Deck], clock: Clock | None) -> tuple[Problem, list[Deck]]
     return problem, timed
 
 
-def _checked(deck: Deck) -> Problem:
-    """Check a complete deck."""
+def check_deck(deck: Deck) -> Problem:
+    """Check a complete deck.
+
+    Raises
+    ------
+    CasesError
+        If it has an error; the first is the message.
+    """
     findings = Findings()
     checked = check(ParsedProblem(deck), findings)
     _raise_first(findings)
