@@ -59,6 +59,10 @@ NEXT
 """
 
 
+# A disc in the fourth element, whose stresses and those of its nearest neighbour are stored.
+DISC = "PATC\nDISC             .2       1.5       1.5\n"
+PLY_PROGRAM = PROGRAM.replace("NEXT", "PLYS          5    2\nNEXT")
+
 # Findings that the small plate has: its coupled laminate is held in its plane at every node, it has
 # no projectile of its own, and its mesh is coarse.
 OWN_FINDINGS = ("W318", "W414", "W415")

@@ -15,12 +15,9 @@ from fecm.results.schema import NotStoredError, ResultFileError
 from fecm.results.vtkhdf import write_vtkhdf
 from tests.builders import REPORT_PLY, turned_stiffness
 from tests.calls import call
-from tests.decks import DATA_CARDS, PROGRAM, small
+from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, small
 
-# The disc lies in element 4, whose centre is nearest to it.
-PATCH = "PATC\nDISC             .2       1.5       1.5\n"
-STORED = PROGRAM.replace("DISP          5\n", "DISP          5\nPLYS          5    2\n")
-DECK = small(STORED, data=PATCH + DATA_CARDS)
+DECK = small(PLY_PROGRAM, data=DISC + DATA_CARDS)
 
 
 @pytest.fixture(scope="module")

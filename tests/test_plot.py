@@ -20,7 +20,7 @@ from fecm.plot.pictures import draw, save
 from fecm.plot.style import COLOURS, scale
 from fecm.results.result import Result
 from tests.builders import distorted_square
-from tests.decks import DATA_CARDS, MESH, PROGRAM, small
+from tests.decks import DATA_CARDS, DISC, MESH, PLY_PROGRAM, PROGRAM, small
 
 Array = NDArray[Any]
 
@@ -172,11 +172,20 @@ def test_strain_is_curvature_times_the_distance_of_the_face(result: Result) -> N
     shown = lines(far.axes[0])
     np.testing.assert_allclose(shown["x at 1, 1"][1], 53e3 * means["kappa_x"], rtol=1e-12)
     np.testing.assert_allclose(shown["45° at 1, 1"][1], 1e6 * expected, rtol=1e-12)
-    struck = lines(result.plot("strain", face="struck", gages=(0.0,)).axes[0])
+    middle: dict[str, Any] = {"at": ((1.0, 1.0),)}
+    struck = lines(result.plot("strain", face="struck", gages=(0.0,), **middle).axes[0])
     np.testing.assert_allclose(struck["x at 1, 1"][1], -shown["x at 1, 1"][1], rtol=1e-12)
-    curvature = result.plot("strain", face="curvature", gages=(90.0,)).axes[0]
+    curvature = result.plot("strain", face="curvature", gages=(90.0,), **middle).axes[0]
     np.testing.assert_allclose(lines(curvature)["y at 1, 1"][1], 1e6 * means["kappa_y"], rtol=1e-12)
     assert curvature.get_ylabel() == "Curvature (10⁻⁶ in⁻¹)"
+
+
+def test_strain_is_not_shown_under_a_point_force_unless_asked_for(result: Result) -> None:
+    with pytest.warns(PlotNote, match="point force depend on the mesh: .* those at 1.5, 1 are"):
+        shown = legend_of(result.plot("strain"))
+    assert shown == ["x at 1.5, 1", "y at 1.5, 1"]
+    patch = run(small(data=DISC + DATA_CARDS))
+    assert legend_of(patch.plot("strain")) == ["x at 1.5, 1.5", "y at 1.5, 1.5"]
 
 
 def test_strain_points_are_nodes_or_gauss_points(result: Result) -> None:
@@ -190,7 +199,7 @@ def test_strain_points_are_nodes_or_gauss_points(result: Result) -> None:
 def test_a_plate_that_stretches_is_said_to_show_bending_alone() -> None:
     free = MESH[: MESH.index("BOUN")] + "BOUN\n    1    0    1    1    1    1    1\n\n"
     with pytest.warns(PlotNote, match="bending alone"):
-        run(small(mesh=free)).plot("strain")
+        run(small(mesh=free)).plot("strain", at=((1.0, 1.0),))
 
 
 def test_contours_share_one_scale_about_zero(result: Result) -> None:
@@ -234,6 +243,91 @@ def test_mesh_marks_supports_and_the_impact_point() -> None:
     assert axes.get_aspect() == 1.0
 
 
+@pytest.mark.parametrize("kind", ["mesh", "contour"])
+def test_plans_of_the_plate_draw_the_circle_of_the_patch(kind: str) -> None:
+    axes: Any = run(small(data=DISC + DATA_CARDS)).plot(kind).axes[0]
+    x, y = axes.get_lines()[-1].get_data()
+    np.testing.assert_allclose(np.hypot(x - 1.5, y - 1.5), 0.2, rtol=1e-12)
+    assert np.ptp(x) == pytest.approx(0.4) == np.ptp(y)
+    cross = axes.get_lines()[-2].get_data()
+    assert [float(value[0]) for value in cross] == [1.5, 1.5]
+
+
+# Through the thickness --------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def plies() -> Result:
+    """The small plate under a disc in its fourth element, symmetric and with four plies."""
+    layers = "".join(f"{n}, {angle}., .0265\n" for n, angle in enumerate((0, 90, 90, 0), 1))
+    data = DISC + DATA_CARDS[: DATA_CARDS.index("    1   0.")] + layers + "UNIT\nin lbf s\n"
+    return run(small(PLY_PROGRAM, data=data).replace("   25    4    2", "   25    4    4"))
+
+
+def test_thickness_shows_six_components_with_jumps_at_the_faces_of_plies(plies: Result) -> None:
+    with pytest.warns(PlotNote, match="element 4 of .* is under the load"):
+        figure: Any = plies.plot("thickness", at=((1.45, 1.05),), times=(2.5e-6,))
+    labels = [axes.get_xlabel().partition(" (") for axes in figure.axes]
+    assert [label for label, _, _ in labels] == [
+        r"$\sigma_1$", r"$\sigma_2$", r"$\tau_{12}$", r"$\tau_{xz}$", r"$\tau_{yz}$",
+        r"$(\tau_{xz}^2 + \tau_{yz}^2)^{1/2}$",
+    ]  # fmt: skip
+    factors = [{"lbf/in²)": 1.0, "10⁻³ lbf/in²)": 1e3}[unit] for _, _, unit in labels]
+    assert figure.get_suptitle() == "element 4 at 1.5, 1 in, time 2.5 µs"
+    member = plies["plies/element"].tolist().index(4)
+    curves = [axes.get_lines()[-1].get_data() for axes in figure.axes]
+    curves = [(x / factor, z) for (x, z), factor in zip(curves, factors, strict=True)]
+    for (values, z), name in zip(curves, ("sigma_1", "sigma_2", "tau_12"), strict=False):
+        stored = plies[f"plies/{name}"][0, member, 4].ravel()
+        np.testing.assert_allclose(values, stored, rtol=1e-12)
+        np.testing.assert_allclose(z, [-53, -26.5, -26.5, 0, 0, 26.5, 26.5, 53], atol=1e-12)
+    values, z = curves[3]
+    stored = plies["plies/tau_xz"][0, member]
+    np.testing.assert_allclose(np.reshape(values, (4, 9))[:, [0, 4, 8]], stored, rtol=1e-12)
+    # Between three values of a ply: the parabola, which in a ply is exact.
+    parabola = np.polyfit(plies["plies/z"][0] * 1e3, stored[0], 2)
+    np.testing.assert_allclose(values[:9], np.polyval(parabola, z[:9]), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(curves[5][0], np.hypot(values, curves[4][0]), rtol=1e-12)
+    dotted = [
+        line.get_ydata()[0] for line in figure.axes[0].get_lines() if line.get_linestyle() == ":"
+    ]
+    np.testing.assert_allclose(dotted, [-53, -26.5, 0, 26.5, 53], atol=1e-12)
+    assert figure.axes[0].get_ylim() == (53.0, -53.0)
+
+
+@pytest.mark.filterwarnings("ignore::fecm.plot.kinds.PlotNote")
+def test_thickness_without_a_place_is_that_of_the_largest_stress_along_the_fibres(
+    plies: Result,
+) -> None:
+    largest = np.abs(plies["plies/sigma_1"]).max()
+    axes: Any = plies.plot("thickness").axes[0]
+    assert np.abs(axes.get_lines()[-1].get_xdata()).max() == largest
+
+
+def test_thickness_beside_the_stored_elements_names_the_nearest(plies: Result) -> None:
+    others = set(range(1, 5)) - set(plies["plies/element"].tolist())
+    (x, y) = {1: (0.4, 0.4), 2: (1.6, 0.4), 3: (0.4, 1.6)}[others.pop()]
+    with pytest.warns(PlotNote, match=f"no ply stresses at {x},{y}; the nearest element"):
+        plies.plot("thickness", at=((x, y),))
+    with pytest.raises(PlotError, match="9,9 is not on the plate"):
+        plies.plot("thickness", at=((9.0, 9.0),))
+    with pytest.raises(PlotError, match="no ply stresses at time 1"):
+        plies.plot("thickness", times=(1.0,))
+    with pytest.raises(PlotError, match="one point at one time"):
+        plies.plot("thickness", times=(2e-6, 5e-6))
+
+
+@pytest.mark.filterwarnings("ignore:.*under the load")
+def test_thickness_of_elements_without_nine_nodes_shows_in_plane_stresses(plies: Result) -> None:
+    arrays = {path: plies[path] for path in plies}
+    for name in ("tau_xz", "tau_yz", "residual"):
+        arrays[f"plies/{name}"] = np.full_like(arrays[f"plies/{name}"], np.nan)
+    made = Result(arrays, {"deck": plies.deck}, {"patch": plies.patch.attributes})
+    with pytest.warns(PlotNote, match="does not have nine nodes"):
+        figure = made.plot("thickness")
+    assert sum(axes.axison for axes in figure.axes) == 3
+
+
 def test_the_animation_has_a_frame_for_each_stored_row(result: Result, tmp_path: Path) -> None:
     image = pytest.importorskip("PIL.Image")
     result.plot("animation", tmp_path / "plate.gif")
@@ -270,7 +364,8 @@ def test_widths_are_those_of_a_column_and_of_a_page(result: Result) -> None:
 @pytest.mark.parametrize("kind", sorted(set(OF_RUNS) - {"mesh"}))
 def test_a_picture_names_the_macro_that_stores_what_it_lacks(kind: str) -> None:
     result = run(small("LMAS\nDT        .5E-6\n"))
-    macro = "DISP" if kind in {"line", "contour", "surface", "animation"} else "RODP"
+    stores = dict.fromkeys(("line", "contour", "surface", "animation"), "DISP")
+    macro = {**stores, "thickness": "PLYS"}.get(kind, "RODP")
     with pytest.raises(PlotError, match=f"bare has no .*; add {macro} to"):
         draw(kind, {"bare": result})
 
@@ -280,7 +375,7 @@ def test_a_picture_names_the_macro_that_stores_what_it_lacks(kind: str) -> None:
     [
         ("line", {"times": (1.0,)}, "no displacements at time 1"),
         ("strain", {"at": ((9.0, 9.0),)}, "9,9 is not on the plate"),
-        ("strain", {"gages": tuple(range(8))}, "fewer points"),
+        ("strain", {"gages": tuple(range(8)), "at": ((1.0, 1.0),)}, "fewer points"),
         ("picture", {}, "unknown kind of picture 'picture'"),
         ("force", {"colour": "red"}, "unknown option colour"),
     ],

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 import fecm
 from fecm.plot.kinds import KINDS, PlotError
 from tests.calls import assert_unusable, call
-from tests.decks import PROGRAM, small
+from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, small
 
 Array = NDArray[Any]
 
@@ -28,8 +28,8 @@ OF_RUNS = [name for name, kind in KINDS.items() if not kind.sweep]
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    """The small plate's result file."""
-    fecm.run(small(), output=tmp_path / "small.h5")
+    """Result file of the small plate under a patch, with ply stresses."""
+    fecm.run(small(PLY_PROGRAM, data=DISC + DATA_CARDS), output=tmp_path / "small.h5")
     return tmp_path / "small.h5"
 
 
@@ -37,7 +37,12 @@ def test_the_command_writes_every_kind_and_keeps_what_is_there(file: Path) -> No
     asked = [part for kind in OF_RUNS for part in ("--kind", kind)]
     done = call("plot", file, *asked, cwd=file.parent)
     expected = [f"small-{k}.{'gif' if k == 'animation' else 'png'}" for k in OF_RUNS]
-    assert (done.exit_code, done.stdout.split(), done.stderr) == (0, expected, "")
+    assert (done.exit_code, done.stdout.split()) == (0, expected)
+    under_load, residual = done.stderr.splitlines()
+    assert under_load.endswith(
+        "element 4 of small is under the load, where plate theory does not hold"
+    )
+    assert "in-plane supports act there" in residual  # a coupled laminate with u = v = 0
     assert sorted(p.name for p in file.parent.iterdir()) == sorted([*expected, "small.h5"])
     (file.parent / "small-loop.png").write_text("precious")
     (file.parent / "small-force.png").unlink()
@@ -84,7 +89,7 @@ def test_nothing_but_a_picture_imports_matplotlib(file: Path) -> None:
     assert done.stdout.splitlines()[-1] == "[]"
     assert (file.parent / "small-history.csv").exists()
     assert "Commands:" in done.stdout
-    assert PROGRAM in fecm.load(file).deck
+    assert PLY_PROGRAM in fecm.load(file).deck
 
 
 # Results without sense ----------------------------------------------------------------------------
@@ -98,7 +103,7 @@ def infinite(file: h5py.File) -> None:
     file["tape3/w"][...] = np.inf
     file["history/force"][...] = np.inf
     file["energy/plate_kinetic"][...] = np.nan
-    file["tape8/kappa_x"][...] = np.inf
+    file["tape8/kappa_x"][...] = file["plies/sigma_1"][...] = np.inf
 
 
 def huge(file: h5py.File) -> None:
@@ -108,13 +113,23 @@ def huge(file: h5py.File) -> None:
 
 
 def tiny(file: h5py.File) -> None:
-    for path in ("history/force", "history/time", "tape3/w", "tape3/time", "mesh/coordinates"):
+    for path in (
+        "history/force",
+        "history/time",
+        "tape3/w",
+        "tape3/time",
+        "plies/sigma_1",
+        "mesh/coordinates",
+    ):
         file[path][...] *= 1e-310
+    for name in ("x", "y", "radius"):
+        file["patch"].attrs[name] *= 1e-310
 
 
 def without_rows(file: h5py.File) -> None:
-    for group in ("history", "energy", "tape3", "tape8"):
-        for name, dataset in list(file[group].items()):
+    for group in ("history", "energy", "tape3", "tape8", "plies"):
+        kept = {"element", "z", "under_load"}
+        for name, dataset in [item for item in file[group].items() if item[0] not in kept]:
             del file[group][name]
             file[group][name] = np.zeros((0, *dataset.shape[1:]), dataset.dtype)
 
@@ -122,11 +137,11 @@ def without_rows(file: h5py.File) -> None:
 @pytest.mark.parametrize(
     ("edit", "undrawn"),
     [
-        (zero, "strain line contour surface mesh"),
-        (infinite, "force loop energy strain line contour surface"),
-        (huge, "force loop strain line contour surface mesh"),
+        (zero, "strain line contour surface mesh thickness"),
+        (infinite, "force loop energy strain line contour surface thickness"),
+        (huge, "force loop strain line contour surface mesh thickness"),
         (tiny, "contour"),
-        (without_rows, "force loop energy strain line contour surface"),
+        (without_rows, "force loop energy strain line contour surface thickness"),
     ],
 )
 def test_a_result_without_sense_is_drawn_or_is_one_line(
@@ -135,7 +150,8 @@ def test_a_result_without_sense_is_drawn_or_is_one_line(
     with h5py.File(file, "r+") as stored:
         edit(stored)
     refused = []
-    for kind in ("force", "loop", "energy", "strain", "line", "contour", "surface", "mesh"):
+    kinds = ("force", "loop", "energy", "strain", "line", "contour", "surface", "mesh", "thickness")
+    for kind in kinds:
         picture = file.with_name(f"{kind}.png")
         done = call("plot", file, "--kind", kind, "-o", picture)
         if done.exit_code:
@@ -143,7 +159,7 @@ def test_a_result_without_sense_is_drawn_or_is_one_line(
             assert_unusable(done)
             assert not picture.exists()
         else:
-            assert done.stderr == ""
+            assert kind == "thickness" or done.stderr == ""
     assert refused == undrawn.split()
 
 

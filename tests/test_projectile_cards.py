@@ -125,6 +125,17 @@ def test_odd_but_possible_values_are_warned_of() -> None:
     assert "W426" in codes(with_segment("GAGE\n1, 0.5, 0.5, 0.1, 0.\n\n"))
 
 
+@pytest.mark.parametrize(
+    ("x", "patch", "warned"),
+    [(1.0, "", True), (1.105, "", True), (1.106, "", False), (1.0, "PATC\n\n", False)],
+)
+def test_a_gage_within_the_thickness_of_a_point_force_is_warned_of(
+    x: float, patch: str, warned: bool
+) -> None:
+    found = codes(with_segment(f"{patch}GAGE\n1, {x}, 1.0, 0.05, 0.\n\n"))
+    assert ("W452" in found) == warned
+
+
 def test_a_shear_correction_scales_the_transverse_shear_stiffness_alone() -> None:
     deck = model(with_segment("SHEA\n  0.822467\n"))
     plain = model(small())

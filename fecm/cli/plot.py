@@ -43,13 +43,14 @@ def _by_name(
               help="Picture (.png, .svg, .pdf; .gif for animation), or folder for several.  "
                    "[default: RESULT-KIND.png in this folder]")  # fmt: skip
 @click.option("--at", type=ListOf("X,Y", Finite(), [2]), multiple=True, metavar="X,Y",
-              help="Point of strain; may be repeated.  [default: the impact point]",
-              )  # fmt: skip
+              help="Point of strain (may be repeated), thickness or mesh.  [default of strain: the "
+                   "contact patch, or the nearest point at least the thickness away from a point "
+                   "force; of thickness: where |sigma_1| is largest]")  # fmt: skip
 @click.option("--gage", "gages", type=ListOf("DEGREES,...", Finite()), metavar="DEGREES,...",
               help="Directions of strain, from the x-axis.  [default: 0,90]")  # fmt: skip
 @click.option("--face", type=click.Choice(["far", "struck", "curvature"]),
               help="Face of the strain, or curvature instead.  [default: far]")  # fmt: skip
-@click.option("--times", type=ListOf("T,T,...", Finite()), metavar="T,T,...",
+@click.option("--times", "--time", "times", type=ListOf("T,T,...", Finite()), metavar="T,T,...",
               help="Times, in the deck's unit; the nearest stored rows are drawn.")  # fmt: skip
 @click.option("--along", type=click.Choice(["x", "y"]),
               help="Direction of line.  [default: x]")  # fmt: skip

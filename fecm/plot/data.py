@@ -88,14 +88,34 @@ def deck_of(result: Result, name: str) -> Deck:
         raise PlotError(f"{name} holds no deck that can be read") from None
 
 
+def circle(result: Result, name: str) -> tuple[Floats, float] | None:
+    """Centre, (2,), and radius of the contact patch, length; None without a patch.
+
+    Raises
+    ------
+    PlotError
+        If the result does not say where its patch is.
+    """
+    if "patch/weight" not in result:
+        return None
+    values = [result.patch.attributes.get(key) for key in ("x", "y", "radius")]
+    if not all(isinstance(value, int | float) and abs(value) <= LARGEST for value in values):
+        raise PlotError(f"{name} has a contact patch without a centre and a radius")
+    x, y, radius = map(float, values)
+    return np.array([x, y]), radius
+
+
 def struck(result: Result, name: str) -> Floats:
-    """Coordinates of the impact node, (1, 2), length; (0, 2) without impact.
+    """Centre of the contact patch, or the impact node, (1, 2), length; (0, 2) without either.
 
     Raises
     ------
     PlotError
         If the mesh lacks the deck's impact node.
     """
+    patch = circle(result, name)
+    if patch is not None:
+        return patch[0][None]
     impact = deck_of(result, name).last(Impact)
     nodes = [] if impact is None else [impact.node - 1]
     coordinates = result["mesh/coordinates"][:, :2]
@@ -105,12 +125,12 @@ def struck(result: Result, name: str) -> Floats:
 
 
 def impact_point(result: Result, name: str) -> Floats:
-    """Coordinates of the impact node, (2,), length.
+    """Centre of the contact patch, or the impact node, (2,), length.
 
     Raises
     ------
     PlotError
-        If the deck has no impact.
+        If the deck has neither.
     """
     points = struck(result, name)
     if not len(points):
@@ -216,6 +236,23 @@ def strain_points(result: Result, name: str) -> Floats:
     return np.stack(places, axis=-1)
 
 
+def on_plate(points: Floats, at: Floats, name: str) -> None:
+    """Refuse a place outside of the plate's points, (..., 2).
+
+    Raises
+    ------
+    PlotError
+        If it is outside.
+    """
+    low, high = points.reshape(-1, 2).min(axis=0), points.reshape(-1, 2).max(axis=0)
+    room = 0.02 * float((high - low).max())
+    if not ((at >= low - room) & (at <= high + room)).all():
+        raise PlotError(
+            f"the point {at[0]:g},{at[1]:g} is not on the plate of {name}, which extends from "
+            f"{low[0]:g},{low[1]:g} to {high[0]:g},{high[1]:g}"
+        )
+
+
 def nearest(points: Floats, at: Floats, name: str) -> Bools:
     """Mask of the points nearest to a place; several if elements meet there.
 
@@ -224,12 +261,7 @@ def nearest(points: Floats, at: Floats, name: str) -> Bools:
     PlotError
         If the place is outside the plate.
     """
-    low, high = points.min(axis=(0, 1)), points.max(axis=(0, 1))
-    room = 0.02 * float((high - low).max())
-    if not ((at >= low - room) & (at <= high + room)).all():
-        raise PlotError(
-            f"the point {at[0]:g},{at[1]:g} is not on the plate of {name}, which extends from "
-            f"{low[0]:g},{low[1]:g} to {high[0]:g},{high[1]:g}"
-        )
+    on_plate(points, at, name)
     distance = np.hypot(*np.moveaxis(points - at, -1, 0))
-    return np.asarray(distance <= distance.min() + 1e-6 * float((high - low).max()))
+    size = float(np.ptp(points, axis=(0, 1)).max())
+    return np.asarray(distance <= distance.min() + 1e-6 * size)

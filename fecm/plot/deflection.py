@@ -16,6 +16,7 @@ from matplotlib.tri import LinearTriInterpolator, Triangulation
 from fecm._typing import Floats
 from fecm.plot.data import Array, Patches, impact_point, patches, require, stored_rows, struck
 from fecm.plot.kinds import Picture, PlotError
+from fecm.plot.meshes import draw_circle
 from fecm.plot.style import (
     COLOURS,
     IN_ORDER,
@@ -188,6 +189,7 @@ def contour(results: Results, *, times: Sequence[float] = (), width: str = "colu
         fills.append(ax.tricontourf(triangles, values, levels, cmap=SIGNED))
         fills[-1].set(edgecolor="face", linewidth=0.2)  # hides white seams
         ax.plot(*where.T, "+", color="black", ms=4, mew=0.6)
+        draw_circle(ax, result, name, place, color="black")
         ax.set_title(f"time {clock.show(float(result['tape3/time'][row]))}", loc="left")
         ax.set_aspect("equal")
     for ax in axes[len(rows) :]:

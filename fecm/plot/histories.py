@@ -10,7 +10,15 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from fecm.deck.model import Material
-from fecm.plot.data import Array, deck_of, impact_point, nearest, require, strain_points
+from fecm.plot.data import (
+    Array,
+    circle,
+    deck_of,
+    impact_point,
+    nearest,
+    require,
+    strain_points,
+)
 from fecm.plot.kinds import Picture, PlotError, warn
 from fecm.plot.style import (
     COLOURS,
@@ -155,7 +163,8 @@ def strain(
     ----------
     results : mapping of str to Result
     at : sequence of (float, float)
-        Points of the plate (length); by default the impact point.
+        Points of the plate (length); by default the centre of the contact patch, or the point
+        nearest to the impact node that is at least the thickness h away.
     gages : sequence of float
         Directions, degrees from the x-axis.
     face : str
@@ -196,10 +205,10 @@ def _strains(
     """Histories of one result, by point and direction."""
     columns = require(result, name, "tape8/kappa_x", "tape8/kappa_y", "tape8/kappa_xy")
     points = strain_points(result, name)
-    places = [np.array(place) for place in at] or [impact_point(result, name)[:2]]
+    thickness = sum(layer.thickness for layer in deck_of(result, name).require(Material).layers)
+    places = [np.array(place) for place in at] or [_default_place(result, name, points, thickness)]
     height = 1.0
     if face != "curvature":
-        thickness = sum(a.thickness for a in deck_of(result, name).require(Material).layers)
         height = thickness / 2.0 if face == "far" else -thickness / 2.0
         if result["mesh/equations"][:, :2].any():
             warn(
@@ -217,3 +226,22 @@ def _strains(
             direction = {0.0: "x", 90.0: "y"}.get(angle, f"{angle:g}°")
             found[f"{direction} at {x:.4g}, {y:.4g}"] = values
     return found
+
+
+def _default_place(result: Result, name: str, points: Array, thickness: float) -> Array:
+    """Place of the strain if none is given, (2,): not under a point force."""
+    hit = impact_point(result, name)
+    if circle(result, name) is not None:
+        return hit
+    distance = np.hypot(*np.moveaxis(points - hit, -1, 0))
+    away = distance >= thickness * (1.0 - 1e-9)
+    if not away.any():
+        return hit
+    at_least = distance[away].min() * (1.0 + 1e-9)
+    x, y = max(points[away & (distance <= at_least)].round(12).tolist())
+    warn(
+        f"strains at the impact node of a point force depend on the mesh: of {name} those at "
+        f"{x:.4g}, {y:.4g} are shown, the nearest point that is at least the thickness away; --at "
+        "chooses another"
+    )
+    return np.array([x, y])

@@ -71,10 +71,11 @@ KINDS = {
     "loop": Kind("histories:loop", "contact force against indentation", True),
     "energy": Kind("histories:energy", "energies of plate and projectile against time", True),
     "strain": Kind("histories:strain", "surface strain at points against time", True),
+    "thickness": Kind("thickness:thickness", "ply stresses through the thickness of an element"),
     "line": Kind("deflection:line", "deflection along a line through the impact point", True),
     "contour": Kind("deflection:contour", "deflection of the plate, seen from above"),
     "surface": Kind("deflection:surface", "the deflected plate"),
-    "mesh": Kind("meshes:mesh", "mesh, supports and impact point"),
+    "mesh": Kind("meshes:mesh", "mesh, supports, impact point and contact patch"),
     "animation": Kind("deflection:animation", "the moving plate", suffixes=(".gif",)),
     "map": Kind("maps:parameter_map", "a quantity of a sweep over its parameters", sweep=True),
 }

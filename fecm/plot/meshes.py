@@ -1,4 +1,4 @@
-"""The mesh with its supports and the impact point (the report's figure 4.11 a)."""
+"""The mesh with its supports, impact point and contact patch (the report's figure 4.11 a)."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
 
 from fecm._typing import Bools
-from fecm.plot.data import patches, require, struck
+from fecm.deck.model import Impact
+from fecm.plot.data import circle, deck_of, patches, require, struck
 from fecm.plot.kinds import Picture
-from fecm.plot.style import COLOURS, WIDTHS, legend, panels, scale_of
+from fecm.plot.style import COLOURS, WIDTHS, Scale, legend, panels, scale_of
 from fecm.results.result import Result
 
 # Marks of the supports by their label.
@@ -34,13 +37,24 @@ def supports(result: Result) -> dict[str, Bools]:
     }
 
 
+def draw_circle(axes: Axes, result: Result, name: str, place: Scale, **style: Any) -> list[Line2D]:
+    """Draw the circle of the contact patch, if there is one, on axes of x and y."""
+    found = circle(result, name)
+    if found is None:
+        return []
+    centre, radius = found
+    angle = np.linspace(0.0, 2.0 * np.pi, 73)
+    x, y = place.factor * (centre[:, None] + radius * np.stack([np.cos(angle), np.sin(angle)]))
+    return axes.plot(x, y, lw=0.7, **style)
+
+
 def mesh(
     results: Mapping[str, Result],
     *,
     at: Sequence[tuple[float, float]] = (),
     width: str = "column",
 ) -> Picture:
-    """Elements, supports, impact point, and points to mark (`at`)."""
+    """Elements, supports, impact point, contact patch, and points to mark (`at`)."""
     ((name, result),) = results.items()
     coordinates, _ = require(result, name, "mesh/coordinates", "mesh/elements")
     cut = patches(result, 4, name)
@@ -61,8 +75,14 @@ def mesh(
             labels.append(label)
     where = place.factor * struck(result, name)
     if len(where):
-        handles += axes.plot(*where.T, "X", color=COLOURS[1], ms=6.0, mec="white", mew=0.5, ls="")
-        labels.append("impact")
+        mark: dict[str, Any] = (
+            {"marker": "+"} if circle(result, name) else {"marker": "X", "mec": "white"}
+        )
+        handles += axes.plot(*where.T, color=COLOURS[1], ms=6.0, mew=0.5, ls="", **mark)
+        labels.append("impact" if deck_of(result, name).has(Impact) else "load")
+    if ring := draw_circle(axes, result, name, place, color=COLOURS[1]):
+        handles += ring
+        labels.append("contact patch")
     if at:
         marked = place.factor * np.array(at)
         handles += axes.plot(marked[:, 0], marked[:, 1], "D", color=COLOURS[3], ms=3.5, ls="none")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.deck.findings import Findings
-from fecm.deck.model import Deck, Gages, Impact, Indentation, Material, Projectile, Shear
+from fecm.deck.model import Deck, Gages, Impact, Indentation, Material, Patch, Projectile, Shear
 from fecm.mechanics import element_groups
 from fecm.mechanics.contact_law import ACR_POWER
 from fecm.mechanics.gages import locate
@@ -174,6 +174,24 @@ def check_gages(segment: Gages, mesh: Mesh, deck: Deck, findings: Findings) -> N
                 "W426",
                 f"Gage {record.number} at z = {record.z:g} is outside the laminate, whose faces "
                 f"are at {half:g} from the mid-plane.", record.place("gage's z"),
+            )  # fmt: skip
+
+
+def check_gages_under_force(problem: Problem, findings: Findings) -> None:
+    """Warn of gages nearer than the thickness to the impact node of a point force."""
+    segment = problem.deck.last(Gages)
+    if segment is None or problem.deck.has(Patch):
+        return
+    x, y = problem.mesh.coordinates[problem.deck.require(Impact).node - 1]
+    for record in segment.records:
+        distance = float(np.hypot(record.x - x, record.y - y))
+        if distance < problem.laminate.thickness * (1.0 - 1e-9):
+            findings.add(
+                "W452",
+                f"Gage {record.number} is {distance:.3g} from the impact node: strains at the "
+                "impact node of a point force depend on the mesh.", record.place("gage's x"),
+                f"put it at least the thickness {problem.laminate.thickness:.3g} away, or give the "
+                "contact force an area by a PATC segment",
             )  # fmt: skip
 
 

@@ -29,6 +29,7 @@ from fecm.deck.reader import ParsedProblem
 from fecm.problem.build import Problem
 from fecm.problem.check_impact import (
     check_gages,
+    check_gages_under_force,
     check_impact,
     check_law,
     check_projectile,
@@ -129,6 +130,7 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
                 if not deck.has(Projectile):
                     warn_of_the_reports_rod(deck.require(Impact), findings)
                 check_resolution(checked, findings)
+                check_gages_under_force(checked, findings)
     return checked
 
 
