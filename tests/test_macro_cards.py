@@ -10,7 +10,7 @@ from fecm.api import load_deck
 from fecm.deck import Deck, DeckError, Finding, read_deck
 from fecm.deck.format import format_deck
 from fecm.deck.macros import WORDS, estimate_work
-from fecm.deck.model import Impact, Indentation, Projectile, Segment, Shear
+from fecm.deck.model import Impact, Indentation, Patch, Projectile, Segment, Shear
 from fecm.deck.records import Macro
 from fecm.problem.slips import MODES
 from tests.calls import call
@@ -170,6 +170,15 @@ def test_a_new_deck_has_a_time_step_that_a_person_can_read() -> None:
     "segment",
     [
         Shear(0.8224670334241132),
+        Shear(1.0, assumed=True),
+        Shear(1.0, equilibrium=True),
+        Shear(0.8, assumed=True, equilibrium=True),
+        Patch(),
+        Patch("HERT"),
+        Patch("HERT", 1 / 3),
+        Patch("DISC", None, 1.0, 0.1 + 0.2),
+        Patch("DISC", 0.25, None, None, -7.5),
+        Patch("HERT", 0.1, 0.0, 1.0, 1e300),
         Projectile(0, 0, 1e-4, 2.1e5, 7.8e-9),
         Projectile(0, 0, 1e-4, 0.0, 7.8e-9),
         Projectile(0, 0, 1e-4),
@@ -182,6 +191,13 @@ def test_a_segment_is_written_with_all_that_it_says(segment: Segment) -> None:
     made = replace(deck, segments=(*deck.segments, segment), text="")
     assert read(made.to_text()) == made
     assert read(format_deck(made.to_text())) == made
+
+
+@pytest.mark.parametrize("card", ["", "hert", "DISC,,1.,2.", ",.3", ",,,,5.", " " * 49 + "5"])
+def test_blanks_of_a_patch_stay_blank_when_a_deck_is_formatted(card: str) -> None:
+    deck = small().replace("EXPE", f"PATC\n{card}\nEXPE")
+    assert read(format_deck(deck)) == read(deck)
+    assert format_deck(format_deck(deck)) == format_deck(deck)
 
 
 @pytest.mark.parametrize("value", [1e300, 1e-300, 5e-324, 2.0**53, -0.0, 1 / 3])

@@ -414,8 +414,9 @@ def check_listing(deck: Deck, mesh: Mesh, findings: Findings) -> None:
     words = [] if macro is None else [("PLYS", macro.place("macro"))]
     if (patch := deck.last(Patch)) is not None:
         words.append(("PATC", patch.place()))
-    shear = deck.last(Shear)
-    if shear is not None and (shear.assumed or shear.equilibrium):
-        words.append(("SHEA MITC" if shear.assumed else "SHEA EQUI", shear.place()))
+    if (shear := deck.last(Shear)) is not None:
+        given = (shear.assumed, shear.equilibrium)
+        used = [word for word, is_given in zip(Shear.WORDS, given, strict=True) if is_given]
+        words += [(f"SHEA {word}", shear.place()) for word in used]
     for word, place in words:
         findings.add("E603", f"The printed program has no {word}.", place, ANOTHER_MODE)
