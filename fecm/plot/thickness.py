@@ -147,7 +147,7 @@ def _warn(result: Result, name: str, plies: Plies, point: int) -> None:
     reach = plies.z[-1, 2] + (0.0 if patch is None else patch[1])
     distance = np.hypot(*(struck(result, name) - [plies.x[0, point], plies.y[0, point]]).T)
     if plies.under_load[0] or (distance < reach).any():
-        warn(f"{element} is under the load, where plate theory does not hold")
+        warn(f"{element} is within {reach:.3g} of the load, where plate theory does not hold")
     tau = np.abs([plies.tau_xz, plies.tau_yz]).max()
     if np.isnan(tau):
         warn(f"{element} does not have nine nodes: it has no interlaminar stresses")
