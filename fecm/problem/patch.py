@@ -122,11 +122,9 @@ def check_patch(deck: Deck, mesh: Mesh, findings: Findings) -> None:
         return
     if patch is None:
         return
-    distance = np.hypot(*(mesh.coordinates - [patch.x, patch.y]).T)
-    held = np.flatnonzero((mesh.codes[:, W] != 0) & (distance <= patch.radius))
-    if len(held):
+    if held := _held(mesh, patch):
         findings.add(
-            "E445", f"w of node {held[0] + 1} under the patch is restrained.", card.place(),
+            "E445", f"w of {held} under the patch is restrained.", card.place(),
             "a BOUN card restrains it",
         )  # fmt: skip
         return
@@ -143,6 +141,31 @@ def check_patch(deck: Deck, mesh: Mesh, findings: Findings) -> None:
             card.place("radius c"),
             "refine the mesh at the patch; fecm check --mesh-error shows the effect on the peak",
         )
+
+
+def _held(mesh: Mesh, patch: ContactPatch) -> str:
+    """Name a node or a side under a patch whose w is restrained; empty if there is none."""
+    held = mesh.codes[:, W] != 0
+    centre = np.array([patch.x, patch.y])
+    near = np.hypot(*(mesh.coordinates - centre).T) <= patch.radius
+    if (held & near).any():
+        return f"node {np.argmax(held & near) + 1}"
+    for family in element_blocks(mesh.elements, mesh.coordinates):
+        local = np.stack([family.shape.xi, family.shape.eta], axis=1)[family.present]
+        for a in range(family.shape.corners):
+            b = (a + 1) % family.shape.corners
+            (x, y), (from_x, from_y) = local[b] - local[a], (local - local[a]).T
+            on_side = np.abs(x * from_y - y * from_x) < 1e-9
+            nodes = family.nodes[held[family.nodes[:, on_side]].all(axis=1)]
+            start, end = mesh.coordinates[nodes[:, a]], mesh.coordinates[nodes[:, b]]
+            side = end - start
+            t = ((centre - start) * side).sum(axis=1) / (side**2).sum(axis=1)
+            nearest = start + np.clip(t, 0.0, 1.0)[:, None] * side
+            under = np.hypot(*(nearest - centre).T) <= patch.radius
+            if under.any():
+                first, last = nodes[under][0, [a, b]] + 1
+                return f"the side from node {first} to node {last}"
+    return ""
 
 
 def _side(mesh: Mesh, patch: ContactPatch) -> float:
