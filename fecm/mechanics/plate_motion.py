@@ -179,8 +179,12 @@ class DistributedLoad:
 
     def subtract(self, force: float, dt2: float, internal: Floats) -> None:
         """Subtract a force from an internal force scaled by M^-1 dt2."""
-        if force:
-            internal[self.equations] -= self.mobility * (force * dt2)
+        if not force:
+            return
+        part = internal[self.equations]
+        part -= self.mobility * (force * dt2)
+        if not isinstance(self.equations, slice):
+            internal[self.equations] = part
 
 
 Load = PointLoad | DistributedLoad
