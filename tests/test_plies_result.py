@@ -11,7 +11,7 @@ import pytest
 import fecm
 from fecm.results.csv import table
 from fecm.results.result import Result
-from fecm.results.schema import NotStoredError, ResultFileError
+from fecm.results.schema import ExportError, NotStoredError, ResultFileError
 from fecm.results.vtkhdf import write_vtkhdf
 from tests.builders import REPORT_PLY, turned_stiffness
 from tests.calls import call
@@ -141,6 +141,16 @@ def test_cells_without_nine_nodes_have_no_interlaminar_stress(
     with h5py.File(tmp_path / "plate.vtkhdf") as file:
         assert np.isnan(file["VTKHDF/CellData/tau_xz_ply"][()]).all()
         assert np.isfinite(file["VTKHDF/CellData/sigma_1_ply"][()]).any()
+
+
+def test_a_damaged_result_is_refused_in_words(result: Result, tmp_path: Path) -> None:
+    arrays = {path: result[path] for path in result}
+    arrays["plies/element"] = np.array([2, 9])
+    damaged = Result(arrays, {"deck": result.deck}, {})
+    with pytest.raises(ExportError, match="outside 1 to 4"):
+        write_vtkhdf(damaged, tmp_path / "plate.vtkhdf")
+    with pytest.raises(ResultFileError, match="outside 1 to 4"):
+        damaged.plies()
 
 
 def test_xarray_opens_plies_and_patch_beside_the_other_groups(file: Path, result: Result) -> None:

@@ -185,7 +185,8 @@ def _rows_of(
 ) -> tuple[Ints, NDArray[np.bool_]]:
     """Rows of a group at the time steps, and which of these have one."""
     stored = result[f"{group}/step"]
-    at, shared = np.searchsorted(stored, steps), np.isin(steps, stored)
+    at = np.minimum(np.searchsorted(stored, steps), len(stored) - 1)
+    shared = stored[at] == steps
     if not shared.any():
         note(f"{what} ({group}) and displacements (tape3) share no step; {what} are omitted")
     elif not shared.all():
@@ -204,6 +205,8 @@ def _write_plies(root: h5py.Group, result: Result, steps: Ints, note: Note) -> N
     if not shared.any():
         return
     cells, length = result["plies/element"] - 1, len(result["mesh/elements"])
+    if not 0 <= cells.min() <= cells.max() < length:
+        raise ExportError(f"elements outside 1 to {length} have ply stresses")
     for name in (*IN_PLANE, *INTERLAMINAR):
         values = result[f"plies/{name}"]
         largest = _field(root, "Cell", name, len(steps), (length,))
