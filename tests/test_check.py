@@ -82,6 +82,23 @@ def test_a_wrong_deck_shows_its_user_exactly_this(
     assert [path.name for path in tmp_path.iterdir()] == [deck.name]
 
 
+@pytest.mark.parametrize(
+    ("cards", "words"),
+    [
+        ("PATC\n\n", ["PATC"]),
+        ("SHEA MITC\n", ["SHEA MITC"]),
+        ("SHEA EQUI MITC\n", ["SHEA MITC", "SHEA EQUI"]),
+        ("SHEA\n       0.9\n", []),
+    ],
+)
+def test_listing_mode_refuses_words_that_the_printed_program_lacks(
+    cards: str, words: list[str]
+) -> None:
+    findings = load_deck(small(data=cards + DATA_CARDS), "listing").findings
+    found = [f.message for f in findings if f.code == "E603"]
+    assert found == [f"The printed program has no {word}." for word in words]
+
+
 def test_five_independent_errors_are_five_findings_in_one_run() -> None:
     deck = next(path for path in WRONG if path.stem == "five-errors")
     assert [f.code for f in load_deck(deck).findings] == ["E005", "E408", "E101", "E403", "E501"]

@@ -233,7 +233,7 @@ def _check_unused(word: Word, macro: Macro, findings: Findings) -> None:
 def _check_value(word: Word, macro: Macro, findings: Findings) -> None:
     value, kind = macro.value, word.value
     if word.second and not (macro.second >= 0 and macro.second.is_integer()):
-        must = f"takes a second whole number from 0, not {macro.second:g}"
+        must = f"takes a whole number of 0 or more as its second value, not {macro.second:g}"
         findings.add("E505", f"{word.name} {must}.", macro.place("second value"))
     is_count = kind in ("count", "every")
     if is_count and not (0 <= value <= MOST_MACROS and value.is_integer()):
