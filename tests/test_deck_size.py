@@ -170,7 +170,7 @@ def test_a_coor_segment_for_every_few_bytes_is_refused() -> None:
 
 def test_too_many_segments_layers_and_gages_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     prints = small(data=DATA_CARDS + "PRIN\nNOPR\n")
-    gages = small(data=DATA_CARDS + "GAGE\n1,1.,1.\n2,1.,1.\n\n")
+    gages = small(data=DATA_CARDS + "GAGE\n1,.5,.5\n2,.5,.5\n\n")
     assert codes(prints) == codes(gages) == []
     monkeypatch.setattr(check_impact, "MOST_GAGES", 1)
     assert codes(gages) == ["E012"]
