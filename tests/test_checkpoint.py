@@ -88,6 +88,20 @@ def test_a_run_stopped_anywhere_goes_on_to_the_same_bytes(
         path.unlink()
 
 
+def test_a_stopped_run_with_a_patch_and_stresses_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
+    words = "PATC\nHERT,.3\nSHEA MITC\nALLO\n2e5,2e5,7e3,28e3,13e3\n\n"
+    program = "LMAS\nDT,,.5E-6\nLOOP,,12\nTIME\nRODP,,4\nPLYS,,3,2\nFAIL,,2\nNEXT\n"
+    text = small(program, data=DATA_CARDS + words)
+    looks = run(text, tmp_path / "whole.h5")
+    for stop in range(1, looks + 1, 2):
+        path = tmp_path / "stopped.h5"
+        with pytest.raises(StoppedError):
+            run(text, path, stop)
+        run(text, path, resume=True)
+        assert path.read_bytes() == (tmp_path / "whole.h5").read_bytes(), f"stopped at {stop}"
+        path.unlink()
+
+
 # The corners hold the plate, so that it has a static displacement.
 LAST = "   25    0    1    1    0    0    0\n"
 HELD = MESH.replace(

@@ -44,6 +44,7 @@ class LazyCommand:
 COMMANDS = {
     "check": LazyCommand("fecm.cli.decks", "Check DECK without running it, and summarise it."),
     "diff": LazyCommand("fecm.cli.diff", "Compare two results dataset by dataset.", True),
+    "estimate": LazyCommand("fecm.cli.estimate", "Estimate an impact and its damage threshold."),
     "export": LazyCommand("fecm.cli.export", "Write RESULT for ParaView or a spreadsheet.", True),
     "fmt": LazyCommand("fecm.cli.decks", "Align the columns of DECK."),
     "indent": LazyCommand("fecm.cli.indent", "Indentation tests and the law of contact."),

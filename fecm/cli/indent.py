@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
 
 from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError, note
 from fecm.cli.indent_curve import curve
+from fecm.cli.laminate_options import laminate_options, ply_of_options
 from fecm.cli.outputs import OVERWRITE, PLOT, STANDARD_OUTPUT, OutputPaths
 from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, ListOf
 from fecm.deck.catalogue import CONTACTS, SYSTEM, SYSTEMS
@@ -18,6 +20,7 @@ from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.studies.indentation_test import LIMITS_Q
 from fecm.studies.indentation_test.constants import fit as fitted
 from fecm.studies.indentation_test.cycles import NoTestError
+from fecm.studies.indentation_test.modulus import effective_stiffness, indentation_modulus
 from fecm.studies.indentation_test.report import card, lines, notes, plain
 from fecm.studies.indentation_test.table import Test, read_test
 
@@ -105,18 +108,28 @@ def _units_line(read: Test) -> str:
 # hertz and contacts ------------------------------------------------------------------------------
 
 
+RADIUS = click.option("--radius", type=float, required=True, help="Radius of the sphere.")
+E_S = click.option("--es", "e_s", type=float, required=True, help="Young's modulus of the sphere.")
+NU_S = click.option(
+    "--nus", "nu_s", type=float, required=True, help="Poisson's ratio of the sphere."
+)
+ALPHA_P = click.option("--alpha-p", type=NOT_NEGATIVE, default=0.0, show_default=True,
+                       help="Critical indentation for the card.")  # fmt: skip
+S_P = click.option("--s-p", type=Finite(0.0, 1.0, max_open=True), default=0.0, show_default=True,
+                   help="Slope of permanent indentation for the card.")  # fmt: skip
+Q = click.option("--q", type=POSITIVE, default=1.5, show_default=True,
+                 help="Unloading power for the card; 1.5 is elastic.")  # fmt: skip
+
+
 @indent.command()
-@click.option("--radius", type=float, required=True, help="Radius of the sphere.")
-@click.option("--es", "e_s", type=float, required=True, help="Young's modulus of the sphere.")
-@click.option("--nus", "nu_s", type=float, required=True, help="Poisson's ratio of the sphere.")
+@RADIUS
+@E_S
+@NU_S
 @click.option("--et", "e_t", type=float, required=True,
               help="Young's modulus of the laminate through its thickness.")  # fmt: skip
-@click.option("--alpha-p", type=NOT_NEGATIVE, default=0.0, show_default=True,
-              help="Critical indentation for the card.")  # fmt: skip
-@click.option("--s-p", type=Finite(0.0, 1.0, max_open=True), default=0.0,
-              show_default=True, help="Slope of permanent indentation for the card.")  # fmt: skip
-@click.option("--q", type=POSITIVE, default=1.5, show_default=True,
-              help="Unloading power for the card; 1.5 is elastic.")  # fmt: skip
+@ALPHA_P
+@S_P
+@Q
 @FORMAT_OPTION
 def hertz(
     radius: float,
@@ -142,6 +155,56 @@ def hertz(
     if form == "json":
         click.echo(json.dumps({"k": k, "card": law.text()}))
     else:
+        click.echo(law.text())
+
+
+@indent.command()
+@laminate_options(required=True)
+@click.option("--nu23", type=Finite(), default=0.4, show_default=True,
+              help="Poisson's ratio of the ply across the fibres.")  # fmt: skip
+@RADIUS
+@E_S
+@NU_S
+@ALPHA_P
+@S_P
+@Q
+@FORMAT_OPTION
+def estimate(
+    layup: Sequence[float],
+    ply_thickness: float,
+    ply: Sequence[float] | None,
+    material: str | None,
+    units: str | None,
+    nu23: float,
+    radius: float,
+    e_s: float,
+    nu_s: float,
+    alpha_p: float,
+    s_p: float,
+    q: float,
+    form: str,
+) -> None:
+    """Estimate k of a laminate from its elastic constants, and print its EXPE card.
+
+    By the indentation modulus M of the laminate's effective solid, and by its E2 for comparison.
+    Measured coefficients may be larger: that of the report's plate under the 0.5 in indenter is
+    1.330e6 lb/in^1.5, where M gives 1.084e6 and E2 0.741e6.  By default the law is elastic.
+    """
+    constants = ply_of_options(ply, material, units)
+    stiffness = effective_stiffness(constants, layup, [ply_thickness] * len(layup), nu23)
+    modulus = indentation_modulus(stiffness)
+    try:
+        k, by_e2 = (hertz_coefficient(radius, e_s, nu_s, e) for e in (modulus, constants.e2))
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+    law = Indentation(float(f"{k:.6g}"), alpha_p, s_p, q)
+    if form == "json":
+        values = {"k": k, "modulus": modulus, "k_by_e2": by_e2, "card": law.text()}
+        click.echo(json.dumps(values))
+    else:
+        click.echo(f"modulus M   {modulus:.6g}")
+        click.echo(f"k by M      {k:.6g}")
+        click.echo(f"k by E2     {by_e2:.6g}")
         click.echo(law.text())
 
 

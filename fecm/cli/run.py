@@ -35,8 +35,8 @@ from fecm.problem.options import ENERGY_LIMIT, RunOptions
 from fecm.problem.problem import Problem
 from fecm.problem.slips import NAMES, active_slips
 from fecm.results import hdf5_writer
-from fecm.results.result import load
-from fecm.results.summary import OPEN_END, summary
+from fecm.results.result import Result, load
+from fecm.results.summary import OPEN_END, largest_exposures, summary
 from fecm.simulation.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
 from fecm.simulation.printout import Printer
 from fecm.simulation.run import run as simulate_run
@@ -83,6 +83,8 @@ from fecm.simulation.spool import Journal, SpoolError
 @click.option("--energy-limit", type=POSITIVE, default=ENERGY_LIMIT,
               show_default=True, metavar="RATIO",
               help="Relative energy error that ends a run without slips.")  # fmt: skip
+@click.option("--fail-limit", type=POSITIVE, metavar="EXPOSURE",
+              help="Exit with status 1 if an exposure of FAIL exceeds this value.")  # fmt: skip
 @click.option(
     "--force",
     is_flag=True,
@@ -110,6 +112,7 @@ def run(
     threads: int,
     every: float | None,
     energy_limit: float,
+    fail_limit: float | None,
 ) -> None:
     """Run every problem in DECK and write its result.
 
@@ -133,14 +136,20 @@ def run(
     choices = RunOptions(
         active, solver, threads, RodMethod(rod_mass, rod_integrator), energy_limit
     )  # fmt: skip
+    if fail_limit is not None and not any(problem.work.passes["FAIL"] for problem in problems):
+        raise RefusedError(f"--fail-limit needs the macro FAIL; {deck} has none")
+    exceeded: list[str] = []
     for number, (problem, path, print_to) in enumerate(zip(problems, paths, prints, strict=True)):
         if number:
             echo()
         if number < own - 1 and path.exists():
             note(f"{path} is complete")
             continue
-        _run_one(problem, path, print_to, choices, every, resumes=number == own - 1,
-                 overwrite=overwrite or number < own)  # fmt: skip
+        result = _run_one(problem, path, print_to, choices, every, resumes=number == own - 1,
+                          overwrite=overwrite or number < own)  # fmt: skip
+        exceeded += [] if fail_limit is None else _exceeded(result, fail_limit)
+    if exceeded:
+        raise CheckFailedError(f"{'; '.join(exceeded)}: more than the limit of {fail_limit:g}")
 
 
 def _interrupted(paths: Sequence[Path], *, resume: bool, overwrite: bool) -> int:
@@ -165,8 +174,8 @@ def _run_one(
     *,
     resumes: bool,
     overwrite: bool,
-) -> None:
-    """Run one problem of a deck into a file and print its summary."""
+) -> Result:
+    """Run one problem of a deck into a file, print its summary and return its result."""
     _check_room(path, problem.output_bytes)
     check_memory(problem, solver=choices.solver)
     with contextlib.ExitStack() as stack:
@@ -199,6 +208,13 @@ def _run_one(
     echo(f"  result            {path}")
     if printed is not None:
         echo(f"  printed           {printed}")
+    return result
+
+
+def _exceeded(result: Result, limit: float) -> list[str]:
+    """Criteria whose largest exposure exceeds a limit."""
+    found = largest_exposures(result)
+    return [f"exposure {e.exposure:.4g} of {e.criterion}" for e in found if e.exposure > limit]
 
 
 @contextlib.contextmanager

@@ -91,6 +91,7 @@ WORDS = {
             "every",
             second=True,
         ),
+        Word("FAIL", "Evaluates the failure criteria at every N-th pass.", "every"),
         Word("CHEC", "Reports mesh and storage."),
     )
 }
@@ -337,7 +338,7 @@ def _entry(body: Body, count: int) -> tuple[int, Counter[str], Counter[int]]:
             steps.update({n: count * more for n, more in taken.items()})
             continue
         macros += count
-        if item.word in ("DISP", "STRE", "PLYS"):
+        if item.word in ("DISP", "STRE", "PLYS", "FAIL"):
             passes[item.word] += count // every(item)
         elif item.word == "REAC":
             passes["REAC"] += count

@@ -8,7 +8,7 @@ and elements between them.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Self, TypeVar
 
 from fecm.deck.card import Fields, Source, Value, layout, write_card
@@ -262,6 +262,16 @@ class Projectile(Segment):
             yield ""
 
 
+def _or_blank(values: Sequence[Value], source: Source) -> list[float | None]:
+    """Numbers of a card; None where its field is blank."""
+    texts = [text.strip() for _, text in source.card.cut(source.fields)]
+    blank = [not text for text in texts] + [True] * len(values)
+    return [
+        None if empty or isinstance(value, str) else float(value)
+        for value, empty in zip(values, blank, strict=False)
+    ]
+
+
 @dataclass(frozen=True)
 class Patch(Segment):
     """PATC: (A4,6X,4F10.0); the contact force acts on a circle (not in the report's program).
@@ -294,11 +304,8 @@ class Patch(Segment):
     @classmethod
     def from_row(cls, values: Sequence[Value], source: Source) -> Self:
         """Build the segment from the card's values; a blank radius or centre is None."""
-        texts = [text.strip() for _, text in source.card.cut(source.fields)]
-        blank = [not text for text in texts] + [True] * len(values)
-        shape = str(values[0]).upper() or "DISC"
-        radius, x, y = (None if blank[n] else float(values[n]) for n in (1, 2, 3))
-        return cls(shape, radius, x, y, float(values[4]), source=source)
+        radius, x, y = _or_blank(values, source)[1:4]
+        return cls(str(values[0]).upper() or "DISC", radius, x, y, float(values[4]), source=source)
 
     def row(self) -> list[Value]:
         """Values in the card's order; None is a blank."""
@@ -336,6 +343,87 @@ class Shear(Segment):
         yield " ".join([self.keyword, *words])
         if not words or self.factor != 1.0:
             yield write_card(self.fields, [self.factor])
+
+
+@dataclass(frozen=True)
+class Allowables(Segment):
+    """ALLO: (7F10.0) and (3F10.0); strengths of the ply (not in the report's program).
+
+    Attributes
+    ----------
+    xt, xc, yt, yc : float
+        Strengths along and across the fibres, in tension and compression: all positive, force/area.
+    s12, s13, s23 : float
+        Shear strengths; a blank S13 is S12, a blank S23 is S13.
+    f12 : float
+        Tsai and Wu's F12*; -0.5 if blank.
+    p_plus, p_minus : float
+        Puck's slopes; 0.35 and 0.3 if blank.
+    """
+
+    xt: float
+    xc: float
+    yt: float
+    yc: float
+    s12: float
+    s13: float
+    s23: float
+    f12: float = -0.5
+    p_plus: float = 0.35
+    p_minus: float = 0.3
+    keyword: ClassVar[str] = "ALLO"
+
+    fields: ClassVar[Fields] = layout(
+        "F10 XT", "F10 XC", "F10 YT", "F10 YC", "F10 S12", "F10 S13", "F10 S23"
+    )
+    constants: ClassVar[Fields] = layout("F10 F12*", "F10 p+", "F10 p-")
+
+    @classmethod
+    def from_row(cls, values: Sequence[Value], source: Source) -> Self:
+        """Build the segment from its first card."""
+        *given, s12, s13, s23 = _or_blank(values, source)
+        s13 = s12 if s13 is None else s13
+        s23 = s13 if s23 is None else s23
+        return cls(*(value or 0.0 for value in (*given, s12, s13, s23)), source=source)
+
+    def with_constants(self, values: Sequence[Value], source: Source) -> Self:
+        """Return the segment with the values of its second card; a blank keeps the default."""
+        defaults = (self.f12, self.p_plus, self.p_minus)
+        found = zip(_or_blank(values, source), defaults, strict=True)
+        f12, p_plus, p_minus = (old if new is None else new for new, old in found)
+        return replace(self, f12=f12, p_plus=p_plus, p_minus=p_minus)
+
+    def cards(self, control: Control) -> Iterator[str]:
+        """Text of the segment's cards."""
+        row = self.row()
+        yield self.keyword
+        yield write_card(self.fields, row[:7])
+        yield write_card(self.constants, row[7:])
+
+
+@dataclass(frozen=True)
+class Delamination(Segment):
+    """DELA: (2F10.0); toughness for the delamination threshold (not in the report's program).
+
+    Attributes
+    ----------
+    toughness : float
+        G_IIc, force/length.
+    number : float
+        Number of delaminations; 1 if blank.
+    """
+
+    toughness: float
+    number: float = 1.0
+    keyword: ClassVar[str] = "DELA"
+
+    fields: ClassVar[Fields] = layout("F10 G_IIc", "F10 number of delaminations|number")
+
+    @classmethod
+    def from_row(cls, values: Sequence[Value], source: Source) -> Self:
+        """Build the segment from the card's values; a blank number is 1."""
+        toughness, number = _or_blank(values, source)
+        return cls(toughness or 0.0, 1.0 if number is None else number, source=source)
 
 
 @dataclass(frozen=True)

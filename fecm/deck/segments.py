@@ -9,8 +9,10 @@ from typing import TypeVar
 from fecm.deck.card import Card, Fields, Source, Value, read_values
 from fecm.deck.findings import Findings
 from fecm.deck.model import (
+    Allowables,
     Boundary,
     Coordinates,
+    Delamination,
     Elements,
     Forces,
     Gages,
@@ -237,6 +239,17 @@ class SegmentReader:
         )
         return None
 
+    def _allowables(self, head: Card) -> Segment | None:
+        strengths = self._single(head, Allowables)
+        card = self._stream.take()
+        if card is not None and card.is_keyword:
+            self._stream.give_back()
+            card = None
+        row = None if card is None else self._stream.row(card, Allowables.constants)
+        if strengths is None or (card is not None and row is None):
+            return None
+        return strengths if row is None else strengths.with_constants(*row)
+
     def _shear(self, head: Card) -> Segment | None:
         words = head.data.replace(",", " ").upper().split()[1:]
         for word in words:
@@ -340,6 +353,8 @@ READERS: dict[str, Callable[[SegmentReader, Card], Segment | None]] = {
     "PROJ": SegmentReader._projectile,
     "SHEA": SegmentReader._shear,
     "PATC": SegmentReader._patch,
+    "ALLO": SegmentReader._allowables,
+    "DELA": lambda reader, head: reader._single(head, Delamination),
     "GAGE": SegmentReader._numbered,
     "UNIT": SegmentReader._units,
     "PRIN": SegmentReader._print_option,

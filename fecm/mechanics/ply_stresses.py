@@ -142,8 +142,6 @@ class PlyStresses:
         Points of the in-plane stresses; the interlaminar ones belong to the element's centre.
     members : ndarray (m,), optional
         Rows of the elements, ascending; all by default.
-    under_load : ndarray (numel,), optional
-        Whether each element of the mesh is so near to the load that plate theory does not hold.
 
     Attributes
     ----------
@@ -159,12 +157,9 @@ class PlyStresses:
         laminate: Laminate,
         rule: Quadrature,
         members: NDArray[np.intp] | None = None,
-        under_load: Bools | None = None,
     ) -> None:
         self.members = np.arange(len(mesh.elements)) if members is None else members
         elements = mesh.elements[self.members]
-        near = np.zeros(len(mesh.elements), dtype=bool) if under_load is None else under_load
-        self.under_load = near[self.members]
         self.z = laminate.plies.z
         self.shape = (len(elements), len(rule.xi), len(laminate.plies.angles))
         self._families = [
@@ -178,6 +173,28 @@ class PlyStresses:
         self._in_plane = in_plane_stresses(laminate)
         self._interlaminar, self._residual = interlaminar_stresses(laminate)
 
+    def strains(self, field: Floats) -> tuple[Floats, Floats]:
+        """Strains of a displacement field, (numnp, 5), and their derivatives.
+
+        Returns
+        -------
+        strains : ndarray (elements, points, 6)
+            eps_xx, eps_yy, gamma_xy, kappa_x, kappa_y, kappa_xy.
+        gradients : ndarray (elements, 2, 6)
+            Derivatives with respect to x and y at the centre; NaN in elements without 9 nodes.
+        """
+        count, points, _ = self.shape
+        strains, gradients = np.empty((count, points, 6)), np.full((count, 2, 6), np.nan)
+        for family, slopes, curved in self._families:
+            q = field[family.nodes][:, :, [0, 1, 3, 4]]
+            q[:, :, 2:] *= -1.0  # curvatures are the strains of the rotations' negatives
+            strains[family.rows] = _strains(slopes @ q[:, None])
+            if curved is not None:
+                xx, yy, xy = (curved @ q).swapaxes(0, 1)
+                by_x, by_y = np.stack([xx, xy], 1), np.stack([xy, yy], 1)
+                gradients[family.rows] = _strains(np.stack([by_x, by_y], 1))
+        return strains, gradients
+
     def evaluate(self, field: Floats) -> dict[str, Floats]:
         """Stresses of a displacement field, (numnp, 5).
 
@@ -187,25 +204,10 @@ class PlyStresses:
             sigma_1, sigma_2, tau_12 (elements, points, plies, 2); tau_xz, tau_yz (elements, plies,
             3) and residual (elements, 2), NaN in elements without 9 nodes.
         """
-        count, points, plies = self.shape
-        stress = np.empty((3, count, points, plies, 2))
-        shear = np.full((2, count, plies, 3), np.nan)
-        residual = np.full((count, 2), np.nan)
-        for family, slopes, curved in self._families:
-            q = field[family.nodes][:, :, [0, 1, 3, 4]]
-            q[:, :, 2:] *= -1.0  # curvatures are the strains of the rotations' negatives
-            stress[:, family.rows] = np.einsum(
-                "lfcs,eps->ceplf", self._in_plane, _strains(np.einsum("epin,end->epid", slopes, q))
-            )
-            if curved is None:
-                continue
-            xx, yy, xy = np.einsum("ein,end->ied", curved, q)
-            along = np.stack(
-                [np.stack([xx, xy], 1), np.stack([xy, yy], 1)], 1
-            )  # (e, d/dx d/dy, i, dof)
-            gradients = _strains(along)
-            shear[:, family.rows] = np.einsum("lptds,eds->telp", self._interlaminar, gradients)
-            residual[family.rows] = np.einsum("tds,eds->et", self._residual, gradients)
+        strains, gradients = self.strains(field)
+        stress = np.einsum("lfcs,eps->ceplf", self._in_plane, strains)
+        shear = np.einsum("lptds,eds->telp", self._interlaminar, gradients)
+        residual = np.einsum("tds,eds->et", self._residual, gradients)
         names = ("sigma_1", "sigma_2", "tau_12")
         return dict(zip(names, stress, strict=True)) | {
             "tau_xz": shear[0], "tau_yz": shear[1], "residual": residual

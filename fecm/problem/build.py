@@ -5,15 +5,17 @@ The active slips become parameters of plate, projectile, contact law and transdu
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
 from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, moves_only
-from fecm.deck.model import Deck, Indentation, Material, Shear
+from fecm.deck.model import Allowables, Deck, Delamination, Indentation, Material, Shear
 from fecm.deck.model import Gages as GageCards
 from fecm.deck.model import Impact as ImpactCard
 from fecm.deck.model import Projectile as ProjectileCard
@@ -25,8 +27,10 @@ from fecm.mechanics.contact_law import (
     ListingLaw,
     YangSunPermanent,
 )
+from fecm.mechanics.delamination import effective_rigidity, threshold_force
 from fecm.mechanics.element_groups import element_centres
 from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
+from fecm.mechanics.failure_envelope import FailureMonitor
 from fecm.mechanics.gages import GageArray, gages
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.laminate import Laminate, laminate
@@ -56,6 +60,13 @@ from fecm.problem.patch import ContactPatch, W, contact_patch
 WORTH_SHARING = 100_000
 # Slips that change the plate or its loads.
 PLATE_SLIPS = {"g12", "small-stiffness", "shear-order", "tapes", "jacobian", "rod-force"}
+
+
+class Threshold(NamedTuple):
+    """Force at which delaminations grow, and the laminate's effective rigidity D*."""
+
+    force: float
+    rigidity: float
 
 
 @dataclass(frozen=True)
@@ -138,6 +149,13 @@ class Problem:
         centres = element_centres(self.mesh.elements, self.mesh.coordinates)
         return np.asarray(np.hypot(*(centres - self.load_place).T))
 
+    def under_load(self, x: Floats, y: Floats) -> NDArray[np.bool_]:
+        """Whether plate theory does not hold at points: within the patch's radius + h/2 of it."""
+        if self.load_place is None:
+            return np.zeros(x.shape, dtype=bool)
+        reach = self.laminate.thickness / 2.0 + (0.0 if self.patch is None else self.patch.radius)
+        return np.asarray(np.hypot(x - self.load_place[0], y - self.load_place[1]) < reach)
+
     @cached_property
     def by_distance(self) -> NDArray[np.intp]:
         """Rows of the elements, those nearest to the load first."""
@@ -157,6 +175,15 @@ class Problem:
         return contact
 
     @cached_property
+    def threshold(self) -> Threshold | None:
+        """Delamination threshold; None without a DELA segment."""
+        card = self.deck.last(Delamination)
+        if card is None:
+            return None
+        rigidity = effective_rigidity(self.laminate)
+        return Threshold(threshold_force(rigidity, card.toughness, int(card.number)), rigidity)
+
+    @cached_property
     def work(self) -> WorkEstimate:
         """Number of macros, steps and stored rows."""
         return estimate_work(self.program)
@@ -168,6 +195,12 @@ class Problem:
         count = (int(cards[0].second) if cards else 0) or self.deck.control.numel
         layers = len(self.deck.require(Material).layers)
         return count * (layers * (6 * len(self.rules[2].xi) + 6) + 2)
+
+    @property
+    def _failure_states(self) -> int:
+        """Number of points, plies and faces at which FAIL keeps exposures."""
+        layers = len(self.deck.require(Material).layers)
+        return self.deck.control.numel * len(self.rules[2].xi) * layers * 2
 
     @cached_property
     def output_bytes(self) -> int:
@@ -182,6 +215,7 @@ class Problem:
             + work.passes["STRE"] * points * 16
             + (work.passes["REAC"] + work.passes["EIGE"]) * field
             + work.passes["PLYS"] * self._ply_values
+            + min(1, work.passes["FAIL"]) * 9 * self._failure_states
             + work.contact_rows * (points * 5 + 8)
             + work.steps * (18 + gages)
         )
@@ -207,6 +241,10 @@ class ImpactModel:
         Contact patch.
     plies : PlyStresses or None
         Elements whose ply stresses are stored; None without PLYS.
+    failure : FailureMonitor or None
+        Failure criteria; None without FAIL.
+    under_load : callable
+        Whether plate theory does not hold at points x, y: :meth:`Problem.under_load`.
     """
 
     plate: PlateModel
@@ -218,6 +256,8 @@ class ImpactModel:
     gages: GageArray | None
     patch: ContactPatch | None
     plies: PlyStresses | None
+    failure: FailureMonitor | None
+    under_load: Callable[[Floats, Floats], NDArray[np.bool_]]
 
 
 class ProgramRules:
@@ -329,10 +369,16 @@ def build_plies(problem: Problem, plate: PlateModel) -> PlyStresses | None:
     card = next((macro for macro in flat(problem.program) if macro.word == "PLYS"), None)
     if card is None:
         return None
-    nearest = problem.by_distance[: int(card.second) or None]
-    reach = 0.0 if problem.load_place is None else plate.laminate.thickness / 2.0
-    near = problem.distances < reach + (0.0 if problem.patch is None else problem.patch.radius)
-    return PlyStresses(problem.mesh, plate.laminate, problem.rules[2], np.sort(nearest), near)
+    nearest = np.sort(problem.by_distance[: int(card.second) or None])
+    return PlyStresses(problem.mesh, plate.laminate, problem.rules[2], nearest)
+
+
+def build_failure(problem: Problem, plate: PlateModel) -> FailureMonitor | None:
+    """Build the failure criteria of FAIL, of all elements."""
+    if all(macro.word != "FAIL" for macro in flat(problem.program)):
+        return None
+    stresses = PlyStresses(problem.mesh, plate.laminate, problem.rules[2])
+    return FailureMonitor(stresses, plate.laminate, problem.deck.require(Allowables))
 
 
 def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactModel:
@@ -392,6 +438,8 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         gages=None if cards is None else gages(mesh, cards.records, transposed_jacobian=transposed),
         patch=problem.patch,
         plies=build_plies(problem, plate),
+        failure=build_failure(problem, plate),
+        under_load=problem.under_load,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fecm.deck.findings import Findings
-from fecm.deck.model import Material
+from fecm.deck.model import Allowables, Delamination, Material
 from fecm.deck.records import Integration, Ply
 from fecm.mechanics.elements.quadrature import HIGHEST_ORDER
 
@@ -15,6 +15,42 @@ def check_material(material: Material, findings: Findings) -> None:
     _check_orders(material.integration, findings)
     _check_ply(material.ply, findings)
     _check_layers(material, findings)
+
+
+def check_allowables(card: Allowables, findings: Findings) -> None:
+    """Check an ALLO segment."""
+    for name, value in zip(("XT", "XC", "YT", "YC", "S12", "S13", "S23"), card.row(), strict=False):
+        if isinstance(value, str) or not value > 0.0:
+            hint = "compressive strengths are positive on this card" if name in ("XC", "YC") else ""
+            findings.add(
+                "E455", f"The strength {name} is {value:g}; it must be positive.",
+                card.place(name), hint,
+            )  # fmt: skip
+    for name, value in (("p+", card.p_plus), ("p-", card.p_minus)):
+        if not 0.0 < value < 1.0:
+            findings.add(
+                "E456", f"Puck's slope {name} is {value:g}; it must be between 0 and 1.",
+                card.place(), "a blank takes 0.35 for p+ and 0.3 for p-",
+            )  # fmt: skip
+    if not abs(card.f12) < 1.0:
+        findings.add(
+            "E456", f"F12* is {card.f12:g}; it must be between -1 and 1.", card.place(),
+            "a blank takes -0.5",
+        )  # fmt: skip
+
+
+def check_delamination(card: Delamination, findings: Findings) -> None:
+    """Check a DELA segment."""
+    if not card.toughness > 0.0:
+        findings.add(
+            "E457", f"G_IIc is {card.toughness:g}; it must be positive.", card.place("G_IIc")
+        )
+    if not (card.number >= 1.0 and card.number.is_integer()):
+        findings.add(
+            "E457",
+            f"The number of delaminations is {card.number:g}; it must be a whole number from 1.",
+            card.place("number of delaminations"),
+        )
 
 
 def _check_orders(card: Integration, findings: Findings) -> None:

@@ -10,7 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.deck.findings import Findings, Place
-from fecm.deck.model import Boundary, Coordinates, Deck, Elements, Material, Patch, Shear
+from fecm.deck.model import (
+    Allowables,
+    Boundary,
+    Coordinates,
+    Deck,
+    Delamination,
+    Elements,
+    Material,
+    Patch,
+    Shear,
+)
 from fecm.deck.records import Integration
 from fecm.mechanics import assumed_shear, element_groups, interpolation
 from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature
@@ -410,8 +420,12 @@ def check_listing(deck: Deck, mesh: Mesh, findings: Findings) -> None:
             material.layers[LISTING_LAYERS].place("layer"),
             ANOTHER_MODE,
         )
-    macro = next((macro for macro in deck.macros if macro.word == "PLYS"), None)
-    words = [] if macro is None else [("PLYS", macro.place("macro"))]
+    later = {macro.word: macro for macro in deck.macros if macro.word in ("PLYS", "FAIL")}
+    words = [(word, macro.place("macro")) for word, macro in later.items()]
+    if (allowables := deck.last(Allowables)) is not None:
+        words.append(("ALLO", allowables.place()))
+    if (delamination := deck.last(Delamination)) is not None:
+        words.append(("DELA", delamination.place()))
     if (patch := deck.last(Patch)) is not None:
         words.append(("PATC", patch.place()))
     if (shear := deck.last(Shear)) is not None:

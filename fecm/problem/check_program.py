@@ -44,7 +44,7 @@ def check_program(problem: Problem, findings: Findings) -> None:
                 f"{sizes.steps}: no strains are stored.",
                 macro.place("value"),
             )
-        if macro.word in ("DISP", "STRE", "PLYS") and not sizes.passes[macro.word]:
+        if macro.word in ("DISP", "STRE", "PLYS", "FAIL") and not sizes.passes[macro.word]:
             findings.add(
                 "W510",
                 f"{macro.word} stores every {every(macro)} passes, but no loop has so many: "
@@ -67,9 +67,11 @@ def check_program(problem: Problem, findings: Findings) -> None:
 
 def _check_ply_stresses(problem: Problem, findings: Findings) -> None:
     """Check the PLYS cards of a program."""
-    cards = [macro for macro in flat(problem.program) if macro.word == "PLYS"]
+    cards = [macro for macro in flat(problem.program) if macro.word in ("PLYS", "FAIL")]
     if not cards:
         return
+    _check_stresses_under_load(problem, cards[0], findings)
+    cards = [macro for macro in cards if macro.word == "PLYS"]
     numel = problem.deck.control.numel
     for card in cards:
         if card.second > numel:
@@ -82,15 +84,19 @@ def _check_ply_stresses(problem: Problem, findings: Findings) -> None:
                 "E448", "The PLYS cards take different numbers of elements.",
                 card.place("second value"), "give each the same number",
             )  # fmt: skip
-    if cards[0].second and problem.has_impact is False and problem.patch is None:
+    if cards and cards[0].second and problem.has_impact is False and problem.patch is None:
         findings.add(
             "E448", "PLYS takes the elements nearest to the load, but nothing hits the plate.",
             cards[0].place("second value"), "leave the number blank for all elements",
         )  # fmt: skip
+
+
+def _check_stresses_under_load(problem: Problem, card: Macro, findings: Findings) -> None:
+    """Warn of ply stresses that depend on the mesh or are not computed."""
     if problem.has_impact and problem.patch is None:
         findings.add(
             "W449", "Ply stresses under a point force grow without bound as the mesh is refined.",
-            cards[0].place("macro"), "a PATC segment gives the contact force an area",
+            card.place("macro"), "a PATC segment gives the contact force an area",
         )  # fmt: skip
     others = np.flatnonzero(~is_complete(problem.mesh.elements))
     if len(others):
@@ -98,7 +104,7 @@ def _check_ply_stresses(problem: Problem, findings: Findings) -> None:
             "W450",
             f"Interlaminar stresses of {len(others)} elements without nine nodes are not computed "
             f"(element {others[0] + 1} first): they are NaN.",
-            cards[0].place("macro"),
+            card.place("macro"),
         )
 
 

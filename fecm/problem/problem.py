@@ -11,9 +11,11 @@ import numpy as np
 from fecm.deck.findings import Findings
 from fecm.deck.macros import STEPS, compile_program
 from fecm.deck.model import (
+    Allowables,
     Boundary,
     Coordinates,
     Deck,
+    Delamination,
     Elements,
     Gages,
     Impact,
@@ -37,7 +39,11 @@ from fecm.problem.check_impact import (
     check_shear_correction,
     warn_of_the_reports_rod,
 )
-from fecm.problem.check_material import check_material
+from fecm.problem.check_material import (
+    check_allowables,
+    check_delamination,
+    check_material,
+)
 from fecm.problem.check_mesh import (
     check_assumed_shear,
     check_elements,
@@ -61,6 +67,7 @@ IN_AN_IMPACT: tuple[type[Segment], ...] = (Impact, Indentation)
 # Segments of which only the last is effective.
 SINGLE: tuple[type[Segment], ...] = (
     Coordinates, Elements, Material, Impact, Indentation, Projectile, Shear, Patch, Gages, Units,
+    Allowables, Delamination,
 )  # fmt: skip
 
 
@@ -101,6 +108,10 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
         check_impact(impact, deck, mesh, findings)
     if (law := deck.last(Indentation)) is not None:
         check_law(law, findings)
+    if (allowables := deck.last(Allowables)) is not None:
+        check_allowables(allowables, findings)
+    if (delamination := deck.last(Delamination)) is not None:
+        check_delamination(delamination, findings)
     if (projectile := deck.last(Projectile)) is not None:
         check_projectile(projectile, findings)
     if (correction := deck.last(Shear)) is not None:
@@ -117,6 +128,13 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
     checked = Problem(deck, mesh, program)
     if findings.error_count == before and not unsound:
         with np.errstate(all="ignore"):  # numbers out of range end in a finding
+            delamination = deck.last(Delamination)
+            if delamination is not None and checked.laminate.is_coupled:
+                findings.add(
+                    "W458",
+                    "B is not zero: the delamination threshold takes D - B A^-1 B for D.",
+                    delamination.place(),
+                )
             check_time_step(checked, findings)
             check_program(checked, findings)
             check_purpose(deck, mesh, findings)
@@ -142,7 +160,9 @@ def _element_errors(findings: Findings) -> int:
 def _check_segments(deck: Deck, unsound: set[str], findings: Findings) -> None:
     """Report missing segments, and those that a later one of the same keyword replaces."""
     words = {macro.word for macro in deck.macros}
-    for kind in (*ALWAYS, *(IN_AN_IMPACT if "RODP" in words else ())):
+    impact = IN_AN_IMPACT if "RODP" in words else ()
+    failure: tuple[type[Segment], ...] = (Allowables,) if "FAIL" in words else ()
+    for kind in (*ALWAYS, *impact, *failure):
         if not deck.has(kind) and kind.keyword not in unsound:
             findings.add(
                 "E203",

@@ -151,6 +151,11 @@ class Result:
         """Whether the run ended in contact, so that its final values are not known."""
         return f"{HISTORY}/force" in self and still_in_contact(self[f"{HISTORY}/force"])
 
+    @property
+    def threshold(self) -> Mapping[str, Any]:
+        """Delamination threshold of DELA: force, d_star, time, margin; empty without it."""
+        return self._groups.get("threshold", {})
+
     def to_dataframe(self) -> pandas.DataFrame:
         """The history as a pandas DataFrame: one row per step, indexed by time.
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fecm._errors import FecmError
+from fecm.mechanics.failure import CRITERIA
 
 
 class ExportError(FecmError, ValueError):
@@ -160,6 +161,17 @@ def _clock(group: str) -> tuple[Dataset, ...]:
     )
 
 
+INTERLAMINAR = "failure/interlaminar"
+
+
+def _exposures(group: str, shape: tuple[str | int, ...]) -> tuple[Dataset, ...]:
+    return (
+        Dataset(f"{group}/exposure", shape, "largest exposure over time"),
+        Dataset(f"{group}/time", shape, "its time", "time"),
+        Dataset(f"{group}/mode", shape, "its mode: index into the attribute modes", dtype="i1"),
+    )
+
+
 _CONTACT = (
     ("force", "contact force, positive in compression", "force"),
     ("indentation", "indentation of the plate by the projectile", "length"),
@@ -264,7 +276,7 @@ DATASETS = {
         ),
         Dataset(
             "plies/under_load", ("members",),
-            "1 where plate theory does not hold: nearer than the patch's radius + h/2 to the load",
+            "1 where plate theory does not hold: within the patch's radius + h/2 of the load",
             dtype="i4",
         ),
         *_group(
@@ -282,6 +294,19 @@ DATASETS = {
             "plies/residual", ("rows", "members", "directions"),
             "tau_xz and tau_yz of equilibrium at z = h/2, removed linearly in z", "force/length^2",
         ),
+        Dataset("failure/x", ("numel", "npp"), "x of every point of every element", "length"),
+        Dataset("failure/y", ("numel", "npp"), "y of every point of every element", "length"),
+        Dataset(
+            "failure/under_load", ("numel", "npp"),
+            "1 where plate theory does not hold: nearer than the patch's radius + h/2 to the load",
+            dtype="i4",
+        ),
+        *(
+            dataset
+            for criterion in CRITERIA
+            for dataset in _exposures(f"failure/{criterion}", ("numel", "npp", "layers", "faces"))
+        ),
+        *_exposures(INTERLAMINAR, ("numel", "interfaces")),
         *_clock("reactions"),
         Dataset(
             "reactions/force", ("rows", "numnp", "ndf"),
@@ -365,6 +390,8 @@ GROUP_DESCRIPTIONS = {
     "stresses": "strains and stress resultants, stored by STRE",
     "patch": "nodal weights of the contact force",
     "plies": "stresses ply by ply, stored by PLYS",
+    "threshold": "delamination threshold: force, time of its first crossing, margin of the peak",
+    "failure": "largest exposures over time, found by FAIL",
     "reactions": "forces of the supports, stored by REAC",
     "modes": "natural modes, found by EIGE",
 }
@@ -373,7 +400,7 @@ GROUP_DESCRIPTIONS = {
 STORED_BY = {
     "tape3": "DISP", "tape8": "RODP", "tape9": "RODP", "history": "RODP", "energy": "RODP",
     "gages": "RODP or EXCD",
-    "stresses": "STRE", "plies": "PLYS", "reactions": "REAC", "modes": "EIGE",
+    "stresses": "STRE", "plies": "PLYS", "failure": "FAIL", "reactions": "REAC", "modes": "EIGE",
 }  # fmt: skip
 
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+
 import numpy as np
 
+from fecm.mechanics.failure import CRITERIA
 from fecm.results.result import Result, contact_intervals
 
 # Most contacts and frequencies listed individually.
@@ -27,12 +31,93 @@ def summary(result: Result) -> list[str]:
         )
     if "history/force" not in result and "tape3/w" in result:
         lines += _deflection(result)
+    lines += _threshold(result)
+    lines += [exposure.line(result) for exposure in largest_exposures(result)]
+    if "failure/x" in result and (count := np.count_nonzero(result["failure/under_load"])):
+        lines.append(f"under the load    {count} points are left out of these exposures")
     if "modes/angular_frequency" in result:
         found = result["modes/angular_frequency"]
         texts = ", ".join(f"{omega:.6g}" for omega in found[:LISTED])
         more = f" and {len(found) - LISTED} more" if len(found) > LISTED else ""
         lines.append(f"frequencies       {texts}{more} {result.unit('1/time')}".rstrip())
     return lines or ["nothing was stored"]
+
+
+def _threshold(result: Result) -> list[str]:
+    """Line about the delamination threshold; empty without one."""
+    values = result.threshold
+    if not values:
+        return []
+    time, margin = float(values["time"]), float(values["margin"])
+    force = _quantity(result, float(values["force"]), "force")
+    if math.isnan(time):
+        return [f"delamination      {force} not reached: the peak is {margin:.1%} below"]
+    return [f"delamination      {force} reached at time {_quantity(result, time, 'time')}"]
+
+
+@dataclass(frozen=True)
+class LargestExposure:
+    """Largest exposure of a criterion outside the elements under the load.
+
+    Attributes
+    ----------
+    criterion : str
+    exposure : float
+    mode : str
+    ply : int
+        From 1 at the struck face; of an interface the ply above it.
+    x, y, time : float
+    """
+
+    criterion: str
+    exposure: float
+    mode: str
+    ply: int
+    x: float
+    y: float
+    time: float
+
+    def line(self, result: Result) -> str:
+        """One line of the summary."""
+        place = "interface of plies" if self.criterion == "interlaminar" else "ply"
+        plies = f"{self.ply} and {self.ply + 1}" if self.criterion == "interlaminar" else self.ply
+        return (
+            f"{self.criterion.replace('_', ' '):18}{self.exposure:.4g}: {self.mode}, {place} "
+            f"{plies} at ({self.x:.6g}, {self.y:.6g}), time "
+            f"{_quantity(result, self.time, 'time')}"
+        )
+
+
+def largest_exposures(result: Result) -> list[LargestExposure]:
+    """Largest exposure of each criterion; empty without FAIL."""
+    if "failure/x" not in result:
+        return []
+    under = result["failure/under_load"] != 0
+    x, y = result["failure/x"], result["failure/y"]
+    modes = [str(mode) for mode in result.failure.attributes["modes"]]
+    found = []
+    for name in (*CRITERIA, "interlaminar"):
+        exposure = result[f"failure/{name}/exposure"]
+        # Interlaminar exposures belong to the element.
+        near = under.any(axis=1)[:, None] if name == "interlaminar" else under[:, :, None, None]
+        outside = np.where(near, -1.0, exposure)
+        if not outside.size or not (outside >= 0.0).any():
+            continue
+        place = np.unravel_index(int(np.nanargmax(outside)), outside.shape)
+        element, ply = place[0], place[-2] if exposure.ndim > 2 else place[1]
+        at_point = exposure.ndim > 2
+        found.append(
+            LargestExposure(
+                name,
+                float(exposure[place]),
+                modes[int(result[f"failure/{name}/mode"][place])],
+                int(ply) + 1,
+                float(x[element, place[1]] if at_point else x[element].mean()),
+                float(y[element, place[1]] if at_point else y[element].mean()),
+                float(result[f"failure/{name}/time"][place]),
+            )
+        )
+    return found
 
 
 def _deflection(result: Result) -> list[str]:

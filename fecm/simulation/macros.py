@@ -194,6 +194,14 @@ def store_ply_stresses(run: Simulation, n: int) -> None:
     run.recorder.row("plies", plate.step, plate.time, values)
 
 
+def evaluate_failure(run: Simulation, n: int) -> None:
+    """FAIL."""
+    envelope, monitor = run.state.failure, run.model.failure
+    if envelope is None or monitor is None or run.interpreter.current_pass % n:
+        return
+    monitor.update(envelope, run.displacement_field(), run.state.plate.time)
+
+
 def check(run: Simulation) -> None:
     """CHEC: store and print sizes; ends the program under its slip."""
     plate = run.model.plate
@@ -222,6 +230,7 @@ ACTIONS: dict[str, Callable[..., bool | None]] = {
     "DISP": store_displacements,
     "STRE": store_stresses,
     "PLYS": store_ply_stresses,
+    "FAIL": evaluate_failure,
     "CHEC": check,
 }
 

@@ -10,13 +10,16 @@ from numpy.typing import NDArray
 
 from fecm._typing import Floats
 from fecm.deck.macros import WorkEstimate
+from fecm.mechanics.failure import CRITERIA, MODES
+from fecm.mechanics.failure_envelope import FailureEnvelope
 from fecm.mechanics.strains import STRAINS
 from fecm.problem.build import ImpactModel
-from fecm.results.schema import DATASETS, FIXED, Dataset
+from fecm.results.schema import DATASETS, FIXED, INTERLAMINAR, Dataset
 from fecm.results.sinks import RowBuffer, Sink
 from fecm.simulation.state import subset
 from fecm.simulation.step_recorder import OnBlock, StepRecorder
 
+FAILURE = ("failure", INTERLAMINAR, *(f"failure/{name}" for name in CRITERIA))
 BUFFERED = ("tape3", "tape8", "stresses", "plies", "reactions", "modes")
 
 
@@ -73,6 +76,7 @@ class Recorder:
             "gages": sizes.steps if self._model.gages is not None else 0,
             "stresses": sizes.passes["STRE"],
             "plies": sizes.passes["PLYS"],
+            **dict.fromkeys(FAILURE, int(self._model.failure is not None)),
             "patch": int(self._model.patch is not None),
             "reactions": sizes.passes["REAC"],
             "modes": sizes.passes["EIGE"],
@@ -91,6 +95,9 @@ class Recorder:
         }  # fmt: skip
         if self._model.plies is not None:
             numbers |= zip(("members", "npp", "layers"), self._model.plies.shape, strict=True)
+        if self._model.failure is not None:
+            _, numbers["npp"], numbers["layers"] = self._model.failure.stresses.shape
+            numbers["interfaces"] = numbers["layers"] - 1
         if self._model.patch is not None:
             numbers["patch_nodes"] = np.count_nonzero(self._model.patch.weights)
         return tuple(numbers[n] if isinstance(n, str) else n for n in dataset.shape)
@@ -122,11 +129,16 @@ class Recorder:
             constants |= {"patch/node": nodes + 1, "patch/weight": patch.weights[nodes]}
             values = {"shape": patch.shape, "radius": patch.radius, "x": patch.x, "y": patch.y}
             self._sink.attributes("patch", values)
+        x, y = model.stress_points.places(mesh.coordinates)
+        near = model.under_load(x, y)
         if self._room["plies"] and model.plies is not None:
             constants |= {
                 "plies/element": model.plies.members + 1, "plies/z": model.plies.z,
-                "plies/under_load": model.plies.under_load.astype(int),
+                "plies/under_load": near[model.plies.members].any(axis=1).astype(int),
             }  # fmt: skip
+        if model.failure is not None:
+            constants |= {"failure/x": x, "failure/y": y, "failure/under_load": near.astype(int)}
+            self._sink.attributes("failure", {"modes": list(MODES)})
         for path, array in constants.items():
             self._sink.write(path, 0, array)
         if self._room["tape8"]:
@@ -171,6 +183,16 @@ class Recorder:
         self.steps.restore(subset(state, "steps/"))
         for group, buffer in self._buffers.items():
             buffer.restore(subset(state, f"rows/{group}/"))
+
+    def failure(self, found: FailureEnvelope) -> None:
+        """Store the largest exposures of FAIL."""
+        groups = [(f"failure/{name}", n) for n, name in enumerate(CRITERIA)]
+        for part in ("exposure", "time", "mode"):
+            for group, n in groups:
+                values = getattr(found.plies, part)[n]
+                shape = self._shape(DATASETS[f"{group}/{part}"])
+                self._sink.write(f"{group}/{part}", 0, values.reshape(shape))
+            self._sink.write(f"{INTERLAMINAR}/{part}", 0, getattr(found.interfaces, part))
 
     def finish(self) -> None:
         """Store the remaining rows and trim each dataset to its rows."""

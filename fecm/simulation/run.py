@@ -54,6 +54,8 @@ def run(simulation: Simulation) -> None:
             simulation.interpreter.run(
                 partial(bind, simulation), state.position, partial(simulation.on_macro, simulation)
             )
+            if state.failure is not None:
+                simulation.recorder.failure(state.failure)
             simulation.recorder.finish()
     except DivergenceError as diverged:
         cause = likely_cause(problem, simulation.model, state.dt)
@@ -84,6 +86,13 @@ def _write_header(simulation: Simulation) -> None:
 
 def _write_footer(simulation: Simulation) -> None:
     """Store the permanent indentation, and the number of steps that did not converge."""
+    state, threshold = simulation.state, simulation.problem.threshold
+    if threshold is not None:
+        values = {
+            "force": threshold.force, "d_star": threshold.rigidity, "time": state.crossing,
+            "margin": 1.0 - state.peak_force / threshold.force,
+        }  # fmt: skip
+        simulation.sink.attributes("threshold", values)
     impact, system = simulation.state.impact, simulation.model.impact
     if impact is None or system is None or not impact.plate.step:
         return

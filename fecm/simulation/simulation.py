@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -74,18 +75,30 @@ class Simulation:
         self.state = state = RunState(self.model.motion.start())
         if self.model.impact is not None:
             state.impact = self.model.impact.start(state.plate)
+        if self.model.failure is not None:
+            state.failure = self.model.failure.start()
         if self.rules.prop_replaces_contact:
             state.prop_force = 1.0  # PROP's first value in the listing
         self.interpreter = Interpreter(problem.program)
         self.interval = max(1, min(64, 100_000 // self.model.plate.neq))
-        limit = options.energy_limit if self.rules.enforces_energy_limit else None
         self.recorder = Recorder(
             self.sink,
             self.model,
             problem.work,
             contact_at_every_step=self.rules.listing_tapes,
-            on_block=partial(state.balance.add, limit=limit),
+            on_block=self._judge_block,
         )
+
+    def _judge_block(self, block: Mapping[str, Floats], initial: float) -> None:
+        """Add a block of steps to the energy balance, and compare the force with the threshold."""
+        state, threshold = self.state, self.problem.threshold
+        limit = self.options.energy_limit if self.rules.enforces_energy_limit else None
+        state.balance.add(block, initial, limit=limit)
+        if threshold is not None:
+            state.peak_force = max(state.peak_force, float(block["force"].max()))
+            above = np.flatnonzero(block["force"] >= threshold.force)
+            if len(above) and math.isnan(state.crossing):
+                state.crossing = float(block["time"][above[0]])
 
     @cached_property
     def tangent(self) -> Tangent:

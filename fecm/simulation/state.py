@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from fecm._typing import Floats
+from fecm.mechanics.failure_envelope import FailureEnvelope
 from fecm.mechanics.impact import ImpactState
 from fecm.mechanics.plate_motion import PlateState
 from fecm.simulation.guard import EnergyBalance
@@ -56,6 +58,12 @@ class RunState:
         Time step of the rod's constants.
     balance : EnergyBalance
         Energy balance so far.
+    peak_force : float
+        Largest contact force so far.
+    crossing : float
+        Time at which it first reached the delamination threshold; NaN before.
+    failure : FailureEnvelope or None
+        Largest exposures so far, of FAIL.
     notes : list of str
         Remarks for the user.
     """
@@ -78,6 +86,9 @@ class RunState:
     prop_force: float | None = None
     first_dt: float | None = None
     balance: EnergyBalance = field(default_factory=EnergyBalance)
+    peak_force: float = 0.0
+    crossing: float = math.nan
+    failure: FailureEnvelope | None = None
     notes: list[str] = field(default_factory=list)
 
 

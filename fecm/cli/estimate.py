@@ -1,0 +1,92 @@
+"""``fecm estimate``."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError, echo
+from fecm.cli.decks import load_valid
+from fecm.deck.units import unit_names, unit_of
+from fecm.problem.problem import Problem
+from fecm.results.schema import jsonable
+from fecm.studies.estimate import estimate as estimate_problem
+from fecm.sweeps.api import carry_out
+from fecm.sweeps.find import velocity_of_peak
+from fecm.sweeps.plan import plan
+
+COLUMNS = ("model", "peak force", "duration", "threshold", "velocity", "energy")
+
+
+@click.command(short_help="Estimate an impact and its damage threshold.")
+@click.argument("deck", type=DECK_PATH)
+@FORMAT_OPTION
+def estimate(deck: Path, form: str) -> None:
+    """Estimate the impact of DECK by models without a mesh, beside the run itself.
+
+    The infinite plate is for small masses, the static plate for large ones.  With a DELA segment,
+    velocity and energy are those at which the peak force reaches the delamination threshold.
+    """
+    problems = load_valid(deck).problems
+    if len(problems) != 1:
+        raise RefusedError(f"{deck} has {len(problems)} problems; estimate takes one")
+    (problem,) = problems
+    found = estimate_problem(problem)
+    rows = [
+        {
+            "model": model.name, "peak_force": model.impact.peak,
+            "duration": model.impact.duration, "threshold": model.threshold,
+            "velocity": model.velocity, "energy": 0.5 * found.mass * model.velocity**2,
+        }
+        for model in found.models
+    ]  # fmt: skip
+    rows.append(_run(problem, found.mass))
+    values = {
+        "class": found.response, "mass_ratio": found.mass_ratio, "lambda": found.parameter,
+        "stiffness": found.stiffness, "models": rows,
+    }  # fmt: skip
+    if form == "json":
+        click.echo(json.dumps(jsonable(values)))
+        return
+    _print(problem, values)
+
+
+def _run(problem: Problem, mass: float) -> dict[str, Any]:
+    """The row of the run itself, by the kernel of sweeps."""
+    threshold = math.nan if problem.threshold is None else problem.threshold.force
+    own = carry_out(problem, plan(problem, [{}], history=False))
+    velocity = velocity_of_peak(problem, threshold) if threshold == threshold else math.nan
+    return {
+        "model": "run", "peak_force": float(own["peak_force"][0]),
+        "duration": float(own["contact_time"][0]), "threshold": threshold, "velocity": velocity,
+        "energy": 0.5 * mass * velocity**2,
+    }  # fmt: skip
+
+
+def _print(problem: Problem, values: dict[str, Any]) -> None:
+    names = unit_names(problem.deck)
+
+    def text(value: float, dimension: str) -> str:
+        return "-" if math.isnan(value) else f"{value:.5g} {unit_of(dimension, names)}".rstrip()
+
+    echo(problem.deck.title or "(no title)")
+    echo(f"  class       M/M_plate = {values['mass_ratio']:.4g}, {values['class']}")
+    echo(f"  lambda      {values['lambda']:.4g}")
+    stiffness = values["stiffness"]
+    held = text(stiffness, "force/length")
+    free = "- (the plate is free: no static model)"
+    echo(f"  stiffness   {free if math.isnan(stiffness) else held}")
+    dimensions = ("force", "time", "force", "length/time", "force*length")
+    table = [list(COLUMNS)]
+    for row in values["models"]:
+        model, *numbers = row.values()
+        cells = zip(numbers, dimensions, strict=True)
+        table.append([model, *(text(value, dimension) for value, dimension in cells)])
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    for cells_ in table:
+        line = "  ".join(cell.ljust(width) for cell, width in zip(cells_, widths, strict=True))
+        echo(f"  {line}".rstrip())

@@ -1,0 +1,160 @@
+"""Failure criteria of plies: exposure and mode of stress states.
+
+The exposure f = 1/R is the reciprocal of the factor on all stresses that reaches failure; it is
+linear in the load.  Stresses are in the axes of the ply; f < 1 is no failure.  Criteria: maximum
+stress, Tsai and Wu 1971, Hashin 1980 (with S_T = YC/2, for which the compressive matrix criterion
+is a sum of squares), Puck's plane criterion (Puck and Schürmann 1998), and a quadratic criterion of
+the interlaminar shear stresses.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import reduce
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._typing import Floats
+
+MODES = (
+    "none", "fibre tension", "fibre compression", "matrix tension", "matrix compression", "shear",
+    "interactive", "inter-fibre A", "inter-fibre B", "inter-fibre C", "interlaminar shear",
+)  # fmt: skip
+_CODE = {name: code for code, name in enumerate(MODES)}
+
+Codes = NDArray[np.int8]
+Exposure = tuple[Floats, Codes]
+# Values of a criterion by mode; the exposure is the largest.
+Candidates = tuple[tuple[str, Floats], ...]
+
+
+class Strengths(Protocol):
+    """Strengths of a ply, all positive (force/area), and dimensionless constants.
+
+    XT, XC along and YT, YC across the fibres, S12, S13, S23 in shear; F12 is Tsai and Wu's
+    F12*, p_plus and p_minus are Puck's slopes.
+    """
+
+    @property
+    def xt(self) -> float: ...  # noqa: D102
+    @property
+    def xc(self) -> float: ...  # noqa: D102
+    @property
+    def yt(self) -> float: ...  # noqa: D102
+    @property
+    def yc(self) -> float: ...  # noqa: D102
+    @property
+    def s12(self) -> float: ...  # noqa: D102
+    @property
+    def s13(self) -> float: ...  # noqa: D102
+    @property
+    def s23(self) -> float: ...  # noqa: D102
+    @property
+    def f12(self) -> float: ...  # noqa: D102
+    @property
+    def p_plus(self) -> float: ...  # noqa: D102
+    @property
+    def p_minus(self) -> float: ...  # noqa: D102
+
+
+def modes_of(candidates: Candidates, where: NDArray[np.intp] | None = None) -> Codes:
+    """Mode of the largest candidate, the first one of equals, at all or some flat indices."""
+    values = np.stack([v if where is None else v.ravel()[where] for _, v in candidates])
+    codes = np.array([_CODE[mode] for mode, _ in candidates], np.int8)
+    return np.where(values.max(axis=0) > 0.0, codes[values.argmax(axis=0)], 0).astype(np.int8)
+
+
+def exposure_of(candidates: Candidates) -> Floats:
+    """Largest candidate."""
+    return reduce(np.maximum, [value for _, value in candidates])
+
+
+def evaluate(
+    criterion: Callable[[Strengths, Floats, Floats, Floats], Candidates],
+    ply: Strengths,
+    s1: Floats,
+    s2: Floats,
+    tau: Floats,
+) -> Exposure:
+    """Exposure and mode of stress states."""
+    candidates = criterion(ply, s1, s2, tau)
+    return exposure_of(candidates), modes_of(candidates)
+
+
+def max_stress(ply: Strengths, s1: Floats, s2: Floats, tau: Floats) -> Candidates:
+    """Ratios of the stresses to their strengths."""
+    return (
+        ("fibre tension", s1 / ply.xt),
+        ("fibre compression", s1 / -ply.xc),
+        ("matrix tension", s2 / ply.yt),
+        ("matrix compression", s2 / -ply.yc),
+        ("shear", np.abs(tau) / ply.s12),
+    )
+
+
+def tsai_wu(ply: Strengths, s1: Floats, s2: Floats, tau: Floats) -> Candidates:
+    """Positive root f of f^2 - l f - q = 0, with the linear and the quadratic terms l and q."""
+    x, y = ply.xt * ply.xc, ply.yt * ply.yc
+    q = s1 * (s1 / x + (2.0 * ply.f12 / math.sqrt(x * y)) * s2) + s2**2 / y + (tau / ply.s12) ** 2
+    linear = s1 * (1.0 / ply.xt - 1.0 / ply.xc) + s2 * (1.0 / ply.yt - 1.0 / ply.yc)
+    return (("interactive", (linear + np.sqrt(linear**2 + 4.0 * q)) / 2.0),)
+
+
+def hashin(ply: Strengths, s1: Floats, s2: Floats, tau: Floats) -> Candidates:
+    """Fibre and matrix failure, each in tension and in compression."""
+    shear = (tau / ply.s12) ** 2
+    matrix = np.where(s2 >= 0.0, s2 / ply.yt, s2 / ply.yc)
+    both = np.sqrt(matrix**2 + shear)
+    fibre = np.sqrt((s1 / ply.xt) ** 2 + shear)
+    return (
+        ("fibre tension", np.where(s1 >= 0.0, fibre, 0.0)),
+        ("fibre compression", s1 / -ply.xc),
+        ("matrix tension", np.where(s2 >= 0.0, both, 0.0)),
+        ("matrix compression", np.where(s2 < 0.0, both, 0.0)),
+    )
+
+
+def puck(ply: Strengths, s1: Floats, s2: Floats, tau: Floats) -> Candidates:
+    """Fibre failure by its stress, inter-fibre failure in the modes A, B and C."""
+    s, yc, plus, minus = ply.s12, ply.yc, ply.p_plus, ply.p_minus
+    resistance, critical = puck_limits(ply)
+    slope = minus * resistance / s
+    t, pressed = np.abs(tau), s2 < 0.0
+    # A in tension and B in compression have the same form.
+    factor = np.where(pressed, minus / s, 1.0 / ply.yt - plus / s) * s2
+    ab = np.sqrt((t / s) ** 2 + factor**2) + np.where(pressed, minus / s, plus / s) * s2
+    steep = pressed & (-s2 * critical > t * resistance)
+    below = np.where(steep, s2, -1.0)
+    c = (t**2 * (yc / (2.0 * (1.0 + slope) * s) ** 2) + s2**2 / yc) / -below
+    return (
+        ("fibre tension", s1 / ply.xt),
+        ("fibre compression", s1 / -ply.xc),
+        ("inter-fibre A", np.where(pressed, 0.0, ab)),
+        ("inter-fibre B", np.where(pressed & ~steep, ab, 0.0)),
+        ("inter-fibre C", np.where(steep, c, 0.0)),
+    )
+
+
+def puck_limits(ply: Strengths) -> tuple[float, float]:
+    """Fracture resistance R_A of the action plane, and shear stress tau_c where B meets C."""
+    s, minus = ply.s12, ply.p_minus
+    resistance = s / (2.0 * minus) * (math.sqrt(1.0 + 2.0 * minus * ply.yc / s) - 1.0)
+    return resistance, s * math.sqrt(1.0 + 2.0 * minus * resistance / s)
+
+
+def puck_angle(ply: Strengths, s2: Floats, exposure: Floats) -> Floats:
+    """Angle of the fracture plane of mode C, in degrees."""
+    resistance, _ = puck_limits(ply)
+    ratio = np.clip(exposure * resistance / -s2, 0.0, 1.0)
+    return np.asarray(np.rad2deg(np.arccos(np.sqrt(ratio))))
+
+
+CRITERIA = {"max_stress": max_stress, "tsai_wu": tsai_wu, "hashin": hashin, "puck": puck}
+
+
+def interlaminar(ply: Strengths, tau_13: Floats, tau_23: Floats) -> Floats:
+    """Quadratic sum of the interlaminar shear stresses, in the axes of a ply."""
+    return np.hypot(tau_13 / ply.s13, tau_23 / ply.s23)

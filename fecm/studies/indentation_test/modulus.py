@@ -1,0 +1,108 @@
+"""Indentation modulus of a laminate from its elastic constants.
+
+The laminate is replaced by a homogeneous half-space of its effective stiffness; its indentation
+modulus, which takes the place of E_t in equation 3-2, follows from the Barnett-Lothe tensor
+(Vlassak and Nix 1994).  Axes: 3 is the normal of the
+plate; strains in the order 11, 22, 33, 23, 13, 12.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.mechanics.laminate import PlyConstants
+from fecm.studies import StudyError
+
+# Directions in the surface and around each of them.
+SURFACE, AROUND = 72, 180
+# In-plane and out-of-plane components.
+_A, _B = [0, 1, 5], [2, 4, 3]
+_VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
+
+
+def ply_stiffness(ply: PlyConstants, nu23: float) -> Floats:
+    """Three-dimensional stiffness of a transversely isotropic ply in its own axes, (6, 6).
+
+    Raises
+    ------
+    StudyError
+        If the compliance is not positive definite.
+    """
+    nu12, e1, e2 = ply.nu12, ply.e1, ply.e2
+    compliance = np.zeros((6, 6))
+    compliance[:3, :3] = [
+        [1.0 / e1, -nu12 / e1, -nu12 / e1],
+        [-nu12 / e1, 1.0 / e2, -nu23 / e2],
+        [-nu12 / e1, -nu23 / e2, 1.0 / e2],
+    ]
+    compliance[[3, 4, 5], [3, 4, 5]] = 1.0 / ply.g23, 1.0 / ply.g13, 1.0 / ply.g12
+    if not np.linalg.eigvalsh(compliance)[0] > 0.0:
+        raise StudyError(
+            f"the ply's compliance is not positive definite: nu12 = {nu12:g} with "
+            f"E1/E2 = {e1 / e2:.4g} and nu23 = {nu23:g}; nu23 must stay below "
+            f"1 - 2 nu12^2 E2/E1 = {1.0 - 2.0 * nu12**2 * e2 / e1:.4g}"
+        )
+    return np.asarray(np.linalg.inv(compliance), dtype=float)
+
+
+def _turned(stiffness: Floats, angle: float) -> Floats:
+    """Stiffness seen from axes to which the fibres lie at an angle, in degrees."""
+    c, s = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    tensor = stiffness[_VOIGT[:, :, None, None], _VOIGT]
+    tensor = np.einsum("ia,jb,kc,ld,abcd->ijkl", R, R, R, R, tensor)
+    first, second = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])
+    return np.asarray(tensor[first[:, None], second[:, None], first, second])
+
+
+def effective_stiffness(
+    ply: PlyConstants, angles: Sequence[float], thicknesses: Sequence[float], nu23: float
+) -> Floats:
+    """Stiffness of the homogeneous solid with the laminate's averages, (6, 6).
+
+    In-plane strains and out-of-plane stresses are those of all plies.
+
+    Raises
+    ------
+    StudyError
+        As :func:`ply_stiffness`.
+    """
+    share = np.array(thicknesses) / np.sum(thicknesses)
+    own = ply_stiffness(ply, nu23)
+    C = np.array([_turned(own, angle) for angle in angles])
+    aa, ab, bb = (C[:, rows][:, :, columns] for rows, columns in ((_A, _A), (_A, _B), (_B, _B)))
+    R = np.linalg.inv(bb)
+    Q = ab @ R
+    P = aa - Q @ ab.swapaxes(1, 2)
+    P, Q, R = (np.einsum("n,nij->ij", share, part) for part in (P, Q, R))
+    bb = np.linalg.inv(R)
+    whole = np.empty((6, 6))
+    whole[np.ix_(_A, _A)] = P + Q @ bb @ Q.T
+    whole[np.ix_(_A, _B)] = Q @ bb
+    whole[np.ix_(_B, _A)] = (Q @ bb).T
+    whole[np.ix_(_B, _B)] = bb
+    return whole
+
+
+def indentation_modulus(stiffness: Floats) -> float:
+    """Indentation modulus M of a half-space whose surface normal is axis 3 (force/area).
+
+    1/M is pi times the mean over the directions t of the surface of (B(t)^-1)_33/(8 pi^2), with
+    the Barnett-Lothe tensor B(t) = 1/(8 pi^2) times the integral over phi of
+    (mm) - (mn)(nn)^-1(nm), (ab)_jk = a_i C_ijkl b_l, where m and n turn in the plane normal to t.
+    """
+    C = stiffness[_VOIGT[:, :, None, None], _VOIGT]
+    phi = (np.arange(AROUND) + 0.5) * (2.0 * np.pi / AROUND)
+    total = 0.0
+    for theta in np.arange(SURFACE) * (np.pi / SURFACE):
+        across = np.array([-np.sin(theta), np.cos(theta), 0.0])
+        normal = np.array([0.0, 0.0, 1.0])
+        m = np.outer(np.cos(phi), across) + np.outer(np.sin(phi), normal)
+        n = np.outer(-np.sin(phi), across) + np.outer(np.cos(phi), normal)
+        mm, mn, nn = (np.einsum("pi,ijkl,pl->pjk", a, C, b) for a, b in ((m, m), (m, n), (n, n)))
+        B = (mm - mn @ np.linalg.inv(nn) @ mn.swapaxes(1, 2)).mean(axis=0) / (4.0 * np.pi)
+        total += float(np.linalg.inv(B)[2, 2]) / (8.0 * np.pi**2)
+    return SURFACE / (np.pi * total)

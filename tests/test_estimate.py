@@ -1,0 +1,88 @@
+"""fecm estimate: quick models beside the run, and the velocity that reaches the threshold."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm.api import load_deck
+from fecm.deck.model import Impact
+from fecm.results.result import Result
+from fecm.studies.estimate import estimate
+from fecm.sweeps.find import velocity_of_peak
+from tests.calls import call
+from tests.decks import MESH, PROGRAM, small
+
+# w is held along the lower and the upper edge.
+HELD = MESH[: MESH.index("BOUN")] + (
+    "BOUN\n    1    1   -1   -1   -1    0    0\n    5    1   -1   -1    1    0    0\n"
+    "   21    1   -1   -1   -1    0    0\n   25    0    1    1    1    0    0\n\n"
+)
+
+
+def deck(segments: str = "", *, mesh: str = MESH) -> str:
+    text = small(PROGRAM.replace("         10", "        100"), mesh=mesh)
+    return text.replace("EXPE", f"PATC\nDISC,.2\n{segments}EXPE")
+
+
+def test_the_row_of_the_run_is_the_run(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(deck("DELA\n.001,\n"))
+    done = call("estimate", "d.inp", "--format", "json", cwd=tmp_path)
+    assert done.exit_code == 0
+    found = json.loads(done.stdout)
+    assert [row["model"] for row in found["models"]] == ["infinite plate", "run"]
+    full = fecm.run(tmp_path / "d.inp")
+    assert isinstance(full, Result)
+    assert found["models"][1]["peak_force"] == pytest.approx(full.force.max(), rel=1e-9)
+    assert found["models"][1]["threshold"] == pytest.approx(full.threshold["force"], rel=1e-12)
+
+
+def test_at_the_found_velocity_the_peak_is_the_threshold() -> None:
+    (problem,) = load_deck(deck("DELA\n.001,\n")).problems
+    assert problem.threshold is not None
+    velocity = velocity_of_peak(problem, problem.threshold.force)
+    segments = tuple(
+        replace(segment, velocity=velocity) if isinstance(segment, Impact) else segment
+        for segment in problem.deck.segments
+    )
+    found = fecm.run(replace(problem.deck, segments=segments, text=""))
+    assert isinstance(found, Result)
+    assert found.force.max() == pytest.approx(problem.threshold.force, rel=1e-5)
+    assert np.isnan(velocity_of_peak(problem, 1e12))
+
+
+def test_a_held_plate_has_a_static_model_with_its_own_stiffness() -> None:
+    (free,) = load_deck(deck()).problems
+    assert np.isnan(estimate(free).stiffness)
+    program = "TANG\nFORM\nSOLV\nDISP\n"
+    held = estimate(load_deck(deck(mesh=HELD)).problems[0])
+    static = fecm.run(small(program, mesh=HELD).replace("EXPE", "PATC\nDISC,.2,1.,1.,1000.\nEXPE"))
+    assert isinstance(static, Result)
+    w = static["tape3/w"][0, static["patch/node"] - 1] @ static["patch/weight"]
+    assert held.stiffness == pytest.approx(1000.0 / w, rel=1e-9)
+    assert [model.name for model in held.models] == ["infinite plate", "static plate"]
+
+
+def test_models_reach_the_threshold_at_their_velocity() -> None:
+    (problem,) = load_deck(deck("DELA\n.5,\n", mesh=HELD)).problems
+    found = estimate(problem)
+    for model in found.models:
+        segments = tuple(
+            replace(s, velocity=model.velocity) if isinstance(s, Impact) else s
+            for s in problem.deck.segments
+        )
+        again = estimate(replace(problem, deck=replace(problem.deck, segments=segments)))
+        (same,) = (m for m in again.models if m.name == model.name)
+        assert same.impact.peak == pytest.approx(model.threshold, rel=1e-6)
+
+
+def test_a_deck_without_impact_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(small("LMAS\nEIGE,2\n"))
+    done = call("estimate", "d.inp", cwd=tmp_path)
+    assert done.exit_code == 2
+    assert "the deck has no impact" in done.stderr
