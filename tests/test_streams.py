@@ -253,5 +253,5 @@ def test_too_little_address_space_ends_in_one_line(folder: Path, megabytes: int)
 
 def test_no_line_of_the_list_of_commands_is_cut() -> None:
     lines = call("--help").stdout.partition("Commands:\n")[2].splitlines()
-    assert len(lines) == 15
+    assert len(lines) == 16
     assert [line for line in lines if line.endswith("...")] == []

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -81,24 +80,15 @@ class Simulation:
             state.prop_force = 1.0  # PROP's first value in the listing
         self.interpreter = Interpreter(problem.program)
         self.interval = max(1, min(64, 100_000 // self.model.plate.neq))
+        limit = options.energy_limit if self.rules.enforces_energy_limit else None
         self.recorder = Recorder(
             self.sink,
             self.model,
             problem.work,
             contact_at_every_step=self.rules.listing_tapes,
-            on_block=self._judge_block,
+            # Without a reference to the run, which would keep it alive.
+            on_block=partial(state.judge, limit=limit, threshold=problem.threshold),
         )
-
-    def _judge_block(self, block: Mapping[str, Floats], initial: float) -> None:
-        """Add a block of steps to the energy balance, and compare the force with the threshold."""
-        state, threshold = self.state, self.problem.threshold
-        limit = self.options.energy_limit if self.rules.enforces_energy_limit else None
-        state.balance.add(block, initial, limit=limit)
-        if threshold is not None:
-            state.peak_force = max(state.peak_force, float(block["force"].max()))
-            above = np.flatnonzero(block["force"] >= threshold.force)
-            if len(above) and math.isnan(state.crossing):
-                state.crossing = float(block["time"][above[0]])
 
     @cached_property
     def tangent(self) -> Tangent:

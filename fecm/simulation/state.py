@@ -14,6 +14,7 @@ from fecm._typing import Floats
 from fecm.mechanics.failure_envelope import FailureEnvelope
 from fecm.mechanics.impact import ImpactState
 from fecm.mechanics.plate_motion import PlateState
+from fecm.problem.build import Threshold
 from fecm.simulation.guard import EnergyBalance
 
 # Relative change of the displacement below which CONV leaves its loop.
@@ -90,6 +91,22 @@ class RunState:
     crossing: float = math.nan
     failure: FailureEnvelope | None = None
     notes: list[str] = field(default_factory=list)
+
+    def judge(
+        self,
+        block: Mapping[str, Floats],
+        initial: float,
+        *,
+        limit: float | None,
+        threshold: Threshold | None,
+    ) -> None:
+        """Add a block of steps to the energy balance, and compare the force with the threshold."""
+        self.balance.add(block, initial, limit=limit)
+        if threshold is not None:
+            self.peak_force = max(self.peak_force, float(block["force"].max()))
+            above = np.flatnonzero(block["force"] >= threshold.force)
+            if len(above) and math.isnan(self.crossing):
+                self.crossing = float(block["time"][above[0]])
 
 
 def save(state: object, name: str) -> dict[str, Any]:
