@@ -20,7 +20,15 @@ from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.symmetry import symmetry_reduction
 from fecm.mechanics.time_step import critical_time_step
 from fecm.results.result import Result
-from tests.builders import Floats, rules, table
+from tests.builders import (
+    Floats,
+    mesh_on,
+    nothing,
+    report_plate,
+    rules,
+    table,
+    with_restraints,
+)
 from tests.decks import LONG, MESH, PROGRAM, small
 from tests.test_patch import CROSS_PLY, rectangle
 
@@ -224,3 +232,35 @@ def test_assumed_shear_strains_take_the_half_plate_of_four_elements() -> None:
     assert isinstance(half, Result)
     assert isinstance(whole, Result)
     np.testing.assert_allclose(half.force, whole.force, rtol=1e-9)
+
+
+def test_the_peak_on_the_reports_free_plate_does_not_depend_on_the_mesh() -> None:
+    x, y = np.meshgrid(np.linspace(0.0, 6.0, 49), np.linspace(0.0, 4.0, 33))
+    times, peaks = np.linspace(0.0, 6e-5, 13), {}
+    for every, radius in ((4, 0.0347), (2, 0.125), (2, 0.0347), (1, 0.125)):
+        mesh = mesh_on(np.stack([x[::every, ::every], y[::every, ::every]], axis=-1), 9)
+        held = nothing(mesh[0])
+        held[:, :2] = True
+        plate = with_restraints(*mesh, held)
+        weights = patch_weights(plate, DISC, radius, 3.0, 2.0)
+        found = strike(plate, report_plate(), weights, ELASTIC, (0.000181, 115.0), times)
+        peaks[every, radius] = found[1]
+    # Limits of finer meshes: 80.07 and 77.18 lb.
+    assert peaks[2, 0.125] == pytest.approx(80.07, rel=1e-2)
+    assert peaks[1, 0.125] == pytest.approx(80.07, rel=5e-4)
+    assert peaks[4, 0.0347] == pytest.approx(77.18, rel=3e-2)
+    assert peaks[2, 0.0347] == pytest.approx(77.18, rel=5e-3)
+
+
+def test_assumed_shear_strains_neither_lock_nor_hourglass_on_a_thin_cross_ply_plate() -> None:
+    # Sun and Chen's plate, [0/90/0/90/0]s, 200 x 200 x 2.69 mm; SI units.
+    ply = Ply(1580.0, 0.3, 120e9, 7.9e9, 5.5e9, 5.5e9, 5.5e9)
+    half = (0.0, 90.0, 0.0, 90.0, 0.0)
+    plate = laminate(ply, half + half[::-1], [0.000269] * 10)
+    law, peaks = LinearPermanent(8.116e8, 1.0, 0.0, 1.5), []
+    for n in (10, 20):
+        mesh = rectangle(n, n, 0.2, 0.2)
+        weights = patch_weights(mesh, DISC, 0.327 * 0.00269, 0.1, 0.1)
+        times = np.linspace(0.0, 6e-4, 61)
+        peaks.append(strike(mesh, plate, weights, law, (0.008537, 3.0), times)[1])
+    assert peaks == pytest.approx([306.4, 293.5], rel=2e-3)
