@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 import fecm
 from fecm.plot.data import patches, strain_points
 from fecm.plot.deflection import profile
+from fecm.plot.failure import outline
 from fecm.plot.kinds import KINDS, MISSING, Picture, PlotError, PlotNote
 from fecm.plot.meshes import supports
 from fecm.plot.pictures import draw, save
 from fecm.plot.style import COLOURS, scale
 from fecm.results.result import Result
+from fecm.results.summary import summary
 from tests.builders import distorted_square
 from tests.decks import DATA_CARDS, DISC, MESH, PLY_PROGRAM, PROGRAM, small
 
@@ -358,6 +360,164 @@ def test_widths_are_those_of_a_column_and_of_a_page(result: Result) -> None:
     assert result.plot("force", width="full").get_figwidth() == 7.2
 
 
+# Exposures --------------------------------------------------------------------------------------
+
+STRENGTHS = "ALLO\n200000,200000,7000,28000,13000\n\n"
+CRITERIA = ("max_stress", "tsai_wu", "hashin", "puck")
+
+
+@pytest.fixture(scope="module")
+def failing() -> Result:
+    """The small plate under a disc in its fourth element, whose middle is left out."""
+    program = PROGRAM.replace("NEXT", "FAIL          1\nNEXT")
+    return run(small(program, data=STRENGTHS + DISC + DATA_CARDS + "UNIT\nin lbf s\n"))
+
+
+def scaled(result: Result, factor: float) -> Result:
+    """The result with exposures times a factor."""
+    arrays = {path: result[path] for path in result}
+    for path in arrays:
+        if path.endswith("/exposure"):
+            arrays[path] = factor * arrays[path]
+    groups = {"": result.attributes, **{name: getattr(result, name).attributes for name in
+              ("failure", "patch")}}  # fmt: skip
+    return Result(arrays, {"deck": result.deck}, groups)
+
+
+def area(polygon: Array) -> float:
+    """Area of a polygon, (n, 2), by the shoelace formula."""
+    x, y = polygon.T
+    return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2.0)
+
+
+@pytest.mark.filterwarnings("ignore::fecm.plot.kinds.PlotNote")
+@pytest.mark.parametrize("points", [-3, -2, 2, 3])
+def test_the_map_of_exposures_has_a_cell_around_every_point(points: int) -> None:
+    data = (STRENGTHS + DATA_CARDS).replace("    3    3   -3", f"    3    3{points:5}")
+    result = run(small(PROGRAM.replace("NEXT", "FAIL          1\nNEXT"), data=data))
+    plate: Any = result.plot("failure").axes[0]
+    shown, hatched, _ = plate.collections
+    under = result["failure/under_load"] != 0
+    stored = np.max([result[f"failure/{name}/exposure"] for name in CRITERIA], axis=0)
+    np.testing.assert_array_equal(shown.get_array(), stored.max(axis=(2, 3))[~under])
+    assert len(hatched.get_paths()) == np.count_nonzero(under)
+    cells = [path.vertices[:4] for path in (*shown.get_paths(), *hatched.get_paths())]
+    assert sum(map(area, cells)) == pytest.approx(4.0, rel=1e-12)
+    x, y = (np.concatenate([result[f"failure/{n}"][~under], result[f"failure/{n}"][under]])
+            for n in "xy")  # fmt: skip
+    for cell, place in zip(cells, np.stack([x, y], axis=1), strict=True):
+        assert (cell.min(axis=0) <= place + 1e-12).all()
+        assert (cell.max(axis=0) >= place - 1e-12).all()
+
+
+def test_a_bar_per_ply_leaves_out_what_is_under_the_load(failing: Result) -> None:
+    raised = scaled(failing, 1.0)
+    raised["failure/puck/exposure"][3, 8] = 9.0  # the point under the load
+    with pytest.warns(PlotNote, match="are left out: 1 point of element 4$"):
+        figure: Any = draw("failure", {"small": raised}, quantity="puck").figure
+    plate, bars, _ = figure.axes
+    under = failing["failure/under_load"] != 0
+    exposure = failing["failure/puck/exposure"]
+    expected = [exposure[:, :, ply][~under].max() for ply in (0, 1)]
+    assert [bar.get_width() for bar in bars.patches] == expected
+    assert plate.collections[0].norm.vmax == max(expected)
+    assert bars.get_ylim()[0] > bars.get_ylim()[1]  # the struck face at the top
+    assert list(bars.get_lines()[-1].get_xdata()) == [1.0, 1.0]
+    (line,) = (line for line in summary(failing) if line.startswith("puck"))
+    value, mode = plate.get_title(loc="left").split(" (puck): ")
+    assert line.split()[1] == f"{value}:"
+    assert mode.split(",")[0] in line
+    assert legend_of(figure) == ["puck", "exposure 1", "largest", "under the load"]
+
+
+@pytest.mark.filterwarnings("ignore::fecm.plot.kinds.PlotNote")
+def test_all_criteria_mark_their_values_and_interfaces_have_their_own_bars(
+    failing: Result,
+) -> None:
+    figure: Any = failing.plot("failure", width="full")
+    _, bars, _ = figure.axes
+    under = failing["failure/under_load"] != 0
+    values = [failing[f"failure/{name}/exposure"][~under].max(axis=(0, 2)) for name in CRITERIA]
+    widths = [bar.get_width() for bar in bars.patches]
+    np.testing.assert_array_equal(widths[:2], np.max(values, axis=0))
+    np.testing.assert_array_equal([line.get_xdata() for line in bars.get_lines()[:4]], values)
+    between = failing["failure/interlaminar/exposure"]
+    assert widths[2:] == [between[:3].max()]  # the fourth element is under the load
+    assert bars.patches[2].get_y() + bars.patches[2].get_height() / 2.0 == pytest.approx(1.5)
+    alone: Any = failing.plot("failure", quantity="interlaminar")
+    shown, hatched, _ = alone.axes[0].collections
+    np.testing.assert_array_equal(shown.get_array(), np.repeat(between[:3, 0], 9))
+    assert len(hatched.get_paths()) == 9
+    assert "plies 1 and 2" in alone.axes[0].get_title(loc="left")
+
+
+@pytest.mark.filterwarnings("ignore::fecm.plot.kinds.PlotNote")
+def test_the_plate_is_outlined_where_the_exposure_is_above_1(failing: Result) -> None:
+    plate: Any = draw("failure", {"a": failing}).figure.axes[0]
+    largest = plate.collections[0].get_array().max()
+    for factor, above in ((0.999 / largest, False), (1.001 / largest, True)):
+        figure: Any = draw("failure", {"a": scaled(failing, factor)}).figure
+        assert bool(figure.axes[0].collections[2].get_segments()) is above
+        assert bool(figure.axes[2].lines) is above
+
+
+def test_an_outline_leaves_out_the_sides_between_cells() -> None:
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) / 128.0
+    cells = np.stack([square + np.array([x, 0.0]) for x in (0.0, 1.0 / 128.0, 4.0)])
+    assert outline(cells).shape == (6 + 4, 2, 2)
+    assert outline(cells[:0]).shape == (0, 2, 2)
+
+
+def test_exposures_that_can_not_be_shown_are_refused(failing: Result) -> None:
+    words = "no criterion 'strain'; there are max_stress, tsai_wu, hashin, puck, interlaminar"
+    with pytest.raises(PlotError, match=words):
+        failing.plot("failure", quantity="strain")
+    arrays = {path: failing[path] for path in failing}
+    arrays["failure/under_load"] = np.ones_like(arrays["failure/under_load"])
+    groups = {"failure": failing.failure.attributes, "patch": failing.patch.attributes}
+    with pytest.raises(PlotError, match="load is over all elements of covered: no exposure"):
+        draw("failure", {"covered": Result(arrays, {"deck": failing.deck}, groups)})
+
+
+@pytest.mark.filterwarnings("ignore::fecm.plot.kinds.PlotNote")
+def test_a_single_ply_has_one_bar() -> None:
+    data = DATA_CARDS.replace("    2  90.     0.053\n", "").replace("0.     0.053", "0.     0.106")
+    deck = small(PROGRAM.replace("NEXT", "FAIL          1\nNEXT"), data=STRENGTHS + data)
+    figure: Any = run(deck.replace("   25    4    2", "   25    4    1")).plot("failure")
+    assert len(figure.axes[1].patches) == 1
+
+
+# Delamination threshold -------------------------------------------------------------------------
+
+
+def test_force_draws_the_delamination_threshold_if_there_is_one(result: Result) -> None:
+    tough, weak = (
+        run(small(data=f"DELA\n{value}\n" + DATA_CARDS + "UNIT\nin lbf s\n"))
+        for value in (4.0, 1.0)
+    )
+    figure = tough.plot("force")
+    assert legend_of(figure)[-1] == "delamination threshold"
+    line = figure.axes[0].get_lines()[-1]
+    factor = {"Force (lbf)": 1.0, "Force (10³ lbf)": 1e-3}[figure.axes[0].get_ylabel()]
+    assert line.get_ydata() == pytest.approx([factor * tough.threshold["force"]] * 2)
+    figure = draw("force", {"none": result, "tough": tough, "weak": weak}).figure
+    labels = ["tough, delamination threshold", "weak, delamination threshold"]
+    assert legend_of(figure) == ["none", "tough", "weak", *labels]
+    first, second = (lines(figure.axes[0])[label][1][0] for label in labels)
+    assert first == pytest.approx(2.0 * second)  # the square root of G_IIc
+    same = draw("force", {"none": result, "a": weak, "b": weak}).figure
+    assert legend_of(same) == ["none", "a", "b", "delamination threshold"]
+    assert "delamination threshold" not in legend_of(result.plot("force"))
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -1.0, "high", None])
+def test_a_threshold_without_sense_is_refused(result: Result, value: Any) -> None:
+    arrays = {path: result[path] for path in result}
+    made = Result(arrays, {"deck": result.deck}, {"threshold": {"force": value}})
+    with pytest.raises(PlotError, match="odd has a delamination threshold that can't be drawn"):
+        draw("force", {"odd": made})
+
+
 # What is missing --------------------------------------------------------------------------------
 
 
@@ -365,7 +525,7 @@ def test_widths_are_those_of_a_column_and_of_a_page(result: Result) -> None:
 def test_a_picture_names_the_macro_that_stores_what_it_lacks(kind: str) -> None:
     result = run(small("LMAS\nDT        .5E-6\n"))
     stores = dict.fromkeys(("line", "contour", "surface", "animation"), "DISP")
-    macro = {**stores, "thickness": "PLYS"}.get(kind, "RODP")
+    macro = {**stores, "thickness": "PLYS", "failure": "FAIL"}.get(kind, "RODP")
     with pytest.raises(PlotError, match=f"bare has no .*; add {macro} to"):
         draw(kind, {"bare": result})
 

@@ -28,8 +28,10 @@ OF_RUNS = [name for name, kind in KINDS.items() if not kind.sweep]
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    """Result file of the small plate under a patch, with ply stresses."""
-    fecm.run(small(PLY_PROGRAM, data=DISC + DATA_CARDS), output=tmp_path / "small.h5")
+    """Result file of the small plate under a patch, with ply stresses and exposures."""
+    program = PLY_PROGRAM.replace("NEXT", "FAIL          5\nNEXT")
+    data = "ALLO\n200000,200000,7000,28000,13000\n\n" + DISC + DATA_CARDS
+    fecm.run(small(program, data=data), output=tmp_path / "small.h5")
     return tmp_path / "small.h5"
 
 
@@ -38,11 +40,12 @@ def test_the_command_writes_every_kind_and_keeps_what_is_there(file: Path) -> No
     done = call("plot", file, *asked, cwd=file.parent)
     expected = [f"small-{k}.{'gif' if k == 'animation' else 'png'}" for k in OF_RUNS]
     assert (done.exit_code, done.stdout.split()) == (0, expected)
-    under_load, residual = done.stderr.splitlines()
+    under_load, residual, left_out = done.stderr.splitlines()
     assert under_load.endswith(
         "element 4 of small is within 0.253 of the load, where plate theory does not hold"
     )
     assert "in-plane supports act there" in residual  # a coupled laminate with u = v = 0
+    assert left_out.endswith("are left out: 1 point of element 4")
     assert sorted(p.name for p in file.parent.iterdir()) == sorted([*expected, "small.h5"])
     (file.parent / "small-loop.png").write_text("precious")
     (file.parent / "small-force.png").unlink()
@@ -89,7 +92,7 @@ def test_nothing_but_a_picture_imports_matplotlib(file: Path) -> None:
     assert done.stdout.splitlines()[-1] == "[]"
     assert (file.parent / "small-history.csv").exists()
     assert "Commands:" in done.stdout
-    assert PLY_PROGRAM in fecm.load(file).deck
+    assert "PLYS          5    2\n" in fecm.load(file).deck
 
 
 # Results without sense ----------------------------------------------------------------------------
@@ -104,6 +107,7 @@ def infinite(file: h5py.File) -> None:
     file["history/force"][...] = np.inf
     file["energy/plate_kinetic"][...] = np.nan
     file["tape8/kappa_x"][...] = file["plies/sigma_1"][...] = np.inf
+    file["failure/puck/exposure"][...] = np.nan
 
 
 def huge(file: h5py.File) -> None:
@@ -120,6 +124,7 @@ def tiny(file: h5py.File) -> None:
         "tape3/time",
         "plies/sigma_1",
         "mesh/coordinates",
+        "failure/puck/exposure",
     ):
         file[path][...] *= 1e-310
     for name in ("x", "y", "radius"):
@@ -132,16 +137,17 @@ def without_rows(file: h5py.File) -> None:
         for name, dataset in [item for item in file[group].items() if item[0] not in kept]:
             del file[group][name]
             file[group][name] = np.zeros((0, *dataset.shape[1:]), dataset.dtype)
+    del file["failure/under_load"]
 
 
 @pytest.mark.parametrize(
     ("edit", "undrawn"),
     [
-        (zero, "strain line contour surface mesh thickness"),
-        (infinite, "force loop energy strain line contour surface thickness"),
-        (huge, "force loop strain line contour surface mesh thickness"),
+        (zero, "strain line contour surface mesh thickness failure"),
+        (infinite, "force loop energy strain line contour surface thickness failure"),
+        (huge, "force loop strain line contour surface mesh thickness failure"),
         (tiny, "contour"),
-        (without_rows, "force loop energy strain line contour surface thickness"),
+        (without_rows, "force loop energy strain line contour surface thickness failure"),
     ],
 )
 def test_a_result_without_sense_is_drawn_or_is_one_line(
@@ -150,7 +156,10 @@ def test_a_result_without_sense_is_drawn_or_is_one_line(
     with h5py.File(file, "r+") as stored:
         edit(stored)
     refused = []
-    kinds = ("force", "loop", "energy", "strain", "line", "contour", "surface", "mesh", "thickness")
+    kinds = (
+        "force", "loop", "energy", "strain", "line", "contour", "surface", "mesh", "thickness",
+        "failure",
+    )  # fmt: skip
     for kind in kinds:
         picture = file.with_name(f"{kind}.png")
         done = call("plot", file, "--kind", kind, "-o", picture)
@@ -159,7 +168,7 @@ def test_a_result_without_sense_is_drawn_or_is_one_line(
             assert_unusable(done)
             assert not picture.exists()
         else:
-            assert kind == "thickness" or done.stderr == ""
+            assert kind in ("thickness", "failure") or done.stderr == ""
     assert refused == undrawn.split()
 
 

@@ -57,8 +57,8 @@ def _by_name(
 @click.option("--width", type=click.Choice(["column", "full"]),
               help="3.5 in, or 7.2 in.  [default: column]")  # fmt: skip
 @click.option("--quantity", metavar="NAME",
-              help="Quantity of map: a name of the sweep's summary.  [default: "
-                   "peak_force]")  # fmt: skip
+              help="Quantity of map: a name of the sweep's summary; of failure: a criterion.  "
+                   "[default: peak_force; the largest of all criteria]")  # fmt: skip
 @click.option("--over", type=ListOf("NAME or NAME,NAME", click.STRING, [1, 2]),
               metavar="NAME[,NAME]",
               help="Parameters on the axes of map.  [default: those that vary]")  # fmt: skip

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 
 from fecm.deck.model import Material
 from fecm.plot.data import (
+    LARGEST,
     Array,
     circle,
     deck_of,
@@ -65,13 +66,18 @@ def _mark_open_ends(axes: Axes, results: Results, width: str) -> None:
 
 
 def force(results: Results, *, width: str = "column") -> Picture:
-    """Contact force and transducer against time; of several results, one above the other."""
+    """Contact force and transducer against time; of several results, one above the other.
+
+    A dashed line marks the delamination threshold of a result that has one.
+    """
     limit_count(len(results), "forces")
     paths = ("history/time", "history/force", "history/transducer")
     data = {name: require(result, name, *paths) for name, result in results.items()}
     times = [columns[0] for columns in data.values()]
     clock = scale_of(results, "time", times)
-    pound = scale_of(results, "force", [c for columns in data.values() for c in columns[1:]])
+    limits = _thresholds(results)
+    forces = [c for columns in data.values() for c in columns[1:]]
+    pound = scale_of(results, "force", [*forces, np.array(list(limits.values()))])
     if len(data) == 1:
         figure, axes = panels(width, ratio=RATIO[width])
         graphs = [Graph(axes[0], clock, pound)]
@@ -87,10 +93,34 @@ def force(results: Results, *, width: str = "column") -> Picture:
                 graph.plot(time, values, color=colour, label=name)
         for graph, label in zip(graphs, ("Contact force", "Transducer"), strict=True):
             graph.label(y=label)
+    colours = dict(zip(data, COLOURS, strict=False))
+    shared = len(set(limits.values())) == 1
+    for name, limit in list(limits.items())[: 1 if shared else None]:
+        label = "delamination threshold" if shared else f"{name}, delamination threshold"
+        colour = "0.3" if shared else colours[name]
+        axes[0].axhline(pound.factor * limit, color=colour, ls=STYLES[1], lw=0.8, label=label)
     _time_axis(graphs[-1], times)
     _mark_open_ends(axes[0], results, width)
     lines_legend(figure, axes[0])
     return Picture(figure)
+
+
+def _thresholds(results: Results) -> dict[str, float]:
+    """Delamination thresholds by the names of the results that have one.
+
+    Raises
+    ------
+    PlotError
+        If one can't be drawn.
+    """
+    found = {}
+    for name, result in results.items():
+        if result.threshold:
+            value = result.threshold.get("force")
+            if not isinstance(value, int | float) or not 0.0 < value <= LARGEST:
+                raise PlotError(f"{name} has a delamination threshold that can't be drawn: {value}")
+            found[name] = float(value)
+    return found
 
 
 def loop(results: Results, *, width: str = "column") -> Picture:

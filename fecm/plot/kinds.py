@@ -72,6 +72,7 @@ KINDS = {
     "energy": Kind("histories:energy", "energies of plate and projectile against time", True),
     "strain": Kind("histories:strain", "surface strain at points against time", True),
     "thickness": Kind("thickness:thickness", "ply stresses through the thickness of an element"),
+    "failure": Kind("failure:failure", "largest exposures over the plate and of every ply"),
     "line": Kind("deflection:line", "deflection along a line through the impact point", True),
     "contour": Kind("deflection:contour", "deflection of the plate, seen from above"),
     "surface": Kind("deflection:surface", "the deflected plate"),

@@ -1,0 +1,298 @@
+"""The largest failure exposures over time: a map of the plate, and a bar per ply."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from fecm._typing import Bools, Floats
+from fecm.deck.model import Material
+from fecm.mechanics.element_groups import element_blocks
+from fecm.mechanics.elements.quadrature import Quadrature
+from fecm.mechanics.failure import CRITERIA
+from fecm.mechanics.interpolation import local_shape_functions
+from fecm.plot.data import deck_of, mesh_of, require, struck
+from fecm.plot.kinds import Picture, PlotError, warn
+from fecm.plot.meshes import draw_circle
+from fecm.plot.style import COLOURS, IN_ORDER, WIDTHS, legend, panels, scale_of
+from fecm.problem.build import rules
+from fecm.results.result import Result
+from fecm.results.summary import LargestExposure, largest_exposures
+
+BETWEEN = "interlaminar"
+NAMES = (*CRITERIA, BETWEEN)
+COLOUR_OF = dict(zip(NAMES, COLOURS, strict=False))
+LIMIT: dict[str, Any] = {"color": "#C00000", "linewidth": 1.0}
+HATCH: dict[str, Any] = {"facecolor": "white", "edgecolor": "0.55", "hatch": "//////"}
+LARGEST: dict[str, Any] = {
+    "color": LIMIT["color"], "marker": "o", "mfc": "none", "ms": 5.0, "mew": 0.9, "ls": "none",
+}  # fmt: skip
+# Marks of the criteria in the bars: small ones above large ones, as values may coincide.
+MARKS: tuple[dict[str, Any], ...] = tuple(
+    {"marker": marker, "ms": size, "mew": 0.6, "mfc": "none", "ls": "none"}
+    for marker, size in (("s", 4.0), ("D", 3.0), ("o", 4.0), ("x", 2.5))
+)
+# Maps of more cells are drawn as pixels in PDF and SVG.
+MANY = 5000
+# Elements under the load that a note names; the others it counts.
+NAMED = 12
+# Numbers on the axis of the plies at most.
+TICKS = 16
+
+
+@dataclass(frozen=True)
+class Exposures:
+    """What is drawn of a result.
+
+    Attributes
+    ----------
+    under_load : ndarray (numel, points) of bool
+        Points that are left out.
+    over_plate : ndarray (numel, points)
+        Largest exposure of all plies (or interfaces) at every point.
+    over_plies : dict of str to ndarray (plies,) or (plies - 1,)
+        Largest exposure outside the load, by criterion.
+    worst : LargestExposure
+        The largest of them.
+    """
+
+    under_load: Bools
+    over_plate: Floats
+    over_plies: dict[str, Floats]
+    worst: LargestExposure
+
+
+def failure(results: Mapping[str, Result], *, quantity: str = "", width: str = "column") -> Picture:
+    """Largest exposures over time: of the worst ply on the plate, and of every ply in bars.
+
+    Points under the load are hatched; the bars leave them out.  Values between two plies belong to
+    an element, which the bars leave out if one of its points is under the load.
+
+    Parameters
+    ----------
+    results : mapping of str to Result
+        One result.
+    quantity : str
+        A criterion; by default the largest of all criteria of the plies, and bars of the
+        interlaminar exposure between them.
+    width : str
+        ``"column"`` or ``"full"``.
+    """
+    ((name, result),) = results.items()
+    found = _exposures(result, name, quantity)
+    corners = _cells(result, name, found.under_load.shape[1])
+    place = scale_of(results, "length", [corners])
+    figure, plate, bars = _axes(corners, max(map(len, found.over_plies.values())), width)
+    _map(figure, plate, place.factor * corners, found)
+    plate.plot(*(place.factor * struck(result, name)).T, "+", color="black", ms=4, mew=0.6)
+    draw_circle(plate, result, name, place, color="black")
+    at = place.factor * np.array([found.worst.x, found.worst.y])
+    plate.plot(*at[:, None], **LARGEST)
+    plate.set_title(_worst(found.worst), loc="left")
+    plate.set_xlabel(place.label("$x$"))
+    plate.set_ylabel(place.label("$y$"))
+    _bars(bars, found)
+    _legend(figure, found)
+    _note(found.under_load, name)
+    return Picture(figure)
+
+
+def _exposures(result: Result, name: str, quantity: str) -> Exposures:
+    """Largest exposures by one criterion or by all."""
+    if quantity and quantity not in NAMES:
+        raise PlotError(f"there is no criterion {quantity!r}; there are {', '.join(NAMES)}")
+    (near,) = require(result, name, "failure/under_load")
+    under = near != 0
+    over_plies, fields = {}, []
+    for criterion in (quantity,) if quantity else NAMES:
+        path = f"failure/{criterion}/exposure"
+        if criterion == BETWEEN and not quantity and path in result and not result[path].size:
+            continue  # a single ply
+        (values,) = require(result, name, path)
+        if criterion == BETWEEN:
+            left_out = np.broadcast_to(under.any(axis=1)[:, None], under.shape)
+            field = np.broadcast_to(values.max(axis=1)[:, None], under.shape)
+            outside = values[~left_out[:, 0]]
+        else:
+            left_out, field = under, values.max(axis=(2, 3))
+            outside = values[~under].max(axis=2)
+        if len(outside):
+            over_plies[criterion] = outside.max(axis=0)
+        if quantity or criterion != BETWEEN:
+            fields.append((left_out, field))
+    names = set(over_plies) - (set() if quantity else {BETWEEN})
+    largest = [one for one in largest_exposures(result) if one.criterion in names]
+    if not largest:
+        raise PlotError(f"the load is over all elements of {name}: no exposure is left to show")
+    worst = max(largest, key=lambda one: one.exposure)
+    over_plate = np.max([field for _, field in fields], axis=0)
+    return Exposures(fields[0][0], over_plate, over_plies, worst)
+
+
+def _worst(worst: LargestExposure) -> str:
+    """Text of the largest exposure: value, criterion, mode and ply."""
+    plies = (
+        f"plies {worst.ply} and {worst.ply + 1}"
+        if worst.criterion == BETWEEN
+        else (f"ply {worst.ply}")
+    )
+    return f"{worst.exposure:.4g} ({worst.criterion.replace('_', ' ')}): {worst.mode}, {plies}"
+
+
+def _cells(result: Result, name: str, count: int) -> Floats:
+    """Corners of the part of the element around each point, (numel, points, 4, 2), length."""
+    rule = rules(deck_of(result, name).require(Material))[2]
+    if len(rule.xi) != count:
+        raise PlotError(
+            f"{name} has exposures at {count} points of an element, its deck has {len(rule.xi)}"
+        )
+    at = np.unique(rule.xi.round(12))
+    bounds = np.concatenate(([-1.0], (at[1:] + at[:-1]) / 2.0, [1.0]))
+    column, row = (np.abs(at - local[:, None]).argmin(axis=1) for local in (rule.xi, rule.eta))
+    right, upper = np.array([0, 1, 1, 0]), np.array([0, 0, 1, 1])
+    xi, eta = bounds[column[:, None] + right].ravel(), bounds[row[:, None] + upper].ravel()
+    grid = Quadrature(xi, eta, np.zeros(len(xi)))  # points only; nothing is integrated
+    elements, coordinates = mesh_of(result, name)
+    found = np.empty((len(elements), count, 4, 2))
+    for family in element_blocks(elements, coordinates):
+        N = local_shape_functions(family, grid)[0]
+        places = np.einsum("pn,eni->epi", N, family.coordinates)
+        found[family.rows] = places.reshape(-1, count, 4, 2)
+    return found
+
+
+def outline(cells: Floats) -> Floats:
+    """Sides of cells, (n, 4, 2), that belong to one of them only: (sides, 2, 2)."""
+    sides = np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2, 2)
+    if not len(sides):
+        return sides
+    # An offset keeps coordinates of regular meshes off the borders between integers.
+    whole = np.floor(sides / (1e-6 * np.ptp(sides, axis=(0, 1)).max()) + 0.377)
+    first, second = whole[:, 0], whole[:, 1]
+    back = (first[:, 0] > second[:, 0]) | (
+        (first[:, 0] == second[:, 0]) & (first[:, 1] > second[:, 1])
+    )
+    whole[back] = whole[back][:, ::-1]
+    _, index, times = np.unique(
+        whole.reshape(-1, 4), axis=0, return_index=True, return_counts=True
+    )  # fmt: skip
+    return np.asarray(sides[index[times == 1]])
+
+
+def _axes(corners: Floats, plies: int, width: str) -> tuple[Figure, Axes, Axes]:
+    """Axes of the map and of the bars: side by side on a page, one above the other in a column."""
+    wide, high = np.ptp(corners.reshape(-1, 2), axis=0)
+    aspect = float(np.clip(high / wide, 0.3, 2.0))
+    inches = WIDTHS[width]
+    bars = float(np.clip(0.8 + 0.07 * plies, 1.4, 4.0))
+    if width == "column":
+        plate = 0.85 * inches * aspect + 1.5
+        total, rows, columns = plate + bars, 2, 1
+        parts: dict[str, Any] = {"height_ratios": (plate, bars)}
+    else:
+        total, rows, columns = max(0.54 * inches * aspect + 1.5, bars + 0.4), 1, 2
+        parts = {"width_ratios": (5.0, 3.0)}
+    figure, (first, second) = panels(
+        width, rows, columns, ratio=total * columns / (inches * rows), **parts
+    )
+    return figure, first, second
+
+
+def _map(figure: Figure, axes: Axes, cells: Floats, found: Exposures) -> None:
+    """One cell per point, in the plot's unit of length."""
+    outside = ~found.under_load
+    values = found.over_plate[outside]
+    peak = float(values.max())
+    drawn = PolyCollection(
+        list(cells[outside]), array=values, cmap=IN_ORDER, norm=Normalize(0.0, peak or 1.0),
+        edgecolors="face", linewidths=0.2, rasterized=len(values) > MANY,
+    )  # fmt: skip
+    axes.add_collection(drawn)
+    axes.add_collection(PolyCollection(list(cells[~outside]), linewidths=0.0, **HATCH))
+    above = outline(cells[outside & (found.over_plate >= 1.0)])
+    axes.add_collection(LineCollection(list(above), colors=LIMIT["color"], linewidths=0.8))
+    low, high = cells.min(axis=(0, 1, 2)), cells.max(axis=(0, 1, 2))
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    bar = figure.colorbar(drawn, ax=axes, location="top", aspect=30, pad=0.03)
+    what = "the interfaces" if found.worst.criterion == BETWEEN else "the plies"
+    bar.set_label(f"Largest exposure of {what}")
+    bar.outline.set_linewidth(0.6)
+    bar.locator = MaxNLocator(5)
+    bar.update_ticks()
+    if peak >= 1.0:
+        bar.ax.axvline(1.0, **LIMIT)
+
+
+def _bars(axes: Axes, found: Exposures) -> None:
+    """A bar per ply, the struck face at the top, and one per interface between them."""
+    plies = {name: values for name, values in found.over_plies.items() if name != BETWEEN}
+    between = found.over_plies.get(BETWEEN)
+    if plies:
+        largest = np.max(list(plies.values()), axis=0)
+        number = np.arange(1, len(largest) + 1)
+        alone = len(plies) == 1
+        colour = COLOUR_OF[next(iter(plies))] if alone else "0.85"
+        axes.barh(number, largest, height=0.8, color=colour)
+        for (name, values), mark in zip(plies.items(), MARKS, strict=False):
+            if not alone:
+                axes.plot(values, number, color=COLOUR_OF[name], **mark)
+    if between is not None:
+        place = np.arange(len(between)) + (1.5 if plies else 1.0)
+        height = 0.35 if plies else 0.8
+        axes.barh(place, between, height=height, color=COLOUR_OF[BETWEEN], zorder=3)
+    axes.axvline(1.0, zorder=4, **LIMIT)
+    count = max(map(len, found.over_plies.values()))
+    axes.set_ylim(count + 0.6, 0.4)
+    axes.set_xlim(0.0, 1.05 * max(1.0, *(values.max() for values in found.over_plies.values())))
+    axes.yaxis.set_major_locator(MaxNLocator(TICKS, integer=True, min_n_ticks=1))
+    axes.set_ylabel("Ply (1: struck face)" if plies else "Interface below ply (1: struck face)")
+    axes.set_xlabel("Largest exposure")
+
+
+def _legend(figure: Figure, found: Exposures) -> None:
+    """Legend of bars, marks and hatching, and the largest exposure above it."""
+    plies = [name for name in found.over_plies if name != BETWEEN]
+    handles: list[Any] = []
+    if len(plies) > 1:
+        handles = [
+            Line2D([], [], color=COLOUR_OF[n], **m) for n, m in zip(plies, MARKS, strict=True)
+        ]
+    elif plies:
+        handles = [Patch(color=COLOUR_OF[plies[0]])]
+    labels = [name.replace("_", " ") for name in plies]
+    if BETWEEN in found.over_plies:
+        handles.append(Patch(color=COLOUR_OF[BETWEEN]))
+        labels.append(BETWEEN)
+    handles.append(Line2D([], [], **LIMIT))
+    labels.append("exposure 1")
+    handles.append(Line2D([], [], **LARGEST))
+    labels.append("largest")
+    if found.under_load.any():
+        handles.append(Patch(linewidth=0.0, **HATCH))
+        labels.append("under the load")
+    legend(figure, handles, labels)
+
+
+def _note(under_load: Bools, name: str) -> None:
+    """Name the elements with points under the load."""
+    elements = 1 + np.flatnonzero(under_load.any(axis=1))
+    if not len(elements):
+        return
+    texts = ", ".join(map(str, elements[:NAMED]))
+    more = f" and {len(elements) - NAMED} more" if len(elements) > NAMED else ""
+    points = np.count_nonzero(under_load)
+    warn(
+        f"exposures of {name} under the load, where plate theory does not hold, are left out: "
+        f"{points} {'point' if points == 1 else 'points'} of "
+        f"{'element' if len(elements) == 1 else 'elements'} {texts}{more}"
+    )
