@@ -20,7 +20,7 @@ from fecm.mechanics.laminate import laminate
 from fecm.mechanics.plate import assemble
 from fecm.mechanics.ply_stresses import PlyStresses
 from fecm.results.result import Result
-from tests.builders import rules, table
+from tests.builders import nothing, rules, square, table, with_restraints
 from tests.calls import call
 from tests.decks import PROGRAM, small
 from tests.patches import equilibrium
@@ -143,3 +143,14 @@ def test_a_single_ply_has_exposures_and_no_interface() -> None:
     assert found["failure/puck/exposure"].shape[2] == 1
     assert found["failure/puck/exposure"].max() > 0.0
     assert found["failure/interlaminar/exposure"].shape == (4, 0)
+
+
+def test_interlaminar_exposures_of_elements_without_nine_nodes_are_nan() -> None:
+    coordinates, elements = square(2, 2, 8)
+    mesh = with_restraints(coordinates, elements, nothing(coordinates))
+    plate = laminate(Ply(1.0, 0.3, 20.0, 1.0, 0.5, 0.5, 0.5), (0.0, 90.0), [0.1, 0.1])
+    monitor = FailureMonitor(PlyStresses(mesh, plate, gauss(2)), plate, STRENGTHS)
+    envelope = monitor.start()
+    monitor.update(envelope, np.random.default_rng(2).normal(size=(len(coordinates), 5)), 1.0)
+    assert np.isnan(envelope.interfaces.exposure).all()
+    assert (envelope.plies.exposure > 0.0).any()

@@ -111,6 +111,8 @@ class FailureMonitor:
             len(gradients), self.stresses.shape[2] - 1, 2, 2
         )
         worst = interlaminar(self._strengths, shear[..., 0], shear[..., 1]).max(axis=2)
+        # Elements without nine nodes have no interlaminar stresses.
+        envelope.interfaces.exposure[np.isnan(worst)] = np.nan
         higher = worst > envelope.interfaces.exposure
         envelope.interfaces.exposure[higher] = worst[higher]
         envelope.interfaces.time[higher] = time
