@@ -4,23 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from fecm._files import check_outputs
 from fecm.api import load_deck
 from fecm.cli.common import RefusedError, echo, echo_file, note, write_text
+from fecm.cli.fixtures import complete, duration_of
 from fecm.cli.laminate_options import laminate_options, ply_of_options
 from fecm.cli.outputs import STANDARD_OUTPUT
 from fecm.cli.types import POSITIVE, Finite, ListOf, Parsed, assignment
 from fecm.deck.catalogue import CONTACTS, MATERIALS, SYSTEM, SYSTEMS
 from fecm.deck.format import format_deck
-from fecm.deck.grid import Grid, Section, graded, listed, longest_at, refined, uniform
+from fecm.deck.grid import Grid, Section, framed, graded, listed, longest_at, refined, uniform
 from fecm.deck.model import Deck, Indentation, Material, Patch, Projectile, Shear, Units
 from fecm.deck.records import RodDiameter
 from fecm.mechanics.patch import DISC, HERTZ, RADIUS_PER_THICKNESS
+from fecm.problem.build import build_projectile
+from fecm.problem.fixture import CUSTOM, FIXTURES, Fixture, parse_fixture
 from fecm.problem.new import EDGES, SUPPORTS, new_deck
 
 # Most elements in one direction, and in all.
@@ -91,9 +96,15 @@ def _edge(text: str) -> tuple[str, str]:
               help="Support of all edges.")  # fmt: skip
 @click.option("--edge", "edges", type=Parsed(_edge), multiple=True, metavar="EDGE=SUPPORT",
               help="Support of one edge: left, right, bottom or top; may be repeated.")  # fmt: skip
+@click.option("--fixture", type=Parsed(parse_fixture), metavar="NAME",
+              help=f"Fixture of a drop-weight test: {', '.join(FIXTURES)} or {CUSTOM}, a plate on "
+                   "the edges of a window; --mesh then counts the window's elements.")  # fmt: skip
 @click.option("--at", type=ListOf("X,Y", Finite(), [2]), metavar="X,Y",
               help="Impact point.  [default: the plate's centre]")  # fmt: skip
-@click.option("--velocity", type=Finite(), required=True, help="Approach velocity.")
+@click.option("--velocity", type=Finite(), help="Approach velocity.")
+@click.option("--energy", type=POSITIVE,
+              help="Impact energy in the deck's units (mJ in mm-N-s), instead of "
+                   "--velocity.")  # fmt: skip
 @click.option("--law", type=ListOf("K,ALPHA_P,S_P,Q", Finite(), [4]), metavar="K,ALPHA_P,S_P,Q",
               help="Parameters of the indentation law.")  # fmt: skip
 @click.option("--contact", type=click.Choice(list(CONTACTS)), metavar="NAME",
@@ -103,10 +114,12 @@ def _edge(text: str) -> tuple[str, str]:
                    "report's rod]")  # fmt: skip
 @click.option("--patch", type=Parsed(_patch), default="disc", show_default=True, metavar="PATCH",
               help="Area of the contact force: disc or hertz, with :RADIUS, to which the mesh is "
-                   "then refined; or none, a point force.")  # fmt: skip
+                   "then refined; or none, a point force.  D7136 takes hertz.")  # fmt: skip
 @click.option("--shear", type=click.Choice([MITC, FULL]), default=MITC, show_default=True,
               help="Transverse shear: assumed strains, or full quadrature.")  # fmt: skip
-@click.option("--duration", type=POSITIVE, required=True, help="Simulated time.")
+@click.option("--duration", type=POSITIVE,
+              help="Simulated time.  [default with --fixture: 1.25 times half a period of the "
+                   "projectile on the plate]")  # fmt: skip
 @click.option("--dt", type=POSITIVE, help="Time step.  [default: 0.9 of the critical one]")
 @click.option("--every", type=click.IntRange(min=1),
               help="Steps between stored rows.  [default: for about 200 rows]")  # fmt: skip
@@ -119,8 +132,15 @@ def new(output: Path, overwrite: bool, **options: Any) -> None:
     to_file = output != STANDARD_OUTPUT
     if to_file:
         check_outputs([output], overwrite)
-    deck, notes = deck_of_options(**options)
-    text = format_deck(deck.to_text())
+    notes: list[str] = []
+    if options["fixture"] is not None:
+        source = click.get_current_context().get_parameter_source
+        given = {name for name in options if source(name) is ParameterSource.COMMANDLINE}
+        notes += complete(options, given)
+    deck, more = deck_of_options(**options)
+    notes += more
+    fixture: Fixture | None = options["fixture"]
+    text = (fixture.comment if fixture else "") + format_deck(deck.to_text())
     prepared = load_deck(text)
     if errors := prepared.errors():
         for finding in errors:
@@ -165,20 +185,22 @@ def deck_of_options(
     units: str | None,
     support: str,
     edges: Sequence[tuple[str, str]],
+    fixture: Fixture | None,
     at: tuple[float, float] | None,
-    velocity: float,
+    velocity: float | None,
+    energy: float | None,
     law: Sequence[float] | None,
     contact: str | None,
     projectile: Projectile | None,
     patch: Patch | None,
     shear: str,
-    duration: float,
+    duration: float | None,
     dt: float | None,
     every: int | None,
 ) -> tuple[Deck, list[str]]:
     """Deck of the options of ``fecm new``, and notes about what they do not state."""
     radius = None if patch is None else patch.radius
-    grid = _grid(size, mesh, grading, columns, rows, at, radius)
+    grid = _grid(size, mesh, grading, columns, rows, at, radius, fixture)
     x, y = at or (grid.columns[-1].end / 2.0, grid.rows[-1].end / 2.0)
     constants = ply_of_options(ply, material, units)
     system = units or (MATERIALS[material].system if material else None)
@@ -187,7 +209,12 @@ def deck_of_options(
             f"give --projectile mass:M or rod:{PROJECTILES['rod']}: without it the projectile is "
             f"the report's steel rod, whose numbers are in {SYSTEM}"
         )
-    deck = new_deck(
+    if (velocity is None) == (energy is None):
+        raise click.UsageError("give either --velocity or --energy")
+    if duration is None and fixture is None:
+        raise click.UsageError("Missing option '--duration'.")
+    make = partial(
+        new_deck,
         title=title,
         grid=grid,
         angles=layup,
@@ -195,16 +222,22 @@ def deck_of_options(
         ply=constants,
         supports=dict.fromkeys(EDGES, support) | dict(edges),
         at=(x, y),
-        velocity=velocity,
         law=_law(law, contact, system),
         projectile=projectile,
-        duration=duration,
-        dt=dt,
         every=every,
         units=None if units is None else Units(*SYSTEMS[units].values()),
         patch=patch,
         shear=Shear(assumed=True) if shear == MITC else None,
+        window=None if fixture is None else fixture.window,
     )
+    if velocity is None or duration is None:
+        first = make(velocity=velocity or 1.0, duration=duration or dt or 1.0, dt=dt)
+        dt = next(macro.value for macro in first.macros if macro.word == "DT")
+        if velocity is None:
+            velocity = _velocity(energy or 0.0, first)
+        if duration is None:
+            duration = duration_of(first)
+    deck = make(velocity=velocity, duration=duration, dt=dt)
     notes: list[str] = []
     node, node_x, node_y = grid.nearest(x, y)
     distance = math.hypot(node_x - x, node_y - y)
@@ -214,7 +247,7 @@ def deck_of_options(
             f"the impact point is moved by {distance:.4g}: from {asked} at {x:g}, {y:g} to the "
             f"nearest node, {node} at {node_x:g}, {node_y:g}"
         )
-    if mesh and grid.elements > mesh[0] * mesh[1]:
+    if mesh and fixture is None and grid.elements > mesh[0] * mesh[1]:
         notes.append(
             f"the mesh has {grid.across // 2}x{grid.up // 2} elements instead of {mesh[0]}x"
             f"{mesh[1]}: their sides at the patch are at most its radius {radius:g}"
@@ -222,6 +255,15 @@ def deck_of_options(
     if patch is not None or shear == MITC:
         notes.append(_additions(deck))
     return deck, notes
+
+
+def _velocity(energy: float, deck: Deck) -> float:
+    """Velocity of a deck's projectile with an energy, in as many digits as its card has."""
+    mass = build_projectile(deck).total_mass
+    velocity = math.sqrt(2.0 * energy / mass) if mass > 0.0 else math.inf
+    if not 0.0 < velocity < math.inf:
+        raise click.UsageError(f"no velocity gives the energy {energy:g} to the mass {mass:g}")
+    return float(f"{velocity:.6g}")
 
 
 def _additions(deck: Deck) -> str:
@@ -247,8 +289,12 @@ def _grid(
     rows: list[Section] | None,
     at: tuple[float, float] | None,
     radius: float | None,
+    fixture: Fixture | None,
 ) -> Grid:
-    """Grid of elements from sizes, refined to the radius of a patch, or from lists."""
+    """Grid of elements from sizes, refined to the radius of a patch, or from lists.
+
+    With a fixture the sizes are those of its window.
+    """
     if columns and rows:
         if size or mesh or grading != 1.0:
             raise click.UsageError("--columns and --rows replace --size, --mesh and --grading")
@@ -256,11 +302,17 @@ def _grid(
     elif columns or rows or not (size and mesh):
         raise click.UsageError("give --size and --mesh, or --columns and --rows")
     else:
-        centre = at or (size[0] / 2.0, size[1] / 2.0)
-        grid = Grid(*(
+        whole = fixture.size if fixture else size
+        rims = [(length - side) / 2.0 for length, side in zip(whole, size, strict=True)]
+        place = at or (whole[0] / 2.0, whole[1] / 2.0)
+        centre = (x - rim for x, rim in zip(place, rims, strict=True))
+        columns, rows = (
             _sections(length, count, middle, grading, radius)
             for length, count, middle in zip(size, mesh, centre, strict=True)
-        ))  # fmt: skip
+        )
+        if fixture:
+            columns, rows = framed(columns, whole[0]), framed(rows, whole[1])
+        grid = Grid(columns, rows)
     if max(grid.across, grid.up) // 2 > MOST or grid.elements > MOST_ELEMENTS:
         raise click.UsageError(
             f"the mesh would have {grid.elements} elements; at most {MOST_ELEMENTS}, and {MOST} "

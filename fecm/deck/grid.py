@@ -16,6 +16,8 @@ from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
 
 # Significant digits of coordinates, relative to the plate's size, so that they fit their columns.
 DIGITS = 6
+# Least number of elements between a window and an edge.
+LEAST_BESIDE = 2
 
 
 @dataclass(frozen=True)
@@ -124,6 +126,22 @@ def refined(
     return graded(length, elements + more, centre, ratio)
 
 
+def framed(inner: Sequence[Section], length: float) -> list[Section]:
+    """Elements of a window in the middle of a length, and beside it some like its outermost.
+
+    The window's edges become lines of nodes.
+    """
+    start = (length - inner[-1].end) / 2.0
+    ends = [_round(start + section.end, length) for section in inner]
+    starts = [_round(start, length), *ends]
+    sizes = [(section.end - section.start) / section.elements for section in inner]
+    before, after = (max(LEAST_BESIDE, math.ceil(start / size)) for size in (sizes[0], sizes[-1]))
+    middle = (
+        Section(a, b, section.elements) for a, b, section in zip(starts, ends, inner, strict=False)
+    )
+    return [Section(0.0, starts[0], before), *middle, Section(ends[-1], length, after)]
+
+
 def _series(length: float, count: int, ratio: float) -> list[float]:
     """Sizes that grow geometrically by `ratio` over all, and add up to `length`."""
     growth = ratio ** (1.0 / (count - 1)) if count > 1 else 1.0
@@ -143,6 +161,14 @@ def lines(sections: Sequence[Section]) -> list[float]:
         step = (section.end - section.start) / count
         found += [section.start + i * step for i in range(count)]
     return [*found, sections[-1].end]
+
+
+def _edges(sections: Sequence[Section], side: float) -> tuple[int, int]:
+    """Numbers of the lines of nodes nearest to the edges of a window in the middle."""
+    places, length = np.array(lines(sections)), sections[-1].end
+    near = (int(np.abs(places - (length + sign * side) / 2.0).argmin()) for sign in (-1.0, 1.0))
+    first, last = near
+    return first, last
 
 
 @dataclass(frozen=True)
@@ -210,7 +236,11 @@ class Grid:
         return Elements(tuple(records))
 
     def boundary(
-        self, everywhere: Sequence[int], edges: Mapping[str, Sequence[int]]
+        self,
+        everywhere: Sequence[int],
+        edges: Mapping[str, Sequence[int]],
+        window: tuple[float, float] | None = None,
+        held: Sequence[int] = (),
     ) -> Boundary | None:
         """BOUN cards; None where nothing is restrained.
 
@@ -220,11 +250,25 @@ class Grid:
             Codes of every node.
         edges : dict
             Codes of the nodes of the edges ``left``, ``right``, ``bottom`` and ``top``.
+        window : tuple of float, optional
+            Sides of a window in the middle of the plate.
+        held : sequence of int
+            Codes of the nodes of its edges.
         """
         codes = np.tile(np.array(everywhere), (self.up, self.across, 1))
         parts = {"left": codes[:, 0], "right": codes[:, -1], "bottom": codes[0], "top": codes[-1]}
-        for name, held in edges.items():
-            np.maximum(parts[name], held, out=parts[name])
+        for name, code in edges.items():
+            np.maximum(parts[name], code, out=parts[name])
+        if window is not None:
+            (left, right), (low, high) = (
+                _edges(sections, side)
+                for sections, side in zip((self.columns, self.rows), window, strict=True)
+            )
+            for j, i in (
+                (slice(low, high + 1), [left, right]),
+                ([low, high], slice(left, right + 1)),
+            ):
+                codes[j, i] = np.maximum(codes[j, i], held)
         rows = codes.reshape(self.nodes, -1)
         starts = [0, *(np.flatnonzero((np.diff(rows, axis=0) != 0).any(axis=1)) + 1).tolist()]
         records: list[NodeCodes] = []

@@ -51,6 +51,7 @@ def new_deck(
     units: Units | None = None,
     patch: Patch | None = None,
     shear: Shear | None = None,
+    window: tuple[float, float] | None = None,
 ) -> Deck:
     """Build the deck of an impact.
 
@@ -87,6 +88,8 @@ def new_deck(
         Contact patch; None for a point force.
     shear : Shear or None
         Treatment of transverse shear; None for quadrature.
+    window : tuple of float or None
+        Sides of a window in the middle, along whose edges w is held; the grid has lines there.
     """
     total = float(f"{len(angles) * ply_thickness:.9g}")
     layers = tuple(
@@ -105,7 +108,7 @@ def new_deck(
         }[supports[edge]]
         for edge in EDGES
     }
-    boundary = grid.boundary((*in_plane, 0, 0, 0), edges)
+    boundary = grid.boundary((*in_plane, 0, 0, 0), edges, window, (1, 1, 1, 0, 0))
     node = grid.nearest(*at)[0]
     segments = (
         units, grid.coordinates(), grid.element_cards(), boundary, projectile,

@@ -98,7 +98,7 @@ def estimate(problem: Problem) -> Estimate:
         return infinite_plate(mass, v, k, inelasticity(mass, v, k, laminate.mass, rigidity))
 
     models = [_model("infinite plate", small, velocity, SMALL_MASS * force)]
-    stiffness = _static_stiffness(problem.moving_plate, contact)
+    stiffness = static_stiffness(problem.moving_plate, contact)
     if math.isfinite(stiffness):
 
         def large(v: float) -> QuickImpact:
@@ -126,7 +126,7 @@ def _model(
     return Model(name, impact(velocity), threshold, found)
 
 
-def _static_stiffness(plate: PlateModel, contact: Floats) -> float:
+def static_stiffness(plate: PlateModel, contact: Floats) -> float:
     """Force per displacement under the load; NaN for a plate that is not held."""
     load = contact[plate.mesh.equations > 0]
     try:

@@ -1,0 +1,89 @@
+"""Fixtures of drop-weight tests: a plate that lies on the edges of a window."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+CUSTOM = "window:LXxLY,WXxWY"
+
+
+@dataclass(frozen=True)
+class DropWeight:
+    """What a test standard prescribes besides its fixture, in mm, N, s and t.
+
+    Attributes
+    ----------
+    mass, radius : float
+        Of the rigid projectile.
+    energy : float
+        Impact energy per thickness, force.
+    thickest, thinnest : float
+        Limits of the laminate's thickness, length.
+    """
+
+    mass: float
+    radius: float
+    energy: float
+    thinnest: float
+    thickest: float
+
+
+@dataclass(frozen=True)
+class Fixture:
+    """A plate on the edges of a window in its middle.
+
+    Attributes
+    ----------
+    name : str
+    size, window : tuple of float
+        Sides of the plate and of the window, length.
+    test : DropWeight or None
+        What the standard prescribes; None for a fixture of one's own.
+    """
+
+    name: str
+    size: tuple[float, float]
+    window: tuple[float, float]
+    test: DropWeight | None = None
+
+    @property
+    def comment(self) -> str:
+        """Comment lines of a deck."""
+        (lx, ly), (wx, wy) = self.size, self.window
+        return (
+            f"! Fixture {self.name}: a plate of {lx:g} x {ly:g}, w = 0 along the edges of a "
+            f"window of {wx:g} x {wy:g}.\n"
+            "! Clamps and lift-off are not modelled.\n"
+        )
+
+
+# ASTM D7136/D7136M: 5.5 kg, hemisphere of 16 mm diameter, 6.7 J per mm of thickness.
+FIXTURES = {
+    fixture.name: fixture
+    for fixture in (
+        Fixture("D7136", (150.0, 100.0), (125.0, 75.0), DropWeight(5.5e-3, 8.0, 6700.0, 4.0, 6.0)),
+    )
+}
+
+
+def parse_fixture(text: str) -> Fixture:
+    """Fixture of a name, or of ``window:LXxLY,WXxWY``.
+
+    Raises
+    ------
+    ValueError
+        If it is neither, or the window is not smaller than the plate.
+    """
+    if text in FIXTURES:
+        return FIXTURES[text]
+    number = r"\s*(\d+\.?\d*|\.\d+)\s*"
+    match = re.fullmatch(f"window:{number}[xX×]{number},{number}[xX×]{number}", text)
+    if match is None:
+        raise ValueError(f"{text!r} is not a fixture: {', '.join(FIXTURES)} or {CUSTOM}")
+    lx, ly, wx, wy = (float(value) for value in match.groups())
+    if not (0.0 < wx < lx < 1e30 and 0.0 < wy < ly < 1e30):
+        raise ValueError(
+            f"the window of {wx:g} x {wy:g} is not smaller than the plate of {lx:g} x {ly:g}"
+        )
+    return Fixture("window", (lx, ly), (wx, wy))

@@ -1,0 +1,102 @@
+"""fecm new --fixture: plates on the edges of a window, and what a test standard prescribes."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm.api import load_deck
+from fecm.deck import Deck
+from fecm.deck.model import Impact, Patch
+from fecm.problem.build import build_projectile
+from fecm.studies.estimate import static_stiffness
+from tests.calls import Done, assert_unusable, call
+
+WINDOW = "150x100 plate, w=0 along the window"
+ISOTROPIC = "2.7e-9,.3,6e4,6e4,23076.9231,23076.9231,23076.9231"
+IM7 = "1.58e-9,.32,161000,11380,5170,5170,3980"
+# The ply constants of IM7 give D of the table threshold_loads.csv to nine digits.
+PLIES = {
+    "isotropic E=60 GPa nu=.3 h=5, K=1": ("[0]", "5", ISOTROPIC),
+    "IM7/8552 [45/0/-45/90]3s h=4.416, K=1": ("[45/0/-45/90]3s", ".184", IM7),
+}  # fmt: skip
+PLATE = ("--layup", "[45/0/-45/90]3s", "--ply-thickness", ".184", "--ply", IM7)
+QUICK = ("--mesh", "8x6", "--duration", "1e-4")
+
+
+def new(*options: str) -> Done:
+    return call("new", "-", *options)
+
+
+def deck_of(*options: str) -> Deck:
+    made = new(*options)
+    assert made.exit_code == 0, made.stderr
+    deck = fecm.read_deck(made.stdout)
+    assert isinstance(deck, Deck)
+    return deck
+
+
+@pytest.mark.parametrize("plate", PLIES)
+def test_the_static_stiffness_of_d7136_is_that_of_another_code(plate: str) -> None:
+    with (Path(__file__).parent / "data" / "d7136_stiffness.csv").open() as file:
+        (row,) = (r for r in csv.DictReader(file) if (r["plate"], r["support"]) == (plate, WINDOW))
+    layup, thickness, ply = PLIES[plate]
+    made = new("--fixture", "D7136", "--layup", layup, "--ply-thickness", thickness, "--ply", ply,
+               "--patch", "disc:2", "--duration", "1e-4")  # fmt: skip
+    (problem,) = load_deck(made.stdout).problems
+    assert problem.contact is not None
+    stiffness = static_stiffness(problem.moving_plate, problem.contact)
+    assert stiffness == pytest.approx(float(row["n=3"]), rel=0.01)
+
+
+def test_d7136_prescribes_mass_energy_patch_and_units() -> None:
+    deck = deck_of("--fixture", "D7136", *PLATE, *QUICK)
+    assert build_projectile(deck).total_mass == 5.5e-3
+    assert deck.last(Patch) == Patch("HERT")
+    energy = 0.5 * 5.5e-3 * deck.require(Impact).velocity ** 2
+    assert energy == pytest.approx(6700 * 4.416, rel=1e-5)
+
+
+def test_w_is_held_along_the_window_and_nowhere_else() -> None:
+    made = new("--fixture", "D7136", *PLATE, *QUICK)
+    assert "! Clamps and lift-off are not modelled." in made.stdout
+    (problem,) = load_deck(made.stdout).problems
+    held = problem.mesh.equations[:, 2] == 0
+    x, y = np.abs(problem.mesh.coordinates - (75.0, 50.0)).T
+    on = (np.isclose(x, 62.5) & (y < 37.5001)) | (np.isclose(y, 37.5) & (x < 62.5001))
+    assert (held == on).all()
+    assert on.any()
+    assert (problem.mesh.equations[:, 3:] > 0).all()
+
+
+def test_energy_gives_the_velocity_of_the_mass() -> None:
+    deck = deck_of("--fixture", "window:60x40,50x30", *PLATE, *QUICK, "--projectile", "mass:2e-3",
+                   "--energy", "4000", "--law", "5e4,0,0,1.5")  # fmt: skip
+    assert deck.require(Impact).velocity == pytest.approx(2000.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--fixture", "D1"], "'D1' is not a fixture: D7136 or window:LXxLY,WXxWY"),
+        (["--fixture", "window:10x10,10x5"], "is not smaller than the plate"),
+        (["--fixture", "D7136", "--size", "6x4"], "leave out --size"),
+        (["--fixture", "D7136", "--support", "free"], "leave out --support"),
+        (["--fixture", "D7136", "--units", "m-N-s"], "leave out --units"),
+        (["--fixture", "D7136", "--velocity", "1", "--energy", "1"], "--velocity or --energy"),
+    ],
+)
+def test_what_does_not_go_with_a_fixture_is_refused(options: list[str], message: str) -> None:
+    made = new(*options, *PLATE, *QUICK)
+    assert_unusable(made)
+    assert message in made.stderr
+
+
+def test_a_laminate_outside_the_standard_is_warned_of() -> None:
+    made = new("--fixture", "D7136", "--layup", "[0/90]s", *PLATE[2:], *QUICK)
+    assert "warning: D7136 is for laminates of 4 to 6 mm; this one has 0.736 mm" in made.stderr
+    assert "warning" not in new("--fixture", "D7136", *PLATE, *QUICK).stderr
