@@ -21,15 +21,10 @@ from fecm.mechanics import element_groups, interpolation
 from fecm.mechanics.element_groups import ElementBlock
 from fecm.mechanics.elements.quadrature import Quadrature
 from fecm.mechanics.interpolation import NDOF
+from fecm.mechanics.locate import locate
 from fecm.mechanics.mesh import Mesh
 
 Indices = NDArray[np.intp]
-
-# Tolerance, in local coordinates, for points on the edge of an element.
-MARGIN = 1.0e-6
-# The Jacobian of a triangle is singular at node 3.
-INSIDE = 1.0 - 1.0e-9
-PASSES = 50
 
 
 class OutsideError(FecmError, ValueError):
@@ -99,61 +94,26 @@ def gages(
     )
 
 
-def locate(
-    families: Sequence[ElementBlock], x: float, y: float
-) -> list[tuple[ElementBlock, float, float]]:
-    """Elements that contain a point, each as a block of one, with the local coordinates."""
-    found: list[tuple[ElementBlock, float, float]] = []
-    point = np.array([x, y])
-    for family in families:
-        low, high = family.coordinates.min(axis=1), family.coordinates.max(axis=1)
-        margin = 0.1 * (high - low).max(axis=1, keepdims=True)  # sides may bulge
-        near = ((low - margin <= point) & (point <= high + margin)).all(axis=1)
-        for member in np.flatnonzero(near):
-            one = family.take(np.array([member]))
-            local = _local(one, point)
-            if local is not None:
-                found.append((one, *local))
-    return found
-
-
-def _local(element: ElementBlock, point: Floats) -> tuple[float, float] | None:
-    """Local coordinates of a point, by Newton's method; None if it is outside."""
-    xi = np.zeros(2)
-    for _ in range(PASSES):
-        rule = _at(xi)
-        values, local = interpolation.local_shape_functions(element, rule)
-        miss = point - values[0] @ element.coordinates[0]
-        jacobian = np.einsum("an,ni->ia", local[0], element.coordinates[0])
-        step = np.linalg.solve(jacobian, miss)
-        xi = np.clip(xi + step, -2.0, [2.0, INSIDE if element.shape.corners == 3 else 2.0])
-        if np.abs(step).max() < 1e-13:
-            break
-    if np.abs(xi).max() > 1.0 + MARGIN:
-        return None
-    size = np.ptp(element.coordinates[0], axis=0).max()
-    values, _ = interpolation.local_shape_functions(element, _at(xi))
-    miss = np.abs(point - values[0] @ element.coordinates[0]).max()
-    return (float(xi[0]), float(xi[1])) if miss <= MARGIN * size else None
-
-
-def _at(xi: Floats) -> Quadrature:
-    return Quadrature(xi[:1], xi[1:], np.ones(1))
-
-
 def _functional(
     families: Sequence[ElementBlock], gage: GagePlace, transposed_jacobian: bool
 ) -> tuple[Indices, Floats]:
     """Dofs and weights of a gage's strain."""
-    found = locate(families, gage.x, gage.y)
+    point = np.array([[gage.x, gage.y]])
+    found = [
+        (family.take(np.array([member])), at)
+        for family in families
+        for member, _, at in zip(*locate(family, point), strict=True)
+    ]
     if not found:
         raise OutsideError(f"gage {gage.number} at ({gage.x:g}, {gage.y:g}) is not on the plate")
     c, s = np.cos(np.deg2rad(gage.direction)), np.sin(np.deg2rad(gage.direction))
     dof_indices: list[Indices] = []
     weights: list[Floats] = []
-    for element, xi, eta in found:
+    for element, xi in found:
         at = interpolation.interpolate(
-            element, _at(np.array([xi, eta])), transposed_jacobian=transposed_jacobian
+            element,
+            Quadrature(xi[:1], xi[1:], np.ones(1)),
+            transposed_jacobian=transposed_jacobian,
         )
         along = c * at.dN[0, 0, 0] + s * at.dN[0, 0, 1]  # derivative in the gage's direction
         nodes = element.nodes[0] * NDOF

@@ -60,13 +60,13 @@ def _local(elements: ElementBlock, points: Floats) -> tuple[Floats, Bools]:
             break
         coordinates = elements.coordinates[active]
         values, local = local_shape_functions(elements, _rule(xi[active]))
-        miss = points[active] - np.einsum("pn,pni->pi", values, coordinates)
+        miss = points[active] - (values.copy()[:, None] @ coordinates)[:, 0]
         jacobian = np.einsum("pan,pni->pia", local, coordinates)
         step = np.linalg.solve(jacobian, miss[:, :, None])[:, :, 0]
         xi[active] = np.clip(xi[active] + step, -2.0, highest)
         active = active[np.abs(step).max(axis=1) >= 1e-13]
     values, _ = local_shape_functions(elements, _rule(xi))
-    miss = np.abs(points - np.einsum("pn,pni->pi", values, elements.coordinates)).max(axis=1)
+    miss = np.abs(points - (values.copy()[:, None] @ elements.coordinates)[:, 0]).max(axis=1)
     size = np.ptp(elements.coordinates, axis=1).max(axis=1)
     return xi, (np.abs(xi).max(axis=1) <= 1.0 + MARGIN) & (miss <= MARGIN * size)
 

@@ -11,7 +11,7 @@ from fecm.deck.findings import Findings
 from fecm.deck.model import Deck, Gages, Impact, Indentation, Material, Patch, Projectile, Shear
 from fecm.mechanics import element_groups
 from fecm.mechanics.contact_law import ACR_POWER
-from fecm.mechanics.gages import locate
+from fecm.mechanics.locate import locate
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.projectile import Rod, report_rod
 from fecm.problem import check_mesh
@@ -161,7 +161,8 @@ def check_gages(segment: Gages, mesh: Mesh, deck: Deck, findings: Findings) -> N
                 "give each gage its own number",
             )  # fmt: skip
         seen.add(record.number)
-        if not locate(families, record.x, record.y):
+        point = np.array([[record.x, record.y]])
+        if not any(len(locate(family, point)[0]) for family in families):
             findings.add(
                 "E424",
                 f"Gage {record.number} at ({record.x:g}, {record.y:g}) is not on the plate.",
