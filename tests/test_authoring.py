@@ -16,7 +16,15 @@ from fecm.deck.catalogue import MATERIALS
 from fecm.deck.format import format_deck
 from fecm.deck.grid import Grid, graded, lines, listed, longest_at, refined, uniform
 from fecm.deck.layup import LayupError, parse_layup
-from fecm.deck.model import Impact, Material, Patch, Projectile, Shear
+from fecm.deck.model import (
+    Allowables,
+    Delamination,
+    Impact,
+    Material,
+    Patch,
+    Projectile,
+    Shear,
+)
 from fecm.deck.records import Control
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import build_projectile
@@ -246,6 +254,35 @@ def test_formatting_changes_neither_model_nor_itself(path: Path) -> None:
     assert formatted != text
     assert fecm.read_deck(formatted) == fecm.read_deck(text)
     assert format_deck(formatted) == formatted
+
+
+BLANKS = """\
+PATC
+HERT                     3.0                25.0
+ALLO
+     100.0      90.0      40.0      80.0      20.0                30.0
+                 0.4
+DELA
+       2.0
+"""
+
+
+@pytest.mark.parametrize(
+    "cards",
+    [BLANKS, "PATC\nHERT,,3.0,,25.0\nALLO\n100,90,40,80,20,,30\n,0.4,\nDELA\n2.0,\n"],
+    ids=["columns", "commas"],
+)
+def test_formatting_keeps_fields_blank_whose_default_is_not_zero(cards: str) -> None:
+    text = small().replace("END\nMACR", f"{cards}END\nMACR")
+    deck = fecm.read_deck(text)
+    assert isinstance(deck, Deck)
+    patch, strengths = deck.require(Patch), deck.require(Allowables)
+    assert (patch.radius, patch.x, patch.y, patch.load) == (None, 3.0, None, 25.0)
+    assert (strengths.s12, strengths.s13, strengths.s23) == (20.0, 20.0, 30.0)
+    assert (strengths.f12, strengths.p_plus, strengths.p_minus) == (-0.5, 0.4, 0.3)
+    assert deck.require(Delamination).number == 1.0
+    assert fecm.read_deck(format_deck(text)) == deck
+    assert fecm.read_deck(deck.to_text()) == deck
 
 
 def test_a_formatted_deck_runs_to_the_same_tapes(tmp_path: Path) -> None:

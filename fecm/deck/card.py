@@ -116,13 +116,17 @@ LARGEST_INTEGER = 2**31 - 1
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A field of a card: name, Fortran letter (I, F or A), columns, and a label for rulers."""
+    """A field of a card: name, Fortran letter (I, F or A), columns, and a label for rulers.
+
+    A blank number is 0; with `has_default` it is read as ``""`` and the record has its default.
+    """
 
     name: str
     kind: str
     first: int
     last: int
     label: str
+    has_default: bool
 
     @property
     def width(self) -> int:
@@ -141,16 +145,17 @@ def layout(*descriptors: str) -> Fields:
     ----------
     *descriptors : str
         ``"I5 node"``, ``"A4 word"``, ``"X1"`` for a column that is skipped, or with a label for
-        rulers ``"F10 x-coordinate|x"``.
+        rulers ``"F10 x-coordinate|x"``; ``"F10? radius"`` where a blank is not 0.
     """
     fields: list[Field] = []
     column = 1
     for descriptor in descriptors:
         code, _, text = descriptor.partition(" ")
         name, _, label = text.partition("|")
-        width = int(code[1:])
+        width = int(code[1:].rstrip("?"))
         if code[0] != "X":
-            fields.append(Field(name, code[0], column, column + width - 1, label or name))
+            last = column + width - 1
+            fields.append(Field(name, code[0], column, last, label or name, code[-1] == "?"))
         column += width
     return tuple(fields)
 
@@ -392,12 +397,12 @@ def _word(field: Field, text: str, source: Source, findings: Findings) -> str | 
 
 def _number(
     field: Field, text: str, source: Source, findings: Findings, zeros: bool
-) -> int | float | None:
-    """A field's number, or None after reporting an error."""
+) -> Value | None:
+    """A field's number, ``""`` where a blank has a default, or None after reporting an error."""
     parse = parse_integer if field.kind == "I" else parse_real
     written = text.strip()
     if not written:
-        return 0 if field.kind == "I" else 0.0
+        return "" if field.has_default else 0 if field.kind == "I" else 0.0
     if len(written) > LONGEST:
         findings.add(
             "E109",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fecm.deck.card import Card, Fields, Value, write_card
 from fecm.deck.findings import DeckError
-from fecm.deck.model import STOP, Patch
+from fecm.deck.model import STOP
 from fecm.deck.reader import Reader
 from fecm.deck.records import Macro
 from fecm.deck.segments import READERS
@@ -77,8 +77,6 @@ def _aligned(card: Card, fields: Fields, values: list[Value]) -> str:
     texts = [text for _, text in card.cut(fields)][: len(fields)]
     count = max([n for n, text in enumerate(texts, start=1) if text.strip()], default=0)
     kept: list[Value] = list(values[:count])
-    if fields == Patch.fields:  # where a blank is not 0
-        kept = [value if text.strip() else "" for text, value in zip(texts, kept, strict=False)]
     if fields in (Macro.fields, Macro.short_fields):
         kept[:1] = [str(v).strip().upper() for v in kept[:1]]
         if fields == Macro.short_fields:

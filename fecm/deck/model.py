@@ -262,14 +262,9 @@ class Projectile(Segment):
             yield ""
 
 
-def _or_blank(values: Sequence[Value], source: Source) -> list[float | None]:
-    """Numbers of a card; None where its field is blank."""
-    texts = [text.strip() for _, text in source.card.cut(source.fields)]
-    blank = [not text for text in texts] + [True] * len(values)
-    return [
-        None if empty or isinstance(value, str) else float(value)
-        for value, empty in zip(values, blank, strict=False)
-    ]
+def _given(value: Value) -> float | None:
+    """A number of a card; None where its field is blank."""
+    return None if value == "" else float(value)
 
 
 @dataclass(frozen=True)
@@ -297,14 +292,14 @@ class Patch(Segment):
 
     optional: ClassVar[int] = 4
     fields: ClassVar[Fields] = layout(
-        "A4 shape", "X6", "F10 radius c|c", "F10 centre x0|x0", "F10 centre y0|y0",
+        "A4 shape", "X6", "F10? radius c|c", "F10? centre x0|x0", "F10? centre y0|y0",
         "F10 static load|load",
     )  # fmt: skip
 
     @classmethod
     def from_row(cls, values: Sequence[Value], source: Source) -> Self:
         """Build the segment from the card's values; a blank radius or centre is None."""
-        radius, x, y = _or_blank(values, source)[1:4]
+        radius, x, y = map(_given, values[1:4])
         return cls(str(values[0]).upper() or "DISC", radius, x, y, float(values[4]), source=source)
 
     def row(self) -> list[Value]:
@@ -374,23 +369,23 @@ class Allowables(Segment):
     keyword: ClassVar[str] = "ALLO"
 
     fields: ClassVar[Fields] = layout(
-        "F10 XT", "F10 XC", "F10 YT", "F10 YC", "F10 S12", "F10 S13", "F10 S23"
+        "F10 XT", "F10 XC", "F10 YT", "F10 YC", "F10 S12", "F10? S13", "F10? S23"
     )
-    constants: ClassVar[Fields] = layout("F10 F12*", "F10 p+", "F10 p-")
+    constants: ClassVar[Fields] = layout("F10? F12*", "F10? p+", "F10? p-")
 
     @classmethod
     def from_row(cls, values: Sequence[Value], source: Source) -> Self:
         """Build the segment from its first card."""
-        *given, s12, s13, s23 = _or_blank(values, source)
-        s13 = s12 if s13 is None else s13
-        s23 = s13 if s23 is None else s23
-        return cls(*(value or 0.0 for value in (*given, s12, s13, s23)), source=source)
+        *given, s12, s13, s23 = values
+        s13 = s12 if s13 == "" else s13
+        s23 = s13 if s23 == "" else s23
+        return cls(*map(float, (*given, s12, s13, s23)), source=source)
 
-    def with_constants(self, values: Sequence[Value], source: Source) -> Self:
+    def with_constants(self, values: Sequence[Value]) -> Self:
         """Return the segment with the values of its second card; a blank keeps the default."""
         defaults = (self.f12, self.p_plus, self.p_minus)
-        found = zip(_or_blank(values, source), defaults, strict=True)
-        f12, p_plus, p_minus = (old if new is None else new for new, old in found)
+        read = zip(values, defaults, strict=True)
+        f12, p_plus, p_minus = (old if value == "" else float(value) for value, old in read)
         return replace(self, f12=f12, p_plus=p_plus, p_minus=p_minus)
 
     def cards(self, control: Control) -> Iterator[str]:
@@ -417,13 +412,13 @@ class Delamination(Segment):
     number: float = 1.0
     keyword: ClassVar[str] = "DELA"
 
-    fields: ClassVar[Fields] = layout("F10 G_IIc", "F10 number of delaminations|number")
+    fields: ClassVar[Fields] = layout("F10 G_IIc", "F10? number of delaminations|number")
 
     @classmethod
     def from_row(cls, values: Sequence[Value], source: Source) -> Self:
         """Build the segment from the card's values; a blank number is 1."""
-        toughness, number = _or_blank(values, source)
-        return cls(toughness or 0.0, 1.0 if number is None else number, source=source)
+        toughness, number = values
+        return cls(float(toughness), 1.0 if number == "" else float(number), source=source)
 
 
 @dataclass(frozen=True)

@@ -248,7 +248,7 @@ class SegmentReader:
         row = None if card is None else self._stream.row(card, Allowables.constants)
         if strengths is None or (card is not None and row is None):
             return None
-        return strengths if row is None else strengths.with_constants(*row)
+        return strengths if row is None else strengths.with_constants(row[0])
 
     def _shear(self, head: Card) -> Segment | None:
         words = head.data.replace(",", " ").upper().split()[1:]
