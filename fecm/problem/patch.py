@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from fecm.mechanics.locate import locate
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.patch import DISC, HERTZ, RADIUS_PER_THICKNESS, PatchError, patch_weights
 from fecm.mechanics.symmetry import half_turn_images
+
+if TYPE_CHECKING:
+    from fecm.problem.build import Problem
 
 # Dof w, from 0.
 W = 2
@@ -65,18 +69,9 @@ def contact_patch(deck: Deck, mesh: Mesh) -> ContactPatch | None:
     return ContactPatch(card.shape, radius, x, y, np.where(mesh.codes[:, W] == 0, weights, 0.0))
 
 
-def with_patch_load(deck: Deck, mesh: Mesh) -> Mesh:
-    """Add the static load of a deck's patch to the nodal forces."""
-    card = deck.last(Patch)
-    if card is None or not card.load or (patch := contact_patch(deck, mesh)) is None:
-        return mesh
-    forces = mesh.forces.copy()
-    forces[:, W] += card.load * patch.weights
-    return replace(mesh, forces=forces)
-
-
-def check_patch(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+def check_patch(problem: Problem, findings: Findings) -> None:
     """Check a PATC segment on a sound mesh."""
+    deck, mesh = problem.deck, problem.mesh
     card = deck.require(Patch)
     if card.shape not in RADIUS_PER_THICKNESS:
         findings.add(
@@ -112,7 +107,7 @@ def check_patch(deck: Deck, mesh: Mesh, findings: Findings) -> None:
         )  # fmt: skip
         return
     try:
-        patch = contact_patch(deck, mesh)
+        patch = problem.patch
     except PatchError as error:
         findings.add(
             "E445", f"{str(error)[0].upper()}{str(error)[1:]}.", card.place(),

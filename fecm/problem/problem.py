@@ -58,7 +58,7 @@ from fecm.problem.check_plausibility import (
 )
 from fecm.problem.check_program import check_program, check_time_step
 from fecm.problem.generate import generate
-from fecm.problem.patch import check_patch, with_patch_load
+from fecm.problem.patch import W, check_patch
 
 __all__ = ["Problem", "check"]
 
@@ -118,14 +118,14 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
         check_shear_correction(correction, findings)
     if (segment := deck.last(Gages)) is not None and findings.error_count == before and not unsound:
         check_gages(segment, mesh, deck, findings)
+    checked = Problem(deck, mesh, program)
     if findings.error_count == before and not unsound:
         if deck.has(Shear):
             check_assumed_shear(deck, mesh, findings)
-        if deck.has(Patch):
-            check_patch(deck, mesh, findings)
-    if findings.error_count == before and not unsound:
-        mesh = with_patch_load(deck, mesh)
-    checked = Problem(deck, mesh, program)
+        if (patch := deck.last(Patch)) is not None:
+            check_patch(checked, findings)
+            if findings.error_count == before and patch.load and checked.patch is not None:
+                mesh.forces[:, W] += patch.load * checked.patch.weights
     if findings.error_count == before and not unsound:
         with np.errstate(all="ignore"):  # numbers out of range end in a finding
             delamination = deck.last(Delamination)
