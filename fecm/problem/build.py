@@ -5,7 +5,6 @@ The active slips become parameters of plate, projectile, contact law and transdu
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import NamedTuple
@@ -13,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._typing import Floats
+from fecm._typing import Bools, Floats
 from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, moves_only
 from fecm.deck.model import Allowables, Deck, Delamination, Indentation, Material, Shear
 from fecm.deck.model import Gages as GageCards
@@ -149,7 +148,7 @@ class Problem:
         centres = element_centres(self.mesh.elements, self.mesh.coordinates)
         return np.asarray(np.hypot(*(centres - self.load_place).T))
 
-    def under_load(self, x: Floats, y: Floats) -> NDArray[np.bool_]:
+    def under_load(self, x: Floats, y: Floats) -> Bools:
         """Whether plate theory does not hold at points: within the patch's radius + h/2 of it."""
         if self.load_place is None:
             return np.zeros(x.shape, dtype=bool)
@@ -243,8 +242,8 @@ class ImpactModel:
         Elements whose ply stresses are stored; None without PLYS.
     failure : FailureMonitor or None
         Failure criteria; None without FAIL.
-    under_load : callable
-        Whether plate theory does not hold at points x, y: :meth:`Problem.under_load`.
+    under_load : ndarray (numel, points) of bool, or None
+        Whether plate theory does not hold at a stress point; None without PLYS and FAIL.
     """
 
     plate: PlateModel
@@ -257,7 +256,7 @@ class ImpactModel:
     patch: ContactPatch | None
     plies: PlyStresses | None
     failure: FailureMonitor | None
-    under_load: Callable[[Floats, Floats], NDArray[np.bool_]]
+    under_load: Bools | None
 
 
 class ProgramRules:
@@ -427,6 +426,9 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         )
         law = build_law(deck, slips)
         impact = ImpactSystem(motion, rod, law, conditions, STEPS[method.integrator])
+    stress_points = plate.strain_field(problem.rules[2])
+    plies, failure = build_plies(problem, plate), build_failure(problem, plate)
+    places = stress_points.places(mesh.coordinates) if plies or failure else None
     cards, transposed = deck.last(GageCards), plate.rules.transposed_jacobian
     return ImpactModel(
         plate=plate,
@@ -434,26 +436,22 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         impact=impact,
         station=build_station(deck, rod, slips),
         strains=plate.strain_field(plate.rules.strains),
-        stress_points=plate.strain_field(problem.rules[2]),
+        stress_points=stress_points,
         gages=None if cards is None else gages(mesh, cards.records, transposed_jacobian=transposed),
         patch=problem.patch,
-        plies=build_plies(problem, plate),
-        failure=build_failure(problem, plate),
-        under_load=problem.under_load,
+        plies=plies,
+        failure=failure,
+        under_load=places and problem.under_load(*places),
     )
 
 
-def laminate_of(
-    material: Material, shear_factor: float = 1.0, *, isotropic_g12: bool = False
-) -> Laminate:
+def laminate_of(material: Material, *, isotropic_g12: bool = False) -> Laminate:
     """Laminate of a deck's MATE segment; its inertia uses the card's total thickness.
 
     Parameters
     ----------
     material : Material
         The segment.
-    shear_factor : float
-        Shear correction factor, on the transverse shear stiffness.
     isotropic_g12 : bool
         Replace G12 by E1/2(1+nu12) where E1 = E2 (the slip ``g12``).
     """
@@ -462,8 +460,7 @@ def laminate_of(
         ply = replace(ply, g12=ply.e1 / (2.0 * (1.0 + ply.nu12)))
     angles = [layer.angle for layer in material.layers]
     thicknesses = [layer.thickness for layer in material.layers]
-    built = laminate(ply, angles, thicknesses, material.integration.thickness)
-    return replace(built, shear=shear_factor * built.shear)
+    return laminate(ply, angles, thicknesses, material.integration.thickness)
 
 
 def laminate_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> Laminate:

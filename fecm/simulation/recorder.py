@@ -129,14 +129,13 @@ class Recorder:
             constants |= {"patch/node": nodes + 1, "patch/weight": patch.weights[nodes]}
             values = {"shape": patch.shape, "radius": patch.radius, "x": patch.x, "y": patch.y}
             self._sink.attributes("patch", values)
-        x, y = model.stress_points.places(mesh.coordinates)
-        near = model.under_load(x, y)
-        if self._room["plies"] and model.plies is not None:
+        if (near := model.under_load) is not None and self._room["plies"] and model.plies:
             constants |= {
                 "plies/element": model.plies.members + 1, "plies/z": model.plies.z,
                 "plies/under_load": near[model.plies.members].any(axis=1).astype(int),
             }  # fmt: skip
-        if model.failure is not None:
+        if near is not None and model.failure is not None:
+            x, y = model.stress_points.places(mesh.coordinates)
             constants |= {"failure/x": x, "failure/y": y, "failure/under_load": near.astype(int)}
             self._sink.attributes("failure", {"modes": list(MODES)})
         for path, array in constants.items():
