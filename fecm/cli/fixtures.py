@@ -20,7 +20,7 @@ from fecm.studies import StudyError
 from fecm.studies.estimate import static_stiffness
 from fecm.studies.indentation_test.modulus import effective_stiffness, indentation_modulus
 
-# Options that a fixture stands for.
+# Options that a fixture sets.
 REPLACED = ("size", "columns", "rows", "support", "edges")
 # Elements of the window where --mesh does not give them, and their grading.
 MESH, GRADING = (20, 12), 3.0
@@ -33,7 +33,7 @@ E_S, NU_S, NU23 = 207e3, 0.3, 0.4
 
 
 def complete(options: dict[str, Any], given: Collection[str]) -> list[str]:
-    """Fill in the options of ``fecm new`` that a fixture stands for; notes about them.
+    """Fill in the options of ``fecm new`` that a fixture sets; return notes about them.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Failure criteria of plies: exposure and mode of stress states.
 
 The exposure f = 1/R is the reciprocal of the factor on all stresses that reaches failure; it is
-linear in the load.  Stresses are in the axes of the ply; f < 1 is no failure.  Criteria: maximum
+linear in the load.  Stresses are in the axes of the ply; a ply fails at f = 1.  Criteria: maximum
 stress, Tsai and Wu 1971, Hashin 1980 (with S_T = YC/2, for which the compressive matrix criterion
 is a sum of squares), Puck's plane criterion (Puck and Schürmann 1998), and a quadratic criterion of
 the interlaminar shear stresses.

@@ -39,7 +39,7 @@ class Fixture:
     size, window : tuple of float
         Sides of the plate and of the window, length.
     test : DropWeight or None
-        What the standard prescribes; None for a fixture of one's own.
+        What the standard prescribes; None for a custom fixture.
     """
 
     name: str
