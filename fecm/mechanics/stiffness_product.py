@@ -4,9 +4,9 @@ It is computed with scipy's CSR matrix, or element by element: congruent element
 matrix that stays in the cache, and the products run at the speed of BLAS.
 
 A vector q is padded to (q, 0), or to (q, -q, 0) where symmetry reverses the sign of some dofs; the
-zero is the value of every dof at rest.  The result is processed in pieces while they are in the cache.
-The pieces and their order depend only on the plate, so that sums do not depend on the number of
-threads.
+zero is the value of every dof at rest.  The result is processed in pieces while they are in the
+cache.  The pieces and their order depend only on the plate, so that sums do not depend on the
+number of threads.
 """
 
 from __future__ import annotations
