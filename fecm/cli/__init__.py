@@ -49,7 +49,7 @@ COMMANDS = {
     "fmt": LazyCommand("fecm.cli.decks", "Align the columns of DECK."),
     "indent": LazyCommand("fecm.cli.indent", "Indentation tests and the law of contact."),
     "info": LazyCommand("fecm.cli.info", "Describe the contents of RESULT.", True),
-    "materials": LazyCommand("fecm.cli.new", "List the named plies of `fecm new`."),
+    "materials": LazyCommand("fecm.cli.new", "List the named plies of `fecm new`, or of a file."),
     "new": LazyCommand("fecm.cli.new", "Write a deck from plate, layup, supports and impact."),
     "plot": LazyCommand("fecm.cli.plot", "Draw the report's figures, or the map of a sweep.", True),
     "rod": LazyCommand("fecm.cli.rod", "The projectile's rod alone: pulses and calibration."),

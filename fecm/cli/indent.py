@@ -14,7 +14,7 @@ from fecm.cli.indent_curve import curve
 from fecm.cli.laminate_options import laminate_options, ply_of_options
 from fecm.cli.outputs import OVERWRITE, PLOT, STANDARD_OUTPUT, OutputPaths
 from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, ListOf
-from fecm.deck.catalogue import CONTACTS, SYSTEM, SYSTEMS
+from fecm.deck.catalogue import CONTACTS, SYSTEM, SYSTEMS, NamedPly
 from fecm.deck.model import Indentation
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.studies.indentation_test import LIMITS_Q
@@ -173,7 +173,7 @@ def estimate(
     layup: Sequence[float],
     ply_thickness: float,
     ply: Sequence[float] | None,
-    material: str | None,
+    material: NamedPly | None,
     units: str | None,
     nu23: float,
     radius: float,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import click
 
 from fecm.cli.types import POSITIVE, Finite, ListOf, Parsed
-from fecm.deck.catalogue import MATERIALS, SYSTEMS
+from fecm.deck.catalogue import MATERIALS, SYSTEMS, NamedPly, read_plies
 from fecm.deck.findings import Findings
 from fecm.deck.layup import parse_layup
 from fecm.deck.model import Material
@@ -17,6 +19,25 @@ from fecm.problem.build import laminate_of
 from fecm.problem.check_material import check_material
 
 Decorated = Callable[..., None]
+
+# Key of the plies of --materials among the values of a context.
+_META = "fecm.plies"
+# Most bytes of a file of plies.
+MOST = 1_000_000
+
+
+def _read(path: str) -> dict[str, NamedPly]:
+    """Plies of a file."""
+    try:
+        with Path(path).open("rb") as file:
+            return read_plies(file.read(MOST).decode("utf-8-sig"))
+    except OSError as error:
+        raise ValueError(f"{path} can't be read: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+PLIES = Parsed(_read)
 
 
 def laminate_options(*, required: bool) -> Callable[[Decorated], Decorated]:
@@ -28,8 +49,11 @@ def laminate_options(*, required: bool) -> Callable[[Decorated], Decorated]:
                      help="Thickness of a ply."),
         click.option("--ply", type=ListOf("RHO,NU12,E1,E2,G12,G13,G23", Finite(), [7]),
                      metavar="RHO,NU12,E1,E2,G12,G13,G23", help="Density and moduli of a ply."),
-        click.option("--material", type=click.Choice(list(MATERIALS)), metavar="NAME",
+        click.option("--material", callback=_named, metavar="NAME",
                      help="Named ply, instead of --ply; `fecm materials` lists them."),
+        click.option("--materials", "file", type=PLIES, is_eager=True, expose_value=False,
+                     callback=_own, metavar="FILE.toml",
+                     help="Named plies of your own; `fecm materials FILE.toml` checks them."),
         click.option("--units", type=click.Choice(list(SYSTEMS)), metavar="SYSTEM",
                      help="in-lbf-s, m-N-s or mm-N-s: names the units, and converts a named ply "
                           "to them.  [default for a named ply: its source's]"),
@@ -43,21 +67,38 @@ def laminate_options(*, required: bool) -> Callable[[Decorated], Decorated]:
     return decorate
 
 
-def ply_of_options(ply: Sequence[float] | None, material: str | None, units: str | None) -> Ply:
+def _own(context: click.Context, _: click.Parameter, plies: dict[str, NamedPly] | None) -> None:
+    """Callback of --materials, before that of --material."""
+    context.meta[_META] = plies or {}
+
+
+def _named(context: click.Context, parameter: click.Parameter, name: str | None) -> NamedPly | None:
+    """Callback of --material: the ply of a name."""
+    plies: dict[str, NamedPly] = MATERIALS | context.meta[_META]
+    if name is None or name in plies:
+        return plies.get(name or "")
+    near = ", ".join(difflib.get_close_matches(name, plies, cutoff=0.4))
+    hint = f"did you mean {near}?" if near else "`fecm materials` lists them"
+    raise click.BadParameter(f"{name!r} is not a named ply; {hint}", context, parameter)
+
+
+def ply_of_options(
+    ply: Sequence[float] | None, material: NamedPly | None, units: str | None
+) -> Ply:
     """Constants of the ply; of a named one in the units."""
     if (ply is None) == (material is None):
         raise click.UsageError("give either --ply or --material")
     if ply is not None:
         return Ply(*ply)
-    named = MATERIALS[material or ""]
-    return named.converted(units or named.system)
+    assert material is not None
+    return material.converted(units or material.system)
 
 
 def laminate_of_options(
     layup: Sequence[float],
     ply_thickness: float | None,
     ply: Sequence[float] | None,
-    material: str | None,
+    material: NamedPly | None,
     units: str | None,
 ) -> tuple[Laminate, dict[str, str]]:
     """Laminate of these options, checked as in a deck, and the names of its units."""

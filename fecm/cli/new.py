@@ -15,13 +15,13 @@ from fecm._files import check_outputs
 from fecm.api import load_deck
 from fecm.cli.common import RefusedError, echo, echo_file, note, write_text
 from fecm.cli.fixtures import complete, duration_of
-from fecm.cli.laminate_options import laminate_options, ply_of_options
+from fecm.cli.laminate_options import PLIES, laminate_options, ply_of_options
 from fecm.cli.outputs import STANDARD_OUTPUT
 from fecm.cli.types import POSITIVE, Finite, ListOf, Parsed, assignment
-from fecm.deck.catalogue import CONTACTS, MATERIALS, SYSTEM, SYSTEMS
+from fecm.deck.catalogue import CONTACTS, MATERIALS, STRENGTHS, SYSTEM, SYSTEMS, NamedPly
 from fecm.deck.format import format_deck
 from fecm.deck.grid import Grid, Section, framed, graded, listed, longest_at, refined, uniform
-from fecm.deck.model import Deck, Indentation, Material, Patch, Projectile, Shear, Units
+from fecm.deck.model import Deck, Indentation, Material, Patch, Projectile, Segment, Shear, Units
 from fecm.deck.records import RodDiameter
 from fecm.mechanics.patch import DISC, HERTZ, RADIUS_PER_THICKNESS
 from fecm.problem.build import build_projectile
@@ -39,6 +39,12 @@ ROD_ELEMENTS = 20
 PATCHES = {"disc": DISC, "hertz": HERTZ}
 NO_PATCH = "none"
 MITC, FULL = "mitc", "full"
+
+# Constants of a named ply, as `fecm materials` lists them.
+LINES = (
+    ("E1", "E2", "nu12", "nu23", "G12", "G13", "G23", "density", "thickness"),
+    (*STRENGTHS, "S13", "S23"), ("GIc", "GIIc"),
+)  # fmt: skip
 
 PROJECTILES = {"mass": "M", "rod": "LENGTH,DIAMETER,E,DENSITY"}
 
@@ -92,6 +98,9 @@ def _edge(text: str) -> tuple[str, str]:
                    "--mesh.")  # fmt: skip
 @click.option("--rows", type=Parsed(listed), metavar="LIST", help="The same along y.")
 @laminate_options(required=True)
+@click.option("--damage", is_flag=True,
+              help="Add strengths and toughness of a named ply: failure exposures (ALLO, FAIL) and "
+                   "the delamination threshold (DELA).")  # fmt: skip
 @click.option("--support", type=click.Choice(SUPPORTS), default="free", show_default=True,
               help="Support of all edges.")  # fmt: skip
 @click.option("--edge", "edges", type=Parsed(_edge), multiple=True, metavar="EDGE=SUPPORT",
@@ -158,16 +167,17 @@ def new(output: Path, overwrite: bool, **options: Any) -> None:
 
 
 @click.command()
-def materials() -> None:
-    """List the named plies of `fecm new`, with their sources."""
-    for material in MATERIALS.values():
-        ply = material.ply
-        click.echo(f"{material.name} ({material.system})")
-        click.echo(
-            f"  E1 {ply.e1:g}, E2 {ply.e2:g}, NU12 {ply.nu12:g}, G12 {ply.g12:g}, G13 {ply.g13:g}, "
-            f"G23 {ply.g23:g}, density {ply.density:g}"
-        )
-        click.echo(f"  {material.source}{'; ' + material.assumed if material.assumed else ''}")
+@click.argument("plies", type=PLIES, metavar="[FILE.toml]", required=False)
+def materials(plies: dict[str, NamedPly] | None) -> None:
+    """List the named plies of `fecm new`, or those of a file, with their sources."""
+    for name, material in (plies or MATERIALS).items():
+        click.echo(f"{name} ({material.system})")
+        values = {"G13": material.ply.g13, "G23": material.ply.g23} | material.values
+        for keys in LINES:
+            if line := ", ".join(f"{key} {values[key]:g}" for key in keys if key in values):
+                click.echo(f"  {line}")
+        texts = "; ".join(filter(None, (material.source, material.assumed)))
+        click.echo(f"  {texts or '(no source)'}")
 
 
 def deck_of_options(
@@ -181,7 +191,8 @@ def deck_of_options(
     layup: Sequence[float],
     ply_thickness: float,
     ply: Sequence[float] | None,
-    material: str | None,
+    material: NamedPly | None,
+    damage: bool,
     units: str | None,
     support: str,
     edges: Sequence[tuple[str, str]],
@@ -203,7 +214,7 @@ def deck_of_options(
     grid = _grid(size, mesh, grading, columns, rows, at, radius, fixture)
     x, y = at or (grid.columns[-1].end / 2.0, grid.rows[-1].end / 2.0)
     constants = ply_of_options(ply, material, units)
-    system = units or (MATERIALS[material].system if material else None)
+    system = units or (material.system if material else None)
     if projectile is None and system not in (None, SYSTEM):
         raise click.UsageError(
             f"give --projectile mass:M or rod:{PROJECTILES['rod']}: without it the projectile is "
@@ -213,6 +224,7 @@ def deck_of_options(
         raise click.UsageError("give either --velocity or --energy")
     if duration is None and fixture is None:
         raise click.UsageError("Missing option '--duration'.")
+    segments, notes = _damage(material, system) if damage else ((), [])
     make = partial(
         new_deck,
         title=title,
@@ -229,6 +241,7 @@ def deck_of_options(
         patch=patch,
         shear=Shear(assumed=True) if shear == MITC else None,
         window=None if fixture is None else fixture.window,
+        damage=segments,
     )
     if velocity is None or duration is None:
         first = make(velocity=velocity or 1.0, duration=duration or dt or 1.0, dt=dt)
@@ -238,7 +251,6 @@ def deck_of_options(
         if duration is None:
             duration = duration_of(first)
     deck = make(velocity=velocity, duration=duration, dt=dt)
-    notes: list[str] = []
     node, node_x, node_y = grid.nearest(x, y)
     distance = math.hypot(node_x - x, node_y - y)
     if distance > 1e-9 * grid.columns[-1].end:
@@ -255,6 +267,23 @@ def deck_of_options(
     if patch is not None or shear == MITC:
         notes.append(_additions(deck))
     return deck, notes
+
+
+def _damage(material: NamedPly | None, system: str | None) -> tuple[tuple[Segment, ...], list[str]]:
+    """Strengths and toughness of a named ply, and a note about what it does not have."""
+    if material is None or system is None:
+        raise click.UsageError("--damage needs --material, a ply with strengths or toughness")
+    parts = {
+        " and ".join(key for key in STRENGTHS if key not in material.values): (
+            material.allowables(system), "no failure exposures (ALLO, FAIL)"
+        ),
+        "GIIc": (material.delamination(system), "no delamination threshold (DELA)"),
+    }  # fmt: skip
+    missing = [f"no {key}, so {what}" for key, (part, what) in parts.items() if part is None]
+    if len(missing) == len(parts):
+        raise click.UsageError(f"--damage: {material.name} has {'; '.join(missing)}")
+    notes = [f"{material.name} has {text}" for text in missing]
+    return tuple(part for part, _ in parts.values() if part is not None), notes
 
 
 def _velocity(energy: float, deck: Deck) -> float:

@@ -6,11 +6,15 @@ all of them (section 3.2.2 and the input listing), and q for each indenter.
 
 from __future__ import annotations
 
+import math
+import tomllib
 from dataclasses import dataclass, replace
+from importlib import resources
+from typing import Any
 
-from fecm.deck.model import Indentation, Units
+from fecm.deck.model import Allowables, Delamination, Indentation, Units
 from fecm.deck.records import Ply
-from fecm.deck.units import DENSITY, MODULUS, in_si
+from fecm.deck.units import DENSITY, MODULUS, TOUGHNESS, in_si
 
 # Systems of units: names of length, force and time.
 SYSTEMS = {
@@ -27,6 +31,17 @@ def convert(value: float, dimension: str, system: str, other: str) -> float:
     return value if system == other else float(f"{value * (before / after):.6g}")
 
 
+# Keys of a ply in a TOML file, and their dimensions.
+ELASTIC = {"density": DENSITY, "nu12": "", "E1": MODULUS, "E2": MODULUS, "G12": MODULUS}
+KEYS = ELASTIC | {
+    "G13": MODULUS, "G23": MODULUS, "nu23": "",
+    "XT": MODULUS, "XC": MODULUS, "YT": MODULUS, "YC": MODULUS, "S12": MODULUS,
+    "S13": MODULUS, "S23": MODULUS,
+    "GIc": TOUGHNESS, "GIIc": TOUGHNESS, "thickness": "length",
+}  # fmt: skip
+TEXTS = ("source", "assumed", "units")
+STRENGTHS = ("XT", "XC", "YT", "YC", "S12")
+SYSTEM_OF_FILES = "mm-N-s"
 NU23 = 0.4
 
 
@@ -37,8 +52,8 @@ class NamedPly:
     Attributes
     ----------
     name : str
-    ply : Ply
-        Constants in the units of `system`.
+    values : dict
+        Constants by :data:`KEYS`, in the units of `system`.
     system : str
         A key of :data:`SYSTEMS`.
     source : str
@@ -48,53 +63,97 @@ class NamedPly:
     """
 
     name: str
-    ply: Ply
+    values: dict[str, float]
     system: str
-    source: str
+    source: str = ""
     assumed: str = ""
 
+    @property
+    def ply(self) -> Ply:
+        """Elastic constants in their own units."""
+        return self.converted(self.system)
+
+    @property
+    def nu23(self) -> float:
+        """Poisson's ratio across the fibres."""
+        return self.values.get("nu23", NU23)
+
+    def value(self, key: str, system: str) -> float | None:
+        """A constant in a system of units; None if it is not known."""
+        value, dimension = self.values.get(key), KEYS[key]
+        if value is None or not dimension:
+            return value
+        return convert(value, dimension, self.system, system)
+
     def converted(self, system: str) -> Ply:
-        """Constants in another system of units; unchanged in their own."""
-        ply = self.ply
-        moduli = (ply.e1, ply.e2, ply.g12, ply.g13, ply.g23)
-        return Ply(
-            convert(ply.density, DENSITY, self.system, system),
-            ply.nu12,
-            *(convert(value, MODULUS, self.system, system) for value in moduli),
-        )
+        """Elastic constants in a system of units; unchanged in their own."""
+        density, nu12, e1, e2, g12 = (self.value(key, system) or 0.0 for key in ELASTIC)
+        g13 = self.value("G13", system) or g12
+        g23 = self.value("G23", system) or float(f"{e2 / (2.0 * (1.0 + self.nu23)):.6g}")
+        return Ply(density, nu12, e1, e2, g12, g13, g23)
+
+    def allowables(self, system: str) -> Allowables | None:
+        """Strengths in a system of units; None if one of :data:`STRENGTHS` is not known."""
+        xt, xc, yt, yc, s12 = (self.value(key, system) for key in STRENGTHS)
+        if xt is None or xc is None or yt is None or yc is None or s12 is None:
+            return None
+        s13 = self.value("S13", system) or s12
+        s23 = self.value("S23", system) or s13
+        return Allowables(xt=xt, xc=xc, yt=yt, yc=yc, s12=s12, s13=s13, s23=s23)
+
+    def delamination(self, system: str) -> Delamination | None:
+        """Toughness G_IIc in a system of units; None if it is not known."""
+        toughness = self.value("GIIc", system)
+        return None if toughness is None else Delamination(toughness=toughness)
 
 
-def _tsai_hahn(
-    name: str, e1: float, e2: float, nu12: float, g12: float, specific_gravity: float
-) -> NamedPly:
-    """A ply of Tsai and Hahn's table: moduli in GPa."""
-    g23 = round(e2 / (2.0 * (1.0 + NU23)), 2)
-    moduli = (1e9 * value for value in (e1, e2, g12, g12, g23))
-    return NamedPly(
-        name,
-        Ply(1000.0 * specific_gravity, nu12, *moduli),
-        "m-N-s",
-        "S. W. Tsai and H. T. Hahn, Introduction to Composite Materials, Technomic 1980",
-        f"G13 = G12; G23 from nu23 = {NU23:g}",
-    )
+def read_plies(text: str) -> dict[str, NamedPly]:
+    """Plies of a TOML file, by name.
+
+    Each table is a ply: numbers by :data:`KEYS`, and the texts `source` and `assumed`.  `units`, of
+    the file or of a ply, is a key of :data:`SYSTEMS`; mm-N-s if it is missing.
+
+    Raises
+    ------
+    ValueError
+        If a name, value or unit cannot be meant, or the file is not TOML.
+    """
+    tables = tomllib.loads(text)
+    units = tables.pop("units", SYSTEM_OF_FILES)
+    for name, table in tables.items():
+        if not isinstance(table, dict):
+            raise ValueError(f'{name} stands in no ply; begin a ply with ["its name"]')
+    if not tables:
+        raise ValueError('no plies; begin each with ["its name"]')
+    return {name: _ply(name, {"units": units, **table}) for name, table in tables.items()}
 
 
-MATERIALS = {
-    material.name: material
-    for material in (
-        NamedPly(
-            "report",
-            Ply(0.000148, 0.3, 17.5e6, 1.15e6, 0.8e6, 0.8e6, 0.8e6),
-            "in-lbf-s",
-            "T. M. Tan and C. T. Sun, NASA CR-168057, 1982, equation 2-25 (graphite/epoxy)",
-        ),
-        _tsai_hahn("T300/5208", 181.0, 10.3, 0.28, 7.17, 1.6),
-        _tsai_hahn("B4/5505", 204.0, 18.5, 0.23, 5.59, 2.0),
-        _tsai_hahn("AS/3501", 138.0, 8.96, 0.30, 7.1, 1.6),
-        _tsai_hahn("Scotchply-1002", 38.6, 8.27, 0.26, 4.14, 1.8),
-        _tsai_hahn("Kevlar49/epoxy", 76.0, 5.5, 0.34, 2.3, 1.46),
-    )
-}
+def _ply(name: str, table: dict[str, Any]) -> NamedPly:
+    """Ply of a table, checked."""
+    for key, value in table.items():
+        if key in TEXTS:
+            if not isinstance(value, str):
+                raise ValueError(f"[{name}] {key}: {value!r} is not a text in quotes")
+        elif key not in KEYS:
+            raise ValueError(
+                f"[{name}] {key} is unknown; the keys are {', '.join((*KEYS, *TEXTS))}"
+            )
+        elif isinstance(value, bool) or not isinstance(value, int | float):
+            raise ValueError(f"[{name}] {key}: {value!r} is not a number")
+        elif not math.isfinite(value) or (KEYS[key] and value <= 0.0):
+            hint = "; compressive strengths are positive too" if key in ("XC", "YC") else ""
+            raise ValueError(f"[{name}] {key}: {value:g} is not a positive number{hint}")
+    system = table["units"]
+    if system not in SYSTEMS:
+        raise ValueError(f"[{name}] units: {system!r} is none of {', '.join(SYSTEMS)}")
+    missing = [key for key in ELASTIC if key not in table]
+    if missing:
+        raise ValueError(f"[{name}] {' and '.join(missing)} missing")
+    values = {key: float(table[key]) for key in KEYS if key in table}
+    return NamedPly(name, values, system, table.get("source", ""), table.get("assumed", ""))
+
+
+MATERIALS = read_plies((resources.files("fecm.deck") / "materials.toml").read_text("utf-8"))
 
 # Constants of the report that are not the indenter's: alpha_p, s_p and reference 14's alpha_cr.
 ALPHA_P, S_P, ALPHA_CR = 6.564e-4, 0.094, 3.16e-3

@@ -20,6 +20,7 @@ KNOWN = {
 }  # fmt: skip
 MASS = "force*time^2/length"
 MODULUS = "force/length^2"
+TOUGHNESS = "force/length"
 DENSITY = "force*time^2/length^4"
 
 

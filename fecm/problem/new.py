@@ -8,12 +8,14 @@ from dataclasses import replace
 
 from fecm.deck.grid import Grid
 from fecm.deck.model import (
+    Allowables,
     Deck,
     Impact,
     Indentation,
     Material,
     Patch,
     Projectile,
+    Segment,
     Shear,
     Units,
 )
@@ -52,6 +54,7 @@ def new_deck(
     patch: Patch | None = None,
     shear: Shear | None = None,
     window: tuple[float, float] | None = None,
+    damage: Sequence[Segment] = (),
 ) -> Deck:
     """Build the deck of an impact.
 
@@ -90,6 +93,8 @@ def new_deck(
         Treatment of transverse shear; None for quadrature.
     window : tuple of float or None
         Sides of a window in the middle, along whose edges w is held; the grid has lines there.
+    damage : sequence of Segment
+        Strengths, whose criteria FAIL evaluates as often as rows are stored, and toughness.
     """
     total = float(f"{len(angles) * ply_thickness:.9g}")
     layers = tuple(
@@ -112,7 +117,7 @@ def new_deck(
     node = grid.nearest(*at)[0]
     segments = (
         units, grid.coordinates(), grid.element_cards(), boundary, projectile,
-        Impact(node, 3, velocity), patch, law, shear, material,
+        Impact(node, 3, velocity), patch, *damage, law, shear, material,
     )  # fmt: skip
     control = Control(grid.nodes, grid.elements, len(layers), 2, 5, 9)
     deck = Deck(title, control, tuple(s for s in segments if s is not None), ())
@@ -120,6 +125,7 @@ def new_deck(
         dt = rounded_time_step(critical_time_step(build_plate(deck, generate(deck))))
     steps = max(1, math.ceil(duration / dt - 1e-9))
     rows = float(every if every is not None else max(1, steps // ROWS))
+    criteria = any(isinstance(segment, Allowables) for segment in damage)
     program = (
         Macro("LMAS"),
         Macro("DT", value=dt),
@@ -127,6 +133,7 @@ def new_deck(
         Macro("TIME"),
         Macro("RODP", value=rows),
         Macro("DISP", value=rows),
+        *([Macro("FAIL", value=rows)] if criteria else []),
         Macro("NEXT"),
     )
     return replace(deck, macros=program)

@@ -1,0 +1,137 @@
+"""Named plies: strengths and toughness of the catalogue, and files of one's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import fecm
+from fecm.api import load_deck
+from fecm.deck import Deck
+from fecm.deck.catalogue import MATERIALS, SYSTEMS
+from fecm.deck.model import Allowables, Delamination
+from tests.calls import Done, assert_unusable, call
+
+PLATE = (
+    "--size", "100x80", "--mesh", "2x2", "--layup", "[0/90]s", "--ply-thickness", ".125",
+    "--velocity", "2000", "--law", "5e4,0,0,1.5", "--projectile", "mass:1e-3",
+    "--duration", "1e-5", "--patch", "none",
+)  # fmt: skip
+OWN = '[mine]\ndensity=1.6e-9\nnu12=0.3\nE1=140e3\nE2=9e3\nG12=5e3\nsource="a test"\n'
+
+
+def new(*options: str | Path) -> Done:
+    return call("new", "-", *PLATE, *options)
+
+
+def deck_of(*options: str | Path) -> Deck:
+    made = new(*options)
+    assert made.exit_code == 0, made.stderr
+    deck = fecm.read_deck(made.stdout)
+    assert isinstance(deck, Deck)
+    return deck
+
+
+# Soden, Hinton and Kaddour 1998, tables 1 and 2; Camanho, Maimi and Davila 2007, tables 2 and 3.
+@pytest.mark.parametrize(
+    ("name", "moduli", "strengths"),
+    [
+        ("AS4/3501-6", (126e3, 11e3, 6.6e3), (1950, 1480, 48, 200, 79)),
+        ("T300/914", (138e3, 11e3, 5.5e3), (1500, 900, 27, 200, 80)),
+        ("E-glass/LY556", (53.48e3, 17.7e3, 5.83e3), (1140, 570, 35, 114, 72)),
+        ("E-glass/MY750", (45.6e3, 16.2e3, 5.83e3), (1280, 800, 40, 145, 73)),
+        ("IM7/8552", (171.42e3, 9.08e3, 5.29e3), (2326.2, 1200.1, 62.3, 199.8, 92.3)),
+    ],
+)
+def test_published_plies_have_the_published_values(
+    name: str, moduli: tuple[float, ...], strengths: tuple[float, ...]
+) -> None:
+    material = MATERIALS[name]
+    assert (material.ply.e1, material.ply.e2, material.ply.g12) == moduli
+    found = material.allowables("mm-N-s")
+    assert found is not None
+    assert (found.xt, found.xc, found.yt, found.yc, found.s12) == strengths
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_every_ply_is_plausible_and_has_a_source(name: str) -> None:
+    material = MATERIALS[name]
+    ply = material.converted("mm-N-s")
+    assert material.source
+    assert 1.2e-9 < ply.density < 2.3e-9
+    assert 1.5e3 < ply.g23 <= ply.e2 <= ply.e1 < 250e3
+    strengths = material.allowables("mm-N-s")
+    if strengths is not None:
+        assert 10 < min(strengths.yt, strengths.s12) < max(strengths.xt, strengths.xc) < 4000
+
+
+@pytest.mark.parametrize("units", SYSTEMS)
+def test_damage_adds_strengths_and_toughness_in_the_decks_units(units: str) -> None:
+    pascal, metre = {"mm-N-s": (1e6, 1e-3), "m-N-s": (1.0, 1.0), "in-lbf-s": (6894.757, 0.0254)}[
+        units
+    ]
+    deck = deck_of("--material", "IM7/8552", "--damage", "--units", units)
+    allowables, delamination = deck.require(Allowables), deck.require(Delamination)
+    assert allowables.xc * pascal == pytest.approx(1200.1e6, rel=1e-5)
+    assert allowables.s23 == allowables.s13 == allowables.s12
+    assert delamination.toughness * pascal * metre == pytest.approx(787.9, rel=1e-5)
+    every = {macro.word: macro.value for macro in deck.macros}
+    assert every["FAIL"] == every["DISP"]
+
+
+def test_what_a_ply_lacks_is_told_or_refused() -> None:
+    made = new("--material", "IM7/8551-7", "--damage")
+    assert "note: IM7/8551-7 has no GIIc, so no delamination threshold (DELA)" in made.stderr
+    deck = fecm.read_deck(made.stdout)
+    assert isinstance(deck, Deck)
+    assert deck.require(Allowables).s23 == 57.0
+    assert not deck.has(Delamination)
+    for refused in (new("--material", "report", "--damage", "--units", "mm-N-s"),
+                    new("--ply", "1.6e-9,.3,140e3,9e3,5e3,5e3,3e3", "--damage")):  # fmt: skip
+        assert_unusable(refused)
+        assert "--damage" in refused.stderr
+
+
+def test_a_file_of_ones_own_is_used_and_listed(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text('units = "m-N-s"\n' + OWN.replace("1.6e-9", "1600").replace("e3", "e9"))
+    made = new("--material", "mine", "--materials", file, "--units", "mm-N-s")
+    (problem,) = load_deck(made.stdout).problems
+    assert problem.laminate.A[0, 0] == pytest.approx(0.5 * (140e3 + 9e3) / 2 / (1 - 0.09 * 9 / 140))
+    listed = call("materials", file)
+    assert "mine (m-N-s)" in listed.stdout
+    assert "a test" in listed.stdout
+    assert_unusable(new("--material", "mine"))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (OWN + "XC=-900", "[mine] XC: -900 is not a positive number; compressive strengths are"),
+        (OWN + "E3=9e3", "[mine] E3 is unknown; the keys are density, nu12, E1, "),
+        (OWN + 'XT="2000"', "[mine] XT: '2000' is not a number"),
+        (OWN + "XT=nan", "[mine] XT: nan is not a positive number"),
+        (OWN + "E1=1\n", "Cannot overwrite a value (at line 8"),
+        (OWN.replace('"a test"', "7"), "[mine] source: 7 is not a text in quotes"),
+        (OWN.replace("E2=9e3\nG12=5e3\n", ""), "[mine] E2 and G12 missing"),
+        ('units="psi"\n' + OWN, "[mine] units: 'psi' is none of in-lbf-s, m-N-s, mm-N-s"),
+        ("E1=1\n" + OWN, 'E1 stands in no ply; begin a ply with ["its name"]'),
+        (OWN + "XT 2000", "(at line 8, column 4)"),
+        ("", "no plies"),
+        ("a=" + "[" * 9000, "recursion"),
+    ],
+)  # fmt: skip
+def test_a_file_that_cannot_be_meant_is_refused_with_the_place(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(text)
+    for done in (call("materials", file), new("--material", "mine", "--materials", file)):
+        assert_unusable(done)
+        assert message in done.stderr
+        assert str(file) in done.stderr
+
+
+def test_the_nearest_names_are_shown_for_an_unknown_one() -> None:
+    assert "did you mean IM7/8552" in new("--material", "IM7-8552").stderr
