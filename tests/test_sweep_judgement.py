@@ -12,8 +12,9 @@ import pytest
 import fecm
 from fecm.deck import Deck
 from fecm.mechanics.plate_motion import DivergenceError
+from fecm.results.metrics import PEAKS, SUMMARY
 from fecm.sweeps.batch import impacts
-from fecm.sweeps.outcome import PEAKS, STILL, SUMMARY
+from fecm.sweeps.outcome import STILL
 from fecm.sweeps.vary import apply_case
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, PROGRAM, small

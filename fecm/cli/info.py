@@ -13,7 +13,7 @@ import click
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION
 from fecm.cli.isolation import reads
 from fecm.results.hdf5_reader import Contents, read
-from fecm.results.info import describe_groups, summary_of_run
+from fecm.results.info import about_run, describe_groups
 from fecm.results.result import result_of
 from fecm.results.schema import FORMAT, SWEEP, declared_units, jsonable, printable, shown
 from fecm.sweeps.result import summary, sweep_of
@@ -36,7 +36,7 @@ def info(result: Path, form: str) -> None:
     """Describe units, summary and every dataset of RESULT, of a run or of a sweep."""
     contents = read(result, FORMAT, SWEEP)
     is_sweep = contents.form == SWEEP
-    extent = _of_sweep(contents) if is_sweep else _of_run(contents)
+    extent = _of_sweep(contents) if is_sweep else about_run(result_of(contents))
     if extent.get("still_in_contact") and PERMANENT in contents.groups["history"]:
         contents.groups["history"][PERMANENT] = math.nan  # unknown before the end of the contact
     attributes, lines = contents.attributes, extent.pop("summary")
@@ -55,20 +55,6 @@ def info(result: Path, form: str) -> None:
         click.echo(json.dumps(jsonable(about)))
     else:
         click.echo("\n".join(_page(about)))
-
-
-def _of_run(contents: Contents) -> dict[str, Any]:
-    """Steps, first and last time, and summary of a run."""
-    result = result_of(contents)
-    steps, span = 0, None
-    if "history/time" in result and (steps := len(times := result["history/time"])):
-        span = float(times[0]), float(times[-1])
-    return {
-        "steps": steps,
-        "time": span,
-        "still_in_contact": result.still_in_contact,
-        "summary": summary_of_run(result),
-    }
 
 
 def _of_sweep(contents: Contents) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -15,6 +16,7 @@ from fecm.api import numbered
 from fecm.cli.common import (
     DECK_PATH,
     FILE_PATH,
+    FORMAT_OPTION,
     MODE_OPTION,
     CheckFailedError,
     RefusedError,
@@ -35,7 +37,9 @@ from fecm.problem.options import ENERGY_LIMIT, RunOptions
 from fecm.problem.problem import Problem
 from fecm.problem.slips import NAMES, active_slips
 from fecm.results import hdf5_writer
+from fecm.results.info import about_run
 from fecm.results.result import Result, load
+from fecm.results.schema import declared_units, jsonable
 from fecm.results.summary import OPEN_END, largest_exposures, summary
 from fecm.simulation.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
 from fecm.simulation.printout import Printer
@@ -97,6 +101,7 @@ from fecm.simulation.spool import Journal, SpoolError
     metavar="OUT.txt",
     help="Also write the printed output of the original program.",
 )
+@FORMAT_OPTION
 def run(
     deck: Path,
     output: Path | None,
@@ -113,6 +118,7 @@ def run(
     every: float | None,
     energy_limit: float,
     fail_limit: float | None,
+    form: str,
 ) -> None:
     """Run every problem in DECK and write its result.
 
@@ -140,13 +146,13 @@ def run(
         raise RefusedError(f"--fail-limit needs the macro FAIL; {deck} has none")
     exceeded: list[str] = []
     for number, (problem, path, print_to) in enumerate(zip(problems, paths, prints, strict=True)):
-        if number:
+        if number and form == "text":
             echo()
         if number < own - 1 and path.exists():
             note(f"{path} is complete")
             continue
         result = _run_one(problem, path, print_to, choices, every, resumes=number == own - 1,
-                          overwrite=overwrite or number < own)  # fmt: skip
+                          overwrite=overwrite or number < own, form=form)  # fmt: skip
         exceeded += [] if fail_limit is None else _exceeded(result, fail_limit)
     if exceeded:
         raise CheckFailedError(f"{'; '.join(exceeded)}: more than the limit of {fail_limit:g}")
@@ -174,8 +180,9 @@ def _run_one(
     *,
     resumes: bool,
     overwrite: bool,
+    form: str,
 ) -> Result:
-    """Run one problem of a deck into a file, print its summary and return its result."""
+    """Run one problem of a deck into a file, print what came out and return its result."""
     _check_room(path, problem.output_bytes)
     check_memory(problem, solver=choices.solver)
     with contextlib.ExitStack() as stack:
@@ -202,6 +209,11 @@ def _run_one(
     result = load(path)
     if result.still_in_contact:
         note(OPEN_END)
+    if form == "json":
+        about = {"title": problem.deck.title, "result": str(path), "printed": printed}
+        units = declared_units(result.attributes)
+        click.echo(json.dumps(jsonable({**about, "units": units, **about_run(result)})))
+        return result
     echo(problem.deck.title or "(no title)")
     for line in summary(result):
         echo(f"  {line}")

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from fecm.plot.kinds import PlotError, warn
 from fecm.plot.style import COLOURS, Scale, peak, scale, superscript
+from fecm.results.metrics import INTEGERS as WHOLE_NUMBERS
+from fecm.results.metrics import METRICS
 from fecm.sweeps.cases import INTEGERS as WHOLE_VALUES
 from fecm.sweeps.cases import TEXTS
-from fecm.sweeps.outcome import INTEGERS as WHOLE_NUMBERS
-from fecm.sweeps.outcome import RUN, STILL, SUMMARY
+from fecm.sweeps.outcome import RUN, STILL
 from fecm.sweeps.result import SweepResult
 
 Array = NDArray[Any]
@@ -203,8 +204,9 @@ def _check_others(axes: list[Axis], others: list[str], other: Axis | None) -> No
 
 def _quantity(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
     """The quantity to show, with a note about cases that lack it."""
-    if quantity not in SUMMARY:
-        raise PlotError(f"unknown quantity {quantity}; a sweep has {_listed(SUMMARY)}")
+    known = [name for name in sweep.summary if name in METRICS]
+    if quantity not in known:
+        raise PlotError(f"unknown quantity {quantity}; the sweep has {_listed(known)}")
     status, values = sweep["status"][rows], sweep[quantity][rows].astype(float)
     run, still = np.isin(status, RUN), status == STILL
     values = np.where(run, values, np.nan)

@@ -90,9 +90,22 @@ def _range(contents: Contents, path: str) -> tuple[float | None, float | None, i
     return (minimum, maximum, not_finite) if minimum <= maximum else (None, None, not_finite)
 
 
-def summary_of_run(result: Result) -> list[str]:
-    """Summary of a run, or the reason why an incomplete file has none."""
-    needed = ("history/time", "history/indentation", "energy/balance_error")
+def about_run(result: Result) -> dict[str, Any]:
+    """Steps, first and last time, metrics and summary of a run."""
+    steps = len(result["history/time"]) if "history/time" in result else 0
+    missing = _missing(result)
+    return {
+        "steps": steps,
+        "time": result["history/time"][[0, -1]].tolist() if steps else None,
+        "still_in_contact": result.still_in_contact,
+        "metrics": {} if missing else result.metrics,
+        "summary": missing or summary(result),
+    }
+
+
+def _missing(result: Result) -> list[str]:
+    """Reason why an incomplete file has no summary; empty if it has one."""
+    needed = ("history/time", "history/indentation", "history/plate_w", "energy/balance_error")
     if "history/force" in result:
         if not len(result["history/force"]) or any(name not in result for name in needed):
             return ["no summary: history or energies are not complete"]
@@ -100,4 +113,4 @@ def summary_of_run(result: Result) -> list[str]:
         initial = result.energy.attributes.get("initial")
         if not all(isinstance(value, int | float) for value in (permanent, initial)):
             return ["no summary: permanent_indentation or the initial energy is missing"]
-    return summary(result)
+    return []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm.deck.model import Impact
 from fecm.deck.units import unit_of
+from fecm.results.metrics import INTEGERS, METRICS, Indentation, summarise
 from fecm.results.schema import (
     DATASETS,
     NotStoredError,
@@ -156,6 +160,38 @@ class Result:
         """Delamination threshold of DELA: force, d_star, time, margin; empty without it."""
         return self._groups.get("threshold", {})
 
+    @property
+    def metrics(self) -> dict[str, float]:
+        """Impact metrics by the names of :data:`fecm.results.metrics.METRICS`.
+
+        Empty without impact steps.  Unknown values are NaN: those after a contact that lasts to the
+        end, those that need a deck that can't be read, the time of a threshold that is not reached.
+        """
+        if f"{HISTORY}/force" not in self or not len(self[f"{HISTORY}/force"]):
+            return {}
+        from fecm.results.plies import model_of
+
+        velocity = np.float64(math.nan)
+        with contextlib.suppress(ResultFileError):
+            if (card := model_of(self).last(Impact)) is not None and card.velocity:
+                velocity = np.float64(card.velocity)
+        force, time, indentation, w = (
+            self[f"{HISTORY}/{name}"] for name in ("force", "time", "indentation", "plate_w")
+        )
+        permanent = _number(self._groups.get(HISTORY, {}).get("permanent_indentation"))
+        initial = _number(self._groups.get("energy", {}).get("initial"))
+        depths = Indentation(
+            indentation.max(keepdims=True, initial=0.0), indentation[-1:], np.array([permanent])
+        )
+        threshold = _number(self.threshold.get("force")) if self.threshold else None
+        with np.errstate(all="ignore"):
+            mass = 2.0 * initial / velocity**2
+            found = summarise(force[:, None], time, depths, mass, velocity, threshold)
+        rising = self.still_in_contact and w.argmax() == len(w) - 1
+        found["max_deflection"] = np.array([math.nan]) if rising else w[[w.argmax()]]
+        values: dict[str, float] = {n: found[n].item() for n in METRICS if n in found}
+        return values if self.still_in_contact else values | {n: int(values[n]) for n in INTEGERS}
+
     def to_dataframe(self) -> pandas.DataFrame:
         """The history as a pandas DataFrame: one row per step, indexed by time.
 
@@ -272,6 +308,11 @@ def result_of(contents: Contents) -> Result:
     if found := shape_error(contents.shapes, kinds):
         raise ResultFileError(f"{contents.path}: {found}")
     return Result(contents, contents.texts, {"": contents.attributes, **contents.groups})
+
+
+def _number(value: Any) -> float:
+    """A number of a file's attribute; NaN for anything else."""
+    return float(value) if isinstance(value, int | float) else math.nan
 
 
 def still_in_contact(force: Array) -> bool:

@@ -167,6 +167,18 @@ def _impact(result: Result) -> list[str]:
             f"largest indent    {quantity(indentation[deepest], 'length')} at time "
             f"{quantity(time[deepest], 'time')}, permanent {left}"
         )
+        w = result["history/plate_w"]
+        lines.append(
+            f"largest w         {quantity(w.max(), 'length')} under the load at time "
+            f"{quantity(time[np.argmax(w)], 'time')}"
+        )
+        metrics = result.metrics
+        if not (result.still_in_contact or math.isnan(metrics["rebound_velocity"])):
+            lines.append(
+                f"rebound           {quantity(metrics['rebound_velocity'], 'length/time')}, "
+                f"impulse {quantity(metrics['impulse'], 'force*time')}, "
+                f"{quantity(metrics['energy_absorbed'], 'force*length')} absorbed"
+            )
     initial = float(result.energy.attributes["initial"])
     worst = float(np.abs(result["energy/balance_error"]).max())
     share = f"{worst / initial:.2g} of the initial" if initial else f"{worst:.3g}, initially"

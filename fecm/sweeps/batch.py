@@ -31,12 +31,13 @@ from fecm.problem.check_impact import check_impact, check_law, check_projectile
 from fecm.problem.check_program import check_program
 from fecm.problem.generate import generate
 from fecm.problem.problem import Problem, check
+from fecm.results.metrics import Indentation, summarise
 from fecm.results.sinks import MemorySink
 from fecm.simulation.guard import ENERGY_WARNING
 from fecm.simulation.run import simulate
 from fecm.sweeps.cases import CasesError
 from fecm.sweeps.clock import Clock, with_time_step
-from fecm.sweeps.outcome import Indentation, Outcome, merge, status_of, summarise
+from fecm.sweeps.outcome import Outcome, merge, status_of
 from fecm.sweeps.plan import ADVANCED, Plan, Task, shares_plate, without_output
 from fecm.sweeps.responses import BLOCK, Convolution, TipState, TipSteps, plate_response
 from fecm.sweeps.vary import apply_case
@@ -141,6 +142,11 @@ def _time_step(checked: Problem) -> float:
     return dt or taken_time_step(checked.critical_time_step)
 
 
+def _threshold(checked: Problem) -> float | None:
+    """Delamination threshold of a plate, force; None without a DELA segment."""
+    return None if checked.threshold is None else checked.threshold.force
+
+
 def _together(numbers: list[int], decks: list[Deck], checked: Problem) -> Outcome:
     """Run cases that share a plate by its response to a unit force."""
     setup = build_model(checked)
@@ -164,7 +170,7 @@ def _together(numbers: list[int], decks: list[Deck], checked: Problem) -> Outcom
         found = impacts(response, tips, law, speed, node_mass)
         times = np.add.accumulate(np.full(steps, dt))
         mass = np.array([projectiles[case].total_mass for case in order])
-        summary = summarise(found.force, times, found.indentation, mass, speed)
+        summary = summarise(found.force, times, found.indentation, mass, speed, _threshold(checked))
         error = balance_errors(found, tips, list(kinds), kind, speed)
     back = np.argsort(order)
     force = np.ascontiguousarray(found.force.T[back])
@@ -323,7 +329,7 @@ def _alone(number: int, checked: Problem) -> Outcome:
     values = sink.groups["history"]
     permanent = values.get("permanent_indentation", 0.0)
     found = Indentation(largest, indentation[-1:], np.array([permanent]))
-    summary = summarise(force[:, None], times, found, mass, np.array([speed]))
+    summary = summarise(force[:, None], times, found, mass, np.array([speed]), _threshold(checked))
     columns = {
         **summary,
         "status": status_of(force[:, None]),

@@ -4,42 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
+from fecm.results.metrics import SUMMARY
 
-# Description and dimension of every quantity, by name.
-SUMMARY = {
-    "peak_force": ("largest contact force", "force"),
-    "time_of_peak": ("time of the largest contact force", "time"),
-    "contacts": ("number of contacts", ""),
-    "contact_time": ("time in contact", "time"),
-    "last_contact": ("time of the last step in contact", "time"),
-    "max_indentation": ("largest indentation", "length"),
-    "permanent_indentation": ("permanent indentation", "length"),
-    "impulse": ("time integral of the contact force", "force*time"),
-    "rebound_velocity": (
-        "velocity of the projectile's centre at the end, positive away from the plate",
-        "length/time",
-    ),
-    "energy_absorbed": (
-        "kinetic energy that the projectile's centre has lost at the end", "force*length"
-    ),
-}  # fmt: skip
-INTEGERS = ("contacts",)
 FINE = "ok"
 # The run ends during contact.
 STILL = "still in contact"
 RUN = (FINE, STILL)
-# Peaks: valid even if the run ends in contact, unless they occur at the end.
-PEAKS = ("peak_force", "time_of_peak", "max_indentation")
-
-
-# Columns of an outcome.
-COLUMNS = (*SUMMARY, "status", "dt", "steps", "unsettled")
 
 
 @dataclass
@@ -51,10 +27,10 @@ class Outcome:
     numbers : list of int
         Numbers of the cases, from 0.
     columns : dict of ndarray (cases,)
-        Values by the names of :data:`COLUMNS`.  Those of :data:`SUMMARY` are NaN if the case
-        failed, or if they are unknown because the run ended in contact.  ``status`` is ``"ok"``,
-        ``"still in contact"``, or the reason for the failure; ``unsettled`` counts the steps whose
-        contact iteration did not converge.
+        Values by name: those of :data:`~fecm.results.metrics.METRICS` are NaN if the case failed,
+        or if they are unknown because the run ended in contact.  ``status`` is ``"ok"``, ``"still
+        in contact"``, or the reason for the failure; ``dt``, ``steps``; ``unsettled`` counts the
+        steps whose contact iteration did not converge.
     force : ndarray (cases, steps) or None
         Contact force after every step.
     """
@@ -96,69 +72,14 @@ def merge(parts: Sequence[Outcome]) -> Outcome:
         if part.force is not None:
             force[row : row + len(part.numbers), : part.force.shape[1]] = part.force
         row += len(part.numbers)
-    columns = {n: np.concatenate([part.columns[n] for part in parts])[order] for n in COLUMNS}
+    names = dict.fromkeys(name for part in parts for name in part.columns)
+    columns = {
+        name: np.concatenate(
+            [part.columns.get(name, np.full(len(part.numbers), np.nan)) for part in parts]
+        )[order]
+        for name in names
+    }
     return Outcome([numbers[i] for i in order], columns, force[order])
-
-
-class Indentation(NamedTuple):
-    """Largest, last and permanent indentation of cases (length)."""
-
-    largest: Floats
-    last: Floats
-    permanent: Floats
-
-
-def summarise(
-    force: Floats, times: Floats, indentation: Indentation, mass: Any, velocity: Any
-) -> dict[str, Floats]:
-    """Summarise many cases from their contact forces.
-
-    If the last step is in contact, quantities that depend on the rest of the contact are NaN:
-    everything except the peaks, and a peak at the last step.
-
-    Parameters
-    ----------
-    force : ndarray (steps, cases)
-        Contact force after every step.
-    times : ndarray (steps,)
-        Times of the steps.
-    indentation : Indentation
-    mass, velocity : float or ndarray (cases,)
-        Mass and impact velocity of the projectile.
-
-    Returns
-    -------
-    dict of ndarray (cases,)
-        By the names of :data:`SUMMARY`.
-    """
-    dt = np.diff(times, prepend=0.0)
-    touching = force > 0.0
-    before = np.vstack([np.zeros_like(touching[:1]), touching[:-1]])
-    last = len(times) - 1 - np.argmax(touching[::-1], axis=0)
-    peak = np.argmax(force, axis=0)
-    met = touching.any(axis=0)
-    # The force is linear between steps, and 0 before the first.
-    weights = 0.5 * (dt + np.append(dt[1:], 0.0))
-    impulse = weights @ force
-    rebound = impulse / mass - velocity
-    found = {
-        "peak_force": force.max(axis=0),
-        "time_of_peak": np.where(met, times[peak], np.nan),
-        "contacts": (touching & ~before).sum(axis=0).astype(float),
-        "contact_time": dt @ touching,
-        "last_contact": np.where(met, times[last], np.nan),
-        "max_indentation": indentation.largest,
-        "permanent_indentation": indentation.permanent,
-        "impulse": impulse,
-        "rebound_velocity": rebound,
-        "energy_absorbed": 0.5 * mass * (velocity**2 - rebound**2),
-    }
-    still = touching[-1]
-    rising = {name: still & (peak == len(times) - 1) for name in PEAKS}
-    rising["max_indentation"] = still & (indentation.last >= indentation.largest)
-    return {
-        name: np.where(rising.get(name, still), np.nan, values) for name, values in found.items()
-    }
 
 
 def status_of(force: Floats) -> NDArray[np.str_]:

@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._version import __version__
+from fecm.deck.model import Delamination
 from fecm.deck.units import unit_names, unit_of
+from fecm.results.metrics import METRICS, SUMMARY, THRESHOLD
 from fecm.results.schema import FORMAT_VERSION, SWEEP, Dataset, ResultFileError, declared_units
-from fecm.sweeps.outcome import RUN, STILL, SUMMARY, Outcome
+from fecm.sweeps.outcome import RUN, STILL, Outcome
 from fecm.sweeps.plan import Plan
 
 if TYPE_CHECKING:
@@ -133,7 +135,7 @@ class SweepResult:
 
     def unit(self, name: str) -> str:
         """Return the unit of a value or result; empty if the deck states none."""
-        dimension = SUMMARY[name][1] if name in SUMMARY else DIMENSIONS.get(name, "")
+        dimension = METRICS[name][1] if name in METRICS else DIMENSIONS.get(name, "")
         return unit_of(dimension, self.units)
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -187,8 +189,10 @@ def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
     names = list(plan.cases[0])
     cases = {name: np.array([case[name] for case in plan.cases]) for name in names}
     columns, deck = outcome.columns, plan.deck
+    found = (*SUMMARY, *(THRESHOLD if deck.last(Delamination) else ()), "status")
+    none = np.full(len(plan.cases), np.nan)
     return SweepResult(
-        cases, {name: columns[name] for name in (*SUMMARY, "status")},
+        cases, {name: columns.get(name, none) for name in found},
         columns["dt"], columns["steps"], outcome.force, columns["unsettled"],
         deck.text or deck.to_text(), deck.title, unit_names(deck),
     )  # fmt: skip
@@ -215,7 +219,8 @@ def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
     columns = [
         *((f"cases/{name}", values, f"{name} of every case", DIMENSIONS.get(name, ""))
           for name, values in result.cases.items()),
-        *((f"summary/{name}", result.summary[name], *about) for name, about in SUMMARY.items()),
+        *((f"summary/{name}", values, *METRICS[name])
+          for name, values in result.summary.items() if name in METRICS),
         ("summary/status", result.summary["status"],
          "ok, still in contact, or why the case failed", ""),
         ("history/dt", result.dt, "time step of every case", "time"),
@@ -288,7 +293,7 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     unconverged_steps = contents.get("history/unsettled_steps")
     rows += () if unconverged_steps is None else (unconverged_steps,)
     shape = contents.shapes.get("history/force")
-    kinds = {name: summary[name].dtype.kind for name in SUMMARY}
+    kinds = {name: summary[name].dtype.kind for name in METRICS if name in summary}
     if (
         any(values.shape != count for values in rows)
         or (shape is not None and (len(shape), shape[:1]) != (2, count))

@@ -16,7 +16,7 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm._files import beside, packed
-from fecm.sweeps.outcome import COLUMNS, Outcome
+from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.plan import Task
 
 MARK = "sweep.json"
@@ -89,8 +89,9 @@ class PartialResults:
         with np.load(io.BytesIO(packed_arrays), allow_pickle=False) as arrays:
             if arrays["numbers"].tolist() != list(task.numbers):
                 raise DamagedPartError(f"{path} holds other cases")
-            columns = {name: arrays[name] for name in COLUMNS}
-            return Outcome(arrays["numbers"].tolist(), columns, arrays.get("force", None))
+            columns = dict(arrays)
+            force = columns.pop("force", None)
+            return Outcome(columns.pop("numbers").tolist(), columns, force)
 
     def put(self, task: Task, outcome: Outcome) -> None:
         """Store the outcome of a task."""

@@ -1,0 +1,121 @@
+"""Impact metrics from contact forces: numbers of one run, or of many cases."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fecm._typing import Floats
+
+# Description and dimension of every quantity, by name.
+SUMMARY = {
+    "peak_force": ("largest contact force", "force"),
+    "time_of_peak": ("time of the largest contact force", "time"),
+    "contacts": ("number of contacts", ""),
+    "contact_time": ("time in contact", "time"),
+    "last_contact": ("time of the last step in contact", "time"),
+    "max_indentation": ("largest indentation", "length"),
+    "permanent_indentation": ("permanent indentation", "length"),
+    "impulse": ("time integral of the contact force", "force*time"),
+    "rebound_velocity": (
+        "velocity of the projectile's centre at the end, positive away from the plate",
+        "length/time",
+    ),
+    "energy_absorbed": (
+        "kinetic energy that the projectile's centre has lost at the end", "force*length"
+    ),
+}  # fmt: skip
+# Those of decks with a delamination threshold.
+THRESHOLD = {
+    "threshold_force": ("delamination threshold", "force"),
+    "threshold_margin": ("1 less the largest contact force over the threshold", ""),
+    "threshold_time": ("time at which the contact force first reaches the threshold", "time"),
+    "time_above": ("time at or above the threshold", "time"),
+}
+# All of a run.
+METRICS = {
+    **SUMMARY,
+    "max_deflection": ("largest displacement of the plate under the load", "length"),
+    **THRESHOLD,
+}
+INTEGERS = ("contacts",)
+# Peaks: valid even if the run ends in contact, unless they occur at the end.
+PEAKS = ("peak_force", "time_of_peak", "max_indentation")
+
+
+class Indentation(NamedTuple):
+    """Largest, last and permanent indentation of cases (length)."""
+
+    largest: Floats
+    last: Floats
+    permanent: Floats
+
+
+def summarise(
+    force: Floats,
+    times: Floats,
+    indentation: Indentation,
+    mass: Any,
+    velocity: Any,
+    threshold: float | None = None,
+) -> dict[str, Floats]:
+    """Summarise many cases from their contact forces.
+
+    If the last step is in contact, quantities that depend on the rest of the contact are NaN:
+    everything except the peaks, and a peak at the last step.
+
+    Parameters
+    ----------
+    force : ndarray (steps, cases)
+        Contact force after every step.
+    times : ndarray (steps,)
+        Times of the steps.
+    indentation : Indentation
+    mass, velocity : float or ndarray (cases,)
+        Mass and impact velocity of the projectile.
+    threshold : float, optional
+        Delamination threshold, force.
+
+    Returns
+    -------
+    dict of ndarray (cases,)
+        By the names of :data:`SUMMARY`; with a threshold also those of :data:`THRESHOLD`.
+    """
+    dt = np.diff(times, prepend=0.0)
+    touching = force > 0.0
+    before = np.vstack([np.zeros_like(touching[:1]), touching[:-1]])
+    last = len(times) - 1 - np.argmax(touching[::-1], axis=0)
+    peak = np.argmax(force, axis=0)
+    met = touching.any(axis=0)
+    # The force is linear between steps, and 0 before the first.
+    weights = 0.5 * (dt + np.append(dt[1:], 0.0))
+    impulse = weights @ force
+    rebound = impulse / mass - velocity
+    found = {
+        "peak_force": force.max(axis=0),
+        "time_of_peak": np.where(met, times[peak], np.nan),
+        "contacts": (touching & ~before).sum(axis=0).astype(float),
+        "contact_time": dt @ touching,
+        "last_contact": np.where(met, times[last], np.nan),
+        "max_indentation": indentation.largest,
+        "permanent_indentation": indentation.permanent,
+        "impulse": impulse,
+        "rebound_velocity": rebound,
+        "energy_absorbed": 0.5 * mass * (velocity**2 - rebound**2),
+    }
+    still = touching[-1]
+    unknown = {name: still & (peak == len(times) - 1) for name in PEAKS}
+    if threshold is not None:
+        above = force >= threshold
+        first = times[np.argmax(above, axis=0)]
+        found["threshold_force"] = np.full(force.shape[1], threshold)
+        found["threshold_margin"] = 1.0 - found["peak_force"] / threshold
+        found["threshold_time"] = np.where(above.any(axis=0), first, np.nan)
+        found["time_above"] = dt @ above
+        unknown["threshold_margin"] = unknown["peak_force"]
+        unknown |= dict.fromkeys(("threshold_force", "threshold_time"), np.zeros_like(still))
+    unknown["max_indentation"] = still & (indentation.last >= indentation.largest)
+    return {
+        name: np.where(unknown.get(name, still), np.nan, values) for name, values in found.items()
+    }
