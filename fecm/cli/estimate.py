@@ -30,6 +30,7 @@ def estimate(deck: Path, form: str) -> None:
 
     The infinite plate is for small masses, the static plate for large ones.  With a DELA segment,
     velocity and energy are those at which the peak force reaches the delamination threshold.
+    The models without a mesh neglect DAMP.
     """
     problems = load_valid(deck).problems
     if len(problems) != 1:
@@ -80,6 +81,8 @@ def _print(problem: Problem, values: dict[str, Any]) -> None:
     held = text(stiffness, "force/length")
     free = "- (the plate is free: no static model)"
     echo(f"  stiffness   {free if math.isnan(stiffness) else held}")
+    if problem.damping:
+        echo("  damping     in the run only: the models without a mesh neglect DAMP")
     dimensions = ("force", "time", "force", "length/time", "force*length")
     table = [list(COLUMNS)]
     for row in values["models"]:

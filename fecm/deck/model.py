@@ -422,6 +422,22 @@ class Delamination(Segment):
 
 
 @dataclass(frozen=True)
+class Damping(Segment):
+    """DAMP: (F10.0); mass-proportional damping of the plate (not in the report's program).
+
+    Attributes
+    ----------
+    coefficient : float
+        a of the damping matrix C = a M, 1/time.
+    """
+
+    coefficient: float
+    keyword: ClassVar[str] = "DAMP"
+
+    fields: ClassVar[Fields] = layout("F10 a")
+
+
+@dataclass(frozen=True)
 class Gages(NumberedSegment):
     """GAGE: strain gages, read at every step (not in the report's program)."""
 

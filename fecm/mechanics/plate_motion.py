@@ -3,6 +3,16 @@
 Central differences in increments: d = u - u_last is dt times the velocity in the middle of the last
 step, and d + dt^2 M^-1 (P - K u) is the next increment.  Vectors are over equations and are
 processed in pieces that fit the cache.
+
+With damping C = a M the velocity is the mean of both middles, so that the mass stays diagonal and
+the order 2:
+
+    (1 + b) d_next = (1 - b) d + dt^2 M^-1 (P - K u),  b = a dt/2
+
+The critical time step does not change.  A mode of frequency w has
+(1 + b) z^2 - (2 - w^2 dt^2) z + (1 - b) = 0.  With b > 0 both roots are inside the unit circle if
+|2 - w^2 dt^2| < (1 + b) + (1 - b) = 2 (Jury), that is for w dt < 2, as without damping.  A rigid
+body slows down by (1 - b)/(1 + b) a step: the rate a is off by the factor 1 + (a dt)^2/12.
 """
 
 from __future__ import annotations
@@ -232,6 +242,8 @@ class PlateMotion:
         The independent dofs; all of them by default, and with the sparse matrix.
     workers : Workers, optional
         Threads that share the work of a step.
+    damping : float
+        a of the damping matrix C = a M, 1/time.
     """
 
     def __init__(
@@ -240,7 +252,9 @@ class PlateMotion:
         solver: str = AUTO,
         reduced: SymmetryReduction | None = None,
         workers: Workers | None = None,
+        damping: float = 0.0,
     ) -> None:
+        self.damping = damping
         kept = unreduced(plate) if reduced is None or solver == CSR else reduced
         self.plate = plate
         self._reduction = kept
@@ -367,7 +381,7 @@ class PlateMotion:
         *,
         velocity_dt: float | None = None,
     ) -> None:
-        """Take one step: v += velocity_dt M^-1 (P - K u), u += dt v.
+        """Take one step: v += velocity_dt (M^-1 (P - K u) - a v), u += dt v.
 
         Parameters
         ----------
@@ -381,7 +395,8 @@ class PlateMotion:
         velocity_dt : float, optional
             Time between the middles of the last step and of this one; `dt` by default.
         """
-        dt2 = dt * (dt if velocity_dt is None else velocity_dt)
+        dt_v = dt if velocity_dt is None else velocity_dt
+        dt2, b = dt * dt_v, 0.5 * self.damping * dt_v
         if state.dt2 != dt2 or self._scaled_for != dt2:
             state.dt2 = dt2
             self._update_forces(state)
@@ -391,9 +406,13 @@ class PlateMotion:
         if applied is not None:
             applied.load.subtract(applied.force, dt2, state.scaled_internal_force)
         for (u, d, internal), (scale, _, _, loads) in zip(state.views, self._views, strict=True):
+            if b:
+                d *= 1.0 - b
             d -= internal
             if loads is not None:
                 d += factor * scale * loads
+            if b:
+                d /= 1.0 + b
             u += d
         self._update_forces(state)
         state.external_work += factor * state.sums.load
@@ -406,7 +425,8 @@ class PlateMotion:
         """Kinetic energy at the time of the displacement (force*length).
 
         The stored velocity is half a step old: the energy is that of v + dt/2 a, with
-        a = M^-1 (P - K u).  Its square is expanded into the inner products of :class:`Sums`.
+        a = M^-1 (P - K u).  Its square is expanded into the inner products of :class:`Sums`.  With
+        damping the mean of the velocities before and after is that, divided by 1 + b.
 
         Parameters
         ----------
@@ -431,7 +451,8 @@ class PlateMotion:
             force += F * (F * inverse - 2.0 * p)
             if self._loads is not None:
                 force += 2.0 * factor * F * load.nodal_load * inverse
-        return 0.5 * (inertia / dt2 + work + 0.25 * force)
+        damped = 1.0 + 0.5 * self.damping * state.dt
+        return 0.5 * (inertia / dt2 + work + 0.25 * force) / damped**2
 
     def central_difference(self, state: PlateState, dt: float, factor: float) -> None:
         """Take one step of the central differences, from rest or from the last step.

@@ -49,6 +49,7 @@ ENERGIES = {
     "projectile_strain": "projectile, strain",
     "contact_work": "indentation",
 }
+DAMPING = {"damping_work": "damping"}
 
 
 def _time_axis(graph: Graph, times: Iterable[Array]) -> None:
@@ -152,7 +153,9 @@ def loop(results: Results, *, width: str = "column") -> Picture:
 def energy(results: Results, *, width: str = "column") -> Picture:
     """Energies of plate, projectile and indentation, and their sum; one line style per result."""
     limit_count(len(results), "results", len(STYLES))
-    paths = ("energy/time", *(f"energy/{column}" for column in ENERGIES))
+    damped = all("energy/damping_work" in result for result in results.values())
+    energies = ENERGIES | (DAMPING if damped else {})
+    paths = ("energy/time", *(f"energy/{column}" for column in energies))
     data = {name: require(result, name, *paths) for name, result in results.items()}
     times = [columns[0] for columns in data.values()]
     clock = scale_of(results, "time", times)
@@ -167,8 +170,8 @@ def energy(results: Results, *, width: str = "column") -> Picture:
     graph.label(y="Energy")
     _mark_open_ends(axes, results, width)
     _time_axis(graph, times)
-    handles = [Line2D([], [], color=c) for c in (*COLOURS[: len(ENERGIES)], "0.5")]
-    labels = [*ENERGIES.values(), "sum"]
+    handles = [Line2D([], [], color=c) for c in (*COLOURS[: len(energies)], "0.5")]
+    labels = [*energies.values(), "sum"]
     if len(data) > 1:
         handles += [Line2D([], [], color="0.3", ls=style) for style in STYLES[: len(data)]]
         labels += list(data)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fecm._typing import Bools, Floats
 from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, moves_only
-from fecm.deck.model import Allowables, Deck, Delamination, Indentation, Material, Shear
+from fecm.deck.model import Allowables, Damping, Deck, Delamination, Indentation, Material, Shear
 from fecm.deck.model import Gages as GageCards
 from fecm.deck.model import Impact as ImpactCard
 from fecm.deck.model import Projectile as ProjectileCard
@@ -182,6 +182,12 @@ class Problem:
         rigidity = effective_rigidity(self.laminate)
         return Threshold(threshold_force(rigidity, card.toughness, int(card.number)), rigidity)
 
+    @property
+    def damping(self) -> float:
+        """Mass-proportional damping a of the plate, 1/time; 0 without a DAMP segment."""
+        card = self.deck.last(Damping)
+        return 0.0 if card is None else card.coefficient
+
     @cached_property
     def work(self) -> WorkEstimate:
         """Number of macros, steps and stored rows."""
@@ -216,7 +222,7 @@ class Problem:
             + work.passes["PLYS"] * self._ply_values
             + min(1, work.passes["FAIL"]) * 9 * self._failure_states
             + work.contact_rows * (points * 5 + 8)
-            + work.steps * (18 + gages)
+            + work.steps * (18 + gages + bool(self.damping))
         )
 
 
@@ -412,7 +418,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     reduced = symmetry_reduction(mobile, contact) if only_moves and chosen.solver != CSR else None
     count = mobile.neq if reduced is None else reduced.count
     workers = Workers(chosen.threads or (available() if count >= WORTH_SHARING else 1))
-    motion = PlateMotion(mobile, chosen.solver, reduced, workers)
+    motion = PlateMotion(mobile, chosen.solver, reduced, workers, problem.damping)
     impact = None
     if contact is not None:
         card = deck.require(ImpactCard)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fecm.deck.findings import Findings
-from fecm.deck.model import Allowables, Delamination, Material
+from fecm.deck.model import Allowables, Damping, Delamination, Material
 from fecm.deck.records import Integration, Ply
 from fecm.mechanics.elements.quadrature import HIGHEST_ORDER
 
@@ -51,6 +51,15 @@ def check_delamination(card: Delamination, findings: Findings) -> None:
             f"The number of delaminations is {card.number:g}; it must be a whole number from 1.",
             card.place("number of delaminations"),
         )
+
+
+def check_damping(card: Damping, findings: Findings) -> None:
+    """Check a DAMP segment."""
+    if not card.coefficient >= 0.0:
+        findings.add(
+            "E459", f"The damping a is {card.coefficient:g}; it must not be negative.",
+            card.place("a"), "the amplitude of a free plate decays as exp(-a t/2)",
+        )  # fmt: skip
 
 
 def _check_orders(card: Integration, findings: Findings) -> None:

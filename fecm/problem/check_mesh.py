@@ -14,6 +14,7 @@ from fecm.deck.model import (
     Allowables,
     Boundary,
     Coordinates,
+    Damping,
     Deck,
     Delamination,
     Elements,
@@ -422,12 +423,9 @@ def check_listing(deck: Deck, mesh: Mesh, findings: Findings) -> None:
         )
     later = {macro.word: macro for macro in deck.macros if macro.word in ("PLYS", "FAIL")}
     words = [(word, macro.place("macro")) for word, macro in later.items()]
-    if (allowables := deck.last(Allowables)) is not None:
-        words.append(("ALLO", allowables.place()))
-    if (delamination := deck.last(Delamination)) is not None:
-        words.append(("DELA", delamination.place()))
-    if (patch := deck.last(Patch)) is not None:
-        words.append(("PATC", patch.place()))
+    for kind in (Allowables, Delamination, Damping, Patch):
+        if (segment := deck.last(kind)) is not None:
+            words.append((kind.keyword, segment.place()))
     if (shear := deck.last(Shear)) is not None:
         given = (shear.assumed, shear.equilibrium)
         used = [word for word, is_given in zip(Shear.WORDS, given, strict=True) if is_given]

@@ -11,7 +11,7 @@ import numpy as np
 
 from fecm.deck.findings import Findings
 from fecm.deck.macros import MOST_MACROS, STEPS, every, flat
-from fecm.deck.model import Material
+from fecm.deck.model import Damping, Material
 from fecm.deck.records import Macro
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.ply_stresses import is_complete
@@ -117,6 +117,7 @@ def check_time_step(problem: Problem, findings: Findings) -> None:
     try:
         safe = problem.safe_time_step
         _check_least_step(steps, safe, findings)
+        _check_damping(problem, max(m.value or safe for m in steps), findings)
         if min(m.value for m in steps) > 0.0 and max(m.value for m in steps) < safe:
             return
         critical = problem.critical_time_step
@@ -137,6 +138,19 @@ def check_time_step(problem: Problem, findings: Findings) -> None:
                 macro.place("value"),
                 f"take {0.95 * critical:.2g} or less; --force runs the deck nevertheless",
             )
+
+
+def _check_damping(problem: Problem, dt: float, findings: Findings) -> None:
+    """Report a damping whose rate the time step does not resolve, by (a dt)^2/12."""
+    card = problem.deck.last(Damping)
+    if card is not None and (error := (card.coefficient * dt) ** 2 / 12.0) > 0.01:
+        findings.add(
+            "W460",
+            f"The damping a = {card.coefficient:g} is resolved badly by DT = {dt:.4g}: its rate is "
+            f"off by (a DT)^2/12 = {error:.2g}.",
+            card.place("a"),
+            "check the unit of time, or take a smaller DT",
+        )
 
 
 def _check_least_step(steps: Sequence[Macro], safe: float, findings: Findings) -> None:

@@ -14,6 +14,7 @@ from fecm.deck.model import (
     Allowables,
     Boundary,
     Coordinates,
+    Damping,
     Deck,
     Delamination,
     Elements,
@@ -41,6 +42,7 @@ from fecm.problem.check_impact import (
 )
 from fecm.problem.check_material import (
     check_allowables,
+    check_damping,
     check_delamination,
     check_material,
 )
@@ -67,7 +69,7 @@ IN_AN_IMPACT: tuple[type[Segment], ...] = (Impact, Indentation)
 # Segments of which only the last is effective.
 SINGLE: tuple[type[Segment], ...] = (
     Coordinates, Elements, Material, Impact, Indentation, Projectile, Shear, Patch, Gages, Units,
-    Allowables, Delamination,
+    Allowables, Delamination, Damping,
 )  # fmt: skip
 
 
@@ -112,6 +114,8 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
         check_allowables(allowables, findings)
     if (delamination := deck.last(Delamination)) is not None:
         check_delamination(delamination, findings)
+    if (damping := deck.last(Damping)) is not None:
+        check_damping(damping, findings)
     if (projectile := deck.last(Projectile)) is not None:
         check_projectile(projectile, findings)
     if (correction := deck.last(Shear)) is not None:

@@ -236,6 +236,7 @@ DATASETS = {
                 "all energies and the contact work, less the initial energy and external work",
                 "force*length",
             ),
+            ("damping_work", "energy dissipated by DAMP, only with that card", "force*length"),
         ),
         *_clock("gages"),
         Dataset("gages/number", ("gages",), "number of every gage", dtype="i4"),

@@ -20,6 +20,7 @@ from fecm.simulation.state import subset
 from fecm.simulation.step_recorder import OnBlock, StepRecorder
 
 FAILURE = ("failure", INTERLAMINAR, *(f"failure/{name}" for name in CRITERIA))
+DAMPING_WORK = "energy/damping_work"
 BUFFERED = ("tape3", "tape8", "stresses", "plies", "reactions", "modes")
 
 
@@ -55,6 +56,7 @@ class Recorder:
             (dataset, self._shape(dataset))
             for dataset in DATASETS.values()
             if self._room.get(dataset.group) != 0
+            if dataset.path != DAMPING_WORK or model.motion.damping
         ]
         self._buffers: dict[str, RowBuffer] = {}
         for group in BUFFERED:
@@ -200,7 +202,7 @@ class Recorder:
         for group, buffer in self._buffers.items():
             buffer.flush()
             stored[group] = buffer.stored
-        for dataset in DATASETS.values():
+        for dataset, _ in self._datasets:
             room, rows = self._room.get(dataset.group, 0), stored.get(dataset.group, 0)
             if room > rows and dataset.shape[0] == "rows":
                 self._sink.trim(dataset.path, rows)

@@ -67,6 +67,8 @@ class StepRecorder:
             self._gages = model.motion.dof_sums(model.gages.dof_indices, model.gages.weights)
             self._strains = np.empty((BLOCK, len(model.gages.numbers)))
         self.initial = 0.0
+        # Last time, power and work of the damping.
+        self._damped = (0.0, 0.0, 0.0)
 
     def begin(self, plate: PlateState, impact: ImpactState | None) -> None:
         """Store the energy before the first step (force*length)."""
@@ -126,6 +128,7 @@ class StepRecorder:
             "stored": self._stored,
             "tape9": self._tape9_rows,
             "initial": self.initial,
+            "damped": self._damped,
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -135,7 +138,7 @@ class StepRecorder:
         self._rod[: len(self._rows)] = state["rod"]
         self._strains[: len(self._rows)] = state["strains"]
         self._stored, self._tape9_rows = state["stored"], state["tape9"]
-        self.initial = state["initial"]
+        self.initial, self._damped = state["initial"], tuple(state["damped"])
 
     def flush(self) -> None:
         """Store the gathered rows and pass them to `on_block`."""
@@ -149,11 +152,13 @@ class StepRecorder:
             + table["projectile_kinetic"] + table["projectile_strain"] + table["contact_work"]
         )  # fmt: skip
         table["balance_error"] = table["held_energy"] - self.initial - table["external_work"]
+        if self._motion.damping:
+            self._add_damping(table)
         self._on_block(table, self.initial)
         table["strain"] = self._strains[:count]
         groups = self.rows.keys() - {"tape9"}
         for dataset in DATASETS.values():
-            if dataset.group in groups and dataset.shape[0] == "rows":
+            if dataset.group in groups and dataset.shape[0] == "rows" and dataset.name in table:
                 self._sink.write(dataset.path, self._stored, table[dataset.name])
         rows = np.array(self._contact_rows, dtype=int)
         if len(rows):
@@ -163,6 +168,15 @@ class StepRecorder:
         self._stored += count
         self._rows.clear()
         self._contact_rows.clear()
+
+    def _add_damping(self, table: dict[str, Floats]) -> None:
+        """Add the work of damping: its power v C v is 2 a times the plate's kinetic energy."""
+        last_time, last_power, work = self._damped
+        time, power = table["time"], 2.0 * self._motion.damping * table["plate_kinetic"]
+        means = 0.5 * (power + np.concatenate([[last_power], power[:-1]]))
+        table["damping_work"] = work + np.cumsum(means * np.diff(time, prepend=last_time))
+        table["balance_error"] += table["damping_work"]
+        self._damped = (float(time[-1]), float(power[-1]), float(table["damping_work"][-1]))
 
     def _add_projectile(self, table: dict[str, Floats], count: int) -> None:
         """Add the columns that follow from the motion of the projectile."""
