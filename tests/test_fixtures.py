@@ -100,3 +100,42 @@ def test_a_laminate_outside_the_standard_is_warned_of() -> None:
     made = new("--fixture", "D7136", "--layup", "[0/90]s", *PLATE[2:], *QUICK)
     assert "warning: D7136 is for laminates of 4 to 6 mm; this one has 0.736 mm" in made.stderr
     assert "warning" not in new("--fixture", "D7136", *PLATE, *QUICK).stderr
+
+
+SPHERE = ("--size", "100x80", "--mesh", "4x4", "--projectile", "mass:1e-3", "--velocity", "1000",
+          "--duration", "1e-5", "--patch", "none")  # fmt: skip
+
+
+@pytest.mark.parametrize("ply", [PLATE, (*PLATE[:4], "--material", "AS4/8552")])
+def test_contact_estimate_is_that_of_indent_estimate_and_says_so_in_the_deck(
+    ply: tuple[str, ...],
+) -> None:
+    made = new(*SPHERE, *ply, "--contact", "estimate:8", "--units", "mm-N-s")
+    printed = call("indent", "estimate", *ply, "--radius", "8", "--es", "207e3", "--nus", ".3",
+                   "--units", "mm-N-s")  # fmt: skip
+    card = printed.stdout.splitlines()[-1]
+    assert card in made.stdout
+    assert "! k of EXPE is estimated by the laminate's indentation modulus" in made.stdout
+    fixture = new("--fixture", "D7136", *ply, *QUICK, "--contact", "estimate")
+    assert card in fixture.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--contact", "estimate"], "needs the sphere: estimate:RADIUS[,ES,NUS]"),
+        (["--contact", "estimate:0"], "'0' is not of the form estimate:RADIUS[,ES,NUS]"),
+        (["--contact", "estimate:8"], "--contact estimate with --ply needs --units"),
+        (["--contact", "estimate:8,2e5,0.9"], "k cannot be estimated: nu_s must lie between"),
+    ],
+)
+def test_an_estimate_that_cannot_be_made_is_refused(options: list[str], message: str) -> None:
+    made = new(*SPHERE, *PLATE, *options)
+    assert_unusable(made)
+    assert message in made.stderr
+
+
+def test_no_contact_is_estimated_on_a_fabric() -> None:
+    made = new("--fixture", "D7136", *PLATE[:4], "--material", "AS4-5H/3501-6", *QUICK)
+    assert_unusable(made)
+    assert "the ply is a fabric" in made.stderr

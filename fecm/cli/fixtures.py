@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import click
 
 from fecm.api import load_deck
-from fecm.cli.laminate_options import ply_of_options
-from fecm.deck.model import Deck, Patch, Projectile
+from fecm.cli.types import POSITIVE, ListOf
+from fecm.deck.catalogue import CONTACTS, NamedContact, convert
+from fecm.deck.model import Deck, Indentation, Patch, Projectile
 from fecm.deck.records import Ply
+from fecm.deck.units import MODULUS
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.mechanics.patch import HERTZ
 from fecm.problem.build import build_projectile
@@ -26,10 +29,71 @@ REPLACED = ("size", "columns", "rows", "support", "edges")
 MESH, GRADING = (20, 12), 3.0
 # Simulated time over half a period of the projectile on the plate's static stiffness.
 CONTACT_TIMES = 1.25
+ESTIMATE = "estimate:RADIUS[,ES,NUS]"
 # Units of the standards.
 UNITS = "mm-N-s"
-# Young's modulus (MPa) and Poisson's ratio of a standard's projectile, steel; nu23 of the ply.
-E_S, NU_S, NU23 = 207e3, 0.3, 0.4
+# Young's modulus (MPa) and Poisson's ratio of steel.
+E_S, NU_S = 207e3, 0.3
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """Elastic contact of a sphere, its k estimated from the ply's constants.
+
+    Attributes
+    ----------
+    radius : float or None
+        None where a standard prescribes it.
+    e_s, nu_s : float or None
+        Elastic constants; None for steel.
+    """
+
+    radius: float | None = None
+    e_s: float | None = None
+    nu_s: float | None = None
+
+    def law(
+        self, ply: Ply, layup: Sequence[float], nu23: float, system: str | None
+    ) -> tuple[Indentation, str]:
+        """Law of contact, and comment lines of the deck which say how k was computed."""
+        if self.radius is None:
+            raise click.UsageError(f"--contact estimate needs the sphere: {ESTIMATE}")
+        if self.e_s is None and system is None:
+            raise click.UsageError(
+                "--contact estimate with --ply needs --units, or the sphere's elastic constants: "
+                f"{ESTIMATE}"
+            )
+        e_s = self.e_s or convert(E_S, MODULUS, UNITS, system or UNITS)
+        nu_s = NU_S if self.nu_s is None else self.nu_s
+        try:
+            stiffness = effective_stiffness(ply, layup, [1.0] * len(layup), nu23)
+            modulus = indentation_modulus(stiffness)
+            k = float(f"{hertz_coefficient(self.radius, e_s, nu_s, modulus):.6g}")
+        except (StudyError, ValueError, ArithmeticError) as error:
+            raise click.UsageError(f"k cannot be estimated: {error}; give --law") from None
+        return Indentation(k, 0.0, 0.0, 1.5), (
+            "! k of EXPE is estimated by the laminate's indentation modulus "
+            f"{modulus:.5g}: a sphere of radius {self.radius:g},\n"
+            f"! E {e_s:g} and nu {nu_s:g}; nu23 of the ply {nu23:g}.  A measured k may be larger; "
+            "the law is elastic.\n"
+        )
+
+
+def parse_contact(text: str) -> NamedContact | Sphere:
+    """Named contact, or a sphere whose k is estimated.
+
+    Raises
+    ------
+    ValueError
+        If the text is neither.
+    """
+    word, _, values = text.partition(":")
+    if word == "estimate":
+        parts = ListOf(ESTIMATE, POSITIVE, [1, 3])(values) if values else ()
+        return Sphere(*parts)
+    if text not in CONTACTS:
+        raise ValueError(f"{text!r} is none of {', '.join(CONTACTS)}, {ESTIMATE}")
+    return CONTACTS[text]
 
 
 def complete(options: dict[str, Any], given: Collection[str]) -> list[str]:
@@ -78,25 +142,9 @@ def _prescribe(
         notes.append(
             f"the energy is {energy / 1000.0:.4g} J, {test.energy / 1000.0:g} J per mm of thickness"
         )
-    if options["law"] is None and options["contact"] is None:
-        ply = ply_of_options(options["ply"], options["material"], UNITS)
-        options["law"] = (_coefficient(test, ply, options["layup"]), 0.0, 0.0, 1.5)
-        notes.append(
-            f"the law of contact is elastic, its k an estimate from the ply's constants for a "
-            f"steel sphere of radius {test.radius:g} mm (fecm indent estimate); --law takes a "
-            "measured one"
-        )
+    if options["law"] is None and options["contact"] in (None, Sphere()):
+        options["contact"] = Sphere(test.radius)
     return notes
-
-
-def _coefficient(test: DropWeight, ply: Ply, layup: Sequence[float]) -> float:
-    """Contact coefficient of the standard's projectile by the laminate's indentation modulus."""
-    try:
-        stiffness = effective_stiffness(ply, layup, [1.0] * len(layup), NU23)
-        modulus = indentation_modulus(stiffness)
-        return float(f"{hertz_coefficient(test.radius, E_S, NU_S, modulus):.6g}")
-    except (StudyError, ValueError, ArithmeticError) as error:
-        raise click.UsageError(f"k cannot be estimated: {error}; give --law") from None
 
 
 def duration_of(deck: Deck) -> float:

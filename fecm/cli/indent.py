@@ -14,7 +14,7 @@ from fecm.cli.indent_curve import curve
 from fecm.cli.laminate_options import laminate_options, ply_of_options
 from fecm.cli.outputs import OVERWRITE, PLOT, STANDARD_OUTPUT, OutputPaths
 from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, ListOf
-from fecm.deck.catalogue import CONTACTS, SYSTEM, SYSTEMS, NamedPly
+from fecm.deck.catalogue import CONTACTS, NU23, SYSTEM, SYSTEMS, NamedPly
 from fecm.deck.model import Indentation
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.studies.indentation_test import LIMITS_Q
@@ -160,8 +160,8 @@ def hertz(
 
 @indent.command()
 @laminate_options(required=True)
-@click.option("--nu23", type=Finite(), default=0.4, show_default=True,
-              help="Poisson's ratio of the ply across the fibres.")  # fmt: skip
+@click.option("--nu23", type=Finite(), help="Poisson's ratio of the ply across the fibres.  "
+                                            "[default: the named ply's, or 0.4]")  # fmt: skip
 @RADIUS
 @E_S
 @NU_S
@@ -175,7 +175,7 @@ def estimate(
     ply: Sequence[float] | None,
     material: NamedPly | None,
     units: str | None,
-    nu23: float,
+    nu23: float | None,
     radius: float,
     e_s: float,
     nu_s: float,
@@ -191,6 +191,8 @@ def estimate(
     1.330e6 lb/in^1.5, where M gives 1.084e6 and E2 0.741e6.  By default the law is elastic.
     """
     constants = ply_of_options(ply, material, units)
+    if nu23 is None:
+        nu23 = material.nu23 if material else NU23
     stiffness = effective_stiffness(constants, layup, [ply_thickness] * len(layup), nu23)
     modulus = indentation_modulus(stiffness)
     try:

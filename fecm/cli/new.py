@@ -14,15 +14,15 @@ from click.core import ParameterSource
 from fecm._files import check_outputs
 from fecm.api import load_deck
 from fecm.cli.common import RefusedError, echo, echo_file, note, write_text
-from fecm.cli.fixtures import complete, duration_of
+from fecm.cli.fixtures import ESTIMATE, Sphere, complete, duration_of, parse_contact
 from fecm.cli.laminate_options import PLIES, laminate_options, ply_of_options
 from fecm.cli.outputs import STANDARD_OUTPUT
 from fecm.cli.types import POSITIVE, Finite, ListOf, Parsed, assignment
-from fecm.deck.catalogue import CONTACTS, MATERIALS, STRENGTHS, SYSTEM, SYSTEMS, NamedPly
+from fecm.deck.catalogue import MATERIALS, NU23, STRENGTHS, SYSTEM, SYSTEMS, NamedContact, NamedPly
 from fecm.deck.format import format_deck
 from fecm.deck.grid import Grid, Section, framed, graded, listed, longest_at, refined, uniform
 from fecm.deck.model import Deck, Indentation, Material, Patch, Projectile, Segment, Shear, Units
-from fecm.deck.records import RodDiameter
+from fecm.deck.records import Ply, RodDiameter
 from fecm.mechanics.patch import DISC, HERTZ, RADIUS_PER_THICKNESS
 from fecm.problem.build import build_projectile
 from fecm.problem.fixture import CUSTOM, FIXTURES, Fixture, parse_fixture
@@ -116,8 +116,10 @@ def _edge(text: str) -> tuple[str, str]:
                    "--velocity.")  # fmt: skip
 @click.option("--law", type=ListOf("K,ALPHA_P,S_P,Q", Finite(), [4]), metavar="K,ALPHA_P,S_P,Q",
               help="Parameters of the indentation law.")  # fmt: skip
-@click.option("--contact", type=click.Choice(list(CONTACTS)), metavar="NAME",
-              help="Named law, instead of --law; `fecm indent contacts` lists them.")  # fmt: skip
+@click.option("--contact", type=Parsed(parse_contact), metavar="NAME",
+              help="Named law, instead of --law; `fecm indent contacts` lists them.  "
+                   f"{ESTIMATE} estimates the k of a sphere (default: steel) as `fecm indent "
+                   "estimate` does.")  # fmt: skip
 @click.option("--projectile", type=Parsed(_projectile), metavar="PROJECTILE",
               help="mass:M, or rod:LENGTH,DIAMETER,E,DENSITY.  [default in lbf, in and s: the "
                    "report's rod]")  # fmt: skip
@@ -146,10 +148,9 @@ def new(output: Path, overwrite: bool, **options: Any) -> None:
         source = click.get_current_context().get_parameter_source
         given = {name for name in options if source(name) is ParameterSource.COMMANDLINE}
         notes += complete(options, given)
-    deck, more = deck_of_options(**options)
+    deck, comments, more = deck_of_options(**options)
     notes += more
-    fixture: Fixture | None = options["fixture"]
-    text = (fixture.comment if fixture else "") + format_deck(deck.to_text())
+    text = comments + format_deck(deck.to_text())
     prepared = load_deck(text)
     if errors := prepared.errors():
         for finding in errors:
@@ -201,15 +202,15 @@ def deck_of_options(
     velocity: float | None,
     energy: float | None,
     law: Sequence[float] | None,
-    contact: str | None,
+    contact: NamedContact | Sphere | None,
     projectile: Projectile | None,
     patch: Patch | None,
     shear: str,
     duration: float | None,
     dt: float | None,
     every: int | None,
-) -> tuple[Deck, list[str]]:
-    """Deck of the options of ``fecm new``, and notes about what they do not state."""
+) -> tuple[Deck, str, list[str]]:
+    """Deck of the options of ``fecm new``, its comments, and notes about what is not stated."""
     radius = None if patch is None else patch.radius
     grid = _grid(size, mesh, grading, columns, rows, at, radius, fixture)
     x, y = at or (grid.columns[-1].end / 2.0, grid.rows[-1].end / 2.0)
@@ -224,6 +225,8 @@ def deck_of_options(
         raise click.UsageError("give either --velocity or --energy")
     if duration is None and fixture is None:
         raise click.UsageError("Missing option '--duration'.")
+    nu23 = material.nu23 if material else NU23
+    indentation, comment = _law(law, contact, system, constants, layup, nu23)
     segments, notes = _damage(material, system) if damage else ((), [])
     make = partial(
         new_deck,
@@ -234,7 +237,7 @@ def deck_of_options(
         ply=constants,
         supports=dict.fromkeys(EDGES, support) | dict(edges),
         at=(x, y),
-        law=_law(law, contact, system),
+        law=indentation,
         projectile=projectile,
         every=every,
         units=None if units is None else Units(*SYSTEMS[units].values()),
@@ -266,7 +269,12 @@ def deck_of_options(
         )
     if patch is not None or shear == MITC:
         notes.append(_additions(deck))
-    return deck, notes
+    if comment:
+        notes.append(
+            f"k = {indentation.k:g} is estimated from the ply's constants (fecm indent estimate) "
+            "for an elastic law; --law takes a measured one"
+        )
+    return deck, (fixture.comment if fixture else "") + comment, notes
 
 
 def _damage(material: NamedPly | None, system: str | None) -> tuple[tuple[Segment, ...], list[str]]:
@@ -367,13 +375,18 @@ def _sections(
     return refined(length, count, centre, grading, radius)
 
 
-def _law(law: Sequence[float] | None, contact: str | None, system: str | None) -> Indentation:
-    """Indentation law; a named one in the units of the ply."""
+def _law(
+    law: Sequence[float] | None, contact: NamedContact | Sphere | None, system: str | None,
+    ply: Ply, layup: Sequence[float], nu23: float,
+) -> tuple[Indentation, str]:  # fmt: skip
+    """Indentation law, a named one in the units of the ply, and comment lines about it."""
     if (law is None) == (contact is None):
         raise click.UsageError("give either --law or --contact")
     if law is not None:
         k, alpha_p, s_p, q = law
-        return Indentation(k, alpha_p, s_p, q)
-    if system is None:
+        return Indentation(k, alpha_p, s_p, q), ""
+    if isinstance(contact, Sphere):
+        return contact.law(ply, layup, nu23, system)
+    if system is None or contact is None:
         raise click.UsageError("--contact with --ply needs --units, the units of the ply")
-    return CONTACTS[contact or ""].converted(system)
+    return contact.converted(system), ""

@@ -29,9 +29,11 @@ def ply_stiffness(ply: PlyConstants, nu23: float) -> Floats:
     Raises
     ------
     StudyError
-        If the compliance is not positive definite.
+        If the compliance is not positive definite, or the ply is a fabric.
     """
     nu12, e1, e2 = ply.nu12, ply.e1, ply.e2
+    if e2 > 0.5 * e1 and ply.g12 < 0.25 * e2:
+        raise StudyError("the ply is a fabric (E2 near E1, G12 far below): its E3 is not its E2")
     compliance = np.zeros((6, 6))
     compliance[:3, :3] = [
         [1.0 / e1, -nu12 / e1, -nu12 / e1],
