@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import fecm
+from fecm.plot.kinds import PlotError
 from fecm.results.metrics import METRICS, SUMMARY, THRESHOLD
 from fecm.results.result import Result
 from tests.calls import call
@@ -39,6 +41,23 @@ def test_a_rigid_mass_rebounds_with_the_impulse_and_its_energy_is_absorbed() -> 
     assert found["energy_absorbed"] == pytest.approx(absorbed, rel=1e-9)
     assert found["max_deflection"] == result.plate_w.max()
     assert found["peak_force"] == result.force.max()
+
+
+def test_the_area_of_the_force_displacement_curve_is_the_absorbed_energy() -> None:
+    pytest.importorskip("matplotlib")
+    result = run(deck())
+
+    def curve(against: str) -> tuple[Any, Any]:
+        line: Any = result.plot("loop", against=against).axes[0].get_lines()[0]
+        return 1e-3 * line.get_xdata(), line.get_ydata()  # the axis is in 10^-3
+
+    x, force = curve("displacement")
+    area = np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(x))
+    assert area == pytest.approx(result.metrics["energy_absorbed"], rel=1e-9)
+    difference = x - curve("deflection")[0]
+    np.testing.assert_allclose(difference[1:], result.indentation, rtol=0.0, atol=1e-15)
+    with pytest.raises(PlotError, match="indentation, deflection, displacement"):
+        result.plot("loop", against="time")
 
 
 def test_run_info_and_sweep_have_the_same_metrics(tmp_path: Path) -> None:

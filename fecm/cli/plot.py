@@ -52,6 +52,9 @@ def _by_name(
               help="Face of the strain, or curvature instead.  [default: far]")  # fmt: skip
 @click.option("--times", "--time", "times", type=ListOf("T,T,...", Finite()), metavar="T,T,...",
               help="Times, in the deck's unit; the nearest stored rows are drawn.")  # fmt: skip
+@click.option("--against", type=click.Choice(["indentation", "deflection", "displacement"]),
+              help="Horizontal axis of loop: indentation, displacement of the plate under the "
+                   "load, or of the projectile (the sum).  [default: indentation]")  # fmt: skip
 @click.option("--along", type=click.Choice(["x", "y"]),
               help="Direction of line.  [default: x]")  # fmt: skip
 @click.option("--width", type=click.Choice(["column", "full"]),

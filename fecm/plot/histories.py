@@ -42,6 +42,13 @@ Results = Mapping[str, Result]
 # Letters of small text per inch.
 LETTERS = 16
 
+# What a loop is drawn against: column of the history, sign, and label.
+AGAINST = {
+    "indentation": ("indentation", 1.0, "Indentation"),
+    "deflection": ("plate_w", 1.0, "Deflection under the load"),
+    "displacement": ("displacement", -1.0, "Displacement of the projectile"),
+}
+
 ENERGIES = {
     "plate_kinetic": "plate, kinetic",
     "plate_strain": "plate, strain",
@@ -124,26 +131,40 @@ def _thresholds(results: Results) -> dict[str, float]:
     return found
 
 
-def loop(results: Results, *, width: str = "column") -> Picture:
-    """Contact force against indentation, beginning at rest."""
+def loop(results: Results, *, against: str = "indentation", width: str = "column") -> Picture:
+    """Contact force against indentation or displacement, beginning at rest.
+
+    Parameters
+    ----------
+    results : mapping of str to Result
+    against : str
+        ``"indentation"``; ``"deflection"``: displacement of the plate under the load;
+        ``"displacement"``: that of the projectile's impacted end towards the plate, in contact the
+        sum of both.
+    width : str
+        ``"column"`` or ``"full"``.
+    """
     limit_count(len(results), "loops")
-    paths = ("history/indentation", "history/force")
+    if against not in AGAINST:
+        raise PlotError(f"unknown against {against}; a loop is drawn against {', '.join(AGAINST)}")
+    column, sign, label = AGAINST[against]
     data = {
-        name: [np.concatenate(([0.0], column)) for column in require(result, name, *paths)]
+        name: [np.concatenate(([0.0], values)) for values in (sign * x, force)]
         for name, result in results.items()
+        for x, force in [require(result, name, f"history/{column}", "history/force")]
     }
-    length = scale_of(results, "length", [a.clip(min=0.0) for a, _ in data.values()])
+    # Without force the bodies move apart.
+    touched = np.concatenate([[0.0], *(x[force > 0.0] for x, force in data.values())])
+    length = scale_of(results, "length", [touched])
     pound = scale_of(results, "force", [f for _, f in data.values()])
     figure, (axes,) = panels(width, ratio=1.2 * RATIO[width])
     graph = Graph(axes, length, pound)
-    for (name, (indentation, values)), colour in zip(data.items(), COLOURS, strict=False):
-        graph.plot(indentation, values, color=colour, label=name)
-    deepest = max(float(indentation.max()) for indentation, _ in data.values())
-    if deepest > 0.0:
-        # Negative indentations are a gap without force.
-        axes.set_xlim(0.0, 1.05 * length.factor * deepest)
+    for (name, (x, values)), colour in zip(data.items(), COLOURS, strict=False):
+        graph.plot(x, values, color=colour, label=name)
+    if touched.any():
+        axes.set_xlim(*(1.05 * length.factor * end for end in (touched.min(), touched.max())))
     axes.set_ylim(bottom=0.0)
-    graph.label("Indentation", "Contact force")
+    graph.label(label, "Contact force")
     _mark_open_ends(axes, results, width)
     if len(data) > 1:
         lines_legend(figure, axes)

@@ -68,7 +68,7 @@ class Kind:
 
 KINDS = {
     "force": Kind("histories:force", "contact force and transducer against time", True),
-    "loop": Kind("histories:loop", "contact force against indentation", True),
+    "loop": Kind("histories:loop", "contact force against indentation or displacement", True),
     "energy": Kind("histories:energy", "energies of plate and projectile against time", True),
     "strain": Kind("histories:strain", "surface strain at points against time", True),
     "thickness": Kind("thickness:thickness", "ply stresses through the thickness of an element"),
