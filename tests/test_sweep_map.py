@@ -106,6 +106,36 @@ def test_lines_of_equal_value_are_labelled_and_lie_where_the_values_are(
     assert figure.axes[0].texts  # numbers on the lines
 
 
+TOUGH = small(STEPS, data=DATA_CARDS.replace("EXPE", "DELA\n.2,\nEXPE"))
+
+
+def test_a_threshold_of_all_cases_is_a_level_of_peak_forces_only() -> None:
+    sweep = fecm.sweep(TOUGH, {"velocity": [20.0, 200.0], "k": [1e6, 3e6]})
+    (force,) = set(sweep["threshold_force"])
+    assert sweep["peak_force"].min() < force < sweep["peak_force"].max()
+    marked: Any = sweep.plot().axes[0].collections[-1]
+    np.testing.assert_allclose(marked.levels, [force])
+    assert len(sweep.plot("impulse").axes[0].collections) == 2  # cells and lines
+
+
+def test_thresholds_of_different_plates_are_drawn_case_by_case() -> None:
+    layups = ["[0/90]", "[0/0]"]
+    sweep = fecm.sweep(TOUGH, {"layup": layups, "velocity": [20.0, 200.0]})
+    lines = sweep.plot().axes[0].get_lines()
+    limits = sweep["threshold_force"].reshape(2, 2)
+    assert limits[0, 0] != limits[1, 0]
+    for line, forces in zip(lines[2:], limits, strict=True):
+        np.testing.assert_allclose(data_of(line)[1], forces)
+    sweep = fecm.sweep(TOUGH, {"thickness": [0.1, 0.12], "velocity": [20.0, 200.0]})
+    axes = sweep.plot().axes[0]
+    low, high = (sweep["peak_force"] - sweep["threshold_force"]).reshape(2, 2).T
+    share = low / (low - high)
+    (path,) = axes.collections[-1].get_paths()
+    expected = [[0.1, 20.0 + 180.0 * share[0]], [0.12, 20.0 + 180.0 * share[1]]]
+    found = path.vertices[np.argsort(path.vertices[:, 0])][[0, -1]]
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
 def test_over_says_which_value_lies_across(plane: SweepResult) -> None:
     figure = plane.plot(over=("k", "velocity"))
     assert figure.axes[0].get_ylabel() == "Impact velocity (in/s)"

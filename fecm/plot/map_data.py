@@ -86,6 +86,8 @@ class Choice:
         Second varying parameter of a map over one.
     still : ndarray (cases,) of bool
         Mask of the cases that ended in contact.
+    limits : ndarray (cases,)
+        Delamination thresholds, scaled, if they differ and peak forces are shown; else empty.
     """
 
     over: list[Axis]
@@ -94,6 +96,7 @@ class Choice:
     title: str
     other: Axis | None
     still: NDArray[np.bool_]
+    limits: Array
 
 
 def choose(
@@ -121,7 +124,14 @@ def choose(
     shown = _quantity(sweep, name, rows, quantity)
     title = ", ".join(f"{held} {_text(sweep, held, rows[0])}" for held in where)
     still = sweep["status"][rows] == STILL
-    return Choice(axes, shown, _levels(level, shown), title, other, still)
+    limits = np.empty(0)
+    if quantity == "peak_force" and "threshold_force" in sweep.summary:
+        limits = sweep["threshold_force"][rows]
+        highest = float(np.nanmax(limits))
+        if highest - np.nanmin(limits) <= 1e-9 * highest:
+            level, limits = [*level, highest], np.empty(0)
+    levels = _levels(level, shown)
+    return Choice(axes, shown, levels, title, other, still, shown.scale.factor * limits)
 
 
 def _rows(sweep: SweepResult, name: str, where: Mapping[str, Any]) -> Ints:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -91,6 +91,8 @@ def parameter_map(
         first, second = (second, first) if first.ticks else (first, second)
         place = (first, shown) if 0 < len(second.ticks) <= CURVES else (first, second)
     _mark_still(figure, *place, choice.still)
+    if len(choice.limits):
+        _mark_limits(figure.axes[0], *place, choice)
     if choice.title:
         figure.axes[0].set_title(choice.title, loc="left")
     return Picture(figure)
@@ -106,6 +108,40 @@ def _mark_still(figure: Figure, x: Axis, y: Axis, still: NDArray[np.bool_]) -> N
         f"\N{MULTIPLICATION SIGN} still in contact at the end: {still.sum()} of {len(still)} cases"
     )
     figure.supxlabel(text, fontsize=7.0, color="0.25")
+
+
+def _mark_limits(axes: Axes, x: Axis, y: Axis, choice: Choice) -> None:
+    """Mark the delamination thresholds of cases whose plates differ."""
+    shown, limits = choice.shown, choice.limits
+    above = replace(shown, values=shown.values - limits)
+    if y is shown:
+        axes.set_ylim(top=max(axes.get_ylim()[1], 1.05 * np.nanmax(limits)))
+    elif x is shown:
+        axes.set_xlim(right=max(axes.get_xlim()[1], 1.05 * np.nanmax(limits)))
+    if y is shown and choice.other is not None and not choice.other.ticks:
+        axes.plot(x.values, limits, "_", color="0.2")
+    elif y is shown:
+        texts = next((axis for axis in (*choice.over, choice.other) if axis and axis.ticks), None)
+        for row in range(len(texts.ticks) if texts else 1):
+            here = np.flatnonzero(texts.values == row) if texts else np.arange(len(limits))
+            here = here[np.argsort(x.values[here], kind="stable")]
+            style = LEVEL | ({"color": COLOURS[row]} if texts else {})
+            axes.plot(x.values[here], limits[here], **style)
+    elif x is shown:
+        axes.plot(limits, y.values, "|", color="0.2", markersize=11.0)
+    elif (grid := _grid(x, y, above)) is None:
+        reached = above.values >= 0.0
+        axes.plot(
+            x.values[reached], y.values[reached], "o", markersize=4.2, markerfacecolor="none",
+            markeredgecolor=LEVEL_COLOUR,
+        )  # fmt: skip
+    elif y.ticks:
+        _crossings(axes, grid, 0.0)
+    elif grid.values.min() < 0.0 < grid.values.max():
+        axes.contour(
+            grid.x, grid.y, grid.values, [0.0], colors=LEVEL_COLOUR, linestyles=[DASHES],
+            linewidths=1.2,
+        )  # fmt: skip
 
 
 # One value ---------------------------------------------------------------------------------------
