@@ -130,7 +130,8 @@ def test_thresholds_of_different_plates_are_drawn_case_by_case() -> None:
     axes = sweep.plot().axes[0]
     low, high = (sweep["peak_force"] - sweep["threshold_force"]).reshape(2, 2).T
     share = low / (low - high)
-    (path,) = axes.collections[-1].get_paths()
+    contour: Any = axes.collections[-1]
+    (path,) = contour.get_paths()
     expected = [[0.1, 20.0 + 180.0 * share[0]], [0.12, 20.0 + 180.0 * share[1]]]
     found = path.vertices[np.argsort(path.vertices[:, 0])][[0, -1]]
     np.testing.assert_allclose(found, expected, rtol=1e-6)
