@@ -1,22 +1,23 @@
 """fecm: low-velocity impact on laminated composite plates, from the decks of NASA CR-168057.
 
 >>> import fecm
->>> result = fecm.run("decks/appendix.inp")
->>> result.force.shape
+>>> result = fecm.run_one("decks/appendix.inp")  # doctest: +SKIP
+>>> result.force.shape  # doctest: +SKIP
 (10,)
 """
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING
 
-from fecm._errors import FecmError
+from fecm._errors import FecmError, FecmWarning
 from fecm._version import __version__
 
 if TYPE_CHECKING:
-    from fecm.api import run
+    from fecm.api import read_one, run, run_one
     from fecm.deck.findings import DeckError
+    from fecm.deck.model import Deck
     from fecm.deck.reader import read_deck
     from fecm.mechanics.plate_motion import DivergenceError
     from fecm.results.result import Result, load
@@ -25,35 +26,46 @@ if TYPE_CHECKING:
     from fecm.sweeps.result import load as load_sweep
 
 __all__ = [
+    "Deck",
     "DeckError",
     "DivergenceError",
     "FecmError",
+    "FecmWarning",
     "Result",
     "SweepResult",
     "__version__",
     "load",
     "load_sweep",
     "read_deck",
+    "read_one",
     "run",
+    "run_one",
     "sweep",
 ]
 
-_HOMES = {
-    "run": "fecm.api",
-    "DeckError": "fecm.deck.findings",
-    "read_deck": "fecm.deck.reader",
-    "DivergenceError": "fecm.mechanics.plate_motion",
-    "Result": "fecm.results.result",
-    "load": "fecm.results.result",
-    "sweep": "fecm.sweeps.api",
-    "SweepResult": "fecm.sweeps.result",
-    "load_sweep": "fecm.sweeps.result:load",
-}
+if not TYPE_CHECKING:  # type checkers know the names from the imports above
+    _HOMES = {
+        "run": "fecm.api",
+        "run_one": "fecm.api",
+        "read_one": "fecm.api",
+        "Deck": "fecm.deck.model",
+        "DeckError": "fecm.deck.findings",
+        "read_deck": "fecm.deck.reader",
+        "DivergenceError": "fecm.mechanics.plate_motion",
+        "Result": "fecm.results.result",
+        "load": "fecm.results.result",
+        "sweep": "fecm.sweeps.api",
+        "SweepResult": "fecm.sweeps.result",
+        "load_sweep": "fecm.sweeps.result:load",
+    }
+
+    def __getattr__(name):
+        """Import a public name on first access, so that `import fecm` is fast."""
+        if name not in _HOMES:
+            raise AttributeError(f"module 'fecm' has no attribute {name!r}")
+        module, _, own = _HOMES[name].partition(":")
+        return getattr(_import_module(module), own or name)
 
 
-def __getattr__(name: str) -> Any:
-    """Import a public name on first access, so that `import fecm` is fast."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'fecm' has no attribute {name!r}")
-    module, _, own = _HOMES[name].partition(":")
-    return getattr(import_module(module), own or name)
+def __dir__() -> list[str]:
+    return __all__

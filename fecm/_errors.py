@@ -13,3 +13,7 @@ class FecmError(Exception):
     """
 
     exit_code = 2
+
+
+class FecmWarning(UserWarning):
+    """A reason to doubt a deck or the result of a run."""

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import logging
+import warnings
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
+from fecm._errors import FecmWarning
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.model import Deck
-from fecm.deck.reader import Reader, load_text
-from fecm.mechanics.rod_integrators import LUMPED, WILSON, RodMethod
-from fecm.mechanics.stiffness_product import AUTO
+from fecm.deck.reader import Reader, load_text, read_deck
+from fecm.mechanics.rod_integrators import Integrator, MassMatrix, RodMethod
 from fecm.problem.check_mesh import HOURGLASS, check_listing
 from fecm.problem.check_program import UNSTABLE
 from fecm.problem.memory import check_memory
@@ -20,6 +23,15 @@ from fecm.problem.slips import LISTING, REPORT, active_slips
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.simulation.run import simulate
+from fecm.simulation.simulation import Simulation
+
+Mode = Literal["report", "listing"]
+Solver = Literal["auto", "csr"]
+
+# Called with the number of steps taken and of all steps.
+Progress = Callable[[int, int], object]
+
+LOGGER = logging.getLogger("fecm")
 
 
 @dataclass(frozen=True)
@@ -83,19 +95,70 @@ def load_deck(path_or_text: str | Path | Deck, mode: str = REPORT) -> LoadedDeck
     return LoadedDeck(source, problems, list(reader.findings))
 
 
-def run(
+def read_one(path_or_text: str | Path) -> Deck:
+    """Read a deck with exactly one problem; see :func:`read_deck`.
+
+    Raises
+    ------
+    DeckError
+        If the deck has errors.
+    ValueError
+        If it has several problems, or none.
+    """
+    found = read_deck(path_or_text)
+    decks = [found] if isinstance(found, Deck) else found
+    _check_one(decks)
+    return decks[0]
+
+
+def run_one(
     deck: str | Path | Deck,
-    mode: str = REPORT,
+    mode: Mode = "report",
     slips: Iterable[str] = (),
     output: str | Path | None = None,
     force: bool = False,
-    solver: str = AUTO,
+    solver: Solver = "auto",
     threads: int = 0,
-    rod_mass: str = LUMPED,
-    rod_integrator: str = WILSON,
+    rod_mass: MassMatrix = "lumped",
+    rod_integrator: Integrator = "wilson",
     energy_limit: float = ENERGY_LIMIT,
+    progress: Progress | None = None,
+) -> Result:
+    """Run a deck with exactly one problem; parameters and errors are those of :func:`run`.
+
+    Raises
+    ------
+    ValueError
+        Also if the deck has several problems.
+
+    Examples
+    --------
+    >>> result = run_one("decks/impact-115.inp")
+    >>> print(f"{result.force.max():.2f} lb")
+    86.20 lb
+    """
+    choices = _options(mode, slips, solver, threads, rod_mass, rod_integrator, energy_limit)
+    prepared = _load_valid(deck, mode, force)
+    _check_one(prepared.problems)
+    return _run(prepared, choices, output, progress)[0]
+
+
+def run(
+    deck: str | Path | Deck,
+    mode: Mode = "report",
+    slips: Iterable[str] = (),
+    output: str | Path | None = None,
+    force: bool = False,
+    solver: Solver = "auto",
+    threads: int = 0,
+    rod_mass: MassMatrix = "lumped",
+    rod_integrator: Integrator = "wilson",
+    energy_limit: float = ENERGY_LIMIT,
+    progress: Progress | None = None,
 ) -> Result | list[Result]:
     """Run every problem of a deck.
+
+    Each warning about the deck and each reason to doubt the result is a :class:`FecmWarning`.
 
     Parameters
     ----------
@@ -122,11 +185,13 @@ def run(
         ``"average-acceleration"``.
     energy_limit : float
         Relative error of the energy balance above which a run without slips ends.
+    progress : callable, optional
+        Called now and then with the number of steps taken and that of all steps of the problem.
 
     Returns
     -------
     Result or list of Result
-        A list if the deck has several problems.
+        A list if the deck has several problems; :func:`run_one` returns one result.
 
     Raises
     ------
@@ -148,32 +213,73 @@ def run(
     >>> print(f"{result.force.max():.2f} lb")
     6.19 lb
     """
-    choices = RunOptions(
-        active_slips(mode, slips), solver, threads, RodMethod(rod_mass, rod_integrator),
-        energy_limit,
-    )  # fmt: skip
-    prepared = load_deck(deck, mode)
-    if prepared.errors(force):
-        raise DeckError(prepared.findings, prepared.source)
-    results: list[Result] = []
-    for number, problem in enumerate(prepared.problems, start=1):
-        check_memory(problem, solver=solver, in_memory=output is None)
-        path = None if output is None else numbered(Path(output), number)
-        results.append(_run_one(problem, choices, path))
+    choices = _options(mode, slips, solver, threads, rod_mass, rod_integrator, energy_limit)
+    results = _run(_load_valid(deck, mode, force), choices, output, progress)
     return results[0] if len(results) == 1 else results
 
 
-def _run_one(problem: Problem, choices: RunOptions, path: Path | None) -> Result:
+def _options(
+    mode: str, slips: Iterable[str], solver: str, threads: int, mass: str, integrator: str,
+    energy_limit: float,
+) -> RunOptions:  # fmt: skip
+    rod = RodMethod(mass, integrator)
+    return RunOptions(active_slips(mode, slips), solver, threads, rod, energy_limit)
+
+
+def _load_valid(deck: str | Path | Deck, mode: str, force: bool) -> LoadedDeck:
+    """Read a deck, or raise a DeckError."""
+    prepared = load_deck(deck, mode)
+    if prepared.errors(force):
+        raise DeckError(prepared.findings, prepared.source)
+    return prepared
+
+
+def _check_one(found: Sequence[object]) -> None:
+    """Refuse a deck that does not have exactly one problem."""
+    if len(found) != 1:
+        raise ValueError(f"the deck has {len(found)} problems, not one")
+
+
+def _run(
+    prepared: LoadedDeck, choices: RunOptions, output: str | Path | None, progress: Progress | None
+) -> list[Result]:
+    """Run the problems of a deck; warn as the caller's caller."""
+    found = tuple(finding for finding in prepared.findings if finding.severity == "warning")
+    for finding in found:
+        warnings.warn(FecmWarning(finding.render(prepared.source)), stacklevel=3)
+    results: list[Result] = []
+    for number, problem in enumerate(prepared.problems, start=1):
+        check_memory(problem, solver=choices.solver, in_memory=output is None)
+        path = None if output is None else numbered(Path(output), number)
+        title = problem.deck.title or prepared.source
+        LOGGER.info("%s: %d steps", title, problem.work.steps)
+        result = _run_one(problem, choices, path, progress)
+        LOGGER.info("%s: done", title)
+        result.findings = found
+        for note in result.notes:
+            warnings.warn(FecmWarning(note), stacklevel=3)
+        results.append(result)
+    return results
+
+
+def _run_one(
+    problem: Problem, choices: RunOptions, path: Path | None, progress: Progress | None
+) -> Result:
     """Run one problem, into a file if there is a path."""
+
+    def report(simulation: Simulation) -> None:
+        if progress is not None:
+            progress(simulation.state.plate.step, problem.work.steps)
+
     if path is None:
         memory = MemorySink()
-        simulate(problem, memory, choices)
+        report(simulate(problem, memory, choices, [report]))
         return Result(memory.arrays, memory.texts, memory.groups)
     from fecm.results.hdf5_writer import writing
     from fecm.results.result import load
 
     with writing(path) as sink:
-        simulate(problem, sink, choices)
+        report(simulate(problem, sink, choices, [report]))
     return load(path)
 
 

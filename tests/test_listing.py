@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
+from fecm.api import Mode, load_deck
 from fecm.deck.findings import DeckError
 from fecm.results.result import Result
 from tests.calls import call
@@ -45,7 +45,7 @@ MIXED = (
 )
 
 
-def run(text: str, mode: str = "listing", *slips: str) -> Result:
+def run(text: str, mode: Mode = "listing", *slips: str) -> Result:
     """Result of a deck of one problem."""
     result = fecm.run(text, mode=mode, slips=slips)
     assert isinstance(result, Result)

@@ -12,10 +12,11 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
+from fecm._errors import FecmWarning
 from fecm.plot.data import patches, strain_points
 from fecm.plot.deflection import profile
 from fecm.plot.failure import outline
-from fecm.plot.kinds import KINDS, MISSING, Picture, PlotError, PlotNote
+from fecm.plot.kinds import KINDS, MISSING, Picture, PlotError
 from fecm.plot.meshes import supports
 from fecm.plot.pictures import draw, save
 from fecm.plot.style import COLOURS, scale
@@ -183,7 +184,7 @@ def test_strain_is_curvature_times_the_distance_of_the_face(result: Result) -> N
 
 
 def test_strain_is_not_shown_under_a_point_force_unless_asked_for(result: Result) -> None:
-    with pytest.warns(PlotNote, match="point force depend on the mesh: .* those at 1.5, 1 are"):
+    with pytest.warns(FecmWarning, match="point force depend on the mesh: .* those at 1.5, 1 are"):
         shown = legend_of(result.plot("strain"))
     assert shown == ["x at 1.5, 1", "y at 1.5, 1"]
     patch = run(small(data=DISC + DATA_CARDS))
@@ -200,7 +201,7 @@ def test_strain_points_are_nodes_or_gauss_points(result: Result) -> None:
 
 def test_a_plate_that_stretches_is_said_to_show_bending_alone() -> None:
     free = MESH[: MESH.index("BOUN")] + "BOUN\n    1    0    1    1    1    1    1\n\n"
-    with pytest.warns(PlotNote, match="bending alone"):
+    with pytest.warns(FecmWarning, match="bending alone"):
         run(small(mesh=free)).plot("strain", at=((1.0, 1.0),))
 
 
@@ -267,7 +268,7 @@ def plies() -> Result:
 
 
 def test_thickness_shows_six_components_with_jumps_at_the_faces_of_plies(plies: Result) -> None:
-    with pytest.warns(PlotNote, match="element 4 of .* is within 0.253 of the load"):
+    with pytest.warns(FecmWarning, match="element 4 of .* is within 0.253 of the load"):
         figure: Any = plies.plot("thickness", at=((1.45, 1.05),), times=(2.5e-6,))
     labels = [axes.get_xlabel().partition(" (") for axes in figure.axes]
     assert [label for label, _, _ in labels] == [
@@ -297,7 +298,7 @@ def test_thickness_shows_six_components_with_jumps_at_the_faces_of_plies(plies: 
     assert figure.axes[0].get_ylim() == (53.0, -53.0)
 
 
-@pytest.mark.filterwarnings("ignore::fecm.plot.kinds.PlotNote")
+@pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
 def test_thickness_without_a_place_is_that_of_the_largest_stress_along_the_fibres(
     plies: Result,
 ) -> None:
@@ -309,7 +310,7 @@ def test_thickness_without_a_place_is_that_of_the_largest_stress_along_the_fibre
 def test_thickness_beside_the_stored_elements_names_the_nearest(plies: Result) -> None:
     others = set(range(1, 5)) - set(plies["plies/element"].tolist())
     (x, y) = {1: (0.4, 0.4), 2: (1.6, 0.4), 3: (0.4, 1.6)}[others.pop()]
-    with pytest.warns(PlotNote, match=f"no ply stresses at {x},{y}; the nearest element"):
+    with pytest.warns(FecmWarning, match=f"no ply stresses at {x},{y}; the nearest element"):
         plies.plot("thickness", at=((x, y),))
     with pytest.raises(PlotError, match="9,9 is not on the plate"):
         plies.plot("thickness", at=((9.0, 9.0),))
@@ -325,7 +326,7 @@ def test_thickness_of_elements_without_nine_nodes_shows_in_plane_stresses(plies:
     for name in ("tau_xz", "tau_yz", "residual"):
         arrays[f"plies/{name}"] = np.full_like(arrays[f"plies/{name}"], np.nan)
     made = Result(arrays, {"deck": plies.deck}, {"patch": plies.patch.attributes})
-    with pytest.warns(PlotNote, match="does not have nine nodes"):
+    with pytest.warns(FecmWarning, match="does not have nine nodes"):
         figure = made.plot("thickness")
     assert sum(axes.axison for axes in figure.axes) == 3
 
@@ -390,7 +391,7 @@ def area(polygon: Array) -> float:
     return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2.0)
 
 
-@pytest.mark.filterwarnings("ignore::fecm.plot.kinds.PlotNote")
+@pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
 @pytest.mark.parametrize("points", [-3, -2, 2, 3])
 def test_the_map_of_exposures_has_a_cell_around_every_point(points: int) -> None:
     data = (STRENGTHS + DATA_CARDS).replace("    3    3   -3", f"    3    3{points:5}")
@@ -413,7 +414,7 @@ def test_the_map_of_exposures_has_a_cell_around_every_point(points: int) -> None
 def test_a_bar_per_ply_leaves_out_what_is_under_the_load(failing: Result) -> None:
     raised = scaled(failing, 1.0)
     raised["failure/puck/exposure"][3, 8] = 9.0  # the point under the load
-    with pytest.warns(PlotNote, match="are left out: 1 point of element 4$"):
+    with pytest.warns(FecmWarning, match="are left out: 1 point of element 4$"):
         figure: Any = draw("failure", {"small": raised}, quantity="puck").figure
     plate, bars, _ = figure.axes
     under = failing["failure/under_load"] != 0
@@ -430,7 +431,7 @@ def test_a_bar_per_ply_leaves_out_what_is_under_the_load(failing: Result) -> Non
     assert legend_of(figure) == ["puck", "exposure 1", "largest", "under the load"]
 
 
-@pytest.mark.filterwarnings("ignore::fecm.plot.kinds.PlotNote")
+@pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
 def test_all_criteria_mark_their_values_and_interfaces_have_their_own_bars(
     failing: Result,
 ) -> None:
@@ -451,7 +452,7 @@ def test_all_criteria_mark_their_values_and_interfaces_have_their_own_bars(
     assert "plies 1 and 2" in alone.axes[0].get_title(loc="left")
 
 
-@pytest.mark.filterwarnings("ignore::fecm.plot.kinds.PlotNote")
+@pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
 def test_the_plate_is_outlined_where_the_exposure_is_above_1(failing: Result) -> None:
     plate: Any = draw("failure", {"a": failing}).figure.axes[0]
     largest = plate.collections[0].get_array().max()
@@ -479,7 +480,7 @@ def test_exposures_that_can_not_be_shown_are_refused(failing: Result) -> None:
         draw("failure", {"covered": Result(arrays, {"deck": failing.deck}, groups)})
 
 
-@pytest.mark.filterwarnings("ignore::fecm.plot.kinds.PlotNote")
+@pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
 def test_a_single_ply_has_one_bar() -> None:
     data = DATA_CARDS.replace("    2  90.     0.053\n", "").replace("0.     0.053", "0.     0.106")
     deck = small(PROGRAM.replace("NEXT", "FAIL          1\nNEXT"), data=STRENGTHS + data)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
+from fecm.api import Mode, load_deck
 from fecm.deck import Findings
 from fecm.deck.macros import compile_program, estimate_work
 from fecm.deck.records import Macro
@@ -23,7 +23,7 @@ from fecm.simulation.run import simulate
 from tests.decks import DATA_CARDS, PROGRAM, ready, small
 
 
-def run(program: str, mode: str = "report", slips: tuple[str, ...] = ()) -> Result:
+def run(program: str, mode: Mode = "report", slips: tuple[str, ...] = ()) -> Result:
     """Result of the small plate under a program."""
     result = fecm.run(small(program), mode=mode, slips=slips)
     assert isinstance(result, Result)

@@ -19,6 +19,7 @@ from fecm.mechanics.rod_integrators import (
     MASSES,
     STEPS,
     WILSON,
+    Integrator,
     RodIntegrator,
     RodState,
 )
@@ -88,7 +89,9 @@ def test_lumped_frequencies_come_up_to_the_exact_ones_with_the_square() -> None:
 
 
 @pytest.mark.parametrize(("mass", "integrator"), BOTH)
-def test_a_step_meets_the_equation_of_motion_at_its_own_instant(mass: str, integrator: str) -> None:
+def test_a_step_meets_the_equation_of_motion_at_its_own_instant(
+    mass: str, integrator: Integrator
+) -> None:
     rod = uniform(3, mass)
     K, M, n = rod.stiffness(), matrix(rod), 8
     dt, force = 0.07, 0.9
@@ -187,9 +190,9 @@ def test_a_result_tells_its_choices_and_nothing_of_the_default() -> None:
 
 def test_an_unknown_choice_is_refused_by_name() -> None:
     with pytest.raises(ValueError, match=r"rod mass 'heavy'; known are lumped, consistent"):
-        fecm.run(small(), rod_mass="heavy")
+        fecm.run(small(), rod_mass="heavy")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match=r"rod integrator 'euler'; known are wilson, average"):
-        fecm.run(small(), rod_integrator="euler")
+        fecm.run(small(), rod_integrator="euler")  # type: ignore[arg-type]
 
 
 def test_the_first_steps_constants_stay_under_their_slip_with_any_integrator() -> None:

@@ -11,7 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.plot.kinds import KINDS, PlotError, PlotNote
+from fecm._errors import FecmWarning
+from fecm.plot.kinds import KINDS, PlotError
 from fecm.plot.pictures import draw
 from fecm.sweeps.result import SweepResult, save
 from tests.calls import assert_unusable, call
@@ -145,7 +146,7 @@ def test_over_says_which_value_lies_across(plane: SweepResult) -> None:
 
 def test_failed_cases_are_gaps_and_told(plane: SweepResult) -> None:
     holed = some_failed(plane, 1, 6)
-    with pytest.warns(PlotNote, match=r"2 of 12 cases of .* failed \(it went wrong\)"):
+    with pytest.warns(FecmWarning, match=r"2 of 12 cases of .* failed \(it went wrong\)"):
         drawn = mesh_of(holed.plot()).get_array()
     at = {
         (sorted(STIFFNESSES).index(plane["k"][n]), sorted(VELOCITIES).index(plane["velocity"][n]))
@@ -176,7 +177,7 @@ def test_cases_that_are_no_grid_are_coloured_points() -> None:
 
 
 def test_each_layup_is_a_curve(layups: SweepResult) -> None:
-    with pytest.warns(PlotNote, match="3 of 12 cases"):
+    with pytest.warns(FecmWarning, match="3 of 12 cases"):
         figure = layups.plot(level=(100.0,))
     (axes,) = figure.axes
     lines = {line.get_label(): line for line in axes.get_lines()}
@@ -213,7 +214,7 @@ def test_more_layups_than_colours_are_rows_that_show_where_they_pass_a_level() -
 
 def test_one_value_is_a_line_with_a_gap_at_a_failed_case() -> None:
     sweep = some_failed(fecm.sweep(NAMED, {"velocity": [100.0, 50.0, 150.0]}), 0)
-    with pytest.warns(PlotNote, match="1 of 3 cases"):
+    with pytest.warns(FecmWarning, match="1 of 3 cases"):
         (axes,) = sweep.plot("time_of_peak").axes
     (line,) = axes.get_lines()
     x, y = data_of(line)
@@ -225,7 +226,7 @@ def test_one_value_is_a_line_with_a_gap_at_a_failed_case() -> None:
 
 
 def test_one_layup_a_row_with_a_point(layups: SweepResult) -> None:
-    with pytest.warns(PlotNote, match="1 of 4 cases"):
+    with pytest.warns(FecmWarning, match="1 of 4 cases"):
         (axes,) = layups.plot("impulse", where={"velocity": 101.0}).axes
     assert [text.get_text() for text in axes.get_yticklabels()] == [*LAYUPS, "[0/"]
     assert axes.get_title(loc="left") == "velocity 100 in/s"
@@ -260,14 +261,14 @@ def test_cases_still_in_contact_are_crossed_and_counted(vary: dict[str, list[flo
     sweep = fecm.sweep(LONG_ENOUGH_FOR_TWO, vary)
     count = int(sweep.still.sum())
     assert 0 < count < len(sweep)
-    with pytest.warns(PlotNote, match=f"{count} of {len(sweep)} cases of .* still in contact"):
+    with pytest.warns(FecmWarning, match=f"{count} of {len(sweep)} cases of .* still in contact"):
         figure = sweep.plot()
     cross = figure.axes[0].get_lines()[-1]
     assert cross.get_marker() == "x"
     assert data_of(cross)[0].tolist() == sweep["velocity"][sweep.still].tolist()
     told = f"still in contact at the end: {count} of {len(sweep)} cases"
     assert figure.get_supxlabel() == f"\N{MULTIPLICATION SIGN} {told}"
-    with pytest.warns(PlotNote, match="they have no value in the picture"):
+    with pytest.warns(FecmWarning, match="they have no value in the picture"):
         sweep.plot("impulse")
 
 
@@ -324,7 +325,7 @@ def test_a_sweep_that_failed_whole_says_why(plane: SweepResult) -> None:
 
 
 def test_a_level_beyond_all_values_is_told(plane: SweepResult) -> None:
-    with pytest.warns(PlotNote, match="level 1e.06 is outside"):
+    with pytest.warns(FecmWarning, match="level 1e.06 is outside"):
         plane.plot(level=(1e6,))
 
 

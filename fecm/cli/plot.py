@@ -9,11 +9,12 @@ from typing import Any
 
 import click
 
+from fecm._errors import FecmWarning
 from fecm._files import check_outputs
 from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, note, progress
 from fecm.cli.isolation import reads
 from fecm.cli.types import Finite, ListOf, Parsed, assignment
-from fecm.plot.kinds import KINDS, Picture, PlotError, PlotNote
+from fecm.plot.kinds import KINDS, Picture, PlotError
 from fecm.plot.pictures import check_options, check_suffix, draw, options_of, save
 from fecm.results.hdf5_reader import read
 from fecm.results.result import Result, result_of
@@ -153,7 +154,7 @@ def _draw(
             own = options_of(kind)
             pictures[kind] = draw(kind, results, **{n: v for n, v in options.items() if n in own})
             advance(1)
-    notes = [str(one.message) for one in caught if issubclass(one.category, PlotNote)]
+    notes = [str(one.message) for one in caught if issubclass(one.category, FecmWarning)]
     for text in dict.fromkeys(notes):
         note(text)
     return pictures

@@ -412,8 +412,9 @@ def read_deck(path_or_text: str | Path) -> Deck | list[Deck]:
 
     Examples
     --------
+    >>> from fecm.deck.model import Impact
     >>> deck = read_deck("decks/appendix.inp")
-    >>> deck.need(Impact).velocity
+    >>> deck.require(Impact).velocity
     115.0
     """
     text, name = load_text(path_or_text)

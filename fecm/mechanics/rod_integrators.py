@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Literal, Protocol
 
 import numpy as np
 
 from fecm._typing import Floats
 
 # The report's program uses the lumped mass, its text the consistent one (equation 4-24).
-LUMPED, CONSISTENT = "lumped", "consistent"
-
+MassMatrix = Literal["lumped", "consistent"]
+LUMPED: MassMatrix = "lumped"
+CONSISTENT: MassMatrix = "consistent"
 MASSES = (LUMPED, CONSISTENT)
 
-WILSON, AVERAGE = "wilson", "average-acceleration"
-
+Integrator = Literal["wilson", "average-acceleration"]
+WILSON: Integrator = "wilson"
+AVERAGE: Integrator = "average-acceleration"
 INTEGRATORS = (WILSON, AVERAGE)
 
 

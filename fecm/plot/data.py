@@ -98,7 +98,7 @@ def circle(result: Result, name: str) -> tuple[Floats, float] | None:
     """
     if "patch/weight" not in result:
         return None
-    values = [result.patch.attributes.get(key) for key in ("x", "y", "radius")]
+    values: list[Any] = [result.patch.attributes.get(key) for key in ("x", "y", "radius")]
     if not all(isinstance(value, int | float) and abs(value) <= LARGEST for value in values):
         raise PlotError(f"{name} has a contact patch without a centre and a radius")
     x, y, radius = map(float, values)

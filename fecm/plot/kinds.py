@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from fecm._errors import FecmError
+from fecm._errors import FecmError, FecmWarning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,13 +24,9 @@ class PlotError(FecmError, ValueError):
     """A result lacks what a picture needs, or the options do not fit it."""
 
 
-class PlotNote(UserWarning):
-    """Something a user should know about a picture; other warnings come from libraries."""
-
-
 def warn(text: str) -> None:
-    """Warn with a :class:`PlotNote`."""
-    warnings.warn(text, PlotNote, stacklevel=3)
+    """Warn with a :class:`FecmWarning`; other warnings come from libraries."""
+    warnings.warn(text, FecmWarning, stacklevel=3)
 
 
 @dataclass(frozen=True)

@@ -53,6 +53,7 @@ from fecm.problem.check_mesh import (
     check_in_plane_supports,
     check_mesh,
 )
+from fecm.problem.check_patch import check_patch
 from fecm.problem.check_plausibility import (
     check_plausibility,
     check_purpose,
@@ -60,7 +61,7 @@ from fecm.problem.check_plausibility import (
 )
 from fecm.problem.check_program import check_program, check_time_step
 from fecm.problem.generate import generate
-from fecm.problem.patch import W, check_patch
+from fecm.problem.patch import W
 
 __all__ = ["Problem", "check"]
 

@@ -11,8 +11,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._typing import Floats
 from fecm.deck.model import Impact
 from fecm.deck.units import unit_of
+from fecm.results.groups import (
+    Contact,
+    Energy,
+    Failure,
+    GageGroup,
+    History,
+    Ints,
+    LaminateStiffness,
+    Mesh,
+    Modes,
+    PatchGroup,
+    PlyRows,
+    Reactions,
+    Stresses,
+    Tape3,
+    Tape8,
+    Tape9,
+    group,
+)
 from fecm.results.metrics import INTEGERS, METRICS, Indentation, summarise
 from fecm.results.schema import (
     DATASETS,
@@ -26,6 +46,7 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+    from fecm.deck.findings import Finding
     from fecm.results.hdf5_reader import Contents
     from fecm.results.plies import Plies
 
@@ -33,32 +54,11 @@ Array = NDArray[Any]
 HISTORY = "history"
 
 
-class Group:
-    """The datasets of one group as attributes: ``result.tape3.w``."""
-
-    def __init__(
-        self, name: str, arrays: Mapping[str, Array], attributes: Mapping[str, Any]
-    ) -> None:
-        self._name = name
-        self._arrays = arrays
-        self.attributes = dict(attributes)
-
-    def __getattr__(self, name: str) -> Array:
-        try:
-            return self._arrays[f"{self._name}/{name}"]
-        except KeyError:
-            raise NotStoredError(f"there is no {self._name}/{name} in this result") from None
-
-    def __dir__(self) -> list[str]:
-        own = [p.rpartition("/")[2] for p in self._arrays if p.startswith(f"{self._name}/")]
-        return [*super().__dir__(), *own]
-
-
-class PlyGroup(Group):
+class PlyGroup(PlyRows):
     """The datasets of ``plies``; called, the stresses and strains of some plies."""
 
     def __init__(self, result: Result) -> None:
-        super().__init__("plies", result._arrays, result._groups.get("plies", {}))
+        super().__init__("plies", result._arrays, result._groups)
         self._result = result
 
     def __call__(
@@ -92,7 +92,7 @@ class PlyGroup(Group):
         return plies_of(self._result, time, elements)
 
 
-class Result:
+class Result(Contact):
     """Result of a run.
 
     Every dataset is available as ``result["tape3/w"]`` and ``result.tape3.w``; the columns of the
@@ -107,7 +107,33 @@ class Result:
         Texts by path.
     groups : mapping of str to mapping
         Attributes of the groups; those of the result itself under ``""``.
+
+    Attributes
+    ----------
+    attributes : dict
+        Attributes of the result.
+    deck : str
+        The cards of the problem.
+    findings : tuple of Finding
+        Warnings about the deck, of a run in this process; empty for a loaded result.
     """
+
+    step: Ints
+    time: Floats
+    plate_w: Floats
+    mesh: Mesh
+    laminate: LaminateStiffness
+    tape3: Tape3
+    tape8: Tape8
+    tape9: Tape9
+    history: History
+    energy: Energy
+    gages: GageGroup
+    stresses: Stresses
+    patch: PatchGroup
+    failure: Failure
+    reactions: Reactions
+    modes: Modes
 
     def __init__(
         self,
@@ -119,6 +145,7 @@ class Result:
         self._groups = groups
         self.attributes = dict(groups.get("", {}))
         self.deck = texts.get("deck", "")
+        self.findings: tuple[Finding, ...] = ()
 
     @property
     def title(self) -> str:
@@ -135,6 +162,11 @@ class Result:
         """Names of the active slips, sorted."""
         slips = self.attributes.get("slips", ())
         return tuple(map(str, slips)) if isinstance(slips, list | tuple) else ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Reasons to doubt the result."""
+        return tuple(map(str, self.attributes.get("notes", ())))
 
     @property
     def has_listing_tapes(self) -> bool:
@@ -251,14 +283,16 @@ class Result:
         """Iterate over the paths of all datasets."""
         return iter(self._arrays)
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        if f"{HISTORY}/{name}" in self._arrays:
-            return self._arrays[f"{HISTORY}/{name}"]
-        if any(path.startswith(f"{name}/") for path in self._arrays):
-            return Group(name, self._arrays, self._groups.get(name, {}))
-        raise NotStoredError(f"there is no {name} in this result")
+    if not TYPE_CHECKING:  # so that a misspelt name is a type error
+
+        def __getattr__(self, name):
+            if name.startswith("_"):
+                raise AttributeError(name)
+            if f"{HISTORY}/{name}" in self._arrays:
+                return self._arrays[f"{HISTORY}/{name}"]
+            if any(path.startswith(f"{name}/") for path in self._arrays):
+                return group(name, self._arrays, self._groups)
+            raise NotStoredError(f"there is no {name} in this result")
 
     def __dir__(self) -> list[str]:
         heads = {path.partition("/")[0] for path in self._arrays}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -17,10 +18,15 @@ from fecm.results.schema import FORMAT, FORMAT_VERSION
 from fecm.results.sinks import Sink
 from fecm.simulation.guard import ENERGY_WARNING, likely_cause
 from fecm.simulation.macros import bind
-from fecm.simulation.simulation import Simulation
+from fecm.simulation.simulation import Observer, Simulation
 
 
-def simulate(problem: Problem, sink: Sink, options: RunOptions | None = None) -> Simulation:
+def simulate(
+    problem: Problem,
+    sink: Sink,
+    options: RunOptions | None = None,
+    observers: Sequence[Observer] = (),
+) -> Simulation:
     """Run a problem into a sink and return the finished simulation.
 
     Raises
@@ -30,7 +36,7 @@ def simulate(problem: Problem, sink: Sink, options: RunOptions | None = None) ->
     SingularStiffnessError
         If a static solution is requested and the plate is not held.
     """
-    simulation = Simulation(problem, sink, options or RunOptions())
+    simulation = Simulation(problem, sink, options or RunOptions(), observers=observers)
     run(simulation)
     return simulation
 

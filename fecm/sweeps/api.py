@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from fecm._errors import FecmWarning
 from fecm.api import load_deck
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
@@ -17,6 +18,11 @@ from fecm.sweeps.plan import Plan, Task, check_memory, plan, tasks
 from fecm.sweeps.result import SweepResult, result_of, save
 from fecm.sweeps.schedule import Done, Idle, lost, on_dask, on_workers, run_serial
 from fecm.sweeps.store import DamagedPartError, PartialResults
+
+
+def warn(text: str) -> None:
+    """Warn with a :class:`FecmWarning`."""
+    warnings.warn(FecmWarning(text), stacklevel=3)
 
 
 def problem_of(deck: str | Path | Deck) -> Problem:
@@ -46,7 +52,7 @@ def carry_out(
     parts: PartialResults | None = None,
     done: Done = lambda task, outcome: None,
     idle: Idle = lambda: None,
-    note: Callable[[str], None] = warnings.warn,
+    note: Callable[[str], None] = warn,
 ) -> SweepResult:
     """Run the tasks of a plan.
 

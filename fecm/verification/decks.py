@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from fecm._errors import FecmWarning
 from fecm._typing import Floats
-from fecm.api import run
+from fecm.api import Mode, run_one
 from fecm.deck.grid import Grid, Section, lines, uniform
 from fecm.deck.model import Deck, Forces, Impact, Indentation, Material, Projectile, Segment
 from fecm.deck.records import Control, Integration, Layer, Macro, NodeValues, Ply
@@ -52,12 +54,10 @@ def impact_program(dt: float, steps: int) -> tuple[Macro, ...]:
     )  # fmt: skip
 
 
-def result_of(one: Deck, mode: str = "report") -> Result:
+def result_of(one: Deck, mode: Mode = "report") -> Result:
     """Run a deck of one problem."""
-    result = run(one, mode=mode)
-    if isinstance(result, list):
-        raise ValueError("the deck holds several problems")
-    return result
+    with warnings.catch_warnings(action="ignore", category=FecmWarning):
+        return run_one(one, mode=mode)
 
 
 def farthest_of(

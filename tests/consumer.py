@@ -1,0 +1,31 @@
+"""Code of a user, for the type checkers: it is not run.
+
+Lines with an ``ignore`` must fail in both checkers; an ``ignore`` without an error is an error.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import fecm
+
+result: fecm.Result = fecm.run_one("plate.inp", mode="report", solver="csr")
+force: NDArray[np.float64] = result.force
+late: NDArray[np.float64] = result.tape3.time[result.tape3.step > 10]
+worst: float = float(result.failure.puck.exposure.max())
+title: str = result.title
+doubts: tuple[str, ...] = result.notes
+several: fecm.Result | list[fecm.Result] = fecm.run(Path("plates.inp"))
+deck: fecm.Deck = fecm.read_one("plate.inp")
+again: fecm.Result = fecm.run_one(deck, progress=lambda step, steps: print(step / steps))
+sweep: fecm.SweepResult = fecm.sweep(deck, {"velocity": [1.0, 2.0]}, workers=2)
+
+result.forse  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]  # noqa: B018
+result.tape3.u  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]  # noqa: B018
+several.force  # type: ignore[union-attr]  # pyright: ignore[reportAttributeAccessIssue]  # noqa: B018
+fecm.run_one("plate.inp", mode="raport")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
+fecm.run_one("plate.inp", solver="gpu")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
+fecm.runn("plate.inp")  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]

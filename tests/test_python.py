@@ -1,0 +1,93 @@
+"""The library as Python code sees it: names, types, warnings, progress."""
+
+from __future__ import annotations
+
+import inspect
+import logging
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm.results.groups import GROUPS, Exposure, Group
+from fecm.results.schema import DATASETS
+from tests.decks import APPENDIX, small
+
+
+def annotated(kind: type[Group]) -> set[str]:
+    """Names of the datasets that a group declares for type checkers."""
+    return {name for base in kind.__mro__ for name in inspect.get_annotations(base)}
+
+
+def test_the_namespace_lists_the_public_names_and_nothing_else() -> None:
+    assert dir(fecm) == sorted(fecm.__all__)
+    for name in fecm.__all__:
+        assert getattr(fecm, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'runn'"):
+        fecm.runn  # type: ignore[attr-defined]  # noqa: B018
+
+
+def test_importing_fecm_imports_neither_numpy_nor_scipy() -> None:
+    code = "import sys, fecm; print({'numpy', 'scipy', 'h5py'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"
+
+
+@pytest.mark.parametrize("name", GROUPS)
+def test_the_typed_names_of_a_group_are_those_of_its_datasets(name: str) -> None:
+    stored = {
+        path.removeprefix(f"{name}/").partition("/")[0]
+        for path in DATASETS
+        if path.startswith(f"{name}/")
+    }
+    assert annotated(GROUPS[name]) == stored
+    if name == "failure":
+        assert annotated(Exposure) == {"exposure", "time", "mode"}
+
+
+def test_every_group_of_datasets_has_typed_names() -> None:
+    assert {path.partition("/")[0] for path in DATASETS} == set(GROUPS)
+
+
+def test_each_warning_of_a_deck_is_a_warning_in_python_at_the_users_line() -> None:
+    with pytest.warns(fecm.FecmWarning) as caught:
+        result = fecm.run_one(APPENDIX)
+    assert [finding.code for finding in result.findings] == ["W414", "W415"]
+    texts = [str(warning.message) for warning in caught]
+    assert len(texts) == 2
+    assert "warning[W414]" in texts[0]
+    assert "warning[W415]" in texts[1]
+    assert {warning.filename for warning in caught} == {__file__}
+
+
+def test_progress_counts_the_steps_up_to_the_last() -> None:
+    seen: list[tuple[int, int]] = []
+    result = fecm.run_one(small(), progress=lambda step, steps: seen.append((step, steps)))
+    steps = len(result.force)
+    assert {total for _, total in seen} == {steps}
+    assert seen == sorted(seen)
+    assert seen[-1] == (steps, steps)
+
+
+def test_a_run_logs_its_title_and_number_of_steps(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO, "fecm"):
+        result = fecm.run_one(small())
+    assert caplog.messages[0] == f"small plate: {len(result.force)} steps"
+
+
+def test_one_problem_is_refused_where_a_deck_has_two() -> None:
+    two = small().removesuffix("STOP\n") + small()
+    assert isinstance(fecm.run(two), list)
+    for function in (fecm.run_one, fecm.read_one):
+        with pytest.raises(ValueError, match="the deck has 2 problems, not one"):
+            function(two)
+
+
+def test_a_group_shows_its_datasets_and_their_shapes(tmp_path: Path) -> None:
+    result = fecm.run_one(small(), output=tmp_path / "small.h5")
+    assert repr(result.laminate) == "<laminate: A (3, 3), B (3, 3), D (3, 3), shear (2, 2)>"
+    np.testing.assert_array_equal(result.laminate.A, result["laminate/A"])
+    assert {"A", "B", "D", "shear"} <= set(dir(result.laminate))
