@@ -14,7 +14,10 @@ from fecm.deck.records import Ply
 from fecm.mechanics.delamination import SMALL_MASS, effective_rigidity, threshold_force
 from fecm.mechanics.laminate import laminate
 from fecm.results.result import Result
+from fecm.studies.estimate import static_stiffness
 from fecm.studies.quick_models import inelasticity, infinite_plate, static_plate
+from fecm.verification.damage import struck_square
+from fecm.verification.decks import result_of
 from tests.builders import report_plate, table
 from tests.calls import call
 from tests.decks import small
@@ -79,6 +82,36 @@ def test_zeners_parameter_classifies_the_reference_plates() -> None:
     assert inelasticity(masses, 1.0, 1.0, 1.0, 1.0) / inelasticity(
         1.0, 1.0, 1.0, 1.0, 1.0
     ) == pytest.approx(ratio, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "row",
+    [r for r in table("plate_stiffness.csv") if r["source"].endswith(("computed", "37"))],
+    ids=lambda row: f"{row['plate']} {row['value']}",
+)
+def test_the_static_stiffness_of_thin_plates_is_timoshenkos(row: dict[str, str]) -> None:
+    ratio = row["plate"].partition("b/a=")[2].partition(" ")[0] or "1"
+    support = "clamped" if "clamped" in row["plate"] else "simple"
+    made = call(
+        "new", "-", "--size", f"1x{ratio}", "--mesh", "8x10", "--grading", "3", "--dt", "1e-3",
+        "--layup", "[0]", "--ply-thickness", ".005", "--ply", "1,.3,1,1,.384615,.384615,.384615",
+        "--support", support, "--patch", "disc:.015", "--projectile", "mass:1",
+        "--velocity", "1e-6", "--law", "1,0,0,1.5", "--duration", "1e-3",
+    )  # fmt: skip
+    (problem,) = load_deck(made.stdout).problems
+    assert problem.contact is not None
+    rigidity = 0.005**3 / (12.0 * (1.0 - 0.3**2))
+    compliance = rigidity / static_stiffness(problem.moving_plate, problem.contact)
+    assert compliance == pytest.approx(float(row["value"]), rel=5e-3)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("row", table("response_classes.csv"), ids=lambda row: row["M/Mp"])
+def test_peaks_of_all_response_classes_are_those_of_the_series(row: dict[str, str]) -> None:
+    # The file's times are twice those of its peaks.
+    deck = struck_square(float(row["M kg"]), 0.55 * float(row["time"]))
+    peak = result_of(deck).force.max()
+    assert peak == pytest.approx(float(row["peak exact series N"]), rel=0.02)
 
 
 # In a run ----------------------------------------------------------------------------------------

@@ -310,3 +310,22 @@ def test_figures_of_patches_and_plies_are_those_of_the_reference_files() -> None
     quantities = ("σ1 at z = h/2", "τ12", "τ_xz", "τ_yz", "σ1 at z = h/6")
     found_ = [check_of("ply-stresses", quantity).expected for quantity in quantities]
     assert found_ == pytest.approx((signs * given).tolist(), rel=1e-8)
+
+
+def test_figures_of_damage_are_those_of_the_reference_files() -> None:
+    first = {r["criterion"]: float(r["q0 at first failure (Pa)"]) for r in
+             reference("first_ply_failure_chain.csv")}  # fmt: skip
+    assert [check.expected for check in chosen(["failure"])[0].checks] == list(first.values())
+    figures = {
+        ("threshold", "isotropic"): ("threshold_loads.csv", 0, "F threshold"),
+        ("threshold", "the report"): ("threshold_loads.csv", -3, "F threshold"),
+        ("small-mass", "F T"): ("zener_olsson_small_mass.csv", 4, "F_max/(M V/T) = F_max/(k^.4 "
+                                "V^1.2 M^.6)"),
+        ("small-mass", "t_peak"): ("zener_olsson_small_mass.csv", 4, "t_peak/T"),
+        ("small-mass", "largest"): ("response_classes.csv", 1, "peak exact series N"),
+        ("large-mass", "largest"): ("large_mass_energy_balance.csv", 0,
+                                    "F max of the ODE of a mass on the two springs"),
+    }  # fmt: skip
+    for (case, quantity), (name, row, column) in figures.items():
+        given = float(list(reference(name))[row][column])
+        assert check_of(case, quantity).expected == pytest.approx(given, rel=1e-7)

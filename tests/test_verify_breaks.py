@@ -11,6 +11,7 @@ import pytest
 import fecm
 from fecm.deck import records
 from fecm.mechanics import (
+    delamination,
     element_matrices,
     gages,
     interpolation,
@@ -33,6 +34,7 @@ from fecm.mechanics.impact import ImpactSystem
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.problem import build
 from fecm.simulation.recorder import Recorder
+from fecm.studies import quick_models
 from fecm.studies.rod_test import pulse_test
 from fecm.studies.waves.fronts import Fronts
 from fecm.studies.waves.medium import Medium
@@ -80,7 +82,7 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
             "angle-ply": ("A11", "A12", "A66", "B16", "D11", "D66"),
             "wave-fronts": ("extension, 0", "in-plane", "bending", "twisting", "extension, 45"),
             "dispersion": ("ω, wavelength 10",),
-            "static-bending": ("w",),
+            "static-bending": ("w",), "large-mass": ("stiffness",),
         },
     ),
     "half of G12": (
@@ -290,6 +292,7 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
             "indentation": ("F(α_p)", "F at the peak", "F halfway down", "F back", "F halfway up",
                             "work", "ACR: F at the peak"),
             "rigid-target": ("deepest", "largest", "contact"), "supported-plate": ("",),
+            "small-mass": ("largest",),
         },
     ),
     "permanent indentation halved": (
@@ -350,6 +353,18 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
     "MITC ignored": (
         changed(build, "has_assumed_shear", lambda found: False), {"assumed-shear": ("w",)},
     ),
+    "D for 12 D in the delamination threshold": (
+        changed(delamination, "threshold_force", lambda force: force / 12.0**0.5),
+        {"threshold": ("",)},
+    ),
+    "a tenth of the plate's inertia missing in Zener's parameter": (
+        instead(quick_models, "infinite_plate", lambda right, *a: right(*a[:-1], a[-1] / 0.9**0.5)),
+        {"small-mass": ("F T", "t_peak")},
+    ),
+    "nine tenths of the plate's stiffness": (
+        instead(quick_models, "static_plate", lambda right, *a: right(*a[:-1], 0.9 * a[-1])),
+        {"large-mass": ("largest",)},
+    ),
     "EQUI ignored": (
         instead(ply_stresses, "equilibrium_shear_stiffness", lambda right, plate: plate.shear),
         {"equilibrium-shear": ("A*",)},
@@ -361,6 +376,11 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
     "stresses of a ply in the plate's axes": (
         instead(ply_stresses, "in_plane_stresses", in_plate_axes),
         {"ply-stresses": ("σ1 at z = h/6",)},
+    ),
+    "σ2 a tenth too small": (
+        changed(ply_stresses, "in_plane_stresses",
+                lambda found: found * np.array([1.0, 0.9, 1.0])[:, None]),
+        {"ply-stresses": ("σ2",), "failure": ("",)},
     ),
     "interlaminar stresses of x and y exchanged": (
         changed(ply_stresses, "interlaminar_stresses",

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from fecm._errors import FecmError
 from fecm.verification import (
     coupled,
+    damage,
     impacts,
     indentations,
     laminates,
@@ -52,6 +53,7 @@ CASES: tuple[Case, ...] = (
     *impacts.CASES,
     *patches.CASES,
     *plies.CASES,
+    *damage.CASES,
 )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.deck.grid import Grid, lines, uniform
-from fecm.deck.model import Forces
+from fecm.deck.model import Forces, Segment
 from fecm.deck.records import Macro, NodeValues, Ply
 from fecm.results.result import Result
 from fecm.verification import sine
@@ -48,7 +48,9 @@ PARABOLA = "3/2 (1 - 4 z²/h²) Q_x/h, Q_x = q a/2π"
 SHEAR = 1.5 / H / (2.0 * PI)
 
 
-def bent(ply: Ply, angles: Sequence[float]) -> Result:
+def bent(
+    ply: Ply, angles: Sequence[float], thickness: float = H, word: str = "PLYS", *others: Segment
+) -> Result:
     """Run a simply supported square under q = cos(pi x) cos(pi y), its origin in the middle."""
     grid = Grid(uniform(0.5, ELEMENTS), uniform(0.5, ELEMENTS))
     x, y = (v.ravel() for v in np.meshgrid(lines(grid.columns), lines(grid.rows)))
@@ -59,10 +61,10 @@ def bent(ply: Ply, angles: Sequence[float]) -> Result:
             for one in uniform_load(grid, 1.0).records
         )
     )
-    plate = material(ply, angles, H / len(angles))
-    plate = replace(plate, integration=replace(plate.integration, points=2, thickness=H))
-    program = (*STATICS, Macro("STRE"), Macro("PLYS"))
-    return result_of(quarter_plate(ELEMENTS, plate, program, others=[loads, MITC]))
+    plate = material(ply, angles, thickness / len(angles))
+    plate = replace(plate, integration=replace(plate.integration, points=2, thickness=thickness))
+    program = (*STATICS, Macro("STRE"), Macro(word))
+    return result_of(quarter_plate(ELEMENTS, plate, program, others=[loads, MITC, *others]))
 
 
 def amplitude(found: Floats, expected: float, shape: Floats) -> float:
