@@ -13,6 +13,7 @@ from fecm._errors import FecmWarning
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, load_text, read_deck
+from fecm.mechanics.contact_law import Law
 from fecm.mechanics.rod_integrators import Integrator, MassMatrix, RodMethod
 from fecm.problem.check_mesh import HOURGLASS, check_listing
 from fecm.problem.check_program import UNSTABLE
@@ -123,6 +124,7 @@ def run_one(
     rod_integrator: Integrator = "wilson",
     energy_limit: float = ENERGY_LIMIT,
     progress: Progress | None = None,
+    law: Law | None = None,
 ) -> Result:
     """Run a deck with exactly one problem; parameters and errors are those of :func:`run`.
 
@@ -137,7 +139,7 @@ def run_one(
     >>> print(f"{result.force.max():.2f} lb")
     86.20 lb
     """
-    choices = _options(mode, slips, solver, threads, rod_mass, rod_integrator, energy_limit)
+    choices = _options(mode, slips, solver, threads, rod_mass, rod_integrator, energy_limit, law)
     prepared = _load_valid(deck, mode, force)
     _check_one(prepared.problems)
     return _run(prepared, choices, output, progress)[0]
@@ -155,6 +157,7 @@ def run(
     rod_integrator: Integrator = "wilson",
     energy_limit: float = ENERGY_LIMIT,
     progress: Progress | None = None,
+    law: Law | None = None,
 ) -> Result | list[Result]:
     """Run every problem of a deck.
 
@@ -187,6 +190,9 @@ def run(
         Relative error of the energy balance above which a run without slips ends.
     progress : callable, optional
         Called now and then with the number of steps taken and that of all steps of the problem.
+    law : Law, optional
+        Contact law instead of that of EXPE, which the deck has all the same; the name of its class
+        is stored as the attribute ``law`` of the result.
 
     Returns
     -------
@@ -213,17 +219,17 @@ def run(
     >>> print(f"{result.force.max():.2f} lb")
     6.19 lb
     """
-    choices = _options(mode, slips, solver, threads, rod_mass, rod_integrator, energy_limit)
+    choices = _options(mode, slips, solver, threads, rod_mass, rod_integrator, energy_limit, law)
     results = _run(_load_valid(deck, mode, force), choices, output, progress)
     return results[0] if len(results) == 1 else results
 
 
 def _options(
     mode: str, slips: Iterable[str], solver: str, threads: int, mass: str, integrator: str,
-    energy_limit: float,
+    energy_limit: float, law: Law | None,
 ) -> RunOptions:  # fmt: skip
     rod = RodMethod(mass, integrator)
-    return RunOptions(active_slips(mode, slips), solver, threads, rod, energy_limit)
+    return RunOptions(active_slips(mode, slips), solver, threads, rod, energy_limit, law)
 
 
 def _load_valid(deck: str | Path | Deck, mode: str, force: bool) -> LoadedDeck:

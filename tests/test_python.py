@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm.mechanics.contact_law import ContactPoint
 from fecm.results.groups import GROUPS, Exposure, Group
 from fecm.results.schema import DATASETS
-from tests.decks import APPENDIX, small
+from tests.decks import APPENDIX, LONG, small
 
 
 def annotated(kind: type[Group]) -> set[str]:
@@ -84,6 +85,36 @@ def test_one_problem_is_refused_where_a_deck_has_two() -> None:
     for function in (fecm.run_one, fecm.read_one):
         with pytest.raises(ValueError, match="the deck has 2 problems, not one"):
             function(two)
+
+
+class Bilinear:
+    """A law without memory: stiff up to 5e-4, then ten times softer."""
+
+    def start(self) -> None:
+        """No memory."""
+
+    def trial(self, memory: None, last: ContactPoint, indentation: float) -> tuple[float, None]:
+        """Force at an indentation."""
+        a = max(indentation, 0.0)
+        return min(1e5 * a, 45.0 + 1e4 * a), None
+
+    def accept(self, memory: None, last: ContactPoint, indentation: float) -> None:
+        """No memory."""
+
+    def permanent(self, memory: None, last: ContactPoint) -> float:
+        """The law is elastic."""
+        return 0.0
+
+
+def test_a_run_follows_a_law_of_ones_own_and_names_it() -> None:
+    result = fecm.run_one(LONG, law=Bilinear())
+    a = np.maximum(result.indentation, 0.0)
+    np.testing.assert_allclose(result.force, np.minimum(1e5 * a, 45.0 + 1e4 * a), atol=2e-3)
+    assert result.force.max() > 50.0
+    assert result.attributes["law"] == "Bilinear"
+    energy = result.energy
+    assert np.abs(energy.balance_error).max() < 1e-5 * energy.projectile_kinetic[0]
+    assert "law" not in fecm.run_one(small()).attributes
 
 
 def test_a_group_shows_its_datasets_and_their_shapes(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -207,9 +207,57 @@ class ContactPoint(NamedTuple):
     force: Number
 
 
+class Law(Protocol):
+    """A contact law: a force for each trial indentation, and a memory of the loading history.
+
+    A step calls `trial` up to five times, as the contact iteration does, and `accept` once, with
+    the indentation at the end of the step.  The memory is of any immutable type; a law without one
+    gives the same force in loading and unloading.
+
+    Examples
+    --------
+    A bilinear law without memory:
+
+    >>> class Bilinear:
+    ...     def start(self):
+    ...         return None
+    ...     def trial(self, memory, last, indentation):
+    ...         a = max(indentation, 0.0)
+    ...         return min(1e5 * a, 50.0 + 1e4 * a), memory
+    ...     def accept(self, memory, last, indentation):
+    ...         return memory
+    ...     def permanent(self, memory, last):
+    ...         return 0.0
+    """
+
+    def start(self) -> Any:
+        """Memory before the first contact."""
+
+    def trial(self, memory: Any, last: ContactPoint, indentation: Number) -> tuple[Number, Any]:
+        """Contact force at a trial indentation, and the memory after the trial.
+
+        Parameters
+        ----------
+        memory
+            Before the trial.
+        last : ContactPoint
+            Indentation (length) and force at the end of the last step.
+        indentation : float
+            Trial value (length); negative where the bodies are apart.
+        """
+        ...
+
+    def accept(self, memory: Any, last: ContactPoint, indentation: Number) -> Any:
+        """Memory after a step that ends at an indentation."""
+
+    def permanent(self, memory: Any, last: ContactPoint) -> Number:
+        """Permanent indentation after unloading from the last point (length)."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
-class Law(ABC):
-    """A contact law.
+class MeasuredLaw:
+    """A law of the report, with measured parameters; subclasses add `trial` and `accept`.
 
     Attributes
     ----------
@@ -231,31 +279,9 @@ class Law(ABC):
         peak = _select(memory.branch == VIRGIN, last.indentation, memory.peak)
         return self.constants.permanent(_select(peak > memory.peak, peak, memory.peak))
 
-    @abstractmethod
-    def trial(
-        self, memory: LoadingHistory, last: ContactPoint, indentation: Number
-    ) -> tuple[Number, LoadingHistory]:
-        """Contact force at a trial indentation, and the loading history after the trial.
-
-        Parameters
-        ----------
-        memory : LoadingHistory
-            Before the trial.
-        last : ContactPoint
-            The last accepted point.
-        indentation : float
-            Trial value.
-        """
-
-    @abstractmethod
-    def accept(
-        self, memory: LoadingHistory, last: ContactPoint, indentation: Number
-    ) -> LoadingHistory:
-        """Loading history after a step that ends at an indentation."""
-
 
 @dataclass(frozen=True, slots=True)
-class HystereticLaw(Law):
+class HystereticLaw(MeasuredLaw):
     """The report's law with any sequence of unloadings and reloadings.
 
     The peak is the point at which the indentation falls from the first loading curve (3-1).  Below
@@ -334,7 +360,7 @@ class HystereticLaw(Law):
 
 
 @dataclass(frozen=True, slots=True)
-class ListingLaw(Law):
+class ListingLaw(MeasuredLaw):
     """The printed program's law (the slip ``reload``), which never returns to an earlier branch.
 
     The first trial whose force is below the last accepted one ends loading; the first trial on the

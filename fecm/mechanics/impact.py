@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from fecm.mechanics.contact_law import ContactPoint, Law, LoadingHistory, Number, Truth
+from fecm.mechanics.contact_law import ContactPoint, Law, Number, Truth
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import AppliedForce, DivergenceError, Load, PlateMotion, PlateState
 from fecm.mechanics.projectile import Projectile, rigid_approach
@@ -36,8 +36,8 @@ class ContactState:
     ----------
     rod : RodState or TipState
         The projectile.
-    memory : LoadingHistory
-        History of the contact law.
+    memory
+        Memory of the contact law.
     contact : ContactPoint
         Accepted indentation and contact force.
     plate_w : float
@@ -49,7 +49,7 @@ class ContactState:
     """
 
     rod: Any
-    memory: LoadingHistory
+    memory: Any
     contact: ContactPoint
     plate_w: Number = 0.0
     contact_work: Number = 0.0

@@ -21,7 +21,6 @@ from fecm.deck.model import Projectile as ProjectileCard
 from fecm.mechanics.contact_law import (
     ContactParameters,
     HystereticLaw,
-    Law,
     LinearPermanent,
     ListingLaw,
     YangSunPermanent,
@@ -363,7 +362,7 @@ def build_station(deck: Deck, projectile: Projectile, slips: frozenset[str]) -> 
     return Transducer(middle if card is None or not card.transducer else card.transducer, sign)
 
 
-def build_law(deck: Deck, slips: frozenset[str] = frozenset()) -> Law:
+def build_law(deck: Deck, slips: frozenset[str] = frozenset()) -> HystereticLaw | ListingLaw:
     """Build the contact law of a deck with the active slips."""
     constants = build_constants(deck.require(Indentation))
     return ListingLaw(constants) if "reload" in slips else HystereticLaw(constants)
@@ -430,7 +429,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
             keeps_first_step="rod-dt" in slips,
             share=share,
         )
-        law = build_law(deck, slips)
+        law = chosen.law or build_law(deck, slips)
         impact = ImpactSystem(motion, rod, law, conditions, STEPS[method.integrator])
     stress_points = plate.strain_field(problem.rules[2])
     plies, failure = build_plies(problem, plate), build_failure(problem, plate)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from fecm.mechanics.contact_law import Law
 from fecm.mechanics.rod_integrators import RodMethod
 from fecm.mechanics.stiffness_product import AUTO, SOLVERS
 
@@ -29,6 +30,8 @@ class RunOptions:
     energy_limit : float
         Error of the energy balance, relative to the supplied energy, that ends a run without
         slips.
+    law : Law or None
+        Contact law instead of the deck's.
 
     Raises
     ------
@@ -41,6 +44,7 @@ class RunOptions:
     threads: int = 0
     rod_method: RodMethod = field(default_factory=RodMethod)
     energy_limit: float = ENERGY_LIMIT
+    law: Law | None = None
 
     def __post_init__(self) -> None:
         if self.solver not in SOLVERS:

@@ -82,6 +82,7 @@ def _write_header(simulation: Simulation) -> None:
         "mode": mode_of(options.slips),
         "slips": sorted(options.slips),
         **options.rod_method.attributes,
+        **({} if options.law is None else {"law": type(options.law).__name__}),
         **{f"unit_{name}": unit for name, unit in unit_names(deck).items()},
     }
     sink.attributes("", attributes)
