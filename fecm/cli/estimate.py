@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError, echo
+from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError, echo, note
 from fecm.cli.decks import load_valid
 from fecm.deck.units import unit_names, unit_of
 from fecm.problem.problem import Problem
@@ -46,6 +46,9 @@ def estimate(deck: Path, form: str) -> None:
         for model in found.models
     ]  # fmt: skip
     rows.append(_run(problem, found.mass))
+    w, h = found.models[-1].impact.peak / found.stiffness, problem.laminate.thickness
+    if w > 0.5 * h:  # not of a free plate, whose stiffness is NaN
+        note(f"the static plate deflects by {w / h:.3g} h: beyond h/2 a linear plate is too soft")
     values = {
         "class": found.response, "mass_ratio": found.mass_ratio, "lambda": found.parameter,
         "stiffness": found.stiffness, "models": rows,

@@ -46,6 +46,7 @@ from fecm.simulation.printout import Printer
 from fecm.simulation.run import run as simulate_run
 from fecm.simulation.simulation import Simulation
 from fecm.simulation.spool import Journal, SpoolError
+from fecm.simulation.validity import warnings_of
 
 
 @click.command()
@@ -204,9 +205,9 @@ def _run_one(
             note(f"{path} resumes after step {step}")
         simulate_run(simulation)
     checkpointer.clear()
-    for text in simulation.state.notes:
-        note(text)
     result = load(path)
+    for text in [*simulation.state.notes, *warnings_of(simulation, result)]:
+        note(text)
     if result.still_in_contact:
         note(OPEN_END)
     if form == "json":

@@ -224,6 +224,11 @@ class Result(Contact):
         values: dict[str, float] = {n: found[n].item() for n in METRICS if n in found}
         return values if self.still_in_contact else values | {n: int(values[n]) for n in INTEGERS}
 
+    def rows(self, path: str, start: int, stop: int) -> Array:
+        """Rows of a dataset; those of a file are not kept in memory."""
+        read = getattr(self._arrays, "rows", None)
+        return np.asarray(self[path][start:stop] if read is None else read(path, start, stop))
+
     def to_dataframe(self) -> pandas.DataFrame:
         """The history as a pandas DataFrame: one row per step, indexed by time.
 
