@@ -58,8 +58,8 @@ def warnings_of(simulation: Simulation, result: Result) -> list[str]:
     beyond = [e.criterion.replace("_", " ") for e in largest_exposures(result) if e.exposure > 1.0]
     if beyond:
         found.append(
-            f"exposure above 1 ({', '.join(beyond)}): the run goes on elastically, and what "
-            "follows the first failure is a bound"
+            f"exposure above 1 ({', '.join(beyond)}): the run goes on elastically, without the "
+            "softening that follows the first failure"
         )
     return found
 
