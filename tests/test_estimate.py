@@ -14,7 +14,6 @@ from fecm.api import load_deck
 from fecm.deck.model import Impact
 from fecm.results.result import Result
 from fecm.studies.estimate import estimate
-from fecm.sweeps.find import velocity_of_peak
 from tests.calls import call
 from tests.decks import MESH, PROGRAM, small
 
@@ -40,20 +39,6 @@ def test_the_row_of_the_run_is_the_run(tmp_path: Path) -> None:
     assert isinstance(full, Result)
     assert found["models"][1]["peak_force"] == pytest.approx(full.force.max(), rel=1e-9)
     assert found["models"][1]["threshold"] == pytest.approx(full.threshold["force"], rel=1e-12)
-
-
-def test_at_the_found_velocity_the_peak_is_the_threshold() -> None:
-    (problem,) = load_deck(deck("DELA\n.001,\n")).problems
-    assert problem.threshold is not None
-    velocity = velocity_of_peak(problem, problem.threshold.force)
-    segments = tuple(
-        replace(segment, velocity=velocity) if isinstance(segment, Impact) else segment
-        for segment in problem.deck.segments
-    )
-    found = fecm.run(replace(problem.deck, segments=segments, text=""))
-    assert isinstance(found, Result)
-    assert found.force.max() == pytest.approx(problem.threshold.force, rel=1e-5)
-    assert np.isnan(velocity_of_peak(problem, 1e12))
 
 
 def test_a_held_plate_has_a_static_model_with_its_own_stiffness() -> None:

@@ -16,7 +16,6 @@ from fecm.problem.problem import Problem
 from fecm.results.schema import jsonable
 from fecm.studies.estimate import estimate as estimate_problem
 from fecm.sweeps.api import carry_out
-from fecm.sweeps.find import velocity_of_peak
 from fecm.sweeps.plan import plan
 
 COLUMNS = ("model", "peak force", "duration", "threshold", "velocity", "energy")
@@ -63,7 +62,10 @@ def _run(problem: Problem, mass: float) -> dict[str, Any]:
     """The row of the run itself, by the kernel of sweeps."""
     threshold = math.nan if problem.threshold is None else problem.threshold.force
     own = carry_out(problem, plan(problem, [{}], history=False))
-    velocity = velocity_of_peak(problem, threshold) if threshold == threshold else math.nan
+    velocity = math.nan
+    if threshold == threshold:
+        found = carry_out(problem, plan(problem, [{}], until=threshold))
+        velocity = float(found["found_velocity"][0])
     return {
         "model": "run", "peak_force": float(own["peak_force"][0]),
         "duration": float(own["contact_time"][0]), "threshold": threshold, "velocity": velocity,

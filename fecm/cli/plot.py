@@ -62,7 +62,7 @@ def _by_name(
               help="3.5 in, or 7.2 in.  [default: column]")  # fmt: skip
 @click.option("--quantity", metavar="NAME",
               help="Quantity of map: a name of the sweep's summary; of failure: a criterion.  "
-                   "[default: peak_force; the largest of all criteria]")  # fmt: skip
+                   "[default: peak_force, found_velocity; the largest of all]")  # fmt: skip
 @click.option("--over", type=ListOf("NAME or NAME,NAME", click.STRING, [1, 2]),
               metavar="NAME[,NAME]",
               help="Parameters on the axes of map.  [default: those that vary]")  # fmt: skip

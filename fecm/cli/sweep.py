@@ -21,7 +21,7 @@ from fecm.results import hdf5_writer
 from fecm.simulation.run import simulate
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.batch import deck_of
-from fecm.sweeps.cases import CasesError, Value, grid, parse_vary, read_cases
+from fecm.sweeps.cases import CasesError, Value, grid, parse_until, parse_vary, read_cases
 from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.plan import Plan, Task, check_memory, freed, plan, tasks
 from fecm.sweeps.result import SweepResult, save, summary, verdict
@@ -38,6 +38,10 @@ from fecm.sweeps.store import PartialResults
                    "dt.")  # fmt: skip
 @click.option("--cases", "table", type=DECK_PATH, metavar="CASES.csv",
               help="A table instead of --vary: a header of names, one row per case.")  # fmt: skip
+@click.option("--find", type=click.Choice(["velocity"]),
+              help="Search in every case for the velocity at which --until holds.")  # fmt: skip
+@click.option("--until", type=Parsed(parse_until), metavar="peak_force=VALUE",
+              help="Peak force to reach: a number, or threshold, that of DELA.")  # fmt: skip
 @click.option("-o", "--output", type=FILE_PATH, metavar="SWEEP.h5",
               help="Result file.  [default: the deck's name with -sweep.h5, in this "
                    "folder]")  # fmt: skip
@@ -55,6 +59,8 @@ def sweep(
     deck: Path,
     varied: tuple[tuple[str, list[Value]], ...],
     table: Path | None,
+    find: str | None,
+    until: float | str | None,
     output: Path | None,
     history: bool,
     full: tuple[int, ...] | None,
@@ -70,8 +76,12 @@ def sweep(
     failed, for which the exit status is 1, and those that ended in contact.
     """
     path = output or Path(f"{deck.stem}-sweep.h5")
-    if bool(varied) == (table is not None):
+    if bool(varied) == (table is not None) and (varied or until is None):
         raise click.UsageError("give either --vary or --cases")
+    if (find is None) != (until is None):
+        raise click.UsageError("--find velocity and --until peak_force=VALUE belong together")
+    if full and find:
+        raise click.UsageError("--full runs given velocities: --vary velocity=FOUND --full 0")
     cases = grid(varied) if table is None else read_cases(table)
     chosen = tuple(dict.fromkeys(full or ()))
     if chosen and max(chosen) >= len(cases):
@@ -79,7 +89,7 @@ def sweep(
     fulls = {case: path.with_name(f"{path.stem}-{case}{path.suffix}") for case in chosen}
     check_outputs([path, *fulls.values()], overwrite, [deck] if table is None else [deck, table])
     problem = _problem(deck)
-    planned = plan(problem, cases, history=history)
+    planned = plan(problem, cases, history=history, until=until)
     check_memory(problem, planned, 0 if scheduler is not None else workers)
     if count := freed(tasks(problem, planned)):
         note(

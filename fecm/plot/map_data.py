@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from fecm.plot.kinds import PlotError, warn
 from fecm.plot.style import COLOURS, Scale, peak, scale, superscript
+from fecm.results.metrics import COLUMNS
 from fecm.results.metrics import INTEGERS as WHOLE_NUMBERS
-from fecm.results.metrics import METRICS
 from fecm.sweeps.cases import INTEGERS as WHOLE_VALUES
 from fecm.sweeps.cases import TEXTS
 from fecm.sweeps.outcome import RUN, STILL
@@ -115,6 +115,7 @@ def choose(
         If the options do not fit the sweep, or no case remains.
     """
     rows = _rows(sweep, name, where)
+    quantity = quantity or ("found_velocity" if "found_velocity" in sweep.summary else "peak_force")
     varying = [n for n, values in sweep.cases.items() if len(np.unique(values[rows])) > 1]
     axes = [_parameter(sweep, parameter, rows) for parameter in _over(sweep, name, varying, over)]
     others = [parameter for parameter in varying if parameter not in [axis.name for axis in axes]]
@@ -214,7 +215,7 @@ def _check_others(axes: list[Axis], others: list[str], other: Axis | None) -> No
 
 def _quantity(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
     """The quantity to show, with a note about cases that lack it."""
-    known = [name for name in sweep.summary if name in METRICS]
+    known = [name for name in sweep.summary if name in COLUMNS]
     if quantity not in known:
         raise PlotError(f"unknown quantity {quantity}; the sweep has {_listed(known)}")
     status, values = sweep["status"][rows], sweep[quantity][rows].astype(float)

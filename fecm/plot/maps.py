@@ -51,7 +51,7 @@ class MapGrid:
 def parameter_map(
     results: Mapping[str, SweepResult],
     *,
-    quantity: str = "peak_force",
+    quantity: str = "",
     over: Sequence[str] = (),
     where: Mapping[str, float | str] | None = None,
     level: Sequence[float] = (),
@@ -68,7 +68,7 @@ def parameter_map(
     results : mapping of str to SweepResult
         One sweep.
     quantity : str
-        A name of the sweep's summary.
+        A name of the sweep's summary; the peak force, or the velocity found, if empty.
     over : sequence of str
         One or two parameters; by default all that vary.
     where : mapping of str to float or str

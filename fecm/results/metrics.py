@@ -39,6 +39,12 @@ METRICS = {
     "max_deflection": ("largest displacement of the plate under the load", "length"),
     **THRESHOLD,
 }
+# Those of a search for velocities, and all of a sweep.
+FOUND = {
+    "found_velocity": ("velocity at which the peak force reaches the value", "length/time"),
+    "found_energy": ("kinetic energy of the projectile at that velocity", "force*length"),
+}
+COLUMNS = {**METRICS, **FOUND}
 INTEGERS = ("contacts",)
 # Peaks: valid even if the run ends in contact, unless they occur at the end.
 PEAKS = ("peak_force", "time_of_peak", "max_indentation")

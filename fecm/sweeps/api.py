@@ -116,6 +116,7 @@ def sweep(
     vary: Mapping[str, Sequence[Any]] | None = None,
     cases: Iterable[Mapping[str, Any]] | None = None,
     *,
+    until: float | str | None = None,
     history: bool = False,
     workers: int = 1,
     scheduler: str | None = None,
@@ -131,6 +132,9 @@ def sweep(
         Values by name; all combinations are run.
     cases : iterable of mapping, optional
         Cases instead, one mapping each.
+    until : float or str, optional
+        Search in every case for the velocity at which the peak force reaches this value;
+        ``"threshold"``: the delamination threshold.  Without `vary` and `cases`, of the deck alone.
     history : bool
         Store the contact force of every step.
     workers : int
@@ -164,17 +168,18 @@ def sweep(
     >>> [f"{force:.3f}" for force in found["peak_force"]]
     ['36.058', '86.202']
     """
-    if (vary is None) == (cases is None):
+    if (vary is None) == (cases is None) and not (vary is None and until is not None):
         raise CasesError("give either vary or cases")
     made: list[Case]
-    if vary is not None:
+    if cases is None:
+        vary = vary or {}
         values = [(name, [case[name] for case in checked({name: v} for v in vary[name])])
                   for name in vary]  # fmt: skip
         made = grid(values)
     else:
-        made = checked(cases or ())
+        made = checked(cases)
     problem = problem_of(deck)
-    planned = plan(problem, made, history=history)
+    planned = plan(problem, made, history=history, until=until)
     check_memory(problem, planned, 0 if scheduler is not None else workers)
     result = carry_out(problem, planned, workers=workers, scheduler=scheduler)
     if output is not None:

@@ -6,8 +6,9 @@ then stepped once under a unit force; every case follows by convolution with its
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,10 +38,16 @@ from fecm.simulation.guard import ENERGY_WARNING
 from fecm.simulation.run import simulate
 from fecm.sweeps.cases import CasesError
 from fecm.sweeps.clock import Clock, with_time_step
-from fecm.sweeps.outcome import Outcome, merge, status_of
-from fecm.sweeps.plan import ADVANCED, Plan, Task, shares_plate, without_output
+from fecm.sweeps.find import search
+from fecm.sweeps.outcome import RUN, Outcome, merge, status_of
+from fecm.sweeps.plan import ADVANCED, THRESHOLD, Plan, Task, shares_plate, without_output
 from fecm.sweeps.responses import BLOCK, Convolution, TipState, TipSteps, plate_response
 from fecm.sweeps.vary import apply_case
+
+# Runs decks by their numbers; doubtful ones in full if they are judged.
+Runs = Callable[[list[int], list[Deck], bool], Outcome]
+# Relative difference of the peak force from the value searched, beyond which it jumps.
+ROUGH = 1e-4
 
 
 def run(task: Task) -> Outcome:
@@ -66,15 +73,66 @@ def run(task: Task) -> Outcome:
         except CasesError as error:
             lost |= dict.fromkeys(numbers, str(error))
         else:
-            if shares_plate(checked):
-                parts.append(_together(numbers, decks, checked))
-            else:
-                pairs = zip(numbers, decks, strict=True)
-                parts += [_alone(number, replace(checked, deck=deck)) for number, deck in pairs]
+            runs = _runs(checked)
+            parts.append(
+                runs(numbers, decks, True)
+                if task.until is None
+                else _found(numbers, decks, _force(checked, task.until), runs)
+            )
     if lost:
         parts.append(Outcome.failed(list(lost), list(lost.values())))
     outcome = merge(parts)
     return outcome if task.history else replace(outcome, force=None)
+
+
+def _runs(checked: Problem) -> Runs:
+    """Return the function that runs decks which share the plate of a problem."""
+    if shares_plate(checked):
+        return partial(_together, checked, _plate(checked))
+    return lambda numbers, decks, judged: merge(
+        [_alone(n, replace(checked, deck=deck)) for n, deck in zip(numbers, decks, strict=True)]
+    )
+
+
+def _force(checked: Problem, until: float | str) -> float:
+    """Peak force to reach."""
+    return (
+        float(until)
+        if checked.threshold is None or until != THRESHOLD
+        else (checked.threshold.force)
+    )
+
+
+def _found(numbers: list[int], decks: list[Deck], force: float, runs: Runs) -> Outcome:
+    """Run cases at the velocities at which their peaks reach a force."""
+
+    def at(pairs: Iterable[tuple[int, float]]) -> list[Deck]:
+        return [apply_case(decks[case], {"velocity": velocity}) for case, velocity in pairs]
+
+    def peaks(pairs: list[tuple[int, float]]) -> Floats:
+        return runs(list(range(len(pairs))), at(pairs), False).columns["peak_force"]
+
+    found = search([deck.require(Impact).velocity for deck in decks], force, peaks)
+    pairs = [(case, v) for case, v in enumerate(found) if isinstance(v, float)]
+    reasons = {numbers[case]: v for case, v in enumerate(found) if isinstance(v, str)}
+    parts = [Outcome.failed(list(reasons), list(reasons.values()))]
+    if pairs:
+        outcome = runs([numbers[case] for case, _ in pairs], at(pairs), True)
+        velocity = np.array([v for _, v in pairs])
+        mass = np.array([build_projectile(decks[case]).total_mass for case, _ in pairs])
+        peak, fine = outcome.columns["peak_force"], np.isin(outcome.columns["status"], RUN)
+        outcome.columns |= {"found_velocity": velocity, "found_energy": 0.5 * mass * velocity**2}
+        right = fine & (np.abs(peak - force) <= ROUGH * force)
+        parts.append(outcome.select(np.flatnonzero(right)))
+        for row in np.flatnonzero(~right):
+            text = f"at velocity {velocity[row]:.6g}: {outcome.status[row]}"
+            if fine[row]:
+                text = (
+                    f"no peak force of {force:.6g}: from velocity {velocity[row]:.6g} on it is "
+                    f"{peak[row]:.6g}, and below it jumps or the run ends before its peak"
+                )
+            parts.append(Outcome.failed([outcome.numbers[row]], [text]))
+    return merge(parts)
 
 
 def deck_of(plan: Plan, case: int) -> Deck:
@@ -147,13 +205,33 @@ def _threshold(checked: Problem) -> float | None:
     return None if checked.threshold is None else checked.threshold.force
 
 
-def _together(numbers: list[int], decks: list[Deck], checked: Problem) -> Outcome:
-    """Run cases that share a plate by its response to a unit force."""
+@dataclass(frozen=True)
+class Plate:
+    """Response of a plate to a unit force in its first step of size `dt`, and the mass it moves."""
+
+    response: Floats
+    dt: float
+    node_mass: float
+
+
+def _plate(checked: Problem) -> Plate:
     setup = build_model(checked)
     if setup.impact is None:
         raise ValueError("the deck has no impact")
-    steps = checked.work.steps
-    dt = _time_step(checked)
+    load, dt = setup.impact.contact.load, _time_step(checked)
+    with np.errstate(all="ignore"):
+        response = plate_response(setup.motion, load, dt, checked.work.steps)
+        return Plate(response, dt, 1.0 / load.inverse_mass)
+
+
+def _together(
+    checked: Problem, plate: Plate, numbers: list[int], decks: list[Deck], judged: bool
+) -> Outcome:
+    """Run cases that share a plate by its response to a unit force.
+
+    Those with doubtful energies are run in full if they are judged.
+    """
+    steps, dt = len(plate.response), plate.dt
     projectiles = [build_projectile(deck) for deck in decks]
     kinds = {projectile: number for number, projectile in enumerate(dict.fromkeys(projectiles))}
     # Cases with the same projectile are adjacent.
@@ -161,17 +239,15 @@ def _together(numbers: list[int], decks: list[Deck], checked: Problem) -> Outcom
     kind = np.array([kinds[projectiles[case]] for case in order], dtype=np.intp)
     require(ADVANCED * steps * len(decks), f"{len(decks)} cases of {steps} steps")
     with np.errstate(all="ignore"):
-        response = plate_response(setup.motion, setup.impact.contact.load, dt, steps)
         rods = [WilsonStep(rod.stiffness(), rod.mass(), dt) for rod in kinds]
         law = HystereticLaw(stacked([build_law(decks[case]).constants for case in order]))
         speed = np.array([decks[case].require(Impact).velocity for case in order])
-        node_mass = 1.0 / setup.impact.contact.load.inverse_mass
         tips = TipSteps(rods, kind, steps)
-        found = impacts(response, tips, law, speed, node_mass)
+        found = impacts(plate.response, tips, law, speed, plate.node_mass)
         times = np.add.accumulate(np.full(steps, dt))
         mass = np.array([projectiles[case].total_mass for case in order])
         summary = summarise(found.force, times, found.indentation, mass, speed, _threshold(checked))
-        error = balance_errors(found, tips, list(kinds), kind, speed)
+        error = balance_errors(found, tips, list(kinds), kind, speed) if judged else 0.0 * speed
     back = np.argsort(order)
     force = np.ascontiguousarray(found.force.T[back])
     unsettled = found.unconverged_steps[back]
@@ -184,7 +260,7 @@ def _together(numbers: list[int], decks: list[Deck], checked: Problem) -> Outcom
     }
     outcome = Outcome(numbers, columns, force)
     doubtful = np.flatnonzero(~(error[back] < ENERGY_WARNING) | (unsettled > 0))
-    if not len(doubtful):
+    if not (judged and len(doubtful)):
         return outcome
     rest = np.setdiff1d(np.arange(len(numbers)), doubtful)
     # Cases near the limits of a run are run in full, which accepts or rejects them.

@@ -65,6 +65,20 @@ def parse_vary(text: str) -> tuple[str, list[Value]]:
     return name, [_value(name, part) for part in _split(text_of_values)]
 
 
+def parse_until(text: str) -> float | str:
+    """Read ``peak_force=NUMBER`` or ``peak_force=threshold``.
+
+    Raises
+    ------
+    CasesError
+        If the text has neither form.
+    """
+    name, _, value = (part.strip() for part in text.partition("="))
+    if name != "peak_force" or not value:
+        raise CasesError(f"`{text}`: write peak_force=NUMBER or peak_force=threshold")
+    return value if value == "threshold" else _number(name, value)
+
+
 def grid(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
     """Return every combination of the values; the last name varies fastest.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -12,17 +13,20 @@ from typing import Any
 from fecm import _memory
 from fecm._version import __version__
 from fecm.deck.macros import Body, Loop, flat
-from fecm.deck.model import Boundary, Deck
+from fecm.deck.model import Boundary, Deck, Delamination, Impact
 from fecm.problem.memory import needed_bytes
 from fecm.problem.problem import Problem
 from fecm.sweeps.cases import CONTACT, LOAD, PLATE, Case, CasesError
 from fecm.sweeps.clock import Clock, clock_of
+from fecm.sweeps.find import COUNT
 from fecm.sweeps.vary import apply_case
 
 # Cases advanced together; fixed, because the last digit of sums depends on it.
 TOGETHER = 1024
 # Bytes per step and case advanced together: above the measured value.
 ADVANCED = 28
+# Delamination threshold instead of a number.
+THRESHOLD = "threshold"
 
 
 @dataclass(frozen=True)
@@ -39,16 +43,19 @@ class Plan:
         Whether contact forces are stored.
     clock : Clock or None
         Rule for the time step of each plate; None if the deck's time step applies to all.
+    until : float or str or None
+        Peak force whose velocity is searched in every case: a number, or ``"threshold"``.
     """
 
     deck: Deck
     cases: tuple[Case, ...]
     history: bool = False
     clock: Clock | None = None
+    until: float | str | None = None
 
     def fingerprint(self) -> str:
         """Hash that identifies this sweep."""
-        parts = [__version__, self.deck.to_text(), self.cases, self.history, TOGETHER]
+        parts = [__version__, self.deck.to_text(), self.cases, self.history, TOGETHER, self.until]
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
@@ -68,21 +75,36 @@ class Task(Plan):
     numbers: tuple[int, ...] = ()
 
 
-def plan(checked: Problem, cases: Sequence[Case], *, history: bool = False) -> Plan:
+def plan(
+    checked: Problem,
+    cases: Sequence[Case],
+    *,
+    history: bool = False,
+    until: float | str | None = None,
+) -> Plan:
     """Create the plan of a sweep.
 
     Raises
     ------
     CasesError
-        If the deck has no impact, or there are no cases.
+        If the deck has no impact, there are no cases, or a search of velocities lacks something.
     """
     if not any(macro.word == "RODP" for macro in checked.deck.macros):
         raise CasesError("the deck has no impact step (RODP); there is nothing to sweep")
     if not cases:
         raise CasesError("a sweep needs at least one case")
+    if until is not None:
+        if "velocity" in cases[0]:
+            raise CasesError("velocity is what is searched; it can't be varied as well")
+        if not checked.deck.require(Impact).velocity:
+            raise CasesError("the search begins at the velocity of ROD, which must not be 0")
+        if until == THRESHOLD and checked.deck.last(Delamination) is None:
+            raise CasesError("the threshold needs a DELA segment, which the deck does not have")
+        if until != THRESHOLD and not (isinstance(until, float | int) and 0.0 < until < math.inf):
+            raise CasesError(f"the peak force to reach is a positive number, not {until}")
     own = "dt" not in cases[0] and not {*LOAD, *CONTACT}.issuperset(cases[0])
     clock = clock_of(checked) if own else None
-    return Plan(checked.deck, tuple(cases), history, clock)
+    return Plan(checked.deck, tuple(cases), history, clock, until)
 
 
 def shares_plate(checked: Problem) -> bool:
@@ -98,9 +120,15 @@ def shares_plate(checked: Problem) -> bool:
     )
 
 
+def _together(checked: Problem, made: Plan) -> int:
+    """Most runs advanced together."""
+    runs = len(made.cases) * (1 if made.until is None else COUNT)
+    return min(TOGETHER, runs) if shares_plate(checked) else 1
+
+
 def tasks(checked: Problem, made: Plan) -> list[Task]:
     """Split a plan into tasks: cases that share a plate together, full runs one by one."""
-    together = TOGETHER if shares_plate(checked) else 1
+    together = max(1, _together(checked, made) // (1 if made.until is None else COUNT))
     groups: dict[tuple[object, ...], list[int]] = {}
     for number, case in enumerate(made.cases):
         key = tuple(case[name] for name in PLATE if name in case)
@@ -110,7 +138,9 @@ def tasks(checked: Problem, made: Plan) -> list[Task]:
         for start in range(0, len(numbers), together):
             some = tuple(numbers[start : start + together])
             cases = tuple(made.cases[n] for n in some)
-            found.append(Task(made.deck, cases, made.history, made.clock, len(found), some))
+            found.append(
+                Task(made.deck, cases, made.history, made.clock, made.until, len(found), some)
+            )
     return found
 
 
@@ -159,7 +189,6 @@ def check_memory(checked: Problem, made: Plan, workers: int) -> None:
         If the sweep needs more memory than is free; the message states both.
     """
     steps, cases = checked.work.steps, len(made.cases)
-    together = min(TOGETHER, cases) if shares_plate(checked) else 1
     at_once = min(workers, len(tasks(checked, made)))
     plate = replace(checked, program=without_output(checked.program))
     kept = KEPT * steps * cases if made.history else 0
@@ -167,7 +196,7 @@ def check_memory(checked: Problem, made: Plan, workers: int) -> None:
     def needed(exact: bool) -> int:
         if not at_once:
             return kept
-        one = needed_bytes(plate, exact=exact) + ADVANCED * steps * together
+        one = needed_bytes(plate, exact=exact) + ADVANCED * steps * _together(checked, made)
         return kept + at_once * one
 
     def remedy(free: int) -> str:

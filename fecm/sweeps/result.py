@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fecm._version import __version__
 from fecm.deck.model import Delamination
 from fecm.deck.units import unit_names, unit_of
-from fecm.results.metrics import METRICS, SUMMARY, THRESHOLD
+from fecm.results.metrics import COLUMNS, FOUND, SUMMARY, THRESHOLD
 from fecm.results.schema import FORMAT_VERSION, SWEEP, Dataset, ResultFileError, declared_units
 from fecm.sweeps.outcome import RUN, STILL, Outcome
 from fecm.sweeps.plan import Plan
@@ -31,15 +31,23 @@ LISTED = 5
 
 
 def summary(result: SweepResult) -> list[str]:
-    """Return summary lines: number of cases, smallest and largest peak force, failures."""
+    """Return summary lines: number of cases, smallest and largest peak or velocity, failures."""
     fine = result.fine
     lines = [f"cases             {len(result)}"]
-    force = np.where(fine, result["peak_force"], np.nan)
-    if np.isfinite(force).any():
-        for word, case in (("smallest", np.nanargmin(force)), ("largest", np.nanargmax(force))):
+    word, names = "peak", ["peak_force"]
+    if "found_velocity" in result.summary:
+        word, names = "found", ["found_velocity", "found_energy"]
+    shown = np.where(fine, result[names[0]], np.nan)
+    if np.isfinite(shown).any():
+        for size, case in (("smallest", np.nanargmin(shown)), ("largest", np.nanargmax(shown))):
             values = ", ".join(f"{name} {values[case]}" for name, values in result.cases.items())
-            peak = f"{force[case]:.6g} {result.unit('peak_force')}".rstrip()
-            lines.append(f"{word + ' peak':17} {peak} ({values})")
+            texts = [
+                f"{result[n][case]:.{8 if n in FOUND else 6}g} {result.unit(n)}" for n in names
+            ]
+            found = ", ".join(text.rstrip() for text in texts)
+            lines.append(
+                f"{size} {word:{16 - len(size)}} {found}{f' ({values})' if values else ''}"
+            )
     reasons = Counter(result["status"][~fine].tolist())
     for reason, times in reasons.most_common(LISTED):
         lines.append(f"failed            {times}: {reason}")
@@ -135,7 +143,7 @@ class SweepResult:
 
     def unit(self, name: str) -> str:
         """Return the unit of a value or result; empty if the deck states none."""
-        dimension = METRICS[name][1] if name in METRICS else DIMENSIONS.get(name, "")
+        dimension = COLUMNS[name][1] if name in COLUMNS else DIMENSIONS.get(name, "")
         return unit_of(dimension, self.units)
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -148,7 +156,7 @@ class SweepResult:
 
     def plot(
         self,
-        quantity: str = "peak_force",
+        quantity: str = "",
         over: str | Sequence[str] = (),
         path: str | Path | None = None,
         **options: Any,
@@ -158,7 +166,7 @@ class SweepResult:
         Parameters
         ----------
         quantity : str
-            Name in the summary.
+            Name in the summary; the peak force, or the velocity found, if empty.
         over : str or sequence of str
             One or two names of varied values; all varied values if empty.
         path : str or Path, optional
@@ -189,7 +197,8 @@ def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
     names = list(plan.cases[0])
     cases = {name: np.array([case[name] for case in plan.cases]) for name in names}
     columns, deck = outcome.columns, plan.deck
-    found = (*SUMMARY, *(THRESHOLD if deck.last(Delamination) else ()), "status")
+    found = [*SUMMARY, *(THRESHOLD if deck.last(Delamination) else ())]
+    found += [*(FOUND if plan.until is not None else ()), "status"]
     none = np.full(len(plan.cases), np.nan)
     return SweepResult(
         cases, {name: columns.get(name, none) for name in found},
@@ -219,8 +228,8 @@ def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
     columns = [
         *((f"cases/{name}", values, f"{name} of every case", DIMENSIONS.get(name, ""))
           for name, values in result.cases.items()),
-        *((f"summary/{name}", values, *METRICS[name])
-          for name, values in result.summary.items() if name in METRICS),
+        *((f"summary/{name}", values, *COLUMNS[name])
+          for name, values in result.summary.items() if name in COLUMNS),
         ("summary/status", result.summary["status"],
          "ok, still in contact, or why the case failed", ""),
         ("history/dt", result.dt, "time step of every case", "time"),
@@ -293,7 +302,7 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     unconverged_steps = contents.get("history/unsettled_steps")
     rows += () if unconverged_steps is None else (unconverged_steps,)
     shape = contents.shapes.get("history/force")
-    kinds = {name: summary[name].dtype.kind for name in METRICS if name in summary}
+    kinds = {name: summary[name].dtype.kind for name in COLUMNS if name in summary}
     if (
         any(values.shape != count for values in rows)
         or (shape is not None and (len(shape), shape[:1]) != (2, count))

@@ -1,0 +1,101 @@
+"""fecm sweep --find velocity: velocities at which the peak force reaches a value."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm.results.metrics import FOUND
+from fecm.results.result import Result
+from fecm.sweeps.find import search
+from tests.calls import assert_unusable, call
+from tests.decks import DATA_CARDS, PROGRAM, small
+
+FIND = ("--find", "velocity", "--until")
+PLATE = DATA_CARDS.replace("EXPE", "DELA\n.2,\nEXPE")
+
+
+def deck(steps: int, data: str = PLATE) -> str:
+    """A small plate, which the projectile has left after 400 steps."""
+    return small(PROGRAM.replace(" 10\n", f"{steps:3}\n"), data=data)
+
+
+def test_the_peak_of_a_power_law_is_found_to_1e_6() -> None:
+    factors, rounds = (0.5, 3.0, 1e4, 1e-9), 0
+
+    def peaks(pairs: list[tuple[int, float]]) -> Any:
+        nonlocal rounds
+        rounds += 1
+        return np.array([factors[n] * v**1.2 for n, v in pairs])
+
+    *found, low, high = search([2.0, 2.0, 2.0, 2.0], 7.0, peaks)
+    for n, velocity in enumerate(found):
+        assert velocity == pytest.approx((7.0 / factors[n]) ** (1.0 / 1.2), rel=1e-6)
+    assert low == "the peak force is above 7 from velocity 0.02 on"
+    assert high == "the peak force is below 7 up to velocity 200"
+    assert rounds <= 4
+
+
+def test_a_run_at_the_found_velocity_has_the_threshold_as_its_peak(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(deck(400))
+    done = call("sweep", "d.inp", *FIND, "peak_force=threshold", "-o", "s.h5", cwd=tmp_path)
+    assert done.exit_code == 0
+    found = fecm.load_sweep(tmp_path / "s.h5")
+    (velocity,) = found["found_velocity"]
+    assert f"smallest found    {velocity:.8g}, " in done.stdout
+    result = fecm.run(deck(400).replace("   13    3     115.0", f"13,3,{velocity:.10g}"))
+    assert isinstance(result, Result)
+    assert result.force.max() == pytest.approx(result.threshold["force"], rel=1e-5)
+    assert found["peak_force"][0] == pytest.approx(result.force.max(), rel=1e-8)
+    # The mass of the report's rod is 1.8096e-4.
+    assert found["found_energy"][0] == pytest.approx(0.5 * 1.8096e-4 * velocity**2, rel=1e-4)
+
+
+def test_a_case_among_others_equals_a_search_of_its_own() -> None:
+    vary: dict[str, list[Any]] = {"layup": ["[0/90]", "[0/0]"], "k": [1e6, 3e6]}
+    together = fecm.sweep(deck(400), vary, until="threshold")
+    assert tuple(together.summary)[-3:] == (*FOUND, "status")
+    own = {name: values[2] for name, values in together.cases.items()}
+    alone = fecm.sweep(deck(400), cases=[own], until=float(together["threshold_force"][2]))
+    velocity = together["found_velocity"][2]
+    assert alone["found_velocity"][0] == pytest.approx(velocity, rel=2e-6)
+    assert len(set(together["found_velocity"])) == 4
+
+
+def test_decks_that_are_run_in_full_are_searched_too() -> None:
+    force = "FORC\n    8    0       0.0       0.0      1E-9\n\n"
+    plain, loaded = (fecm.sweep(deck(50, data + PLATE), until=400.0) for data in ("", force))
+    assert loaded["found_velocity"][0] == pytest.approx(plain["found_velocity"][0], rel=1e-5)
+
+
+def test_what_is_not_reached_is_a_failed_case_with_its_reason(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(deck(100))
+    for force, words in (
+        ("1e7", "the peak force is below 1e+07 up to velocity 11500"),
+        ("0.5", "no peak force of 0.5: from velocity"),  # its run is too short
+    ):
+        options = (*FIND, f"peak_force={force}", "-o", "s.h5", "--overwrite")
+        done = call("sweep", "d.inp", *options, cwd=tmp_path)
+        assert (done.exit_code, words in done.stdout) == (1, True), done.stdout
+        found = fecm.load_sweep(tmp_path / "s.h5")
+        assert np.isnan(found["found_velocity"][0])
+        assert np.isnan(found["peak_force"][0])
+
+
+def test_a_search_that_makes_no_sense_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(deck(10, DATA_CARDS))
+    for options, words in (
+        ((*FIND, "peak_force=threshold"), "the threshold needs a DELA segment"),
+        ((*FIND, "peak_force=-3"), "a positive number, not -3"),
+        ((*FIND, "peak_force=3", "--vary", "velocity=1,2"), "velocity is what is searched"),
+        ((*FIND, "force=3"), "write peak_force=NUMBER or peak_force=threshold"),
+        (("--find", "velocity", "--vary", "k=1e6"), "belong together"),
+        ((*FIND, "peak_force=3", "--full", "0"), "--vary velocity=FOUND"),
+    ):
+        done = call("sweep", "d.inp", *options, cwd=tmp_path)
+        assert_unusable(done)
+        assert words in done.stderr
