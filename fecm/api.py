@@ -25,7 +25,6 @@ from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.simulation.run import simulate
 from fecm.simulation.simulation import Simulation
-from fecm.simulation.validity import warnings_of
 
 Mode = Literal["report", "listing"]
 Solver = Literal["auto", "csr"]
@@ -260,10 +259,10 @@ def _run(
         path = None if output is None else numbered(Path(output), number)
         title = problem.deck.title or prepared.source
         LOGGER.info("%s: %d steps", title, problem.work.steps)
-        result, doubts = _run_one(problem, choices, path, progress)
+        result = _run_one(problem, choices, path, progress)
         LOGGER.info("%s: done", title)
         result.findings = found
-        for note in (*result.notes, *doubts):
+        for note in result.notes:
             warnings.warn(FecmWarning(note), stacklevel=3)
         results.append(result)
     return results
@@ -271,8 +270,8 @@ def _run(
 
 def _run_one(
     problem: Problem, choices: RunOptions, path: Path | None, progress: Progress | None
-) -> tuple[Result, list[str]]:
-    """Run one problem, into a file if there is a path; also return assumptions that it leaves."""
+) -> Result:
+    """Run one problem, into a file if there is a path."""
 
     def report(simulation: Simulation) -> None:
         if progress is not None:
@@ -280,17 +279,14 @@ def _run_one(
 
     if path is None:
         memory = MemorySink()
-        simulation = simulate(problem, memory, choices, [report])
-        result = Result(memory.arrays, memory.texts, memory.groups)
-    else:
-        from fecm.results.hdf5_writer import writing
-        from fecm.results.result import load
+        report(simulate(problem, memory, choices, [report]))
+        return Result(memory.arrays, memory.texts, memory.groups)
+    from fecm.results.hdf5_writer import writing
+    from fecm.results.result import load
 
-        with writing(path) as sink:
-            simulation = simulate(problem, sink, choices, [report])
-        result = load(path)
-    report(simulation)
-    return result, warnings_of(simulation, result)
+    with writing(path) as sink:
+        report(simulate(problem, sink, choices, [report]))
+    return load(path)
 
 
 def numbered(path: Path, number: int) -> Path:

@@ -288,7 +288,8 @@ def test_a_run_that_passes_its_energy_limit_exits_1_and_leaves_no_file(tmp_path:
 
 def test_the_listings_rigid_target_is_warned_of_and_not_judged() -> None:
     problem = load_deck(LONG, "listing").problems[0]
-    simulation = simulate(problem, MemorySink(), RunOptions(active_slips("listing")))
-    assert len([note for note in simulation.state.notes if "as slips are active" in note]) == 1
-    sound = simulate(load_deck(LONG).problems[0], MemorySink())
-    assert sound.state.notes == []
+    sink, sound = MemorySink(), MemorySink()
+    simulate(problem, sink, RunOptions(active_slips("listing")))
+    assert len([note for note in sink.groups[""]["notes"] if "as slips are active" in note]) == 1
+    simulate(load_deck(LONG).problems[0], sound)
+    assert "notes" not in sound.groups[""]

@@ -15,6 +15,7 @@ import fecm
 from fecm.mechanics.contact_law import ContactPoint
 from fecm.results.groups import GROUPS, Exposure, Group
 from fecm.results.schema import DATASETS
+from tests.calls import call
 from tests.decks import APPENDIX, LONG, small
 
 
@@ -58,10 +59,71 @@ def test_each_warning_of_a_deck_is_a_warning_in_python_at_the_users_line() -> No
         result = fecm.run_one(APPENDIX)
     assert [finding.code for finding in result.findings] == ["W414", "W415"]
     texts = [str(warning.message) for warning in caught]
-    assert len(texts) == 2
+    assert len(texts) == 3
     assert "warning[W414]" in texts[0]
     assert "warning[W415]" in texts[1]
+    assert texts[2:] == list(result.notes)
     assert {warning.filename for warning in caught} == {__file__}
+
+
+def test_doubts_about_a_run_are_warnings_and_stay_with_the_result(tmp_path: Path) -> None:
+    path = tmp_path / "small.h5"
+    with pytest.warns(fecm.FecmWarning, match="the run ends in contact"):
+        result = fecm.run_one(small(), output=path)
+    assert any(note.startswith("the run ends in contact") for note in result.notes)
+    assert fecm.load(path).notes == fecm.run_one(small()).notes == result.notes
+    assert "note              the run ends in contact" in call("info", str(path)).stdout
+
+
+def test_a_saved_result_is_the_file_that_the_run_would_have_written(tmp_path: Path) -> None:
+    written, saved = tmp_path / "written.h5", tmp_path / "saved.h5"
+    fecm.run_one(small(), output=written)
+    result = fecm.run_one(small())
+    result.save(saved)
+    again = fecm.load(saved)
+    assert again.attributes == fecm.load(written).attributes
+    assert again.deck == result.deck
+    assert list(again) == list(fecm.load(written))
+    assert call("diff", str(written), str(saved)).exit_code == 0
+    with pytest.raises(OSError, match="exists already"):
+        result.save(saved)
+
+
+def with_units(text: str) -> str:
+    """A deck in inches, pounds and seconds."""
+    return text.replace("END\nMACR", "UNIT\nin lbf s\nEND\nMACR")
+
+
+def test_a_tree_of_arrays_has_named_dimensions_and_places_of_the_nodes() -> None:
+    pytest.importorskip("xarray")
+    result = fecm.run_one(with_units(small()))
+    tree = result.to_xarray()
+    assert tree["tape3"].displacement.dims == ("time", "node", "unknown")
+    assert tree.to_dataset().unknown.values.tolist() == ["u", "v", "w", "theta_x", "theta_y"]
+    np.testing.assert_array_equal(tree["tape3"].y, result.mesh.coordinates[:, 1])
+    np.testing.assert_array_equal(tree["history"].force.sel(time=result.time), result.force)
+    assert tree["history"].force.attrs["units"] == "lbf"
+
+
+def test_pint_converts_a_stored_history_to_newtons(tmp_path: Path) -> None:
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("pint_xarray")
+    pytest.importorskip("h5netcdf")
+    result = fecm.run_one(with_units(small()), output=tmp_path / "small.h5")
+    with xarray.open_dataset(tmp_path / "small.h5", group="history", engine="h5netcdf") as opened:
+        force = opened.force.pint.quantify().pint.to("newton").pint.magnitude
+    np.testing.assert_allclose(force, 4.4482216152605 * result.force, rtol=1e-12)
+
+
+def test_a_grid_of_pyvista_has_the_nodes_and_their_displacements() -> None:
+    pytest.importorskip("pyvista")
+    result = fecm.run_one(small())
+    grid = result.to_pyvista(float(result.tape3.time[0]))
+    np.testing.assert_array_equal(grid.points[:, :2], result.mesh.coordinates)
+    np.testing.assert_array_equal(grid.point_data["w"], result.tape3.w[0])
+    assert (grid.n_cells, set(grid.celltypes)) == (4, {28})
+    with pytest.raises(KeyError, match="no displacements at time 1"):
+        result.to_pyvista(1.0)
 
 
 def test_progress_counts_the_steps_up_to_the_last() -> None:

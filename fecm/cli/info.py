@@ -20,7 +20,7 @@ from fecm.sweeps.result import summary, sweep_of
 
 # Attributes of the file with lines of their own.
 HEADING = ("title", "mode", "slips", "fecm_version", "format", "format_version",
-           "unit_length", "unit_force", "unit_time")  # fmt: skip
+           "unit_length", "unit_force", "unit_time", "notes")  # fmt: skip
 
 # Those that are keys of the JSON output, of runs and of sweeps.
 RUN_KEYS, SWEEP_KEYS = HEADING[:6], ("title", "fecm_version", "format", "format_version")
@@ -90,6 +90,7 @@ def _page(about: Mapping[str, Any]) -> list[str]:
                        f"format version {about['format_version']}"),
         ("units", units or "the deck names none"),
         _extent(about),
+        *(("note", text) for text in about.get("notes", ())),
         *((name, shown(value)) for name, value in about["attributes"].items()),
     ]  # fmt: skip
     lines = [printable(str(about["title"] or "(no title)"))]

@@ -40,13 +40,12 @@ from fecm.results import hdf5_writer
 from fecm.results.info import about_run
 from fecm.results.result import Result, load
 from fecm.results.schema import declared_units, jsonable
-from fecm.results.summary import OPEN_END, largest_exposures, summary
+from fecm.results.summary import largest_exposures, summary
 from fecm.simulation.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
 from fecm.simulation.printout import Printer
 from fecm.simulation.run import run as simulate_run
 from fecm.simulation.simulation import Simulation
 from fecm.simulation.spool import Journal, SpoolError
-from fecm.simulation.validity import warnings_of
 
 
 @click.command()
@@ -206,10 +205,8 @@ def _run_one(
         simulate_run(simulation)
     checkpointer.clear()
     result = load(path)
-    for text in [*simulation.state.notes, *warnings_of(simulation, result)]:
+    for text in (*simulation.state.notes, *result.notes):
         note(text)
-    if result.still_in_contact:
-        note(OPEN_END)
     if form == "json":
         about = {"title": problem.deck.title, "result": str(path), "printed": printed}
         units = declared_units(result.attributes)

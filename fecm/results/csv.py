@@ -14,10 +14,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.deck.records import AXES, DOF_NAMES
 from fecm.results.plies import IN_PLANE, INTERLAMINAR
 from fecm.results.result import Result
-from fecm.results.schema import DATASETS, SCALES, STORED_BY, ExportError, remedy, suggestion
+from fecm.results.schema import (
+    AXIS_NAMES,
+    DATASETS,
+    SCALES,
+    STORED_BY,
+    ExportError,
+    remedy,
+    suggestion,
+)
 
 Array = NDArray[Any]
 
@@ -25,8 +32,7 @@ Array = NDArray[Any]
 CLOCK = ("step", "time", "number")
 # Axes with named positions become columns.
 NAMED: dict[str | int, tuple[str, ...]] = {
-    "ndf": DOF_NAMES,
-    "ndm": AXES,
+    **AXIS_NAMES,
     "nen": tuple(f"node_{n}" for n in range(1, 13)),
     3: ("xx", "yy", "xy"),
     2: ("xz", "yz"),

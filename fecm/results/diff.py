@@ -50,7 +50,7 @@ SOURCE_NAMES = {
 }
 
 # Names of the indices along each size of a dataset; rows are named by their step and time.
-AXES = {size: name for size, (name, _) in SCALES.items()} | {"nen": "position", "ndm": "axis"}
+AXES = {size: name for size, (name, _) in SCALES.items()}
 
 # Terms of energy/balance_error.
 ENERGIES = [

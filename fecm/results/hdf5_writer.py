@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._files import beside
-from fecm.deck.records import DOF_NAMES
 from fecm.deck.units import unit_of
 from fecm.results.schema import (
+    AXIS_NAMES,
     GROUP_DESCRIPTIONS,
     SCALES,
     Dataset,
@@ -65,24 +65,24 @@ class FileSink:
         if dataset.dimension:
             made.attrs["dimension"] = dataset.dimension
             if unit := unit_of(dataset.dimension, self._units):
-                made.attrs["unit"] = unit
+                made.attrs["unit"] = made.attrs["units"] = unit  # xarray and pint read units
         self._datasets[dataset.path] = made
         self._made.append(dataset)
 
     def label_axes(self) -> None:
-        """Attach dimension scales to every axis of datasets stored in rows, for xarray.
+        """Attach dimension scales to the axes of datasets, for xarray.
 
         HDF5 Dimension Scales Specification.  The scale of rows is the group's time; those of nodes,
         elements, points and dofs belong to the file, because a netCDF reader looks for dimensions
         in a group and its parents.  It needs all axes of a dataset labelled, or none.
         """
         made_of = [(d, self._datasets[d.path]) for d in self._made if d.path in self._datasets]
-        clocks = {d.group: made for d, made in made_of if d.name == TIME}
+        clocks = {d.group: made for d, made in made_of if d.name == TIME and d.shape[0] == "rows"}
         for clock in clocks.values():
             clock.make_scale(TIME)
         for dataset, made in made_of:
             clock = clocks.get(dataset.group)
-            if made == clock or (clock is None and dataset.group != "patch"):
+            if made == clock or not {*dataset.shape} <= {"rows", *SCALES}:
                 continue
             for axis, size in enumerate(dataset.shape):
                 rows = size == "rows"
@@ -91,10 +91,11 @@ class FileSink:
 
     def _scale(self, size: str, length: int) -> h5py.Dataset:
         """Scale of an axis, created on first use."""
-        name, description = SCALES.get(size, (size, ""))
+        name, description = SCALES[size]
         if name not in self._file:
-            if size == "ndf":
-                made = self._file.create_dataset(name, data=DOF_NAMES, dtype=h5py.string_dtype())
+            if size in AXIS_NAMES:
+                texts = AXIS_NAMES[size][:length]
+                made = self._file.create_dataset(name, data=texts, dtype=h5py.string_dtype())
             else:
                 made = self._file.create_dataset(name, data=np.arange(1, length + 1, dtype="i4"))
             made.make_scale(name)
@@ -131,6 +132,11 @@ class FileSink:
         """Rows of a dataset, read from the file."""
         return np.asarray(self._datasets[path][start:stop])
 
+    @property
+    def arrays(self) -> Mapping[str, Array]:
+        """Datasets that are stored so far, by path."""
+        return _Stored(self._datasets)
+
     def trim(self, path: str, rows: int) -> None:
         """Truncate a dataset to its first rows; delete it, or an empty group, without any."""
         old = self._datasets.pop(path)
@@ -149,6 +155,26 @@ class FileSink:
         """Store a text, or one text per row."""
         made = self._file.create_dataset(path, data=value, dtype=h5py.string_dtype())
         made.attrs["description"] = description
+
+
+class _Stored(Mapping[str, Array]):
+    """Datasets of an open file as arrays."""
+
+    def __init__(self, datasets: Mapping[str, h5py.Dataset]) -> None:
+        self._datasets = datasets
+
+    def __getitem__(self, path: str) -> Array:
+        return np.asarray(self._datasets[path])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._datasets)
+
+    def __len__(self) -> int:
+        return len(self._datasets)
+
+    def rows(self, path: str, start: int, stop: int) -> Array:
+        """Rows of a dataset."""
+        return np.asarray(self._datasets[path][start:stop])
 
 
 @contextlib.contextmanager

@@ -98,6 +98,7 @@ def about_run(result: Result) -> dict[str, Any]:
         "steps": steps,
         "time": result["history/time"][[0, -1]].tolist() if steps else None,
         "still_in_contact": result.still_in_contact,
+        "notes": list(result.notes),
         "metrics": {} if missing else result.metrics,
         "summary": missing or summary(result),
     }

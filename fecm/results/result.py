@@ -36,6 +36,7 @@ from fecm.results.groups import (
 from fecm.results.metrics import INTEGERS, METRICS, Indentation, summarise
 from fecm.results.schema import (
     DATASETS,
+    Dataset,
     NotStoredError,
     ResultFileError,
     declared_units,
@@ -44,6 +45,8 @@ from fecm.results.schema import (
 
 if TYPE_CHECKING:
     import pandas
+    import pyvista
+    import xarray
     from matplotlib.figure import Figure
 
     from fecm.deck.findings import Finding
@@ -160,13 +163,17 @@ class Result(Contact):
     @property
     def slips(self) -> tuple[str, ...]:
         """Names of the active slips, sorted."""
-        slips = self.attributes.get("slips", ())
-        return tuple(map(str, slips)) if isinstance(slips, list | tuple) else ()
+        return self._texts("slips")
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Reasons to doubt the result."""
-        return tuple(map(str, self.attributes.get("notes", ())))
+        return self._texts("notes")
+
+    def _texts(self, name: str) -> tuple[str, ...]:
+        """An attribute that is a list of texts; empty if it is not there."""
+        texts = self.attributes.get(name)
+        return tuple(map(str, texts)) if isinstance(texts, list | tuple) else ()
 
     @property
     def has_listing_tapes(self) -> bool:
@@ -250,6 +257,65 @@ class Result(Contact):
         columns = {path.partition("/")[2]: self[path] for path in dict.fromkeys(known + members)}
         index = pandas.Index(columns.pop("time"), name="time")
         return pandas.DataFrame(columns, index=index)
+
+    def to_xarray(self) -> xarray.DataTree:
+        """The result as a tree of labelled arrays; needs xarray.
+
+        Dimensions have the names of the file's scales (``time``, ``node``, ``element``, ...); x and
+        y of the nodes are coordinates; ``units`` are the deck's, as pint-xarray reads them.
+
+        Examples
+        --------
+        >>> tree = result.to_xarray()  # doctest: +SKIP
+        >>> tree["tape3"].w.sel(time=1e-4, method="nearest").max()  # doctest: +SKIP
+        """
+        from fecm.results.convert import to_xarray
+
+        return to_xarray(self)
+
+    def to_pyvista(self, time: float | None = None) -> pyvista.UnstructuredGrid:
+        """The plate with its displacements, w and rotations as point data; needs PyVista.
+
+        Parameters
+        ----------
+        time : float, optional
+            The nearest stored row is taken; by default the last.
+
+        Raises
+        ------
+        NotStoredError
+            If the result has no displacements, or none at this time.
+        """
+        from fecm.results.convert import to_pyvista
+
+        return to_pyvista(self, time)
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write the result as a file, such as one of a run in memory.
+
+        Raises
+        ------
+        OSError
+            If the file exists and may not be replaced, or can't be written.
+        """
+        from fecm._files import check_outputs
+        from fecm.results.hdf5_writer import writing
+
+        check_outputs([Path(path)], overwrite)
+        with writing(Path(path), overwrite=overwrite) as sink:
+            sink.attributes("", self.attributes)
+            sink.text("deck", self.deck, "the cards of the problem")
+            for name in self:
+                values = self[name]
+                own = Dataset(name, values.shape, "", dtype=values.dtype.name)
+                sink.create(DATASETS.get(name, own), values.shape)
+                sink.write(name, 0, values)
+            for group in filter(None, self._groups):
+                sink.attributes(group, self.attributes_of(group))
+
+    def attributes_of(self, group: str) -> dict[str, Any]:
+        """Attributes of a group; empty without the group."""
+        return dict(self._groups.get(group, {}))
 
     def plot(self, kind: str = "force", path: str | Path | None = None, **options: Any) -> Figure:
         """Draw a picture, and write it if a path is given.

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fecm._errors import FecmError
+from fecm.deck.records import AXES, DOF_NAMES
 from fecm.mechanics.failure import CRITERIA
 
 
@@ -330,6 +331,8 @@ FIXED = {"faces": 2, "levels": 3, "directions": 2}
 SCALES = {
     "numnp": ("node", "number of the node"),
     "numel": ("element", "number of the element"),
+    "ndm": ("axis", "name of the coordinate"),
+    "nen": ("position", "position of the node in its element, from 1"),
     "npt": ("point", "number of the point in its element"),
     "nps": ("stress_point", "number of the stress point in its element"),
     "ndf": ("unknown", "name of the unknown"),
@@ -337,11 +340,14 @@ SCALES = {
     "members": ("member", "position of the element among those with ply stresses, from 1"),
     "npp": ("ply_point", "number of the point in its element"),
     "layers": ("ply", "number of the ply, from z = -h/2"),
+    "interfaces": ("interface", "number of the interface, from 1 between plies 1 and 2"),
     "faces": ("face", "face of the ply: 1 at its lower z, 2 at its upper z"),
     "levels": ("level", "level in the ply: 1 at its lower z, 2 at its middle, 3 at its upper z"),
     "directions": ("direction", "1 is xz, 2 is yz"),
     "gages": ("gage", "position of the gage among the gages, from 1"),
 }
+# Names of the positions of some axes.
+AXIS_NAMES: dict[str | int, tuple[str, ...]] = {"ndf": DOF_NAMES, "ndm": AXES}
 
 
 def shape_error(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str]) -> str:

@@ -21,6 +21,11 @@ Array = NDArray[Any]
 class Sink(Protocol):
     """Receives a result."""
 
+    @property
+    def arrays(self) -> Mapping[str, Array]:
+        """Datasets that are stored so far, by path."""
+        ...
+
     def attributes(self, group: str, values: Mapping[str, Any]) -> None:
         """Set attributes of a group; ``""`` is the file itself."""
         ...

@@ -64,7 +64,7 @@ def write_vtkhdf(
         )
     # A state stored twice is one time step.
     steps, rows = np.unique(result["tape3/step"], return_index=True)
-    cells = _cells(result["mesh/elements"])
+    cells = vtk_cells(result["mesh/elements"])
     with new_hdf5(path, overwrite=overwrite) as (file, _):
         root = file.create_group("VTKHDF")
         root.attrs["Version"] = np.array(VERSION, dtype="i8")
@@ -77,7 +77,7 @@ def write_vtkhdf(
         _write_plies(root, result, steps, note)
 
 
-def _cells(elements: Array) -> tuple[Ints, Ints, Ints]:
+def vtk_cells(elements: Array) -> tuple[Ints, Ints, Ints]:
     """Connectivity, offsets and types; elements that VTK lacks are reduced to corners."""
     count = np.cumprod(elements > 0, axis=1).sum(axis=1)  # nodes before the first absent one
     whole = (count == (elements > 0).sum(axis=1)) & np.isin(count, list(TYPES))

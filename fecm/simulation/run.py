@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from fecm._version import __version__
-from fecm.deck.model import Material
+from fecm.deck.model import Deck, Material
 from fecm.deck.units import unit_names
+from fecm.mechanics.failure import MODES
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.problem.options import RunOptions
 from fecm.problem.problem import Problem
 from fecm.problem.slips import mode_of
+from fecm.results.result import Result
 from fecm.results.schema import FORMAT, FORMAT_VERSION
 from fecm.results.sinks import Sink
+from fecm.results.summary import OPEN_END
 from fecm.simulation.guard import ENERGY_WARNING, likely_cause
 from fecm.simulation.macros import bind
 from fecm.simulation.simulation import Observer, Simulation
+from fecm.simulation.validity import warnings_of
 
 
 def simulate(
@@ -83,12 +88,17 @@ def _write_header(simulation: Simulation) -> None:
         "slips": sorted(options.slips),
         **options.rod_method.attributes,
         **({} if options.law is None else {"law": type(options.law).__name__}),
-        **{f"unit_{name}": unit for name, unit in unit_names(deck).items()},
+        **_units(deck),
     }
     sink.attributes("", attributes)
     sink.text("deck", deck.text or deck.to_text(), "the cards of the problem")
     at_nodes = deck.require(Material).integration.points < 0 and not rules.listing_tapes
     simulation.recorder.create("nodes" if at_nodes else "gauss")
+
+
+def _units(deck: Deck) -> dict[str, str]:
+    """Attributes that name the units; empty without UNIT."""
+    return {f"unit_{name}": unit for name, unit in unit_names(deck).items()}
 
 
 def _write_footer(simulation: Simulation) -> None:
@@ -111,16 +121,26 @@ def _write_footer(simulation: Simulation) -> None:
 
 
 def _judge(simulation: Simulation) -> None:
-    """Add notes on reasons to doubt the result."""
+    """Store reasons to doubt the result, if there are any."""
+    notes: list[str] = []
     state, enforced = simulation.state, simulation.rules.enforces_energy_limit
     error, step = state.balance.worst_error, state.balance.worst_step
     if error > ENERGY_WARNING:
         why = "" if enforced else " (not a failure, as slips are active)"
-        state.notes.append(
+        notes.append(
             f"the energy balance is off by {error:.2%} of the supplied energy, at step {step}{why}"
         )
     if state.impact is not None and state.impact.unconverged_steps and enforced:
-        state.notes.append(
+        notes.append(
             f"the contact iteration did not converge in {state.impact.unconverged_steps} "
             "steps; a smaller DT helps"
         )
+    groups: dict[str, dict[str, Any]] = {
+        "": _units(simulation.problem.deck), "failure": {"modes": list(MODES)}
+    }  # fmt: skip
+    result = Result(simulation.sink.arrays, {}, groups)
+    notes += warnings_of(simulation, result)
+    if result.still_in_contact:
+        notes.append(OPEN_END)
+    if notes:
+        simulation.sink.attributes("", {"notes": notes})

@@ -85,6 +85,11 @@ class Journal:
         self._new.append(entry)
         self._sink.text(path, value, description)
 
+    @property
+    def arrays(self) -> Mapping[str, Array]:
+        """Datasets that are stored so far, by path."""
+        return self._sink.arrays
+
     def spool(self, file: BinaryIO) -> Part:
         """Append the new operations to the spool and sync it.
 
