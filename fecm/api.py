@@ -250,9 +250,10 @@ def _run(
     prepared: LoadedDeck, choices: RunOptions, output: str | Path | None, progress: Progress | None
 ) -> list[Result]:
     """Run the problems of a deck; warn as the caller's caller."""
-    found = tuple(finding for finding in prepared.findings if finding.severity == "warning")
+    found = tuple(finding for finding in prepared.findings if finding.severity != "error")
     for finding in found:
-        warnings.warn(FecmWarning(finding.render(prepared.source)), stacklevel=3)
+        if finding.severity == "warning":
+            warnings.warn(FecmWarning(finding.render(prepared.source)), stacklevel=3)
     results: list[Result] = []
     for number, problem in enumerate(prepared.problems, start=1):
         check_memory(problem, solver=choices.solver, in_memory=output is None)

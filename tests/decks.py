@@ -65,7 +65,7 @@ PLY_PROGRAM = PROGRAM.replace("NEXT", "PLYS          5    2\nNEXT")
 
 # Findings that the small plate has: its coupled laminate is held in its plane at every node, it has
 # no projectile of its own, and its mesh is coarse.
-OWN_FINDINGS = ("W318", "W414", "W415")
+OWN_FINDINGS = ("W318", "N414", "W415")
 
 
 def ready(deck: str | Path) -> ImpactModel:

@@ -34,7 +34,7 @@ ENDLESS = PROGRAM.replace("         10", "      99999").replace("          5", "
 
 def codes(text: str) -> list[str]:
     """Codes of a deck's findings, without the projectile that small decks never give."""
-    return [f.code for f in load_deck(text).findings if f.code not in ("W414", "W415")]
+    return [f.code for f in load_deck(text).findings if f.code not in ("N414", "W415")]
 
 
 def with_data(old: str, new: str) -> str:
@@ -122,7 +122,7 @@ def test_the_summary_has_the_reports_critical_time_step_to_1_per_cent() -> None:
 def test_findings_and_summary_are_json_lines_for_programs() -> None:
     sound = call("check", str(LONG), "--format", "json")
     *findings, last = (json.loads(line) for line in sound.stdout.splitlines())
-    assert [f["code"] for f in findings] == ["W414", "W415"]
+    assert [f["code"] for f in findings] == ["N414", "W415"]
     assert last["kind"] == "summary"
     assert last["equations"] == 1827
     assert last["D"][0][0] == pytest.approx(1287.414844365, rel=1e-10)
@@ -141,7 +141,7 @@ def test_check_runs_nothing_and_writes_nothing(tmp_path: Path) -> None:
 
 
 def test_a_sound_deck_has_no_findings_but_the_projectile() -> None:
-    assert [f.code for f in load_deck(APPENDIX).findings] == ["W414", "W415"]
+    assert [f.code for f in load_deck(APPENDIX).findings] == ["N414", "W415"]
     assert codes(small()) == []
 
 
@@ -251,6 +251,23 @@ def test_units_are_named_in_summary_and_result(tmp_path: Path) -> None:
 @pytest.mark.parametrize("card", ["in lbf", "in lbf s lb", ""])
 def test_units_need_three_names(card: str) -> None:
     assert codes(small(data=f"UNIT\n{card}\n" + DATA_CARDS)) == ["E010"]
+
+
+@pytest.mark.parametrize("units", ["", "in lbf s", "inch lb sec"])
+def test_the_reports_rod_is_a_note_of_one_line_in_a_deck_of_its_units(units: str) -> None:
+    segment = f"UNIT\n{units}\n" if units else ""
+    loaded = load_deck(small(data=segment + DATA_CARDS))
+    (note,) = (finding for finding in loaded.findings if finding.code == "N414")
+    line = note.render("small.inp")
+    assert re.fullmatch(r"small.inp:\d+:1: note\[N414\]: no PROJ: the report's .* is taken", line)
+    assert note.to_dict("small.inp")["severity"] == "note"
+
+
+@pytest.mark.parametrize("units", ["mm N s", "in kip s", "in lbf ms", "furlong lbf s"])
+def test_the_reports_rod_is_a_warning_in_a_deck_of_other_units(units: str) -> None:
+    found = load_deck(small(data=f"UNIT\n{units}\n" + DATA_CARDS)).findings
+    (warning,) = (finding for finding in found if finding.code in ("N414", "W414"))
+    assert warning.severity == "warning"
 
 
 def test_masses_are_shown_in_tonnes_or_kilograms_beside_the_decks_unit() -> None:

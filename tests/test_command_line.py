@@ -41,8 +41,8 @@ def test_a_call_in_this_process_gives_what_the_program_gives(deck: Path) -> None
 def test_a_run_writes_its_result_beside_the_user_and_says_what_came_out(tmp_path: Path) -> None:
     done = call("run", APPENDIX, cwd=tmp_path)
     assert done.exit_code == 0
-    assert re.findall(r"(error|warning)\[(\w+)\]", done.stderr) == [
-        ("warning", "W414"),
+    assert re.findall(r"(error|warning|note)\[(\w+)\]", done.stderr) == [
+        ("note", "N414"),
         ("warning", "W415"),
     ]
     assert [p.name for p in tmp_path.iterdir()] == ["appendix.h5"]

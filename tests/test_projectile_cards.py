@@ -48,7 +48,7 @@ def with_segment(segment: str, mesh: str = MESH) -> str:
 def codes(text: str) -> list[str]:
     """Codes of a deck's findings; of the small plate's own ones only that of the projectile."""
     return [
-        f.code for f in load_deck(text).findings if f.code == "W414" or f.code not in OWN_FINDINGS
+        f.code for f in load_deck(text).findings if f.code == "N414" or f.code not in OWN_FINDINGS
     ]
 
 

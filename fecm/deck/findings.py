@@ -1,7 +1,7 @@
-"""Findings: errors and warnings of a deck, with place and remedy.
+"""Findings: errors, warnings and notes of a deck, with place and remedy.
 
 A finding has a stable code whose first letter is its severity: ``E`` for an error, ``W`` for a
-warning.  Lines and columns are counted from 1.
+warning, ``N`` for a note.  Lines and columns are counted from 1.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 from fecm._errors import FecmError
 
+# Severities by the first letter of a code.
+SEVERITIES = {"E": "error", "W": "warning", "N": "note"}
 # Largest number of errors, and of warnings, that are kept.
 MOST = 1000
 # The code of the error that ends too many of them.
@@ -34,12 +36,12 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One error or warning.
+    """One error, warning or note.
 
     Attributes
     ----------
     code : str
-        Stable identifier, ``E101`` for an error or ``W301`` for a warning.
+        Stable identifier, ``E101`` for an error, ``W301`` for a warning, ``N414`` for a note.
     message : str
         One self-contained sentence.
     place : Place or None
@@ -55,8 +57,8 @@ class Finding:
 
     @property
     def severity(self) -> str:
-        """``"error"`` or ``"warning"``."""
-        return "error" if self.code.startswith("E") else "warning"
+        """``"error"``, ``"warning"`` or ``"note"``."""
+        return SEVERITIES[self.code[0]]
 
     def to_dict(self, source: str) -> dict[str, object]:
         """The finding as plain values, for JSON.
@@ -84,27 +86,24 @@ class Finding:
     def render(self, source: str) -> str:
         """Format the finding as text, with the card and a caret under the field.
 
+        A note is one line, without its card.
+
         Parameters
         ----------
         source : str
             Name of the deck's file, for the ``FILE:LINE:COLUMN`` that opens the text.
         """
         head = f"{self.severity}[{self.code}]: {self.message}"
-        if self.place is None:
-            lines = [f"{source}: {head}"]
-        else:
-            place = self.place
+        place = self.place
+        lines = [f"{source}:{place.line}:{place.first}: {head}" if place else f"{source}: {head}"]
+        if place and self.severity != "note":
             number = str(place.line)
             margin = " " * len(number)
             card, first, last = _excerpt(place)
             mark = " " * (first - 1) + "^" * max(1, last - first + 1)
             if place.field:
                 mark += f" {place.field}"
-            lines = [
-                f"{source}:{place.line}:{place.first}: {head}",
-                f" {number} | {card}",
-                f" {margin} | {mark}",
-            ]
+            lines += [f" {number} | {card}", f" {margin} | {mark}"]
         if self.hint:
             lines.append(f"   hint: {self.hint}")
         return "\n".join(map(_printable, lines))

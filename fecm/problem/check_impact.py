@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fecm.deck.findings import Findings
 from fecm.deck.model import Deck, Gages, Impact, Indentation, Material, Patch, Projectile, Shear
+from fecm.deck.units import KNOWN, in_si, unit_names
 from fecm.mechanics import element_groups
 from fecm.mechanics.contact_law import ACR_POWER
 from fecm.mechanics.locate import locate
@@ -19,6 +20,8 @@ from fecm.problem.build import Problem, build_projectile
 from fecm.problem.generate import rod_diameters
 
 W = 3
+# One inch, pound and second in m, N and s.
+REPORT_UNITS = [KNOWN["length"]["in"], KNOWN["force"]["lbf"], KNOWN["time"]["s"]]
 # A rod's step is a full matrix of three times as many rows and columns as it has dofs.
 MOST_ROD_ELEMENTS = 500
 # Each gage is compared with every element.
@@ -210,15 +213,19 @@ def check_shear_correction(segment: Shear, findings: Findings) -> None:
         )  # fmt: skip
 
 
-def warn_of_the_reports_rod(impact: Impact, findings: Findings) -> None:
-    """Warn that the report's rod is assumed, in the report's units."""
+def warn_of_the_reports_rod(deck: Deck, findings: Findings) -> None:
+    """Say that the report's rod is assumed; warn of it in a deck of other units."""
+    place, names = deck.require(Impact).place("impact node"), unit_names(deck)
+    if not names or [in_si(name, names) for name in names] == REPORT_UNITS:
+        findings.add("N414", "no PROJ: the report's steel rod (in, lbf, s) is taken", place)
+        return
     rod = report_rod()
     findings.add(
         "W414",
         f"No projectile is defined: the report's steel rod is assumed, in lb, in and s whatever "
         f"the deck's units (length {rod.length:g}, diameter {rod.diameters[-1]:g}, "
         f"E {rod.modulus:g}, density {rod.density:g}, mass {rod.total_mass:.5g}).",
-        impact.place("impact node"),
+        place,
         "define the projectile in a PROJ segment",
     )
 

@@ -151,7 +151,7 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
                     check_time_step_of_contact(checked, findings)
             if checked.has_impact:
                 if not deck.has(Projectile):
-                    warn_of_the_reports_rod(deck.require(Impact), findings)
+                    warn_of_the_reports_rod(deck, findings)
                 check_resolution(checked, findings)
                 check_gages_under_force(checked, findings)
     return checked

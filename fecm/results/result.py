@@ -118,7 +118,7 @@ class Result(Contact):
     deck : str
         The cards of the problem.
     findings : tuple of Finding
-        Warnings about the deck, of a run in this process; empty for a loaded result.
+        Warnings and notes about the deck, of a run in this process; empty for a loaded result.
     """
 
     step: Ints
