@@ -12,7 +12,7 @@ from fecm.api import load_deck
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
 from fecm.problem.problem import Problem
-from fecm.sweeps.cases import Case, CasesError, checked, grid
+from fecm.sweeps.cases import CasesError, checked, combined
 from fecm.sweeps.outcome import Outcome, merge
 from fecm.sweeps.plan import Plan, Task, check_memory, plan, tasks
 from fecm.sweeps.result import SweepResult, result_of, save
@@ -170,14 +170,7 @@ def sweep(
     """
     if (vary is None) == (cases is None) and not (vary is None and until is not None):
         raise CasesError("give either vary or cases")
-    made: list[Case]
-    if cases is None:
-        vary = vary or {}
-        values = [(name, [case[name] for case in checked({name: v} for v in vary[name])])
-                  for name in vary]  # fmt: skip
-        made = grid(values)
-    else:
-        made = checked(cases)
+    made = combined({} if vary is None else vary) if cases is None else checked(cases)
     problem = problem_of(deck)
     planned = plan(problem, made, history=history, until=until)
     check_memory(problem, planned, 0 if scheduler is not None else workers)

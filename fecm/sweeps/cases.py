@@ -6,7 +6,9 @@ import itertools
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -134,27 +136,65 @@ def read_cases(path: Path) -> list[Case]:
     return cases
 
 
-def checked(cases: Iterable[Mapping[str, Value]]) -> list[Case]:
+def combined(vary: Mapping[str, Iterable[Any]]) -> list[Case]:
+    """Return every combination of lists of values, given by name; see :func:`grid`.
+
+    Raises
+    ------
+    CasesError
+        If a name is unknown, a value is invalid, or values are not in a list.
+    """
+    if not isinstance(vary, Mapping):
+        raise CasesError(f'vary is {vary!r}; write a mapping such as {{"velocity": [50.0, 115.0]}}')
+    return grid([(name, _listed(name, values)) for name, values in vary.items()])
+
+
+def _listed(name: str, given: Iterable[Any]) -> list[Value]:
+    """Values of a name; a lone text or number is refused."""
+    values: list[Any] | None = None
+    if not isinstance(given, str | bytes):
+        with suppress(TypeError):
+            values = list(given)
+    if values is None:
+        raise CasesError(f'vary: {name} is one value; write a list: {{"{name}": [{given!r}]}}')
+    if not values:
+        raise CasesError(f"vary: {name} has no values")
+    return [case[name] for case in checked(({name: value} for value in values), "vary")]
+
+
+def checked(cases: Iterable[Mapping[str, Any]], source: str = "") -> list[Case]:
     """Validate cases given as mappings, which must all have the same names.
 
     Raises
     ------
     CasesError
-        If the cases are invalid.
+        If the cases are invalid; the message states the source, or else the number of the case.
     """
-    made = [
-        {name: _value(name, value if isinstance(value, str) else repr(float(value)))
-         for name, value in case.items()}
-        for case in cases
-    ]  # fmt: skip
+    made: list[Case] = []
+    remedy = 'write a list of mappings such as [{"velocity": 50.0}]'
+    if not isinstance(cases, Iterable):
+        raise CasesError(f"cases is {cases!r}; {remedy}")
+    for number, case in enumerate(cases):
+        where = source or f"case {number}"
+        if not isinstance(case, Mapping):
+            raise CasesError(f"{where} is {case!r}, not a mapping of names to values; {remedy}")
+        for name in case:
+            _known(name, where)
+        if made and case.keys() != made[0].keys():
+            raise CasesError(f"{where} has other names than case 0")
+        made.append({name: _given(name, value, where) for name, value in case.items()})
     if not made:
         raise CasesError("a sweep needs at least one case")
-    for number, case in enumerate(made):
-        for name in case:
-            _known(name, f"case {number}")
-        if case.keys() != made[0].keys():
-            raise CasesError(f"case {number} has other names than case 0")
     return made
+
+
+def _given(name: str, value: Any, where: str) -> Value:
+    """Validate a value given in Python."""
+    try:
+        return _value(name, value if isinstance(value, str) else repr(float(value)))
+    except (TypeError, ValueError) as error:
+        text = str(error) if isinstance(error, CasesError) else f"{name} can't be {value!r}"
+        raise CasesError(f"{where}: {text}") from None
 
 
 def _known(name: str, where: str) -> None:
