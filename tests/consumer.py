@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 import fecm
@@ -21,8 +22,10 @@ doubts: tuple[str, ...] = result.notes
 several: fecm.Result | list[fecm.Result] = fecm.run(Path("plates.inp"))
 deck: fecm.Deck = fecm.read_one("plate.inp")
 again: fecm.Result = fecm.run_one(deck, progress=lambda step, steps: print(step / steps))
+axes: Axes = result.plot("loop", ax=result.plot("force"), against="displacement")
 sweep: fecm.SweepResult = fecm.sweep(deck, {"velocity": [1.0, 2.0]}, workers=2)
 
+result.plot("forse")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 result.forse  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]  # noqa: B018
 result.tape3.u  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]  # noqa: B018
 several.force  # type: ignore[union-attr]  # pyright: ignore[reportAttributeAccessIssue]  # noqa: B018

@@ -11,6 +11,7 @@ import pytest
 
 import fecm
 from fecm.plot.kinds import PlotError
+from fecm.plot.pictures import draw
 from fecm.results.metrics import METRICS, SUMMARY, THRESHOLD
 from fecm.results.result import Result
 from tests.calls import call
@@ -48,8 +49,8 @@ def test_the_area_of_the_force_displacement_curve_is_the_absorbed_energy() -> No
     result = run(deck())
 
     def curve(against: str) -> tuple[Any, Any]:
-        line: Any = result.plot("loop", against=against).axes[0].get_lines()[0]
-        return 1e-3 * line.get_xdata(), line.get_ydata()  # the axis is in 10^-3
+        line: Any = draw("loop", {"a": result}, against=against).figure.axes[0].get_lines()[0]
+        return line.get_xdata(), line.get_ydata()
 
     x, force = curve("displacement")
     area = np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(x))
@@ -57,7 +58,7 @@ def test_the_area_of_the_force_displacement_curve_is_the_absorbed_energy() -> No
     difference = x - curve("deflection")[0]
     np.testing.assert_allclose(difference[1:], result.indentation, rtol=0.0, atol=1e-15)
     with pytest.raises(PlotError, match="indentation, deflection, displacement"):
-        result.plot("loop", against="time")
+        curve("time")
 
 
 def test_run_info_and_sweep_have_the_same_metrics(tmp_path: Path) -> None:

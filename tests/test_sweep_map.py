@@ -60,6 +60,17 @@ def some_failed(sweep: SweepResult, *cases: int) -> SweepResult:
     return SweepResult(sweep.cases, summary, sweep.dt, sweep.steps, units=sweep.units)
 
 
+def plot(
+    sweep: SweepResult,
+    quantity: str = "peak_force",
+    over: str | tuple[str, ...] = (),
+    **options: Any,
+) -> Any:
+    """The command line's map of a sweep."""
+    names = (over,) if isinstance(over, str) else over
+    return draw("map", {"the sweep": sweep}, quantity=quantity, over=names, **options).figure
+
+
 def mesh_of(figure: Any) -> Any:
     """The cells of a map."""
     return figure.axes[0].collections[0]
@@ -75,10 +86,10 @@ def data_of(line: Any) -> tuple[Floats, Floats]:
 
 
 def test_a_full_grid_is_a_cell_a_case_in_rising_order(plane: SweepResult) -> None:
-    figure = plane.plot()
+    figure = plot(plane)
     axes, bar = figure.axes
     assert axes.get_xlabel() == "Impact velocity (in/s)"
-    assert axes.get_ylabel() == "Contact coefficient $k$ (10⁶ lbf/in¹·⁵)"
+    assert axes.get_ylabel() == "Contact coefficient $k$ (10⁶ lbf/in^1.5)"
     assert bar.get_xlabel() == "Peak force (lbf)"
     drawn = mesh_of(figure).get_array()
     assert drawn.shape == (4, 3)
@@ -87,19 +98,19 @@ def test_a_full_grid_is_a_cell_a_case_in_rising_order(plane: SweepResult) -> Non
         assert drawn[row, column] == force
     corners = mesh_of(figure).get_coordinates()
     np.testing.assert_allclose(corners[0, :, 0], [25.0, 75.0, 125.0, 175.0])
-    np.testing.assert_allclose(corners[:, 0, 1], [0.5, 1.5, 2.5, 3.5, 4.5])
+    np.testing.assert_allclose(corners[:, 0, 1], [0.5e6, 1.5e6, 2.5e6, 3.5e6, 4.5e6])
 
 
 def test_lines_of_equal_value_are_labelled_and_lie_where_the_values_are(
     plane: SweepResult,
 ) -> None:
     level = 0.5 * float(plane["peak_force"].min() + plane["peak_force"].max())
-    figure = plane.plot(level=(level,))
+    figure = plot(plane, level=(level,))
     marked: Any = figure.axes[0].collections[-1]
     np.testing.assert_allclose(marked.levels, [level])
     (path,) = [p for p in marked.get_paths() if len(p.vertices)]
     # On the grid's own line of k = 2e6, between the velocities, the value is linear.
-    at = float(np.interp(2.0, *path.vertices[np.argsort(path.vertices[:, 1])].T[::-1]))
+    at = float(np.interp(2e6, *path.vertices[np.argsort(path.vertices[:, 1])].T[::-1]))
     fixed = plane["k"] == 2e6
     order = np.argsort(plane["velocity"][fixed])
     expected = np.interp(level, plane["peak_force"][fixed][order], plane["velocity"][fixed][order])
@@ -114,21 +125,21 @@ def test_a_threshold_of_all_cases_is_a_level_of_peak_forces_only() -> None:
     sweep = fecm.sweep(TOUGH, {"velocity": [20.0, 200.0], "k": [1e6, 3e6]})
     (force,) = set(sweep["threshold_force"])
     assert sweep["peak_force"].min() < force < sweep["peak_force"].max()
-    marked: Any = sweep.plot().axes[0].collections[-1]
+    marked: Any = plot(sweep).axes[0].collections[-1]
     np.testing.assert_allclose(marked.levels, [force])
-    assert len(sweep.plot("impulse").axes[0].collections) == 2  # cells and lines
+    assert len(plot(sweep, "impulse").axes[0].collections) == 2  # cells and lines
 
 
 def test_thresholds_of_different_plates_are_drawn_case_by_case() -> None:
     layups = ["[0/90]", "[0/0]"]
     sweep = fecm.sweep(TOUGH, {"layup": layups, "velocity": [20.0, 200.0]})
-    lines = sweep.plot().axes[0].get_lines()
+    lines = plot(sweep).axes[0].get_lines()
     limits = sweep["threshold_force"].reshape(2, 2)
     assert limits[0, 0] != limits[1, 0]
     for line, forces in zip(lines[2:], limits, strict=True):
         np.testing.assert_allclose(data_of(line)[1], forces)
     sweep = fecm.sweep(TOUGH, {"thickness": [0.1, 0.12], "velocity": [20.0, 200.0]})
-    axes = sweep.plot().axes[0]
+    axes = plot(sweep).axes[0]
     low, high = (sweep["peak_force"] - sweep["threshold_force"]).reshape(2, 2).T
     share = low / (low - high)
     contour: Any = axes.collections[-1]
@@ -139,15 +150,15 @@ def test_thresholds_of_different_plates_are_drawn_case_by_case() -> None:
 
 
 def test_over_says_which_value_lies_across(plane: SweepResult) -> None:
-    figure = plane.plot(over=("k", "velocity"))
+    figure = plot(plane, over=("k", "velocity"))
     assert figure.axes[0].get_ylabel() == "Impact velocity (in/s)"
-    np.testing.assert_array_equal(mesh_of(figure).get_array(), mesh_of(plane.plot()).get_array().T)
+    np.testing.assert_array_equal(mesh_of(figure).get_array(), mesh_of(plot(plane)).get_array().T)
 
 
 def test_failed_cases_are_gaps_and_told(plane: SweepResult) -> None:
     holed = some_failed(plane, 1, 6)
     with pytest.warns(FecmWarning, match=r"2 of 12 cases of .* failed \(it went wrong\)"):
-        drawn = mesh_of(holed.plot()).get_array()
+        drawn = mesh_of(plot(holed)).get_array()
     at = {
         (sorted(STIFFNESSES).index(plane["k"][n]), sorted(VELOCITIES).index(plane["velocity"][n]))
         for n in (1, 6)
@@ -156,7 +167,7 @@ def test_failed_cases_are_gaps_and_told(plane: SweepResult) -> None:
 
 
 def test_counts_have_a_colour_each_and_no_lines(plane: SweepResult) -> None:
-    figure = plane.plot("contacts")
+    figure = plot(plane, "contacts")
     assert len(figure.axes[0].collections) == 1
     drawn = mesh_of(figure).get_array()
     assert sorted(drawn.ravel()) == sorted(plane["contacts"])
@@ -166,10 +177,10 @@ def test_counts_have_a_colour_each_and_no_lines(plane: SweepResult) -> None:
 def test_cases_that_are_no_grid_are_coloured_points() -> None:
     cases = [{"velocity": v, "k": 1e6 + 1e4 * v} for v in (50.0, 80.0, 120.0)]
     sweep = fecm.sweep(NAMED, cases=cases)
-    figure = sweep.plot("max_indentation", level=(float(sweep["max_indentation"][1]),))
+    figure = plot(sweep, "max_indentation", level=(float(sweep["max_indentation"][1]),))
     points = mesh_of(figure)
     np.testing.assert_allclose(
-        points.get_offsets(), np.column_stack([sweep["velocity"], 1e-6 * sweep["k"]])
+        points.get_offsets(), np.column_stack([sweep["velocity"], sweep["k"]])
     )
     shown = points.get_array() / sweep["max_indentation"]
     np.testing.assert_allclose(shown, shown[0], rtol=1e-12)
@@ -178,7 +189,7 @@ def test_cases_that_are_no_grid_are_coloured_points() -> None:
 
 def test_each_layup_is_a_curve(layups: SweepResult) -> None:
     with pytest.warns(FecmWarning, match="3 of 12 cases"):
-        figure = layups.plot(level=(100.0,))
+        figure = plot(layups, level=(100.0,))
     (axes,) = figure.axes
     lines = {line.get_label(): line for line in axes.get_lines()}
     for layup in LAYUPS:
@@ -187,8 +198,7 @@ def test_each_layup_is_a_curve(layups: SweepResult) -> None:
         assert x.tolist() == sorted(VELOCITIES)
         order = np.argsort(layups["velocity"][here])
         np.testing.assert_array_equal(y, layups["peak_force"][here][order])
-    assert np.isnan(data_of(lines["[0/"])[1]).all()
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == [*LAYUPS, "[0/"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == LAYUPS
     assert data_of(axes.get_lines()[-1])[1].tolist() == [100.0, 100.0]
     assert axes.get_ylabel() == "Peak force (lbf)"
 
@@ -198,7 +208,7 @@ def test_more_layups_than_colours_are_rows_that_show_where_they_pass_a_level() -
     sweep = fecm.sweep(NAMED, {"layup": angles, "velocity": [50.0, 100.0]})
     first = sweep["peak_force"][:2]
     level = float(first.mean())
-    figure = sweep.plot(level=(level,))
+    figure = plot(sweep, level=(level,))
     axes = figure.axes[0]
     assert [text.get_text() for text in axes.get_yticklabels()] == angles
     assert axes.yaxis.get_inverted()
@@ -215,11 +225,11 @@ def test_more_layups_than_colours_are_rows_that_show_where_they_pass_a_level() -
 def test_one_value_is_a_line_with_a_gap_at_a_failed_case() -> None:
     sweep = some_failed(fecm.sweep(NAMED, {"velocity": [100.0, 50.0, 150.0]}), 0)
     with pytest.warns(FecmWarning, match="1 of 3 cases"):
-        (axes,) = sweep.plot("time_of_peak").axes
+        (axes,) = plot(sweep, "time_of_peak").axes
     (line,) = axes.get_lines()
     x, y = data_of(line)
     assert x.tolist() == [50.0, 100.0, 150.0]
-    np.testing.assert_allclose(y, 1e6 * sweep["time_of_peak"][[1, 0, 2]], rtol=1e-12)
+    np.testing.assert_allclose(y, sweep["time_of_peak"][[1, 0, 2]], rtol=1e-12)
     assert np.isnan(y[1])
     assert (line.get_linestyle(), line.get_marker()) == ("-", "o")
     assert axes.get_ylabel() == "Time of peak (µs)"
@@ -227,7 +237,7 @@ def test_one_value_is_a_line_with_a_gap_at_a_failed_case() -> None:
 
 def test_one_layup_a_row_with_a_point(layups: SweepResult) -> None:
     with pytest.warns(FecmWarning, match="1 of 4 cases"):
-        (axes,) = layups.plot("impulse", where={"velocity": 101.0}).axes
+        (axes,) = plot(layups, "impulse", where={"velocity": 101.0}).axes
     assert [text.get_text() for text in axes.get_yticklabels()] == [*LAYUPS, "[0/"]
     assert axes.get_title(loc="left") == "velocity 100 in/s"
     x, y = data_of(axes.get_lines()[0])
@@ -239,19 +249,19 @@ def test_one_layup_a_row_with_a_point(layups: SweepResult) -> None:
 
 
 def test_points_have_colours_where_one_other_value_varies_too(plane: SweepResult) -> None:
-    axes, bar = plane.plot(over="velocity").axes
+    axes, bar = plot(plane, over="velocity").axes
     assert not axes.get_lines()
     points: Any = axes.collections[0]
-    assert bar.get_xlabel() == "Contact coefficient $k$ (10⁶ lbf/in¹·⁵)"
+    assert bar.get_xlabel() == "Contact coefficient $k$ (10⁶ lbf/in^1.5)"
     drawn = sorted(zip(*np.asarray(points.get_offsets()).T, points.get_array(), strict=True))
-    cases = zip(plane["velocity"], plane["peak_force"], 1e-6 * plane["k"], strict=True)
+    cases = zip(plane["velocity"], plane["peak_force"], plane["k"], strict=True)
     np.testing.assert_allclose(drawn, sorted(cases))
 
 
 def test_one_value_of_three_is_not_drawn_without_the_others() -> None:
     sweep = fecm.sweep(NAMED, {"velocity": [50.0, 60.0], "k": [1e6, 2e6], "q": [2.0, 2.5]})
     with pytest.raises(PlotError, match="k and q vary too"):
-        sweep.plot(over="velocity")
+        plot(sweep, over="velocity")
 
 
 @pytest.mark.parametrize(
@@ -262,24 +272,24 @@ def test_cases_still_in_contact_are_crossed_and_counted(vary: dict[str, list[flo
     count = int(sweep.still.sum())
     assert 0 < count < len(sweep)
     with pytest.warns(FecmWarning, match=f"{count} of {len(sweep)} cases of .* still in contact"):
-        figure = sweep.plot()
+        figure = plot(sweep)
     cross = figure.axes[0].get_lines()[-1]
     assert cross.get_marker() == "x"
     assert data_of(cross)[0].tolist() == sweep["velocity"][sweep.still].tolist()
     told = f"still in contact at the end: {count} of {len(sweep)} cases"
-    assert figure.get_supxlabel() == f"\N{MULTIPLICATION SIGN} {told}"
+    assert figure.axes[0].get_xlabel().endswith(f"\n\N{MULTIPLICATION SIGN} {told}")
     with pytest.warns(FecmWarning, match="they have no value in the picture"):
-        sweep.plot("impulse")
+        plot(sweep, "impulse")
 
 
 def test_a_quantity_that_no_case_has_yet_is_refused() -> None:
     sweep = fecm.sweep(small(), {"velocity": VELOCITIES})
     with pytest.raises(PlotError, match=r"3 of 3 cases .* still in contact at the end"):
-        sweep.plot("impulse")
+        plot(sweep, "impulse")
 
 
 def test_a_sweep_without_units_has_none_on_its_axes() -> None:
-    (axes,) = fecm.sweep(small(STEPS), {"velocity": [50.0, 100.0]}).plot().axes
+    (axes,) = plot(fecm.sweep(small(STEPS), {"velocity": [50.0, 100.0]})).axes
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("Impact velocity", "Peak force")
 
 
@@ -301,7 +311,7 @@ def test_options_that_do_not_fit_are_refused(
     plane: SweepResult, options: dict[str, Any], words: str
 ) -> None:
     with pytest.raises(PlotError, match=words):
-        plane.plot(**options)
+        plot(plane, **options)
 
 
 def test_more_than_two_values_need_a_choice() -> None:
@@ -309,10 +319,10 @@ def test_more_than_two_values_need_a_choice() -> None:
     with pytest.raises(
         PlotError, match="two axes, and velocity, k and s_p vary; choose with --over"
     ):
-        sweep.plot()
+        plot(sweep)
     with pytest.raises(PlotError, match=r"s_p varies too, .*; --where s_p=VALUE selects"):
-        sweep.plot(over=("velocity", "k"))
-    figure = sweep.plot(over=("velocity", "k"), where={"s_p": 0.2})
+        plot(sweep, over=("velocity", "k"))
+    figure = plot(sweep, over=("velocity", "k"), where={"s_p": 0.2})
     kept = sweep["s_p"] == 0.2
     drawn = mesh_of(figure).get_array()
     np.testing.assert_array_equal(drawn.T.ravel(), sweep["peak_force"][kept])
@@ -321,12 +331,12 @@ def test_more_than_two_values_need_a_choice() -> None:
 
 def test_a_sweep_that_failed_whole_says_why(plane: SweepResult) -> None:
     with pytest.raises(PlotError, match=r"12 of 12 cases .* failed \(it went wrong\)"):
-        some_failed(plane, *range(12)).plot()
+        plot(some_failed(plane, *range(12)))
 
 
 def test_a_level_beyond_all_values_is_told(plane: SweepResult) -> None:
     with pytest.warns(FecmWarning, match="level 1e.06 is outside"):
-        plane.plot(level=(1e6,))
+        plot(plane, level=(1e6,))
 
 
 @pytest.mark.parametrize("kind", [name for name, kind in KINDS.items() if not kind.sweep])

@@ -11,6 +11,7 @@ import matplotlib
 import numpy as np
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 from fecm._typing import Floats
@@ -18,13 +19,13 @@ from fecm.plot.data import Array, Patches, impact_point, patches, require, store
 from fecm.plot.kinds import Picture, PlotError
 from fecm.plot.meshes import draw_circle
 from fecm.plot.style import (
-    COLOURS,
     IN_ORDER,
     RATIO,
     SIGNED,
     WIDTHS,
-    Graph,
     Scale,
+    colour_bar,
+    colours,
     limit_count,
     lines_legend,
     panels,
@@ -133,25 +134,22 @@ def line(
     length = scale_of(results, "length", [w for _, _, w in data.values()])
     if len(data) == 1:
         figure, axes = panels(width, ratio=RATIO[width])
-    else:
-        ratio = 0.6 * RATIO[width]
-        figure, axes = panels(width, len(instants[0]), sharex=True, sharey=True, ratio=ratio)
-    graphs = [Graph(ax, place, length) for ax in axes]
-    if len(data) == 1:
         ((stored, position, w),) = data.values()
         shades = matplotlib.colormaps[IN_ORDER](np.linspace(0.0, 0.85, len(stored)))
         for time, values, shade in zip(stored, w, shades, strict=True):
-            graphs[0].plot(position, values, color=shade, label=f"{clock.factor * time:.4g}")
-    for (name, (stored, position, w)), colour in zip(data.items(), COLOURS, strict=False):
-        if len(data) > 1:
-            for graph, time, values in zip(graphs, stored, w, strict=True):
-                graph.plot(position, values, color=colour, label=name)
-                graph.axes.set_title(f"time {clock.show(time)}", loc="left")
+            axes[0].plot(position, values, color=shade, label=f"{clock.factor * time:.4g}")
+    else:
+        ratio = 0.6 * RATIO[width]
+        figure, axes = panels(width, len(instants[0]), sharex=True, sharey=True, ratio=ratio)
+        for (name, (stored, position, w)), colour in zip(data.items(), colours(), strict=False):
+            for ax, time, values in zip(axes, stored, w, strict=True):
+                ax.plot(position, values, color=colour, label=name)
+                ax.set_title(f"time {clock.show(time)}", loc="left")
     lines_legend(figure, axes[0], clock.label("Time") if len(data) == 1 else "")
-    for graph in graphs:
-        graph.label(y="Deflection")
-        graph.axes.margins(x=0.0)
-    graphs[-1].label(f"${along}$")
+    for ax in axes:
+        length.name(ax.yaxis, "Deflection")
+        ax.margins(x=0.0)
+    place.name(axes[-1].xaxis, f"${along}$")
     return Picture(figure)
 
 
@@ -178,29 +176,26 @@ def contour(results: Results, *, times: Sequence[float] = (), width: str = "colu
         sharey=True,
         ratio=float(np.clip(height / wide, 0.3, 2.0)) + 0.65 * columns / lines / WIDTHS[width],
     )
-    fields = [length.factor * cut.values(row) for row in w]
+    fields = [cut.values(row) for row in w]
     peak = float(np.abs(fields).max()) or 1.0  # may exceed the nodal values
-    levels = np.linspace(-peak, peak, LEVELS)
-    at = place.factor * cut.points
-    triangles = Triangulation(at[:, 0], at[:, 1], cut.triangles)
-    where = place.factor * struck(result, name)
+    levels = MaxNLocator(LEVELS).tick_values(np.min(fields), np.max(fields))
+    triangles = Triangulation(cut.points[:, 0], cut.points[:, 1], cut.triangles)
     fills = []
     for ax, row, values in zip(axes, rows, fields, strict=False):
-        fills.append(ax.tricontourf(triangles, values, levels, cmap=SIGNED))
+        norm = Normalize(-peak, peak)
+        fills.append(ax.tricontourf(triangles, values, levels, cmap=SIGNED, norm=norm))
         fills[-1].set(edgecolor="face", linewidth=0.2)  # hides white seams
-        ax.plot(*where.T, "+", color="black", ms=4, mew=0.6)
-        draw_circle(ax, result, name, place, color="black")
+        ax.plot(*struck(result, name).T, "+", color="black", ms=4, mew=0.6, clip_on=False)
+        draw_circle(ax, result, name, color="black")
         ax.set_title(f"time {clock.show(float(result['tape3/time'][row]))}", loc="left")
         ax.set_aspect("equal")
+    for ax in axes[-columns:]:
+        place.name(ax.xaxis, "$x$")
+    for ax in axes[::columns]:
+        place.name(ax.yaxis, "$y$")
     for ax in axes[len(rows) :]:
         ax.set_axis_off()
-    figure.supxlabel(place.label("$x$"), fontsize=8.0)
-    figure.supylabel(place.label("$y$"), fontsize=8.0)
-    bar = figure.colorbar(fills[0], ax=axes, location="top", aspect=40, shrink=0.8, pad=0.03)
-    bar.set_label(length.label("Deflection"))
-    bar.outline.set_linewidth(0.6)
-    bar.locator = matplotlib.ticker.MaxNLocator(6, symmetric=True)
-    bar.update_ticks()
+    colour_bar(axes, fills[0], length, "Deflection", MaxNLocator(6), aspect=40, shrink=0.8)
     return Picture(figure)
 
 
@@ -212,27 +207,26 @@ class _Plate:
     ) -> None:
         from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-        self._cut, self._length = cut, length
+        self._cut, self._flat = cut, cut.points[cut.quads]
         peak = max(map(abs, span)) or 1.0
-        self._flat = place.factor * cut.points[cut.quads]
-        self.axes = axes
-        self._norm = Normalize(-length.factor * peak, length.factor * peak)
         self._title = axes.text2D(0.03, 0.94, "", transform=axes.transAxes)
         self.collection = Poly3DCollection(
-            self._at(np.zeros(len(cut.points))), cmap=SIGNED, norm=self._norm,
+            self._at(np.zeros(len(cut.points))), cmap=SIGNED, norm=Normalize(-peak, peak),
             edgecolors="0.25", linewidths=0.12, clip_on=False,
         )  # fmt: skip
         axes.add_collection3d(self.collection)
         low, high = self._flat.min(axis=(0, 1)), self._flat.max(axis=(0, 1))
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        axes.set_zlim(length.factor * min(span[0], 0.0), length.factor * max(span[1], 0.0))
+        axes.set_zlim(min(span[0], 0.0), max(span[1], 0.0))
         side = float((high - low).max())
         axes.set_box_aspect((*(high - low) / side, EXAGGERATION), zoom=1.3)
         axes.view_init(elev=28.0, azim=-62.0)
-        axes.set_xlabel(place.label("$x$"), labelpad=-4.0)
-        axes.set_ylabel(place.label("$y$"), labelpad=-4.0)
-        axes.set_zlabel(length.label("Deflection"), labelpad=-7.0)
-        for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        for axis, shown, text, pad in (
+            (axes.xaxis, place, "$x$", -4.0), (axes.yaxis, place, "$y$", -4.0),
+            (axes.zaxis, length, "Deflection", -7.0),
+        ):  # fmt: skip
+            shown.name(axis, text)
+            axis.labelpad = pad
             axis.pane.set_visible(False)
             axis._axinfo["grid"]["linewidth"] = 0.3
         axes.tick_params(pad=-3.0)
@@ -241,7 +235,7 @@ class _Plate:
         axes.locator_params(axis="y", nbins=5)
 
     def _at(self, values: Floats) -> Floats:
-        heights = (self._length.factor * values)[self._cut.quads]
+        heights = values[self._cut.quads]
         return np.concatenate([self._flat, heights[:, :, None]], axis=2)
 
     def show(self, w: Array, text: str) -> None:
@@ -278,11 +272,24 @@ def _plates(
     length = scale_of(results, "length", [w])
     span = (float(w.min()), float(w.max()))
     lines = math.ceil(count / columns)
-    figure, axes = panels(width, lines, columns, ratio=0.62, subplot_kw={"projection": "3d"})
-    figure.subplots_adjust(left=0.0, right=0.91, bottom=0.07, top=1.0, wspace=0.1, hspace=0.05)
+    figure, axes = panels(width, lines, columns, ratio=0.7, subplot_kw={"projection": "3d"})
     for ax in axes[count:]:
         ax.set_axis_off()
-    return figure, [_Plate(ax, cut, place, length, span) for ax in axes[:count]]
+    plates = [_Plate(ax, cut, place, length, span) for ax in axes[:count]]
+    locator = MaxNLocator(5)
+    bar = colour_bar(
+        axes,
+        plates[0].collection,
+        length,
+        "Deflection",
+        locator,
+        shrink=0.6,
+        pad=0.0,
+        fraction=0.06,
+    )
+    if span[0] < span[1]:
+        bar.ax.set_xlim(span)
+    return figure, plates
 
 
 def animation(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:

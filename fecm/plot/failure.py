@@ -24,7 +24,7 @@ from fecm.mechanics.interpolation import local_shape_functions
 from fecm.plot.data import deck_of, mesh_of, require, struck
 from fecm.plot.kinds import Picture, PlotError, warn
 from fecm.plot.meshes import draw_circle
-from fecm.plot.style import COLOURS, IN_ORDER, WIDTHS, legend, panels, scale_of
+from fecm.plot.style import COLOURS, IN_ORDER, WIDTHS, Scale, colour_bar, legend, panels, scale_of
 from fecm.problem.build import rules
 from fecm.results.result import Result
 from fecm.results.summary import LargestExposure, largest_exposures
@@ -93,14 +93,13 @@ def failure(results: Mapping[str, Result], *, quantity: str = "", width: str = "
     corners = _cells(result, name, found.under_load.shape[1])
     place = scale_of(results, "length", [corners])
     figure, plate, bars = _axes(corners, max(map(len, found.over_plies.values())), width)
-    _map(figure, plate, place.factor * corners, found)
-    plate.plot(*(place.factor * struck(result, name)).T, "+", color="black", ms=4, mew=0.6)
-    draw_circle(plate, result, name, place, color="black")
-    at = place.factor * np.array([found.worst.x, found.worst.y])
-    plate.plot(*at[:, None], **LARGEST)
+    _map(plate, corners, found)
+    plate.plot(*struck(result, name).T, "+", color="black", ms=4, mew=0.6, clip_on=False)
+    draw_circle(plate, result, name, color="black")
+    plate.plot(found.worst.x, found.worst.y, clip_on=False, **LARGEST)
     plate.set_title(_worst(found.worst), loc="left")
-    plate.set_xlabel(place.label("$x$"))
-    plate.set_ylabel(place.label("$y$"))
+    place.name(plate.xaxis, "$x$")
+    place.name(plate.yaxis, "$y$")
     _bars(bars, found)
     _legend(figure, found)
     _note(found.under_load, name)
@@ -208,8 +207,8 @@ def _axes(corners: Floats, plies: int, width: str) -> tuple[Figure, Axes, Axes]:
     return figure, first, second
 
 
-def _map(figure: Figure, axes: Axes, cells: Floats, found: Exposures) -> None:
-    """One cell per point, in the plot's unit of length."""
+def _map(axes: Axes, cells: Floats, found: Exposures) -> None:
+    """One cell per point."""
     outside = ~found.under_load
     values = found.over_plate[outside]
     peak = float(values.max())
@@ -223,12 +222,9 @@ def _map(figure: Figure, axes: Axes, cells: Floats, found: Exposures) -> None:
     axes.add_collection(LineCollection(list(above), colors=LIMIT["color"], linewidths=0.8))
     low, high = cells.min(axis=(0, 1, 2)), cells.max(axis=(0, 1, 2))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-    bar = figure.colorbar(drawn, ax=axes, location="top", aspect=30, pad=0.03)
     what = "the interfaces" if found.worst.criterion == BETWEEN else "the plies"
-    bar.set_label(f"Largest exposure of {what}")
-    bar.outline.set_linewidth(0.6)
-    bar.locator = MaxNLocator(5)
-    bar.update_ticks()
+    label = f"Largest exposure of {what}"
+    bar = colour_bar(axes, drawn, Scale(1.0, ""), label, MaxNLocator(5))
     if peak >= 1.0:
         bar.ax.axvline(1.0, **LIMIT)
 

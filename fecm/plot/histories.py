@@ -26,7 +26,8 @@ from fecm.plot.style import (
     RATIO,
     STYLES,
     WIDTHS,
-    Graph,
+    Scale,
+    colours,
     legend,
     limit_count,
     lines_legend,
@@ -59,9 +60,9 @@ ENERGIES = {
 DAMPING = {"damping_work": "damping"}
 
 
-def _time_axis(graph: Graph, times: Iterable[Array]) -> None:
-    graph.label("Time")
-    graph.axes.set_xlim(0.0, graph.x.factor * max(float(array[-1]) for array in times))
+def _time_axis(axes: Axes, clock: Scale, times: Iterable[Array]) -> None:
+    clock.name(axes.xaxis, "Time")
+    axes.set_xlim(0.0, max(float(array[-1]) for array in times))
 
 
 def _mark_open_ends(axes: Axes, results: Results, width: str) -> None:
@@ -88,26 +89,27 @@ def force(results: Results, *, width: str = "column") -> Picture:
     pound = scale_of(results, "force", [*forces, np.array(list(limits.values()))])
     if len(data) == 1:
         figure, axes = panels(width, ratio=RATIO[width])
-        graphs = [Graph(axes[0], clock, pound)]
+        first, second, *_ = colours()
         ((time, contact, transducer),) = data.values()
-        graphs[0].plot(time, contact, color=COLOURS[0], label="contact force")
-        graphs[0].plot(time, transducer, color=COLOURS[1], label="transducer")
-        graphs[0].label(y="Force")
+        equal = np.array_equal(contact, transducer)  # of a rigid mass
+        label = f"contact force{' and transducer, which are equal' if equal else ''}"
+        axes[0].plot(time, contact, color=first, label=label)
+        if not equal:
+            axes[0].plot(time, transducer, color=second, label="transducer")
+        pound.name(axes[0].yaxis, "Force")
     else:
         figure, axes = panels(width, 2, sharex=True, sharey=True, ratio=0.65 * RATIO[width])
-        graphs = [Graph(ax, clock, pound) for ax in axes]
-        for (name, (time, *both)), colour in zip(data.items(), COLOURS, strict=False):
-            for graph, values in zip(graphs, both, strict=True):
-                graph.plot(time, values, color=colour, label=name)
-        for graph, label in zip(graphs, ("Contact force", "Transducer"), strict=True):
-            graph.label(y=label)
-    colours = dict(zip(data, COLOURS, strict=False))
+        for (name, (time, *both)), colour in zip(data.items(), colours(), strict=False):
+            for ax, values in zip(axes, both, strict=True):
+                ax.plot(time, values, color=colour, label=name)
+        for ax, label in zip(axes, ("Contact force", "Transducer"), strict=True):
+            pound.name(ax.yaxis, label)
     shared = len(set(limits.values())) == 1
     for name, limit in list(limits.items())[: 1 if shared else None]:
         label = "delamination threshold" if shared else f"{name}, delamination threshold"
-        colour = "0.3" if shared else colours[name]
-        axes[0].axhline(pound.factor * limit, color=colour, ls=STYLES[1], lw=0.8, label=label)
-    _time_axis(graphs[-1], times)
+        colour = "0.3" if shared else dict(zip(data, colours(), strict=False))[name]
+        axes[0].axhline(limit, color=colour, ls=STYLES[1], lw=0.8, label=label)
+    _time_axis(axes[-1], clock, times)
     _mark_open_ends(axes[0], results, width)
     lines_legend(figure, axes[0])
     return Picture(figure)
@@ -158,13 +160,13 @@ def loop(results: Results, *, against: str = "indentation", width: str = "column
     length = scale_of(results, "length", [touched])
     pound = scale_of(results, "force", [f for _, f in data.values()])
     figure, (axes,) = panels(width, ratio=1.2 * RATIO[width])
-    graph = Graph(axes, length, pound)
-    for (name, (x, values)), colour in zip(data.items(), COLOURS, strict=False):
-        graph.plot(x, values, color=colour, label=name)
+    for (name, (x, values)), colour in zip(data.items(), colours(), strict=False):
+        axes.plot(x, values, color=colour, label=name)
     if touched.any():
-        axes.set_xlim(*(1.05 * length.factor * end for end in (touched.min(), touched.max())))
+        axes.set_xlim(1.05 * touched.min(), 1.05 * touched.max())
     axes.set_ylim(bottom=0.0)
-    graph.label(label, "Contact force")
+    length.name(axes.xaxis, label)
+    pound.name(axes.yaxis, "Contact force")
     _mark_open_ends(axes, results, width)
     if len(data) > 1:
         lines_legend(figure, axes)
@@ -182,16 +184,15 @@ def energy(results: Results, *, width: str = "column") -> Picture:
     clock = scale_of(results, "time", times)
     work = scale_of(results, "force*length", [c for columns in data.values() for c in columns[1:]])
     figure, (axes,) = panels(width, ratio=1.1 * RATIO[width])
-    graph = Graph(axes, clock, work)
+    shades = [*colours()[: len(energies)], "0.5"]
     for (time, *columns), style in zip(data.values(), STYLES, strict=False):
-        for values, colour in zip(columns, COLOURS, strict=False):
-            graph.plot(time, values, color=colour, ls=style)
-        graph.plot(time, np.sum(columns, axis=0), color="0.5", ls=style)
+        for values, colour in zip((*columns, np.sum(columns, axis=0)), shades, strict=True):
+            axes.plot(time, values, color=colour, ls=style)
     axes.set_ylim(bottom=0.0)
-    graph.label(y="Energy")
+    work.name(axes.yaxis, "Energy")
     _mark_open_ends(axes, results, width)
-    _time_axis(graph, times)
-    handles = [Line2D([], [], color=c) for c in (*COLOURS[: len(energies)], "0.5")]
+    _time_axis(axes, clock, times)
+    handles = [Line2D([], [], color=c) for c in shades]
     labels = [*energies.values(), "sum"]
     if len(data) > 1:
         handles += [Line2D([], [], color="0.3", ls=style) for style in STYLES[: len(data)]]
@@ -240,11 +241,10 @@ def strain(
     curvature = face == "curvature"
     shown = scale_of(results, "1/length", values_of) if curvature else scale(peak(*values_of), "")
     figure, (axes,) = panels(width, ratio=RATIO[width])
-    graph = Graph(axes, scale_of(results, "time", times), shown)
-    for (label, (time, values)), colour in zip(lines.items(), COLOURS, strict=False):
-        graph.plot(time, values, color=colour, label=label)
-    graph.label(y="Curvature" if curvature else f"Strain, {face} face")
-    _time_axis(graph, times)
+    for (label, (time, values)), colour in zip(lines.items(), colours(), strict=False):
+        axes.plot(time, values, color=colour, label=label)
+    shown.name(axes.yaxis, "Curvature" if curvature else f"Strain, {face} face")
+    _time_axis(axes, scale_of(results, "time", times), times)
     lines_legend(figure, axes)
     return Picture(figure)
 

@@ -14,14 +14,12 @@ from fecm.plot.style import (
     COLOURS,
     RATIO,
     STYLES,
-    Graph,
     Scale,
     lines_legend,
     panels,
     scale,
     scale_in,
     styled,
-    superscript,
 )
 from fecm.studies.indentation_test.constants import Fit
 from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING
@@ -52,13 +50,12 @@ def fit_picture(
     width = "full" if both else "column"
     figure, axes = panels(width, 1, 2 if both else 1, ratio=RATIO["column"])
     curves, p = found.solution.curves, found.solution.scaled
-    graph = Graph(axes[0], length, pound)
     seen: set[str] = set()
     for number in range(len(curves.division.stretches)):
         stretch = curves.division.stretches[number]
         colour, label = LOOKS[stretch.kind]
         a = indentation[stretch.rows]
-        graph.plot(
+        axes[0].plot(
             a, force[stretch.rows], ".", color=colour, alpha=0.5,
             markersize=3.0, markeredgewidth=0.0,
             label="_" if stretch.kind in seen else label,
@@ -70,8 +67,9 @@ def fit_picture(
                 top = max(top, found.solution.values[curves.layout.corners[stretch.begin]])
             x = np.linspace(max(0.0, a.min()), top, POINTS)
             y = curves.force * curves.stretch(p, number, x / curves.length)
-            graph.plot(x, y, color=colour)
-    graph.label("Indentation", "Force")
+            axes[0].plot(x, y, color=colour)
+    length.name(axes[0].xaxis, "Indentation")
+    pound.name(axes[0].yaxis, "Force")
     lines_legend(figure, axes[0])
     for handle in figure.legends[0].get_lines():
         handle.set(markersize=5.0, alpha=1.0)
@@ -86,17 +84,16 @@ def _permanent(axes: Axes, found: Fit, length: Scale) -> None:
     y = np.array([cycle.alpha_0.value for cycle in found.cycles])
     down = np.array([cycle.alpha_0.error for cycle in found.cycles])
     across = np.array([cycle.alpha_m.error for cycle in found.cycles])
-    by = length.factor
     axes.errorbar(
-        by * x, by * y, by * down, by * across, "o",
-        color=COLOURS[0], markersize=3.0, linewidth=0.8, capsize=2.0,
-    )  # fmt: skip
+        x, y, down, across, "o", color=COLOURS[0], markersize=3.0, linewidth=0.8, capsize=2.0
+    )
     peaks = np.linspace(0.0, 1.05 * x.max(), 4 * POINTS)
     if (relation := found.relation()) is not None:
         left = np.asarray(relation.permanent(peaks))
-        axes.plot(length.factor * peaks, length.factor * left, color=COLOURS[1])
+        axes.plot(peaks, left, color=COLOURS[1])
     axes.set_xlim(left=0.0)
-    Graph(axes, length, length).label("Largest indentation", "Permanent indentation")
+    length.name(axes.xaxis, "Largest indentation")
+    length.name(axes.yaxis, "Permanent indentation")
 
 
 @styled
@@ -104,9 +101,9 @@ def path_picture(indentation: Floats, force: Floats, units: Mapping[str, str]) -
     """Force along an indentation path."""
     length, pound = scale_in(units, "length", indentation), scale_in(units, "force", force)
     figure, (axes,) = panels("column", ratio=RATIO["column"])
-    graph = Graph(axes, length, pound)
-    graph.plot(indentation, force, color=COLOURS[0])
-    graph.label("Indentation", "Force")
+    axes.plot(indentation, force, color=COLOURS[0])
+    length.name(axes.xaxis, "Indentation")
+    pound.name(axes.yaxis, "Force")
     return Picture(figure)
 
 
@@ -130,14 +127,13 @@ def rigidity_picture(
     length = scale_in(units, "length", peaks)
     # The rigidity is unbounded towards zero: the deeper half sets the height of the axis.
     top = 3.0 * max(float(s[len(s) // 2 :].max()) for s in relations.values())
-    unit = unit_of(f"force/length{superscript(f'{power:g}')}", dict(units))
-    stiff = Scale(scale(top, "").factor, f"{scale(top, '').unit} {unit}".strip())
+    stiff = scale(top, unit_of(f"force/length^{power:g}", dict(units)))
     figure, (axes,) = panels("column", ratio=RATIO["column"])
-    graph = Graph(axes, length, stiff)
     for (name, values), colour, style in zip(relations.items(), COLOURS, STYLES, strict=False):
-        graph.plot(peaks, values, color=colour, linestyle=style, label=name)
-    axes.set_ylim(0.0, stiff.factor * top)
+        axes.plot(peaks, values, color=colour, linestyle=style, label=name)
+    axes.set_ylim(0.0, top)
     axes.set_xlim(left=0.0)
-    graph.label("Largest indentation", "Unloading rigidity")
+    length.name(axes.xaxis, "Largest indentation")
+    stiff.name(axes.yaxis, "Unloading rigidity")
     lines_legend(figure, axes)
     return Picture(figure)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.plot.kinds import PlotError, warn
-from fecm.plot.style import COLOURS, Scale, peak, scale, superscript
+from fecm.plot.style import COLOURS, Scale, peak, scale
 from fecm.results.metrics import COLUMNS
 from fecm.results.metrics import INTEGERS as WHOLE_NUMBERS
 from fecm.sweeps.cases import INTEGERS as WHOLE_VALUES
@@ -46,7 +45,7 @@ class Axis:
     name : str
     scale : Scale
     values : ndarray (cases,)
-        Scaled numbers; for texts their positions in `ticks`.
+        Numbers; for texts their positions in `ticks`.
     ticks : tuple of str
         Texts in the order of the cases; empty for numbers.
     """
@@ -58,9 +57,8 @@ class Axis:
 
     @property
     def label(self) -> str:
-        """Label of the axis."""
-        plain = self.name.replace("_", " ").capitalize()
-        return self.scale.label(LABELS.get(self.name, plain))
+        """Name in words."""
+        return LABELS.get(self.name, self.name.replace("_", " ").capitalize())
 
     @property
     def whole(self) -> bool:
@@ -79,7 +77,7 @@ class Choice:
     shown : Axis
         Quantity; NaN where a case has none.
     levels : list of float
-        Values to mark, scaled.
+        Values to mark.
     title : str
         Values that select the cases; empty for all cases.
     other : Axis or None
@@ -87,7 +85,7 @@ class Choice:
     still : ndarray (cases,) of bool
         Mask of the cases that ended in contact.
     limits : ndarray (cases,)
-        Delamination thresholds, scaled, if they differ and peak forces are shown; else empty.
+        Delamination thresholds, if they differ and peak forces are shown; else empty.
     """
 
     over: list[Axis]
@@ -131,8 +129,8 @@ def choose(
         highest = float(np.nanmax(limits))
         if highest - np.nanmin(limits) <= 1e-9 * highest:
             level, limits = [*level, highest], np.empty(0)
-    levels = _levels(level, shown)
-    return Choice(axes, shown, levels, title, other, still, shown.scale.factor * limits)
+    _check_levels(level, shown)
+    return Choice(axes, shown, list(level), title, other, still, limits)
 
 
 def _rows(sweep: SweepResult, name: str, where: Mapping[str, Any]) -> Ints:
@@ -181,7 +179,7 @@ def _text(sweep: SweepResult, name: str, row: int) -> str:
     value = sweep[name][row]
     if name in TEXTS:
         return str(value)
-    return scale(abs(float(value)), _unit(sweep, name)).show(float(value))
+    return scale(abs(float(value)), sweep.unit(name)).show(float(value))
 
 
 def _over(sweep: SweepResult, name: str, varying: list[str], asked: Sequence[str]) -> list[str]:
@@ -244,39 +242,31 @@ def _quantity(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
         warn(f"{open_ends}{gaps}")
     if lacking := int((np.isnan(values) & run & ~still).sum()):
         warn(f"{lacking} cases of {name} without contact have no {quantity}")
-    return _scaled(sweep, quantity, values)
-
-
-def _unit(sweep: SweepResult, name: str) -> str:
-    """Unit with its powers as superscripts."""
-    return re.sub(r"\^([\d.]+)", lambda power: superscript(power[1]), sweep.unit(name))
+    return _numbers(sweep, quantity, values)
 
 
 def _parameter(sweep: SweepResult, name: str, rows: Ints) -> Axis:
     """Axis of a parameter."""
     values = sweep[name][rows]
     if name not in TEXTS:
-        return _scaled(sweep, name, values)
+        return _numbers(sweep, name, values)
     ticks = tuple(dict.fromkeys(values.tolist()))
     places = {text: place for place, text in enumerate(ticks)}
     return Axis(name, Scale(1.0, ""), np.array([places[v] for v in values.tolist()]), ticks)
 
 
-def _scaled(sweep: SweepResult, name: str, values: Array) -> Axis:
+def _numbers(sweep: SweepResult, name: str, values: Array) -> Axis:
     """Axis of numbers; counts are not scaled."""
-    if name in INTEGERS:
-        return Axis(name, Scale(1.0, ""), values)
-    shown = scale(peak(values), _unit(sweep, name))
-    return Axis(name, shown, shown.factor * values)
+    shown = Scale(1.0, "") if name in INTEGERS else scale(peak(values), sweep.unit(name))
+    return Axis(name, shown, values)
 
 
-def _levels(levels: Sequence[float], shown: Axis) -> list[float]:
-    """Scaled values to mark, with a note about those outside the values shown."""
+def _check_levels(levels: Sequence[float], shown: Axis) -> None:
+    """Warn of values to mark outside the values shown."""
     low, high = np.nanmin(shown.values), np.nanmax(shown.values)
     for level in levels:
-        if not low <= shown.scale.factor * level <= high:
+        if not low <= level <= high:
             warn(
-                f"the level {level:g} is outside the picture's values, which range from "
-                f"{low / shown.scale.factor:g} to {high / shown.scale.factor:g}"
+                f"the level {level:g} is outside the picture's values, which range from {low:g} "
+                f"to {high:g}"
             )
-    return [shown.scale.factor * level for level in levels]

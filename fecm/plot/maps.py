@@ -9,20 +9,30 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, Normalize
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
 from fecm.plot.kinds import Picture
 from fecm.plot.map_data import CURVES, Axis, Choice, choose
-from fecm.plot.style import COLOURS, IN_ORDER, RATIO, lines_legend, panels
+from fecm.plot.style import (
+    COLOURS,
+    IN_ORDER,
+    RATIO,
+    WIDTHS,
+    Multiple,
+    colour_bar,
+    colours,
+    lines_legend,
+    panels,
+)
 from fecm.sweeps.result import SweepResult
 
 # More cells or points are stored as an image in vector formats.
 MANY = 10_000
 LINES = 8  # contour lines, approximately
-ROW, HEAD = 0.17, 0.75  # heights of a row of texts, and of everything around the rows (in)
+# Heights of a row of texts, of everything around the rows, and of a colour bar (in).
+ROW, HEAD, BAR = 0.17, 0.75, 0.45
 DASHES = (0, (5, 1.5))
 # Style of a level among curves, and its colour on a map.
 LEVEL: Any = {"color": "0.2", "linestyle": DASHES, "linewidth": 1.1}
@@ -83,31 +93,32 @@ def parameter_map(
     shown = choice.shown
     if len(choice.over) == 1:
         (first,) = choice.over
-        figure = _one(choice, width)
+        axes = _one(choice, width)
         place = (shown, first) if first.ticks else (first, shown)
     else:
         first, second = choice.over
-        figure = _two(first, second, shown, choice.levels, width)
+        axes = _two(first, second, shown, choice.levels, width)
         first, second = (second, first) if first.ticks else (first, second)
         place = (first, shown) if 0 < len(second.ticks) <= CURVES else (first, second)
-    _mark_still(figure, *place, choice.still)
+    _mark_still(axes, *place, choice.still)
     if len(choice.limits):
-        _mark_limits(figure.axes[0], *place, choice)
+        _mark_limits(axes, *place, choice)
     if choice.title:
-        figure.axes[0].set_title(choice.title, loc="left")
+        axes.set_title(choice.title, loc="left")
+    figure: Any = axes.figure
     return Picture(figure)
 
 
-def _mark_still(figure: Figure, x: Axis, y: Axis, still: NDArray[np.bool_]) -> None:
+def _mark_still(axes: Axes, x: Axis, y: Axis, still: NDArray[np.bool_]) -> None:
     """Mark the cases that ended in contact with crosses, and count them."""
     if not still.any():
         return
     mark: Any = {"marker": "x", "color": "0.25", "markersize": 3.5, "linestyle": "none"}
-    figure.axes[0].plot(x.values[still], y.values[still], zorder=4, **mark)
+    axes.plot(x.values[still], y.values[still], zorder=4, clip_on=False, **mark)
     text = (
         f"\N{MULTIPLICATION SIGN} still in contact at the end: {still.sum()} of {len(still)} cases"
     )
-    figure.supxlabel(text, fontsize=7.0, color="0.25")
+    axes.set_xlabel(f"{axes.get_xlabel()}\n{text}")
 
 
 def _mark_limits(axes: Axes, x: Axis, y: Axis, choice: Choice) -> None:
@@ -125,7 +136,7 @@ def _mark_limits(axes: Axes, x: Axis, y: Axis, choice: Choice) -> None:
         for row in range(len(texts.ticks) if texts else 1):
             here = np.flatnonzero(texts.values == row) if texts else np.arange(len(limits))
             here = here[np.argsort(x.values[here], kind="stable")]
-            style = LEVEL | ({"color": COLOURS[row]} if texts else {})
+            style = LEVEL | ({"color": colours()[row]} if texts else {})
             axes.plot(x.values[here], limits[here], **style)
     elif x is shown:
         axes.plot(limits, y.values, "|", color="0.2", markersize=11.0)
@@ -147,18 +158,17 @@ def _mark_limits(axes: Axes, x: Axis, y: Axis, choice: Choice) -> None:
 # One value ---------------------------------------------------------------------------------------
 
 
-def _one(choice: Choice, width: str) -> Figure:
+def _one(choice: Choice, width: str) -> Axes:
     """Points, joined if the cases differ in nothing else; texts are rows."""
     (over,), shown, levels, other = choice.over, choice.shown, choice.levels, choice.other
     if other is not None and other.ticks and not over.ticks:
         return _curves(over, other, shown, levels, width)
     if over.ticks:
-        figure, axes = _text_rows(width, over)
+        axes = _text_rows(width, over, 0.0 if other is None else BAR)
         if other is None:
-            axes.plot(shown.values, over.values, "o", color=COLOURS[0], markersize=3.5)
+            axes.plot(shown.values, over.values, "o", color=colours()[0], markersize=3.5)
         else:
-            figure.set_figheight(figure.get_figheight() + 0.45)
-            _coloured(figure, axes, shown, over, other)
+            _coloured(axes, shown, over, other)
         _name_axes(axes, shown, None)
         if np.nanmin(shown.values) >= 0.0:
             axes.set_xlim(left=0.0)
@@ -166,24 +176,24 @@ def _one(choice: Choice, width: str) -> Figure:
             axes.axvline(level, **LEVEL)
         axes.grid(axis="y", linewidth=0.4, color="0.85")
         axes.set_axisbelow(True)
-        return figure
-    figure, (axes,) = panels(width, ratio=RATIO[width])
+        return axes
+    _, (axes,) = panels(width, ratio=RATIO[width])
     if other is not None:
-        _coloured(figure, axes, over, shown, other)
+        _coloured(axes, over, shown, other)
     else:
         order = np.argsort(over.values, kind="stable")
-        axes.plot(over.values[order], shown.values[order], "o-", color=COLOURS[0], markersize=2.5)
+        axes.plot(over.values[order], shown.values[order], "o-", color=colours()[0], markersize=2.5)
     _finish_curves(axes, over, shown, levels)
-    return figure
+    return axes
 
 
-def _coloured(figure: Figure, axes: Axes, x: Axis, y: Axis, other: Axis) -> None:
+def _coloured(axes: Axes, x: Axis, y: Axis, other: Axis) -> None:
     """Points coloured by another parameter."""
     drawn = axes.scatter(
         x.values, y.values, c=other.values, s=9.0, cmap=IN_ORDER, norm=_colours(other),
         linewidths=0.0,
     )  # fmt: skip
-    _bar(figure, axes, drawn, other, [])
+    _bar(axes, drawn, other, [])
 
 
 def _finish_curves(axes: Axes, over: Axis, shown: Axis, levels: list[float]) -> None:
@@ -196,59 +206,60 @@ def _finish_curves(axes: Axes, over: Axis, shown: Axis, levels: list[float]) -> 
 
 def _name_axes(axes: Axes, x: Axis, y: Axis | None) -> None:
     """Label the axes; counts have ticks at integers only."""
-    axes.set_xlabel(x.label)
+    x.scale.name(axes.xaxis, x.label)
     if x.whole:
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     if y is not None:
-        axes.set_ylabel(y.label)
+        y.scale.name(axes.yaxis, y.label)
         if y.whole:
             axes.yaxis.set_major_locator(MaxNLocator(integer=True))
 
 
-def _text_rows(width: str, over: Axis) -> tuple[Figure, Axes]:
-    """Axes whose rows are texts, the first at the top."""
-    figure, (axes,) = panels(width, ratio=1.0)
-    figure.set_figheight(HEAD + ROW * max(len(over.ticks), 4))
+def _text_rows(width: str, over: Axis, more: float) -> Axes:
+    """Axes whose rows are texts, the first at the top, with more room above (in)."""
+    height = HEAD + ROW * max(len(over.ticks), 4) + more
+    _, (axes,) = panels(width, ratio=height / WIDTHS[width])
     axes.set_yticks(range(len(over.ticks)), over.ticks)
     axes.set_ylim(len(over.ticks) - 0.5, -0.5)
-    return figure, axes
+    return axes
 
 
 # Two values --------------------------------------------------------------------------------------
 
 
-def _two(first: Axis, second: Axis, shown: Axis, levels: list[float], width: str) -> Figure:
+def _two(first: Axis, second: Axis, shown: Axis, levels: list[float], width: str) -> Axes:
     if first.ticks:
         first, second = second, first
     if second.ticks and len(second.ticks) <= CURVES:
         return _curves(first, second, shown, levels, width)
     found = _grid(first, second, shown)
     if second.ticks:
-        figure, axes = _text_rows(width, second)
-        figure.set_figheight(figure.get_figheight() + 0.45)
+        axes = _text_rows(width, second, BAR)
     else:
-        figure, (axes,) = panels(width, ratio=1.35 * RATIO[width])
+        _, (axes,) = panels(width, ratio=1.35 * RATIO[width])
     _name_axes(axes, first, None if second.ticks else second)
     if found is None:
-        _points(figure, axes, first, second, shown, levels)
+        _points(axes, first, second, shown, levels)
     else:
-        _cells(figure, axes, found, shown, levels, rows=bool(second.ticks))
-    return figure
+        _cells(axes, found, shown, levels, rows=bool(second.ticks))
+    return axes
 
 
-def _curves(over: Axis, texts: Axis, shown: Axis, levels: list[float], width: str) -> Figure:
+def _curves(over: Axis, texts: Axis, shown: Axis, levels: list[float], width: str) -> Axes:
     """A curve a text."""
     figure, (axes,) = panels(width, ratio=1.15 * RATIO[width])
-    for row, (text, colour) in enumerate(zip(texts.ticks, COLOURS, strict=False)):
+    for row, (text, colour) in enumerate(zip(texts.ticks, colours(), strict=False)):
         here = np.flatnonzero(texts.values == row)
         here = here[np.argsort(over.values[here], kind="stable")]
+        if np.isnan(shown.values[here]).all():  # failed
+            continue
         axes.plot(
             over.values[here], shown.values[here], marker=MARKERS[row], color=colour,
             markersize=2.2, label=text,
         )  # fmt: skip
     _finish_curves(axes, over, shown, levels)
     lines_legend(figure, axes)
-    return figure
+    return axes
 
 
 def _colours(shown: Axis) -> Normalize:
@@ -259,28 +270,22 @@ def _colours(shown: Axis) -> Normalize:
     return Normalize(low, high)
 
 
-def _bar(figure: Figure, axes: Axes, drawn: Any, shown: Axis, levels: list[float]) -> None:
-    bar = figure.colorbar(drawn, ax=axes, location="top", aspect=30, pad=0.03)
-    bar.set_label(shown.label)
-    bar.outline.set_linewidth(0.6)
-    bar.locator = MaxNLocator(6, integer=shown.whole)
-    bar.minorticks_off()
-    bar.update_ticks()
+def _bar(axes: Axes, drawn: Any, shown: Axis, levels: list[float]) -> None:
+    locator = MaxNLocator(6, integer=shown.whole)
+    bar = colour_bar(axes, drawn, shown.scale, shown.label, locator)
     for level in levels:
         if drawn.norm.vmin <= level <= drawn.norm.vmax:
             bar.ax.axvline(level, color=LEVEL_COLOUR, linewidth=1.5)
 
 
-def _cells(
-    figure: Figure, axes: Axes, grid: MapGrid, shown: Axis, levels: list[float], *, rows: bool
-) -> None:
+def _cells(axes: Axes, grid: MapGrid, shown: Axis, levels: list[float], *, rows: bool) -> None:
     """One cell per case, with contour lines unless the rows are texts."""
     many = grid.values.size > MANY
     drawn = axes.pcolormesh(
         grid.x, grid.y, grid.values, shading="nearest", cmap=IN_ORDER, norm=_colours(shown),
         edgecolor="face", linewidth=0.1, rasterized=many,
     )  # fmt: skip
-    _bar(figure, axes, drawn, shown, levels)
+    _bar(axes, drawn, shown, levels)
     low, high = grid.values.min(), grid.values.max()
     if rows:
         for level in levels:
@@ -290,13 +295,14 @@ def _cells(
         ticks = MaxNLocator(LINES).tick_values(low, high)
         inner = [tick for tick in ticks if low < tick < high and tick not in levels]
         lines = axes.contour(grid.x, grid.y, grid.values, inner, colors="white", linewidths=0.5)
-        axes.clabel(lines, fontsize=6.0, inline_spacing=2)
+        axes.clabel(lines, fontsize=6.0, inline_spacing=2, fmt=Multiple(shown.scale.factor))
     if inside := sorted({level for level in levels if low < level < high}):
         marked = axes.contour(
             grid.x, grid.y, grid.values, inside, colors=LEVEL_COLOUR,
             linestyles=[DASHES], linewidths=1.2,
         )  # fmt: skip
-        axes.clabel(marked, fontsize=6.0, inline_spacing=2, colors="white")
+        form = Multiple(shown.scale.factor)
+        axes.clabel(marked, fontsize=6.0, inline_spacing=2, colors="white", fmt=form)
 
 
 def _crossings(axes: Axes, grid: MapGrid, level: float) -> None:
@@ -310,9 +316,7 @@ def _crossings(axes: Axes, grid: MapGrid, level: float) -> None:
         axes.vlines(at, row - 0.5, row + 0.5, color=LEVEL_COLOUR, linewidth=1.2)
 
 
-def _points(
-    figure: Figure, axes: Axes, first: Axis, second: Axis, shown: Axis, levels: list[float]
-) -> None:
+def _points(axes: Axes, first: Axis, second: Axis, shown: Axis, levels: list[float]) -> None:
     """One coloured point per case; those above the lowest level have an edge."""
     fine = np.isfinite(shown.values)
     drawn: Any = axes.scatter(
@@ -323,7 +327,7 @@ def _points(
         above = shown.values[fine] >= min(levels)
         drawn.set_linewidths(np.where(above, 0.9, 0.0))
         drawn.set_edgecolors(LEVEL_COLOUR)
-    _bar(figure, axes, drawn, shown, levels)
+    _bar(axes, drawn, shown, levels)
 
 
 def _grid(first: Axis, second: Axis, shown: Axis) -> MapGrid | None:

@@ -12,17 +12,22 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
+from fecm._errors import FecmError
 from fecm._files import beside
 from fecm.plot.kinds import KINDS, MISSING, Kind, Picture, PlotError
 from fecm.results.result import Result
-from fecm.results.schema import ResultFileError
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
     from fecm.sweeps.result import SweepResult
+
+RunKind = Literal[
+    "force", "loop", "energy", "strain", "thickness", "failure", "line", "contour", "surface",
+    "mesh", "animation",
+]  # fmt: skip
 
 
 def kind_named(name: str) -> Kind:
@@ -74,14 +79,19 @@ def _errors_as_one(what: str) -> Iterator[None]:
     """Turn any error of matplotlib about senseless numbers into one PlotError."""
     try:
         yield
-    except (PlotError, ResultFileError, ImportError, OSError, MemoryError):
+    except (FecmError, ImportError, OSError, MemoryError):
         raise
     except Exception as error:  # matplotlib does not document what it may raise
         message = " ".join(str(error).split())
         raise PlotError(f"{what} can't be drawn: {type(error).__name__}: {message}") from error
 
 
-def draw(kind: str, results: Mapping[str, Result | SweepResult], **options: Any) -> Picture:
+def draw(
+    kind: str,
+    results: Mapping[str, Result | SweepResult],
+    style: Mapping[str, Any] | None = None,
+    **options: Any,
+) -> Picture:
     """Draw a picture.
 
     Parameters
@@ -90,6 +100,8 @@ def draw(kind: str, results: Mapping[str, Result | SweepResult], **options: Any)
         One of `KINDS`.
     results : mapping of str to Result or SweepResult
         Results by their names in the legend.
+    style : mapping of str to Any, optional
+        matplotlib's settings; by default those of the command line.
     **options
         Keywords of the kind's function, such as ``times`` or ``width``.
 
@@ -116,23 +128,67 @@ def draw(kind: str, results: Mapping[str, Result | SweepResult], **options: Any)
 
     from fecm.plot.style import RC
 
-    with matplotlib.rc_context(RC), _errors_as_one(f"{kind} of {' and '.join(results)}"):
+    settings: Any = RC if style is None else style
+    with (
+        matplotlib.rc_context(settings),
+        _errors_as_one(f"{kind} of {' and '.join(results)}"),
+    ):
         return _function(kind)(results, **options)
 
 
-def figure(
+def plot(
     kind: str,
     results: Mapping[str, Result | SweepResult],
     path: str | Path | None = None,
+    ax: Axes | None = None,
     **options: Any,
-) -> Figure:
-    """Draw a picture, and write it if a path is given; see :func:`draw` and :func:`save`."""
+) -> Axes:
+    """Draw a picture for Python: in a file, on given axes, or else on a new figure of pyplot.
+
+    Files are those of the command line.  On axes and figures of pyplot the user's settings of
+    matplotlib hold.
+
+    Parameters
+    ----------
+    kind, results, **options
+        As of :func:`draw`.
+    path : str or Path, optional
+        File to write; an existing one is replaced.
+    ax : matplotlib.axes.Axes, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The picture's first axes.
+
+    Raises
+    ------
+    PlotError
+        Also if the picture has several axes and `ax` is given, or `path` and `ax` are.
+    """
     if path is not None:
+        if ax is not None:
+            raise PlotError("give path or ax, not both: ax.figure.savefig writes your own figure")
         check_suffix(kind, Path(path))
-    picture = draw(kind, results, **options)
-    if path is not None:
+        picture = draw(kind, results, **options)
         save(picture, Path(path))
-    return picture.figure
+        return picture.figure.axes[0]
+    _function(kind)  # without matplotlib, this says what to install
+    from matplotlib import pyplot
+
+    from fecm.plot.style import TARGET, style_on
+
+    before = set(pyplot.get_fignums())
+    token = TARGET.set("pyplot" if ax is None else ax)
+    try:
+        picture = draw(kind, results, style_on(ax), **options)
+    except BaseException:
+        for number in set(pyplot.get_fignums()) - before:
+            pyplot.close(number)
+        raise
+    finally:
+        TARGET.reset(token)
+    return picture.figure.axes[0] if ax is None else ax
 
 
 def check_suffix(kind: str, path: Path) -> None:

@@ -15,7 +15,6 @@ from fecm.plot.style import (
     COLOURS,
     RATIO,
     STYLES,
-    Graph,
     legend,
     lines_legend,
     literal,
@@ -47,11 +46,11 @@ def _against_time(
     """Draw lines against time, both axes scaled."""
     clock = scale(float(time[-1]), unit_of("time", dict(units or {})))
     size = scale_in(units, dimension, *(values for _, values, _, _ in lines))
-    graph = Graph(axes, clock, size)
     for label, values, colour, style in lines:
-        graph.plot(time, values, color=colour, linestyle=style, label=label)
-    graph.label("Time", name)
-    axes.set_xlim(clock.factor * min(0.0, float(time[0])), clock.factor * float(time[-1]))
+        axes.plot(time, values, color=colour, linestyle=style, label=label)
+    clock.name(axes.xaxis, "Time")
+    size.name(axes.yaxis, name)
+    axes.set_xlim(min(0.0, float(time[0])), float(time[-1]))
 
 
 @styled
@@ -119,28 +118,28 @@ def filter_picture(
 
 
 @styled
-def calibration_picture(time: Floats, v_f: Floats, v_a: Floats, found: Calibration) -> Picture:
-    """Both outputs against time (figure 4.5), and one against the other with the fit (4.6)."""
+def calibration_picture(
+    time: Floats, v_f: Floats, v_a: Floats, found: Calibration, units: Sequence[str] = ()
+) -> Picture:
+    """Both outputs against time (figure 4.5), and one against the other with the fit (4.6).
+
+    `units` are those of time, V_F and V_a.
+    """
     figure, (left, right) = panels("full", 1, 2, ratio=2 * RATIO["full"])
-    clock = scale(float(time[-1]), "")
-    sizes = {"V_F": scale(peak(v_f), ""), "V_a": scale(peak(v_a), "")}
-    names = {"V_F": "$V_F$", "V_a": "$V_a$"}
-    shown = {"V_F": v_f, "V_a": v_a}
+    time_unit, f_unit, a_unit = units or ("", "", "")
     other = left.twinx()
     other.spines["right"].set_visible(True)
     handles = []
-    for axes, name, colour in ((left, "V_F", COLOURS[0]), (other, "V_a", COLOURS[1])):
-        size = sizes[name]
-        handles += axes.plot(clock.factor * time, size.factor * shown[name], color=colour)
-        axes.set_ylabel(size.label(names[name]))
-    left.set_xlabel(clock.label("Time"))
-    x, y = sizes["V_a"].factor, sizes["V_F"].factor
-    handles += right.plot(x * v_a, y * v_f, "o", color=COLOURS[0], markersize=2.0)
+    for axes, colour, values in ((left, COLOURS[0], v_f), (other, COLOURS[1], v_a)):
+        handles += axes.plot(time, values, color=colour)
+    handles += right.plot(v_a, v_f, "o", color=COLOURS[0], markersize=2.0)
     ends = np.array([min(0.0, float(v_a.min())), max(0.0, float(v_a.max()))])
-    fitted = found.offset + found.slope * ends
-    handles += right.plot(x * ends, y * fitted, color=COLOURS[-1])
-    right.set_xlabel(sizes["V_a"].label("$V_a$"))
-    right.set_ylabel(sizes["V_F"].label("$V_F$"))
+    handles += right.plot(ends, found.offset + found.slope * ends, color=COLOURS[-1])
+    scale(float(time[-1]), time_unit).name(left.xaxis, "Time")
+    for ax in (left, right):
+        scale(peak(v_f), f_unit).name(ax.yaxis, "$V_F$")
+    scale(peak(v_a), a_unit).name(other.yaxis, "$V_a$")
+    scale(peak(v_a), a_unit).name(right.xaxis, "$V_a$")
     labels = ["$V_F$", "$V_a$", "measured", f"slope {found.slope:.4g} ± {found.slope_error:.2g}"]
     legend(figure, handles, labels, mathematics=True)
     return Picture(figure)

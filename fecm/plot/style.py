@@ -1,19 +1,27 @@
-"""Style of the pictures: journal sizes and colours, units on the axes, legends beside the data."""
+"""Style of the pictures: journal sizes and colours, units on the axes, legends beside the data.
+
+Axes hold numbers in the deck's units; their ticks show them times the factor of a :class:`Scale`.
+"""
 
 from __future__ import annotations
 
 import functools
+import itertools
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import Any, ParamSpec
+from typing import Any, Literal, ParamSpec
 
 import matplotlib
 import numpy as np
+from cycler import cycler
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
+from matplotlib.ticker import Formatter, Locator
 
 from fecm.deck.units import unit_of
 from fecm.plot.kinds import Picture, PlotError
@@ -24,6 +32,8 @@ from fecm.results.schema import printable
 WIDTHS = {"column": 3.5, "full": 7.2}
 
 RATIO = {"column": 0.68, "full": 0.45}  # height over width of a graph
+
+BAR = 0.32  # height of a colour bar with its labels (in)
 
 RESOLUTION, SCREEN = 300, 150  # dots per inch in print and on a screen
 
@@ -36,8 +46,13 @@ IN_ORDER = "viridis"  # sequential
 
 SIGNED = "RdBu_r"  # diverging, about zero
 
+# Where pictures are drawn: on axes, on a new figure of pyplot, or on a figure by itself.
+TARGET: ContextVar[Axes | Literal["pyplot"] | None] = ContextVar("TARGET", default=None)
+
 # Any: matplotlib's types of these names differ between versions.
 RC: Any = {
+    "axes.prop_cycle": cycler(color=COLOURS),
+    "figure.dpi": SCREEN,
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 8.0,
@@ -46,6 +61,7 @@ RC: Any = {
     "xtick.labelsize": 7.0,
     "ytick.labelsize": 7.0,
     "legend.fontsize": 7.0,
+    "legend.title_fontsize": 7.0,
     "axes.linewidth": 0.6,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
@@ -79,7 +95,7 @@ _PREFIXED = {
 
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
-_SUPERSCRIPTS = str.maketrans("-0123456789.", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹·")
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 Drawn = ParamSpec("Drawn")
 
@@ -100,9 +116,34 @@ def literal(text: str) -> str:
     return printable(text).replace("$", r"\$")
 
 
+class Multiple(Formatter):
+    """Shows ticks times a factor, all with the decimals that one of them needs."""
+
+    def __init__(self, factor: float) -> None:
+        self._factor, self._decimals = factor, 12
+
+    def set_locs(self, locs: Any) -> None:
+        """Take the positions of the ticks."""
+        if not len(locs):
+            return
+        shown = self._factor * np.asarray(locs)
+        near = 1e-4 * (np.diff(np.sort(shown)).max() if len(shown) > 1 else np.abs(shown).max())
+        rounded = (n for n in range(12) if (np.abs(shown - shown.round(n)) <= near).all())
+        self._decimals = next(rounded, 12)
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """Text of a tick."""
+        form = ".4g" if self._decimals == 12 else f".{self._decimals}f"
+        return self.fix_minus(f"{self._factor * x:z{form}}")
+
+    def format_data_short(self, value: float) -> str:
+        """Text of the cursor's position."""
+        return f"{self._factor * value:.4g}"
+
+
 @dataclass(frozen=True)
 class Scale:
-    """Scale of an axis: factor of the numbers, and text of the unit."""
+    """Scale of an axis: factor of the numbers at its ticks, and text of the unit."""
 
     factor: float
     unit: str
@@ -110,6 +151,11 @@ class Scale:
     def label(self, name: str) -> str:
         """Label of an axis."""
         return f"{name} ({literal(self.unit)})" if self.unit else name
+
+    def name(self, axis: Axis, name: str) -> None:
+        """Label an axis; its ticks show the numbers in the unit."""
+        axis.set_label_text(self.label(name))
+        axis.set_major_formatter(Multiple(self.factor))
 
     def show(self, value: float) -> str:
         """A value with its unit, to four significant digits."""
@@ -131,14 +177,14 @@ def scale(peak: float, unit: str) -> Scale:
     if base and power + own in _PREFIXES:
         return Scale(10.0**-power, _PREFIXES[power + own] + base)
     text = f"{unit[2:]}⁻¹" if unit.startswith("1/") else unit
-    text = text.replace("*", "·").replace("^2", "²")
-    power_of_ten = f"10{superscript(power)} " if power else ""
-    return Scale(10.0**-power, f"{power_of_ten}{text}".strip())
+    text = re.sub(r"\^(\d+)(?![\d.])", lambda found: _superscript(found[1]), text)
+    power_of_ten = f"10{_superscript(str(power))} " if power else ""
+    return Scale(10.0**-power, f"{power_of_ten}{text.replace('*', '·')}".strip())
 
 
-def superscript(number: object) -> str:
-    """A number in superscript."""
-    return str(number).translate(_SUPERSCRIPTS)
+def _superscript(integer: str) -> str:
+    """An integer in superscript."""
+    return integer.translate(_SUPERSCRIPTS)
 
 
 def common_unit(results: Mapping[str, Result], dimension: str) -> str:
@@ -185,37 +231,77 @@ def limit_count(count: int, what: str, most: int = len(COLOURS)) -> None:
         raise PlotError(f"{count} {what} can't be told apart in one picture; at most {most} can")
 
 
-@dataclass(frozen=True)
-class Graph:
-    """Axes whose numbers are scaled."""
+def colours() -> list[str]:
+    """Colours of the lines: this style's, or the user's own."""
+    own = matplotlib.rcParams["axes.prop_cycle"].by_key().get("color", COLOURS)
+    return list(itertools.islice(itertools.cycle(own), len(COLOURS)))
 
-    axes: Axes
-    x: Scale
-    y: Scale
 
-    def plot(self, x: Any, y: Any, *style: str, **options: Any) -> list[Line2D]:
-        """Draw a line or points."""
-        return self.axes.plot(self.x.factor * x, self.y.factor * y, *style, **options)
+def style_on(axes: Axes | None) -> dict[str, Any]:
+    """The part of this style that the user's settings leave open, or the style on given axes.
 
-    def label(self, x: str = "", y: str = "") -> None:
-        """Label the axes that are named, with their units."""
-        if x:
-            self.axes.set_xlabel(self.x.label(x))
-        if y:
-            self.axes.set_ylabel(self.y.label(y))
+    On given axes it is the user's, with the colours after those of the lines there.
+    """
+    own: Any = matplotlib.rcParams
+    if axes is not None:
+        cycle = own["axes.prop_cycle"]
+        first = len(axes.get_lines()) % len(cycle)
+        return {"axes.prop_cycle": cycle[first:].concat(cycle[:first])}
+    return {name: RC[name] for name in RC if own[name] == matplotlib.rcParamsDefault[name]}
 
 
 def panels(
     width: str, rows: int = 1, columns: int = 1, *, ratio: float, **options: Any
 ) -> tuple[Figure, list[Axes]]:
-    """Figure with equal axes, row by row; `ratio` is height over width of each."""
-    inches = WIDTHS[width]
+    """Figure with equal axes, row by row; `ratio` is height over width of each.
+
+    Raises
+    ------
+    PlotError
+        If the picture does not fit the axes to draw on.
+    """
+    inches, target = WIDTHS[width], TARGET.get()
+    solid = "subplot_kw" in options and options["subplot_kw"].get("projection") == "3d"
+    if isinstance(target, Axes):
+        if rows * columns > 1:
+            raise PlotError(f"this picture has {rows * columns} axes and can't be drawn on one")
+        if solid != (target.name == "3d"):
+            raise PlotError(
+                "this picture needs axes made with subplot_kw={'projection': '3d'}"
+                if solid else "this picture can't be drawn on three-dimensional axes"
+            )  # fmt: skip
+        figure: Any = target.figure
+        return figure, [target]
     # Layout engines do not know the size of three-dimensional axes.
     layout: Any = None if "subplot_kw" in options else "constrained"
-    figure = Figure(figsize=(inches, inches * ratio * rows / columns), layout=layout)
-    FigureCanvasAgg(figure)
+    size = (inches, inches * ratio * rows / columns)
+    if target is None:
+        figure = Figure(figsize=size, layout=layout)
+        FigureCanvasAgg(figure)
+    else:
+        from matplotlib import pyplot
+
+        figure = pyplot.figure(figsize=size, layout=layout)
     axes = figure.subplots(rows, columns, squeeze=False, **options)
+    if solid:  # with room for a colour bar
+        top = 1.0 - BAR / size[1]
+        figure.subplots_adjust(0.0, 0.07, 0.91, top, wspace=0.1, hspace=0.05)
     return figure, list(axes.ravel())
+
+
+def colour_bar(
+    axes: Axes | Sequence[Axes], drawn: Any, shown: Scale, name: str, locator: Locator,
+    **options: Any,
+) -> Any:  # fmt: skip
+    """Draw the colour bar of what is drawn above axes."""
+    place: dict[str, Any] = {"location": "top", "aspect": 30, "pad": 0.03} | options
+    bar = drawn.axes.figure.colorbar(drawn, ax=axes, **place)
+    bar.set_label(shown.label(name))
+    bar.outline.set_linewidth(0.6)
+    bar.locator, bar.formatter = locator, Multiple(shown.factor)
+    bar.minorticks_off()
+    bar.update_ticks()
+    return bar
 
 
 def legend(
@@ -226,14 +312,20 @@ def legend(
     *,
     mathematics: bool = False,
 ) -> None:
-    """Draw a legend above the axes; labels are shown literally, or as mathematics."""
-    letters = max(map(len, labels), default=0)
-    room = figure.get_figwidth() - (0.08 * len(title) if title else 0.0)
-    columns = max(1, min(len(labels), int(room / (0.062 * letters + 0.45))))
-    drawn = figure.legend(
-        handles, labels, loc="outside upper center", ncols=columns, title=title or None,
-        title_fontsize=7.0,
-    )  # fmt: skip
+    """Draw a legend above the axes, or in the axes if they are given.
+
+    Labels are shown literally, or as mathematics.
+    """
+    target = TARGET.get()
+    if isinstance(target, Axes):
+        drawn = target.legend(handles, labels, title=title or None)
+    else:
+        letters = max(map(len, labels), default=0)
+        room = figure.get_figwidth() - (0.08 * len(title) if title else 0.0)
+        columns = max(1, min(len(labels), int(room / (0.062 * letters + 0.45))))
+        drawn = figure.legend(
+            handles, labels, loc="outside upper center", ncols=columns, title=title or None
+        )
     for text in drawn.get_texts():
         text.set_parse_math(mathematics)
 

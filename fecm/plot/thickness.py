@@ -12,7 +12,7 @@ from fecm.mechanics.element_groups import element_blocks, element_centres
 from fecm.mechanics.locate import locate
 from fecm.plot.data import Array, circle, mesh_of, on_plate, require, struck
 from fecm.plot.kinds import Picture, PlotError, warn
-from fecm.plot.style import COLOURS, literal, panels, scale_of
+from fecm.plot.style import colours, literal, panels, scale_of
 from fecm.results.plies import Plies, rows_at
 from fecm.results.result import Result
 from fecm.results.schema import NotStoredError, ResultFileError
@@ -74,16 +74,16 @@ def thickness(
     place = scale_of(results, "length", [z])
     for ax, (label, (levels, values)) in zip(axes, drawn.items(), strict=False):
         stress = scale_of(results, STRESS, [values])
-        for face in place.factor * np.unique(z[:, ::2]):
+        for face in np.unique(z[:, ::2]):
             ax.axhline(face, color="0.6", lw=0.4, ls=":")
         ax.axvline(0.0, color="0.6", lw=0.4)
-        ax.plot(stress.factor * values.ravel(), place.factor * levels.ravel(), color=COLOURS[0])
-        ax.set_xlabel(stress.label(label))
-        ax.set_ylim(place.factor * z[-1, 2], place.factor * z[0, 0])
+        ax.plot(values.ravel(), levels.ravel(), color=colours()[0])
+        stress.name(ax.xaxis, label)
+        ax.set_ylim(z[-1, 2], z[0, 0])
     for ax in axes[len(drawn) :]:
         ax.set_axis_off()
     for ax in axes[: len(drawn) : columns]:
-        ax.set_ylabel(place.label("$z$"))
+        place.name(ax.yaxis, "$z$")
     clock = scale_of(results, "time", [plies.time])
     x, y = plies.x[0, point], plies.y[0, point]
     where = f"{x:.4g}, {y:.4g} {literal(result.unit('length'))}".rstrip()

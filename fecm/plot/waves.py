@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from fecm.plot.kinds import Picture
-from fecm.plot.style import COLOURS, limit_count, panels, scale_in, styled
-from fecm.studies.waves import FRONTS, MODES, Cusp, Dispersion, Medium, WaveSurfaces
+from fecm.plot.style import COLOURS, Multiple, limit_count, panels, scale_in, styled
+from fecm.studies.waves import FRONTS, MODES, Dispersion, Medium, WaveSurfaces
 
 AROUND = np.arange(1441) / 4.0  # directions of the normals, degrees
 RAYS = 45.0  # degrees between the normals of the rays
@@ -80,13 +80,14 @@ def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
     for place, colour in enumerate(COLOURS[: len(FRONTS)]):
         graphs[0 if place < 2 else 1].plot(
             np.deg2rad(fronts.normal),
-            speed.factor * fronts.velocity[:, place],
+            fronts.velocity[:, place],
             color=colour,
             label=WORDS[FRONTS[place]],
         )
     for ax, title in zip(graphs, ("In-plane fronts", "Flexural fronts"), strict=True):
         ax.set_title(speed.label(f"{title}: normal velocity"))
-        ax.set_rlim(0.0, 1.06 * speed.factor * float(fronts.velocity.max()))
+        ax.set_rlim(0.0, 1.06 * float(fronts.velocity.max()))
+        ax.yaxis.set_major_formatter(Multiple(speed.factor))
         ax.set_rlabel_position(112.5)
         ax.tick_params(labelsize=6.5, pad=1)
         ax.grid(lw=0.4, color="0.8")
@@ -114,28 +115,27 @@ def fronts_picture(
     clock = scale_in(units, "time", np.array(times))
     figure, axes = panels("full", 2, 3, ratio=0.95)
     for mode, ax in enumerate(axes[:5]):
-        _circle(ax, length.factor * radius)
-        for start, end in zip(*(length.factor * at[:, mode] for at in ends), strict=True):
+        _circle(ax, radius)
+        for start, end in zip(*(at[:, mode] for at in ends), strict=True):
             ax.plot(*zip(start, end, strict=True), color="0.6", lw=0.5)
         for at, colour in zip(places, COLOURS, strict=False):
-            ax.plot(*(length.factor * at[:, mode].T), color=colour)
-        _dots(ax, [c for found in turns for c in found if c.mode == FRONTS[mode]], length.factor)
+            ax.plot(*at[:, mode].T, color=colour)
+        dots = [(c.x, c.y) for found in turns for c in found if c.mode == FRONTS[mode]]
+        ax.plot(*np.reshape(dots, (-1, 2)).T, **_DOT)
         ax.set_title(WORDS[FRONTS[mode]])
         ax.locator_params(nbins=5)
-        ax.set(aspect="equal", xlabel=length.label("$x$"), ylabel=length.label("$y$"))
+        ax.set_aspect("equal")
+        length.name(ax.xaxis, "$x$")
+        length.name(ax.yaxis, "$y$")
     axes[5].set_axis_off()
     handles = [Line2D([], [], color=colour) for _, colour in zip(times, COLOURS, strict=False)]
     labels = [clock.show(time) for time in times]
-    extra = (
-        ("time 0", Line2D([], [], color="0.4", ls=DASHES[2])),
-        (f"rays, normals {RAYS:g}° apart", Line2D([], [], color="0.6", lw=0.5)),
-        ("cusps", Line2D([], [], **_DOT)),
-    )
-    axes[5].legend(
-        [*handles, *(handle for _, handle in extra)],
-        [*labels, *(label for label, _ in extra)],
-        loc="center",
-    )
+    handles += [Line2D([], [], color="0.4", ls=DASHES[2]), Line2D([], [], color="0.6", lw=0.5)]
+    labels += ["time 0", f"rays, normals {RAYS:g}° apart"]
+    if any(turns):
+        handles.append(Line2D([], [], **_DOT))
+        labels.append("cusps")
+    axes[5].legend(handles, labels, loc="center")
     return Picture(figure)
 
 
@@ -152,7 +152,3 @@ _DOT: dict[str, Any] = {
 def _circle(ax: Axes, radius: float) -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 181)
     ax.plot(radius * np.cos(angle), radius * np.sin(angle), color="0.4", ls=DASHES[2])
-
-
-def _dots(ax: Axes, found: Sequence[Cusp], factor: float) -> None:
-    ax.plot([factor * c.x for c in found], [factor * c.y for c in found], **_DOT)

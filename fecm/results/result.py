@@ -47,9 +47,10 @@ if TYPE_CHECKING:
     import pandas
     import pyvista
     import xarray
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
     from fecm.deck.findings import Finding
+    from fecm.plot.pictures import RunKind
     from fecm.results.hdf5_reader import Contents
     from fecm.results.plies import Plies
 
@@ -317,32 +318,53 @@ class Result(Contact):
         """Attributes of a group; empty without the group."""
         return dict(self._groups.get(group, {}))
 
-    def plot(self, kind: str = "force", path: str | Path | None = None, **options: Any) -> Figure:
-        """Draw a picture, and write it if a path is given.
+    def plot(
+        self,
+        kind: RunKind = "force",
+        path: str | Path | None = None,
+        *,
+        ax: Axes | None = None,
+        **options: Any,
+    ) -> Axes:
+        """Draw a picture on a new figure of pyplot, on given axes, or in a file.
+
+        The axes hold the result's numbers in the deck's units; the labels of their ticks are
+        scaled.  The user's settings of matplotlib hold, except in files.
 
         Parameters
         ----------
         kind : str
-            Kind of picture; see :data:`fecm.plot.kinds.KINDS`.
+            ``"force"``, ``"loop"``, ``"energy"``, ``"strain"``, ``"thickness"``, ``"failure"``,
+            ``"line"``, ``"contour"``, ``"surface"``, ``"mesh"`` or ``"animation"``.
         path : str or Path, optional
-            File to write; an existing one is replaced.  The suffix selects the format.
+            File to write instead, as ``fecm plot`` does; an existing one is replaced.  The suffix
+            selects the format.
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw on.
         **options
-            Options of the kind, such as ``times`` or ``width``; see docs/pictures.md.
+            Options of the kind, such as ``times`` or ``overlay``; see docs/pictures.md.
 
         Returns
         -------
-        matplotlib.figure.Figure
+        matplotlib.axes.Axes
+            The picture's first axes.
 
         Raises
         ------
         PlotError
-            If the result lacks the data, or the options are invalid.
+            If the result lacks the data, the options are invalid, or `ax` is given and the picture
+            has several axes.
         ImportError
             If matplotlib is not installed.
-        """
-        from fecm.plot.pictures import figure
 
-        return figure(kind, {self.title or "the result": self}, path, **options)
+        Examples
+        --------
+        >>> ax = result.plot("force", width="full")  # doctest: +SKIP
+        >>> ax.plot(time, force, ".")  # doctest: +SKIP
+        """
+        from fecm.plot.pictures import plot
+
+        return plot(kind, {self.title or "the result": self}, path, ax, **options)
 
     def __getitem__(self, path: str) -> Array:
         return self._arrays[path.strip("/")]

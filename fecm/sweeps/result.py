@@ -21,7 +21,7 @@ from fecm.sweeps.plan import Plan
 
 if TYPE_CHECKING:
     import pandas
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
     from fecm.results.hdf5_reader import Contents
 
@@ -159,9 +159,11 @@ class SweepResult:
         quantity: str = "",
         over: str | Sequence[str] = (),
         path: str | Path | None = None,
+        *,
+        ax: Axes | None = None,
         **options: Any,
-    ) -> Figure:
-        """Draw a map; write it if a path is given.
+    ) -> Axes:
+        """Draw a map on a new figure of pyplot, on given axes, or in a file.
 
         Parameters
         ----------
@@ -170,13 +172,17 @@ class SweepResult:
         over : str or sequence of str
             One or two names of varied values; all varied values if empty.
         path : str or Path, optional
-            Output file, which is overwritten; the suffix selects the format.
+            File to write instead, as ``fecm plot`` does; an existing one is replaced.  The suffix
+            selects the format.
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw on.
         **options
             Other options of the kind map: ``where``, ``level``, ``width``.
 
         Returns
         -------
-        matplotlib.figure.Figure
+        matplotlib.axes.Axes
+            The map's axes.
 
         Raises
         ------
@@ -185,11 +191,11 @@ class SweepResult:
         ImportError
             If matplotlib is not installed.
         """
-        from fecm.plot.pictures import figure
+        from fecm.plot.pictures import plot
 
         names = (over,) if isinstance(over, str) else tuple(over)
         named = {self.title or "the sweep": self}
-        return figure("map", named, path, quantity=quantity, over=names, **options)
+        return plot("map", named, path, ax, quantity=quantity, over=names, **options)
 
 
 def result_of(plan: Plan, outcome: Outcome) -> SweepResult:

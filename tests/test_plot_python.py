@@ -1,0 +1,156 @@
+"""Pictures in Python: figures of pyplot, given axes, the user's style, measured data."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm.plot.kinds import KINDS, PlotError
+from fecm.plot.pictures import RunKind, draw
+from tests.calls import call
+from tests.decks import DATA_CARDS, PROGRAM, small
+
+matplotlib = pytest.importorskip("matplotlib")
+pyplot = pytest.importorskip("matplotlib.pyplot")
+
+
+@pytest.fixture(autouse=True)
+def _closed() -> Iterator[None]:
+    """No figures of pyplot before and after a test."""
+    pyplot.close("all")
+    yield
+    pyplot.close("all")
+
+
+@pytest.fixture(scope="module")
+def result() -> fecm.Result:
+    """The small plate in in, lbf and s."""
+    return fecm.run_one(small(data=DATA_CARDS + "UNIT\nin lbf s\n"))
+
+
+@pytest.fixture(scope="module")
+def sweep() -> fecm.SweepResult:
+    """Velocity by k."""
+    program = PROGRAM.replace("LOOP         10", "LOOP        800")
+    return fecm.sweep(small(program), {"velocity": [50.0, 100.0], "k": [1e6, 2e6]})
+
+
+def test_a_picture_is_the_current_figure_of_pyplot_and_its_first_axes_are_returned(
+    result: fecm.Result,
+) -> None:
+    axes = result.plot("force")
+    assert pyplot.get_fignums() == [1]
+    assert (pyplot.gcf(), pyplot.gca()) == (axes.figure, axes)
+    several = result.plot("contour")
+    assert several is pyplot.figure(2).axes[0]
+
+
+def test_measured_numbers_drawn_on_the_axes_lie_on_the_curve(result: fecm.Result) -> None:
+    axes = result.plot("force")
+    line = axes.get_lines()[0]
+    np.testing.assert_array_equal(line.get_xdata(), result.time)
+    np.testing.assert_array_equal(line.get_ydata(), result.force)
+    assert axes.get_xlabel() == "Time (µs)"
+
+
+def test_pictures_are_drawn_on_given_axes_and_nowhere_else(
+    result: fecm.Result, sweep: fecm.SweepResult
+) -> None:
+    figure, (left, right) = pyplot.subplots(1, 2)
+    (measured,) = left.plot([0.0, 5e-6], [0.0, 1.0])
+    assert result.plot("force", ax=left) is left
+    drawn: Any = left.get_legend()
+    assert [text.get_text() for text in drawn.get_texts()] == ["contact force", "transducer"]
+    colours = [line.get_color() for line in left.get_lines()]
+    assert len(set(colours)) == 3
+    assert colours[0] == measured.get_color()
+    assert sweep.plot(ax=right) is right
+    assert not figure.legends
+    assert pyplot.get_fignums() == [1]
+    solid = pyplot.figure().add_subplot(projection="3d")
+    assert result.plot("surface", ax=solid) is solid
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [("contour", "has 4 axes and can't be drawn on one"), ("surface", "'projection': '3d'")],
+)
+def test_pictures_that_do_not_fit_the_axes_are_refused(
+    result: fecm.Result, kind: RunKind, words: str
+) -> None:
+    with pytest.raises(PlotError, match=words):
+        result.plot(kind, ax=pyplot.subplots()[1], times=(2.5e-6, 5e-6, 5e-6, 5e-6)
+                    if kind == "contour" else ())  # fmt: skip
+    with pytest.raises(PlotError, match="path or ax, not both"):
+        result.plot("force", "x.png", ax=pyplot.gca())
+    with pytest.raises(PlotError, match="three-dimensional"):
+        result.plot("force", ax=pyplot.figure().add_subplot(projection="3d"))
+
+
+def test_a_refused_picture_leaves_no_empty_figure(
+    result: fecm.Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fecm.plot.histories.lines_legend", lambda *_: 1 / 0)
+    with pytest.raises(PlotError, match="can't be drawn: ZeroDivisionError"):
+        result.plot("force")
+    assert not pyplot.get_fignums()
+
+
+def test_the_users_style_holds_where_it_differs_from_that_of_matplotlib(
+    result: fecm.Result,
+) -> None:
+    own = {"lines.linewidth": 3.5, "axes.prop_cycle": matplotlib.cycler(color=["red", "lime"])}
+    with matplotlib.rc_context(own):
+        lines = result.plot("force").get_lines()
+        assert [(line.get_linewidth(), line.get_color()) for line in lines] == [
+            (3.5, "red"), (3.5, "lime"),
+        ]  # fmt: skip
+        picture = draw("force", {"a": result}).figure
+        assert picture.axes[0].get_lines()[0].get_linewidth() == 0.9
+    assert result.plot("force").get_lines()[0].get_linewidth() == 0.9
+    given = result.plot("force", ax=pyplot.subplots()[1])
+    assert given.get_lines()[0].get_linewidth() == matplotlib.rcParamsDefault["lines.linewidth"]
+    assert given.spines["top"].get_visible()
+
+
+def test_a_file_is_that_of_the_command_line_whatever_the_users_style(
+    result: fecm.Result, tmp_path: Path
+) -> None:
+    fecm.run(small(data=DATA_CARDS + "UNIT\nin lbf s\n"), output=tmp_path / "a.h5")
+    assert call("plot", tmp_path / "a.h5", "-o", tmp_path / "a.svg").exit_code == 0
+    with matplotlib.rc_context({"lines.linewidth": 3.5}):
+        result.plot("force", tmp_path / "b.svg")
+    assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
+    assert not pyplot.get_fignums()
+
+
+def test_the_command_line_does_not_import_pyplot(tmp_path: Path) -> None:
+    fecm.run(small(), output=tmp_path / "a.h5")
+    code = (
+        "import sys; from fecm.plot.pictures import draw, save; import fecm, pathlib\n"
+        "save(draw('force', {'a': fecm.load('a.h5')}), pathlib.Path('a.png'))\n"
+        "print('matplotlib.pyplot' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "False\n"
+
+
+def test_the_kinds_for_type_checkers_are_those_of_results() -> None:
+    assert list(get_args(RunKind)) == [name for name, kind in KINDS.items() if not kind.sweep]
+
+
+def test_a_rigid_mass_has_one_curve_that_says_so() -> None:
+    deck = small(data=DATA_CARDS + "PROJ\n0, 0, 2.E-4\n\n")
+    axes: Any = fecm.run_one(deck).plot()
+    assert [line.get_label() for line in axes.get_lines()] == [
+        "contact force and transducer, which are equal"
+    ]
