@@ -16,24 +16,35 @@ from fecm._version import __version__
 
 if TYPE_CHECKING:
     from fecm.api import read_one, run, run_one
+    from fecm.authoring import impact
     from fecm.deck.findings import DeckError
     from fecm.deck.model import Deck
     from fecm.deck.reader import read_deck
+    from fecm.deck.records import Ply
     from fecm.mechanics.plate_motion import DivergenceError
+    from fecm.mechanics.projectile import RigidMass, Rod
+    from fecm.objects import Contact, Laminate, Plate
     from fecm.results.result import Result, load
     from fecm.sweeps.api import sweep
     from fecm.sweeps.result import SweepResult
     from fecm.sweeps.result import load as load_sweep
 
 __all__ = [
+    "Contact",
     "Deck",
     "DeckError",
     "DivergenceError",
     "FecmError",
     "FecmWarning",
+    "Laminate",
+    "Plate",
+    "Ply",
     "Result",
+    "RigidMass",
+    "Rod",
     "SweepResult",
     "__version__",
+    "impact",
     "load",
     "load_sweep",
     "read_deck",
@@ -51,6 +62,13 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "Deck": "fecm.deck.model",
         "DeckError": "fecm.deck.findings",
         "read_deck": "fecm.deck.reader",
+        "impact": "fecm.authoring",
+        "Contact": "fecm.objects",
+        "Laminate": "fecm.objects",
+        "Plate": "fecm.objects",
+        "Ply": "fecm.deck.records",
+        "RigidMass": "fecm.mechanics.projectile",
+        "Rod": "fecm.mechanics.projectile",
         "DivergenceError": "fecm.mechanics.plate_motion",
         "Result": "fecm.results.result",
         "load": "fecm.results.result",

@@ -24,6 +24,14 @@ deck: fecm.Deck = fecm.read_one("plate.inp")
 again: fecm.Result = fecm.run_one(deck, progress=lambda step, steps: print(step / steps))
 axes: Axes = result.plot("loop", ax=result.plot("force"), against="displacement")
 sweep: fecm.SweepResult = fecm.sweep(deck, {"velocity": [1.0, 2.0]}, workers=2)
+plate: fecm.Plate = fecm.Plate.from_mesh("plate.msh", {"rim": "clamped"})
+ply: fecm.Ply = fecm.Ply(1.6e-9, 0.3, 140e3, 9e3, 5e3, 5e3, 3e3)
+laminates: list[fecm.Laminate] = [fecm.Laminate(x, ply, 0.2) for x in ("[0/90]s", [0, 45.0])]
+rods: tuple[fecm.Rod | fecm.RigidMass, ...] = (fecm.RigidMass(1e-3),)
+made: fecm.Deck = fecm.impact(
+    fecm.Plate.rectangle((100, 80), (10, 8), support="simple", edges={"top": "free"}),
+    laminates[0], rods[0], fecm.Contact.estimate(8.0), energy=500.0, duration=1e-3, units="mm-N-s",
+).with_(velocity=3.0, layup="[0/90]2s")  # fmt: skip
 
 result.plot("forse")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 result.forse  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]  # noqa: B018
@@ -32,3 +40,5 @@ several.force  # type: ignore[union-attr]  # pyright: ignore[reportAttributeAcce
 fecm.run_one("plate.inp", mode="raport")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.run_one("plate.inp", solver="gpu")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.runn("plate.inp")  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]
+fecm.Plate.from_mesh("plate.msh", {"rim": "glued"})  # type: ignore[dict-item]  # pyright: ignore[reportArgumentType]
+fecm.impact(plate, laminates[0], 5.0)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]

@@ -123,9 +123,9 @@ def test_contact_estimate_is_that_of_indent_estimate_and_says_so_in_the_deck(
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--contact", "estimate"], "needs the sphere: estimate:RADIUS[,ES,NUS]"),
+        (["--contact", "estimate"], "--contact estimate needs the sphere's radius"),
         (["--contact", "estimate:0"], "'0' is not of the form estimate:RADIUS[,ES,NUS]"),
-        (["--contact", "estimate:8"], "--contact estimate with --ply needs --units"),
+        (["--contact", "estimate:8"], "with constants of a --ply needs --units"),
         (["--contact", "estimate:8,2e5,0.9"], "k cannot be estimated: nu_s must lie between"),
     ],
 )

@@ -82,16 +82,21 @@ def _named(context: click.Context, parameter: click.Parameter, name: str | None)
     raise click.BadParameter(f"{name!r} is not a named ply; {hint}", context, parameter)
 
 
+def one_ply(ply: Sequence[float] | None, material: NamedPly | None) -> Ply | NamedPly:
+    """The ply of one of the two options."""
+    if ply is not None and material is None:
+        return Ply(*ply)
+    if ply is not None or material is None:
+        raise click.UsageError("give either --ply or --material")
+    return material
+
+
 def ply_of_options(
     ply: Sequence[float] | None, material: NamedPly | None, units: str | None
 ) -> Ply:
     """Constants of the ply; of a named one in the units."""
-    if (ply is None) == (material is None):
-        raise click.UsageError("give either --ply or --material")
-    if ply is not None:
-        return Ply(*ply)
-    assert material is not None
-    return material.converted(units or material.system)
+    chosen = one_ply(ply, material)
+    return chosen if isinstance(chosen, Ply) else chosen.converted(units or chosen.system)
 
 
 def laminate_of_options(

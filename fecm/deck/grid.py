@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecm.deck.model import Boundary, Coordinates, Elements
 from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
@@ -18,6 +19,10 @@ from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
 DIGITS = 6
 # Least number of elements between a window and an edge.
 LEAST_BESIDE = 2
+# Restraints of an edge: nothing; w and, along x or y, the rotation along it; all out of the plane.
+SUPPORTS = ("free", "simple", "clamped")
+HELD, SIMPLE, CLAMPED = (1, 1, 1, 0, 0), ((1, 1, 1, 1, 0), (1, 1, 1, 0, 1)), (1, 1, 1, 1, 1)
+EDGES = ("left", "right", "bottom", "top")
 
 
 @dataclass(frozen=True)
@@ -58,7 +63,7 @@ def listed(text: str) -> list[Section]:
         if match is None or int(match[1]) < 1 or not 0.0 < size < math.inf:
             raise ValueError(f"`{part.strip()}` is not COUNT*SIZE, as in 3*0.5,8*0.375,3*0.5")
         end = start + int(match[1]) * size
-        sections.append(Section(start, _round(end, end), int(match[1])))
+        sections.append(Section(start, round_to(end, end), int(match[1])))
         start = sections[-1].end
     return sections
 
@@ -95,7 +100,7 @@ def graded(length: float, elements: int, centre: float, ratio: float) -> list[Se
     start = total = 0.0
     for number, step in enumerate(steps, start=1):
         total += step
-        end = length if number == len(steps) else _round(total, length)
+        end = length if number == len(steps) else round_to(total, length)
         sections.append(Section(start, end, 1))
         start = end
     return sections
@@ -132,8 +137,8 @@ def framed(inner: Sequence[Section], length: float) -> list[Section]:
     The window's edges become lines of nodes.
     """
     start = (length - inner[-1].end) / 2.0
-    ends = [_round(start + section.end, length) for section in inner]
-    starts = [_round(start, length), *ends]
+    ends = [round_to(start + section.end, length) for section in inner]
+    starts = [round_to(start, length), *ends]
     sizes = [(section.end - section.start) / section.elements for section in inner]
     before, after = (max(LEAST_BESIDE, math.ceil(start / size)) for size in (sizes[0], sizes[-1]))
     middle = (
@@ -149,7 +154,8 @@ def _series(length: float, count: int, ratio: float) -> list[float]:
     return [length * size / sum(sizes) for size in sizes]
 
 
-def _round(value: float, scale: float) -> float:
+def round_to(value: float, scale: float) -> float:
+    """A coordinate with :data:`DIGITS` digits of the plate's size."""
     return round(value, DIGITS - math.floor(math.log10(scale)))
 
 
@@ -204,6 +210,16 @@ class Grid:
         """Number of elements."""
         return (self.across // 2) * (self.up // 2)
 
+    @property
+    def most_nodes(self) -> int:
+        """Nodes per element."""
+        return 9
+
+    @property
+    def extent(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Lowest and highest coordinates."""
+        return (0.0, 0.0), (self.columns[-1].end, self.rows[-1].end)
+
     def nearest(self, x: float, y: float) -> tuple[int, float, float]:
         """Number and place of the node nearest to a point."""
         xs, ys = lines(self.columns), lines(self.rows)
@@ -216,7 +232,7 @@ class Grid:
         records: list[NodeValues] = []
         for line, y in enumerate(lines(self.rows)):
             node = 1 + line * self.across
-            y = _round(y, self.rows[-1].end)
+            y = round_to(y, self.rows[-1].end)
             for section in self.columns:
                 records.append(NodeValues(node, 1, (section.start, y)))
                 node += 2 * section.elements
@@ -234,6 +250,21 @@ class Grid:
             number = 1 + row * (a // 2)
             records.append(ElementNodes(number, (*corners, *sides, n + 1 + a), 2))
         return Elements(tuple(records))
+
+    def supported(
+        self,
+        everywhere: Sequence[int],
+        supports: Mapping[str, str],
+        window: tuple[float, float] | None = None,
+    ) -> Boundary | None:
+        """BOUN cards of the supports of the edges; w is held along the edges of a window."""
+        # The rotation along an edge x = const is theta_y, along y = const theta_x.
+        codes = {
+            edge: CLAMPED if support == "clamped" else SIMPLE[edge in ("left", "right")]
+            for edge, support in supports.items()
+            if support != "free"
+        }
+        return self.boundary(everywhere, codes, window, HELD)
 
     def boundary(
         self,
@@ -269,14 +300,18 @@ class Grid:
                 ([low, high], slice(left, right + 1)),
             ):
                 codes[j, i] = np.maximum(codes[j, i], held)
-        rows = codes.reshape(self.nodes, -1)
-        starts = [0, *(np.flatnonzero((np.diff(rows, axis=0) != 0).any(axis=1)) + 1).tolist()]
-        records: list[NodeCodes] = []
-        for start, end in pairwise([*starts, self.nodes]):
-            code = tuple(rows[start].tolist())
-            if not any(code):
-                continue
-            if end - start > 1:  # a negative code carries on up to the next card
-                records.append(NodeCodes(start + 1, 1, tuple(-c for c in code)))
-            records.append(NodeCodes(end, 0, code))
-        return Boundary(tuple(records)) if records else None
+        return boundary_cards(codes.reshape(self.nodes, -1))
+
+
+def boundary_cards(codes: NDArray[np.int_]) -> Boundary | None:
+    """BOUN cards of restraint codes (numnp, ndf), runs of equal ones generated."""
+    starts = [0, *(np.flatnonzero((np.diff(codes, axis=0) != 0).any(axis=1)) + 1).tolist()]
+    records: list[NodeCodes] = []
+    for start, end in pairwise([*starts, len(codes)]):
+        code = tuple(codes[start].tolist())
+        if not any(code):
+            continue
+        if end - start > 1:  # a negative code carries on up to the next card
+            records.append(NodeCodes(start + 1, 1, tuple(-c for c in code)))
+        records.append(NodeCodes(end, 0, code))
+    return Boundary(tuple(records)) if records else None

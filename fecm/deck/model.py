@@ -7,7 +7,7 @@ and elements between them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Self, TypeVar
 
@@ -541,6 +541,31 @@ class Deck(Record):
         if segment is None:
             raise LookupError(f"the deck has no {kind.keyword} segment")
         return segment
+
+    def with_(self, **values: float | str | Sequence[float]) -> Deck:
+        """Deck with other values, under the names that :func:`fecm.sweep` varies.
+
+        Raises
+        ------
+        ValueError
+            If a name is unknown, or a value is invalid for this deck.
+
+        Examples
+        --------
+        >>> import fecm
+        >>> deck = fecm.read_one("decks/impact-115.inp")
+        >>> deck.with_(velocity=60, layup="[0/90]5s").control.layers
+        20
+        """
+        from fecm.sweeps.cases import checked
+        from fecm.sweeps.vary import apply_case
+
+        case = {
+            name: value if isinstance(value, str) or not isinstance(value, Iterable)
+            else "/".join(map(str, value))
+            for name, value in values.items()
+        }  # fmt: skip
+        return apply_case(self, *checked([case]))
 
     def to_text(self) -> str:
         """Write the problem as cards, ended by STOP; reading them gives the same model.

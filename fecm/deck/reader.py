@@ -7,6 +7,7 @@ from unreadable cards.
 from __future__ import annotations
 
 import difflib
+import re
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -39,6 +40,11 @@ LINE_ENDS = b"\n\r\x0b\x0c\x1c\x1d\x1e\x85\xa8\xa9"
 # Number of bytes that identify a binary file.
 FIRST = 4096
 HDF5 = b"\x89HDF\r\n\x1a\n"
+# First lines of other programs' files.
+OTHERS = {
+    r"\*\*|\*[a-z]": "an input file of Abaqus or CalculiX",
+    r"\$MeshFormat": "a mesh of Gmsh",
+}
 
 
 @dataclass
@@ -88,6 +94,14 @@ class Reader:
         problems: list[ParsedProblem] = []
         stopped = False
         while (card := self.stream.take_filled()) is not None:
+            first = not (problems or stopped or self.findings)
+            if first and (other := _program_of(card.data)):
+                self.findings.add(
+                    "E013", f"This is {other}, not a deck.", card.place,
+                    "`fecm new DECK --mesh FILE`, or fecm.Plate.from_mesh, takes a mesh from it",
+                )  # fmt: skip
+                self.findings.close()
+                break
             if card.keyword == STOP:
                 stopped = True
                 break
@@ -355,6 +369,12 @@ def decode(data: bytes) -> str:
         return data.decode("utf-8")
     except UnicodeDecodeError:
         return data.decode("latin-1")
+
+
+def _program_of(line: str) -> str:
+    """The kind of file that begins with a line, if it is another program's."""
+    found = (kind for head, kind in OTHERS.items() if re.match(head, line, re.IGNORECASE))
+    return next(found, "")
 
 
 def load_text(path_or_text: str | Path) -> tuple[str, str]:

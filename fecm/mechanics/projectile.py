@@ -49,6 +49,13 @@ class Rod:
     density: float
     consistent: bool = False
 
+    @classmethod
+    def cylinder(
+        cls, length: float, diameter: float, modulus: float, density: float, elements: int = 20
+    ) -> Rod:
+        """Rod of one diameter."""
+        return cls(length, (float(diameter),) * elements, modulus, density)
+
     @property
     def elements(self) -> int:
         """Number of elements."""

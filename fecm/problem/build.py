@@ -18,6 +18,7 @@ from fecm.deck.model import Allowables, Damping, Deck, Delamination, Indentation
 from fecm.deck.model import Gages as GageCards
 from fecm.deck.model import Impact as ImpactCard
 from fecm.deck.model import Projectile as ProjectileCard
+from fecm.deck.records import RodDiameter
 from fecm.mechanics.contact_law import (
     ContactParameters,
     HystereticLaw,
@@ -343,6 +344,18 @@ def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> Project
         return RigidMass(card.size)
     diameters = tuple(rod_diameters(card).tolist())
     return Rod(card.size, diameters, card.modulus, card.density)
+
+
+def projectile_segment(rod: Projectile, transducer: int = 0) -> ProjectileCard:
+    """PROJ segment of a projectile."""
+    if isinstance(rod, RigidMass):
+        return ProjectileCard(0, 0, rod.total_mass)
+    cards = [RodDiameter(n, 0, diameter) for n, diameter in enumerate(rod.diameters, start=1)]
+    if len(set(rod.diameters)) == 1 < len(cards):  # those between two cards are generated
+        cards = [replace(cards[0], increment=1), cards[-1]]
+    return ProjectileCard(
+        rod.elements, transducer, rod.length, rod.modulus, rod.density, tuple(cards)
+    )
 
 
 def build_constants(measured: Indentation) -> ContactParameters:

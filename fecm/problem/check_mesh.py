@@ -261,7 +261,9 @@ def _check_shapes(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool) 
     supported = bool((mesh.equations[:, W] == 0).any())
     if not listing:
         nodal = _loads_a_node(deck, mesh, supported=supported)
-        _check_shear(material, families, supported, nodal, findings)
+        shear = deck.last(Shear)
+        assumed = shear is not None and shear.assumed
+        _check_shear(material, families, supported, nodal, assumed, findings)
 
 
 def _at_third_node(card: Integration, family: element_groups.ElementBlock) -> bool:
@@ -328,6 +330,7 @@ def _check_shear(
     families: list[element_groups.ElementBlock],
     supported: bool,
     nodal: bool,
+    assumed: bool,
     findings: Findings,
 ) -> None:
     """Find zero-energy modes of the transverse shear's quadrature, and elements that lock."""
@@ -335,7 +338,7 @@ def _check_shear(
     weak: dict[int, list[str]] = {}
     for family in families:
         name, free, held = _orders_without_motions(family)
-        if name == FOUR_NODES and order >= free:
+        if name == FOUR_NODES and order >= free and not assumed:
             findings.add(
                 "W320",
                 f"4-node elements lock under the shear order L2 = {card.shear}: they are much too "

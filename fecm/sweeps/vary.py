@@ -20,11 +20,11 @@ from fecm.deck.model import (
     Segment,
 )
 from fecm.deck.reader import ParsedProblem
-from fecm.deck.records import Layer, NodeCodes, Ply, RodDiameter
+from fecm.deck.records import Layer, NodeCodes, Ply
 from fecm.mechanics.mesh import holds_the_plane
 from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.time_step import taken_time_step
-from fecm.problem.build import build_projectile, is_coupled
+from fecm.problem.build import build_projectile, is_coupled, projectile_segment
 from fecm.problem.generate import restraint_codes
 from fecm.problem.problem import check
 from fecm.sweeps.cases import NAMES, Case, CasesError, Value
@@ -122,11 +122,9 @@ def _rod(deck: Deck, name: str, value: Value) -> Deck:
     if isinstance(rod, RigidMass):
         if name != "rod_mass":
             raise CasesError(f"{name}: the projectile of the deck is a rigid mass")
-        new = Projectile(0, 0, number)
+        new = projectile_segment(RigidMass(number))
     else:
-        diameters = tuple(RodDiameter(n, 0, d) for n, d in enumerate(rod.diameters, start=1))
-        transducer = 0 if old is None else old.transducer
-        new = Projectile(rod.elements, transducer, rod.length, rod.modulus, rod.density, diameters)
+        new = projectile_segment(rod, 0 if old is None else old.transducer)
         if name == "rod_length":
             new = replace(new, size=number)
         elif name == "rod_modulus":

@@ -1,0 +1,422 @@
+"""The deck of an impact from plate, laminate, projectile and contact."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Literal
+
+from fecm._errors import FecmWarning
+from fecm.api import load_deck
+from fecm.deck.catalogue import (
+    CONTACTS,
+    MATERIALS,
+    NU23,
+    STRENGTHS,
+    SYSTEM,
+    SYSTEMS,
+    NamedContact,
+    NamedPly,
+)
+from fecm.deck.findings import DeckError
+from fecm.deck.grid import Grid
+from fecm.deck.model import (
+    Allowables,
+    Deck,
+    Gages,
+    Impact,
+    Indentation,
+    Material,
+    Patch,
+    Projectile,
+    Segment,
+    Shear,
+    Units,
+)
+from fecm.deck.records import Control, Gage, Integration, Layer, Macro, Ply
+from fecm.mechanics.laminate import laminate as stiffness_of
+from fecm.mechanics.patch import HERTZ
+from fecm.mechanics.projectile import RigidMass, Rod
+from fecm.mechanics.time_step import critical_time_step, rounded_time_step
+from fecm.objects import (
+    STANDARD,
+    Contact,
+    Laminate,
+    ObjectError,
+    Plate,
+    Sphere,
+    check_positive,
+    grid_of,
+    parse_patch,
+)
+from fecm.problem.build import build_plate, build_projectile, projectile_segment
+from fecm.problem.fixture import DropWeight
+from fecm.problem.generate import generate
+from fecm.problem.plate_mesh import PlateMesh
+from fecm.studies.estimate import static_stiffness
+
+# Integration order of stiffness and mass, and stress points.
+ORDER, NODAL_POINTS = 3, -3
+# Default number of stored rows of strains and displacements.
+ROWS = 200
+# Simulated time over half a period of the projectile on the plate's static stiffness.
+CONTACT_TIMES = 1.25
+# The default patch: a disc, or what a standard has.
+AUTO = "auto"
+MITC, FULL = "mitc", "full"
+
+
+@dataclass(frozen=True)
+class Authored:
+    """A new deck, not yet checked.
+
+    Attributes
+    ----------
+    deck : Deck
+    comments : str
+        Comment lines for the deck's head.
+    notes, doubts : list of str
+        What was filled in, and what differs from what was asked.
+    """
+
+    deck: Deck
+    comments: str
+    notes: list[str]
+    doubts: list[str]
+
+
+def impact(
+    plate: Plate,
+    laminate: Laminate,
+    projectile: Rod | RigidMass | Projectile | None = None,
+    contact: Indentation | NamedContact | Sphere | str | None = None,
+    *,
+    velocity: float | None = None,
+    energy: float | None = None,
+    at: tuple[float, float] | None = None,
+    duration: float | None = None,
+    dt: float | None = None,
+    every: int | None = None,
+    units: str | None = None,
+    patch: str | Patch | None = AUTO,
+    shear: Literal["mitc", "full"] = "mitc",
+    gages: Iterable[tuple[float, float, float, float]] = (),
+    damage: bool = False,
+    title: str = "",
+) -> Deck:
+    """Deck of an impact, as `fecm new` writes it.
+
+    A laminate without coupling has its in-plane dofs restrained, as the report's does; any other
+    has them free, and restrained only where the plate is supported.
+
+    Parameters
+    ----------
+    plate : Plate
+    laminate : Laminate
+    projectile : Rod or RigidMass, optional
+        In the deck's units; the report's rod, or the mass of a fixture's standard, by default.
+    contact : Contact or str
+        Indentation law, or the name of a published one.
+    velocity, energy : float
+        Approach velocity (length/time) or energy (force*length) of the projectile.
+    at : tuple of float, optional
+        Impact point; the middle of the plate by default.  The nearest node is hit; on an imported
+        mesh a patch is centred at the point itself.
+    duration : float
+        Simulated time; with a fixture by default 1.25 times half a period of the projectile on the
+        plate.
+    dt : float, optional
+        Time step; 0.9 of the critical one by default.
+    every : int, optional
+        Steps between stored rows; about 200 rows by default.
+    units : str, optional
+        ``"in-lbf-s"``, ``"m-N-s"`` or ``"mm-N-s"``: names the units, and converts a named ply and
+        contact to them; those of a named ply's source by default.
+    patch : str or Patch or None
+        Area of the contact force: ``"disc"`` or ``"hertz"``, with ``":RADIUS"``, to which the mesh
+        of a rectangle is then refined; None is a point force.  By default a disc.
+    shear : str
+        Transverse shear: assumed strains, ``"mitc"``, or full quadrature, ``"full"``.
+    gages : iterable of tuple
+        x, y, z from the mid-plane (length) and direction (degrees) of strain gages.
+    damage : bool
+        Add strengths and toughness of a named ply.
+    title : str, optional
+
+    Returns
+    -------
+    Deck
+
+    Raises
+    ------
+    ValueError
+        If something is missing or makes no sense.
+    DeckError
+        If the deck has errors.
+
+    Examples
+    --------
+    >>> import fecm
+    >>> deck = fecm.impact(
+    ...     fecm.Plate.rectangle((100, 80), (10, 8), support="simple"),
+    ...     fecm.Laminate("[0/90]2s", "T300/5208", 0.25),
+    ...     fecm.RigidMass(1e-3),
+    ...     fecm.Contact.estimate(radius=8),
+    ...     energy=500, duration=5e-4, units="mm-N-s",
+    ... )
+    >>> deck.control.numel
+    80
+    """
+    made = author(
+        plate, laminate, projectile, contact, velocity=velocity, energy=energy, at=at,
+        duration=duration, dt=dt, every=every, units=units, patch=patch, shear=shear, gages=gages,
+        damage=damage, title=title,
+    )  # fmt: skip
+    loaded = load_deck(made.deck)
+    if errors := loaded.errors():
+        raise DeckError(errors, "<deck>")
+    for doubt in made.doubts:
+        warnings.warn(FecmWarning(doubt), stacklevel=2)
+    return made.deck
+
+
+def author(
+    plate: Plate,
+    laminate: Laminate,
+    projectile: Rod | RigidMass | Projectile | None,
+    contact: Indentation | NamedContact | Sphere | str | None,
+    *,
+    velocity: float | None,
+    energy: float | None,
+    at: tuple[float, float] | None,
+    duration: float | None,
+    dt: float | None,
+    every: int | None,
+    units: str | None,
+    patch: str | Patch | None,
+    shear: str,
+    gages: Iterable[tuple[float, float, float, float]],
+    damage: bool,
+    title: str,
+) -> Authored:
+    """Make the deck of :func:`impact` without checking it."""
+    check_positive(
+        energy=energy, duration=duration, dt=dt, every=every, ply_thickness=laminate.ply_thickness
+    )
+    if shear not in (MITC, FULL):
+        raise ObjectError(f"`shear` is {shear!r}, not {MITC} or {FULL}")
+    if units is not None and units not in SYSTEMS:
+        raise ObjectError(f"`units` is {units!r}, none of {', '.join(SYSTEMS)}")
+    notes: list[str] = []
+    doubts: list[str] = []
+    test = plate.fixture.test if plate.fixture else None
+    if test is not None:
+        if units not in (None, STANDARD):
+            raise ObjectError(f"the fixture's standard is in {STANDARD}; leave out `units`")
+        units = STANDARD
+        doubts += _outside(plate, test, laminate)
+        if projectile is None:
+            projectile = RigidMass(test.mass)
+        if velocity is None and energy is None:
+            energy = test.energy * laminate.thickness
+            notes.append(
+                f"the energy is {energy / 1000.0:.4g} J, {test.energy / 1000.0:g} J per mm of "
+                "thickness"
+            )
+        if contact in (None, Sphere()):
+            contact = Sphere(test.radius)
+    if patch == AUTO:
+        patch = Patch() if test is None else Patch(HERTZ)
+    elif isinstance(patch, str):
+        patch = parse_patch(patch)
+    named = _named(laminate.ply)
+    system = units or (named.system if named else None)
+    ply = named.converted(system or named.system) if named else laminate.ply
+    if not isinstance(ply, Ply):
+        raise ObjectError(f"`ply` is {ply!r}, not a name or a Ply")
+    if projectile is None and system not in (None, SYSTEM):
+        raise ObjectError(
+            "give `projectile`, a rigid mass or a rod: without it the projectile is the report's "
+            f"steel rod, whose numbers are in {SYSTEM}"
+        )
+    if (velocity is None) == (energy is None):
+        raise ObjectError("give either `velocity` or `energy`")
+    if duration is None and plate.fixture is None:
+        raise ObjectError("`duration` is missing")
+    law, comment = _law(contact, laminate, ply, named, system)
+    if comment:
+        notes.append(
+            f"k = {law.k:g} is estimated from the ply's constants (fecm indent estimate) for an "
+            "elastic law; a measured one is better"
+        )
+    damages: tuple[Segment, ...] = ()
+    if damage:
+        damages, more = _damage(named, system)
+        notes += more
+    mesh, (x, y) = _mesh(plate, at, None if patch is None else patch.radius)
+    if isinstance(mesh, PlateMesh) and mesh.groups and not plate.supports:
+        doubts.append(
+            f"the plate is free: no group of the mesh has a support, of {', '.join(mesh.groups)}"
+        )
+    node, node_x, node_y = mesh.nearest(x, y)
+    distance = math.hypot(node_x - x, node_y - y)
+    if distance > 1e-9 * max(map(abs, (x, y, node_x, node_y))):
+        asked = "the plate's centre" if at is None else "`at`"
+        if patch is not None and isinstance(mesh, PlateMesh):
+            patch = replace(patch, x=float(f"{x:.6g}"), y=float(f"{y:.6g}"))
+        else:
+            doubts.append(
+                f"the impact point is moved by {distance:.4g}: from {asked} at {x:g}, {y:g} to the "
+                f"nearest node, {node} at {node_x:g}, {node_y:g}"
+            )
+    if isinstance(mesh, Grid) and plate.mesh and not plate.fixture and patch and patch.radius:
+        counts = mesh.across // 2, mesh.up // 2
+        if counts != plate.mesh:
+            doubts.append(
+                f"the mesh has {counts[0]}x{counts[1]} elements instead of {plate.mesh[0]}x"
+                f"{plate.mesh[1]}: their sides at the patch are at most its radius "
+                f"{patch.radius:g}"
+            )
+    angles = laminate.angles
+    layers = tuple(Layer(n, a, laminate.ply_thickness) for n, a in enumerate(angles, start=1))
+    coupled = stiffness_of(ply, angles, [laminate.ply_thickness] * len(angles)).is_coupled
+    everywhere = (0, 0, 0, 0, 0) if coupled else (1, 1, 0, 0, 0)
+    window = plate.fixture.window if plate.fixture else None
+    records = tuple(Gage(n, *map(float, gage)) for n, gage in enumerate(gages, start=1))
+    if isinstance(projectile, Rod | RigidMass):
+        projectile = projectile_segment(projectile)
+    segments = (
+        None if units is None else Units(*SYSTEMS[units].values()),
+        mesh.coordinates(), mesh.element_cards(),
+        mesh.supported(everywhere, plate.supports, window), projectile,
+        Impact(node, 3, velocity or 1.0), patch, Gages(records) if records else None, *damages, law,
+        Shear(assumed=True) if shear == MITC else None,
+        Material(Integration(ORDER, ORDER, NODAL_POINTS, laminate.thickness), ply, layers),
+    )  # fmt: skip
+    control = Control(mesh.nodes, mesh.elements, len(layers), 2, 5, mesh.most_nodes)
+    deck = Deck(title, control, tuple(s for s in segments if s is not None), ())
+    if dt is None:
+        dt = rounded_time_step(critical_time_step(build_plate(deck, generate(deck))))
+    if energy is not None:
+        deck = _with_energy(deck, energy)
+    program = partial(_program, dt=dt, every=every, fails=deck.has(Allowables))
+    if duration is None:
+        duration = _duration(replace(deck, macros=program(dt)))
+    comments = (plate.fixture.comment if plate.fixture else "") + comment
+    return Authored(replace(deck, macros=program(duration)), comments, notes, doubts)
+
+
+def _program(duration: float, dt: float, every: int | None, fails: bool) -> tuple[Macro, ...]:
+    """Macro program of an impact."""
+    steps = max(1, math.ceil(duration / dt - 1e-9))
+    rows = float(every if every is not None else max(1, steps // ROWS))
+    return (
+        Macro("LMAS"),
+        Macro("DT", value=dt),
+        Macro("LOOP", value=float(steps)),
+        Macro("TIME"),
+        Macro("RODP", value=rows),
+        Macro("DISP", value=rows),
+        *([Macro("FAIL", value=rows)] if fails else []),
+        Macro("NEXT"),
+    )
+
+
+def _outside(plate: Plate, test: DropWeight, laminate: Laminate) -> list[str]:
+    """Warning of a laminate that a standard does not cover."""
+    assert plate.fixture is not None
+    if test.thinnest <= round(laminate.thickness, 9) <= test.thickest:
+        return []
+    return [
+        f"warning: {plate.fixture.name} is for laminates of {test.thinnest:g} to "
+        f"{test.thickest:g} mm; this one has {laminate.thickness:.4g} mm"
+    ]
+
+
+def _named(ply: str | Ply | NamedPly) -> NamedPly | None:
+    """The named ply; None for constants."""
+    if isinstance(ply, str):
+        if ply not in MATERIALS:
+            raise ObjectError(f"{ply!r} is not a named ply: {', '.join(MATERIALS)}")
+        return MATERIALS[ply]
+    return ply if isinstance(ply, NamedPly) else None
+
+
+def _law(
+    contact: Indentation | NamedContact | Sphere | str | None, laminate: Laminate, ply: Ply,
+    named: NamedPly | None, system: str | None,
+) -> tuple[Indentation, str]:  # fmt: skip
+    """Indentation law, a named one in the units of the ply, and comment lines about it."""
+    if isinstance(contact, str):
+        contact = Contact.named(contact)
+    if isinstance(contact, Indentation):
+        return Indentation(*contact.values(), contact.word), ""
+    if isinstance(contact, Sphere):
+        return contact.law(laminate, ply, named.nu23 if named else NU23, system)
+    if contact is None:
+        raise ObjectError(f"give `contact`, a law or one of {', '.join(CONTACTS)}")
+    if system is None:
+        raise ObjectError("a named `contact` with constants of a `ply` needs `units`, theirs")
+    return contact.converted(system), ""
+
+
+def _damage(named: NamedPly | None, system: str | None) -> tuple[tuple[Segment, ...], list[str]]:
+    """Strengths and toughness of a named ply, and notes about what it does not have."""
+    if named is None or system is None:
+        raise ObjectError("`damage` needs a named ply with strengths or toughness")
+    parts = {
+        " and ".join(key for key in STRENGTHS if key not in named.values): (
+            named.allowables(system), "no failure exposures (ALLO, FAIL)"
+        ),
+        "GIIc": (named.delamination(system), "no delamination threshold (DELA)"),
+    }  # fmt: skip
+    missing = [f"no {key}, so {what}" for key, (part, what) in parts.items() if part is None]
+    if len(missing) == len(parts):
+        raise ObjectError(f"`damage`: {named.name} has {'; '.join(missing)}")
+    notes = [f"{named.name} has {text}" for text in missing]
+    return tuple(part for part, _ in parts.values() if part is not None), notes
+
+
+def _mesh(
+    plate: Plate, at: Sequence[float] | None, radius: float | None
+) -> tuple[Grid | PlateMesh, tuple[float, float]]:
+    """Mesh of the plate and the impact point."""
+    if at is not None and len(at) != 2:
+        raise ObjectError(f"`at` is {at!r}, not x and y")
+    place = None if at is None else (float(at[0]), float(at[1]))
+    mesh = plate.imported or grid_of(plate, place, radius)
+    low, high = mesh.extent
+    if place is None:
+        return mesh, ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0)
+    if not all(a <= x <= b for a, x, b in zip(low, place, high, strict=True)):
+        raise ObjectError("`at` is outside the plate")
+    return mesh, place
+
+
+def _with_energy(deck: Deck, energy: float) -> Deck:
+    """The deck with a velocity for an energy, in as many digits as its card has."""
+    mass = build_projectile(deck).total_mass
+    velocity = math.sqrt(2.0 * energy / mass) if mass > 0.0 else math.inf
+    if not 0.0 < velocity < math.inf:
+        raise ObjectError(f"no velocity gives the energy {energy:g} to the mass {mass:g}")
+    old = deck.require(Impact)
+    new = replace(old, velocity=float(f"{velocity:.6g}"))
+    return replace(deck, segments=tuple(new if s is old else s for s in deck.segments))
+
+
+def _duration(deck: Deck) -> float:
+    """Simulated time: longer than half a period of projectile and static plate.
+
+    That of a deck with errors, which is refused later, is 1.
+    """
+    loaded = load_deck(deck)
+    if loaded.errors():
+        return 1.0
+    (problem,) = loaded.problems
+    assert problem.contact is not None
+    stiffness = static_stiffness(problem.moving_plate, problem.contact)
+    half = math.pi * math.sqrt(build_projectile(deck).total_mass / stiffness)
+    return float(f"{CONTACT_TIMES * half:.2g}")

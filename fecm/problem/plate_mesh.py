@@ -1,0 +1,350 @@
+"""Meshes of mesh generators: elements and groups of nodes of a file or of arrays."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecm._errors import FecmError
+from fecm._typing import Bools, Floats
+from fecm.deck.grid import CLAMPED, HELD, SIMPLE, SUPPORTS, boundary_cards, round_to
+from fecm.deck.model import Boundary, Coordinates, Elements
+from fecm.deck.records import ElementNodes, NodeValues
+
+Integers = NDArray[np.int_]
+
+# Kinds of cells by their number of nodes: meshio's name, which is that of the corners' number too.
+KINDS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
+LINES = ("vertex", "line", "line3")
+# Name of all sides that belong to one element, unless the mesh has a group of that name.
+BOUNDARY = "boundary"
+# Formats whose files name other files.
+ELSEWHERE = (".xdmf", ".xmf")
+# Coordinates that differ by less, over the size of the mesh, are equal; and areas over its square.
+SAME, NO_AREA = 1e-9, 1e-12
+# Most elements named in a message.
+NAMED = 8
+
+
+class MeshError(FecmError, ValueError):
+    """A mesh cannot be used for a plate."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlateMesh:
+    """Quadrilaterals of 4 or 9 nodes, counter-clockwise in the deck's order.
+
+    Attributes
+    ----------
+    points : ndarray (numnp, 2)
+        Coordinates, length.
+    cells : ndarray (numel, 4) or (numel, 9)
+        Nodes of the elements, from 0.
+    groups : dict
+        Nodes by the name of a group, from 0.
+    middles : ndarray
+        Nodes put in the middles of straight sides, from 0.
+    """
+
+    points: Floats
+    cells: Integers
+    groups: dict[str, Integers] = field(repr=False)
+    middles: Integers = field(repr=False)
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes."""
+        return len(self.points)
+
+    @property
+    def elements(self) -> int:
+        """Number of elements."""
+        return len(self.cells)
+
+    @property
+    def most_nodes(self) -> int:
+        """Nodes per element."""
+        return int(self.cells.shape[1])
+
+    @property
+    def extent(self) -> tuple[list[float], list[float]]:
+        """Lowest and highest coordinates."""
+        return self.points.min(axis=0).tolist(), self.points.max(axis=0).tolist()
+
+    def nearest(self, x: float, y: float) -> tuple[int, float, float]:
+        """Number and place of the node nearest to a point."""
+        row = int(np.hypot(*(self.points - (x, y)).T).argmin())
+        return row + 1, *self.points[row].tolist()
+
+    def coordinates(self) -> Coordinates:
+        """COOR cards, one per node."""
+        places = enumerate(self.points.tolist(), start=1)
+        return Coordinates(tuple(NodeValues(n, 0, tuple(place)) for n, place in places))
+
+    def element_cards(self) -> Elements:
+        """ELEM cards, one per element."""
+        rows = enumerate((self.cells + 1).tolist(), start=1)
+        return Elements(tuple(ElementNodes(n, tuple(nodes), 0) for n, nodes in rows))
+
+    def supported(
+        self, everywhere: Sequence[int], supports: Mapping[str, str], _: object = None
+    ) -> Boundary | None:
+        """BOUN cards; None where nothing is restrained.
+
+        Parameters
+        ----------
+        everywhere : sequence of int
+            Codes of every node.
+        supports : dict
+            Support by the name of a group; that of the boundary leaves out the other groups.
+        """
+        codes = np.tile(np.array(everywhere), (self.nodes, 1))
+        for name, support in supports.items():
+            rows = self._group(name)
+            if name == BOUNDARY and name not in self.groups:
+                for other in supports.keys() - {name}:
+                    rows = np.setdiff1d(rows, self._group(other))
+            if support == "clamped":
+                codes[rows] = np.maximum(codes[rows], CLAMPED)
+            elif support == "simple":
+                sides, _, counts = _sides(self.cells)
+                sides = sides[_inside(sides, counts, rows)]
+                along = np.ptp(self.points[sides], axis=1) <= SAME * np.ptp(self.points)
+                if len(sides) and along.any(axis=1).all():
+                    # The rotation along the sides, if all of them run along x or y.
+                    for axis, code in enumerate(reversed(SIMPLE)):
+                        on = np.unique(sides[along[:, axis]])
+                        codes[on] = np.maximum(codes[on], code)
+                else:
+                    # Three nodes in a line, on a polygon for a curve, would hold its rotation too.
+                    rows = np.setdiff1d(rows, self.middles)
+                codes[rows] = np.maximum(codes[rows], HELD)
+        return boundary_cards(codes)
+
+    def _group(self, name: str) -> Integers:
+        """Nodes of a group, or of the boundary."""
+        if name in self.groups or name != BOUNDARY:
+            return self.groups[name]
+        sides, _, counts = _sides(self.cells)
+        return np.unique(sides[counts == 1])
+
+    def supports(self, wanted: Mapping[str, str]) -> dict[str, str]:
+        """Supports of groups, checked; groups named after a support have it.
+
+        Raises
+        ------
+        MeshError
+            If a group or a support is unknown.
+        """
+        for name, support in wanted.items():
+            if name not in self.groups and name != BOUNDARY:
+                known = ", ".join(sorted({*self.groups, BOUNDARY}))
+                raise MeshError(f"the mesh has no group {name!r}; its groups are {known}")
+            if support not in SUPPORTS:
+                raise MeshError(f"{name}={support}: the supports are {', '.join(SUPPORTS)}")
+        return {name: name for name in SUPPORTS if name in self.groups} | dict(wanted)
+
+
+class MeshLike(Protocol):
+    """What is used of a `meshio.Mesh`."""
+
+    points: Any
+    cells: Any
+    cell_data: Any
+    cell_sets: Any
+    point_sets: Any
+    field_data: Any
+
+
+def read_mesh(path: str | Path) -> PlateMesh:
+    """Read a mesh with meshio: Gmsh's `.msh`, or what else it reads.
+
+    Raises
+    ------
+    MeshError
+        If the file is not the mesh of a plane plate.
+    ImportError
+        If meshio is not installed.
+    """
+    try:
+        import meshio
+    except ModuleNotFoundError:
+        raise ImportError("meshes need meshio: pip install 'fecm[mesh]'") from None
+    path = Path(path)
+    text = path.read_bytes()  # an OSError says what is wrong with the file
+    include = path.suffix.lower() == ".inp" and b"*include" in text.lower()
+    if include or path.suffix.lower() in ELSEWHERE:
+        raise MeshError(f"{path} refers to other files, which are not read; put it into one file")
+    printed = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
+            read = meshio.read(path)
+    except (Exception, SystemExit) as error:
+        why = " ".join(str(error).split()) if isinstance(error, Exception) else "unknown format"
+        raise MeshError(f"{path} can't be read as a mesh by meshio: {why[:200]}") from None
+    return from_meshio(read, f"{path}: ")
+
+
+def from_meshio(read: MeshLike, where: str = "") -> PlateMesh:
+    """Plate of a `meshio.Mesh`; see :func:`plate_mesh`."""
+    blocks = {n: block for n, block in enumerate(read.cells) if block.type not in LINES}
+    kinds = sorted({block.type for block in blocks.values()})
+    if len(kinds) != 1 or kinds[0] not in KINDS.values():
+        what = f"has {' and '.join(kinds)} elements" if kinds else "has no elements with an area"
+        raise MeshError(
+            f"{where}the mesh {what}; all must be triangles of 3 or 6 nodes, or all quadrilaterals "
+            "of 4, 8 or 9"
+        )
+    groups: dict[str, list[Any]] = {}
+    names = {(int(tag), int(dim)): name for name, (tag, dim) in read.field_data.items()}
+    for number, block in enumerate(read.cells):
+        if number in blocks:
+            continue
+        if "gmsh:physical" in read.cell_data:
+            tags = read.cell_data["gmsh:physical"][number]
+            for tag in np.unique(tags[tags > 0]).tolist():
+                name = names.get((tag, 0 if block.type == "vertex" else 1), str(tag))
+                groups.setdefault(name, []).append(block.data[tags == tag])
+        for name, sets in read.cell_sets.items():
+            if not name.startswith("gmsh:") and name not in read.field_data:
+                groups.setdefault(name, []).append(block.data[np.asarray(sets[number], int)])
+    for name, rows in read.point_sets.items():
+        groups.setdefault(name, []).append(rows)
+    flat = {name: np.concatenate([np.ravel(p) for p in parts]) for name, parts in groups.items()}
+    cells = np.concatenate([block.data for block in blocks.values()])
+    return plate_mesh(read.points, cells, {k: v for k, v in flat.items() if len(v)}, where)
+
+
+def plate_mesh(
+    points: ArrayLike, cells: ArrayLike, groups: Mapping[str, ArrayLike], where: str = ""
+) -> PlateMesh:
+    """Elements of a plate from points and cells.
+
+    Cells are turned counter-clockwise and nodes without a cell dropped.  Three quadrilaterals of 4
+    nodes replace a triangle; a quadrilateral of 8 nodes gets its centre as the ninth.
+
+    Parameters
+    ----------
+    points : array_like (n, 2) or (n, 3)
+        Coordinates in a plane z = const.
+    cells : array_like (m, 3), (m, 4), (m, 6), (m, 8) or (m, 9)
+        Points of the cells, from 0: corners, mid-sides (the first between corners 1 and 2), centre.
+    groups : dict
+        Points by the name of a group.
+    where : str
+        Beginning of messages.
+
+    Raises
+    ------
+    MeshError
+        If they are not the mesh of a plane plate.
+    """
+    try:
+        places, nodes = np.array(points, float), np.array(cells)
+        rows = {name: np.unique(np.asarray(group, int)) for name, group in groups.items()}
+    except (TypeError, ValueError) as error:
+        raise MeshError(f"{where}points, cells or groups are not arrays: {error}") from None
+    if places.ndim != 2 or places.shape[1] not in (2, 3) or not np.isfinite(places).all():
+        raise MeshError(f"{where}points must be finite numbers, (n, 2) or (n, 3)")
+    if nodes.ndim != 2 or nodes.shape[1] not in KINDS or nodes.dtype.kind not in "iu":
+        raise MeshError(f"{where}cells must be integers, (m, k) with k one of 3, 4, 6, 8 and 9")
+    nodes, size = nodes.astype(int), float(np.ptp(places[:, :2], axis=0).max(initial=0.0))
+    for name, part in {"cells": nodes, **rows}.items():
+        if not part.size or part.min() < 0 or part.max() >= len(places):
+            raise MeshError(f"{where}{name} must name points 0 to {len(places) - 1}")
+    if places.shape[1] == 3 and np.ptp(places[np.unique(nodes), 2]) > SAME * size:
+        low, high = places[:, 2].min(), places[:, 2].max()
+        raise MeshError(f"{where}the mesh is not in a plane z = const: z is {low:g} to {high:g}")
+    nodes = _turned(places[:, :2], nodes, size, where)
+    count = len(places)
+    places, nodes, new = _quadrilaterals(places[:, :2], nodes, rows)
+    used, numbers = np.unique(nodes, return_inverse=True)
+    kept = {name: np.flatnonzero(np.isin(used, group)) for name, group in rows.items()}
+    if lost := [name for name, group in kept.items() if not len(group)]:
+        raise MeshError(f"{where}no node of the group {lost[0]!r} belongs to an element")
+    rounded = [[round_to(value, size) for value in place] for place in places[used].tolist()]
+    middles = np.flatnonzero((used >= count) & (used < count + new))
+    made = PlateMesh(np.array(rounded), numbers.reshape(nodes.shape), kept, middles)
+    if (_sides(made.cells)[2] > 2).any():
+        raise MeshError(f"{where}elements overlap: more than two share a side")
+    return made
+
+
+def _turned(places: Floats, nodes: Integers, size: float, where: str) -> Integers:
+    """The cells counter-clockwise; those without an area, or given twice, are refused."""
+    count = 3 if nodes.shape[1] in (3, 6) else 4
+    x, y = np.moveaxis(places[nodes[:, :count]], 2, 0)
+    area = (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) / 2.0
+    ordered = np.sort(nodes, axis=1)
+    collapsed = (np.abs(area) <= NO_AREA * size**2) | (np.diff(ordered, axis=1) == 0).any(axis=1)
+    _, first = np.unique(ordered, axis=0, return_index=True)
+    twice = ~np.isin(np.arange(len(nodes)), first)
+    for wrong, what in ((collapsed, "without an area"), (twice, "given twice")):
+        if wrong.any():
+            some = (np.flatnonzero(wrong)[:NAMED] + 1).tolist()
+            more = ", ..." if wrong.sum() > NAMED else ""
+            raise MeshError(
+                f"{where}{wrong.sum()} elements {what}: number {', '.join(map(str, some))}{more} "
+                "of the plane elements"
+            )
+    back = [0, *range(count - 1, 0, -1)]
+    if nodes.shape[1] > count:  # mid-sides follow their corners
+        back += [2 * count - 1 - n for n in range(count)]
+    back += range(2 * count, nodes.shape[1])
+    return np.where(area[:, None] < 0.0, nodes[:, back], nodes)
+
+
+def _quadrilaterals(
+    places: Floats, nodes: Integers, groups: dict[str, Integers]
+) -> tuple[Floats, Integers, int]:
+    """Points and cells with quadrilaterals of 4 or 9 nodes only, and the number of new mid-sides.
+
+    Mid-sides come after the old points; they join the groups of their sides.
+    """
+    count, new = nodes.shape[1], 0
+    if count in (4, 9):
+        return places, nodes, new
+    if count == 3:  # new nodes in the middles of the sides
+        sides, number, counts = _sides(nodes)
+        new = len(sides)
+        for name, group in groups.items():
+            middles = np.flatnonzero(_inside(sides, counts, group))
+            groups[name] = np.concatenate([group, len(places) + middles])
+        nodes = np.hstack([nodes, len(places) + number])
+        places = np.vstack([places, places[sides].mean(axis=1)])
+    # The element's own shape functions at its centre.
+    corners = len(nodes[0]) // 2
+    share = np.repeat([-1 / 9, 4 / 9] if corners == 3 else [-0.25, 0.5], corners)
+    centre = len(places) + np.arange(len(nodes))
+    places = np.vstack([places, np.einsum("i,nij->nj", share, places[nodes])])
+    if corners == 4:
+        return places, np.column_stack([nodes, centre]), new
+    parts = [
+        np.column_stack([nodes[:, n], nodes[:, 3 + n], centre, nodes[:, 3 + (n + 2) % 3]])
+        for n in range(3)
+    ]
+    return places, np.stack(parts, axis=1).reshape(-1, 4), new
+
+
+def _sides(cells: Integers) -> tuple[Integers, Integers, Integers]:
+    """Nodes of the sides, (n, 2) or (n, 3), the elements' sides, and how many share each."""
+    corners = min(cells.shape[1], 4)
+    parts = [cells[:, :corners], np.roll(cells[:, :corners], -1, axis=1), cells[:, 4:8]]
+    sides = np.stack(parts[: 2 if cells.shape[1] == corners else 3], axis=2)
+    sides = np.sort(sides, axis=2).reshape(-1, sides.shape[2])
+    found, number, counts = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    return found, number.reshape(-1, corners), counts
+
+
+def _inside(sides: Integers, counts: Integers, group: Integers) -> Bools:
+    """Which sides lie in a group of nodes; on the boundary only, if all of its nodes do."""
+    edge = counts == 1
+    within = np.asarray(np.isin(sides, group).all(axis=1))
+    return within & edge if np.isin(group, sides[edge]).all() else within
