@@ -162,20 +162,11 @@ def layout(*descriptors: str) -> Fields:
 
 @dataclass(frozen=True, slots=True)
 class Card:
-    """One line of a deck.
+    """One line of a deck."""
 
-    Attributes
-    ----------
-    line : int
-        Line number in the file, from 1.
-    text : str
-        The line as written.
-    data : str
-        The text without its comment and trailing blanks.
-    """
-
-    line: int
-    text: str
+    line: int  # line number in the file, from 1
+    text: str  # the line as written
+    # The text without its comment and trailing blanks.
     data: str = dataclasses.field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -23,32 +23,17 @@ MOST_MACROS = 10**9
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """A word of the macro language.
+    """A word of the macro language."""
 
-    Attributes
-    ----------
-    name : str
-        Up to four letters.
-    meaning : str
-        Its effect, in one sentence.
-    value : str
-        Kind of its number: ``"count"`` (an integer, at least 0), ``"every"`` (the same, 0 or blank
-        counting as 1), ``"time step"`` or ``"tolerance"`` (positive; 0 is a time step by itself),
-        or empty without a number.
-    needs : tuple of str
-        Words that must come before; ``"LMAS|CMAS"`` is one or the other.
-    inside : bool
-        Whether it belongs inside a loop.
-    second : bool
-        Whether it takes a second number, an integer of at least 0.
-    """
-
-    name: str
-    meaning: str
+    name: str  # up to four letters
+    meaning: str  # its effect, in one sentence
+    # Kind of its number: ``"count"`` (an integer, at least 0), ``"every"`` (the same, 0 or blank
+    # counting as 1), ``"time step"`` or ``"tolerance"`` (positive; 0 is a time step by itself), or
+    # empty without a number.
     value: str = ""
-    needs: tuple[str, ...] = ()
-    inside: bool = False
-    second: bool = False
+    needs: tuple[str, ...] = ()  # words that must come before; ``"LMAS|CMAS"`` is one or the other
+    inside: bool = False  # whether it belongs inside a loop
+    second: bool = False  # whether it takes a second number, an integer of at least 0
 
 
 WORDS = {
@@ -288,24 +273,12 @@ STEPS = {"RODP", "EXCD"}
 
 @dataclass(frozen=True, slots=True)
 class WorkEstimate:
-    """Work and output of a program; an upper bound where CONV may leave loops early.
+    """Work and output of a program; an upper bound where CONV may leave loops early."""
 
-    Attributes
-    ----------
-    macros : int
-        Executed macros; each pass of a loop executes its NEXT.
-    steps : int
-        Time steps, impact steps and central differences.
-    contact_rows : int
-        Steps at which contact and strains are stored.
-    passes : Counter
-        Times that DISP, STRE, REAC and EIGE store something, by word.
-    """
-
-    macros: int
-    steps: int
-    contact_rows: int
-    passes: Counter[str]
+    macros: int  # executed macros; each pass of a loop executes its NEXT
+    steps: int  # time steps, impact steps and central differences
+    contact_rows: int  # steps at which contact and strains are stored
+    passes: Counter[str]  # times that DISP, STRE, REAC and EIGE store something, by word
 
 
 def estimate_work(body: Body) -> WorkEstimate:

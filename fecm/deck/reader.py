@@ -49,17 +49,10 @@ OTHERS = {
 
 @dataclass
 class ParsedProblem:
-    """The readable part of a problem.
+    """The readable part of a problem."""
 
-    Attributes
-    ----------
-    deck : Deck or None
-        The model; None where the control card could not be read.
-    unsound : set of str
-        Keywords of segments with unreadable cards, from which no conclusion can be drawn.
-    """
-
-    deck: Deck | None
+    deck: Deck | None  # the model; None where the control card could not be read
+    # Keywords of segments with unreadable cards, from which no conclusion can be drawn.
     unsound: set[str] = field(default_factory=set)
 
 

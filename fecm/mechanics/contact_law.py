@@ -67,19 +67,11 @@ def hertz_coefficient(radius: float, e_s: float, nu_s: float, e_t: float) -> flo
 
 
 class ContactParameters(ABC):
-    """Parameters of the contact law.
-
-    Attributes
-    ----------
-    k : float
-        Contact coefficient, force/length^1.5 (equation 3-1).
-    q : float
-        Power of the unloading curve (equation 3-3).
-    """
+    """Parameters of the contact law."""
 
     __slots__ = ()
-    k: Number
-    q: Number
+    k: Number  # contact coefficient, force/length^1.5 (equation 3-1)
+    q: Number  # power of the unloading curve (equation 3-3)
 
     @abstractmethod
     def permanent(self, peak: Number) -> Number:
@@ -104,22 +96,13 @@ class ContactParameters(ABC):
 
 @dataclass(frozen=True, slots=True)
 class LinearPermanent(ContactParameters):
-    """Parameters with a linear permanent indentation (the card of EXPE).
+    """Parameters with a linear permanent indentation (the card of EXPE)."""
 
-    Attributes
-    ----------
-    k : float
-        Contact coefficient, force/length^1.5 (equation 3-1).
-    alpha_p, s_p : float
-        Critical indentation (length) and slope of equation 3-8.
-    q : float
-        Power of the unloading curve (equation 3-3).
-    """
-
-    k: Number
+    k: Number  # contact coefficient, force/length^1.5 (equation 3-1)
+    # Critical indentation (length) and slope of equation 3-8.
     alpha_p: Number
     s_p: Number
-    q: Number
+    q: Number  # power of the unloading curve (equation 3-3)
 
     def permanent(self, peak: Number) -> Number:
         """Permanent indentation after a peak, equation 3-8, never negative (length)."""
@@ -129,21 +112,11 @@ class LinearPermanent(ContactParameters):
 
 @dataclass(frozen=True, slots=True)
 class YangSunPermanent(ContactParameters):
-    """Parameters with one unloading rigidity k/alpha_cr for every peak (the card of EXPE ACR).
+    """Parameters with one unloading rigidity k/alpha_cr for every peak (the card of EXPE ACR)."""
 
-    Attributes
-    ----------
-    k : float
-        Contact coefficient, force/length^1.5 (equation 3-1).
-    alpha_cr : float
-        Critical indentation of equation 3-6 (length).
-    q : float
-        5/2.
-    """
-
-    k: Number
-    alpha_cr: Number
-    q: Number = field(default=ACR_POWER, init=False)
+    k: Number  # contact coefficient, force/length^1.5 (equation 3-1)
+    alpha_cr: Number  # critical indentation of equation 3-6 (length)
+    q: Number = field(default=ACR_POWER, init=False)  # 5/2
 
     def permanent(self, peak: Number) -> Number:
         """Permanent indentation after a peak, equation 3-7, never negative (length)."""
@@ -172,28 +145,18 @@ def stacked(records: Sequence[ContactParameters]) -> ContactParameters:
 
 
 class LoadingHistory(NamedTuple):
-    """Loading history of a contact.
+    """Loading history of a contact."""
 
-    Attributes
-    ----------
-    branch : int
-        VIRGIN, UNLOADING or RELOADING.
-    f, b, w, p : float
-        The branch's curve F = f ((a - b)/w)^p.
-    peak, peak_force : float
-        Last point of first loading.
-    permanent : float
-        Permanent indentation after that peak.
-    """
-
-    branch: Number
+    branch: Number  # VIRGIN, UNLOADING or RELOADING
+    # The branch's curve F = f ((a - b)/w)^p.
     f: Number
     b: Number
     w: Number
     p: Number
+    # Last point of first loading.
     peak: Number
     peak_force: Number
-    permanent: Number
+    permanent: Number  # permanent indentation after that peak
 
     def force(self, indentation: Number) -> Number:
         """Force on the branch's curve."""
@@ -257,12 +220,7 @@ class Law(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class MeasuredLaw:
-    """A law of the report, with measured parameters; subclasses add `trial` and `accept`.
-
-    Attributes
-    ----------
-    constants : ContactParameters
-    """
+    """A law of the report, with measured parameters; subclasses add `trial` and `accept`."""
 
     constants: ContactParameters
 

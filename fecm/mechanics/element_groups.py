@@ -17,18 +17,10 @@ TOLERANCE = 1.0e-9
 
 @dataclass(frozen=True)
 class Congruence:
-    """Groups of elements of a block that are translations of one another.
+    """Groups of elements of a block that are translations of one another."""
 
-    Attributes
-    ----------
-    representatives : ndarray (ng,)
-        Position in the block of one element per group.
-    group : ndarray (ne,)
-        Group of every element.
-    """
-
-    representatives: NDArray[np.intp]
-    group: NDArray[np.intp]
+    representatives: NDArray[np.intp]  # (ng,): position in the block of one element per group
+    group: NDArray[np.intp]  # (ne,): group of every element
 
 
 def congruence(family: ElementBlock) -> Congruence:
@@ -79,27 +71,13 @@ Ints = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class ElementBlock:
-    """Elements that have the same nodes present.
+    """Elements that have the same nodes present."""
 
-    Attributes
-    ----------
-    rows : ndarray (ne,)
-        Rows of the elements in the mesh.
-    nodes : ndarray (ne, nn)
-        Rows of their nodes, from 0.
-    coordinates : ndarray (ne, nn, 2)
-        Length.
-    present : ndarray (shape.nodes,) of bool
-        Which nodes of the shape are present.
-    shape : ElementShape
-        Triangle, quadrilateral or cubic quadrilateral.
-    """
-
-    rows: NDArray[np.intp]
-    nodes: NDArray[np.intp]
-    coordinates: Floats
-    present: Bools
-    shape: ElementShape
+    rows: NDArray[np.intp]  # (ne,): rows of the elements in the mesh
+    nodes: NDArray[np.intp]  # (ne, nn): rows of their nodes, from 0
+    coordinates: Floats  # (ne, nn, 2): length
+    present: Bools  # (shape.nodes,) of bool: which nodes of the shape are present
+    shape: ElementShape  # triangle, quadrilateral or cubic quadrilateral
 
     def blocks(self, size: int) -> Iterator[ElementBlock]:
         """Split into blocks of at most `size` elements."""

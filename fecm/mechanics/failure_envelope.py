@@ -28,18 +28,11 @@ BLOCK = 512
 
 @dataclass
 class Maxima:
-    """Largest exposure of every state so far, its time and mode.
-
-    Attributes
-    ----------
-    exposure, time : ndarray
-    mode : ndarray of int8
-        Index into :data:`~fecm.mechanics.failure.MODES`.
-    """
+    """Largest exposure of every state so far, its time and mode."""
 
     exposure: Floats
     time: Floats
-    mode: Codes
+    mode: Codes  # index into :data:`~fecm.mechanics.failure.MODES`
 
 
 def _none(*shape: int) -> Maxima:
@@ -48,19 +41,12 @@ def _none(*shape: int) -> Maxima:
 
 @dataclass
 class FailureEnvelope:
-    """Largest exposures over time.
+    """Largest exposures over time."""
 
-    Attributes
-    ----------
-    plies : Maxima
-        (criteria, states): by :data:`~fecm.mechanics.failure.CRITERIA`, then elements, points,
-        plies and faces.
-    interfaces : Maxima
-        (elements, plies - 1).
-    """
-
+    # (criteria, states): by :data:`~fecm.mechanics.failure.CRITERIA`, then elements, points, plies
+    # and faces.
     plies: Maxima
-    interfaces: Maxima
+    interfaces: Maxima  # (elements, plies - 1)
 
 
 class FailureMonitor:

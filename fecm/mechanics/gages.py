@@ -48,20 +48,11 @@ class GagePlace(Protocol):
 
 @dataclass(frozen=True)
 class GageArray:
-    """Strains of gages as weighted sums of dofs.
+    """Strains of gages as weighted sums of dofs."""
 
-    Attributes
-    ----------
-    numbers : ndarray (gages,)
-    dof_indices : ndarray (gages, m)
-        Indices into a flattened field.
-    weights : ndarray (gages, m)
-        Strain per unit of the dof.
-    """
-
-    numbers: NDArray[np.int32]
-    dof_indices: Indices
-    weights: Floats
+    numbers: NDArray[np.int32]  # (gages,)
+    dof_indices: Indices  # (gages, m): indices into a flattened field
+    weights: Floats  # (gages, m): strain per unit of the dof
 
 
 def gages(

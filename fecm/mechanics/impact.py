@@ -31,70 +31,36 @@ class ContactState:
     """State of projectile and contact after a step.
 
     Values are floats, or arrays with one entry per case.
-
-    Attributes
-    ----------
-    rod : RodState or TipState
-        The projectile.
-    memory
-        Memory of the contact law.
-    contact : ContactPoint
-        Accepted indentation and contact force.
-    plate_w : float
-        The plate's displacement in the contact law.
-    contact_work : float
-        Work stored or dissipated by the indentation.
-    unconverged_steps : int
-        Steps whose contact iteration did not converge.
     """
 
-    rod: Any
-    memory: Any
-    contact: ContactPoint
-    plate_w: Number = 0.0
-    contact_work: Number = 0.0
-    unconverged_steps: Number = 0
+    rod: Any  # the projectile: RodState or TipState
+    memory: Any  # memory of the contact law
+    contact: ContactPoint  # accepted indentation and contact force
+    plate_w: Number = 0.0  # the plate's displacement in the contact law
+    contact_work: Number = 0.0  # work stored or dissipated by the indentation
+    unconverged_steps: Number = 0  # steps whose contact iteration did not converge
 
 
 @dataclass(slots=True)
 class ImpactState(ContactState):
-    """State of plate, projectile and contact after a step.
+    """State of plate, projectile and contact after a step."""
 
-    Attributes
-    ----------
-    plate : PlateState
-        The plate, with the number of steps and the time.
-    """
-
-    plate: PlateState = field(kw_only=True)
+    plate: PlateState = field(kw_only=True)  # the plate, with the number of steps and the time
 
 
 @dataclass(frozen=True)
 class ImpactConditions:
-    """Conditions of the impact, with the slips that affect it as parameters.
+    """Conditions of the impact, with the slips that affect it as parameters."""
 
-    Attributes
-    ----------
-    load : Load
-        The impact dof, or the nodal weights of a patch.
-    velocity : float
-        Approach velocity, length/time.
-    plate_moves : bool
-        Whether the contact law takes the plate's motion into account (not with the slip
-        ``target``).
-    strains_start_moving : bool
-        Whether the rod's du/dx start at the approach velocity (the slip ``rod-start``).
-    keeps_first_step : bool
-        Whether the rod keeps the constants of the first time step (the slip ``rod-dt``).
-    share : float
-        Fraction of the contact force that acts on the plate; 1 without the slip ``rod-force``.
-    """
-
-    load: Load
-    velocity: float
+    load: Load  # the impact dof, or the nodal weights of a patch
+    velocity: float  # approach velocity, length/time
+    # Whether the contact law takes the plate's motion into account (not with the slip ``target``).
     plate_moves: bool = True
+    # Whether the rod's du/dx start at the approach velocity (the slip ``rod-start``).
     strains_start_moving: bool = False
+    # Whether the rod keeps the constants of the first time step (the slip ``rod-dt``).
     keeps_first_step: bool = False
+    # Fraction of the contact force that acts on the plate; 1 without the slip ``rod-force``.
     share: float = 1.0
 
 

@@ -21,21 +21,11 @@ NDOF = 5
 
 @dataclass(frozen=True)
 class Interpolation:
-    """Shape functions of an element block at the points of a rule.
+    """Shape functions of an element block at the points of a rule."""
 
-    Attributes
-    ----------
-    N : ndarray (npt, nn)
-        Values.
-    dN : ndarray (ne, npt, 2, nn)
-        Derivatives with respect to x and y, 1/length.
-    jxw : ndarray (ne, npt)
-        Jacobian determinant times weight, length squared.
-    """
-
-    N: Floats
-    dN: Floats
-    jxw: Floats
+    N: Floats  # (npt, nn): values
+    dN: Floats  # (ne, npt, 2, nn): derivatives with respect to x and y, 1/length
+    jxw: Floats  # (ne, npt): Jacobian determinant times weight, length squared
 
 
 def local_shape_functions(family: ElementBlock, rule: Quadrature) -> tuple[Floats, Floats]:

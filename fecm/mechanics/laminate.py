@@ -43,23 +43,12 @@ class PlyConstants(Protocol):
 
 @dataclass(frozen=True)
 class Plies:
-    """Plies of a laminate, from z = -h/2 on.
+    """Plies of a laminate, from z = -h/2 on."""
 
-    Attributes
-    ----------
-    angles : ndarray (n,)
-        Fibre angles in degrees.
-    faces : ndarray (n + 1,)
-        z of the faces, length.
-    stiffness : ndarray (n, 3, 3)
-        Plane-stress stiffness in the laminate's axes, force/area.
-    shear : ndarray (n, 2, 2)
-        Transverse shear stiffness in the laminate's axes, order xz, yz, force/area.
-    """
-
-    angles: Floats
-    faces: Floats
-    stiffness: Floats
+    angles: Floats  # (n,): fibre angles in degrees
+    faces: Floats  # (n + 1,): z of the faces, length
+    stiffness: Floats  # (n, 3, 3): plane-stress stiffness in the laminate's axes, force/area
+    # (n, 2, 2): transverse shear stiffness in the laminate's axes, order xz, yz, force/area.
     shear: Floats
 
     @property
@@ -71,32 +60,19 @@ class Plies:
 
 @dataclass(frozen=True)
 class Laminate:
-    """Stiffness and inertia of a laminate, per area.
+    """Stiffness and inertia of a laminate, per area."""
 
-    Attributes
-    ----------
-    A, B, D : ndarray (3, 3)
-        Extensional, coupling and bending stiffness (equation 2-18): force/length, force,
-        force*length.
-    shear : ndarray (2, 2)
-        Transverse shear stiffness (equation 2-19), force/length, order xz, yz: A*55, A*45; A*45,
-        A*44.
-    mass : float
-        P of equation 2-24: density times thickness.
-    rotary_inertia : float
-        I of equation 2-24: density times thickness cubed over 12.
-    thickness : float
-        Total thickness.
-    plies : Plies
-    """
-
+    # (3, 3): extensional, coupling and bending stiffness (equation 2-18): force/length, force,
+    # force*length.
     A: Floats
     B: Floats
     D: Floats
+    # (2, 2): transverse shear stiffness (equation 2-19), force/length, order xz, yz: A*55, A*45;
+    # A*45, A*44.
     shear: Floats
-    mass: float
-    rotary_inertia: float
-    thickness: float
+    mass: float  # P of equation 2-24: density times thickness
+    rotary_inertia: float  # I of equation 2-24: density times thickness cubed over 12
+    thickness: float  # total thickness
     plies: Plies
 
     @property

@@ -18,26 +18,13 @@ Ints = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class Mesh:
-    """Nodes, elements, restraints and nodal forces of a problem.
+    """Nodes, elements, restraints and nodal forces of a problem."""
 
-    Attributes
-    ----------
-    coordinates : ndarray (numnp, 2)
-        Length; NaN for undefined nodes.
-    elements : ndarray (numel, nen)
-        Node numbers, 0 where absent.
-    codes : ndarray (numnp, 5)
-        Restraint codes; a dof with a nonzero code is restrained.
-    forces : ndarray (numnp, 5)
-        Nodal force, or displacement of a restrained dof.
-    equations : ndarray (numnp, 5)
-        Equation numbers in the order of nodes and dofs, 0 where restrained.
-    """
-
-    coordinates: Floats
-    elements: Ints
-    codes: Ints
-    forces: Floats
+    coordinates: Floats  # (numnp, 2): length; NaN for undefined nodes
+    elements: Ints  # (numel, nen): node numbers, 0 where absent
+    codes: Ints  # (numnp, 5): restraint codes; a dof with a nonzero code is restrained
+    forces: Floats  # (numnp, 5): nodal force, or displacement of a restrained dof
+    # (numnp, 5): equation numbers in the order of nodes and dofs, 0 where restrained.
     equations: Ints
 
     @property

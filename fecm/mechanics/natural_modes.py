@@ -18,18 +18,10 @@ SHIFT = 1.0e-9
 
 @dataclass(frozen=True)
 class Modes:
-    """The lowest modes of a plate.
+    """The lowest modes of a plate."""
 
-    Attributes
-    ----------
-    angular_frequency : ndarray (n,)
-        Ascending; rigid motions are 0 (1/time).
-    shapes : ndarray (n, neq)
-        Unit modal mass; the largest entry is positive.
-    """
-
-    angular_frequency: Floats
-    shapes: Floats
+    angular_frequency: Floats  # (n,): ascending; rigid motions are 0 (1/time)
+    shapes: Floats  # (n, neq): unit modal mass; the largest entry is positive
 
 
 def modes(plate: PlateModel, count: int, *, consistent: bool) -> Modes:

@@ -41,37 +41,20 @@ class UnsoundPlateError(FecmError, ArithmeticError):
 
 @dataclass(frozen=True)
 class IntegrationRules:
-    """Quadrature rules of a plate.
+    """Quadrature rules of a plate."""
 
-    Attributes
-    ----------
-    bending, shear : Quadrature
-        Membrane, bending and mass; transverse shear.
-    strains : Quadrature
-        Points of the stored strains.
-    transposed_jacobian : bool
-        Transpose the inverse Jacobian (the slip ``jacobian``).
-    assumes_shear : bool
-        Take the transverse shear strains of :mod:`~fecm.mechanics.assumed_shear`.
-    """
-
+    # Membrane, bending and mass; transverse shear.
     bending: Quadrature
     shear: Quadrature
-    strains: Quadrature
-    transposed_jacobian: bool = False
+    strains: Quadrature  # points of the stored strains
+    transposed_jacobian: bool = False  # transpose the inverse Jacobian (the slip ``jacobian``)
+    # Take the transverse shear strains of :mod:`~fecm.mechanics.assumed_shear`.
     assumes_shear: bool = False
 
 
 @dataclass(frozen=True)
 class PlateModel:
-    """The discrete plate: M a + K u = P.
-
-    Attributes
-    ----------
-    mesh : Mesh
-    laminate : Laminate
-    rules : IntegrationRules
-    """
+    """The discrete plate: M a + K u = P."""
 
     mesh: Mesh
     laminate: Laminate

@@ -63,39 +63,17 @@ class DivergenceError(FecmError, ArithmeticError):
 
 @dataclass(slots=True)
 class PlateState:
-    """State of the plate after a step.
+    """State of the plate after a step."""
 
-    Attributes
-    ----------
-    padded : ndarray (size,)
-        Displacement, padded as the stiffness operator requires.
-    increment : ndarray (n,)
-        Displacement increment of the last step.
-    scaled_internal_force : ndarray (n,)
-        M^-1 K u times `dt2`.
-    step : int
-        Number of steps.
-    time : float
-        Sum of the time steps.
-    dt : float
-        Last time step.
-    dt2 : float
-        Factor of `scaled_internal_force`, the square of the time step.
-    external_work : float
-        Work done by nodal forces.
-    sums : Sums
-        Inner products of the vectors.
-    """
-
-    padded: Floats
-    increment: Floats
-    scaled_internal_force: Floats
-    step: int = 0
-    time: float = 0.0
-    dt: float = 0.0
-    dt2: float = 0.0
-    external_work: float = 0.0
-    sums: Sums = field(default_factory=lambda: Sums(*[0.0] * 6))
+    padded: Floats  # (size,): displacement, padded as the stiffness operator requires
+    increment: Floats  # (n,): displacement increment of the last step
+    scaled_internal_force: Floats  # (n,): M^-1 K u times `dt2`
+    step: int = 0  # number of steps
+    time: float = 0.0  # sum of the time steps
+    dt: float = 0.0  # last time step
+    dt2: float = 0.0  # factor of `scaled_internal_force`, the square of the time step
+    external_work: float = 0.0  # work done by nodal forces
+    sums: Sums = field(default_factory=lambda: Sums(*[0.0] * 6))  # inner products of the vectors
     # Displacement, increment and scaled internal force of each piece.
     views: list[tuple[Floats, Floats, Floats]] = field(init=False, repr=False)
 
@@ -135,19 +113,11 @@ class Sums(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PointLoad:
-    """A unit force on one equation.
-
-    Attributes
-    ----------
-    equation : int
-    inverse_mass : float
-    nodal_load : float
-        Nodal load of the equation at a load factor of 1.
-    """
+    """A unit force on one equation."""
 
     equation: int
     inverse_mass: float
-    nodal_load: float
+    nodal_load: float  # nodal load of the equation at a load factor of 1
 
     def dot(self, vector: Floats) -> float:
         """Product with a vector over equations, which may be padded."""
@@ -160,26 +130,13 @@ class PointLoad:
 
 @dataclass(frozen=True, slots=True)
 class DistributedLoad:
-    """A unit force distributed over equations.
+    """A unit force distributed over equations."""
 
-    Attributes
-    ----------
-    equations : ndarray (m,) or slice
-    weights : ndarray (m,)
-        Shares g of the equations.
-    mobility : ndarray (m,)
-        M^-1 g.
-    inverse_mass : float
-        g M^-1 g.
-    nodal_load : float
-        g M^-1 P over g M^-1 g, with the nodal loads P at a load factor of 1.
-    """
-
-    equations: Indices | slice
-    weights: Floats
-    mobility: Floats
-    inverse_mass: float
-    nodal_load: float
+    equations: Indices | slice  # (m,)
+    weights: Floats  # (m,): shares g of the equations
+    mobility: Floats  # (m,): M^-1 g
+    inverse_mass: float  # g M^-1 g
+    nodal_load: float  # g M^-1 P over g M^-1 g, with the nodal loads P at a load factor of 1
 
     def dot(self, vector: Floats) -> float:
         """Product with a vector over equations, which may be padded."""
@@ -209,20 +166,11 @@ class AppliedForce(NamedTuple):
 
 @dataclass(frozen=True)
 class DofSums:
-    """Weighted sums of dofs, such as the strains of gages.
+    """Weighted sums of dofs, such as the strains of gages."""
 
-    Attributes
-    ----------
-    dof_indices : ndarray (n, m)
-        Indices into the padded displacement.
-    weights : ndarray (n, m)
-    prescribed : ndarray (n,)
-        Contribution of the prescribed displacements at a load factor of 1.
-    """
-
-    dof_indices: Indices
-    weights: Floats
-    prescribed: Floats
+    dof_indices: Indices  # (n, m): indices into the padded displacement
+    weights: Floats  # (n, m)
+    prescribed: Floats  # (n,): contribution of the prescribed displacements at a load factor of 1
 
     def evaluate(self, state: PlateState, factor: float) -> Floats:
         """Values of the sums, (n,), under a load factor."""

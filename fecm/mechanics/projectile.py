@@ -27,26 +27,13 @@ LISTING_DENSITY = 0.0003225
 
 @dataclass(frozen=True)
 class Rod:
-    """A straight elastic rod of equal elements.
-
-    Attributes
-    ----------
-    length : float
-        Length.
-    diameters : tuple of float
-        Diameter of each element, starting at the impacted end.
-    modulus : float
-        Young's modulus, force/area.
-    density : float
-        Mass per volume.
-    consistent : bool
-        Use the consistent mass matrix, equation 4-24, instead of the lumped one.
-    """
+    """A straight elastic rod of equal elements."""
 
     length: float
-    diameters: tuple[float, ...]
-    modulus: float
-    density: float
+    diameters: tuple[float, ...]  # diameter of each element, starting at the impacted end
+    modulus: float  # Young's modulus, force/area
+    density: float  # mass per volume
+    # Use the consistent mass matrix, equation 4-24, instead of the lumped one.
     consistent: bool = False
 
     @classmethod
@@ -144,13 +131,7 @@ def _energy(matrix: Floats, x: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class RigidMass:
-    """A projectile that does not deform, with one dof.
-
-    Attributes
-    ----------
-    total_mass : float
-        Mass.
-    """
+    """A projectile that does not deform, with one dof."""
 
     total_mass: float
 
@@ -180,18 +161,10 @@ Projectile = Rod | RigidMass
 
 @dataclass(frozen=True)
 class Transducer:
-    """Node and sign of the force that the transducer measures.
+    """Node and sign of the force that the transducer measures."""
 
-    Attributes
-    ----------
-    node : int
-        Node of the rod, from 1; 0 for the contact force itself.
-    sign : float
-        -1 for a force positive in compression, +1 for one positive in tension.
-    """
-
-    node: int
-    sign: float = -1.0
+    node: int  # node of the rod, from 1; 0 for the contact force itself
+    sign: float = -1.0  # -1 for a force positive in compression, +1 for one positive in tension
 
 
 def report_rod(density: float = REPORT_DENSITY) -> Rod:

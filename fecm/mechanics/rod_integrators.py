@@ -25,21 +25,14 @@ INTEGRATORS = (WILSON, AVERAGE)
 class RodMethod:
     """Mass matrix and integration method of a rod; the defaults are the report program's.
 
-    Attributes
-    ----------
-    mass : str
-        One of `MASSES`.
-    integrator : str
-        One of `INTEGRATORS`.
-
     Raises
     ------
     ValueError
         If mass or integrator is unknown.
     """
 
-    mass: str = LUMPED
-    integrator: str = WILSON
+    mass: str = LUMPED  # one of `MASSES`
+    integrator: str = WILSON  # one of `INTEGRATORS`
 
     def __post_init__(self) -> None:
         for name, value, known in (
@@ -64,18 +57,12 @@ class RodState:
     """State of a rod.
 
     Displacements are relative to the tip, so that a long flight does not cancel the strains.
-
-    Attributes
-    ----------
-    motion : ndarray (3, n, ...)
-        Displacement relative to the tip, velocity and acceleration of every dof; the first
-        displacement is the tip's increment of the last step.
-    tip : float or ndarray (...)
-        Displacement of the tip.
     """
 
+    # (3, n, ...): displacement relative to the tip, velocity and acceleration of every dof; the
+    # first displacement is the tip's increment of the last step.
     motion: Floats
-    tip: Any = 0.0
+    tip: Any = 0.0  # displacement of the tip
 
     @classmethod
     def of(cls, displacement: Floats, velocity: Floats, acceleration: Floats) -> RodState:

@@ -28,23 +28,12 @@ TOLERANCE = 1.0e-9
 
 @dataclass(frozen=True)
 class SymmetryReduction:
-    """Independent dofs, and the dependence of the others on them.
+    """Independent dofs, and the dependence of the others on them."""
 
-    Attributes
-    ----------
-    count : int
-        Number of independent dofs.
-    index : ndarray (numnp, 5)
-        Independent dof that each dof follows; `count` if it is at rest.
-    sign : ndarray (numnp, 5)
-        1 or -1; 0 if it is at rest.
-    weights : ndarray (numel,)
-        Number of elements that each represents: 1 itself, 2 itself and its image, or 0.
-    """
-
-    count: int
-    index: Indices
-    sign: Floats
+    count: int  # number of independent dofs
+    index: Indices  # (numnp, 5): independent dof that each dof follows; `count` if it is at rest
+    sign: Floats  # (numnp, 5): 1 or -1; 0 if it is at rest
+    # (numel,): number of elements that each represents: 1 itself, 2 itself and its image, or 0.
     weights: NDArray[np.int_]
 
     @property

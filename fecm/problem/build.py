@@ -70,19 +70,11 @@ class Threshold(NamedTuple):
 
 @dataclass(frozen=True)
 class Problem:
-    """A checked problem; each part is built once, when it is first needed.
-
-    Attributes
-    ----------
-    deck : Deck
-    mesh : Mesh
-    program : tuple
-        The macro program with nested loops.
-    """
+    """A checked problem; each part is built once, when it is first needed."""
 
     deck: Deck
     mesh: Mesh
-    program: Body
+    program: Body  # the macro program with nested loops
 
     def __getstate__(self) -> dict[str, object]:
         """The deck, mesh and program: a copy in another process builds its own parts."""
@@ -228,40 +220,20 @@ class Problem:
 
 @dataclass(frozen=True)
 class ImpactModel:
-    """Model of a problem, ready to run.
-
-    Attributes
-    ----------
-    plate : PlateModel
-    motion : PlateMotion
-        Motion of the plate; its own plate has only the moving dofs.
-    impact : ImpactSystem or None
-        Plate and projectile; None without impact.
-    station : Transducer
-    strains, stress_points : StrainField
-        Points of tape8 and of the stresses.
-    gages : GageArray or None
-        Strain gages.
-    patch : ContactPatch or None
-        Contact patch.
-    plies : PlyStresses or None
-        Elements whose ply stresses are stored; None without PLYS.
-    failure : FailureMonitor or None
-        Failure criteria; None without FAIL.
-    under_load : ndarray (numel, points) of bool, or None
-        Whether plate theory does not hold at a stress point; None without PLYS and FAIL.
-    """
+    """Model of a problem, ready to run."""
 
     plate: PlateModel
-    motion: PlateMotion
-    impact: ImpactSystem | None
+    motion: PlateMotion  # motion of the plate; its own plate has only the moving dofs
+    impact: ImpactSystem | None  # plate and projectile; None without impact
     station: Transducer
+    # Points of tape8 and of the stresses.
     strains: StrainField
     stress_points: StrainField
     gages: GageArray | None
     patch: ContactPatch | None
-    plies: PlyStresses | None
-    failure: FailureMonitor | None
+    plies: PlyStresses | None  # elements whose ply stresses are stored; None without PLYS
+    failure: FailureMonitor | None  # failure criteria; None without FAIL
+    # (numel, points): where plate theory does not hold; None without PLYS and FAIL.
     under_load: Bools | None
 
 

@@ -68,21 +68,11 @@ def contact_stiffness(deck: Deck, plate: PlateModel) -> float:
 
 @dataclass(frozen=True)
 class ContactStep:
-    """Limit of the time step from the contact.
+    """Limit of the time step from the contact."""
 
-    Attributes
-    ----------
-    stiffness : float
-        Tangent stiffness of the contact, force/length.
-    mass : float
-        The smaller of the plate's mass at the impact dof and the projectile's at its tip.
-    limit : float
-        Largest stable time step; infinite where the time step is certainly stable.
-    """
-
-    stiffness: float
-    mass: float
-    limit: float
+    stiffness: float  # tangent stiffness of the contact, force/length
+    mass: float  # the smaller of the plate's mass at the impact dof and the projectile's at its tip
+    limit: float  # largest stable time step; infinite where the time step is certainly stable
 
 
 def contact_step(

@@ -16,35 +16,23 @@ ENERGY_LIMIT = 0.1
 class RunOptions:
     """Options of a run; the defaults are the report's.
 
-    Attributes
-    ----------
-    slips : frozenset of str
-        Slips of the printed program that are on: see :func:`~fecm.problem.slips.active_slips`.
-    solver : str
-        Computation of K·u, one of ``SOLVERS``: chosen for the mesh, or by a sparse matrix.
-    threads : int
-        Threads that share the work of a step; 0 takes every core for a large mesh.  The result does
-        not depend on it.
-    rod_method : RodMethod
-        The rod's mass matrix and integrator.
-    energy_limit : float
-        Error of the energy balance, relative to the supplied energy, that ends a run without
-        slips.
-    law : Law or None
-        Contact law instead of the deck's.
-
     Raises
     ------
     ValueError
         If a value is not valid.
     """
 
+    # Slips of the printed program that are on: see :func:`~fecm.problem.slips.active_slips`.
     slips: frozenset[str] = frozenset()
+    # Computation of K·u, one of ``SOLVERS``: chosen for the mesh, or by a sparse matrix.
     solver: str = AUTO
+    # Threads that share the work of a step; 0 takes every core for a large mesh.  The result does
+    # not depend on it.
     threads: int = 0
-    rod_method: RodMethod = field(default_factory=RodMethod)
+    rod_method: RodMethod = field(default_factory=RodMethod)  # the rod's mass matrix and integrator
+    # Error of the energy balance, relative to the supplied energy, that ends a run without slips.
     energy_limit: float = ENERGY_LIMIT
-    law: Law | None = None
+    law: Law | None = None  # contact law instead of the deck's
 
     def __post_init__(self) -> None:
         if self.solver not in SOLVERS:

@@ -18,23 +18,14 @@ W = 2
 
 @dataclass(frozen=True)
 class ContactPatch:
-    """Circle on which the contact force acts, and its nodal weights.
+    """Circle on which the contact force acts, and its nodal weights."""
 
-    Attributes
-    ----------
-    shape : str
-        ``"DISC"`` or ``"HERT"``.
-    radius, x, y : float
-        Length.
-    weights : ndarray (numnp,)
-        Shares of the nodes in a unit force; 0 where w is restrained.
-    """
-
-    shape: str
+    shape: str  # ``"DISC"`` or ``"HERT"``
+    # Radius and centre, length.
     radius: float
     x: float
     y: float
-    weights: Floats
+    weights: Floats  # (numnp,): shares of the nodes in a unit force; 0 where w is restrained
 
 
 def contact_patch(deck: Deck, mesh: Mesh) -> ContactPatch | None:

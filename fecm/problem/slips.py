@@ -16,21 +16,11 @@ MODES = (REPORT, LISTING)
 
 @dataclass(frozen=True, slots=True)
 class Slip:
-    """One difference between the printed program and the report.
+    """One difference between the printed program and the report."""
 
-    Attributes
-    ----------
-    name : str
-        Its name on the command line.
-    listing : str
-        Behaviour of the printed program.
-    report : str
-        What the report says or means.
-    """
-
-    name: str
-    listing: str
-    report: str
+    name: str  # its name on the command line
+    listing: str  # behaviour of the printed program
+    report: str  # what the report says or means
 
 
 SLIPS = (
@@ -141,21 +131,11 @@ NAMES = tuple(slip.name for slip in SLIPS)
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A statement of the report that the computation does not confirm, and that no slip explains.
+    """A statement of the report that the computation does not confirm and no slip explains."""
 
-    Attributes
-    ----------
-    place : str
-        Its section of the report.
-    report : str
-        What the report says.
-    found : str
-        Result of the computation.
-    """
-
-    place: str
-    report: str
-    found: str
+    place: str  # its section of the report
+    report: str  # what the report says
+    found: str  # result of the computation
 
 
 CLAIMS = (

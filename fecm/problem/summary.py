@@ -18,28 +18,7 @@ from fecm.problem.check_impact import resolution, said_error
 
 @dataclass(frozen=True)
 class ProblemSummary:
-    """A problem in numbers.
-
-    Attributes
-    ----------
-    title : str
-    nodes, elements, layers, equations, steps : int
-    A, B, D, shear : ndarray
-        Laminate stiffnesses.
-    plate_mass, projectile_mass : float
-        Mass of the plate, and of the projectile even without impact.
-    critical_time_step : float
-    time_steps : list of float
-        Every DT of the program.
-    output_bytes : int
-        Approximate size of the result.
-    elements_per_wave : float or None
-        Elements at the impact node per bending wave of the contact; None without impact.
-    mesh_error : float or None
-        Estimated mesh error of the peak force, relative to it.
-    units : dict
-        Names of the units; empty if the deck has none.
-    """
+    """A problem in numbers."""
 
     title: str
     nodes: int
@@ -47,18 +26,21 @@ class ProblemSummary:
     layers: int
     equations: int
     steps: int
+    # Laminate stiffnesses.
     A: Floats
     B: Floats
     D: Floats
     shear: Floats
+    # Mass of the plate, and of the projectile even without impact.
     plate_mass: float
     projectile_mass: float
     critical_time_step: float
-    time_steps: list[float]
-    output_bytes: int
+    time_steps: list[float]  # every DT of the program
+    output_bytes: int  # approximate size of the result
+    # Elements at the impact node per bending wave of the contact; None without impact.
     elements_per_wave: float | None
-    mesh_error: float | None
-    units: dict[str, str]
+    mesh_error: float | None  # estimated mesh error of the peak force, relative to it
+    units: dict[str, str]  # names of the units; empty if the deck has none
 
     def to_dict(self) -> dict[str, object]:
         """Plain values, for JSON."""

@@ -21,23 +21,14 @@ ENERGY_WARNING = 0.01
 
 @dataclass
 class EnergyBalance:
-    """The energy balance of a run so far.
+    """The energy balance of a run so far."""
 
-    Attributes
-    ----------
-    largest_work, last_work, largest_jump : float
-        Largest and last work of the nodal forces, and its largest change in a step (force*length).
-    worst_error : float
-        Largest error, relative to the supplied energy.
-    worst_step : int
-        Its step.
-    """
-
+    # Largest and last work of the nodal forces, and its largest change in a step (force*length).
     largest_work: float = 0.0
     last_work: float = 0.0
     largest_jump: float = 0.0
-    worst_error: float = 0.0
-    worst_step: int = 0
+    worst_error: float = 0.0  # largest error, relative to the supplied energy
+    worst_step: int = 0  # its step
 
     def add(
         self, block: Mapping[str, Floats], initial: float, *, limit: float | None = None

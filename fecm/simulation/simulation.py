@@ -27,44 +27,21 @@ Observer = Callable[["Simulation"], object]
 
 @dataclass
 class Simulation:
-    """A run; building it writes nothing.
-
-    Attributes
-    ----------
-    problem : Problem
-        The problem.
-    sink : Sink
-        Receives the result.
-    options : RunOptions
-        How the problem is run.
-    printer : Printer
-        Writes the printed output.
-    observers : sequence of callable
-        Called with the simulation every `interval` steps; may write a checkpoint or raise.
-    on_macro : callable
-        The same after every macro; must be fast.
-    rules : ProgramRules
-        How macros behave.
-    model : ImpactModel
-        Plate, projectile and contact.
-    state : RunState
-        State that a checkpoint stores.
-    interval : int
-        Steps between two calls of the observers.
-    """
+    """A run; building it writes nothing."""
 
     problem: Problem
-    sink: Sink
-    options: RunOptions = field(default_factory=RunOptions)
-    printer: Printer = field(default_factory=Printer)
+    sink: Sink  # receives the result
+    options: RunOptions = field(default_factory=RunOptions)  # how the problem is run
+    printer: Printer = field(default_factory=Printer)  # writes the printed output
+    # Called with the simulation every `interval` steps; may write a checkpoint or raise.
     observers: Sequence[Observer] = ()
-    on_macro: Observer = lambda simulation: None
-    rules: ProgramRules = field(init=False)
-    model: ImpactModel = field(init=False)
-    state: RunState = field(init=False)
+    on_macro: Observer = lambda simulation: None  # the same after every macro; must be fast
+    rules: ProgramRules = field(init=False)  # how macros behave
+    model: ImpactModel = field(init=False)  # plate, projectile and contact
+    state: RunState = field(init=False)  # state that a checkpoint stores
     recorder: Recorder = field(init=False)
     interpreter: Interpreter = field(init=False)
-    interval: int = field(init=False)
+    interval: int = field(init=False)  # steps between two calls of the observers
 
     def __post_init__(self) -> None:
         problem, options = self.problem, self.options

@@ -23,74 +23,35 @@ TOLERANCE = 1.0e-9
 
 @dataclass
 class RunState:
-    """State passed from one macro to the next; a checkpoint stores every field.
-
-    Attributes
-    ----------
-    plate : PlateState
-        The plate.
-    impact : ImpactState or None
-        Plate, projectile and contact; shares `plate`.
-    position : list of (int, int)
-        The interpreter's position; empty before the first macro.
-    dt, clock : float
-        Time step, and the time that TIME advances.
-    load_clock : float
-        Clock at the plate's last central difference.
-    constant_factor : float
-        Load factor without a table.
-    table : int or None
-        Index of the current table of proportional loads.
-    tables_read : int
-        Tables that PROP has read.
-    tolerance : float
-        Tolerance of CONV.
-    consistent_mass : bool
-        Whether CMAS came after LMAS.
-    factorised, converged : bool
-        Whether TANG was carried out; whether the last SOLV met the tolerance.
-    residual : ndarray (neq,) or None
-        Load less internal force, formed by FORM.
-    steps_since_output : int
-        Impact steps since the last output (the slip ``counter``).
-    prop_force : float or None
-        Value of PROP that replaces the contact force (the slip ``prop-contact``).
-    first_dt : float or None
-        Time step of the rod's constants.
-    balance : EnergyBalance
-        Energy balance so far.
-    peak_force : float
-        Largest contact force so far.
-    crossing : float
-        Time at which it first reached the delamination threshold; NaN before.
-    failure : FailureEnvelope or None
-        Largest exposures so far, of FAIL.
-    notes : list of str
-        Remarks for the user.
-    """
+    """State passed from one macro to the next; a checkpoint stores every field."""
 
     plate: PlateState
-    impact: ImpactState | None = None
+    impact: ImpactState | None = None  # plate, projectile and contact; shares `plate`
+    # The interpreter's position; empty before the first macro.
     position: list[tuple[int, int]] = field(default_factory=list)
+    # Time step, and the time that TIME advances.
     dt: float = 0.0
     clock: float = 0.0
-    load_clock: float = 0.0
-    constant_factor: float = 1.0
-    table: int | None = None
-    tables_read: int = 0
-    tolerance: float = TOLERANCE
-    consistent_mass: bool = False
+    load_clock: float = 0.0  # clock at the plate's last central difference
+    constant_factor: float = 1.0  # load factor without a table
+    table: int | None = None  # index of the current table of proportional loads
+    tables_read: int = 0  # tables that PROP has read
+    tolerance: float = TOLERANCE  # tolerance of CONV
+    consistent_mass: bool = False  # whether CMAS came after LMAS
+    # Whether TANG was carried out; whether the last SOLV met the tolerance.
     factorised: bool = False
     converged: bool = False
-    residual: Floats | None = None
-    steps_since_output: int = 0
+    residual: Floats | None = None  # (neq,): load less internal force, formed by FORM
+    steps_since_output: int = 0  # impact steps since the last output (the slip ``counter``)
+    # Value of PROP that replaces the contact force (the slip ``prop-contact``).
     prop_force: float | None = None
-    first_dt: float | None = None
-    balance: EnergyBalance = field(default_factory=EnergyBalance)
-    peak_force: float = 0.0
+    first_dt: float | None = None  # time step of the rod's constants
+    balance: EnergyBalance = field(default_factory=EnergyBalance)  # energy balance so far
+    peak_force: float = 0.0  # largest contact force so far
+    # Time at which it first reached the delamination threshold; NaN before.
     crossing: float = math.nan
-    failure: FailureEnvelope | None = None
-    notes: list[str] = field(default_factory=list)
+    failure: FailureEnvelope | None = None  # largest exposures so far, of FAIL
+    notes: list[str] = field(default_factory=list)  # remarks for the user
 
     def judge(
         self,

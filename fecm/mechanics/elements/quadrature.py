@@ -23,19 +23,12 @@ _ETA = np.array([-1, -1, 1, 1, -1, 0, 1, 0, 0])
 
 @dataclass(frozen=True, eq=False)
 class Quadrature:
-    """Points and weights of a quadrature rule.
+    """Points and weights of a quadrature rule."""
 
-    Attributes
-    ----------
-    xi, eta : ndarray (n,)
-        Local coordinates.
-    weights : ndarray (n,)
-        Their sum is 4, the area of the square.
-    """
-
+    # (n,): local coordinates.
     xi: Floats
     eta: Floats
-    weights: Floats
+    weights: Floats  # (n,): their sum is 4, the area of the square
 
 
 @cache

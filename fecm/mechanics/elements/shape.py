@@ -19,27 +19,15 @@ from fecm._typing import Bools, Floats
 
 @dataclass(frozen=True, eq=False)
 class ElementShape:
-    """Shape of an element.
+    """Shape of an element."""
 
-    Attributes
-    ----------
-    name : str
-        Name in messages.
-    xi, eta : ndarray (nodes,)
-        Local coordinates of the nodes.
-    corners : int
-        Number of corners, the first nodes, which are never absent.
-    numbering : str
-        Order of the nodes, for messages.
-    functions : callable
-        ``functions(xi, eta, present)`` returns the values and derivatives, (3, nodes, n).
-    """
-
-    name: str
+    name: str  # name in messages
+    # (nodes,): local coordinates of the nodes.
     xi: Floats
     eta: Floats
-    corners: int
-    numbering: str
+    corners: int  # number of corners, the first nodes, which are never absent
+    numbering: str  # order of the nodes, for messages
+    # ``functions(xi, eta, present)`` returns the values and derivatives, (3, nodes, n).
     functions: Callable[[Floats, Floats, Bools], Floats]
 
     @property
