@@ -97,7 +97,8 @@ class FileSink:
                 texts = AXIS_NAMES[size][:length]
                 made = self._file.create_dataset(name, data=texts, dtype=h5py.string_dtype())
             else:
-                made = self._file.create_dataset(name, data=np.arange(1, length + 1, dtype="i4"))
+                numbers = np.arange(length, dtype="i4") + (size != "cases")
+                made = self._file.create_dataset(name, data=numbers)
             made.make_scale(name)
             made.attrs["description"] = made.attrs["long_name"] = description
         return self._file[name]
@@ -152,8 +153,11 @@ class FileSink:
             del self._file[path.rpartition("/")[0]]
 
     def text(self, path: str, value: str | list[str], description: str) -> None:
-        """Store a text, or one text per row."""
+        """Store a text, or one text per case."""
         made = self._file.create_dataset(path, data=value, dtype=h5py.string_dtype())
+        if not isinstance(value, str):
+            self._datasets[path] = made
+            self._made.append(Dataset(path, ("cases",), description))
         made.attrs["description"] = description
 
 

@@ -327,7 +327,7 @@ DATASETS = {
 # Sizes of axes that every result has.
 FIXED = {"faces": 2, "levels": 3, "directions": 2}
 
-# Dimension scales of datasets stored in rows: name and description by size.
+# Dimension scales: name and description by size.
 SCALES = {
     "numnp": ("node", "number of the node"),
     "numel": ("element", "number of the element"),
@@ -345,6 +345,8 @@ SCALES = {
     "levels": ("level", "level in the ply: 1 at its lower z, 2 at its middle, 3 at its upper z"),
     "directions": ("direction", "1 is xz, 2 is yz"),
     "gages": ("gage", "position of the gage among the gages, from 1"),
+    "cases": ("case", "number of the case, from 0"),
+    "steps": ("step", "number of time steps taken"),
 }
 # Names of the positions of some axes.
 AXIS_NAMES: dict[str | int, tuple[str, ...]] = {"ndf": DOF_NAMES, "ndm": AXES}

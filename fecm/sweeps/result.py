@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,7 @@ from fecm.sweeps.plan import Plan
 
 if TYPE_CHECKING:
     import pandas
+    import xarray
     from matplotlib.axes import Axes
 
     from fecm.results.hdf5_reader import Contents
@@ -71,13 +73,13 @@ def verdict(result: SweepResult) -> str:
 
 Array = NDArray[Any]
 
-# Physical dimensions of the values.
+# Physical dimensions of the values, and of the stored force.
 DIMENSIONS = {
     "velocity": "length/time", "k": "force/length^1.5", "alpha_p": "length",
     "rod_length": "length", "rod_modulus": "force/length^2",
     "rod_density": "force*time^2/length^4", "rod_mass": "force*time^2/length",
     **dict.fromkeys(("patch", "x0", "y0", "thickness"), "length"),
-    "density": "force*time^2/length^4", "dt": "time",
+    "density": "force*time^2/length^4", "dt": "time", "force": "force",
     **dict.fromkeys(("e1", "e2", "g12", "g13", "g23"), "force/length^2"),
 }  # fmt: skip
 
@@ -154,6 +156,53 @@ class SweepResult:
         table.index.name = "case"
         return table
 
+    def to_xarray(self) -> xarray.Dataset:
+        """Return values and results as labelled arrays (requires xarray).
+
+        A full grid has one dimension per name of its values, which are the coordinates: numbers in
+        ascending order, texts in the order of the cases.  Other cases have the dimension ``case``.
+        The last dimension of ``force`` is ``step``.  ``units`` are those of the deck.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+
+        Examples
+        --------
+        >>> from fecm import sweep
+        >>> found = sweep("decks/appendix.inp", {"velocity": [50.0, 115.0], "k": [1e6, 2e6]})
+        >>> found.to_xarray().max_indentation.sel(velocity=115.0).dims
+        ('k',)
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise ImportError("a Dataset needs xarray: pip install 'fecm[xarray]'") from None
+        levels, rows = _grid(self.cases, len(self))
+        axes = list(levels or ["case"])
+        shape = tuple(map(len, levels.values())) or (len(self),)
+
+        def variable(name: str, values: Array) -> tuple[list[str], Array, dict[str, str]]:
+            texts = {"long_name": COLUMNS.get(name, ("",))[0], "units": self.unit(name)}
+            named = {key: text for key, text in texts.items() if text}
+            made = values[rows].reshape(*shape, *values.shape[1:])
+            return [*axes, "step"][: made.ndim], made, named
+
+        columns: dict[str, Array | None] = {**self.cases, **self.summary, "dt": self.dt}
+        columns |= {"steps": self.steps, "unsettled_steps": self.unconverged_steps}
+        columns["force"] = self.force
+        found = xarray.Dataset(
+            {name: variable(name, values) for name, values in columns.items()
+             if values is not None and name not in levels},
+            {name: (name, values, {"units": unit} if (unit := self.unit(name)) else {})
+             for name, values in (levels or {"case": np.arange(len(self))}).items()},
+            {"title": self.title},
+        )  # fmt: skip
+        if self.force is not None:
+            found = found.assign_coords(step=np.arange(1, self.force.shape[1] + 1))
+        return found.set_coords(list(self.cases))
+
     def plot(
         self,
         quantity: str = "",
@@ -196,6 +245,23 @@ class SweepResult:
         names = (over,) if isinstance(over, str) else tuple(over)
         named = {self.title or "the sweep": self}
         return plot("map", named, path, ax, quantity=quantity, over=names, **options)
+
+
+def _grid(cases: Mapping[str, Array], count: int) -> tuple[dict[str, Array], NDArray[np.intp]]:
+    """Values of each name of a full grid and its cases in their order; no values if it is none."""
+    levels: dict[str, Array] = {}
+    places: list[NDArray[np.intp]] = []
+    for name, values in cases.items():
+        found, first, place = np.unique(values, return_index=True, return_inverse=True)
+        order = np.argsort(first) if values.dtype.kind == "U" else np.arange(len(found))
+        levels[name] = found[order]
+        places.append(np.argsort(order)[place])
+    shape = tuple(map(len, levels.values()))
+    if places and math.prod(shape) == count:
+        flat = np.ravel_multi_index(tuple(places), shape)
+        if len(np.unique(flat)) == count:
+            return levels, np.argsort(flat)
+    return {}, np.arange(count)
 
 
 def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
@@ -256,7 +322,8 @@ def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
                 sink.text(name, values.tolist(), text)
                 continue
             dtype = "i8" if values.dtype.kind in "iu" else "f8"
-            sink.create(Dataset(name, ("cases",), text, dimension, dtype), values.shape)
+            axes = ("cases", "steps")[: values.ndim]
+            sink.create(Dataset(name, axes, text, dimension, dtype), values.shape)
             sink.write(name, 0, values)
         for group, text in GROUPS.items():
             sink.attributes(group, {"description": text})
