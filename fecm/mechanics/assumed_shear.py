@@ -38,12 +38,7 @@ def tying_points(nodes: int, axis: int) -> Quadrature:
 
 
 def tying_weights(nodes: int, axis: int, rule: Quadrature) -> Floats:
-    """Values at the points of a rule of the functions that interpolate between tying points.
-
-    Returns
-    -------
-    ndarray (npt, tying points)
-    """
+    """Functions that interpolate between tying points, at the points of a rule, (npt, tying)."""
     along, across, _ = TYING[nodes]
     one, other = (rule.eta, rule.xi) if axis else (rule.xi, rule.eta)
     product = _lagrange(across, other)[:, :, None] * _lagrange(along, one)[:, None, :]
@@ -68,14 +63,7 @@ def strain_matrix(family: ElementBlock, rule: Quadrature) -> Floats:
 
 
 class TiedStrains:
-    """Assumed transverse shear strains of a displacement field.
-
-    Parameters
-    ----------
-    family : ElementBlock
-    rule : Quadrature
-        Points of the strains.
-    """
+    """Assumed transverse shear strains of a displacement field at the points of a rule."""
 
     def __init__(self, family: ElementBlock, rule: Quadrature) -> None:
         nn = family.nodes.shape[1]

@@ -42,16 +42,7 @@ def _any(condition: Truth) -> bool:
 
 
 def hertz_coefficient(radius: float, e_s: float, nu_s: float, e_t: float) -> float:
-    """Contact coefficient of a sphere on a half-space, equation 3-2 (force/length^1.5).
-
-    Parameters
-    ----------
-    radius : float
-        Radius of the sphere, R_s (length).
-    e_s, nu_s : float
-        Young's modulus (force/length^2) and Poisson's ratio of the sphere.
-    e_t : float
-        Young's modulus of the laminate through its thickness, force/length^2.
+    """Contact coefficient of a sphere (s) on a half-space (t), equation 3-2 (force/length^1.5).
 
     Raises
     ------
@@ -199,14 +190,8 @@ class Law(Protocol):
     def trial(self, memory: Any, last: ContactPoint, indentation: Number) -> tuple[Number, Any]:
         """Contact force at a trial indentation, and the memory after the trial.
 
-        Parameters
-        ----------
-        memory
-            Before the trial.
-        last : ContactPoint
-            Indentation (length) and force at the end of the last step.
-        indentation : float
-            Trial value (length); negative where the bodies are apart.
+        The last point is that at the end of the last step.  An indentation is a length, negative
+        where the bodies are apart.
         """
         ...
 
@@ -368,20 +353,9 @@ def _unloading(
 def follow(
     law: Law, corners: Sequence[float], points: int = 1
 ) -> Iterator[tuple[ContactPoint, int]]:
-    """Force of one case along a path of indentations, starting at zero.
+    """Points and branches of one case along a path from zero that turns at some indentations.
 
-    Parameters
-    ----------
-    law : Law
-    corners : sequence of float
-        Indentations at which the path turns.
-    points : int
-        Points per section.
-
-    Yields
-    ------
-    ContactPoint, int
-        Indentation and force, and their branch; the start first.
+    The start comes first, then a number of points per section.
     """
     memory, last, begin = law.start(), ContactPoint(0.0, 0.0), 0.0
     yield last, VIRGIN

@@ -26,17 +26,9 @@ def effective_rigidity(laminate: Laminate) -> float:
 
 
 def threshold_force(rigidity: float, toughness: float, delaminations: int = 1) -> float:
-    """Force at which circular delaminations grow, pi sqrt(32 D* G_IIc/(n + 2)).
+    """Force at which n circular delaminations grow, pi sqrt(32 D* G_IIc/(n + 2)).
 
-    One delamination: Davies and Robinson 1992; n of them: Suemasu and Majima 1996, Olsson 2001.
-
-    Parameters
-    ----------
-    rigidity : float
-        D*, force*length.
-    toughness : float
-        G_IIc, force/length.
-    delaminations : int
-        Number n of delaminations.
+    The rigidity D* is force*length, the toughness G_IIc force/length.  One delamination: Davies and
+    Robinson 1992; n of them: Suemasu and Majima 1996, Olsson 2001.
     """
     return math.pi * math.sqrt(32.0 * rigidity * toughness / (delaminations + 2.0))

@@ -46,12 +46,7 @@ MOST_NODES = SHAPES[-1].nodes
 
 
 def shape_of(present: Bools) -> ElementShape:
-    """Shape of an element by its last node (NEL of the listing): up to 3, 9 or 12.
-
-    Parameters
-    ----------
-    present : ndarray (n,) of bool
-        Which nodes the element has.
+    """Shape of an element by its last node present (NEL of the listing): up to 3, 9 or 12.
 
     Raises
     ------
@@ -95,14 +90,7 @@ class ElementBlock:
 
 
 def element_blocks(elements: Ints, coordinates: Floats) -> list[ElementBlock]:
-    """Sort elements into blocks with the same nodes present.
-
-    Parameters
-    ----------
-    elements : ndarray (numel, nen)
-        Node numbers from 1, 0 where absent; nen is at most 12.
-    coordinates : ndarray (numnp, 2)
-        Length.
+    """Sort elements, (numel, nen), node numbers from 1 or 0, into blocks with the same nodes.
 
     Raises
     ------

@@ -66,24 +66,10 @@ def stiffness(
     transposed_jacobian: bool = False,
     assumes_shear: bool = False,
 ) -> Floats:
-    """Element stiffness matrices, K_p of equation 4-14.
+    """Element stiffness matrices, K_p of equation 4-14, (ne, 5 nn, 5 nn).
 
-    Parameters
-    ----------
-    family : ElementBlock
-        The elements.
-    laminate : Laminate
-        Stiffness per area.
-    bending, shear : Quadrature
-        Rules for membrane and bending energy, and for transverse shear energy.
-    transposed_jacobian : bool
-        See :func:`~fecm.mechanics.interpolation.interpolate`.
-    assumes_shear : bool
-        Take the transverse shear strains of :mod:`~fecm.mechanics.assumed_shear`, with its rule.
-
-    Returns
-    -------
-    ndarray (ne, 5 nn, 5 nn)
+    The rules are those of the membrane and bending energy, and of the transverse shear energy;
+    :mod:`~fecm.mechanics.assumed_shear` has its own.
     """
     ABD = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
     at = interpolate(family, bending, transposed_jacobian=transposed_jacobian)
@@ -101,11 +87,7 @@ def lumped_mass(family: ElementBlock, laminate: Laminate, rule: Quadrature) -> F
 
     The listing's MASS01, the method of Hinton, Rock and Zienkiewicz (1976).  Every entry is
     positive unless a node's shape function is zero at all points, as with order 1 for mid-sides.
-
-    Returns
-    -------
-    ndarray (ne, nn, 5)
-        Mass for u, v, w; mass times length squared for the rotations.
+    (ne, nn, 5): mass for u, v, w; mass times length squared for the rotations.
     """
     values, _ = local_shape_functions(family, rule)
     area = jacobian_determinants(family, rule) * rule.weights
@@ -119,22 +101,9 @@ def consistent_mass(family: ElementBlock, laminate: Laminate, rule: Quadrature) 
     """Consistent element mass matrices, M_p of equation 4-14 (the listing's MASS01).
 
     The integral of N_i N_j times the mass per area rho h for u, v and w, and times the rotary
-    inertia rho h^3 / 12 for the rotations; different dofs are not coupled.
-
-    Parameters
-    ----------
-    family : ElementBlock
-        The elements.
-    laminate : Laminate
-        Mass and rotary inertia per area.
-    rule : Quadrature
-        Exact on parallelograms with order 2 for the 4-node element, 3 with mid-sides, and 4 for
-        the cubic element.
-
-    Returns
-    -------
-    ndarray (ne, 5 nn, 5 nn)
-        Mass for u, v, w; mass times length squared for the rotations.  Exactly symmetric.
+    inertia rho h^3 / 12 for the rotations; different dofs are not coupled.  (ne, 5 nn, 5 nn),
+    exactly symmetric.  The rule is exact on parallelograms with order 2 for the 4-node element, 3
+    with mid-sides, and 4 for the cubic element.
     """
     values, _ = local_shape_functions(family, rule)
     area = jacobian_determinants(family, rule) * rule.weights

@@ -50,14 +50,7 @@ class FailureEnvelope:
 
 
 class FailureMonitor:
-    """Evaluates the failure criteria of all plies.
-
-    Parameters
-    ----------
-    stresses : PlyStresses
-    laminate : Laminate
-    strengths : Strengths
-    """
+    """Evaluates the failure criteria of all plies."""
 
     def __init__(self, stresses: PlyStresses, laminate: Laminate, strengths: Strengths) -> None:
         self.stresses, self._strengths = stresses, strengths

@@ -60,13 +60,6 @@ def gages(
 ) -> GageArray:
     """Express the gages' strains by the dofs of their elements.
 
-    Parameters
-    ----------
-    mesh : Mesh
-    records : sequence of GagePlace
-    transposed_jacobian : bool
-        See :func:`fecm.mechanics.interpolation.interpolate`.
-
     Raises
     ------
     OutsideError

@@ -65,22 +65,7 @@ class ImpactConditions:
 
 
 class ImpactSystem:
-    """Time integration of a plate and a projectile.
-
-    Parameters
-    ----------
-    motion : PlateMotion
-    rod : Rod or RigidMass
-    law : Law
-    contact : ImpactConditions
-    integrator : type of RodIntegrator
-        Integration method of the rod.
-
-    Attributes
-    ----------
-    first_dt : float or None
-        Time step for which the rod's constants are computed.
-    """
+    """Time integration of a plate and a projectile."""
 
     def __init__(
         self,
@@ -98,7 +83,7 @@ class ImpactSystem:
         self.rod_mass = rod.mass()
         self._integrator = integrator
         self._step: RodIntegrator | None = None
-        self.first_dt: float | None = None
+        self.first_dt: float | None = None  # time step of the rod's constants
 
     @property
     def plate(self) -> PlateModel:
@@ -108,10 +93,7 @@ class ImpactSystem:
     def start(self, plate: PlateState | None = None) -> ImpactState:
         """State before the first step, with the projectile just touching the plate.
 
-        Parameters
-        ----------
-        plate : PlateState, optional
-            The plate's state, shared with the caller; at rest by default.
+        The plate's state is shared with the caller; it is at rest by default.
         """
         rod = rigid_approach(
             self.rod, self.contact.velocity, derivatives_too=self.contact.strains_start_moving
@@ -127,18 +109,9 @@ class ImpactSystem:
     def advance(
         self, state: ImpactState, dt: float, factor: float = 1.0, force: float | None = None
     ) -> None:
-        """Take one step.
+        """Take one step with the load factor of FORC's values; changes the state.
 
-        Parameters
-        ----------
-        state : ImpactState
-            Changed in place.
-        dt : float
-            Time step.
-        factor : float
-            Load factor of FORC's values.
-        force : float, optional
-            Replaces the contact force on the plate (the slip ``prop-contact``).
+        A `force` replaces the contact force on the plate (the slip ``prop-contact``).
 
         Raises
         ------
@@ -171,15 +144,7 @@ class ImpactSystem:
 def couple_step(step: TipStep, law: Law, state: ContactState, w: Number) -> None:
     """Iterate contact force and tip acceleration, then advance the projectile under that force.
 
-    Parameters
-    ----------
-    step : TipStep
-        The projectile's step.
-    law : Law
-    state : ContactState
-        Changed in place.
-    w : float
-        The plate's displacement at the contact; an array for many cases.
+    Changes the state; w is the plate's displacement at the contact, an array for many cases.
     """
     last = state.contact
     motion, base, drift, acceleration = step.begin(state.rod)

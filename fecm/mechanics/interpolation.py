@@ -47,23 +47,10 @@ def _shape_functions_at(
 def inverse_jacobian(
     family: ElementBlock, local: Floats, *, transposed_jacobian: bool = False
 ) -> tuple[Floats, Floats]:
-    """Inverse and determinant of the Jacobian.
+    """Inverse (ne, npt, 2, 2) and determinant (ne, npt) of the Jacobian.
 
-    Parameters
-    ----------
-    family : ElementBlock
-        The elements.
-    local : ndarray (npt, 2, nn)
-        Derivatives of the shape functions with respect to xi and eta.
-    transposed_jacobian : bool
-        Transpose the inverse (the slip ``jacobian``).
-
-    Returns
-    -------
-    inverse : ndarray (ne, npt, 2, 2)
-        dxi_a/dx_i in row i and column a, 1/length.
-    determinant : ndarray (ne, npt)
-        Length squared.
+    `local` has the derivatives of the shape functions by xi and eta, (npt, 2, nn).  The inverse has
+    dxi_a/dx_i in row i and column a; `transposed_jacobian` transposes it (the slip ``jacobian``).
     """
     jacobian = np.einsum("pan,eni->epai", local, family.coordinates)  # dx_i/dxi_a
     inverse = np.linalg.inv(jacobian)
@@ -81,17 +68,7 @@ def jacobian_determinants(family: ElementBlock, rule: Quadrature) -> Floats:
 def interpolate(
     family: ElementBlock, rule: Quadrature, *, transposed_jacobian: bool = False
 ) -> Interpolation:
-    """Evaluate shape functions and their derivatives in x and y.
-
-    Parameters
-    ----------
-    family : ElementBlock
-        The elements.
-    rule : Quadrature
-        The points.
-    transposed_jacobian : bool
-        Transpose the inverse Jacobian (the slip ``jacobian``).
-    """
+    """Evaluate shape functions and their derivatives in x and y at the points of a rule."""
     values, local = local_shape_functions(family, rule)
     inverse, determinant = inverse_jacobian(family, local, transposed_jacobian=transposed_jacobian)
     derivatives = np.einsum("epia,pan->epin", inverse, local)

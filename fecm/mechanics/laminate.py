@@ -97,18 +97,7 @@ class Laminate:
 
 
 def reduced_stiffness(ply: PlyConstants) -> Floats:
-    """Plane-stress stiffness of a ply in its own axes, equation 2-3.
-
-    Parameters
-    ----------
-    ply : PlyConstants
-        Elastic constants.
-
-    Returns
-    -------
-    ndarray (3, 3)
-        Q, force/area.
-    """
+    """Plane-stress stiffness Q of a ply in its own axes, equation 2-3, (3, 3)."""
     e1, e2, nu12 = ply.e1, ply.e2, ply.nu12
     full = 1.0 - nu12**2 * e2 / e1
     q12 = nu12 * e2 / full
@@ -116,19 +105,7 @@ def reduced_stiffness(ply: PlyConstants) -> Floats:
 
 
 def transformed_stiffness(q: Floats, angle: float) -> Floats:
-    """Transform a ply's plane-stress stiffness to the laminate's axes, equation 2-5.
-
-    Parameters
-    ----------
-    q : ndarray (3, 3)
-        Stiffness in the ply's axes.
-    angle : float
-        Fibre angle in degrees.
-
-    Returns
-    -------
-    ndarray (3, 3)
-    """
+    """Transform a ply's plane-stress stiffness (3, 3) to the laminate's axes, equation 2-5."""
     m, n = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
     q11, q22, q12, q66 = q[0, 0], q[1, 1], q[0, 1], q[2, 2]
     a, b = q11 - q12 - 2.0 * q66, q12 - q22 + 2.0 * q66
@@ -144,12 +121,8 @@ def transformed_stiffness(q: Floats, angle: float) -> Floats:
 def transformed_shear(g13: float, g23: float, angle: float) -> Floats:
     """Transform a ply's transverse shear stiffness to the laminate's axes, equation 2-5.
 
-    The sign of Q45 follows from the rotation; equation 2-5 of the report has the opposite sign.
-
-    Returns
-    -------
-    ndarray (2, 2)
-        Force/area, order xz, yz.
+    (2, 2), order xz, yz.  The sign of Q45 follows from the rotation; equation 2-5 of the report has
+    the opposite sign.
     """
     m, n = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
     coupling = (g13 - g23) * m * n
@@ -174,10 +147,6 @@ def laminate(
         Layer thicknesses.
     total : float, optional
         Thickness for the inertia; the sum of the layers by default.
-
-    Returns
-    -------
-    Laminate
     """
     faces = np.concatenate(([0.0], np.cumsum(thicknesses)))
     faces -= faces[-1] / 2.0

@@ -20,22 +20,10 @@ PASSES = 50
 
 
 def locate(family: ElementBlock, points: Floats) -> tuple[Indices, Indices, Floats]:
-    """Find every element of a block that contains a point, edges included.
+    """Find every element of a block that contains a point of some, (n, 2), edges included.
 
-    Parameters
-    ----------
-    family : ElementBlock
-    points : ndarray (n, 2)
-        Length.
-
-    Returns
-    -------
-    members : ndarray (k,)
-        Position of the element in the block.
-    which : ndarray (k,)
-        The point.
-    xi : ndarray (k, 2)
-        Local coordinates of the point in the element.
+    Positions of the elements in the block (k,), their points (k,), and the points' local
+    coordinates in the elements (k, 2).
     """
     low, high = family.coordinates.min(axis=1), family.coordinates.max(axis=1)
     margin = 0.1 * (high - low).max(axis=1, keepdims=True)  # sides may bulge

@@ -25,16 +25,7 @@ class Modes:
 
 
 def modes(plate: PlateModel, count: int, *, consistent: bool) -> Modes:
-    """Compute the lowest modes.
-
-    Parameters
-    ----------
-    plate : PlateModel
-    count : int
-        Number of modes; limited to the number of equations.
-    consistent : bool
-        Use the consistent mass instead of the lumped one.
-    """
+    """Compute the lowest modes, at most as many as equations, with the chosen mass matrix."""
     from scipy import linalg, sparse  # slow to import
     from scipy.sparse.linalg import eigsh
 

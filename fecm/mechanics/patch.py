@@ -31,22 +31,7 @@ class PatchError(FecmError, ValueError):
 
 
 def patch_weights(mesh: Mesh, shape: str, radius: float, x: float, y: float) -> Floats:
-    """Nodal weights of a unit pressure on a circle.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    shape : {"DISC", "HERT"}
-        Uniform pressure or Hertz's.
-    radius : float
-        Length, positive.
-    x, y : float
-        Centre, length.
-
-    Returns
-    -------
-    ndarray (numnp,)
-        Weights of w; their sum is 1.
+    """Nodal weights of w, (numnp,), of a unit pressure on a circle; their sum is 1.
 
     Raises
     ------

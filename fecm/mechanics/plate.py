@@ -216,19 +216,7 @@ class PlateModel:
         return np.asarray(loads)
 
     def field(self, displacement: Floats, scale: float = 1.0) -> Floats:
-        """All dofs of all nodes.
-
-        Parameters
-        ----------
-        displacement : ndarray (neq,)
-            The free dofs.
-        scale : float
-            Load factor of the prescribed displacements.
-
-        Returns
-        -------
-        ndarray (numnp, 5)
-        """
+        """All dofs, (numnp, 5): the free ones, (neq,), and `scale` times the prescribed ones."""
         full = scale * self.mesh.forces
         full.reshape(-1)[self._free_indices] = displacement
         return full

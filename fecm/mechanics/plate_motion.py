@@ -179,19 +179,10 @@ class DofSums:
 
 
 class PlateMotion:
-    """Time integration of a plate.
+    """Time integration of a plate with the damping matrix C = a M.
 
-    Parameters
-    ----------
-    plate : PlateModel
-    solver : str
-        How K u is computed: see :func:`~fecm.mechanics.stiffness_product.stiffness_operator`.
-    reduced : SymmetryReduction, optional
-        The independent dofs; all of them by default, and with the sparse matrix.
-    workers : Workers, optional
-        Threads that share the work of a step.
-    damping : float
-        a of the damping matrix C = a M, 1/time.
+    Solver and workers belong to :func:`~fecm.mechanics.stiffness_product.stiffness_operator`.  All
+    dofs are independent by default, and with the sparse matrix.
     """
 
     def __init__(
@@ -253,27 +244,13 @@ class PlateMotion:
         return DistributedLoad(chosen, weights, mobility, square, nodal)
 
     def field(self, state: PlateState, factor: float) -> Floats:
-        """All dofs of all nodes, (numnp, 5).
-
-        Parameters
-        ----------
-        state : PlateState
-        factor : float
-            Load factor of the prescribed displacements.
-        """
+        """All dofs of all nodes, (numnp, 5), with a load factor of the prescribed ones."""
         full = state.padded.take(self._dof_indices)
         full += factor * self._prescribed if self._prescribes else 0.0  # no negative zeros
         return full
 
     def dof_sums(self, dof_indices: Indices, weights: Floats) -> DofSums:
-        """Prepare weighted sums of dofs for evaluation at every step.
-
-        Parameters
-        ----------
-        dof_indices : ndarray (n, m)
-            Indices into a flattened field.
-        weights : ndarray (n, m)
-        """
+        """Prepare sums of dofs of a flattened field, indices and weights (n, m)."""
         prescribed = (weights * self._prescribed.ravel()[dof_indices]).sum(axis=1)
         return DofSums(self._dof_indices.ravel()[dof_indices], weights, prescribed)
 
@@ -307,14 +284,7 @@ class PlateMotion:
         )
 
     def unbalanced(self, state: PlateState, factor: float) -> Floats:
-        """Load minus internal force of every equation.
-
-        Parameters
-        ----------
-        state : PlateState
-        factor : float
-            Load factor of the nodal forces.
-        """
+        """Load minus internal force of every equation, with a load factor of the nodal forces."""
         force = -self.product(state.displacement)
         if self._loads is not None:
             force += factor * self._loads
@@ -329,19 +299,10 @@ class PlateMotion:
         *,
         velocity_dt: float | None = None,
     ) -> None:
-        """Take one step: v += velocity_dt (M^-1 (P - K u) - a v), u += dt v.
+        """Take one step: v += velocity_dt (M^-1 (P - K u) - a v), u += dt v; changes the state.
 
-        Parameters
-        ----------
-        state : PlateState
-            Changed in place.
-        dt : float
-            Time step.
-        factor : float
-            Load factor of the nodal forces.
-        applied : AppliedForce, optional
-        velocity_dt : float, optional
-            Time between the middles of the last step and of this one; `dt` by default.
+        `factor` scales the nodal forces; `velocity_dt` is the time between the middles of the last
+        step and of this one, `dt` by default.
         """
         dt_v = dt if velocity_dt is None else velocity_dt
         dt2, b = dt * dt_v, 0.5 * self.damping * dt_v
@@ -373,15 +334,9 @@ class PlateMotion:
         """Kinetic energy at the time of the displacement (force*length).
 
         The stored velocity is half a step old: the energy is that of v + dt/2 a, with
-        a = M^-1 (P - K u).  Its square is expanded into the inner products of :class:`Sums`.  With
-        damping the mean of the velocities before and after is that, divided by 1 + b.
-
-        Parameters
-        ----------
-        state : PlateState
-        factor : float
-            Load factor of the nodal forces.
-        applied : AppliedForce, optional
+        a = M^-1 (P - K u), and `factor` that of the nodal forces.  Its square is expanded into the
+        inner products of :class:`Sums`.  With damping the mean of the velocities before and after
+        is that, divided by 1 + b.
         """
         dt2 = state.dt**2
         if not dt2:

@@ -19,13 +19,10 @@ from fecm.mechanics.mesh import Ints, Mesh
 
 
 def in_plane_stresses(laminate: Laminate) -> Floats:
-    """Stresses sigma_1, sigma_2, tau_12 of every ply, T Qbar (eps + z kappa).
+    """Stresses sigma_1, sigma_2, tau_12 of every ply, T Qbar (eps + z kappa), (plies, 2, 3, 6).
 
-    Returns
-    -------
-    ndarray (plies, 2, 3, 6)
-        At the lower and the upper z of each ply, per unit of eps_xx, eps_yy, gamma_xy (force/area)
-        and kappa_x, kappa_y, kappa_xy (force/length).
+    At the lower and the upper z of each ply, per unit of eps_xx, eps_yy, gamma_xy (force/area) and
+    kappa_x, kappa_y, kappa_xy (force/length).
     """
     plies = laminate.plies
     m, n = np.cos(np.deg2rad(plies.angles)), np.sin(np.deg2rad(plies.angles))
@@ -80,12 +77,8 @@ def equilibrium_shear_stiffness(laminate: Laminate) -> Floats:
 
     Cylindrical bending in x and in y without membrane forces: H^-1 is the integral of
     F2' G^-1 F2, where F2 gives tau_xz and tau_yz per unit of Q_x and Q_y.  The two bendings are
-    taken along the plate's axes: of an angle-ply laminate the result depends on these.
-
-    Returns
-    -------
-    ndarray (2, 2)
-        Force/length, order xz, yz.
+    taken along the plate's axes: of an angle-ply laminate the result depends on these.  (2, 2),
+    order xz, yz, force/length.
     """
     plies = laminate.plies
     inverse_A = np.linalg.inv(laminate.A)
@@ -132,23 +125,10 @@ def second_derivatives(family: ElementBlock) -> Floats:
 
 
 class PlyStresses:
-    """Stresses of the plies of some elements.
+    """Stresses of the plies of some elements: rows of the mesh, ascending; all by default.
 
-    Parameters
-    ----------
-    mesh : Mesh
-    laminate : Laminate
-    rule : Quadrature
-        Points of the in-plane stresses; the interlaminar ones belong to the element's centre.
-    members : ndarray (m,), optional
-        Rows of the elements, ascending; all by default.
-
-    Attributes
-    ----------
-    shape : tuple of int
-        Numbers of elements, points of an element, and plies.
-    z : ndarray (plies, 3)
-        Lower, middle and upper z of each ply, length.
+    The rule has the points of the in-plane stresses; the interlaminar ones belong to the element's
+    centre.
     """
 
     def __init__(
@@ -161,6 +141,7 @@ class PlyStresses:
         self.members = np.arange(len(mesh.elements)) if members is None else members
         elements = mesh.elements[self.members]
         self.z = laminate.plies.z
+        # Numbers of elements, points of an element, and plies.
         self.shape = (len(elements), len(rule.xi), len(laminate.plies.angles))
         self._families = [
             (

@@ -177,13 +177,7 @@ def report_rod(density: float = REPORT_DENSITY) -> Rod:
 def rigid_approach(rod: Projectile, velocity: float, *, derivatives_too: bool = False) -> RodState:
     """Initial state of a projectile that approaches the plate as a rigid body.
 
-    Parameters
-    ----------
-    rod : Rod or RigidMass
-    velocity : float
-        Approach velocity, positive towards the plate, length/time.
-    derivatives_too : bool
-        Start du/dx at the same velocity (the slip ``rod-start``).
+    With `derivatives_too` du/dx start at the same velocity (the slip ``rod-start``).
     """
     motion = np.zeros((3, len(rod.mass())))
     motion[1, :: 1 if derivatives_too else 2] = -velocity

@@ -134,41 +134,16 @@ class RodIntegrator:
     :math:`f` the force on the tip at :math:`t + \theta \Delta t`, the new motion is
     :math:`y' = T y + h f`.
 
-    Parameters
-    ----------
-    K : ndarray (n, n)
-        Stiffness.
-    m : ndarray (n,) or (n, n)
-        Lumped mass, or mass matrix.
-    dt : float
-        Time step.
-    constants_dt : float, optional
-        Time step of the method's constants, if not `dt` (the slip ``rod-dt``).
-
-    Attributes
-    ----------
-    theta : float
-        Time of equilibrium, as a fraction of the step.
-    inverse_beta : float
-        1/beta, above 2.
-    T : ndarray (3 n, 3 n)
-    h : ndarray (3 n,)
-    gain : float
-        Tip acceleration per force, from `h`.
-    weights : (float, float)
-        Tip displacement per acceleration at the start and at the end of the step.
-    weight : float
-        The latter.
-    n : int
-        Number of dofs.
+    `K` is the stiffness, `m` the lumped mass (n,) or a mass matrix (n, n); `constants_dt` is the
+    time step of the method's constants if that is not `dt` (the slip ``rod-dt``).
 
     References
     ----------
     .. [1] K.-J. Bathe and E. L. Wilson, Numerical Methods in Finite Element Analysis, 1976.
     """
 
-    theta: ClassVar[float]
-    inverse_beta: ClassVar[float]
+    theta: ClassVar[float]  # time of equilibrium, as a fraction of the step
+    inverse_beta: ClassVar[float]  # 1/beta, above 2
 
     def __init__(self, K: Floats, m: Floats, dt: float, constants_dt: float | None = None) -> None:
         theta, tau, r = self.theta, dt if constants_dt is None else constants_dt, self.inverse_beta
@@ -176,6 +151,7 @@ class RodIntegrator:
         self.n = n = len(m)
         # Divisors of dt^2: 1/begin = 1/2 - beta, 1/end = beta.
         begin, end = 2.0 * r / (r - 2.0), r
+        # Tip displacement per acceleration at the start and at the end of the step.
         self.weights = (dt**2 / begin, dt**2 / end)
         self.weight = self.weights[1]
         a0 = r / (theta * tau) ** 2
@@ -208,18 +184,13 @@ class RodIntegrator:
         self.T = np.vstack([displacement, velocity, acceleration])
         gain = a4 * effective[:, 0]
         self.h = np.concatenate([tau**2 / end * relative @ gain, tau / 2.0 * gain, gain])
-        self.gain = float(gain[0])
+        self.gain = float(gain[0])  # tip acceleration per force
 
     def begin(self, state: RodState) -> tuple[Floats, Any, Any, Any]:
-        """Begin a step.
+        """New motion without a force on the tip, (3 n, ...), and three values of the tip.
 
-        Returns
-        -------
-        motion : ndarray (3 n, ...)
-            New motion if no force acted on the tip.
-        base, drift, acceleration : float or ndarray (...)
-            Of the tip: acceleration in that motion; new displacement without `weight` times the
-            new acceleration; last acceleration.
+        These are its acceleration in that motion, its new displacement without `weight` times the
+        new acceleration, and its last acceleration.
         """
         motion = np.dot(self.T, state.motion.reshape(3 * self.n, *state.motion.shape[2:]))
         _, v, a = state.motion[:, 0].tolist() if motion.ndim == 1 else state.motion[:, 0]

@@ -25,10 +25,6 @@ class SingularStiffnessError(FecmError, ArithmeticError):
 class Tangent:
     """The factorised stiffness.
 
-    Parameters
-    ----------
-    plate : PlateModel
-
     Raises
     ------
     SingularStiffnessError
@@ -69,22 +65,9 @@ class Tangent:
 
 
 def reactions(plate: PlateModel, field: Floats, factor: float) -> Floats:
-    """Internal minus applied force of every dof of every node.
+    """Internal minus applied force of every dof, (numnp, 5), under a displacement field.
 
     The support force where a dof is restrained; the residual where it is free.
-
-    Parameters
-    ----------
-    plate : PlateModel
-    field : ndarray (numnp, 5)
-        All dofs of all nodes.
-    factor : float
-        Load factor of nodal forces.
-
-    Returns
-    -------
-    ndarray (numnp, 5)
-        Force, and force times length for the rotations.
     """
     internal = plate.internal_forces(field)
     free = plate.mesh.equations > 0

@@ -49,17 +49,7 @@ def available() -> int:
 
 
 class Workers:
-    """A pool of threads that includes the caller's.
-
-    Parameters
-    ----------
-    count : int
-        Number of threads; 1 starts none.
-
-    Attributes
-    ----------
-    count : int
-    """
+    """A pool of a number of threads that includes the caller's."""
 
     def __init__(self, count: int = 1) -> None:
         self.count = count
@@ -118,19 +108,9 @@ class StiffnessOperator(ABC):
 
     @abstractmethod
     def each(self, padded: Floats, use: Callable[[int, Floats], R]) -> list[R]:
-        """Compute K u and apply a function to each piece.
+        """Compute K u and apply a function to the number and forces of each piece, in order.
 
-        Parameters
-        ----------
-        padded : ndarray (size,)
-            Starts with the displacement and ends with a zero.
-        use : callable
-            Function of a piece's number and forces.
-
-        Returns
-        -------
-        list
-            Results of `use`, in the order of the pieces.
+        The padded vector, (size,), starts with the displacement and ends with a zero.
         """
 
     def __call__(self, displacement: Floats) -> Floats:
@@ -141,12 +121,7 @@ class StiffnessOperator(ABC):
 
 
 class CsrProduct(StiffnessOperator):
-    """K u with a sparse matrix.
-
-    Parameters
-    ----------
-    stiffness : csr_array (neq, neq)
-    """
+    """K u with a sparse matrix."""
 
     def __init__(self, stiffness: sparse.csr_array) -> None:
         self._stiffness = stiffness
@@ -167,15 +142,8 @@ Group = tuple[Floats, Indices]
 class _Domain:
     """Some elements: gather, small matrix products, scatter.
 
-    Parameters
-    ----------
-    groups : sequence of Group
-    count : int
-        Number of independent dofs.
-    size : int
-        Entries of a padded vector.
-    scratch : ndarray (2, entries)
-        Buffer for nodal values and forces, shared with domains of the same thread.
+    `count` is the number of independent dofs, `size` that of a padded vector's entries; `scratch`,
+    (2, entries), has room for nodal values and forces, and is shared by the domains of a thread.
     """
 
     def __init__(self, groups: Sequence[Group], count: int, size: int, scratch: Floats) -> None:
@@ -231,18 +199,9 @@ class _Domain:
 
 
 class ElementProduct(StiffnessOperator):
-    """K u element by element, domain by domain.
+    """K u element by element, domain by domain, which threads share.
 
-    Parameters
-    ----------
-    domains : sequence of sequence of Group
-        The elements; different threads may process different domains.
-    count : int
-        Number of independent dofs.
-    signed : bool
-        Whether the padded vector contains -q.
-    workers : Workers, optional
-        Threads that share the work.
+    `count` is the number of independent dofs; `signed` says that the padded vector contains -q.
     """
 
     def __init__(
@@ -304,18 +263,10 @@ def stiffness_operator(
     reduced: SymmetryReduction | None = None,
     workers: Workers | None = None,
 ) -> StiffnessOperator:
-    """Build the operator K u of a plate.
+    """Build the operator K u of a plate, for all dofs unless it is reduced.
 
-    Parameters
-    ----------
-    plate : PlateModel
-    solver : str
-        One of `SOLVERS`: ``"csr"`` for the sparse matrix of all dofs; otherwise element by element,
-        with one matrix for elements that are congruent to enough others.
-    reduced : SymmetryReduction, optional
-        The independent dofs; all of them by default.
-    workers : Workers, optional
-        Threads that share the work.
+    The solver is one of `SOLVERS`: ``"csr"`` for the sparse matrix of all dofs; otherwise element
+    by element, with one matrix for elements that are congruent to enough others.
     """
     if solver == CSR:
         return CsrProduct(plate.stiffness)

@@ -26,18 +26,8 @@ def strains_and_resultants(
 ) -> dict[str, Floats]:
     """Midplane strains, curvatures, transverse shear strains and resultants (equation 2-20).
 
-    Parameters
-    ----------
-    strains : StrainField
-        Strains at the points.
-    laminate : Laminate
-    field : ndarray (numnp, 5)
-        All dofs of all nodes.
-
-    Returns
-    -------
-    dict of ndarray (numel, npt)
-        By the names of :data:`GENERALISED_STRAINS` and :data:`RESULTANTS`.
+    Each is (numel, npt), by the names of :data:`GENERALISED_STRAINS` and :data:`RESULTANTS`, of a
+    displacement field (numnp, 5).
     """
     bending = strains.evaluate(field)
     # The curvatures of the rotations (-u, -v) are the midplane strains of u and v.
@@ -59,21 +49,7 @@ STRAIN_BLOCK = 256
 
 
 class StrainField:
-    """Curvatures and transverse shear strains at the same points of every element.
-
-    Parameters
-    ----------
-    elements : ndarray (numel, nen)
-        Node numbers from 1, 0 where absent.
-    coordinates : ndarray (numnp, 2)
-        Length.
-    rule : Quadrature
-        The points.
-    transposed_jacobian : bool
-        See :func:`~fecm.mechanics.interpolation.interpolate`.
-    assumes_shear : bool
-        Take the transverse shear strains of :mod:`~fecm.mechanics.assumed_shear`.
-    """
+    """Curvatures and transverse shear strains at the same points of every element."""
 
     def __init__(
         self,
@@ -114,17 +90,10 @@ class StrainField:
         return x, y
 
     def evaluate(self, displacement: Floats) -> Floats:
-        """Strains of a displacement field, or of several.
+        """Strains of a displacement field (numnp, 5), or of several (rows, numnp, 5).
 
-        Parameters
-        ----------
-        displacement : ndarray (numnp, 5) or (rows, numnp, 5)
-            All dofs of all nodes.
-
-        Returns
-        -------
-        ndarray (5, numel, npt) or (5, rows, numel, npt)
-            kappa_x, kappa_y, kappa_xy (1/length), gamma_yz, gamma_xz.
+        kappa_x, kappa_y, kappa_xy (1/length), gamma_yz and gamma_xz: (5, numel, npt), or
+        (5, rows, numel, npt).
         """
         leading = displacement.shape[:-2]
         fields = displacement.reshape(math.prod(leading), -1)

@@ -68,15 +68,7 @@ def unreduced(plate: PlateModel) -> SymmetryReduction:
 
 
 def symmetry_reduction(plate: PlateModel, contact: Floats | None) -> SymmetryReduction:
-    """Find the independent dofs under the plate's loads and a contact force.
-
-    Parameters
-    ----------
-    plate : PlateModel
-        Starts at rest.
-    contact : ndarray (numnp, 5), optional
-        Distribution of the contact force.
-    """
+    """Independent dofs of a plate at rest under its loads and a contact force, (numnp, 5)."""
     free = restrain_resting_dofs(plate, contact).mesh.equations > 0
     dof_indices = np.arange(free.size).reshape(free.shape)
     sign, weights = free.astype(float), np.ones(len(plate.mesh.elements), dtype=int)
@@ -112,16 +104,9 @@ def half_turn_images(coordinates: Floats) -> Indices | None:
 
 
 def restrain_resting_dofs(plate: PlateModel, contact: Floats | None) -> PlateModel:
-    """Restrain the in-plane dofs of a plate if they stay at rest.
+    """Restrain the in-plane dofs of a plate if they stay at rest under a contact force, (numnp, 5).
 
     Their modes are not excited, and their frequencies do not limit the time step.
-
-    Parameters
-    ----------
-    plate : PlateModel
-        Starts at rest.
-    contact : ndarray (numnp, 5), optional
-        Distribution of the contact force.
     """
     mesh = plate.mesh
     in_plane, others = mesh.equations[:, :2].any(), mesh.equations[:, 2:].any()

@@ -64,14 +64,7 @@ def critical_time_step(model: PlateModel, spring: tuple[Floats, float] | None = 
     """Critical time step of the central differences: 2 over the largest angular frequency.
 
     Computed by Lanczos iteration without assembling the stiffness; the relative error is at most
-    5e-5.
-
-    Parameters
-    ----------
-    model : PlateModel
-    spring : (ndarray (neq,), float), optional
-        Weights of a spring to ground, 1 on one equation or those of a patch, and its stiffness
-        (force/length).
+    5e-5.  A spring to ground has weights, (neq,), and a stiffness (force/length).
 
     Raises
     ------

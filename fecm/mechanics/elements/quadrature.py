@@ -33,13 +33,7 @@ class Quadrature:
 
 @cache
 def gauss(order: int) -> Quadrature:
-    """Gauss rule with `order` points in each direction (1 to 4).
-
-    Raises
-    ------
-    ValueError
-        If the order is outside 1 to 4.
-    """
+    """Gauss rule with `order` points in each direction; a ValueError outside 1 to 4."""
     return _rule(order, *np.polynomial.legendre.leggauss(_known(order)))
 
 
@@ -48,12 +42,7 @@ def nodal(order: int) -> Quadrature:
     """Grid of `order` equally spaced points in each direction, including the edges.
 
     Order 3 gives the nodes of the 9-node element.  Weights are those of the Gauss rule and must not
-    be used for integration.
-
-    Raises
-    ------
-    ValueError
-        If the order is outside 1 to 4.
+    be used for integration.  A ValueError outside 1 to 4.
     """
     points = np.linspace(-1.0, 1.0, order) if _known(order) > 1 else np.zeros(1)
     return _rule(order, points, np.polynomial.legendre.leggauss(order)[1])

@@ -36,22 +36,7 @@ class ElementShape:
         return len(self.xi)
 
     def shape_functions(self, xi: Floats, eta: Floats, present: Bools) -> tuple[Floats, Floats]:
-        """Shape functions and their derivatives.
-
-        Parameters
-        ----------
-        xi, eta : ndarray (n,)
-            Points.
-        present : ndarray (nodes,) of bool
-            Which nodes are present; the corners always are.
-
-        Returns
-        -------
-        N : ndarray (n, nodes)
-            Values.
-        dN : ndarray (n, 2, nodes)
-            Derivatives with respect to xi and eta.
-        """
+        """Shape functions (n, nodes) and their derivatives by xi and eta (n, 2, nodes)."""
         S = self.functions(np.asarray(xi, float), np.asarray(eta, float), np.asarray(present))
         return S[0].T.copy(), S[1:].transpose(2, 0, 1).copy()
 
