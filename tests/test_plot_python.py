@@ -15,7 +15,7 @@ import fecm
 from fecm.plot.kinds import KINDS, PlotError
 from fecm.plot.pictures import RunKind, draw
 from tests.calls import call
-from tests.decks import DATA_CARDS, PROGRAM, small
+from tests.decks import APPENDIX, DATA_CARDS, PROGRAM, small
 
 matplotlib = pytest.importorskip("matplotlib")
 pyplot = pytest.importorskip("matplotlib.pyplot")
@@ -154,3 +154,53 @@ def test_a_rigid_mass_has_one_curve_that_says_so() -> None:
     assert [line.get_label() for line in axes.get_lines()] == [
         "contact force and transducer, which are equal"
     ]
+
+
+def test_what_a_notebook_shows_of_an_object_is_short_and_escaped(
+    result: fecm.Result, sweep: fecm.SweepResult
+) -> None:
+    deck = fecm.read_one(APPENDIX.read_text().replace("**LOW", "<b>LOW"))
+    bare = fecm.run_one(small("LMAS\nDT        .5E-6\n"))
+    shown: list[Any] = [result, result.tape3, sweep, deck, bare]
+    for one in shown:
+        assert len(repr(one)) < 200
+        assert "\n" not in repr(one)
+        assert repr(one).startswith("<")
+        assert len(one._repr_html_()) < 3000
+    assert "peak force" in shown[0]._repr_html_()
+    assert "&lt;b&gt;LOW" in shown[3]._repr_html_()
+    assert "<b>" not in shown[3]._repr_html_()
+    assert repr(sweep) == "<fecm sweep 'small plate' over velocity, k: 4 cases: all ok>"
+
+
+NOTEBOOK = """
+import fecm
+r = fecm.run_one("small.inp")
+---
+r.plot()
+---
+r.plot("contour")
+---
+r
+---
+r.plot("nonsense")
+"""
+
+
+@pytest.mark.long
+def test_a_cell_that_plots_shows_exactly_one_picture(tmp_path: Path) -> None:
+    nbclient, nbformat = (pytest.importorskip(name) for name in ("nbclient", "nbformat"))
+    (tmp_path / "small.inp").write_text(small())
+    cells = [nbformat.v4.new_code_cell(text) for text in NOTEBOOK.split("---")]
+    book = nbformat.v4.new_notebook(cells=cells)
+    client = nbclient.NotebookClient(
+        book, kernel_name="python3", allow_errors=True, resources={"metadata": {"path": tmp_path}}
+    )
+    client.execute()
+    _, force, contour, shown, refused = (cell.outputs for cell in book.cells)
+    for outputs in (force, contour):
+        assert sum("image/png" in out.get("data", {}) for out in outputs) == 1
+        texts = [out.data["text/plain"] for out in outputs if "data" in out]
+        assert all(len(text) < 200 for text in texts)
+    assert "<table>" in shown[0].data["text/html"]
+    assert [out.output_type for out in refused] == ["error"]

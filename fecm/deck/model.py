@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from textwrap import shorten
 from typing import ClassVar, Self, TypeVar
 
+from fecm._html import html_table
 from fecm.deck.card import Fields, Source, Value, layout, write_card
 from fecm.deck.records import (
     AXES,
@@ -515,6 +517,19 @@ class Deck(Record):
     macros: tuple[Macro, ...]
     tables: tuple[LoadTable, ...] = ()
     text: str = field(default="", compare=False, repr=False)
+
+    def __repr__(self) -> str:
+        sizes = f"{self.control.numnp} nodes, {self.control.numel} elements"
+        return f"<fecm deck {self.title!r}, {sizes}, {len(self.macros)} macros>"
+
+    def _repr_html_(self) -> str:
+        """Table of segments and macros, for notebooks."""
+        words = {
+            "segments": [segment.keyword for segment in self.segments],
+            "macros": [macro.word for macro in self.macros],
+        }
+        rows = ((name, shorten(" ".join(found), 200)) for name, found in words.items())
+        return html_table(repr(self)[1:-1], rows)
 
     def has(self, kind: type[Segment]) -> bool:
         """Whether the deck has a segment of one kind."""

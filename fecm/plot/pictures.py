@@ -174,10 +174,10 @@ def plot(
         save(picture, Path(path))
         return picture.figure.axes[0]
     _function(kind)  # without matplotlib, this says what to install
-    from matplotlib import pyplot
-
+    pyplot: Any = import_module("matplotlib.pyplot")
     from fecm.plot.style import TARGET, style_on
 
+    pyplot.draw_if_interactive()  # loads the backend: a notebook's changes settings, to be kept
     before = set(pyplot.get_fignums())
     token = TARGET.set("pyplot" if ax is None else ax)
     try:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._html import html_table
 from fecm._typing import Floats
 from fecm.results.schema import NotStoredError
 
@@ -51,14 +52,19 @@ class Group:
         own = {p.removeprefix(head).partition("/")[0] for p in self._arrays if p.startswith(head)}
         return [*super().__dir__(), *own]
 
-    def __repr__(self) -> str:
+    def _shapes(self) -> dict[str, str]:
+        """Shapes of the datasets by their names."""
         head = f"{self._name}/"
-        shapes = [
-            f"{path.removeprefix(head)} {self._arrays[path].shape}"
-            for path in self._arrays
-            if path.startswith(head)
-        ]
-        return f"<{self._name}: {', '.join(shapes)}>"
+        paths = [path for path in self._arrays if path.startswith(head)]
+        return {path.removeprefix(head): str(self._arrays[path].shape) for path in paths}
+
+    def __repr__(self) -> str:
+        shapes = ", ".join(f"{name} {shape}" for name, shape in self._shapes().items())
+        return f"<{self._name}: {shapes}>"
+
+    def _repr_html_(self) -> str:
+        """Table of the datasets, for notebooks."""
+        return html_table(self._name, self._shapes().items())
 
 
 class Rows(Group):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._html import html_table
 from fecm._typing import Floats
 from fecm.deck.model import Impact
 from fecm.deck.units import unit_of
@@ -395,6 +396,14 @@ class Result(Contact):
     def __repr__(self) -> str:
         steps = len(self["history/time"]) if "history/time" in self else 0
         return f"<fecm result {self.title!r}, {self.mode} mode, {steps} steps>"
+
+    def _repr_html_(self) -> str:
+        """Table of the metrics, for notebooks; without an impact of the datasets."""
+        rows = [
+            (name.replace("_", " "), f"{value:.6g} {self.unit(METRICS[name][1])}".rstrip())
+            for name, value in self.metrics.items()
+        ] or [(path, str(self[path].shape)) for path in self]
+        return html_table(repr(self)[1:-1], [*rows, *(("note", note) for note in self.notes)])
 
 
 def load(path: str | Path) -> Result:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._html import html_table
 from fecm._version import __version__
 from fecm.deck.model import Delamination
 from fecm.deck.units import unit_names, unit_of
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from fecm.results.hdf5_reader import Contents
 
 
+# Letters of the names in the lines of the summary.
+WORDS = 18
 # Reasons of failure that the summary lists.
 LISTED = 5
 
@@ -91,7 +94,7 @@ GROUPS = {
 }
 
 
-@dataclass
+@dataclass(repr=False)
 class SweepResult:
     """Result of a sweep.
 
@@ -128,6 +131,15 @@ class SweepResult:
 
     def __len__(self) -> int:
         return len(self.dt)
+
+    def __repr__(self) -> str:
+        varied = ", ".join(self.cases)
+        return f"<fecm sweep {self.title!r} over {varied}: {verdict(self)}>"
+
+    def _repr_html_(self) -> str:
+        """Table of the summary, for notebooks."""
+        lines = ((line[:WORDS].strip(), line[WORDS:]) for line in summary(self))
+        return html_table(repr(self)[1:-1], lines)
 
     def __getitem__(self, name: str) -> Array:
         """Values or results of every case, by name."""
