@@ -11,6 +11,7 @@ from __future__ import annotations
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING
 
+from fecm import examples
 from fecm._errors import FecmError, FecmWarning
 from fecm._version import __version__
 
@@ -44,6 +45,7 @@ __all__ = [
     "Rod",
     "SweepResult",
     "__version__",
+    "examples",
     "impact",
     "load",
     "load_sweep",

@@ -45,6 +45,7 @@ COMMANDS = {
     "check": LazyCommand("fecm.cli.decks", "Check DECK without running it, and summarise it."),
     "diff": LazyCommand("fecm.cli.diff", "Compare two results dataset by dataset.", True),
     "estimate": LazyCommand("fecm.cli.estimate", "Estimate an impact and its damage threshold."),
+    "example": LazyCommand("fecm.cli.example", "List the example decks and tables, or write one."),
     "export": LazyCommand("fecm.cli.export", "Write RESULT for ParaView or a spreadsheet.", True),
     "fmt": LazyCommand("fecm.cli.decks", "Align the columns of DECK."),
     "indent": LazyCommand("fecm.cli.indent", "Indentation tests and the law of contact."),

@@ -1,0 +1,39 @@
+"""``fecm example``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from fecm import examples
+from fecm._files import check_outputs
+from fecm.cli.common import FILE_PATH, echo, echo_file, write_text
+from fecm.cli.outputs import STANDARD_OUTPUT
+
+
+@click.command(short_help="List the example decks and tables, or write one.")
+@click.argument("name", required=False)
+@click.option("-o", "--output", type=FILE_PATH, metavar="FILE",
+              help="File to write; - is standard output.  [default: NAME]")  # fmt: skip
+@click.option("--overwrite", is_flag=True, help="Replace an existing FILE.")
+def example(name: str | None, output: Path | None, overwrite: bool) -> None:
+    """List the example decks and tables; with NAME, write that one."""
+    if name is None:
+        if output or overwrite:
+            raise click.UsageError("give the NAME of an example")
+        for known, content in examples.CONTENTS.items():
+            echo(f"{known:<22}{content}")
+        return
+    try:
+        source = examples.path(name)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+    text = source.read_text(encoding="utf-8")
+    target = output or Path(source.name)
+    if target == STANDARD_OUTPUT:
+        echo_file(text)
+        return
+    check_outputs([target], overwrite, [source])
+    write_text(target, text, overwrite=overwrite)
+    echo(target)

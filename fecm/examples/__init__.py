@@ -1,0 +1,52 @@
+"""Decks and tables that come with the package: ``fecm example`` writes them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+# What is in each file.
+CONTENTS = {
+    "impact-115.inp": "the report's experiment at 115 in/s, with a contact patch (lbf, in, s)",
+    "drop-weight.inp": "ASTM D7136 at 2.5 J, with strengths and delamination threshold (mm, N, s)",
+    "plate-with-gages.inp": "a ball of 20 g on a clamped plate with strain gages (mm, N, s)",
+    "measured-force.csv": "a force of impact-115 as a transducer shows it: time, force",
+    "indentation-test.csv": "an indentation test in five cycles: indentation, force",
+    "calibration-test.csv": "a calibration of a transducer: time, V_F, V_a",
+    "pulse.csv": "a force on a rod: time, force",
+    "cases.csv": "cases of a sweep of impact-115: velocity, k, layup",
+}
+
+
+def names() -> list[str]:
+    """Names of the example files.
+
+    Examples
+    --------
+    >>> names()[0]
+    'impact-115.inp'
+    """
+    return list(CONTENTS)
+
+
+def path(name: str) -> Path:
+    """Path of an example file in the installed package.
+
+    Parameters
+    ----------
+    name : str
+        One of :func:`names`, with or without its suffix.
+
+    Raises
+    ------
+    ValueError
+        If there is no such example.
+
+    Examples
+    --------
+    >>> path("impact-115").name
+    'impact-115.inp'
+    """
+    for known in CONTENTS:
+        if name in (known, Path(known).stem):
+            return Path(__file__).parent / known
+    raise ValueError(f"there is no example {name!r}; there are {', '.join(CONTENTS)}")
