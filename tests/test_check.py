@@ -355,3 +355,10 @@ def test_a_coupled_laminate_held_in_its_plane_at_every_node_is_a_finding() -> No
     assert "W318" in codes(coupled)
     assert "W318" not in codes(small())
     assert "W318" not in codes(coupled.replace(MESH[MESH.index("BOUN") :], ""))
+
+
+def test_the_page_of_findings_has_exactly_the_codes_of_the_program() -> None:
+    written = "\n".join(path.read_text() for path in (ROOT / "fecm").rglob("*.py"))
+    page = (ROOT / "docs" / "findings.md").read_text()
+    listed = re.findall(r"^\| \[([EWN]\d{3})\]\{#", page, re.MULTILINE)
+    assert sorted(listed) == sorted(set(re.findall(r'"([EWN]\d{3})"', written)))

@@ -1,0 +1,71 @@
+"""Sphinx configuration; the site is built by ``sphinx-build -W docs site``."""
+
+from __future__ import annotations
+
+import os
+from importlib.metadata import version as installed
+from typing import Any
+
+from latex2mathml.converter import convert
+
+project = "fecm"
+author = "the fecm developers"
+version = release = installed("fecm")
+
+extensions = [
+    "myst_parser",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx_click",
+]
+if os.environ.get("FECM_DOCS_ONLINE"):  # links to the documentation of other projects
+    extensions.append("sphinx.ext.intersphinx")
+intersphinx_mapping = {
+    "python": ("https://docs.python.org/3", None),
+    "numpy": ("https://numpy.org/doc/stable", None),
+    "matplotlib": ("https://matplotlib.org/stable", None),
+    "xarray": ("https://docs.xarray.dev/en/stable", None),
+}
+
+exclude_patterns = ["schemas"]
+myst_enable_extensions = ["colon_fence", "dollarmath", "attrs_inline"]
+myst_heading_anchors = 4
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+
+html_theme = "pydata_sphinx_theme"
+html_title = "fecm"
+html_theme_options = {
+    "navigation_with_keys": False,
+    "show_toc_level": 2,
+    "navbar_align": "left",
+    "header_links_before_dropdown": 6,
+}
+html_show_sourcelink = False
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_math_renderer = "mathml"
+
+
+def _mathml(self: Any, node: Any) -> None:
+    """Write LaTeX as MathML, which browsers draw without a script."""
+    from docutils import nodes
+
+    block = isinstance(node, nodes.math_block)
+    drawn = convert(node.astext(), display="block" if block else "inline")
+    self.body.append(f"<div>{drawn}</div>\n" if block else drawn)
+    raise nodes.SkipNode
+
+
+def _literally(app: Any, context: Any, lines: list[str]) -> None:
+    """Keep bars in help texts from being substitutions."""
+    lines[:] = [line.replace("|", "\\|") for line in lines]
+
+
+def setup(app: Any) -> None:
+    """Register the renderer of equations, and correct help texts."""
+    for part in ("description", "options"):
+        app.connect(f"sphinx-click-process-{part}", _literally)
+    app.add_html_math_renderer("mathml", (_mathml, None), (_mathml, None))
