@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import logging
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +17,7 @@ from fecm.mechanics.contact_law import ContactPoint
 from fecm.results.groups import GROUPS, Exposure, Group
 from fecm.results.schema import DATASETS
 from tests.calls import call
-from tests.decks import APPENDIX, LONG, small
+from tests.decks import APPENDIX, LONG, ROOT, small
 
 
 def annotated(kind: type[Group]) -> set[str]:
@@ -30,6 +31,12 @@ def test_the_namespace_lists_the_public_names_and_nothing_else() -> None:
         assert getattr(fecm, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'runn'"):
         fecm.runn  # type: ignore[attr-defined]  # noqa: B018
+
+
+def test_the_page_of_the_api_has_every_public_name() -> None:
+    page = (ROOT / "docs" / "api.md").read_text()
+    listed = re.findall(r"^\.\. auto\w+:: fecm\.(\w+)$", page, re.MULTILINE)
+    assert sorted(listed) == sorted(set(fecm.__all__) - {"__version__"})
 
 
 def test_importing_fecm_imports_neither_numpy_nor_scipy() -> None:
