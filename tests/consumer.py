@@ -5,9 +5,11 @@ Lines with an ``ignore`` must fail in both checkers; an ``ignore`` without an er
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
+import xarray
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
@@ -24,6 +26,8 @@ deck: fecm.Deck = fecm.read_one("plate.inp")
 again: fecm.Result = fecm.run_one(deck, progress=lambda step, steps: print(step / steps))
 axes: Axes = result.plot("loop", ax=result.plot("force"), against="displacement")
 sweep: fecm.SweepResult = fecm.sweep(deck, {"velocity": [1.0, 2.0]}, workers=2)
+pooled: fecm.SweepResult = fecm.sweep(deck, {"k": [1e6]}, executor=ThreadPoolExecutor())
+peaks: xarray.DataArray = sweep.to_xarray().peak_force
 plate: fecm.Plate = fecm.Plate.from_mesh("plate.msh", {"rim": "clamped"})
 ply: fecm.Ply = fecm.Ply(1.6e-9, 0.3, 140e3, 9e3, 5e3, 5e3, 3e3)
 laminates: list[fecm.Laminate] = [fecm.Laminate(x, ply, 0.2) for x in ("[0/90]s", [0, 45.0])]
@@ -39,6 +43,8 @@ result.tape3.u  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeA
 several.force  # type: ignore[union-attr]  # pyright: ignore[reportAttributeAccessIssue]  # noqa: B018
 fecm.run_one("plate.inp", mode="raport")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.run_one("plate.inp", solver="gpu")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
+fecm.sweep(deck, {"velocity": 5.0})  # type: ignore[dict-item]  # pyright: ignore[reportArgumentType]
+fecm.sweep(deck, {"k": [1e6]}, executor=2)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.runn("plate.inp")  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]
 fecm.Plate.from_mesh("plate.msh", {"rim": "glued"})  # type: ignore[dict-item]  # pyright: ignore[reportArgumentType]
 fecm.impact(plate, laminates[0], 5.0)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]

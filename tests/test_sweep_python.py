@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +13,8 @@ import pytest
 
 import fecm
 from fecm.sweeps.cases import CasesError
+from fecm.sweeps.schedule import SchedulerError
+from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, small
 
 
@@ -73,3 +78,44 @@ def test_a_full_grid_has_a_dimension_per_name_and_other_cases_have_one(tmp_path:
     some = fecm.sweep(small(), cases=[{"velocity": 50.0, "k": 1e6}, {"velocity": 75.0, "k": 2e6}])
     assert some.to_xarray().peak_force.dims == ("case",)
     assert some.to_xarray().k.values.tolist() == [1e6, 2e6]
+
+
+def test_threads_and_processes_give_what_one_process_does() -> None:
+    serial = fecm.sweep(small(), GRID, history=True)
+    spawn = multiprocessing.get_context("spawn")
+    for executor in (ThreadPoolExecutor(3), ProcessPoolExecutor(1, spawn)):
+        with executor:
+            found = fecm.sweep(small(), GRID, history=True, executor=executor)
+        assert found.fine.sum() == 6
+        np.testing.assert_array_equal(found.force, serial.force)
+        for name, values in serial.summary.items():
+            np.testing.assert_array_equal(found[name], values)
+        with pytest.raises(SchedulerError, match="after shutdown"):
+            fecm.sweep(small(), GRID, executor=executor)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"workers": 2, "scheduler": "tcp://h:1"}, {"executor": 5}, {"scheduler": 5},
+     {"workers": 2, "executor": ThreadPoolExecutor(1)}],
+)  # fmt: skip
+def test_places_to_run_that_conflict_or_are_none_are_refused(options: dict[str, Any]) -> None:
+    with pytest.raises(fecm.FecmError, match=r"give only one of workers|is 5, not a"):
+        fecm.sweep(small(), {"k": [1e6]}, **options)
+
+
+def test_a_scheduler_file_names_the_address(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    deck, file = tmp_path / "plate.inp", tmp_path / "scheduler.json"
+    deck.write_text(small())
+    command = ("sweep", deck, "--vary", "k=1e6", "-o", tmp_path / "s.h5")
+    file.write_text(json.dumps({"type": "Scheduler", "address": "tcp://127.0.0.1:9"}))
+    done = call(*command, "--scheduler-file", file)
+    assert_unusable(done)
+    assert "no Dask scheduler answers at tcp://127.0.0.1:9" in done.stderr
+    done = call(*command, "--scheduler-file", deck)
+    assert_unusable(done)
+    assert "plate.inp has no address" in done.stderr
+    done = call(*command, "--scheduler-file", file, "--scheduler", "tcp://127.0.0.1:9")
+    assert done.exit_code == 2
+    assert not (tmp_path / "s.h5").exists()

@@ -25,7 +25,7 @@ from fecm.sweeps.cases import CasesError, Value, grid, parse_until, parse_vary, 
 from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.plan import Plan, Task, check_memory, freed, plan, tasks
 from fecm.sweeps.result import SweepResult, save, summary, verdict
-from fecm.sweeps.schedule import LOST, SchedulerError
+from fecm.sweeps.schedule import LOST, SchedulerError, address_in
 from fecm.sweeps.store import PartialResults
 
 
@@ -53,6 +53,8 @@ from fecm.sweeps.store import PartialResults
               help="Worker processes on this machine.")  # fmt: skip
 @click.option("--scheduler", metavar="ADDRESS",
               help="Running Dask scheduler, as in tcp://host:8786, to use instead.")  # fmt: skip
+@click.option("--scheduler-file", type=DECK_PATH, metavar="FILE",
+              help="File of `dask scheduler --scheduler-file` instead of its address.")  # fmt: skip
 @click.option("--allow-failed", is_flag=True, help="Exit with 0 even if cases failed.")
 @click.option("--overwrite", is_flag=True, help="Replace existing results.")
 def sweep(
@@ -66,6 +68,7 @@ def sweep(
     full: tuple[int, ...] | None,
     workers: int,
     scheduler: str | None,
+    scheduler_file: Path | None,
     allow_failed: bool,
     overwrite: bool,
 ) -> None:
@@ -80,6 +83,8 @@ def sweep(
         raise click.UsageError("give either --vary or --cases")
     if (find is None) != (until is None):
         raise click.UsageError("--find velocity and --until peak_force=VALUE belong together")
+    if (workers > 1) + (scheduler is not None) + (scheduler_file is not None) > 1:
+        raise click.UsageError("give only one of --workers, --scheduler and --scheduler-file")
     if full and find:
         raise click.UsageError("--full runs given velocities: --vary velocity=FOUND --full 0")
     cases = grid(varied) if table is None else read_cases(table)
@@ -88,6 +93,7 @@ def sweep(
         raise click.UsageError(f"--full {max(chosen)}: the cases are 0 to {len(cases) - 1}")
     fulls = {case: path.with_name(f"{path.stem}-{case}{path.suffix}") for case in chosen}
     check_outputs([path, *fulls.values()], overwrite, [deck] if table is None else [deck, table])
+    scheduler = scheduler if scheduler_file is None else address_in(scheduler_file)
     problem = _problem(deck)
     planned = plan(problem, cases, history=history, until=until)
     check_memory(problem, planned, 0 if scheduler is not None else workers)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,11 @@ from fecm.sweeps.cases import CasesError, checked, combined
 from fecm.sweeps.outcome import Outcome, merge
 from fecm.sweeps.plan import Plan, Task, check_memory, plan, tasks
 from fecm.sweeps.result import SweepResult, result_of, save
-from fecm.sweeps.schedule import Done, Idle, lost, on_dask, on_workers, run_serial
+from fecm.sweeps.schedule import Done, Idle, lost, on_dask, on_executor, on_workers, run_serial
 from fecm.sweeps.store import DamagedPartError, PartialResults
+
+# Executors whose tasks take memory of this machine.
+LOCAL = (ThreadPoolExecutor, ProcessPoolExecutor)
 
 
 def warn(text: str) -> None:
@@ -48,7 +52,8 @@ def carry_out(
     made: Plan,
     *,
     workers: int = 1,
-    scheduler: str | None = None,
+    scheduler: object = None,
+    executor: Executor | None = None,
     parts: PartialResults | None = None,
     done: Done = lambda task, outcome: None,
     idle: Idle = lambda: None,
@@ -63,8 +68,10 @@ def carry_out(
     made : Plan
     workers : int
         Worker processes on this machine; 1 runs all tasks in this process.
-    scheduler : str, optional
-        Address of a Dask scheduler whose workers run the tasks instead.
+    scheduler : str, distributed.Client or cluster, optional
+        Dask cluster whose workers run the tasks instead.
+    executor : concurrent.futures.Executor, optional
+        Runs the tasks instead; it is not shut down.
     parts : PartialResults, optional
         Store of finished tasks, which are not run again.
     done : callable
@@ -99,7 +106,9 @@ def carry_out(
         outcomes.append(outcome)
         done(task, outcome)
 
-    if scheduler is not None:
+    if executor is not None:
+        on_executor(left, executor, keep, idle)
+    elif scheduler is not None:
         on_dask(left, scheduler, keep, idle)
     elif workers > 1 and len(left) > 1:
         on_workers(left, workers, keep, idle)
@@ -119,7 +128,8 @@ def sweep(
     until: float | str | None = None,
     history: bool = False,
     workers: int = 1,
-    scheduler: str | None = None,
+    scheduler: object = None,
+    executor: Executor | None = None,
     output: str | Path | None = None,
 ) -> SweepResult:
     """Run a deck many times with varied values.
@@ -140,8 +150,10 @@ def sweep(
     workers : int
         Worker processes on this machine.  With more than 1, a script needs
         ``if __name__ == "__main__"``.
-    scheduler : str, optional
-        Address of a Dask scheduler (requires dask.distributed).
+    scheduler : str, distributed.Client or cluster, optional
+        Dask scheduler, by its address or by an object of Dask (requires dask.distributed).
+    executor : concurrent.futures.Executor, optional
+        Pool of threads or processes, or another executor.  It is not shut down.
     output : str or Path, optional
         Output file, which is overwritten.
 
@@ -170,11 +182,16 @@ def sweep(
     """
     if (vary is None) == (cases is None) and not (vary is None and until is not None):
         raise CasesError("give either vary or cases")
+    if executor is not None and not isinstance(executor, Executor):
+        raise CasesError(f"executor is {executor!r}, not a concurrent.futures.Executor")
+    if (workers > 1) + (scheduler is not None) + (executor is not None) > 1:
+        raise CasesError("give only one of workers, scheduler and executor")
     made = combined({} if vary is None else vary) if cases is None else checked(cases)
     problem = problem_of(deck)
     planned = plan(problem, made, history=history, until=until)
-    check_memory(problem, planned, 0 if scheduler is not None else workers)
-    result = carry_out(problem, planned, workers=workers, scheduler=scheduler)
+    here = getattr(executor, "_max_workers", 0) if isinstance(executor, LOCAL) else workers
+    check_memory(problem, planned, 0 if scheduler is not None else here)
+    result = carry_out(problem, planned, workers=workers, scheduler=scheduler, executor=executor)
     if output is not None:
         save(result, Path(output))
     return result

@@ -1,4 +1,4 @@
-"""Run tasks in this process, in worker processes on this machine, or on a Dask cluster.
+"""Run tasks in this process, in worker processes on this machine, on a Dask cluster or an executor.
 
 Tasks are independent, and their outcomes do not depend on where they run.  Each outcome is reported
 as soon as it is available, so that an interrupted sweep loses only the tasks in progress.
@@ -6,14 +6,23 @@ as soon as it is available, so that an interrupted sweep loses only the tasks in
 
 from __future__ import annotations
 
+import json
 import multiprocessing
 import os
 import socket
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -32,7 +41,7 @@ DEATHS = 3
 LOOK = 0.5
 # Timeout for the scheduler.
 PATIENCE = "5s"
-LOST = "the worker that ran this case died, again and again"
+LOST = "lost with its worker"
 
 
 def lost(outcome: Outcome) -> bool:
@@ -74,12 +83,27 @@ def _end_with(parent: int) -> None:
 def _run_on(
     executor: Executor, tasks: Iterable[Task], idle: Idle
 ) -> Iterator[tuple[Task, Future[Outcome]]]:
-    """Run tasks on an executor; yield them with their futures as they finish."""
-    running = {executor.submit(attempt, task): task for task in tasks}
-    while running:
-        idle()
-        for future in wait(running, timeout=LOOK, return_when=FIRST_COMPLETED).done:
-            yield running.pop(future), future
+    """Run tasks on an executor; yield them with their futures as they finish.
+
+    Raises
+    ------
+    SchedulerError
+        If the executor takes no tasks.
+    """
+    running: dict[Future[Outcome], Task] = {}
+    try:
+        for task in tasks:
+            try:
+                running[executor.submit(attempt, task)] = task
+            except RuntimeError as error:  # it is broken or shut down
+                raise SchedulerError(f"the executor takes no tasks: {error}") from None
+        while running:
+            idle()
+            for future in wait(running, timeout=LOOK, return_when=FIRST_COMPLETED).done:
+                yield running.pop(future), future
+    finally:
+        for future in running:
+            future.cancel()
 
 
 def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> None:
@@ -94,7 +118,7 @@ def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> Non
             for task, future in _run_on(pool, list(left.values()), idle):
                 done(task, future.result())
                 del left[task.number]
-        except BrokenProcessPool:
+        except (BrokenExecutor, SchedulerError):
             deaths = 0 if len(left) < before else deaths + 1
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
@@ -119,31 +143,80 @@ def _check_address(address: str) -> None:
             raise SchedulerError(f"no Dask scheduler answers at {address} ({error})") from None
 
 
-def on_dask(tasks: Sequence[Task], address: str, done: Done, idle: Idle) -> None:
-    """Run tasks on a Dask cluster, which reruns the tasks of a dead worker.
+@contextmanager
+def _client(scheduler: Any) -> Iterator[Any]:
+    """Client of a scheduler, closed at the end unless it is the caller's own."""
+    if hasattr(scheduler, "get_executor"):
+        yield scheduler
+        return
+    address = getattr(scheduler, "scheduler_address", scheduler)
+    if not isinstance(address, str):
+        raise SchedulerError(
+            f"scheduler is {scheduler!r}, not an address, a Dask client or a cluster"
+        )
+    try:
+        import distributed
+    except ImportError:
+        raise SchedulerError("a scheduler needs Dask: pip install 'fecm[sweep]'") from None
+    module: Any = distributed
+    try:
+        if hasattr(scheduler, "get_client"):
+            client = scheduler.get_client()
+        else:
+            _check_address(address)
+            client = module.Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError, RuntimeError, TimeoutError) as error:
+        raise SchedulerError(f"no Dask scheduler answers at {address} ({error})") from None
+    with client:
+        yield client
+
+
+def on_dask(tasks: Sequence[Task], scheduler: Any, done: Done, idle: Idle) -> None:
+    """Run tasks on a Dask cluster, given by address, client or cluster object.
+
+    It reruns the tasks of a dead worker.
 
     Raises
     ------
     SchedulerError
         If dask.distributed is missing, or nothing answers at the address.
     """
+    with _client(scheduler) as client:
+        if getattr(client, "status", "running") != "running":
+            raise SchedulerError(f"the Dask client is {client.status}; make a new one")
+        on_executor(tasks, client.get_executor(pure=False), done, idle)
+
+
+def on_executor(tasks: Sequence[Task], executor: Executor, done: Done, idle: Idle) -> None:
+    """Run tasks on any executor; those that it loses become failed cases.
+
+    Raises
+    ------
+    SchedulerError
+        If the executor takes no tasks.
+    """
+    for task, future in _run_on(executor, tasks, idle):
+        try:
+            outcome = future.result()
+        except Exception as error:
+            reason = f"{LOST} ({type(error).__name__}: {' '.join(str(error).split())})"
+            outcome = Outcome.failed(task.numbers, [reason] * len(task.numbers))
+        done(task, outcome)
+
+
+def address_in(file: Path) -> str:
+    """Address in the file that ``dask scheduler --scheduler-file`` writes.
+
+    Raises
+    ------
+    SchedulerError
+        If the file has none.
+    OSError
+        If it cannot be read.
+    """
     try:
-        import distributed
-    except ImportError:
+        return str(json.loads(file.read_bytes())["address"])
+    except (ValueError, KeyError, TypeError):
         raise SchedulerError(
-            "--scheduler needs dask.distributed: pip install 'fecm[sweep]'"
+            f"{file} has no address; dask scheduler --scheduler-file writes such a file"
         ) from None
-    _check_address(address)
-    try:
-        module: Any = distributed
-        client = module.Client(address, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
-        raise SchedulerError(f"no Dask scheduler answers at {address} ({error})") from None
-    with client:
-        for task, future in _run_on(client.get_executor(pure=False), tasks, idle):
-            try:
-                outcome = future.result()
-            except Exception as error:
-                reason = f"{LOST} ({type(error).__name__})"
-                outcome = Outcome.failed(task.numbers, [reason] * len(task.numbers))
-            done(task, outcome)
