@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 
-from fecm.mechanics.plate import PlateModel, assemble
+from fecm.mechanics.plate import PlateModel
 from tests.builders import (
     Corners,
     Floats,
@@ -72,7 +72,7 @@ def patch(
     """Prescribe a field on a patch's boundary."""
     held = boundary(*mesh)
     values = np.where(held, field, 0.0)
-    model = assemble(
+    model = PlateModel(
         with_restraints(*mesh, held, values),
         general_plate(),
         rules(3, shear, transposed_jacobian=transposed_jacobian),
@@ -95,7 +95,7 @@ def residual(
 def free_stiffness(mesh: tuple[Floats, Ints], bending: int = 3, shear: int = 3) -> Floats:
     """Stiffness of an unrestrained plate of the general laminate, unknowns node by node."""
     coordinates, elements = mesh
-    model = assemble(
+    model = PlateModel(
         with_restraints(coordinates, elements, nothing(coordinates)),
         general_plate(),
         rules(bending, shear),
@@ -130,7 +130,7 @@ def deflections(
     held = simple_support(coordinates)
     forces = np.zeros(held.shape)
     forces[:, 2] = loads
-    model = assemble(
+    model = PlateModel(
         with_restraints(coordinates, elements, held, np.where(held, 0.0, forces)),
         isotropic_plate(h, ks),
         rules(*orders),

@@ -13,7 +13,7 @@ from fecm.mechanics.assumed_shear import strain_matrix
 from fecm.mechanics.element_groups import element_blocks
 from fecm.mechanics.elements.quadrature import gauss, nodal
 from fecm.mechanics.interpolation import interpolate
-from fecm.mechanics.plate import IntegrationRules, PlateModel, assemble
+from fecm.mechanics.plate import IntegrationRules, PlateModel
 from fecm.mechanics.strains import StrainField
 from tests.builders import (
     SKEWED,
@@ -52,7 +52,7 @@ def supported(mesh: tuple[Floats, Ints], h: float, rule: IntegrationRules = ASSU
         np.add.at(forces[:, 2], family.nodes, np.einsum("ep,pn->en", at.jxw, at.N))
     held = simple_support(coordinates)
     mesh_ = with_restraints(coordinates, elements, held, np.where(held, 0.0, forces))
-    return assemble(mesh_, isotropic_plate(h), rule)
+    return PlateModel(mesh_, isotropic_plate(h), rule)
 
 
 def centre(model: PlateModel) -> float:
@@ -71,7 +71,7 @@ def energy(model: PlateModel) -> float:
 @pytest.mark.parametrize("kind", [4, 9])
 def test_one_element_has_six_zero_energy_modes_and_a_supported_mesh_none(kind: int) -> None:
     coordinates, elements = one_element(SKEWED, kind)
-    free = assemble(
+    free = PlateModel(
         with_restraints(coordinates, elements, nothing(coordinates)), general_plate(), ASSUMED
     )
     values = np.linalg.eigvalsh(free.stiffness.toarray())
@@ -100,7 +100,7 @@ def patched(mesh: tuple[Floats, Ints], field: Floats) -> Floats:
     """Displacements of a patch with a field prescribed on its boundary."""
     held = boundary(*mesh)
     restrained = with_restraints(*mesh, held, np.where(held, field, 0.0))
-    return equilibrium(assemble(restrained, general_plate(), ASSUMED))
+    return equilibrium(PlateModel(restrained, general_plate(), ASSUMED))
 
 
 def sheared(coordinates: Floats) -> Floats:

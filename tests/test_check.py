@@ -57,13 +57,13 @@ def test_check_and_run_of_a_deck_build_plate_and_laminate_once(
 
         monkeypatch.setattr(build, name, counted)
 
-    for name in ("assemble", "laminate", "estimate_work"):
+    for name in ("PlateModel", "laminate", "estimate_work"):
         count(name)
     assert call("run", APPENDIX, "-o", tmp_path / "a.h5").exit_code == 0
-    assert built == {"assemble": 1, "laminate": 1, "estimate_work": 1}
+    assert built == {"PlateModel": 1, "laminate": 1, "estimate_work": 1}
     slips = ("--slip", "g12", "-o", tmp_path / "b.h5")
     assert call("run", APPENDIX, *slips).exit_code == 0
-    assert built == {"assemble": 3, "laminate": 3, "estimate_work": 2}
+    assert built == {"PlateModel": 3, "laminate": 3, "estimate_work": 2}
 
 
 @pytest.mark.parametrize("deck", WRONG, ids=lambda path: path.stem)

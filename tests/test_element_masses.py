@@ -11,7 +11,7 @@ from scipy.sparse.linalg import eigsh
 
 from fecm.mechanics import element_groups, element_matrices, interpolation
 from fecm.mechanics.elements.quadrature import gauss
-from fecm.mechanics.plate import PlateModel, assemble
+from fecm.mechanics.plate import PlateModel
 from tests.builders import (
     GENERAL_LAYERS,
     GENERAL_PLY,
@@ -55,7 +55,7 @@ def free_plate(mesh: Mesh, order: int) -> PlateModel:
     """A free plate of the general laminate, all its quadrature of one order."""
     coordinates, elements = mesh
     restraints = with_restraints(coordinates, elements, nothing(coordinates))
-    return assemble(restraints, general_plate(), rules(order, order))
+    return PlateModel(restraints, general_plate(), rules(order, order))
 
 
 @pytest.mark.parametrize("order", [2, 3, 4])
@@ -139,7 +139,7 @@ def test_consistent_mass_of_small_elements_is_that_of_textbooks(
 def test_consistent_mass_of_restrained_unknowns_is_left_out() -> None:
     coordinates, elements = mesh = distorted_square(3, 3, 9)
     held = boundary(coordinates, elements)
-    model = assemble(with_restraints(*mesh, held), general_plate(), rules())
+    model = PlateModel(with_restraints(*mesh, held), general_plate(), rules())
     whole = free_plate(mesh, 3).consistent_mass.toarray()
     free = ~held.ravel()
     np.testing.assert_allclose(model.consistent_mass.toarray(), whole[np.ix_(free, free)])
@@ -153,7 +153,7 @@ def frequency(n: int, kind: int, *, lumped: bool = False) -> float:
     h, order = 0.1, EXACT[kind]
     coordinates, elements = square(n, n, kind)
     mesh = with_restraints(coordinates, elements, simple_support(coordinates))
-    model = assemble(mesh, isotropic_plate(h), rules(order, order))
+    model = PlateModel(mesh, isotropic_plate(h), rules(order, order))
     K = model.stiffness.tocsc()
     M = sparse.diags_array(model.mass).tocsc() if lumped else model.consistent_mass.tocsc()
     start = np.random.default_rng(0).standard_normal(model.neq)

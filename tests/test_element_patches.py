@@ -11,7 +11,7 @@ import pytest
 
 from fecm.mechanics import element_groups, interpolation
 from fecm.mechanics.elements.quadrature import Quadrature, gauss, nodal
-from fecm.mechanics.plate import assemble
+from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.stiffness_product import stiffness_operator
 from fecm.mechanics.strains import StrainField
 from tests.builders import (
@@ -217,7 +217,7 @@ def test_two_triangles_have_six_rigid_modes_under_one_shear_point_each() -> None
 def test_every_way_to_multiply_by_the_stiffness_gives_the_same_forces(kind: int) -> None:
     coordinates, elements = square(6, 6, kind)
     mesh = with_restraints(coordinates, elements, boundary(coordinates, elements))
-    model = assemble(mesh, general_plate(), rules())
+    model = PlateModel(mesh, general_plate(), rules())
     u = np.random.default_rng(2).standard_normal(mesh.number_of_equations)
     expected = model.stiffness.toarray() @ u
     for solver in ("", "csr"):

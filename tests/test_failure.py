@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,11 +14,14 @@ from fecm.deck.records import Ply
 from fecm.mechanics.failure import (
     CRITERIA,
     MODES,
-    evaluate,
+    Candidates,
+    Codes,
+    Strengths,
+    exposure_of,
     interlaminar,
     max_stress,
+    modes_of,
     puck,
-    puck_angle,
     puck_limits,
     tsai_wu,
 )
@@ -40,6 +44,25 @@ class Ply5:
     f12: float = -0.5
     p_plus: float = 0.35
     p_minus: float = 0.3
+
+
+def evaluate(
+    criterion: Callable[[Strengths, Floats, Floats, Floats], Candidates],
+    ply: Strengths,
+    s1: Floats,
+    s2: Floats,
+    tau: Floats,
+) -> tuple[Floats, Codes]:
+    """Exposure and mode of stress states."""
+    candidates = criterion(ply, s1, s2, tau)
+    return exposure_of(candidates), modes_of(candidates)
+
+
+def puck_angle(ply: Strengths, s2: Floats, exposure: Floats) -> Floats:
+    """Angle of the fracture plane of mode C, in degrees."""
+    resistance, _ = puck_limits(ply)
+    ratio = np.clip(exposure * resistance / -s2, 0.0, 1.0)
+    return np.asarray(np.rad2deg(np.arccos(np.sqrt(ratio))))
 
 
 ROWS = table("failure_vectors.csv")

@@ -17,7 +17,7 @@ from fecm.mechanics.failure import CRITERIA, exposure_of
 from fecm.mechanics.failure_envelope import FailureMonitor
 from fecm.mechanics.interpolation import interpolate
 from fecm.mechanics.laminate import laminate
-from fecm.mechanics.plate import assemble
+from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import PlyStresses
 from fecm.results.result import Result
 from tests.builders import nothing, rules, square, table, with_restraints
@@ -46,7 +46,7 @@ def test_the_first_ply_fails_at_the_load_of_the_exact_solution(name: str) -> Non
         load = at.jxw * np.sin(np.pi * x / 0.2) * np.sin(np.pi * y / 0.2)
         np.add.at(forces[:, 2], family.nodes, np.einsum("ep,pn->en", load, at.N))
     loaded = replace(mesh, forces=np.where(mesh.codes != 0, 0.0, forces))
-    field = equilibrium(assemble(loaded, plate, replace(rules(), assumes_shear=True)))
+    field = equilibrium(PlateModel(loaded, plate, replace(rules(), assumes_shear=True)))
     monitor = FailureMonitor(PlyStresses(mesh, plate, gauss(3)), plate, STRENGTHS)
     envelope = monitor.start()
     monitor.update(envelope, field, 0.0)

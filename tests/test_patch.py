@@ -10,7 +10,7 @@ import pytest
 from fecm.mechanics.laminate import laminate
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.patch import DISC, HERTZ, PatchError, patch_weights
-from fecm.mechanics.plate import assemble
+from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.statics import Tangent
 from tests.builders import (
     REPORT_PLY,
@@ -41,7 +41,7 @@ def rectangle(nx: int, ny: int, a: float = 6.0, b: float = 4.0) -> Mesh:
 
 def compliance(mesh: Mesh, weights: Floats) -> float:
     """W per unit force, W being the weighted mean of w."""
-    plate = assemble(mesh, CROSS_PLY, replace(rules(), assumes_shear=True))
+    plate = PlateModel(mesh, CROSS_PLY, replace(rules(), assumes_shear=True))
     load = np.zeros(mesh.equations.shape)
     load[:, 2] = weights
     free = load[mesh.equations > 0]

@@ -14,7 +14,7 @@ from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.patch import DISC, HERTZ, patch_weights
-from fecm.mechanics.plate import assemble
+from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.symmetry import symmetry_reduction
@@ -51,7 +51,7 @@ def strike(
     half: bool = True,
 ) -> tuple[Floats, float]:
     """Contact force at some times, and its peak, of a rigid mass with a velocity."""
-    model = assemble(mesh, plate, replace(rules(), assumes_shear=True))
+    model = PlateModel(mesh, plate, replace(rules(), assumes_shear=True))
     contact = np.zeros(mesh.equations.shape)
     contact[:, 2] = weights
     motion = PlateMotion(model, reduced=symmetry_reduction(model, contact) if half else None)
@@ -148,7 +148,7 @@ def test_a_patch_in_the_middle_keeps_the_half_plate_and_its_response() -> None:
     weights = patch_weights(mesh, DISC, 0.4, 3.0, 2.0)
     contact = np.zeros(mesh.equations.shape)
     contact[:, 2] = weights
-    model = assemble(mesh, CROSS_PLY, rules())
+    model = PlateModel(mesh, CROSS_PLY, rules())
     assert set(symmetry_reduction(model, contact).weights.tolist()) == {0, 2}
     times = np.linspace(0.0, 1e-4, 201)
     half, full = (

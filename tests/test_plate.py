@@ -11,7 +11,7 @@ from scipy.sparse.linalg import spsolve
 from fecm.mechanics import element_groups, element_matrices, plate
 from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.elements.shape import QUADRILATERAL
-from fecm.mechanics.plate import assemble
+from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.stiffness_product import stiffness_operator
 from fecm.mechanics.strains import StrainField
 from tests.builders import (
@@ -238,7 +238,7 @@ def test_assembling_in_blocks_changes_nothing(
     mesh = with_restraints(coordinates, elements, simple_support(coordinates))
 
     def assembled() -> list[Floats]:
-        model = assemble(mesh, general_plate(), rules())
+        model = PlateModel(mesh, general_plate(), rules())
         return [model.stiffness.toarray(), model.support.toarray(), model.mass]
 
     whole = assembled()
@@ -270,7 +270,7 @@ def test_every_way_to_multiply_by_the_stiffness_gives_the_same_forces(
 ) -> None:
     coordinates, elements = maker(6, 6, kind)
     mesh = with_restraints(coordinates, elements, boundary(coordinates, elements))
-    model = assemble(mesh, general_plate(), rules())
+    model = PlateModel(mesh, general_plate(), rules())
     u = np.random.default_rng(2).standard_normal(mesh.number_of_equations)
     expected = model.stiffness.toarray() @ u
     for solver in ("", "csr"):

@@ -10,7 +10,7 @@ from scipy.sparse.linalg import eigsh
 
 from fecm.mechanics import element_groups, element_matrices, interpolation
 from fecm.mechanics.elements.quadrature import gauss
-from fecm.mechanics.plate import PlateModel, assemble
+from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.time_step import critical_time_step
 from tests.builders import (
     GENERAL_LAYERS,
@@ -52,7 +52,7 @@ def test_lumped_mass_is_positive_and_adds_up_to_the_plates_mass_and_inertia(
     maker: MeshMaker, kind: int, order: int
 ) -> None:
     coordinates, elements = mesh = maker(3, 4, kind)
-    model = assemble(
+    model = PlateModel(
         with_restraints(*mesh, nothing(coordinates)), general_plate(), rules(order, order)
     )
     used = np.isin(np.arange(1, len(coordinates) + 1), elements)
@@ -93,7 +93,7 @@ def frequencies(n: int, kind: int, shear: int, count: int = 1, ks: float = 1.0) 
     """Lowest frequencies of the same plate on n x n elements, omega a^2 sqrt(rho h/D)."""
     h = 0.1
     coordinates, elements = square(n, n, kind)
-    model = assemble(
+    model = PlateModel(
         with_restraints(coordinates, elements, simple_support(coordinates)),
         isotropic_plate(h, ks),
         rules(2 if kind == 4 else 3, shear),
@@ -147,7 +147,7 @@ def test_a_plate_sheared_uniformly_in_its_thickness_swings_at_the_cutoff_frequen
     coordinates, elements = square(3, 2)
     held = nothing(coordinates)
     held[:, :3] = True
-    model = assemble(with_restraints(coordinates, elements, held), report_plate(), rules())
+    model = PlateModel(with_restraints(coordinates, elements, held), report_plate(), rules())
     for direction in ([1.0, 0.0], [0.0, 1.0]):
         theta = np.tile(direction, len(coordinates))
         np.testing.assert_allclose(
@@ -160,7 +160,7 @@ def test_a_plate_sheared_uniformly_in_its_thickness_swings_at_the_cutoff_frequen
 def free_plate(n: int, kind: int) -> PlateModel:
     """A free distorted plate of the general laminate."""
     coordinates, elements = distorted_square(n, n, kind)
-    return assemble(
+    return PlateModel(
         with_restraints(coordinates, elements, nothing(coordinates)), general_plate(), rules()
     )
 
@@ -170,7 +170,7 @@ def element_held_in_its_plane() -> PlateModel:
     coordinates, elements = one_element(SKEWED, 4)
     held = nothing(coordinates)
     held[:, :2] = True
-    return assemble(with_restraints(coordinates, elements, held), general_plate(), rules())
+    return PlateModel(with_restraints(coordinates, elements, held), general_plate(), rules())
 
 
 @pytest.mark.parametrize(

@@ -199,7 +199,7 @@ def test_the_listing_stores_contact_at_every_step_and_strains_one_step_old(
 @pytest.mark.parametrize("solver", ["csr", "auto"])
 def test_both_products_give_the_same_history(solver: str) -> None:
     made = impact_of(APPENDIX)
-    motion = PlateMotion(made.plate, solver)
+    motion = PlateMotion(made.motion.plate, solver)
     impact = ImpactSystem(motion, made.rod, made.law, made.contact)
     state = impact.start()
     for _ in range(10):

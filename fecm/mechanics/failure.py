@@ -10,7 +10,7 @@ the interlaminar shear stresses.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from dataclasses import dataclass
 from functools import reduce
 from typing import Protocol
 
@@ -26,38 +26,26 @@ MODES = (
 _CODE = {name: code for code, name in enumerate(MODES)}
 
 Codes = NDArray[np.int8]
-Exposure = tuple[Floats, Codes]
 # Values of a criterion by mode; the exposure is the largest.
 Candidates = tuple[tuple[str, Floats], ...]
 
 
+@dataclass(frozen=True, match_args=False)  # attributes that need not be assignable
 class Strengths(Protocol):
-    """Strengths of a ply, all positive (force/area), and dimensionless constants.
+    """Strengths of a ply, all positive (force/area), and dimensionless constants."""
 
-    XT, XC along and YT, YC across the fibres, S12, S13, S23 in shear; F12 is Tsai and Wu's
-    F12*, p_plus and p_minus are Puck's slopes.
-    """
-
-    @property
-    def xt(self) -> float: ...  # noqa: D102
-    @property
-    def xc(self) -> float: ...  # noqa: D102
-    @property
-    def yt(self) -> float: ...  # noqa: D102
-    @property
-    def yc(self) -> float: ...  # noqa: D102
-    @property
-    def s12(self) -> float: ...  # noqa: D102
-    @property
-    def s13(self) -> float: ...  # noqa: D102
-    @property
-    def s23(self) -> float: ...  # noqa: D102
-    @property
-    def f12(self) -> float: ...  # noqa: D102
-    @property
-    def p_plus(self) -> float: ...  # noqa: D102
-    @property
-    def p_minus(self) -> float: ...  # noqa: D102
+    # Along and across the fibres, in tension and compression; in shear.
+    xt: float
+    xc: float
+    yt: float
+    yc: float
+    s12: float
+    s13: float
+    s23: float
+    f12: float  # Tsai and Wu's F12*
+    # Puck's slopes.
+    p_plus: float
+    p_minus: float
 
 
 def modes_of(candidates: Candidates, where: NDArray[np.intp] | None = None) -> Codes:
@@ -70,18 +58,6 @@ def modes_of(candidates: Candidates, where: NDArray[np.intp] | None = None) -> C
 def exposure_of(candidates: Candidates) -> Floats:
     """Largest candidate."""
     return reduce(np.maximum, [value for _, value in candidates])
-
-
-def evaluate(
-    criterion: Callable[[Strengths, Floats, Floats, Floats], Candidates],
-    ply: Strengths,
-    s1: Floats,
-    s2: Floats,
-    tau: Floats,
-) -> Exposure:
-    """Exposure and mode of stress states."""
-    candidates = criterion(ply, s1, s2, tau)
-    return exposure_of(candidates), modes_of(candidates)
 
 
 def max_stress(ply: Strengths, s1: Floats, s2: Floats, tau: Floats) -> Candidates:
@@ -143,13 +119,6 @@ def puck_limits(ply: Strengths) -> tuple[float, float]:
     s, minus = ply.s12, ply.p_minus
     resistance = s / (2.0 * minus) * (math.sqrt(1.0 + 2.0 * minus * ply.yc / s) - 1.0)
     return resistance, s * math.sqrt(1.0 + 2.0 * minus * resistance / s)
-
-
-def puck_angle(ply: Strengths, s2: Floats, exposure: Floats) -> Floats:
-    """Angle of the fracture plane of mode C, in degrees."""
-    resistance, _ = puck_limits(ply)
-    ratio = np.clip(exposure * resistance / -s2, 0.0, 1.0)
-    return np.asarray(np.rad2deg(np.arccos(np.sqrt(ratio))))
 
 
 CRITERIA = {"max_stress": max_stress, "tsai_wu": tsai_wu, "hashin": hashin, "puck": puck}

@@ -31,19 +31,15 @@ class OutsideError(FecmError, ValueError):
     """A point is not on the plate."""
 
 
+@dataclass(frozen=True, match_args=False)  # attributes that need not be assignable
 class GagePlace(Protocol):
     """Number, position (length) and direction (degrees from the x-axis) of a gage."""
 
-    @property
-    def number(self) -> int: ...  # noqa: D102
-    @property
-    def x(self) -> float: ...  # noqa: D102
-    @property
-    def y(self) -> float: ...  # noqa: D102
-    @property
-    def z(self) -> float: ...  # noqa: D102
-    @property
-    def direction(self) -> float: ...  # noqa: D102
+    number: int
+    x: float
+    y: float
+    z: float
+    direction: float
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from fecm.mechanics.contact_law import ContactPoint, Law, Number, Truth
-from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import AppliedForce, DivergenceError, Load, PlateMotion, PlateState
 from fecm.mechanics.projectile import Projectile, rigid_approach
 from fecm.mechanics.rod_integrators import RodIntegrator, TipStep, WilsonStep
@@ -84,11 +83,6 @@ class ImpactSystem:
         self._integrator = integrator
         self._step: RodIntegrator | None = None
         self.first_dt: float | None = None  # time step of the rod's constants
-
-    @property
-    def plate(self) -> PlateModel:
-        """The plate."""
-        return self.motion.plate
 
     def start(self, plate: PlateState | None = None) -> ImpactState:
         """State before the first step, with the projectile just touching the plate.

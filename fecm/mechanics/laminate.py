@@ -22,23 +22,17 @@ LISTING_LEAST = 1.0e-6
 ROUNDING = 1.0e-12
 
 
+@dataclass(frozen=True, match_args=False)  # attributes that need not be assignable
 class PlyConstants(Protocol):
     """Density (mass/volume), Poisson's ratio and moduli (force/area) of a ply."""
 
-    @property
-    def density(self) -> float: ...  # noqa: D102
-    @property
-    def nu12(self) -> float: ...  # noqa: D102
-    @property
-    def e1(self) -> float: ...  # noqa: D102
-    @property
-    def e2(self) -> float: ...  # noqa: D102
-    @property
-    def g12(self) -> float: ...  # noqa: D102
-    @property
-    def g13(self) -> float: ...  # noqa: D102
-    @property
-    def g23(self) -> float: ...  # noqa: D102
+    density: float
+    nu12: float
+    e1: float
+    e2: float
+    g12: float
+    g13: float
+    g23: float
 
 
 @dataclass(frozen=True)

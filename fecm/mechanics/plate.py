@@ -230,16 +230,3 @@ class PlateModel:
             transposed_jacobian=self.rules.transposed_jacobian,
             assumes_shear=self.rules.assumes_shear,
         )
-
-
-def assemble(mesh: Mesh, laminate: Laminate, rules: IntegrationRules) -> PlateModel:
-    """Build the plate of a mesh, a laminate and quadrature rules.
-
-    Raises
-    ------
-    ValueError
-        If the mesh has no elements.
-    """
-    if not len(mesh.elements):
-        raise ValueError("the mesh has no elements")
-    return PlateModel(mesh, laminate, rules)

@@ -99,19 +99,12 @@ class RodState:
 class TipStep(Protocol):
     """Interface of a projectile's step to the contact iteration; see :class:`RodIntegrator`."""
 
+    gain: Any  # tip acceleration per force
+    weight: Any  # tip displacement per new acceleration
+
     @property
     def theta(self) -> float:
         """Time of equilibrium, as a fraction of the step."""
-        ...
-
-    @property
-    def gain(self) -> Any:
-        """Tip acceleration per force."""
-        ...
-
-    @property
-    def weight(self) -> Any:
-        """Tip displacement per new acceleration."""
         ...
 
     def begin(self, state: Any) -> tuple[Any, Any, Any, Any]:

@@ -34,7 +34,7 @@ from fecm.mechanics.gages import GageArray, gages
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.mesh import Mesh
-from fecm.mechanics.plate import IntegrationRules, PlateModel, assemble
+from fecm.mechanics.plate import IntegrationRules, PlateModel
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.ply_stresses import PlyStresses, equilibrium_shear_stiffness
 from fecm.mechanics.projectile import (
@@ -294,7 +294,7 @@ def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> 
     laminate = laminate_of_deck(deck, isotropic_g12="g12" in slips)
     if "small-stiffness" in slips:
         laminate = laminate.without_small_entries()
-    return assemble(
+    return PlateModel(
         mesh,
         laminate,
         IntegrationRules(
