@@ -15,8 +15,8 @@ import pytest
 
 import fecm
 from fecm.results.result import load
-from tests.calls import Done, assert_unusable, diff, told
-from tests.decks import small
+from tests.calls import Done, assert_unusable, call, diff, told
+from tests.decks import LONG, PROGRAM, ROOT, small
 
 Edit = Callable[[h5py.File], object]
 
@@ -253,6 +253,85 @@ def test_json_tells_all_that_the_text_does(runs: Path) -> None:
     assert entry["shape_a"] == [2, 609]
 
 
+def test_excluded_datasets_are_counted_and_not_compared(runs: Path) -> None:
+    sides = runs / "report.h5", runs / "listing.h5"
+    done = diff(*sides, "--only", "tape3", "--exclude", "*/w", "--exclude", "modes", "--brief")
+    assert done.stdout.splitlines()[:-1] == ["tape3/displacement"]
+    assert done.stdout.endswith("different: 1 of 3 datasets at rtol 0, atol 0; 1 excluded\n")
+    said = strict(diff(*sides, "--only", "tape3", "--exclude", "tape3/w", "--format", "json"))
+    assert said["excluded"] == ["tape3/w"]
+
+
+def test_the_last_tolerance_that_matches_a_dataset_holds(
+    pair: tuple[Path, Callable[[Edit], Path]], tmp_path: Path
+) -> None:
+    a, changed = pair
+    b = changed(lambda f: f["history/force"].write_direct(f["history/force"][()] * 1.001))
+    file = tmp_path / "tolerances.toml"
+    file.write_text('rtol = 1e-9\nexclude = ["tape8"]\n[tol]\n"history/force" = 1e-2\n')
+    for options, status in (
+        (("--tol", "history/force=1.01e-3"), 0),
+        (("--tol", "history=1e-2", "--tol", "history/force=1e-4"), 1),
+        (("--tol", "history/force=1e-4", "--tol", "h*/force=1e-2"), 0),
+        (("--tol", "history/force=0,1e9"), 0),
+        (("--tol", "history/force=1e-4", "--atol", "1e9"), 0),
+        (("--tol-file", file), 0),
+        (("--tol-file", file, "--tol", "history=1e-4"), 1),
+    ):
+        assert diff(a, b, *options).exit_code == status, options
+    said = strict(diff(a, b, "--tol-file", file, "--rtol", "1e-3", "--format", "json"))
+    found = {entry["name"]: entry["tolerance"] / (entry["scale"] or 1.0)
+             for entry in said["datasets"] if "force" in entry["name"]}  # fmt: skip
+    assert found == pytest.approx({"history/force": 1e-2, "tape9/force": 1e-3})
+    assert "tape8/kappa_x" in said["excluded"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("rtol = true", "rtol: `True` is not R"),
+        ("atol = [1, 2]", "atol: `[1, 2]` is not R"),
+        ('exclude = "tape8"', "exclude is no list of texts"),
+        ("tol = 3", "tol is no table; begin it with [tol]"),
+        ("tolerance = 3", "tolerance is unknown; the keys are rtol, atol, exclude and tol"),
+        ("rtol 3", "at line 1"),
+    ],
+)
+def test_a_wrong_tolerance_file_exits_2_and_names_the_key(
+    runs: Path, tmp_path: Path, text: str, words: str
+) -> None:
+    (tmp_path / "t.toml").write_text(text)
+    small = runs / "small.h5"
+    done = diff(small, small, "--tol-file", tmp_path / "t.toml")
+    assert_unusable(done)
+    assert "t.toml: " in done.stderr
+    assert words in done.stderr
+
+
+def test_the_documented_recipe_passes_rounding_and_fails_a_tenth_of_a_degree(
+    tmp_path: Path,
+) -> None:
+    page = (ROOT / "docs" / "comparing.md").read_text()
+    run, compare = (
+        line.split("fecm ")[1].split() for line in page.splitlines() if "- run: fecm" in line
+    )
+    deck, expected = tmp_path / run[1], tmp_path / compare[1]
+    deck.parent.mkdir()
+    expected.parent.mkdir()
+    deck.write_text(LONG.read_text())
+    assert call("run", deck, "-o", expected, "--solver", "csr").exit_code == 0
+    assert call(*run, cwd=tmp_path).exit_code == 0
+    assert call(*compare, cwd=tmp_path).exit_code == 0
+    assert diff(expected, tmp_path / "new.h5").exit_code == 1
+    ply = "    2  45.    0.0053\n"
+    assert deck.read_text().count(ply) == 1
+    deck.write_text(deck.read_text().replace(ply, ply.replace(" 45.", "45.1")))
+    assert call(*run, "--overwrite", cwd=tmp_path).exit_code == 0
+    done = call(*compare, cwd=tmp_path)
+    assert done.exit_code == 1
+    assert told(done, "history/force").startswith("different")
+
+
 def test_small_blocks_of_rows_find_the_same(
     pair: tuple[Path, Callable[[Edit], Path]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -279,6 +358,12 @@ def test_small_blocks_of_rows_find_the_same(
         (("--only", "force"), "did you mean history/force or tape9/force?"),
         (("--only", "tapes"), "tape3"),
         (("--only", "nonsense"), "there are energy, history, laminate, mesh, tape3"),
+        (("--exclude", "force"), "did you mean history/force or tape9/force?"),
+        (("--exclude", "*"), "every dataset is excluded"),
+        (("--tol", "history/forse=1"), "did you mean history/force"),
+        (("--tol", "history/force"), "'history/force' is not of the form NAME=VALUE"),
+        (("--tol", "history/force=-1"), "history/force: `-1` is not R or R,T"),
+        (("--tol", "history=1e-6,1,2"), "`1e-6,1,2` is not R or R,T"),
     ],
 )
 def test_a_wrong_tolerance_or_name_exits_2_and_says_what_would_do(
@@ -311,12 +396,30 @@ def test_a_residue_of_the_energies_is_judged_by_the_energies(
     assert diff(sound, changed(residue(0.9e-4)), "--rtol", "1e-4").exit_code == 0
     done = diff(sound, changed(residue(1.2e-4)), "--rtol", "1e-4")
     assert done.exit_code == 1
-    assert "of the largest energy 1.196" in done.stdout
+    assert "of the energy put in 1.196" in done.stdout
     done = diff(sound, changed(residue(2e-4)), "--only", "energy", "--format", "json")
     said = json.loads(done.stdout)
     entry = next(d for d in said["datasets"] if d["name"] == "energy/balance_error")
     assert entry["scale"] == pytest.approx(initial, rel=1e-3)
     assert entry["relative"] == pytest.approx(2e-4, rel=2e-3)
+
+
+def test_resultants_of_the_midplane_are_judged_by_those_of_bending(tmp_path: Path) -> None:
+    a, b = tmp_path / "a.h5", tmp_path / "b.h5"
+    plate = small(program=PROGRAM.replace("NEXT", "STRE          5\nNEXT"))
+    fecm.run(plate.replace("    2  90. ", "    2   0. "), output=a)
+    with h5py.File(a) as file:
+        assert not file["stresses/N_x"][()].any()
+        moment = max(abs(file[f"stresses/M_{name}"][()]).max() for name in ("x", "y", "xy"))
+        curvature = max(abs(file[f"stresses/kappa_{name}"][()]).max() for name in ("x", "y", "xy"))
+    # A = E h and D = E h^3 / 12 along the fibres; h is 0.106 in.
+    scales = {"N_y": moment * 12.0**0.5 / 0.106, "eps_xx": curvature * 0.106 / 12.0**0.5}
+    for name, scale in scales.items():
+        shutil.copy(a, b)
+        with h5py.File(b, "r+") as file:
+            file[f"stresses/{name}"][0, 0, 0] = 1e-9 * scale
+        assert diff(a, b, "--rtol", "1.01e-9", "--only", "stresses").exit_code == 0
+        assert diff(a, b, "--rtol", "0.99e-9", "--only", "stresses").exit_code == 1
 
 
 def test_coupling_that_is_a_rounding_is_judged_by_stretching_and_bending(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import click
 
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, RefusedError
 from fecm.cli.isolation import reads
-from fecm.cli.types import NOT_NEGATIVE
+from fecm.cli.types import NOT_NEGATIVE, Parsed, assignment, file_of
 from fecm.results.diff import (
     SCALE_NAMES,
     Comparison,
@@ -22,30 +23,84 @@ from fecm.results.diff import (
 from fecm.results.schema import jsonable, printable, shown_apart
 
 
+def _tolerance(name: str, values: object) -> tuple[float, ...]:
+    """Relative tolerance, or relative and absolute tolerance."""
+    parts: list[Any] = values if isinstance(values, list) else [values]
+    try:
+        numbers = tuple(float("" if isinstance(part, bool) else part) for part in parts)
+    except (TypeError, ValueError, OverflowError):
+        numbers = ()
+    if len(numbers) not in (1, 2) or not all(0 <= number < math.inf for number in numbers):
+        given = ",".join(map(str, parts))
+        raise ValueError(f"{name}: `{given}` is not R or R,T with finite numbers from 0")
+    return numbers
+
+
+def _own(text: str) -> tuple[str, tuple[float, ...]]:
+    """Pattern and tolerances of ``PATTERN=RTOL[,ATOL]``."""
+    pattern, values = assignment(text)
+    return pattern, _tolerance(pattern, values.split(","))
+
+
+def _tolerances(text: str) -> dict[str, Any]:
+    """Options of a tolerance file."""
+    given = tomllib.loads(text)
+    if unknown := given.keys() - {"rtol", "atol", "exclude", "tol"}:
+        raise ValueError(f"{min(unknown)} is unknown; the keys are rtol, atol, exclude and tol")
+    exclude, own = given.get("exclude", []), given.get("tol", {})
+    if not isinstance(exclude, list) or not all(isinstance(name, str) for name in exclude):
+        raise ValueError("exclude is no list of texts")
+    if not isinstance(own, dict):
+        raise ValueError('tol is no table; begin it with [tol], and give "NAME" = RTOL')
+    return {
+        **{name: _tolerance(name, [given.get(name, 0.0)])[0] for name in ("rtol", "atol")},
+        "exclude": exclude,
+        "own": [(name, _tolerance(name, values)) for name, values in own.items()],
+    }
+
+
 @click.command()
 @click.argument("a", type=FILE_PATH)
 @click.argument("b", type=FILE_PATH)
-@click.option("--rtol", type=NOT_NEGATIVE, default=0.0, show_default=True, metavar="R",
-              help="Relative tolerance, of the dataset's largest absolute value.")  # fmt: skip
-@click.option("--atol", type=NOT_NEGATIVE, default=0.0, show_default=True, metavar="T",
-              help="Absolute tolerance, in the dataset's unit.")  # fmt: skip
-@click.option("--only", multiple=True, metavar="PATH",
-              help="Compare only this dataset (tape9/force) or group (tape9); may be "
-                   "repeated.")  # fmt: skip
+@click.option("--rtol", type=NOT_NEGATIVE, metavar="R",
+              help="Relative tolerance, of the dataset's largest absolute value.  "
+                   "[default: 0]")  # fmt: skip
+@click.option("--atol", type=NOT_NEGATIVE, metavar="T",
+              help="Absolute tolerance, in the dataset's unit.  [default: 0]")  # fmt: skip
+@click.option("--only", multiple=True, metavar="PATTERN",
+              help="Compare only this dataset (tape9/force), group (tape9) or pattern "
+                   "('*/force'); may be repeated.")  # fmt: skip
+@click.option("--exclude", multiple=True, metavar="PATTERN",
+              help="Leave out a dataset, group or pattern; may be repeated.")  # fmt: skip
+@click.option("--tol", "own", type=Parsed(_own), multiple=True, metavar="PATTERN=R[,T]",
+              help="Tolerances of a dataset, group or pattern instead of --rtol and --atol; may be "
+                   "repeated, and the last that matches holds.")  # fmt: skip
+@click.option("--tol-file", "file", type=file_of(_tolerances), metavar="FILE.toml",
+              help="File of these tolerances, with the keys rtol, atol, exclude and tol; options "
+                   "go before it.")  # fmt: skip
 @click.option("--brief", is_flag=True, help="Print only names of differences and the verdict.")
 @FORMAT_OPTION
 @reads("a", "b")
 def diff(
-    a: Path, b: Path, rtol: float, atol: float, only: tuple[str, ...], brief: bool, form: str
+    a: Path,
+    b: Path,
+    rtol: float | None,
+    atol: float | None,
+    only: tuple[str, ...],
+    exclude: tuple[str, ...],
+    own: tuple[tuple[str, tuple[float, ...]], ...],
+    file: dict[str, Any] | None,
+    brief: bool,
+    form: str,
 ) -> None:
     """Compare two results dataset by dataset.
 
     A and B are result files or folders of tapes, or both results of sweeps.
 
     Two numbers are equal if |a - b| <= T + R * max, where max is the largest absolute value of the
-    entire dataset; for energy/balance_error it is the largest energy, for laminate/B the square
-    root of the largest A times the largest D, for indentation the largest one in contact.  NaN
-    equals NaN, and an infinity the same infinity.  Integers (steps, node numbers) must be equal at
+    entire dataset; for energy/balance_error it is the energy put in, for laminate/B the square root
+    of the largest A times the largest D, for indentation the largest one in contact.  NaN equals
+    NaN, and an infinity the same infinity.  Integers (steps, node numbers) must be equal at
     any tolerance.  A dataset that only A or B has, or that has another shape or type, is a
     difference.  Differing titles, modes, slips, other attributes and decks are only listed.
 
@@ -55,16 +110,22 @@ def diff(
 
     Exit status: 0 equal, 1 different, 2 unusable file or call.
     """
+    file = file or _tolerances("")
+    rtol = file["rtol"] if rtol is None else rtol
+    atol = file["atol"] if atol is None else atol
+    exclude, own = (*file["exclude"], *exclude), (*file["own"], *own)
     try:
-        found = difference(a, b, rtol, atol, only)
+        found = difference(a, b, rtol, atol, only, exclude, own)
     except IncomparableError as error:
         raise RefusedError(printable(str(error))) from None
     if form == "json":
-        head = {"a": printable(str(a)), "b": printable(str(b)), "rtol": rtol, "atol": atol}
+        judged = {"rtol": rtol, "atol": atol, "tol": dict(own)}
+        head = {"a": printable(str(a)), "b": printable(str(b)), **judged}
         click.echo(json.dumps(jsonable(_json(found, head, brief))))
     else:
         lines = _brief(found) if brief else _lines(found)
-        click.echo("\n".join([*lines, _verdict(found, rtol, atol)]))
+        within = f"rtol {rtol:g}, atol {atol:g}" + ", --tol" * bool(own)
+        click.echo("\n".join([*lines, _verdict(found, within)]))
     if not found.same:
         raise SystemExit(NO)
 
@@ -79,10 +140,10 @@ def _different(found: Difference) -> list[str]:
     return [*(c.path for c in found.compared if not c.same), *found.only[0], *found.only[1]]
 
 
-def _verdict(found: Difference, rtol: float, atol: float) -> str:
+def _verdict(found: Difference, within: str) -> str:
     """The last line."""
     count = len(found.compared) + sum(map(len, found.only))
-    within = f"rtol {rtol:g}, atol {atol:g}"
+    within += f"; {len(found.excluded)} excluded" if found.excluded else ""
     if found.same:
         return f"same: {count} dataset{'s' * (count != 1)} within {within}"
     return f"different: {len(_different(found))} of {count} dataset{'s' * (count != 1)} at {within}"
@@ -168,6 +229,7 @@ def _json(found: Difference, head: dict[str, Any], brief: bool) -> dict[str, Any
         "datasets": [_entry(c) for c in found.compared if not (brief and c.same)],
         "only_in_a": found.only[0],
         "only_in_b": found.only[1],
+        "excluded": found.excluded,
         "listed": found.listed,
     }
 

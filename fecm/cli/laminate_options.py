@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import click
 
-from fecm.cli.types import POSITIVE, Finite, ListOf, Parsed
+from fecm.cli.types import POSITIVE, Finite, ListOf, Parsed, file_of
 from fecm.deck.catalogue import MATERIALS, SYSTEMS, NamedPly, read_plies
 from fecm.deck.findings import Findings
 from fecm.deck.layup import parse_layup
@@ -22,22 +21,8 @@ Decorated = Callable[..., None]
 
 # Key of the plies of --materials among the values of a context.
 _META = "fecm.plies"
-# Most bytes of a file of plies.
-MOST = 1_000_000
 
-
-def _read(path: str) -> dict[str, NamedPly]:
-    """Plies of a file."""
-    try:
-        with Path(path).open("rb") as file:
-            return read_plies(file.read(MOST).decode("utf-8-sig"))
-    except OSError as error:
-        raise ValueError(f"{path} can't be read: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"{path}: {error}") from None
-
-
-PLIES = Parsed(_read)
+PLIES = file_of(read_plies)
 
 
 def laminate_options(*, required: bool) -> Callable[[Decorated], Decorated]:

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from itertools import chain
+from pathlib import Path
 from typing import Any
 
 import click
@@ -92,6 +93,25 @@ class Parsed(click.ParamType):  # type: ignore[type-arg]
             return self._function(value)
         except ValueError as error:
             self.fail(str(error), param, ctx)
+
+
+# Most bytes of a file whose contents are the value of an option.
+MOST = 1_000_000
+
+
+def file_of(parse: Callable[[str], Any]) -> Parsed:
+    """Type of a file's path whose value is what a function makes of the text in the file."""
+
+    def read(path: str) -> Any:
+        try:
+            with Path(path).open("rb") as file:
+                return parse(file.read(MOST).decode("utf-8-sig"))
+        except OSError as error:
+            raise ValueError(f"{path} can't be read: {error.strerror}") from None
+        except (ValueError, RecursionError) as error:
+            raise ValueError(f"{path}: {error}") from None
+
+    return Parsed(read)
 
 
 def assignment(text: str) -> tuple[str, str]:

@@ -2,7 +2,8 @@
 
 Two numbers are equal if |a - b| <= atol + rtol*scale.  The scale is the largest finite absolute
 value of the complete dataset in both results, so that a zero crossing of a history is judged by the
-size of the history.  Datasets that are residues of rounding have another scale (`SCALE_NAMES`).
+size of the history.  Datasets that may hold nothing but rounding errors have another scale
+(`SCALE_NAMES`).
 Integers (steps, node and equation numbers) and texts must be equal.  NaN equals NaN, and an
 infinity the same infinity; either differs from anything else at any tolerance.
 
@@ -12,8 +13,9 @@ Datasets are read in blocks of rows: memory does not grow with the results.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -52,19 +54,20 @@ SOURCE_NAMES = {
 # Names of the indices along each size of a dataset; rows are named by their step and time.
 AXES = {size: name for size, (name, _) in SCALES.items()}
 
-# Terms of energy/balance_error.
-ENERGIES = [
-    dataset.path
-    for dataset in DATASETS.values()
-    if dataset.group == "energy" and dataset.dimension == "force*length"
-    if dataset.name != "balance_error"
-]
+# Datasets of a resultant or strain that is zero in bending, and those of its bending counterpart.
+MEMBRANE = {"N": ("N_x", "N_y", "N_xy"), "eps": ("eps_xx", "eps_yy", "gamma_xy")}
+BENDING = {"N": ("M_x", "M_y", "M_xy"), "eps": ("kappa_x", "kappa_y", "kappa_xy")}
 
 # Scales other than the largest value of the dataset.
 SCALE_NAMES = {
-    "energy/balance_error": "the largest energy",
+    "energy/balance_error": "the energy put in",
     "laminate/B": "sqrt(max A * max D)",
     "plies/residual": "the largest interlaminar stress",
+    **{f"stresses/{name}": "the largest N or M * sqrt(A/D)" for name in MEMBRANE["N"]},
+    **{
+        f"stresses/{name}": "the largest strain or curvature * sqrt(D/A)"
+        for name in MEMBRANE["eps"]
+    },
     "history/indentation": "the largest indentation in contact",
     "tape9/indentation": "the largest indentation in contact",
 }
@@ -177,11 +180,14 @@ class Difference:
         Datasets that only A has, and only B.
     listed : list of dict
         Attributes and texts that differ, which are not judged: ``name``, ``a``, ``b``, ``line``.
+    excluded : list of str
+        Datasets that were not compared.
     """
 
     compared: list[Comparison]
     only: tuple[list[str], list[str]]
-    listed: list[dict[str, Any]] = field(default_factory=list)
+    listed: list[dict[str, Any]]
+    excluded: list[str]
 
     @property
     def same(self) -> bool:
@@ -190,7 +196,13 @@ class Difference:
 
 
 def difference(
-    a: Path, b: Path, rtol: float = 0.0, atol: float = 0.0, only: Sequence[str] = ()
+    a: Path,
+    b: Path,
+    rtol: float = 0.0,
+    atol: float = 0.0,
+    only: Sequence[str] = (),
+    exclude: Sequence[str] = (),
+    own: Sequence[tuple[str, Sequence[float]]] = (),
 ) -> Difference:
     """Compare two results.
 
@@ -203,12 +215,18 @@ def difference(
     atol : float
         Largest difference in the dataset's unit; both are added.
     only : sequence of str
-        Datasets and groups to compare; all by default.
+        Datasets and groups to compare, or patterns of their names; all by default.
+    exclude : sequence of str
+        Those not to compare.
+    own : sequence of tuple
+        Datasets, groups or patterns, each with ``(rtol,)`` or ``(rtol, atol)`` instead of the
+        general ones; of several that match, the last one holds.
 
     Raises
     ------
     IncomparableError
-        If only one is the result of a sweep, or `only` names a missing dataset.
+        If only one is the result of a sweep, if `only` matches no dataset of the results, if
+        another pattern matches neither that nor one that a result can have, or if nothing is left.
     ResultFileError
         If a file can't be read.
     OSError
@@ -222,11 +240,21 @@ def difference(
     left, right = _fitted(left, right), _fitted(right, left)
     shared = ON_TAPE if TAPES in forms else left.shapes.keys() | right.shapes
     in_a, in_b = left.shapes.keys() & shared, right.shapes.keys() & shared
-    chosen = _chosen(in_a | in_b, only)
+    both = in_a | in_b
+    asked = _chosen(both, only) if only else both
+    excluded = asked & _chosen(both, exclude, DATASETS)
+    chosen = asked - excluded
+    if excluded and not chosen:
+        raise IncomparableError("every dataset is excluded")
+    tolerances = dict.fromkeys(chosen, (rtol, atol))
+    for pattern, (relative, *absolute) in own:
+        for path in _chosen(both, [pattern], DATASETS) & chosen:
+            tolerances[path] = (relative, absolute[0] if absolute else atol)
     return Difference(
-        [_compare((left, right), path, rtol, atol) for path in sorted(in_a & in_b & chosen)],
+        [_compare((left, right), path, *tolerances[path]) for path in sorted(in_a & in_b & chosen)],
         (sorted((in_a - in_b) & chosen), sorted((in_b - in_a) & chosen)),
         _listed(left, right),
+        sorted(excluded),
     )
 
 
@@ -238,17 +266,19 @@ def _fitted(source: Source, other: Source) -> Source:
     return source
 
 
-def _chosen(names: set[str], only: Sequence[str]) -> set[str]:
-    """Names that `only` selects."""
-    if not only:
-        return names
+def _chosen(names: set[str], patterns: Sequence[str], known: Collection[str] = ()) -> set[str]:
+    """Names that match patterns or lie in groups that do; each must match one, or a known name."""
     chosen: set[str] = set()
-    for asked in only:
+    for asked in patterns:
         plain = asked.strip("/")
-        found = {name for name in names if name == plain or name.startswith(f"{plain}/")}
+        found = {
+            name
+            for name in names.union(known)
+            if fnmatchcase(name, plain) or name.startswith(f"{plain}/")
+        }
         if not found:
             raise IncomparableError(f"there is no `{asked}` to compare{suggestion(plain, names)}")
-        chosen |= found
+        chosen |= found & names
     return chosen
 
 
@@ -321,19 +351,34 @@ def _scale(found: Comparison) -> float:
 
     if found.path not in SCALE_NAMES:
         return found.maximum
-    group = found.path.partition("/")[0]
+    group, _, name = found.path.partition("/")
     if found.path == "energy/balance_error":
-        scale = max(map(largest, ENERGIES))
+        scale = max(map(_initial_energy, found.sources)) + largest("energy/external_work")
     elif found.path == "plies/residual":
         scale = max(largest("plies/tau_xz"), largest("plies/tau_yz"))
     elif found.path == "laminate/B":
         # With the thickness h, A h and D / h have the order of B.
         scale = (largest("laminate/A") * largest("laminate/D")) ** 0.5
+    elif group == "stresses":
+        kind = "N" if name in MEMBRANE["N"] else "eps"
+        membrane, bending = (
+            max(largest(f"stresses/{name}") for name in names[kind])
+            for names in (MEMBRANE, BENDING)
+        )
+        # sqrt(A/D) is of the order of 1/h.
+        ratio = (largest("laminate/A") / (largest("laminate/D") or np.inf)) ** 0.5
+        scale = max(membrane, bending * ratio if kind == "N" else ratio and bending / ratio)
     elif all(f"{group}/step" in source.shapes for source in found.sources):
         scale = largest(found.path, 0.0)
     else:
         scale = 0.0  # a tape has few digits of every number, also in free flight
     return scale or found.maximum
+
+
+def _initial_energy(source: Source) -> float:
+    """Initial energy of a result; 0 if it does not say."""
+    initial = source.groups.get("energy", {}).get("initial") if isinstance(source, Contents) else 0
+    return abs(float(initial)) if isinstance(initial, int | float) and np.isfinite(initial) else 0.0
 
 
 def _compare_texts(found: Comparison) -> None:
