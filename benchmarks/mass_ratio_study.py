@@ -23,8 +23,8 @@ from fecm.studies.estimate import estimate
 from fecm.studies.quick_models import LARGE, SMALL
 from fecm.sweeps.api import carry_out
 from fecm.sweeps.plan import plan
-from fecm.verification.damage import struck_square
 from fecm.verification.decks import result_of
+from fecm.verification.impacts import struck_square
 
 ROOT = Path(__file__).parent.parent
 NAMES = ("infinite plate", "static plate", "sweep kernel", "run")

@@ -16,8 +16,8 @@ from fecm.mechanics.laminate import laminate
 from fecm.results.result import Result
 from fecm.studies.estimate import static_stiffness
 from fecm.studies.quick_models import inelasticity, infinite_plate, static_plate
-from fecm.verification.damage import struck_square
 from fecm.verification.decks import result_of
+from fecm.verification.impacts import struck_square
 from tests.builders import report_plate, table
 from tests.calls import call
 from tests.decks import small

@@ -16,9 +16,10 @@ from fecm.mechanics import element_matrices
 from fecm.mechanics import laminate as laminates
 from fecm.mechanics.contact_law import LinearPermanent
 from fecm.problem.generate import generate
-from fecm.verification import AGAINST_CHANGE, CASES, CONSISTENCY, carry_out, chosen, series, table
+from fecm.verification import CASES, carry_out, chosen, table
 from fecm.verification.case import Case, Check, Row
 from fecm.verification.decks import report_impact
+from tests import closed_forms
 from tests.builders import table as reference
 from tests.calls import assert_unusable, call
 from tests.decks import LONG, ROOT
@@ -132,7 +133,38 @@ def test_numbers_that_are_missing_or_not_finite_are_never_within() -> None:
         assert table.cells(row)[-1] == "FAILED"
 
 
+def test_of_a_field_the_value_farthest_from_the_expected_one_counts() -> None:
+    check = Check("x", 2.0, "nowhere", 0.1, "")
+    shape = np.array([1.0, 0.5, -1.0])
+    for given, got in (
+        (np.array([[2.1, 1.7], [2.2, 2.0]]), 1.7),
+        (np.array([2.0, math.nan, 1.0]), math.nan),
+        ((2.0 * shape, shape), 2.0),
+        ((2.0 * shape - [0.0, 0.3, 0.1], shape), 1.7),
+    ):
+        (row,) = carry_out(Case("made", "", (check,), lambda given=given: [given]))  # type: ignore[misc]
+        assert row.got == pytest.approx(got, nan_ok=True)
+
+
 # Figures -----------------------------------------------------------------------------------------
+
+# Cases with independent figures that are stated, and compared with references below.
+STATED = {
+    "static-bending", "frequencies", "wave-fronts", "dispersion", "rod-pulse", "infinite-plate",
+    "supported-plate", "patch-impact", "failure", "threshold", "small-mass", "large-mass",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("one", CASES, ids=lambda one: one.name)
+def test_expected_values_are_those_of_closed_forms(one: Case) -> None:
+    derived = closed_forms.EXPECTED.get(one.name, [None] * len(one.checks))
+    for check, value in zip(one.checks, derived, strict=True):
+        if value is not None:
+            assert check.expected == pytest.approx(value, rel=1e-10, abs=0.0), check.quantity
+        elif check.label == "independent":
+            assert one.name in STATED, check.quantity
+        if check.scale is not None and one.name in closed_forms.SCALES:
+            assert check.scale == pytest.approx(closed_forms.SCALES[one.name], rel=1e-10)
 
 
 def test_the_deck_made_in_python_is_the_reports() -> None:
@@ -192,8 +224,8 @@ def test_the_supported_plates_figures_are_the_steps_of_its_modes() -> None:
     h, m, k, steps, end = 0.03, 5.0e-6, 1.0e5, 3000, 200e-6
     e, nu, dt = 1.0e7, 0.3, end / steps
     q = e / (1.0 - nu**2) * np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, (1 - nu) / 2]])
-    a, b, _ = series.terms(39)
-    omega, shapes = series.TwoLayers(q, q, e / 2.6 * np.eye(2), h).modes(a, b)
+    a, b, _ = closed_forms.terms(39)
+    omega, shapes = closed_forms.TwoLayers(q, q, e / 2.6 * np.eye(2), h).modes(a, b)
     w, phi = omega.ravel(), shapes[:, 2].ravel()
     moves = np.abs(phi) > 1e-9 * np.abs(phi).max()
     w, phi = w[moves], phi[moves]
@@ -219,14 +251,14 @@ def test_the_supported_plates_figures_are_the_steps_of_its_modes() -> None:
 def test_the_series_of_two_layers_are_mindlins_where_both_are_the_same_isotropic_ply() -> None:
     g, h, nu = 1.0 / 2.6, 0.1, 0.3
     q = np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, (1 - nu) / 2]]) / (1.0 - nu**2)
-    plate = series.TwoLayers(q, q, g * np.eye(2), h)
+    plate = closed_forms.TwoLayers(q, q, g * np.eye(2), h)
     density = plate.inertia[0] / h
     for quantity, m, n in (("ω11, lumped", 1, 1), ("ω13, lumped", 1, 3), ("ω33, cons", 3, 3)):
         omega = plate.modes(np.array(m * np.pi), np.array(n * np.pi))[0]
         scaled = omega * math.sqrt(density * h / (h**3 / 12.0 / (1.0 - nu**2)))
         expected = check_of("frequencies", quantity).expected
         assert np.abs(scaled / expected - 1.0).min() < 1e-11
-    a, b, loads = series.terms(199)
+    a, b, loads = closed_forms.terms(199)
     K = plate.modal_stiffness(a, b)[:, 2:, 2:]
     w = np.linalg.solve(K, loads[:, None, None] * np.eye(3)[:, :1])[:, 0, 0].sum()
     assert w == pytest.approx(check_of("static-bending", "w in the middle, L2").expected, rel=1e-6)
@@ -246,9 +278,10 @@ def test_rows_are_called_independent_only_where_they_are() -> None:
         ("rod-pulse", "mass of the report's projectile (lb s²/in)"),
         ("indentation", "F(α_p), 0.5 in indenter (lb)"),
     ):
-        assert labels[case, quantity] == AGAINST_CHANGE
-    assert labels["report-impact", "worst error of the energy balance"] == CONSISTENCY
-    assert labels["convolution", "largest difference of the forces"] == CONSISTENCY
+        assert labels[case, quantity] == "against change"
+    assert labels["report-impact", "worst error of the energy balance"] == "consistency"
+    assert labels["convolution", "largest difference of the forces"] == "consistency"
+    assert set(labels.values()) == {"independent", "consistency", "against change"}
 
 
 def test_figures_of_series_and_of_waves_are_those_of_the_reference_files() -> None:
@@ -276,8 +309,15 @@ def test_figures_of_series_and_of_waves_are_those_of_the_reference_files() -> No
         assert check_of("frequencies", quantity).expected == pytest.approx(value, rel=1e-11)
     (along,) = [r for r in reference("waves_normal_velocity.csv") if r["theta_deg"] == "0"]
     given = [float(value) for value in list(along.values())[1:6]]
-    fronts = [check.expected for check in chosen(["wave-fronts"])[0].checks[:5]]
-    assert fronts == pytest.approx(given, rel=1e-13)
+    fronts = [check.expected for check in chosen(["wave-fronts"])[0].checks]
+    assert fronts[:5] == pytest.approx(given, rel=1e-13)
+    columns = ("c_n_in/s", "ray_dir_deg")
+    given = [of("waves_wavefront_rays.csv", "extension", c, normal_deg="45") for c in columns]
+    assert fronts[5:] == pytest.approx(given, rel=1e-10)
+    for quantity, ratio in (("ω, wavelength 10 h", "10"), ("ω, wavelength h", "1")):
+        value = of("waves_dispersion.csv", "0", "mode1_omega_rad/s", alpha_deg="0",
+                   **{"lambda_over_h": ratio})  # fmt: skip
+        assert check_of("dispersion", quantity).expected == pytest.approx(value, rel=1e-10)
 
 
 def test_figures_of_patches_and_plies_are_those_of_the_reference_files() -> None:

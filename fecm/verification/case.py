@@ -1,18 +1,30 @@
 """Verification cases.
 
-A case computes a few values; each of its checks states the expected value, its source, the
-tolerance and the reason for the tolerance.  A check is independent if the expected value is a
-closed form or an external reference, a consistency check if two computations by this program must
-agree, and otherwise guards against change.
+A case computes a few values; its checks state the expected ones.  A check is independent if the
+expected value is a closed form or an external reference, a consistency check if two computations by
+this program must agree, and otherwise guards against change.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+import tomllib
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib import resources
+from typing import Any
 
-INDEPENDENT, CONSISTENCY, AGAINST_CHANGE = "independent", "consistency", "against change"
+import numpy as np
+
+from fecm._typing import Floats
+
+TABLES: dict[str, dict[str, Any]] = tomllib.loads(
+    (resources.files("fecm.verification") / "checks.toml").read_text("utf-8")
+)
+# A number; a field, of which the value farthest from the expected one counts; or a field and its
+# expected shape, of which the amplitude at the point farthest from the expected field counts.
+Value = float | Floats | tuple[Floats, Floats]
+Compute = Callable[[], Sequence[Value]]
 
 
 @dataclass(frozen=True)
@@ -32,7 +44,7 @@ class Check:
     why : str
         Reason for the tolerance.
     label : str
-        `INDEPENDENT`, `CONSISTENCY` or `AGAINST_CHANGE`.
+        ``independent``, ``consistency`` or ``against change``.
     scale : float or None
         Reference of the relative error; None for the expected value.
     """
@@ -42,42 +54,18 @@ class Check:
     source: str
     tolerance: float
     why: str
-    label: str = INDEPENDENT
+    label: str = "independent"
     scale: float | None = None
-
-    def error(self, got: float) -> float:
-        """Return the relative error of a computed value."""
-        return (got - self.expected) / abs(self.expected if self.scale is None else self.scale)
-
-
-def checks(
-    quantities: str, values: Iterable[float], source: str, tolerance: float, why: str
-) -> tuple[Check, ...]:
-    """Return checks of several quantities, separated by commas, that differ only in the value."""
-    names = quantities.split(", ")
-    return tuple(
-        Check(name, value, source, tolerance, why)
-        for name, value in zip(names, values, strict=True)
-    )
 
 
 @dataclass(frozen=True)
 class Case:
-    """Quantities computed together.
-
-    Attributes
-    ----------
-    name, title : str
-        Name and description.
-    checks : tuple of Check
-    compute : callable
-        Returns one value per check, in order.
-    """
+    """Quantities computed together: `compute` returns one value per check, in order."""
 
     name: str
     title: str
     checks: tuple[Check, ...]
-    compute: Callable[[], Sequence[float]]
+    compute: Compute
 
 
 @dataclass(frozen=True)
@@ -103,7 +91,8 @@ class Row:
     @property
     def error(self) -> float:
         """Signed relative error."""
-        return self.check.error(self.got)
+        scale = self.check.expected if self.check.scale is None else self.check.scale
+        return (self.got - self.check.expected) / abs(scale)
 
     @property
     def within(self) -> bool:
@@ -111,11 +100,22 @@ class Row:
         return abs(self.error) <= self.check.tolerance
 
 
-def case(name: str, title: str, *checks: Check) -> Callable[[Callable[[], Sequence[float]]], Case]:
-    """Return a decorator that makes a case of the function that computes its values."""
+CASE_OF: dict[str, Case] = {}
 
-    def made(compute: Callable[[], Sequence[float]]) -> Case:
-        return Case(name, title, checks, compute)
+
+def case(name: str) -> Callable[[Compute], Compute]:
+    """Return a decorator that makes a function compute a case of `checks.toml`."""
+    common = dict(TABLES[name])
+    title, groups = common.pop("title"), common.pop("checks")
+    checks = tuple(
+        Check(quantity, **(common | group | {"expected": expected}))
+        for group in groups
+        for quantity, expected in group["expected"].items()
+    )
+
+    def made(compute: Compute) -> Compute:
+        CASE_OF[name] = Case(name, title, checks, compute)
+        return compute
 
     return made
 
@@ -123,9 +123,10 @@ def case(name: str, title: str, *checks: Check) -> Callable[[Callable[[], Sequen
 def carry_out(one: Case) -> list[Row]:
     """Compute the rows of a case; an exception becomes the failure of all rows."""
     try:
-        numbers, failure = [float(number) for number in one.compute()], ""
-        if len(numbers) != len(one.checks):
-            raise ValueError(f"{len(numbers)} numbers for {len(one.checks)} checks")
+        values, failure = one.compute(), ""
+        if len(values) != len(one.checks):
+            raise ValueError(f"{len(values)} numbers for {len(one.checks)} checks")
+        numbers = [_number(v, c.expected) for v, c in zip(values, one.checks, strict=True)]
     except Exception as error:  # any exception fails the rows
         failure = f"{type(error).__name__}: {error}".splitlines()[0]
         numbers = [math.nan] * len(one.checks)
@@ -135,9 +136,10 @@ def carry_out(one: Case) -> list[Row]:
     ]
 
 
-def farthest(values: Iterable[float], expected: float) -> float:
-    """Return the value farthest from the expected value; NaN if any value is NaN."""
-    every = list(values)
-    if any(math.isnan(value) for value in every):
-        return math.nan
-    return max(every, key=lambda value: abs(value - expected))
+def _number(value: Value, expected: float) -> float:
+    """Return what counts of a value; NaN if any part of it is NaN."""
+    if isinstance(value, tuple):
+        off = (value[0] - expected * value[1]).ravel()
+        return expected + float(off[np.abs(off).argmax()])
+    field = np.ravel(value)
+    return float(field[np.abs(field - expected).argmax()])

@@ -1,4 +1,4 @@
-"""Plates against closed forms: patches, statics, frequencies, the critical time step."""
+"""Simply supported plates against series: statics, frequencies, motion, stresses of plies."""
 
 from __future__ import annotations
 
@@ -9,121 +9,43 @@ from dataclasses import replace
 import numpy as np
 
 from fecm._typing import Floats
-from fecm.deck.grid import Grid, uniform
-from fecm.deck.model import Coordinates, Deck
-from fecm.deck.records import Macro, NodeValues
-from fecm.mechanics.mesh import Mesh
-from fecm.mechanics.time_step import critical_time_step
+from fecm.deck.catalogue import MATERIALS
+from fecm.deck.grid import Grid, lines, uniform
+from fecm.deck.model import Deck, Gages, Patch, Segment, Shear
+from fecm.deck.records import Gage, LoadTable, Macro, Ply
 from fecm.problem.build import build_plate
 from fecm.problem.generate import generate
-from fecm.verification.case import Check, case, checks, farthest
+from fecm.results.result import Result
+from fecm.verification.case import Value, case
 from fecm.verification.decks import (
-    constant_strains,
+    ANGLE_PLY,
+    CROSS_PLY,
+    MITC,
+    REPORT_PLY,
+    SUPPORTED,
     deck,
-    farthest_of,
-    forces,
+    fields,
     isotropic,
     material,
+    program,
     quarter_plate,
     result_of,
+    supports,
 )
-from fecm.verification.laminates import FIBRES, Q11, Q12, Q22, THICK
+from fecm.verification.parts import FIBRES
 
-STATICS = (Macro("TANG"), Macro("FORM"), Macro("SOLV"))
-
-# Patch: uniform midplane strains and curvatures.
-STRAIN = (1e-3, 2e-3, 3e-3)
-CURVATURE = (0.4, -0.5, 0.6)
-# Corners of its four elements: no side is parallel to another or to an axis.
-CORNERS = np.array(
-    [
-        [(0.0, 0.0), (1.1, -0.1), (2.0, 0.1)],
-        [(-0.1, 0.9), (1.2, 1.1), (2.1, 0.8)],
-        [(0.1, 2.0), (0.9, 2.2), (2.0, 1.9)],
-    ]
-)
-MOMENT = (
-    (Q22 - Q11) * THICK**2 / 8.0 * STRAIN[0]
-    + (Q11 + Q22) * THICK**3 / 24.0 * CURVATURE[0]
-    + Q12 * THICK**3 / 12.0 * CURVATURE[1]
-)
-IN_PLANE = ("eps_xx", "eps_yy", "gamma_xy", "kappa_x", "kappa_y", "kappa_xy")
-EXACT = 1e-8
-IN_FIELD = "the field is one of the elements'; rounding of the solution"
-
-
-def patch() -> Deck:
-    """Build four distorted elements of [0/90] whose outer nodes have a constant-strain field."""
-    fine = np.empty((5, 5, 2))
-    fine[::2, ::2] = CORNERS
-    fine[::2, 1::2] = (CORNERS[:, 1:] + CORNERS[:, :-1]) / 2.0
-    fine[1::2] = (fine[2::2] + fine[:-2:2]) / 2.0
-    x, y = fine.reshape(-1, 2).T
-    field = constant_strains(x, y, CURVATURE, strain=STRAIN)
-    grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
-    held = (1,) * 5
-    boundary = grid.boundary((0,) * 5, dict.fromkeys(("left", "right", "bottom", "top"), held))
-    outer = [n for n in range(25) if n // 5 in (0, 4) or n % 5 in (0, 4)]
-    coordinates = [
-        NodeValues(n, 0, place)
-        for n, place in enumerate(zip(x.tolist(), y.tolist(), strict=True), 1)
-    ]
-    segments = (
-        Coordinates(tuple(coordinates)), boundary, forces(field, outer),
-        material(FIBRES, (0.0, 90.0), THICK / 2.0),
-    )  # fmt: skip
-    return deck("patch", grid, segments, (*STATICS, Macro("STRE")))
-
-
-@case(
-    "patch",
-    "constant strain and curvature on distorted elements of [0/90]",
-    *checks("ε_x, ε_y, γ_xy, κ_x (1/in), κ_y (1/in), κ_xy (1/in)", (*STRAIN, *CURVATURE),
-            "the field put on the boundary", EXACT, IN_FIELD),
-    Check("γ_xz, γ_yz: the largest", 0.0, "θ is the slope of w", EXACT, IN_FIELD, scale=1e-3),
-    Check("M_x (lb)", MOMENT, "B11 ε_x + D11 κ_x + D12 κ_y", EXACT, IN_FIELD),
-)  # fmt: skip
-def patch_test() -> Sequence[float]:
-    """Of each strain the value farthest from the expected one."""
-    found = result_of(patch())
-    shears = farthest_of(found, "stresses", ("gamma_xz", "gamma_yz"), (0.0, 0.0))
-    return [
-        *farthest_of(found, "stresses", IN_PLANE, (*STRAIN, *CURVATURE)),
-        farthest(shears, 0.0),
-        *farthest_of(found, "stresses", ("M_x",), (MOMENT,)),
-    ]
-
-
-# Square plate of side 1, E = 1, nu = 0.3, density 1.
-E, NU = 1.0, 0.3
+DEFLECTION = program("TANG FORM SOLV DISP")
 ELEMENTS = 8  # of 16 a side
-NAVIER = "Navier's series, h/a = 1/{}"
-COARSE = "16 × 16 elements; falls with the 4th power of their size"
+ONE = isotropic(1.0, 0.3, 1.0)
 
 
-@case(
-    "static-bending",
-    "simply supported square plate under a uniform load, E = q = a = 1",
-    Check("w in the middle", 46.276346238, NAVIER.format(10), 2e-5, COARSE),
-    Check("w at a quarter", 24.460861870, NAVIER.format(10), 2e-5, COARSE),
-    Check("w in the middle, thin", 44380.045606, NAVIER.format(100), 2e-5, COARSE),
-    Check(
-        "w in the middle, κ = 5/6", 46.659437275,
-        "the same, shear moduli × 5/6", 2e-5, COARSE,
-    ),
-    Check("w in the middle, L2 = 3", 46.276346238, NAVIER.format(10), 5e-5, COARSE),
-    Check(
-        "w in the middle, thin, L2 = 3", 44380.045606, NAVIER.format(100), 2e-3,
-        "order 3 locks: 0.08 % on 16 × 16 elements; falls with the 3rd power of their size",
-    ),
-)  # fmt: skip
-def static_bending() -> Sequence[float]:
+@case("static-bending")
+def static_bending() -> Sequence[Value]:
     """Deflections, with transverse shear integrated by order 2, which does not lock, and 3."""
-    macros = (*STATICS, Macro("DISP"))
 
     def w(thickness: float, factor: float = 1.0, shear_order: int = 2) -> Floats:
-        plate = material(isotropic(E, NU, 1.0, factor), [0.0], thickness, shear_order)
-        row: Floats = result_of(quarter_plate(ELEMENTS, plate, macros, 1.0)).tape3.w[0]
+        plate = material(isotropic(1.0, 0.3, 1.0, factor), [0.0], thickness, shear_order)
+        row: Floats = result_of(quarter_plate(ELEMENTS, plate, DEFLECTION, 1.0)).tape3.w[0]
         return row
 
     across = 2 * ELEMENTS + 1
@@ -135,30 +57,13 @@ def static_bending() -> Sequence[float]:
     ]  # fmt: skip
 
 
-MINDLIN = "Mindlin, m = {}, n = {}, h/a = 1/10"
-SPECTRUM = "16 × 16 elements; falls with the 4th power of their size, grows with n⁴"
-UNIFORM = "uniform over the plate, so in every mesh's fields"
-RIGIDITY = E * 0.1**3 / (12.0 * (1.0 - NU**2))
-CUTOFF = math.sqrt(12.0 / (2.0 * (1.0 + NU))) / 0.1
-
-
-@case(
-    "frequencies",
-    "simply supported square plate, ω a² √(ρh/D)",
-    Check("ω11, lumped mass", 19.1478631568, MINDLIN.format(1, 1), 1e-5, SPECTRUM),
-    Check("ω13, lumped mass", 86.4824443014, MINDLIN.format(1, 3), 2e-4, SPECTRUM),
-    Check("ω11, consistent mass", 19.1478631568, MINDLIN.format(1, 1), 1e-5, SPECTRUM),
-    Check("ω33, consistent mass", 143.6190699617, MINDLIN.format(3, 3), 5e-4, SPECTRUM),
-    Check("cut-off ω, free plate, E = ρ = 1", CUTOFF, "√(12 G/ρ)/h", 1e-9, UNIFORM),
-)
-def frequencies() -> Sequence[float]:
+@case("frequencies")
+def frequencies() -> Sequence[Value]:
     """Frequencies of the symmetric modes, on a quarter of the plate, and of uniform shear."""
-    plate = material(isotropic(E, NU, 1.0), [0.0], 0.1, 2)
-    macros = (
-        Macro("LMAS"), Macro("EIGE", value=4.0), Macro("CMAS"), Macro("EIGE", value=4.0),
-    )  # fmt: skip
+    plate = material(ONE, [0.0], 0.1, 2)
+    macros = program("LMAS EIGE=4 CMAS EIGE=4")
     found = result_of(quarter_plate(ELEMENTS, plate, macros)).modes.angular_frequency
-    scaled = found * math.sqrt(0.1 / RIGIDITY)
+    scaled = found * math.sqrt(0.1 / (0.1**3 / (12.0 * (1.0 - 0.3**2))))
     # Modes 11, 13 and 31, 33 with the lumped mass, then with the consistent mass.
     return [scaled[0], scaled[1], scaled[4], scaled[7], _shear_frequency()]
 
@@ -166,51 +71,150 @@ def frequencies() -> Sequence[float]:
 def _shear_frequency() -> float:
     """Rayleigh quotient of a free plate in uniform transverse shear."""
     grid = Grid(uniform(0.7, 2), uniform(1.3, 2))
-    plate = material(isotropic(E, NU, 1.0), [0.0], 0.1)
     held = grid.boundary((1, 1, 1, 0, 1), {})
-    made = deck("shear", grid, (grid.coordinates(), held, plate), ())
+    made = deck(grid, (held, material(ONE, [0.0], 0.1)), ())
     model = build_plate(made, generate(made))
     ones = np.ones(model.neq)
     return math.sqrt(float(ones @ (model.stiffness @ ones)) / float(model.mass @ ones))
 
 
-# A single square element of which one dof of the centre node is free: its shape function is
-# (1 - xi^2)(1 - eta^2), and its lumped mass 4/9 of the element's.
-SIDE, THIN = 0.3, 0.1
-PLY = isotropic(1.0e7, 0.3, 2.5e-4)
-GRADIENT, SQUARE = 256.0 / 45.0, (16.0 / 15.0) ** 2 / 4.0 * SIDE**2
-MASS = 4.0 / 9.0 * PLY.density * THIN * SIDE**2
-BEND = (PLY.e1 / (1.0 - 0.3**2) + PLY.g12) * THIN**3 / 12.0 * GRADIENT / 2.0
-TILT = math.sqrt(MASS * THIN**2 / 12.0 / (BEND + PLY.g13 * THIN * SQUARE))
-INTEGRATED = "the rule integrates these polynomials exactly"
+# Coupled laminates -------------------------------------------------------------------------------
+
+FEWER = 6  # of 12 a side
+H = 0.1
 
 
-@case(
-    "time-step",
-    "critical time step of a 9-node square with one free dof at its centre",
-    Check(
-        "w free (s)", math.sqrt(5.0) / 4.0 * SIDE * math.sqrt(PLY.density / PLY.g13),
-        "2/ω = (√5/4) a √(ρ/G)", 1e-10, INTEGRATED,
-    ),
-    Check(
-        "θ_x free (s)", 2.0 * TILT, "K = 128/45 (D11 + D66) + 64/225 G h a²", 1e-10,
-        INTEGRATED,
-    ),
-)  # fmt: skip
-def time_step() -> Sequence[float]:
-    """Time step 2/ω of the only mode."""
-    grid = Grid(uniform(SIDE, 1), uniform(SIDE, 1))
-    made = deck("element", grid, (grid.coordinates(), material(PLY, [0.0], THIN)), ())
-    return [_critical(made, dof) for dof in (2, 3)]
+def two_layers(angles: Sequence[float], codes: str, mode: int, node: int) -> Sequence[Value]:
+    """Frequencies of the first and another mode; w in the middle and u at a node under a load."""
+
+    def made(shear_order: int, load: float, macros: Sequence[Macro]) -> Result:
+        card = material(FIBRES, angles, H / 2.0, shear_order)
+        return result_of(quarter_plate(FEWER, card, macros, load, codes))
+
+    modes = [made(n, 0.0, program("LMAS EIGE=3")).modes.angular_frequency for n in (2, 3)]
+    first, second = (made(n, 1.0, DEFLECTION).tape3.displacement[0] for n in (2, 3))
+    return [modes[0][0], modes[0][mode], modes[1][0], first[0, 2], first[node, 0], second[0, 2]]
 
 
-def _critical(made: Deck, dof: int) -> float:
-    """Critical time step where one dof of node 5, the centre, is free."""
-    mesh = generate(made)
-    codes, equations = np.ones_like(mesh.codes), np.zeros_like(mesh.equations)
-    codes[4, dof], equations[4, dof] = 0, 1
-    held: Mesh = replace(mesh, codes=codes, equations=equations)
-    return critical_time_step(build_plate(made, held))
+@case("cross-ply-plate")
+def cross_ply_plate() -> Sequence[Value]:
+    """Frequencies and deflections of [0/90]."""
+    return two_layers((0.0, 90.0), CROSS_PLY, 1, 2 * FEWER)
 
 
-CASES = (patch_test, static_bending, frequencies, time_step)
+@case("angle-ply-plate")
+def angle_ply_plate() -> Sequence[Value]:
+    """Frequencies and deflections of [45/-45]."""
+    return two_layers((45.0, -45.0), ANGLE_PLY, 2, (2 * FEWER + 1) * 2 * FEWER)
+
+
+@case("forced-plate")
+def forced_plate() -> Sequence[Value]:
+    """Last rows of tape3 and of a gage of [0/90] under a uniform load that varies as sin²."""
+    # One of the 2 x 2 points where the strains of a 9-node element are most accurate; the face away
+    # from the load.
+    root = (1.0 - 1.0 / np.sqrt(3.0)) / 2.0 * 0.5 / FEWER
+    gage = Gage(1, float(f"{1 / 12 + root:.9g}"), float(f"{0.25 + root:.9g}"), H / 2.0, 30.0)
+    steps = program("LMAS DT=1.08e-7 PROP=1 LOOP=600 TIME EXCD DISP=600 NEXT")
+    card = material(FIBRES, (0.0, 90.0), H / 2.0, 2)
+    made = quarter_plate(FEWER, card, steps, 1.0, CROSS_PLY, [Gages((gage,))])
+    table = LoadTable(1, 2, 0.0, 1.0, (0.0, 0.0, 1.0, 5.0e4, 0.0))
+    found = result_of(replace(made, tables=(table,)))
+    return [found.tape3.w[-1, 0], found.gages.strain[-1, 0]]
+
+
+# Contact patches and shear -----------------------------------------------------------------------
+
+SIDES = (6.0, 4.0)
+# Pagano's ply.
+STIFF = Ply(1.0, 0.25, 25.0, 1.0, 0.5, 0.5, 0.2)
+CROSS = (0.0, 90.0, 0.0)
+
+
+def rectangle(along: int, patch: Patch, macros: Sequence[Macro], *others: Segment) -> Deck:
+    """Build a simply supported [0/90]5s of the report's ply with MITC, pressed on a patch."""
+    grid = Grid(uniform(SIDES[0], along), uniform(SIDES[1], along * 2 // 3))
+    plate = material(REPORT_PLY, 5 * (0.0, 90.0) + 5 * (90.0, 0.0), 0.106 / 20)
+    return deck(grid, (supports(grid, SUPPORTED), patch, *others, MITC, plate), macros)
+
+
+@case("patch-compliance")
+def compliance() -> Sequence[Value]:
+    """Mean of w, weighted by the pressure."""
+    found = []
+    for shape in ("DISC", "HERT"):
+        patch = Patch(shape, 0.5, SIDES[0] / 2.0, SIDES[1] / 2.0, 1.0)
+        result = result_of(rectangle(12, patch, DEFLECTION))
+        found.append(result.tape3.w[0, result["patch/node"] - 1] @ result["patch/weight"])
+    return found
+
+
+@case("assumed-shear")
+def assumed_shear() -> Sequence[Value]:
+    """Deflections of a plate of four times four elements a quarter."""
+    plates = (quarter_plate(4, material(ONE, [0.0], h), DEFLECTION, 1.0, others=[MITC])
+              for h in (0.1, 0.001))  # fmt: skip
+    return [result_of(made).tape3.w[0, 0] for made in plates]
+
+
+@case("equilibrium-shear")
+def equilibrium_shear() -> Sequence[Value]:
+    """Transverse shear stiffness of the plates of two decks."""
+
+    def shear(ply: Ply, angles: Sequence[float]) -> Floats:
+        plate = material(ply, angles, 1.0 / len(angles))
+        made = quarter_plate(1, plate, (), others=[Shear(equilibrium=True)])
+        return build_plate(made, generate(made)).laminate.shear.diagonal()
+
+    return [shear(ONE, [0.0])[0] / ONE.g13, *shear(STIFF, CROSS)]
+
+
+# Stresses of plies -------------------------------------------------------------------------------
+
+
+def bent(
+    ply: Ply, angles: Sequence[float], thickness: float = H, word: str = "PLYS", *others: Segment
+) -> Result:
+    """Run a simply supported square under q = cos(pi x) cos(pi y), its origin in the middle."""
+    along = np.cos(np.pi * np.array(lines(uniform(0.5, ELEMENTS))))
+    plate = material(ply, angles, thickness / len(angles), points=2)
+    macros, load = program(f"TANG FORM SOLV STRE {word}"), np.outer(along, along)
+    return result_of(quarter_plate(ELEMENTS, plate, macros, load, others=[MITC, *others]))
+
+
+@case("ply-stresses")
+def sinusoidal() -> Sequence[Value]:
+    """Stresses and their shapes."""
+    found = bent(STIFF, CROSS)
+    x, y = fields(found, "stresses", "x y")
+    even, odd = np.cos(np.pi * x) * np.cos(np.pi * y), np.sin(np.pi * x) * np.sin(np.pi * y)
+    x, y = x.mean(axis=1), y.mean(axis=1)
+    one, two, shear, xz, yz = (
+        field[0] for field in fields(found, "plies", "sigma_1 sigma_2 tau_12 tau_xz tau_yz")
+    )
+    return [
+        (one[:, :, 2, 1], even), (two[:, :, 2, 1], even), (shear[:, :, 2, 1], odd),
+        (one[:, :, 1, 1], even), (xz[:, 1, 1], np.sin(np.pi * x) * np.cos(np.pi * y)),
+        (yz[:, 1, 1], np.cos(np.pi * x) * np.sin(np.pi * y)),
+    ]  # fmt: skip
+
+
+@case("ply-shear")
+def homogeneous() -> Sequence[Value]:
+    """Stresses at heights of the third ply, and at the faces, and their shape."""
+    found = bent(ONE, (0.0,) * 4)
+    x, y = (place.mean(axis=1) for place in fields(found, "stresses", "x y"))
+    shape = np.sin(np.pi * x) * np.cos(np.pi * y)
+    tau = found["plies/tau_xz"][0]
+    at_faces = (tau[:, [0, 3], [0, 2]], shape[:, None])
+    return [*((tau[:, 2, height], shape) for height in (0, 2, 1)), at_faces]
+
+
+@case("failure")
+def failure() -> Sequence[Value]:
+    """Reciprocals of the largest exposures under a load of 1 Pa."""
+    named = MATERIALS["T300/5208"]
+    strengths = named.allowables("m-N-s")
+    assert strengths is not None
+    found = bent(named.ply, (0.0, 90.0, 90.0, 0.0), 0.01, "FAIL", strengths)
+    return [1.0 / found[f"failure/{name}/exposure"].max() for name in ("max_stress", "tsai_wu")]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
 from typing import Any
 
-from fecm.verification import CASES
-from fecm.verification.case import Case, Row
+from fecm.verification.case import CASE_OF, Case, Row
 
 HEAD = ("case", "source", "quantity", "expected", "got", "error", "allowed", "label", "verdict")
 FINE, NOT_FINE = "ok", "FAILED"
@@ -39,17 +39,15 @@ def lines(cases: Sequence[Case], rows: Iterable[Row]) -> Iterator[str]:
     rows : iterable of Row
     """
     # Numbers of nine digits are at most 15 wide, errors 8.
-    known = [(one.name, c.source, c.quantity, "", "", "", f"{c.tolerance:g}", c.label)
-             for one in cases for c in one.checks]  # fmt: skip
-    least = (0, 0, 0, 15, 15, 8, 0, 0)
+    known = [cells(Row(one.name, check, math.nan)) for one in cases for check in one.checks]
+    least = (0, 0, 0, 15, 15, 8, 0, 0, 0)
     widths = [
         max(minimum, *map(len, column))
-        for minimum, column in zip(least, zip(HEAD[:-1], *known, strict=True), strict=True)
+        for minimum, column in zip(least, zip(HEAD, *known, strict=True), strict=True)
     ]
 
     def line(texts: Sequence[str]) -> str:
-        padded = [text.ljust(width) for text, width in zip(texts[:-1], widths, strict=True)]
-        return "  ".join([*padded, texts[-1]])
+        return "  ".join(map(str.ljust, texts, widths)).rstrip()
 
     yield line(HEAD)
     for row in rows:
@@ -112,14 +110,10 @@ COLUMNS = ("quantity", "source", "expected", "got", "error", "allowed", "because
 
 def page(rows: Iterable[Row]) -> str:
     """Return the documentation page in Markdown."""
-    of_case: dict[str, list[Row]] = {}
-    for row in rows:
-        of_case.setdefault(row.case, []).append(row)
     text = [INTRODUCTION]
-    for one in CASES:
-        if one.name in of_case:
-            text += ["", f"## `{one.name}`: {one.title}", "", _row(COLUMNS), "|---" * 8 + "|"]
-            text += [_row(_cells(row)) for row in of_case[one.name]]
+    for name, group in groupby(rows, key=lambda row: row.case):
+        text += ["", f"## `{name}`: {CASE_OF[name].title}", "", _row(COLUMNS), "|---" * 8 + "|"]
+        text += [_row(_cells(row)) for row in group]
     return "\n".join([*text, ""])
 
 

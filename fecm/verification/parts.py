@@ -1,0 +1,179 @@
+"""Parts of the program by themselves: laminates, waves, rods, the indentation law (lb, in, s).
+
+Layer 1 lies at z = -h/2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from scipy.linalg import eigh
+
+from fecm.deck.records import Ply
+from fecm.mechanics.contact_law import (
+    ContactPoint,
+    HystereticLaw,
+    LinearPermanent,
+    YangSunPermanent,
+    follow,
+)
+from fecm.mechanics.delamination import effective_rigidity, threshold_force
+from fecm.mechanics.laminate import Laminate, laminate
+from fecm.mechanics.projectile import Rod, report_rod
+from fecm.mechanics.rod_integrators import CONSISTENT
+from fecm.studies.rod_test.pulse_test import simulate_pulse
+from fecm.studies.rod_test.pulses import GaussPulse, SinePulse
+from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
+from fecm.verification.case import Value, case
+from fecm.verification.decks import REPORT_ANGLES, REPORT_PLY, REPORT_THICKNESS, isotropic
+
+# A ply of the report's kind, with a different G23, and the thickness of two layers.
+FIBRES = Ply(2.5e-4, 0.3, 17.5e6, 1.15e6, 0.8e6, 0.8e6, 0.5e6)
+THICK = 0.02
+
+
+@case("isotropic-ply")
+def isotropic_ply() -> Sequence[Value]:
+    """A, B, D, shear, mass and inertia."""
+    h, plate = 0.1, 1.0e7 / (1.0 - 0.3**2)
+    made = laminate(isotropic(1.0e7, 0.3, 2.5e-4), [30.0], [h])
+    vanishing = [*made.A[:2, 2] / h, *made.B.ravel() / h**2, *made.D[:2, 2] / h**3]
+    return [
+        made.A[0, 0], made.A[0, 1], made.A[2, 2], np.abs(vanishing).max() / plate,
+        made.D[0, 0], made.D[0, 1], made.D[2, 2], made.shear[0, 0], made.mass, made.rotary_inertia,
+    ]  # fmt: skip
+
+
+@case("cross-ply")
+def cross_ply() -> Sequence[Value]:
+    """A, B, D and shear."""
+    made = laminate(FIBRES, [0.0, 90.0], [THICK / 2.0] * 2)
+    return [
+        made.A[0, 0], made.A[0, 1], made.A[2, 2], made.B[0, 0], made.B[1, 1], made.D[0, 0],
+        made.D[2, 2], made.shear[0, 0],
+    ]  # fmt: skip
+
+
+@case("angle-ply")
+def angle_ply() -> Sequence[Value]:
+    """A, B, D, and the coupling of transverse shear of a ply at 45 degrees."""
+    made = laminate(FIBRES, [45.0, -45.0], [THICK / 2.0] * 2)
+    a11 = made.A[0, 0]
+    return [
+        a11, made.A[0, 1], made.A[2, 2], made.A[0, 2] / a11, made.B[0, 2],
+        made.B[0, 0] / (a11 * THICK), made.D[0, 0], made.D[2, 2],
+        laminate(FIBRES, [45.0], [THICK]).shear[0, 1],
+    ]  # fmt: skip
+
+
+def report_laminate() -> Laminate:
+    """Stack [0/45/0/-45/0]2s of the report's graphite/epoxy."""
+    return laminate(REPORT_PLY, REPORT_ANGLES, [REPORT_THICKNESS] * len(REPORT_ANGLES))
+
+
+@case("threshold")
+def threshold() -> Sequence[Value]:
+    """Threshold forces of one delamination."""
+    plates = ((laminate(isotropic(60e3, 0.3, 1.0), [0.0], [2.0]), 0.8), (report_laminate(), 2.9))
+    return [threshold_force(effective_rigidity(plate), toughness) for plate, toughness in plates]
+
+
+# Waves -------------------------------------------------------------------------------------------
+
+
+@case("wave-fronts")
+def wave_fronts() -> Sequence[Value]:
+    """Normal velocities, and a ray."""
+    found = WaveSurfaces(Medium(report_laminate())).fronts([0.0, 45.0])
+    names = ("extension", "in_plane_shear", "bending", "twisting", "transverse_shear")
+    extension = FRONTS.index("extension")
+    return [
+        *found.velocity[0, [FRONTS.index(name) for name in names]], found.velocity[1, extension],
+        found.ray_angle[1, extension],
+    ]  # fmt: skip
+
+
+@case("dispersion")
+def harmonic() -> Sequence[Value]:
+    """Angular frequencies."""
+    found = dispersion(Medium(report_laminate()), 0.0, [10.0, 1.0, 1e5]).angular_frequency
+    first, last = MODES.index("flexural_1"), MODES.index("flexural_3")
+    return [found[0, first], found[1, first], found[2, last]]
+
+
+# Rods: the report's steel bar and its pulse, section 4.2 -----------------------------------------
+
+DT = 2e-7
+
+
+def bar(length: float) -> Rod:
+    """Build a bar of elements of 0.05 in."""
+    return Rod(length, (0.625,) * round(20 * length), 30.0e6, 7.33e-4)
+
+
+@case("rod-pulse")
+def rod_pulse() -> Sequence[Value]:
+    """Forces in the middle, final velocity, mass."""
+    pulse, later = (GaussPulse(1000.0, middle, 40e-6) for middle in (200e-6, 300e-6))
+    found = simulate_pulse(bar(1.0), pulse, DT, 600e-6, (0.5,))
+    second = simulate_pulse(bar(1.0), later, DT, 300e-6, (0.5,))
+    at = np.interp(250e-6, second.time, second.forces[:, 0])
+    velocity = found.accelerations[:, 2].sum() * DT
+    return [found.forces.max(), at, found.mean_ratios[0], velocity, report_rod().total_mass]
+
+
+@case("rod-waves")
+def rod_waves() -> Sequence[Value]:
+    """Speed of the pulse's centroid between two stations; frequencies."""
+    ends = (1.0, 4.0)
+    found = simulate_pulse(bar(5.0), SinePulse(1000.0, 8e-6), DT / 2.0, 29e-6, ends)
+    centroids = (found.time @ found.forces) / found.forces.sum(axis=0)
+    speed = (ends[1] - ends[0]) / (centroids[1] - centroids[0])
+    rods = (bar(1.0), bar(1.0).with_mass(CONSISTENT))
+    return [speed, found.forces[:, 1].max(), *map(_first_frequency, rods)]
+
+
+def _first_frequency(rod: Rod) -> float:
+    """Lowest angular frequency after that of the rigid motion."""
+    mass = rod.mass()
+    squares = eigh(rod.stiffness(), np.diag(mass) if mass.ndim == 1 else mass, eigvals_only=True)
+    return math.sqrt(float(squares[1]))
+
+
+# The indentation law along paths -----------------------------------------------------------------
+
+# The report's laminate with the 0.75 in indenter; the critical indentation of ACR.
+K, ALPHA_P, S_P, Q, ALPHA_CR = 1.912e6, 6.564e-4, 0.094, 2.0, 1.2e-3
+PEAK = 2e-3
+REMAINS = S_P * (PEAK - ALPHA_P)
+HALFWAY = (PEAK + REMAINS) / 2.0
+ACR_REMAINS = PEAK - ALPHA_CR**0.4 * PEAK**0.6
+
+
+@case("indentation")
+def indentation() -> Sequence[Value]:
+    """Forces at places of several paths, and the area of a loop."""
+    law, acr = (
+        HystereticLaw(permanent)
+        for permanent in (LinearPermanent(K, ALPHA_P, S_P, Q), YangSunPermanent(K, ALPHA_CR))
+    )
+
+    def path(*corners: float, points: int = 1, law: HystereticLaw = law) -> list[ContactPoint]:
+        return [point for point, _ in follow(law, corners, points)]
+
+    step = 1e-9 * PEAK
+    down, top = path(PEAK, HALFWAY, REMAINS), path(PEAK, PEAK - step)
+    turn, up = path(PEAK, HALFWAY, HALFWAY + step), path(PEAK, -PEAK, HALFWAY, PEAK)
+    work = sum(
+        (b.indentation - a.indentation) * (a.force + b.force) / 2.0
+        for a, b in pairwise(path(PEAK, 0.0, points=2000))
+    )
+    half_inch = LinearPermanent(k=1.330e6, alpha_p=ALPHA_P, s_p=S_P, q=2.5)
+    return [
+        half_inch.loading(ALPHA_P), *(point.force for point in down[1:]),
+        top[2].force - top[1].force, turn[3].force - turn[2].force, up[4].force, up[3].force, work,
+        *(p.force for p in path(PEAK, (PEAK + ACR_REMAINS) / 2.0, ACR_REMAINS, law=acr)[1:]),
+    ]  # fmt: skip
