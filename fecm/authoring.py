@@ -50,6 +50,7 @@ from fecm.objects import (
     Sphere,
     check_positive,
     grid_of,
+    pair,
     parse_patch,
 )
 from fecm.problem.build import build_plate, build_projectile, projectile_segment
@@ -180,7 +181,7 @@ def impact(
         raise DeckError(errors, "<deck>")
     for doubt in made.doubts:
         warnings.warn(FecmWarning(doubt), stacklevel=2)
-    return made.deck
+    return replace(loaded.problems[0].deck, text="")
 
 
 def author(
@@ -203,6 +204,13 @@ def author(
     title: str,
 ) -> Authored:
     """Make the deck of :func:`impact` without checking it."""
+    for name, value, kinds in (
+        ("plate", plate, Plate), ("laminate", laminate, Laminate), ("patch", patch, str | Patch),
+        ("projectile", projectile, Rod | RigidMass | Projectile),
+        ("contact", contact, str | Indentation | NamedContact | Sphere),
+    ):  # fmt: skip
+        if not isinstance(value, kinds) and (value is not None or name in ("plate", "laminate")):
+            raise ObjectError(f"`{name}` is {value!r}, not a {name} of fecm")
     check_positive(
         energy=energy, duration=duration, dt=dt, every=every, ply_thickness=laminate.ply_thickness
     )
@@ -210,6 +218,8 @@ def author(
         raise ObjectError(f"`shear` is {shear!r}, not {MITC} or {FULL}")
     if units is not None and units not in SYSTEMS:
         raise ObjectError(f"`units` is {units!r}, none of {', '.join(SYSTEMS)}")
+    if "\n" in title:
+        raise ObjectError("`title` has more than one line")
     notes: list[str] = []
     doubts: list[str] = []
     test = plate.fixture.test if plate.fixture else None
@@ -285,14 +295,18 @@ def author(
     coupled = stiffness_of(ply, angles, [laminate.ply_thickness] * len(angles)).is_coupled
     everywhere = (0, 0, 0, 0, 0) if coupled else (1, 1, 0, 0, 0)
     window = plate.fixture.window if plate.fixture else None
-    records = tuple(Gage(n, *map(float, gage)) for n, gage in enumerate(gages, start=1))
+    try:
+        records = tuple(Gage(n, *map(float, gage)) for n, gage in enumerate(gages, start=1))
+    except (TypeError, ValueError):
+        raise ObjectError("`gages` are not x, y, z and degrees of each") from None
     if isinstance(projectile, Rod | RigidMass):
         projectile = projectile_segment(projectile)
     segments = (
         None if units is None else Units(*SYSTEMS[units].values()),
         mesh.coordinates(), mesh.element_cards(),
         mesh.supported(everywhere, plate.supports, window), projectile,
-        Impact(node, 3, velocity or 1.0), patch, Gages(records) if records else None, *damages, law,
+        Impact(node, 3, 1.0 if velocity is None else velocity), patch,
+        Gages(records) if records else None, *damages, law,
         Shear(assumed=True) if shear == MITC else None,
         Material(Integration(ORDER, ORDER, NODAL_POINTS, laminate.thickness), ply, layers),
     )  # fmt: skip
@@ -384,9 +398,7 @@ def _mesh(
     plate: Plate, at: Sequence[float] | None, radius: float | None
 ) -> tuple[Grid | PlateMesh, tuple[float, float]]:
     """Mesh of the plate and the impact point."""
-    if at is not None and len(at) != 2:
-        raise ObjectError(f"`at` is {at!r}, not x and y")
-    place = None if at is None else (float(at[0]), float(at[1]))
+    place = None if at is None else pair("at", at)
     mesh = plate.imported or grid_of(plate, place, radius)
     low, high = mesh.extent
     if place is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from numbers import Real
 from pathlib import Path
 from typing import Literal, Self
 
@@ -226,11 +227,15 @@ class Plate:
         """
         if isinstance(mesh, tuple):
             found = plate_mesh(mesh[0], mesh[1], groups or {})
+        elif groups is not None:
+            raise ObjectError("`groups` are for arrays; a mesh has its own")
         elif isinstance(mesh, str | Path):
             found = read_mesh(mesh)
         else:
             found = from_meshio(mesh)
-        wanted = {BOUNDARY: support} if isinstance(support, str) else dict(support or {})
+        wanted = {BOUNDARY: support} if isinstance(support, str) else support or {}
+        if not isinstance(wanted, Mapping):
+            raise ObjectError(f"`support` is {support!r}, not a dictionary of groups")
         return cls(found.supports(wanted), imported=found)
 
 
@@ -263,7 +268,12 @@ class Laminate:
         """Angles of the plies, degrees."""
         if isinstance(self.layup, str):
             return tuple(parse_layup(self.layup))
-        return tuple(map(float, self.layup))
+        try:
+            if angles := tuple(map(float, self.layup)):
+                return angles
+        except (TypeError, ValueError):
+            pass
+        raise ObjectError(f"the layup {self.layup!r} is not a list of angles")
 
     @property
     def thickness(self) -> float:
@@ -392,25 +402,32 @@ def parse_patch(text: str) -> Patch | None:
 def check_positive(**values: float | None) -> None:
     """Refuse parameters that are not positive numbers; None is not given."""
     for name, value in values.items():
-        if value is not None and not (isinstance(value, int | float) and 0.0 < value < math.inf):
+        if value is not None and not (isinstance(value, Real) and 0.0 < value < math.inf):
             raise ObjectError(f"`{name}` is {value!r}; it must be a positive number")
+
+
+def pair(name: str, value: Sequence[float]) -> tuple[float, float]:
+    """Two numbers of a parameter."""
+    try:
+        x, y = map(float, value)
+    except (TypeError, ValueError):
+        raise ObjectError(f"`{name}` is {value!r}, not two numbers") from None
+    return x, y
 
 
 def _sides(size: Sequence[float]) -> tuple[float, float]:
     """Two positive lengths."""
-    if len(size) != 2:
-        raise ObjectError(f"`size` is {size!r}, not two lengths")
-    x, y = map(float, size)
-    check_positive(size=x)
-    check_positive(size=y)
+    x, y = pair("size", size)
+    check_positive(size=min(x, y))
     return x, y
 
 
 def _counts(mesh: Sequence[int]) -> tuple[int, int]:
     """Two numbers of elements."""
-    if len(mesh) != 2 or not all(1 <= n <= MOST and n == int(n) for n in mesh):
+    x, y = pair("mesh", mesh)
+    if not all(1 <= n <= MOST and n == int(n) for n in (x, y)):
         raise ObjectError(f"`mesh` is {mesh!r}, not two numbers of elements from 1 to {MOST}")
-    return int(mesh[0]), int(mesh[1])
+    return int(x), int(y)
 
 
 def grid_of(plate: Plate, at: tuple[float, float] | None, radius: float | None) -> Grid:

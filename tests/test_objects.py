@@ -120,6 +120,37 @@ def test_a_gmsh_circle_has_the_centre_stiffness_of_the_closed_form(
     assert stiffness == pytest.approx(float(row["value"]), rel=limit)
 
 
+def test_a_circle_of_straight_triangles_on_simple_supports_is_no_stiffer_than_a_circle() -> None:
+    meshio = pytest.importorskip("meshio", reason="meshes are read by meshio")
+    read = meshio.read(TRIANGLES)
+    six = np.concatenate([block.data for block in read.cells if block.type == "triangle6"])
+    parts = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]
+    plate = fecm.Plate.from_mesh(
+        (read.points, np.concatenate([six[:, p] for p in parts])), "simple"
+    )
+    (problem,) = load_deck(deck_on(plate)).problems
+    assert problem.contact is not None
+    rigidity = E * H**3 / 12.0 / (1.0 - NU**2)
+    stiffness = static_stiffness(problem.moving_plate, problem.contact) * R**2 / rigidity
+    assert stiffness == pytest.approx(19.8015537, rel=0.02)
+
+
+def test_the_centre_of_a_curved_triangle_is_that_of_its_shape_functions() -> None:
+    points = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, -0.3), (0.5, 0.5), (0.0, 0.5)]
+    made = fecm.Plate.from_mesh((points, [[0, 1, 2, 3, 4, 5]])).imported
+    assert made is not None
+    np.testing.assert_allclose(made.points[6], [1.0 / 3.0, 0.2], rtol=1e-5)
+
+
+def test_a_group_of_the_boundary_does_not_hold_a_side_inside() -> None:
+    cells = [[0, 1, 2], [0, 2, 3]]
+    made = fecm.Plate.from_mesh((SQUARE, cells), groups={"edge": [0, 1, 2, 3]}).imported
+    assert made is not None
+    on = made.points[made.groups["edge"]]
+    assert len(on) == 8
+    assert ((on == 0.0) | (on == 1.0)).any(axis=1).all()
+
+
 @pytest.mark.parametrize("path", [CIRCLE, TRIANGLES, HOLE], ids=lambda path: path.stem)
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_an_imported_mesh_passes_the_patch_test(path: Path, mirrored: bool) -> None:
@@ -408,6 +439,56 @@ def test_what_makes_no_deck_is_refused_in_the_words_of_the_call(
 def test_objects_that_make_no_sense_are_refused(make: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"projectile": 5.0}, {"contact": 5.0}, {"patch": 0.04}, {"plate": "x"}, {"laminate": "[0]"},
+        {"at": 5}, {"at": (1, 2, 3)}, {"gages": [(1, 2)]}, {"title": "a\nb"}, {"every": 2.5},
+        {"laminate": fecm.Laminate([], METAL.ply, 1.0)}, {"every": "x"},
+        {"laminate": fecm.Laminate(["x"], METAL.ply, 1.0)},  # type: ignore[list-item]
+        {"laminate": fecm.Laminate("[0]", (1, 2), 1.0)},  # type: ignore[arg-type]
+    ],
+)  # fmt: skip
+def test_what_is_of_another_type_is_refused(options: dict[str, Any]) -> None:
+    given: dict[str, Any] = {"plate": PLATE, "laminate": METAL, "projectile": MASS, "contact": LAW}
+    with pytest.raises(fecm.FecmError):
+        fecm.impact(**(given | QUICK | options))
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: fecm.Plate.from_mesh(5),  # type: ignore[arg-type]
+        lambda: fecm.Plate.from_mesh(CIRCLE, groups={"a": [1]}),
+        lambda: fecm.Plate.from_mesh((SQUARE, [[0, 1, 2, 3]]), ["boundary"]),  # type: ignore[arg-type]
+        lambda: fecm.Plate.rectangle(5, (1, 2)),  # type: ignore[arg-type]
+        lambda: fecm.Plate.rectangle((1, 2), ("a", 2)),  # type: ignore[arg-type]
+    ],
+)
+def test_plates_of_other_types_are_refused(make: Any) -> None:
+    with pytest.raises(fecm.FecmError):
+        make()
+
+
+def test_whole_numbers_make_the_same_deck_as_others() -> None:
+    four: Any = np.int64(4)
+    one: Any = np.float32(1.0)
+    whole = fecm.impact(
+        fecm.Plate.rectangle((100, 80), (four, 4)),
+        fecm.Laminate([0], fecm.Ply(1, 0, 2, 2, 1, 1, 1), one),
+        fecm.RigidMass(1), fecm.Contact(1, 0, 0, 2), velocity=1, duration=1,
+    )  # fmt: skip
+    floats = fecm.impact(
+        PLATE, fecm.Laminate([0.0], fecm.Ply(1.0, 0.0, 2.0, 2.0, 1.0, 1.0, 1.0), 1.0),
+        fecm.RigidMass(1.0), fecm.Contact(1.0, 0.0, 0.0, 2.0), velocity=1.0, duration=1.0,
+    )  # fmt: skip
+    assert whole.to_text() == floats.to_text()
+
+
+def test_a_velocity_of_zero_stays_zero() -> None:
+    assert deck_on(PLATE, velocity=0.0).require(Impact).velocity == 0.0
 
 
 def test_a_deck_with_errors_is_not_returned() -> None:

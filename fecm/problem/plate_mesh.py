@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -37,7 +37,7 @@ class MeshError(FecmError, ValueError):
     """A mesh cannot be used for a plate."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PlateMesh:
     """Quadrilaterals of 4 or 9 nodes, counter-clockwise in the deck's order.
 
@@ -55,8 +55,11 @@ class PlateMesh:
 
     points: Floats
     cells: Integers
-    groups: dict[str, Integers] = field(repr=False)
-    middles: Integers = field(repr=False)
+    groups: dict[str, Integers]
+    middles: Integers
+
+    def __repr__(self) -> str:
+        return f"<{self.nodes} nodes, {self.elements} elements, groups {list(self.groups)}>"
 
     @property
     def nodes(self) -> int:
@@ -194,10 +197,16 @@ def read_mesh(path: str | Path) -> PlateMesh:
 
 def from_meshio(read: MeshLike, where: str = "") -> PlateMesh:
     """Plate of a `meshio.Mesh`; see :func:`plate_mesh`."""
+    if not all(hasattr(read, name) for name in MeshLike.__annotations__):
+        raise MeshError(f"{read!r} is not a file, a meshio.Mesh, or points and cells")
     blocks = {n: block for n, block in enumerate(read.cells) if block.type not in LINES}
     kinds = sorted({block.type for block in blocks.values()})
     if len(kinds) != 1 or kinds[0] not in KINDS.values():
-        what = f"has {' and '.join(kinds)} elements" if kinds else "has no elements with an area"
+        what = (
+            f"has {' and '.join(kinds)} elements"
+            if kinds
+            else ("has no elements with an area (in Gmsh, give the surface a physical group too)")
+        )
         raise MeshError(
             f"{where}the mesh {what}; all must be triangles of 3 or 6 nodes, or all quadrilaterals "
             "of 4, 8 or 9"
