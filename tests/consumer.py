@@ -25,6 +25,7 @@ several: fecm.Result | list[fecm.Result] = fecm.run(Path("plates.inp"))
 deck: fecm.Deck = fecm.read_one("plate.inp")
 again: fecm.Result = fecm.run_one(deck, progress=lambda step, steps: print(step / steps))
 axes: Axes = result.plot("loop", ax=result.plot("force"), against="displacement")
+similarity: float = result.compare("shot-3.csv").correlation
 sweep: fecm.SweepResult = fecm.sweep(deck, {"velocity": [1.0, 2.0]}, workers=2)
 pooled: fecm.SweepResult = fecm.sweep(deck, {"k": [1e6]}, executor=ThreadPoolExecutor())
 peaks: xarray.DataArray = sweep.to_xarray().peak_force

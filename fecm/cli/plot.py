@@ -56,6 +56,9 @@ def _by_name(
 @click.option("--against", type=click.Choice(["indentation", "deflection", "displacement"]),
               help="Horizontal axis of loop: indentation, displacement of the plate under the "
                    "load, or of the projectile (the sum).  [default: indentation]")  # fmt: skip
+@click.option("--overlay", type=DECK_PATH, metavar="FILE.csv",
+              help="Measured force to draw over that of the kind force: columns time and force (or "
+                   "transducer) in the deck's units.  Notes compare both.")  # fmt: skip
 @click.option("--along", type=click.Choice(["x", "y"]),
               help="Direction of line.  [default: x]")  # fmt: skip
 @click.option("--width", type=click.Choice(["column", "full"]),
@@ -155,6 +158,7 @@ def _draw(
             pictures[kind] = draw(kind, results, **{n: v for n, v in options.items() if n in own})
             advance(1)
     notes = [str(one.message) for one in caught if issubclass(one.category, FecmWarning)]
+    notes += [text for picture in pictures.values() for text in picture.notes]
     for text in dict.fromkeys(notes):
         note(text)
     return pictures

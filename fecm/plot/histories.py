@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -37,8 +38,13 @@ from fecm.plot.style import (
     scale_of,
 )
 from fecm.results.result import Result
+from fecm.results.schema import declared_units
+from fecm.studies.comparison import Measurement, Source, compare, measurement_of
 
 Results = Mapping[str, Result]
+
+# Measured points drawn one by one at most.
+POINTS = 200
 
 # Letters of small text per inch.
 LETTERS = 16
@@ -74,10 +80,19 @@ def _mark_open_ends(axes: Axes, results: Results, width: str) -> None:
         axes.set_title(text, loc="right", fontsize=7.0).set_parse_math(False)
 
 
-def force(results: Results, *, width: str = "column") -> Picture:
+def force(results: Results, *, overlay: Source | None = None, width: str = "column") -> Picture:
     """Contact force and transducer against time; of several results, one above the other.
 
     A dashed line marks the delamination threshold of a result that has one.
+
+    Parameters
+    ----------
+    results : mapping of str to Result
+    overlay : str, Path or tuple, optional
+        A measured force: a CSV file with the columns time and force (or transducer), or times and
+        forces, in the deck's units.
+    width : str
+        ``"column"`` or ``"full"``.
     """
     limit_count(len(results), "forces")
     paths = ("history/time", "history/force", "history/transducer")
@@ -85,7 +100,11 @@ def force(results: Results, *, width: str = "column") -> Picture:
     times = [columns[0] for columns in data.values()]
     clock = scale_of(results, "time", times)
     limits = _thresholds(results)
+    units = declared_units(next(iter(results.values())).attributes)
+    measured = None if overlay is None else measurement_of(overlay, units)
     forces = [c for columns in data.values() for c in columns[1:]]
+    if measured is not None:
+        forces.append(measured.force)
     pound = scale_of(results, "force", [*forces, np.array(list(limits.values()))])
     if len(data) == 1:
         figure, axes = panels(width, ratio=RATIO[width])
@@ -111,8 +130,26 @@ def force(results: Results, *, width: str = "column") -> Picture:
         axes[0].axhline(limit, color=colour, ls=STYLES[1], lw=0.8, label=label)
     _time_axis(axes[-1], clock, times)
     _mark_open_ends(axes[0], results, width)
+    if measured is not None:
+        _draw_measured(axes, measured)
     lines_legend(figure, axes[0])
-    return Picture(figure)
+    notes = [
+        f"{measured.quantity} of {name} against {measured.name}: {compare(result, measured)}"
+        for name, result in results.items()
+        if measured is not None
+    ]
+    return Picture(figure, notes=notes)
+
+
+def _draw_measured(axes: Sequence[Axes], measured: Measurement) -> None:
+    """Draw a measured force over what it is compared with, a few times as points."""
+    style: dict[str, Any] = {"color": "0.2", "zorder": 3.0, "lw": 0.6, "label": measured.name}
+    if len(measured.time) <= POINTS:
+        style |= {"ls": "none", "marker": ".", "ms": 3.0}
+    ax = axes[-1] if measured.column == "transducer" else axes[0]
+    if ax is not axes[0]:
+        axes[0].plot([], [], **style)  # for the legend
+    ax.plot(measured.time, measured.force, **style)
 
 
 def _thresholds(results: Results) -> dict[str, float]:

@@ -31,10 +31,11 @@ def warn(text: str) -> None:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure; `frames` draw its frames if it is animated."""
+    """A figure; `frames` draw its frames if it is animated; `notes` say what it shows in words."""
 
     figure: Figure
     frames: Sequence[Callable[[], Any]] = ()
+    notes: Sequence[str] = ()
 
 
 @dataclass(frozen=True)

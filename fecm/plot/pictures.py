@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import inspect
+import logging
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import import_module
@@ -188,6 +189,8 @@ def plot(
         raise
     finally:
         TARGET.reset(token)
+    for note in picture.notes:
+        logging.getLogger("fecm").info(note)
     return picture.figure.axes[0] if ax is None else ax
 
 

@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from fecm.plot.pictures import RunKind
     from fecm.results.hdf5_reader import Contents
     from fecm.results.plies import Plies
+    from fecm.studies.comparison import Comparison
 
 Array = NDArray[Any]
 HISTORY = "history"
@@ -366,6 +367,35 @@ class Result(Contact):
         from fecm.plot.pictures import plot
 
         return plot(kind, {self.title or "the result": self}, path, ax, **options)
+
+    def compare(self, measured: str | Path | tuple[Any, Any]) -> Comparison:
+        """Compare the contact force, or the transducer, with a measured one.
+
+        Parameters
+        ----------
+        measured : str, Path or tuple
+            CSV file with the columns time and force (or transducer), or times and forces, in the
+            deck's units.
+
+        Returns
+        -------
+        Comparison
+            Peaks, impulses, rms of the difference and correlation; ``str()`` says them in words.
+
+        Raises
+        ------
+        TableError
+            If the file is invalid or in other units.
+        StudyError
+            If the numbers are invalid, or no two of the times are within those of the result.
+
+        Examples
+        --------
+        >>> print(result.compare("shot-3.csv"))  # doctest: +SKIP
+        """
+        from fecm.studies.comparison import compare, measurement_of
+
+        return compare(self, measurement_of(measured, declared_units(self.attributes)))
 
     def __getitem__(self, path: str) -> Array:
         return self._arrays[path.strip("/")]

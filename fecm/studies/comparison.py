@@ -1,0 +1,184 @@
+"""A measured force beside that of a result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.deck.units import KNOWN
+from fecm.results.result import Result
+from fecm.results.schema import declared_units, printable
+from fecm.studies import StudyError
+from fecm.studies.tables import TableError, names_of, read_columns, same_name, units_of
+
+# A CSV file, or times and forces.
+Source = str | Path | tuple[Any, Any]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A measured force in the deck's units.
+
+    Attributes
+    ----------
+    name : str
+    column : str
+        What it is compared with: ``"force"`` or ``"transducer"``.
+    time, force : ndarray (points,)
+        The times increase.
+    """
+
+    name: str
+    column: str
+    time: Floats
+    force: Floats
+
+    @property
+    def quantity(self) -> str:
+        """The column in words."""
+        return "contact force" if self.column == "force" else self.column
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A result's force, interpolated at measured times, against the measured force.
+
+    Attributes
+    ----------
+    points : int
+        Measured times within the times of the result.
+    begin, end : float
+        First and last of them.
+    peak, measured_peak : float
+        Largest forces.
+    impulse, measured_impulse : float
+        Time integrals of the forces, linear between the points.
+    rms : float
+        Root of the mean square of the difference, force.
+    correlation : float
+        Pearson's coefficient; NaN if one of the forces is constant.
+    units : mapping of str to str
+        Names of the units; empty if the deck names none.
+    """
+
+    points: int
+    begin: float
+    end: float
+    peak: float
+    measured_peak: float
+    impulse: float
+    measured_impulse: float
+    rms: float
+    correlation: float
+    units: Mapping[str, str]
+
+    def __str__(self) -> str:
+        clock, pound = (self.units.get(name, "") for name in ("time", "force"))
+        both = f"{pound}*{clock}" if clock and pound else ""
+        return ", ".join(
+            (
+                f"{self.points} points from time {self.begin:g} to {self.end:g} {clock}".rstrip(),
+                _against("peak", self.peak, self.measured_peak, pound),
+                _against("impulse", self.impulse, self.measured_impulse, both),
+                f"rms of the difference {self.rms:.4g} {pound}".rstrip(),
+                f"correlation {self.correlation:.4f}",
+            )
+        )
+
+
+def _against(name: str, own: float, measured: float, unit: str) -> str:
+    """Two values and their relative difference in words."""
+    text = f"{name} {own:.4g} against {measured:.4g} {unit}".rstrip()
+    return f"{text} ({own / measured - 1.0:+.1%})" if measured else text
+
+
+def measurement_of(source: Source, units: Mapping[str, str]) -> Measurement:
+    """Read a measured force.
+
+    Parameters
+    ----------
+    source : str, Path or tuple
+        CSV file with the columns time and force, or time and transducer; or times and forces.
+    units : mapping of str to str
+        Names of the deck's units; may be empty.
+
+    Raises
+    ------
+    TableError
+        If the file is invalid, or names other units.
+    StudyError
+        If times and forces are not finite numbers, equally many, at increasing times.
+    OSError
+        If the file can't be read.
+    """
+    if isinstance(source, str | Path):
+        return _from_file(Path(source), units)
+    try:
+        time, force = (np.asarray(values, dtype=float) for values in source)
+    except (TypeError, ValueError):
+        raise StudyError("an overlay is a CSV file, or a pair of times and forces") from None
+    if time.ndim != 1 or time.shape != force.shape or len(time) < 2:
+        raise StudyError(
+            f"an overlay needs as many times as forces, two at least: {time.shape} and "
+            f"{force.shape} were given"
+        )
+    if not (np.isfinite([time, force]).all() and (np.diff(time) > 0.0).all()):
+        raise StudyError("an overlay needs finite numbers at increasing times")
+    return Measurement("measured", "force", time, force)
+
+
+def _from_file(path: Path, units: Mapping[str, str]) -> Measurement:
+    names = names_of(path)
+    known = [n for n in ("force", "transducer") if any(same_name(n, name) for name in names)]
+    column = (known or ["force"])[0]
+    columns = read_columns(path, ("time", column), increasing="time")
+    for place, (name, unit) in enumerate(zip(names, units_of(path), strict=True)):
+        for wanted, dimension in (("time", "time"), (column, "force")):
+            first = not any(same_name(wanted, one) for one in names)
+            if same_name(name, wanted) or (first and place == (wanted != "time")):
+                _check_unit(path, name, unit, units.get(dimension, ""), KNOWN[dimension])
+    return Measurement(printable(path.name), column, *columns.values())
+
+
+def _check_unit(path: Path, name: str, own: str, deck: str, known: Mapping[str, float]) -> None:
+    """Refuse a column in another unit than the deck's."""
+    same = own == deck or (own in known and known[own] == known.get(deck))
+    if own and deck and not same:
+        raise TableError(f"{path}: {name} is in {own}, and the deck in {deck}; convert the column")
+
+
+def compare(result: Result, measured: Measurement) -> Comparison:
+    """Compare a result's force with a measured one, at the measured times of the run.
+
+    Raises
+    ------
+    StudyError
+        If the result has no impact, or fewer than two times are in both.
+    """
+    if "history/force" not in result:
+        raise StudyError("the result has no history to compare with: no impact step was taken")
+    clock = np.append(0.0, result["history/time"])  # at rest before the first step
+    there = (measured.time >= 0.0) & (measured.time <= clock[-1])
+    if np.count_nonzero(there) < 2:
+        raise StudyError(
+            f"{measured.name} has fewer than two times within those of the result: measured from "
+            f"{measured.time[0]:g} to {measured.time[-1]:g}, computed from 0 to {clock[-1]:g}; "
+            "check its unit of time"
+        )
+    time, force = measured.time[there], measured.force[there]
+    own = np.interp(time, clock, np.append(0.0, result[f"history/{measured.column}"]))
+    weights = 0.5 * (np.diff(time, prepend=time[0]) + np.diff(time, append=time[-1]))
+    varies = np.ptp(own) > 0.0 and np.ptp(force) > 0.0
+    return Comparison(
+        len(time), float(time[0]), float(time[-1]),
+        float(own.max()), float(force.max()), float(weights @ own), float(weights @ force),
+        float(np.sqrt(np.mean((own - force) ** 2))),
+        float(np.corrcoef(own, force)[0, 1]) if varies else math.nan,
+        declared_units(result.attributes),
+    )  # fmt: skip

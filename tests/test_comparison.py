@@ -1,0 +1,132 @@
+"""A measured force beside that of a result: closed forms, files, refusals."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm.plot.pictures import draw
+from fecm.studies import StudyError
+from tests.calls import assert_unusable, call
+from tests.decks import DATA_CARDS, small
+
+pytest.importorskip("matplotlib")
+
+UNITS = {"unit_length": "in", "unit_force": "lbf", "unit_time": "s"}
+
+
+def half_sine(scale: float = 1.0) -> fecm.Result:
+    """Force 10 sin(pi t), the transducer half of it, from the first of 1000 steps to time 1."""
+    time = np.linspace(0.0, 1.0, 1001)[1:]
+    force = scale * 10.0 * np.sin(np.pi * time)
+    arrays: dict[str, Any] = {"time": time, "force": force, "transducer": force / 2.0}
+    history = {f"history/{name}": values for name, values in arrays.items()}
+    return fecm.Result(history, {}, {"": UNITS})
+
+
+def table(path: Path, head: str, time: Any, force: Any) -> Path:
+    """A CSV file of a measurement."""
+    rows = (f"{t!r},{f!r}\n" for t, f in zip(time.tolist(), force.tolist(), strict=True))
+    path.write_text(head + "".join(rows))
+    return path
+
+
+def test_a_measurement_of_ten_percent_more_has_the_errors_of_closed_form() -> None:
+    time = np.linspace(-0.5, 1.5, 4001)
+    found = half_sine().compare((time, 11.0 * np.sin(np.pi * time)))
+    assert (found.begin, found.end) == pytest.approx((0.0, 1.0), abs=1e-3)
+    assert (found.peak, found.measured_peak) == pytest.approx((10.0, 11.0), rel=1e-5)
+    both = (20.0 / math.pi, 22.0 / math.pi)
+    assert (found.impulse, found.measured_impulse) == pytest.approx(both, rel=1e-4)
+    assert found.rms == pytest.approx(1.0 / math.sqrt(2.0), rel=1e-3)
+    assert found.correlation == pytest.approx(1.0, abs=1e-6)
+    assert "peak 10 against 11 lbf (-9.1%), impulse 6.366 against 7.003 lbf*s (-9.1%)" in str(found)
+
+
+def test_a_late_measurement_is_correlated_as_the_cosine_of_its_delay() -> None:
+    time = np.linspace(0.0, 1.0, 2001)
+    whole = fecm.Result(
+        {"history/time": time[1:], "history/force": np.sin(2.0 * np.pi * time[1:])}, {}, {}
+    )
+    found = whole.compare((time, np.sin(2.0 * np.pi * time - 0.3)))
+    assert found.correlation == pytest.approx(math.cos(0.3), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("head", "factor"),
+    [("", 1.0), ("time,force\n", 1.0), ("force (lb),Time [s]\n", 1.0), ("time,transducer\n", 0.5)],
+)
+def test_the_header_says_what_a_file_is_compared_with(
+    tmp_path: Path, head: str, factor: float
+) -> None:
+    time = np.linspace(0.0, 1.0, 101)
+    columns = (time, factor * 10.0 * np.sin(np.pi * time))
+    file = table(tmp_path / "m.csv", head, *(columns[::-1] if "Time" in head else columns))
+    found = half_sine().compare(file)
+    assert found.points == 101
+    assert found.rms == pytest.approx(0.0, abs=1e-4)
+    assert found.peak == pytest.approx(factor * 10.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("time (ms),force\n0,1\n1,2\n", "time is in ms, and the deck in s; convert the column"),
+        ("time,force\ns,kN\n0,1\n1,2\n", "force is in kN, and the deck in lbf"),
+        ("t (ms),load\n0,1\n1,2\n", "t is in ms, and the deck in s"),
+        ("time,force\n10,1\n11,2\n", "measured from 10 to 11, computed from 0 to"),
+        ("time,force\n0,1\n0,2\n", ":3: time must increase: 0 follows 0"),
+        ("time,load\n0,1\n1,2\n", "there is no column force"),
+        ("time,force\n0,nan\n1,2\n", "is 'nan', not a finite number"),
+    ],
+)
+def test_files_that_can_not_be_compared_are_refused_in_one_line(
+    tmp_path: Path, text: str, words: str
+) -> None:
+    fecm.run(small(data=DATA_CARDS + "UNIT\nin lbf s\n"), output=tmp_path / "a.h5")
+    (tmp_path / "m.csv").write_text(text)
+    done = call("plot", "a.h5", "--overlay", "m.csv", cwd=tmp_path)
+    assert_unusable(done)
+    assert words in done.stderr
+    assert not list(tmp_path.glob("*.png"))
+
+
+@pytest.mark.parametrize(
+    ("pair", "words"),
+    [
+        (([0.0, 1.0], [1.0]), "as many times as forces"),
+        (([1.0, 0.0], [1.0, 1.0]), "increasing times"),
+        (([0.0, math.nan], [1.0, 1.0]), "finite"),
+        (("a", "b"), "a CSV file, or a pair"),
+        (([0.0, 1.0], [1.0, 1.0], 3), "a CSV file, or a pair"),
+    ],
+)
+def test_numbers_that_are_no_measurement_are_refused(pair: Any, words: str) -> None:
+    with pytest.raises(StudyError, match=words):
+        half_sine().compare(pair)
+
+
+def test_the_command_draws_a_measurement_and_notes_its_difference(tmp_path: Path) -> None:
+    result = fecm.run_one(small(), output=tmp_path / "a.h5")
+    table(tmp_path / "m.csv", "time,force\n", result.time, 0.5 * result.force)
+    done = call("plot", "a.h5", "--overlay", "m.csv", cwd=tmp_path)
+    assert (done.exit_code, done.stdout) == (0, "a-force.png\n")
+    assert done.stderr.startswith("fecm: note: contact force of a against m.csv: 10 points from")
+    assert "(+100.0%), impulse" in done.stderr
+
+
+@pytest.mark.parametrize("column", ["force", "transducer"])
+def test_a_measurement_lies_on_what_it_is_compared_with(tmp_path: Path, column: str) -> None:
+    result = fecm.run_one(small())
+    file = table(tmp_path / "m.csv", f"time,{column}\n", result.time, result.force)
+    figure: Any = draw("force", {"a": result, "b": result}, overlay=file).figure
+    above, below = (axes.get_lines()[-1] for axes in figure.axes)
+    own = below if column == "transducer" else above
+    assert (own.get_label(), own.get_linestyle()) == ("m.csv", "None")
+    np.testing.assert_array_equal(own.get_ydata(), result.force)
+    assert figure.legends[0].get_texts()[-1].get_text() == "m.csv"
