@@ -1,0 +1,1 @@
+"""Benchmarks over the history of the repository, for airspeed velocity."""
