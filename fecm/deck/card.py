@@ -58,20 +58,10 @@ def parse_real(text: str) -> float | None:
 
 
 def format_real(value: float, width: int) -> str | None:
-    """Write a number into `width` columns so that reading it gives the same number again.
+    """Write a finite number into `width` columns so that reading it gives the same number again.
 
-    Parameters
-    ----------
-    value : float
-        A finite number.
-    width : int
-        Available columns.
-
-    Returns
-    -------
-    str or None
-        The most readable form that fits, not padded; None if none fits.  Only fields of ten
-        columns or more get an exponent without its letter: 2.5E-7 as ``25-8`` is hard to read.
+    The most readable form that fits, not padded; None if none fits.  Only fields of ten columns or
+    more get an exponent without its letter: 2.5E-7 as ``25-8`` is hard to read.
     """
     for letter in ("E", "") if width >= _LETTERLESS else ("E",):
         forms = list(_forms(value, letter))
@@ -141,11 +131,8 @@ Fields = tuple[Field, ...]
 def layout(*descriptors: str) -> Fields:
     """Lay out fields from column 1.
 
-    Parameters
-    ----------
-    *descriptors : str
-        ``"I5 node"``, ``"A4 word"``, ``"X1"`` for a column that is skipped, or with a label for
-        rulers ``"F10 x-coordinate|x"``; ``"F10? radius"`` where a blank is not 0.
+    Each is ``"I5 node"``, ``"A4 word"``, ``"X1"`` for a column that is skipped, or with a label for
+    rulers ``"F10 x-coordinate|x"``; ``"F10? radius"`` where a blank is not 0.
     """
     fields: list[Field] = []
     column = 1
@@ -230,24 +217,10 @@ class Source:
 def read_values(
     card: Card, fields: Fields, findings: Findings, *, blanks_are_zeros: bool = False
 ) -> list[Value] | None:
-    """Read the values of a card.
+    """Read the values of a card, one a field; None after an error, which is reported.
 
-    Parameters
-    ----------
-    card : Card
-        The card.
-    fields : tuple of Field
-        Its fields.
-    findings : Findings
-        Receives the errors.
-    blanks_are_zeros : bool
-        Read a blank inside a number as the zero that it was on the report's machine, with a
-        warning; otherwise it is an error where it would change the value.
-
-    Returns
-    -------
-    list or None
-        One value a field; None after an error.
+    With `blanks_are_zeros` a blank inside a number is read as the zero that it was on the report's
+    machine, with a warning; otherwise it is an error where it would change the value.
     """
     source = Source(card, fields)
     fixed = "," not in card.data

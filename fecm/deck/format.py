@@ -17,14 +17,7 @@ RULER = "!:"
 
 
 def format_deck(text: str, source: str = "<text>") -> str:
-    """Align a deck's columns.
-
-    Parameters
-    ----------
-    text : str
-        The deck.
-    source : str
-        Its name in messages.
+    """Align a deck's columns; `source` is its name in messages.
 
     Raises
     ------

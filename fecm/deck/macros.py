@@ -105,15 +105,7 @@ def number(macro: Macro) -> float:
 
 
 def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
-    """Nest a macro program's loops and check its words.
-
-    Parameters
-    ----------
-    macros : tuple of Macro
-        The cards.
-    findings : Findings
-        Receives their errors.
-    """
+    """Nest a macro program's loops and check its words."""
     open_loops: list[tuple[Macro, list[Macro | Loop]]] = []
     body: list[Macro | Loop] = []
     done: set[str] = set()

@@ -57,17 +57,7 @@ class ParsedProblem:
 
 
 class Reader:
-    """Reads the cards of a file, problem by problem.
-
-    Parameters
-    ----------
-    text : str
-        The file's text.
-    blanks_are_zeros : bool
-        Read blanks inside numbers as the zeros that they were on the report's machine.
-    keeps_values : bool
-        Keep the values of every card in the stream.
-    """
+    """Reads the cards of a file, problem by problem; the options are those of :class:`Stream`."""
 
     def __init__(
         self, text: str, *, blanks_are_zeros: bool = False, keeps_values: bool = False

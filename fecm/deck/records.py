@@ -16,15 +16,7 @@ from fecm.deck.findings import Place
 
 
 def load_factor(table: LoadTable, clock: float) -> float:
-    """A1 + A2 t + A3 sin(A4 t + A5)^L between t_min and t_max, 0 outside.
-
-    Parameters
-    ----------
-    table : LoadTable
-        The card's values; an exponent L below 1 counts as 1.
-    clock : float
-        Time of the TIME macro.
-    """
+    """A1 + A2 t + A3 sin(A4 t + A5)^L between t_min and t_max, 0 outside; L below 1 counts as 1."""
     if not table.begin <= clock <= table.end:
         return 0.0
     a1, a2, a3, a4, a5 = table.constants

@@ -43,25 +43,8 @@ from fecm.deck.records import (
 class Stream:
     """Cards in the order of the file, without the lines that are comments.
 
-    Parameters
-    ----------
-    text : str
-        The file's text.
-    blanks_are_zeros : bool
-        Read blanks inside numbers as the zeros that they were on the report's machine.
-    keeps_values : bool
-        Keep the fields and values of every card in `read`.
-
-    Attributes
-    ----------
-    findings : Findings
-        Receives the errors.
-    lines : list of str
-        The file's lines.
-    position : int
-        Number of lines taken.
-    read : dict
-        By line number, the fields and values of every card that was read, if they are kept.
+    With `blanks_are_zeros` blanks inside numbers are read as the zeros that they were on the
+    report's machine; `keeps_values` keeps the fields and values of every card in `read`.
     """
 
     def __init__(
@@ -70,9 +53,9 @@ class Stream:
         self.lines = text.removeprefix("\ufeff").splitlines()
         self._blanks_are_zeros = blanks_are_zeros
         self._keeps_values = keeps_values
-        self.position = 0
+        self.position = 0  # number of lines taken
         self.findings = Findings()
-        self.read: dict[int, tuple[Fields, list[Value]]] = {}
+        self.read: dict[int, tuple[Fields, list[Value]]] = {}  # by line number
 
     @property
     def at_end(self) -> bool:
@@ -143,25 +126,12 @@ _R = TypeVar("_R", bound=Record)
 
 
 class SegmentReader:
-    """Reads segments of one problem.
-
-    Parameters
-    ----------
-    stream : Stream
-        The deck's cards.
-    control : Control
-        Counts of the problem.
-
-    Attributes
-    ----------
-    unsound : set of str
-        Keywords of segments of which a card could not be read.
-    """
+    """Reads segments of one problem."""
 
     def __init__(self, stream: Stream, control: Control) -> None:
         self._stream = stream
         self._control = control
-        self.unsound: set[str] = set()
+        self.unsound: set[str] = set()  # keywords of segments with unreadable cards
 
     def read(self, head: Card) -> Segment | None:
         """Read the segment of a keyword card; None after an error."""

@@ -35,17 +35,7 @@ def unit_names(deck: Deck) -> dict[str, str]:
 def unit_of(dimension: str, names: dict[str, str]) -> str:
     """Unit of a physical dimension: ``force/length`` in lbf and in is ``lbf/in``.
 
-    Parameters
-    ----------
-    dimension : str
-        Written with the words length, force and time.
-    names : dict
-        As :func:`unit_names` gives them.
-
-    Returns
-    -------
-    str
-        Empty where the deck names no units or the dimension is none.
+    Empty where the deck names no units or the dimension is none.
     """
     if not names or not dimension:
         return ""
@@ -53,20 +43,10 @@ def unit_of(dimension: str, names: dict[str, str]) -> str:
 
 
 def in_si(dimension: str, names: dict[str, str]) -> float | None:
-    """One unit of a physical dimension in m, N and s.
+    """One unit of a physical dimension, such as ``force*time^2/length^4``, in m, N and s.
 
-    Parameters
-    ----------
-    dimension : str
-        Products of the words length, force and time, with powers, and at most one division:
-        ``force*time^2/length^4``.
-    names : dict
-        As :func:`unit_names` gives them.
-
-    Returns
-    -------
-    float or None
-        None where the deck names no units, or one that is not in :data:`KNOWN`.
+    The dimension has at most one division.  None where the deck names no units, or one that is not
+    in :data:`KNOWN`.
     """
     value = 1.0
     for sign, product in zip((1.0, -1.0), dimension.split("/"), strict=False):

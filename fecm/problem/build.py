@@ -237,40 +237,6 @@ class ImpactModel:
     under_load: Bools | None
 
 
-class ProgramRules:
-    """Behaviour of the macros with the slips that are on.
-
-    Attributes
-    ----------
-    forces_scale_with_contact : bool
-        FORC's values are scaled by the contact force (``force-scale``).
-    prop_replaces_contact : bool
-        PROP replaces the contact force of the next step (``prop-contact``).
-    prop_at_zero : bool
-        Tables of proportional loads are evaluated at t = 0 only (``prop``).
-    clock_stands : bool
-        TIME does nothing (``time``).
-    counts_since_output : bool
-        RODP counts steps since the last output (``counter``).
-    listing_tapes : bool
-        Contact is stored at every step, strains one step late (``tapes``).
-    check_ends : bool
-        CHEC ends the program (``check-end``).
-    enforces_energy_limit : bool
-        The energy balance can end the run; not with any slip.
-    """
-
-    def __init__(self, slips: frozenset[str]) -> None:
-        self.forces_scale_with_contact = "force-scale" in slips
-        self.prop_replaces_contact = "prop-contact" in slips
-        self.prop_at_zero = "prop" in slips
-        self.clock_stands = "time" in slips
-        self.counts_since_output = "counter" in slips
-        self.listing_tapes = "tapes" in slips
-        self.check_ends = "check-end" in slips
-        self.enforces_energy_limit = not slips
-
-
 def rules(material: Material) -> tuple[Quadrature, Quadrature, Quadrature]:
     """Quadrature of a MATE card: bending (L1), transverse shear (L2), stored strains (K).
 
@@ -371,16 +337,7 @@ def build_failure(problem: Problem, plate: PlateModel) -> FailureMonitor | None:
 
 
 def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactModel:
-    """Build the model of a checked problem.
-
-    The problem's own plate is used unless a slip changes it.
-
-    Parameters
-    ----------
-    problem : Problem
-    options : RunOptions, optional
-        Defaults to the report's options.
-    """
+    """Build the model of a checked problem, with its own plate unless a slip changes that."""
     chosen = options or RunOptions()
     deck, slips, method = problem.deck, chosen.slips, chosen.rod_method
     rod = build_projectile(deck, slips).with_mass(method.mass)
@@ -438,12 +395,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
 def laminate_of(material: Material, *, isotropic_g12: bool = False) -> Laminate:
     """Laminate of a deck's MATE segment; its inertia uses the card's total thickness.
 
-    Parameters
-    ----------
-    material : Material
-        The segment.
-    isotropic_g12 : bool
-        Replace G12 by E1/2(1+nu12) where E1 = E2 (the slip ``g12``).
+    With `isotropic_g12` E1/2(1+nu12) replaces G12 where E1 = E2 (the slip ``g12``).
     """
     ply = material.ply
     if isotropic_g12 and ply.e1 == ply.e2:

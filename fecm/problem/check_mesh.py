@@ -95,13 +95,7 @@ OFF_PLACE = 0.05
 def check_mesh(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool = False) -> None:
     """Check nodes, and the shapes of elements with valid node numbers.
 
-    Parameters
-    ----------
-    deck : Deck
-    mesh : Mesh
-    findings : Findings
-    listing : bool
-        Whether the deck is for listing mode, which uses L1 instead of L2.
+    Listing mode takes L1 instead of L2.
     """
     missing = np.flatnonzero(~mesh.given)
     if len(missing):

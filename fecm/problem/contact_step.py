@@ -78,20 +78,10 @@ class ContactStep:
 def contact_step(
     deck: Deck, plate: PlateModel, contact: Floats, dt: float, bound: float
 ) -> ContactStep:
-    """Largest time step at which plate and contact are stable together.
+    """Largest time step at which plate and a unit contact force, (numnp, 5), are stable together.
 
-    Parameters
-    ----------
-    deck : Deck
-        A deck without errors, with an impact.
-    plate : PlateModel
-    contact : ndarray (numnp, 5)
-        Distribution of a unit contact force.
-    dt : float
-        Time step of the deck; 0 for 0.9 of the critical one.  The limit is computed only where a
-        bound does not show that this step is stable.
-    bound : float
-        Lower bound of the plate's critical time step.
+    `bound` is a lower bound of the plate's critical time step, `dt` the deck's, 0 for 0.9 of the
+    critical one.  The limit is computed only where the bound does not show that this is stable.
     """
     weights = contact[plate.mesh.equations > 0]
     stiffness = contact_stiffness(deck, plate)

@@ -47,20 +47,9 @@ class _Budget:
 def generate(deck: Deck, findings: Findings | None = None, *, unit_force: bool = False) -> Mesh:
     """Generate nodes, elements, restraints and forces as the listing's GENVEC and PMESH do.
 
-    Parameters
-    ----------
-    deck : Deck
-        The model.
-    findings : Findings, optional
-        Receives the errors.
-    unit_force : bool
-        Set the force of ROD's dof to 1 at ROD's place among the segments, so that it replaces
-        an earlier FORC's value and a later FORC's replaces it (the slip ``rod-force``).
-
-    Returns
-    -------
-    Mesh
-        Complete if there were no findings.
+    The mesh is complete if there were no findings.  With `unit_force` the force of ROD's dof is set
+    to 1 at ROD's place among the segments, so that it replaces an earlier FORC's value and a later
+    FORC's replaces it (the slip ``rod-force``).
     """
     noted = Findings() if findings is None else findings
     control = deck.control
@@ -88,20 +77,7 @@ def generate(deck: Deck, findings: Findings | None = None, *, unit_force: bool =
 def restraint_codes(
     boundaries: Sequence[Boundary], nodes: int, dofs: int, findings: Findings | None = None
 ) -> Ints:
-    """Generate the restraint codes of BOUN segments.
-
-    Parameters
-    ----------
-    boundaries : sequence of Boundary
-    nodes, dofs : int
-        Number of nodes, and of dofs of a node.
-    findings : Findings, optional
-        Receives the errors.
-
-    Returns
-    -------
-    ndarray (nodes, dofs)
-    """
+    """Generate the restraint codes of BOUN segments, (nodes, dofs)."""
     codes = np.zeros((nodes, dofs), dtype=np.int32)
     noted = Findings() if findings is None else findings
     budget = _Budget(nodes, noted)
@@ -113,16 +89,7 @@ def restraint_codes(
 def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floats:
     """Diameter of every element of a rod, generated from PROJ's cards like coordinates.
 
-    Parameters
-    ----------
-    segment : Projectile
-    findings : Findings, optional
-        Receives the errors.
-
-    Returns
-    -------
-    ndarray (elements,)
-        Length; NaN for elements without a card.
+    It is NaN for elements without a card.
     """
     noted = Findings() if findings is None else findings
     values = np.full((segment.elements, 1), np.nan)

@@ -46,18 +46,9 @@ STATIC = {"TANG", "EIGE"}
 def needed_bytes(
     checked: Problem, *, solver: str = AUTO, in_memory: bool = False, exact: bool = True
 ) -> int:
-    """Approximate upper bound of the memory of a run.
+    """Approximate upper bound of the memory of a run, whose result may be kept in memory.
 
-    Parameters
-    ----------
-    checked : Problem
-        A problem without errors.
-    solver : str
-        Computation of K u.
-    in_memory : bool
-        Whether the result is kept in memory instead of being written to a file.
-    exact : bool
-        Count congruent elements once, instead of taking all elements as different.
+    An `exact` one counts congruent elements once, instead of taking all elements as different.
     """
     words = {macro.word for macro in flat(checked.program)}
     output, model, control = checked.output_bytes, checked.plate, checked.deck.control

@@ -75,22 +75,7 @@ SINGLE: tuple[type[Segment], ...] = (
 
 
 def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) -> Problem | None:
-    """Check a problem.
-
-    Parameters
-    ----------
-    problem : ParsedProblem
-        From the reader.
-    findings : Findings
-        Receives errors and warnings.
-    listing : bool
-        Whether the deck is for listing mode.
-
-    Returns
-    -------
-    Problem or None
-        None without a control card.
-    """
+    """Check a problem, in listing mode or not; None without a control card."""
     deck, unsound = problem.deck, problem.unsound
     if deck is None:
         return None

@@ -163,14 +163,7 @@ CLAIMS = (
 
 
 def active_slips(mode: str = REPORT, single: Iterable[str] = ()) -> frozenset[str]:
-    """Names of the slips that are on.
-
-    Parameters
-    ----------
-    mode : str
-        ``"report"`` has none, ``"listing"`` all of them.
-    single : iterable of str
-        Single slips to add to report mode.
+    """Names of the slips that are on: single ones in report mode, all of them in listing mode.
 
     Raises
     ------

@@ -72,15 +72,7 @@ _NAMES = {
 
 
 class Checkpointer:
-    """Writes and reads the checkpoints of a run.
-
-    Parameters
-    ----------
-    result : Path
-        Final path of the result.
-    journal : Journal
-        Operations on the result.
-    """
+    """Writes and reads the checkpoints of a run, beside the final path of its result."""
 
     def __init__(self, result: Path, journal: Journal) -> None:
         self._checkpoint, self._spool = checkpoint_of(result), spool_of(result)

@@ -37,17 +37,8 @@ class EnergyBalance:
 
         The error is relative to the energy supplied up to the end of the block: in its first steps
         a load has done almost no work.  The work of one step is not counted as an error: the
-        work belongs to the step, the energies to its end.
-
-        Parameters
-        ----------
-        block : mapping
-            Columns ``step``, ``held_energy``, ``external_work`` and ``balance_error``.
-        initial : float
-            Energy before the first step (force*length).
-        limit : float, optional
-            Error, relative to the supplied energy, that ends the run; by default only an energy
-            that is not finite does.
+        work belongs to the step, the energies to its end.  `initial` is the energy before the first
+        step.  Without a limit only an energy that is not finite ends the run.
 
         Raises
         ------

@@ -17,13 +17,7 @@ class EndedError(Exception):
 
 
 class Interpreter:
-    """Carries out a program.
-
-    Parameters
-    ----------
-    program : tuple
-        The nested program.
-    """
+    """Carries out a nested program."""
 
     def __init__(self, program: Body) -> None:
         self._program = program
@@ -46,21 +40,10 @@ class Interpreter:
         start: Sequence[tuple[int, int]] = (),
         on_macro: Callable[[], object] = lambda: None,
     ) -> None:
-        """Carry out the program.
+        """Carry out the program, from a `position` on; a ValueError if it has no such one.
 
-        Parameters
-        ----------
-        bind : callable
-            Returns the action of a macro; called once per card.
-        start : sequence of (int, int)
-            `position` to resume from.
-        on_macro : callable
-            Called after each macro, each loop and each pass of an empty loop.
-
-        Raises
-        ------
-        ValueError
-            If the program has no such position.
+        `bind` returns the action of a macro and is called once per card; `on_macro` is called after
+        each macro, each loop and each pass of an empty loop.
         """
         stack = self._stack
         try:

@@ -35,8 +35,8 @@ def set_time_step(run: Simulation, dt: float) -> None:
 
 
 def advance_clock(run: Simulation) -> None:
-    """TIME."""
-    if not run.rules.clock_stands:
+    """TIME; does nothing under its slip."""
+    if "time" not in run.options.slips:
         run.state.clock += run.state.dt
 
 
@@ -50,7 +50,7 @@ def proportional_load(run: Simulation, n: float) -> None:
         state.constant_factor = 0.0
     elif state.table is not None:
         state.constant_factor = load_factor(tables[state.table], 0.0)
-    if run.rules.prop_replaces_contact:
+    if "prop-contact" in run.options.slips:
         state.prop_force = run.load_factor(state.clock)
 
 
@@ -62,17 +62,17 @@ def impact_step(run: Simulation, n: int) -> None:
     state, impact, system = run.state, run.state.impact, run.model.impact
     if system is None or impact is None:
         return
-    plate, recorder, listing_tapes = state.plate, run.recorder, run.rules.listing_tapes
+    plate, recorder, slips = state.plate, run.recorder, run.options.slips
     if not plate.step:
         recorder.steps.begin(plate, impact)
         state.prop_force = None  # the listing's first impact step begins with PROP = 0
-    stores = _counted(run, n) if run.rules.counts_since_output else not (plate.step + 1) % n
-    if stores and listing_tapes:
+    stores = _counted(run, n) if "counter" in slips else not (plate.step + 1) % n
+    if stores and "tapes" in slips:  # strains one step late
         recorder.strains(plate.step + 1, plate.time, run.displacement_field())
     system.advance(impact, state.dt, run.force_factor(), state.prop_force)
     state.prop_force = None
     recorder.steps.step(plate, impact, run.force_factor(), contact_row=stores)
-    if stores and not listing_tapes:
+    if stores and "tapes" not in slips:
         recorder.strains(plate.step, plate.time, run.displacement_field())
     run.observe()
 
@@ -208,7 +208,7 @@ def check(run: Simulation) -> None:
     profile = plate.profile()
     run.sink.attributes("mesh", {"equations": plate.neq, "profile": profile})
     run.printer.check(plate, profile)
-    if run.rules.check_ends:
+    if "check-end" in run.options.slips:
         raise EndedError
 
 

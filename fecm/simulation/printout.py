@@ -38,13 +38,7 @@ CARRIAGE = {"1": "\f", "0": "\n", "-": "\n\n"}
 
 
 class Printer:
-    """Writes the printed output of a run.
-
-    Parameters
-    ----------
-    file : text file, optional
-        Output file; nothing is printed by default.
-    """
+    """Writes the printed output of a run; without a file nothing."""
 
     def __init__(self, file: TextIO | None = None) -> None:
         self._file = file

@@ -25,19 +25,7 @@ BUFFERED = ("tape3", "tape8", "stresses", "plies", "reactions", "modes")
 
 
 class Recorder:
-    """Stores the rows of a run.
-
-    Parameters
-    ----------
-    sink : Sink
-        Receives the rows.
-    model : ImpactModel
-        The model.
-    sizes : WorkEstimate
-        Upper bounds of the numbers of rows.
-    contact_at_every_step, on_block
-        See :class:`~fecm.simulation.step_recorder.StepRecorder`.
-    """
+    """Stores the rows of a run, of which `sizes` has upper bounds, in a sink."""
 
     def __init__(
         self,
@@ -107,10 +95,7 @@ class Recorder:
     def create(self, location: str) -> None:
         """Create every dataset that can have rows; store mesh, laminate and locations.
 
-        Parameters
-        ----------
-        location : str
-            Where the strains of tape8 are evaluated: ``"nodes"`` or ``"gauss"``.
+        The location of tape8's strains is ``"nodes"`` or ``"gauss"``.
         """
         model, mesh, laminate = self._model, self._model.plate.mesh, self._model.plate.laminate
         for dataset, shape in self._datasets:
@@ -150,17 +135,7 @@ class Recorder:
             self._sink.write("stresses/y", 0, y)
 
     def row(self, group: str, step: int, time: float, columns: Mapping[str, Any]) -> None:
-        """Store a row of a group.
-
-        Parameters
-        ----------
-        group : str
-            One of :data:`BUFFERED`.
-        step, time : int, float
-            Step and time of the row.
-        columns : mapping
-            A value or an array for each other dataset of the group.
-        """
+        """Store a row of one of the groups :data:`BUFFERED`, with a value or an array a dataset."""
         self._buffers[group].put({"step": step, "time": time, **columns})
 
     def displacements(self, step: int, time: float, field: Floats) -> None:

@@ -77,8 +77,7 @@ def run(simulation: Simulation) -> None:
 
 def _write_header(simulation: Simulation) -> None:
     """Store the attributes of the file, the deck, and every dataset without its rows."""
-    sink, options, rules = simulation.sink, simulation.options, simulation.rules
-    deck = simulation.problem.deck
+    sink, options, deck = simulation.sink, simulation.options, simulation.problem.deck
     attributes = {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -92,7 +91,7 @@ def _write_header(simulation: Simulation) -> None:
     }
     sink.attributes("", attributes)
     sink.text("deck", deck.text or deck.to_text(), "the cards of the problem")
-    at_nodes = deck.require(Material).integration.points < 0 and not rules.listing_tapes
+    at_nodes = deck.require(Material).integration.points < 0 and "tapes" not in options.slips
     simulation.recorder.create("nodes" if at_nodes else "gauss")
 
 
@@ -123,7 +122,7 @@ def _write_footer(simulation: Simulation) -> None:
 def _judge(simulation: Simulation) -> None:
     """Store reasons to doubt the result, if there are any."""
     notes: list[str] = []
-    state, enforced = simulation.state, simulation.rules.enforces_energy_limit
+    state, enforced = simulation.state, not simulation.options.slips
     error, step = state.balance.worst_error, state.balance.worst_step
     if error > ENERGY_WARNING:
         why = "" if enforced else " (not a failure, as slips are active)"

@@ -12,7 +12,7 @@ import numpy as np
 from fecm._typing import Floats
 from fecm.deck.records import load_factor
 from fecm.mechanics.statics import Tangent
-from fecm.problem.build import ImpactModel, ProgramRules, build_model
+from fecm.problem.build import ImpactModel, build_model
 from fecm.problem.options import RunOptions
 from fecm.problem.problem import Problem
 from fecm.results.sinks import Sink
@@ -36,7 +36,6 @@ class Simulation:
     # Called with the simulation every `interval` steps; may write a checkpoint or raise.
     observers: Sequence[Observer] = ()
     on_macro: Observer = lambda simulation: None  # the same after every macro; must be fast
-    rules: ProgramRules = field(init=False)  # how macros behave
     model: ImpactModel = field(init=False)  # plate, projectile and contact
     state: RunState = field(init=False)  # state that a checkpoint stores
     recorder: Recorder = field(init=False)
@@ -45,7 +44,6 @@ class Simulation:
 
     def __post_init__(self) -> None:
         problem, options = self.problem, self.options
-        self.rules = ProgramRules(options.slips)
         with np.errstate(all="ignore"):
             self.model = build_model(problem, options)
         self.state = state = RunState(self.model.motion.start())
@@ -53,16 +51,16 @@ class Simulation:
             state.impact = self.model.impact.start(state.plate)
         if self.model.failure is not None:
             state.failure = self.model.failure.start()
-        if self.rules.prop_replaces_contact:
+        if "prop-contact" in options.slips:
             state.prop_force = 1.0  # PROP's first value in the listing
         self.interpreter = Interpreter(problem.program)
         self.interval = max(1, min(64, 100_000 // self.model.plate.neq))
-        limit = options.energy_limit if self.rules.enforces_energy_limit else None
+        limit = None if options.slips else options.energy_limit
         self.recorder = Recorder(
             self.sink,
             self.model,
             problem.work,
-            contact_at_every_step=self.rules.listing_tapes,
+            contact_at_every_step="tapes" in options.slips,
             # Without a reference to the run, which would keep it alive.
             on_block=partial(state.judge, limit=limit, threshold=problem.threshold),
         )
@@ -73,16 +71,16 @@ class Simulation:
         return Tangent(self.model.plate)
 
     def load_factor(self, clock: float) -> float:
-        """Load factor of PROP at a time of the clock."""
+        """Load factor of PROP at a time of the clock; under its slip that of t = 0."""
         state = self.state
-        if state.table is None or self.rules.prop_at_zero:
+        if state.table is None or "prop" in self.options.slips:
             return state.constant_factor
         return load_factor(self.problem.deck.tables[state.table], clock)
 
     def force_factor(self, clock: float | None = None) -> float:
         """Factor of FORC's values at a time of the clock, by default now."""
         state = self.state
-        if self.rules.forces_scale_with_contact and state.impact is not None:
+        if "force-scale" in self.options.slips and state.impact is not None:
             contact = float(state.impact.contact.force)
             return contact if state.prop_force is None else state.prop_force
         return self.load_factor(state.clock if clock is None else clock)

@@ -43,21 +43,11 @@ class Journal:
     """Passes operations to a file sink and records them.
 
     Rows are not kept in memory: they are read back from the file when they are spooled.
-
-    Parameters
-    ----------
-    sink : FileSink
-        The result.
-
-    Attributes
-    ----------
-    spooled : Part
-        The part of the spool that a checkpoint names.
     """
 
     def __init__(self, sink: FileSink) -> None:
         self._sink = sink
-        self.spooled = Part(0, 0)
+        self.spooled = Part(0, 0)  # the part that a checkpoint names
         self._new: list[dict[str, Any]] = []
 
     def attributes(self, group: str, values: Mapping[str, Any]) -> None:

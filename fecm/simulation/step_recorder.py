@@ -32,18 +32,10 @@ OnBlock = Callable[[Mapping[str, Floats], float], object]
 
 
 class StepRecorder:
-    """Stores every step in a sink.
+    """Stores every step in a sink; of a plate alone energies and gages only.
 
-    Parameters
-    ----------
-    sink : Sink
-        Receives the rows; the datasets of history, energy and tape9 exist already.
-    model : ImpactModel
-        The model; a plate alone has energies and gages only.
-    contact_at_every_step : bool
-        Store contact on tape9 at every step instead of every N-th (the slip ``tapes``).
-    on_block : callable
-        Called with the columns of each block and the initial energy (force*length).
+    `contact_at_every_step` stores contact on tape9 at every step instead of every N-th (the slip
+    ``tapes``); `on_block` is called with the columns of each block and the initial energy.
     """
 
     def __init__(
@@ -86,16 +78,9 @@ class StepRecorder:
         *,
         contact_row: bool = False,
     ) -> None:
-        """Add a row for the state after a step.
+        """Add a row for the state after a step, with the load factor of the nodal forces.
 
-        Parameters
-        ----------
-        plate : PlateState
-        impact : ImpactState or None
-        factor : float
-            Load factor of the nodal forces.
-        contact_row : bool
-            Whether the contact of the step goes to tape9.
+        `contact_row` stores the contact of the step on tape9.
         """
         applied = None
         if self._impact is not None and impact is not None:

@@ -22,15 +22,7 @@ Peak = tuple[float, float, float, float]
 
 
 def warnings_of(simulation: Simulation, result: Result) -> list[str]:
-    """Warn of deflection, strain, indentation and exposures beyond their limits, once each.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        The finished run.
-    result : Result
-        Its result.
-    """
+    """Warn of deflection, strain, indentation and exposures beyond their limits, once each."""
     h = simulation.model.plate.laminate.thickness
     length, clock = result.unit("length"), result.unit("time")
     free = rigid_deflections(simulation.problem.mesh)
