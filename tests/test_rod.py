@@ -351,6 +351,24 @@ def test_the_picture_of_a_pulse_shows_its_forces_and_accelerations() -> None:
     np.testing.assert_allclose(force, history.forces[:, 0])
 
 
+def test_units_of_a_rod_without_a_deck_are_on_its_picture_and_refused_beside_a_deck(
+    tmp_path: Path,
+) -> None:
+    pytest.importorskip("matplotlib")
+    shape = ("--length", "1", "--modulus", "30e6", "--density", "7.33e-4", "--diameter", ".625")
+    pulse, units = ("rod", "--pulse", "sine:1000,1e-4"), ("--units", "in-lbf-s")
+    picture = tmp_path / "p.svg"
+    done = call(*pulse, *shape, *units, "--plot", picture, "-o", tmp_path / "p.csv")
+    assert done.exit_code == 0
+    text = picture.read_text()
+    assert all(f"<!-- {label} -->" in text for label in ("Force (lbf)", "Time (µs)", "at 0.5 in"))
+    deck = tmp_path / "deck.inp"
+    deck.write_text(small())
+    refused = call(*pulse, deck, *units)
+    assert refused.exit_code == 2
+    assert "--units is for a rod without a deck" in refused.stderr
+
+
 def test_a_decks_own_rod_is_measured_at_its_own_transducer_and_a_rigid_mass_refused(
     tmp_path: Path,
 ) -> None:

@@ -13,6 +13,7 @@ from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError
 from fecm.cli.decks import load_valid
 from fecm.cli.outputs import OUTPUT, OVERWRITE, PLOT, STANDARD_OUTPUT, OutputPaths
 from fecm.cli.types import POSITIVE, Finite, Parsed
+from fecm.deck.catalogue import SYSTEMS
 from fecm.deck.units import unit_names
 from fecm.mechanics.projectile import REPORT_ELEMENTS, RigidMass, Rod
 from fecm.mechanics.rod_integrators import INTEGRATORS, LUMPED, MASSES, WILSON
@@ -24,7 +25,7 @@ from fecm.studies.rod_test.filters import Filter, filter_of
 from fecm.studies.rod_test.history import recorded
 from fecm.studies.rod_test.pulse_test import RodHistory, default_time_step, simulate_pulse, table
 from fecm.studies.rod_test.pulses import Pulse, pulse_of
-from fecm.studies.tables import read_columns
+from fecm.studies.tables import names_of, read_columns, units_of
 
 FILTER_HELP = ("first-order:RISE or moving-average:RISE; RISE is the time from 10 to 90 % of the "
                "step response.")  # fmt: skip
@@ -59,6 +60,9 @@ def rod() -> None:
 @click.option("--diameter", type=POSITIVE, help="Diameter, without a deck.")
 @click.option("--elements", type=click.IntRange(1, 1000), metavar="N",
               help="Number of elements, without a deck.  [default: 20]")  # fmt: skip
+@click.option("--units", type=click.Choice(list(SYSTEMS)), metavar="SYSTEM",
+              help="in-lbf-s, m-N-s or mm-N-s: names the units on the picture, without a "
+                   "deck.")  # fmt: skip
 @click.option("--dt", type=POSITIVE,
               help="Time step.  [default: the deck's DT, or 0.8 of the travel time of a wave "
                    "through an element]")  # fmt: skip
@@ -96,8 +100,9 @@ def pulse(
     Force is positive in compression.
     """
     targets = OutputPaths(output, picture, overwrite)
-    _check_shape(deck, shape)
-    units: Mapping[str, str] = {}
+    system = shape.pop("units")
+    _check_shape(deck, shape | ({"units": system} if system and deck else {}))
+    units: Mapping[str, str] = SYSTEMS[system] if system else {}
     deck_dt = None
     if deck is None:
         diameters = (shape["diameter"],) * (shape["elements"] or REPORT_ELEMENTS)
@@ -243,7 +248,9 @@ def calibrate(
     if targets.picture:
         from fecm.plot.rod import calibration_picture
 
-        targets.draw(calibration_picture(time, v_f, v_a, found))
+        names = dict(zip(map(str.casefold, names_of(test)), units_of(test), strict=True))
+        units = [names.get(name, "") for name in ("time", "v_f", "v_a")]
+        targets.draw(calibration_picture(time, v_f, v_a, found, units))
     text = json.dumps(vars(found)) if form == "json" else "\n".join(_lines(found))
     targets.write([text + "\n"])
 

@@ -71,9 +71,10 @@ def pulse_picture(
     forces: list[Line] = [("applied", history.applied, COLOURS[-1], STYLES[2])]
     for number, x in enumerate(history.stations):
         colour = COLOURS[number % MOST_LINES]
-        forces.append((f"at {x:.4g}", history.forces[:, number], colour, "-"))
+        place = f"at {x:.4g} {unit_of('length', dict(units or {}))}".rstrip()
+        forces.append((place, history.forces[:, number], colour, "-"))
         if filtered is not None:
-            forces.append((f"at {x:.4g}, filtered", filtered[:, number], colour, STYLES[1]))
+            forces.append((f"{place}, filtered", filtered[:, number], colour, STYLES[1]))
     _against_time(above, history.time, forces, "Force", "force", units)
     above.set_xlabel("")
     ends: list[Line] = [
