@@ -134,8 +134,8 @@ def impact(
     every : int, optional
         Steps between stored rows; about 200 rows by default.
     units : str, optional
-        ``"in-lbf-s"``, ``"m-N-s"`` or ``"mm-N-s"``: names the units, and converts a named ply and
-        contact to them; those of a named ply's source by default.
+        ``"in-lbf-s"``, ``"m-N-s"`` or ``"mm-N-s"``, to which a named ply and contact are converted;
+        those of a named ply's source by default.
     patch : str or Patch or None
         Area of the contact force: ``"disc"`` or ``"hertz"``, with ``":RADIUS"``, to which the mesh
         of a rectangle is then refined; None is a point force.  By default a disc.
@@ -244,6 +244,7 @@ def author(
         patch = parse_patch(patch)
     named = _named(laminate.ply)
     system = units or (named.system if named else None)
+    shown = system if units or system != SYSTEM else None  # the report's decks have no UNIT
     ply = named.converted(system or named.system) if named else laminate.ply
     if not isinstance(ply, Ply):
         raise ObjectError(f"`ply` is {ply!r}, not a name or a Ply")
@@ -302,7 +303,7 @@ def author(
     if isinstance(projectile, Rod | RigidMass):
         projectile = projectile_segment(projectile)
     segments = (
-        None if units is None else Units(*SYSTEMS[units].values()),
+        None if shown is None else Units(*SYSTEMS[shown].values()),
         mesh.coordinates(), mesh.element_cards(),
         mesh.supported(everywhere, plate.supports, window), projectile,
         Impact(node, 3, 1.0 if velocity is None else velocity), patch,
