@@ -28,6 +28,9 @@ axes: Axes = result.plot("loop", ax=result.plot("force"), against="displacement"
 similarity: float = result.compare("shot-3.csv").correlation
 sweep: fecm.SweepResult = fecm.sweep(deck, {"velocity": [1.0, 2.0]}, workers=2)
 pooled: fecm.SweepResult = fecm.sweep(deck, {"k": [1e6]}, executor=ThreadPoolExecutor())
+measured: fecm.SweepResult = fecm.sweep(
+    build=lambda case: deck, vary={"width": [1.0]}, measure=lambda r: {"w": r.plate_w.max()}
+)
 peaks: xarray.DataArray = sweep.to_xarray().peak_force
 plate: fecm.Plate = fecm.Plate.from_mesh("plate.msh", {"rim": "clamped"})
 ply: fecm.Ply = fecm.Ply(1.6e-9, 0.3, 140e3, 9e3, 5e3, 5e3, 3e3)
@@ -45,6 +48,7 @@ several.force  # type: ignore[union-attr]  # pyright: ignore[reportAttributeAcce
 fecm.run_one("plate.inp", mode="raport")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.run_one("plate.inp", solver="gpu")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.sweep(deck, {"velocity": 5.0})  # type: ignore[dict-item]  # pyright: ignore[reportArgumentType]
+fecm.sweep(deck, until="treshold")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.sweep(deck, {"k": [1e6]}, executor=2)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.runn("plate.inp")  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]
 fecm.Plate.from_mesh("plate.msh", {"rim": "glued"})  # type: ignore[dict-item]  # pyright: ignore[reportArgumentType]

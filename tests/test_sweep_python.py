@@ -15,7 +15,7 @@ import fecm
 from fecm.sweeps.cases import CasesError
 from fecm.sweeps.schedule import SchedulerError
 from tests.calls import assert_unusable, call
-from tests.decks import DATA_CARDS, small
+from tests.decks import DATA_CARDS, PROGRAM, small
 
 
 @pytest.mark.parametrize(
@@ -102,6 +102,122 @@ def test_threads_and_processes_give_what_one_process_does() -> None:
 def test_places_to_run_that_conflict_or_are_none_are_refused(options: dict[str, Any]) -> None:
     with pytest.raises(fecm.FecmError, match=r"give only one of workers|is 5, not a"):
         fecm.sweep(small(), {"k": [1e6]}, **options)
+
+
+def plate(case: dict[str, Any]) -> fecm.Deck:
+    """The small plate hit at a speed for some time; one kind of plate has other units."""
+    if case["kind"] == "lost":
+        raise KeyError("no such plate")
+    units = UNITS.replace("in lbf", "mm N") if case["kind"] == "metric" else UNITS
+    data = (units + DATA_CARDS).replace("115.0", f"{case['speed']:5.1f}")
+    return fecm.read_one(
+        small(PROGRAM.replace("10", "80" if case["kind"] == "long" else "10"), data=data)
+    )
+
+
+def readings(result: fecm.Result) -> dict[str, float]:
+    """Largest displacement under the load, and stored instants."""
+    return {"w": result.plate_w.max(), "instants": len(result.tape3.time)}
+
+
+OWN: dict[str, list[Any]] = {"speed": [50, 100], "kind": ["", "long", "lost", "metric"]}
+
+
+def test_decks_of_ones_own_are_run_as_runs_and_keep_their_names_and_readings(
+    tmp_path: Path,
+) -> None:
+    path, seen = tmp_path / "s.h5", list[tuple[int, int]]()
+    found = fecm.sweep(
+        vary=OWN, build=plate, measure=readings, history=True, output=path,
+        progress=lambda *counts: seen.append(counts),
+    )  # fmt: skip
+    assert seen == [(done, 8) for done in range(1, 9)]
+    assert found.fine.tolist() == 2 * [True, True, False, False]
+    assert found["status"].tolist()[2:4] == [
+        "build: KeyError: 'no such plate'",
+        "build: the units of the deck are not those of the other cases",
+    ]
+    assert found.force is not None
+    for case in np.flatnonzero(found.fine):
+        one = fecm.run_one(plate({name: found[name][case].item() for name in OWN}))
+        np.testing.assert_array_equal(found.force[case][: len(one.force)], one.force)
+        assert found["w"][case] == one.plate_w.max()
+        assert found["instants"][case] == len(one.tape3.time)
+    assert np.isnan(found["w"][~found.fine]).all()
+    loaded = fecm.load_sweep(path)
+    for name in ("speed", "kind", "w", "status"):
+        np.testing.assert_array_equal(loaded[name], found[name])
+    assert loaded["speed"].dtype.kind == "i"
+    assert loaded.unit("w") == ""
+    assert "measured by the caller" in call("info", path, "--format", "json").stdout
+    assert found.to_xarray()["w"].dims == ("speed", "kind")
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as executor:
+        again = fecm.sweep(vary=OWN, build=plate, measure=readings, executor=executor)
+    np.testing.assert_array_equal(again["w"], found["w"])
+
+
+def test_measured_columns_are_drawn_and_tabulated() -> None:
+    pytest.importorskip("pandas")
+    pytest.importorskip("matplotlib")
+    found = fecm.sweep(small(), {"velocity": [50.0, 100.0]}, measure=readings)
+    assert found.to_dataframe()["w"].tolist() == found["w"].tolist()
+    drawn = [np.asarray(line.get_ydata(), dtype=float).tolist() for line in found.plot("w").lines]
+    assert found["w"].tolist() in drawn
+
+
+def test_readings_with_other_names_in_some_case_name_the_case() -> None:
+    def uneven(result: fecm.Result) -> dict[str, float]:
+        return {"w" if result.velocity[0] < -60.0 else "v": 1.0}
+
+    with pytest.raises(CasesError, match="returns w for case 1, and v for case 0"):
+        fecm.sweep(small(), {"velocity": [50.0, 100.0]}, measure=uneven)
+
+
+@pytest.mark.parametrize(
+    ("readings", "reason"),
+    [
+        (lambda result: {"peak_force": 1.0}, "`peak_force` is a name of the results"),
+        (lambda result: {"k": 1.0}, "`k` is a name of the case"),
+        (lambda result: {"a b": 1.0}, "`a b` is not a name"),
+        (lambda result: {"a": result.force}, "a is not a number"),
+        (lambda result: 5.0, "TypeError: returned float, not numbers by name"),
+        (lambda result: {"a": 1 / 0}, "ZeroDivisionError: division by zero"),
+    ],
+)
+def test_readings_that_can_not_be_stored_are_the_status(readings: Any, reason: str) -> None:
+    (status,) = fecm.sweep(small(), {"k": [1e6]}, measure=readings)["status"]
+    assert status.startswith(f"measure: {reason}")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"build": plate, "deck": small()}, "either deck or build"),
+        ({"build": lambda case: None, "vary": {"a": [1]}}, "case 0: .*NoneType, not a Deck"),
+        ({"build": lambda case: None, "workers": 2}, "build can't be sent to worker processes"),
+        ({"measure": readings, "deck": small(), "until": 9.0}, "until can't be given"),
+        ({"measure": 5, "deck": small()}, "measure is 5, not a function"),
+        ({"build": plate, "vary": {"peak_force": [1.0]}}, "is a name of the results"),
+        ({"build": plate, "vary": {"a": [1, "b"]}}, "a has numbers and texts"),
+        ({"build": plate, "vary": {"a": [float("nan")]}}, "a is nan, not a finite number"),
+    ],
+)
+def test_functions_that_can_not_be_meant_are_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(CasesError, match=message):
+        fecm.sweep(**{"vary": {"k": [1e6]}, **options})
+
+
+def test_findings_and_doubtful_cases_are_warnings_with_counts(tmp_path: Path) -> None:
+    layups = {"layup": ["[0/90]", "[x]", "[y]", "[90/0]"]}
+    with pytest.warns(fecm.FecmWarning) as caught:
+        found = fecm.sweep(small(), layups, output=tmp_path / "s.h5")
+    texts = [str(warning.message) for warning in caught]
+    assert {warning.filename for warning in caught} == {__file__}
+    assert sum("warning[W" in text for text in texts) == len(texts) - 2
+    assert texts[-2:] == list(found.notes) == list(fecm.load_sweep(tmp_path / "s.h5").notes)
+    assert texts[-2] == "2 of 4 cases still in contact at the end"
+    assert texts[-1].startswith("2 of 4 cases failed: layup: the layup `[x]`")
+    assert texts[-1].endswith(", and 1 other reason")
 
 
 def test_a_scheduler_file_names_the_address(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from fecm.plot.style import COLOURS, Scale, peak, scale
 from fecm.results.metrics import COLUMNS
 from fecm.results.metrics import INTEGERS as WHOLE_NUMBERS
 from fecm.sweeps.cases import INTEGERS as WHOLE_VALUES
-from fecm.sweeps.cases import TEXTS
+from fecm.sweeps.cases import NAMES
 from fecm.sweeps.outcome import RUN, STILL
 from fecm.sweeps.result import SweepResult
 
@@ -58,7 +58,9 @@ class Axis:
     @property
     def label(self) -> str:
         """Name in words."""
-        return LABELS.get(self.name, self.name.replace("_", " ").capitalize())
+        plain = self.name.replace("_", " ")
+        own = self.name not in (*COLUMNS, *NAMES)  # the caller's symbol or word
+        return LABELS.get(self.name, plain if own else plain.capitalize())
 
     @property
     def whole(self) -> bool:
@@ -138,7 +140,7 @@ def _rows(sweep: SweepResult, name: str, where: Mapping[str, Any]) -> Ints:
     kept = np.ones(len(sweep), dtype=bool)
     for parameter, wanted in where.items():
         values = _values(sweep, name, parameter)
-        if parameter in TEXTS:
+        if values.dtype.kind == "U":
             chosen = values == str(wanted)
             if not chosen.any():
                 raise PlotError(
@@ -177,7 +179,7 @@ def _listed(names: Iterable[Any]) -> str:
 def _text(sweep: SweepResult, name: str, row: int) -> str:
     """A value for a title."""
     value = sweep[name][row]
-    if name in TEXTS:
+    if isinstance(value, str):
         return str(value)
     return scale(abs(float(value)), sweep.unit(name)).show(float(value))
 
@@ -213,7 +215,7 @@ def _check_others(axes: list[Axis], others: list[str], other: Axis | None) -> No
 
 def _quantity(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
     """The quantity to show, with a note about cases that lack it."""
-    known = [name for name in sweep.summary if name in COLUMNS]
+    known = [name for name in sweep.summary if name != "status"]
     if quantity not in known:
         raise PlotError(f"unknown quantity {quantity}; the sweep has {_listed(known)}")
     status, values = sweep["status"][rows], sweep[quantity][rows].astype(float)
@@ -248,7 +250,7 @@ def _quantity(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
 def _parameter(sweep: SweepResult, name: str, rows: Ints) -> Axis:
     """Axis of a parameter."""
     values = sweep[name][rows]
-    if name not in TEXTS:
+    if values.dtype.kind != "U":
         return _numbers(sweep, name, values)
     ticks = tuple(dict.fromkeys(values.tolist()))
     places = {text: place for place, text in enumerate(ticks)}

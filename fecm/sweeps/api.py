@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
+import pickle
+import sys
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from fecm._errors import FecmWarning
-from fecm.api import load_deck
+from fecm.api import LoadedDeck, Progress, load_deck
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
 from fecm.problem.problem import Problem
-from fecm.sweeps.cases import CasesError, checked, combined
-from fecm.sweeps.outcome import Outcome, merge
-from fecm.sweeps.plan import Plan, Task, check_memory, plan, tasks
+from fecm.sweeps.batch import built
+from fecm.sweeps.cases import Case, CasesError, checked, combined
+from fecm.sweeps.outcome import RUN, Outcome, merge
+from fecm.sweeps.plan import Build, Measure, Plan, Task, check_memory, plan, tasks
 from fecm.sweeps.result import SweepResult, result_of, save
 from fecm.sweeps.schedule import Done, Idle, lost, on_dask, on_executor, on_workers, run_serial
 from fecm.sweeps.store import DamagedPartError, PartialResults
-
-# Executors whose tasks take memory of this machine.
-LOCAL = (ThreadPoolExecutor, ProcessPoolExecutor)
 
 
 def warn(text: str) -> None:
@@ -39,12 +39,45 @@ def problem_of(deck: str | Path | Deck) -> Problem:
     CasesError
         If the deck has several problems.
     """
+    return _loaded(deck).problems[0]
+
+
+def _loaded(deck: str | Path | Deck) -> LoadedDeck:
     prepared = load_deck(deck)
     if prepared.errors(force=True):
         raise DeckError(prepared.findings, prepared.source)
     if (count := len(prepared.problems)) != 1:
         raise CasesError(f"{prepared.source} has {count} problems; a sweep takes one")
-    return prepared.problems[0]
+    return prepared
+
+
+def _first_built(build: Build, cases: Sequence[Case]) -> LoadedDeck:
+    """The first deck that can be built: it has the units, and tells the memory of a case."""
+    reasons: list[str] = []
+    for case in cases:
+        try:
+            return built(build, case)
+        except CasesError as error:
+            reasons.append(str(error))
+    raise CasesError(f"no case has a deck; case 0: {reasons[0]}")
+
+
+def _check_sendable(spawned: bool, **functions: object) -> None:
+    """Refuse functions that worker processes can't import."""
+    for name, function in functions.items():
+        try:
+            pickle.dumps(function)
+        except Exception:  # pickle raises several types
+            raise CasesError(
+                f"{name} can't be sent to worker processes; define it with def at the top level of "
+                "a module"
+            ) from None
+        own = getattr(function, "__module__", "") == "__main__"
+        if spawned and own and not hasattr(sys.modules["__main__"], "__file__"):
+            raise CasesError(
+                f"{name} is defined in an interactive session, where worker processes can't import "
+                "it; define it in a module, or use an executor of threads"
+            )
 
 
 def carry_out(
@@ -121,23 +154,29 @@ def carry_out(
 
 
 def sweep(
-    deck: str | Path | Deck,
+    deck: str | Path | Deck | None = None,
     vary: Mapping[str, Sequence[Any]] | None = None,
     cases: Iterable[Mapping[str, Any]] | None = None,
     *,
-    until: float | str | None = None,
+    until: float | Literal["threshold"] | None = None,
     history: bool = False,
+    build: Build | None = None,
+    measure: Measure | None = None,
     workers: int = 1,
     scheduler: object = None,
     executor: Executor | None = None,
     output: str | Path | None = None,
+    progress: Progress | None = None,
 ) -> SweepResult:
     """Run a deck many times with varied values.
+
+    The warnings about the deck and the numbers of failed and doubtful cases
+    (:attr:`SweepResult.notes`) are :class:`FecmWarning`.
 
     Parameters
     ----------
     deck : str, Path or Deck
-        Deck with a single problem.
+        Deck with a single problem; not with `build`.
     vary : mapping of str to sequence
         Values by name; all combinations are run.
     cases : iterable of mapping, optional
@@ -147,6 +186,13 @@ def sweep(
         ``"threshold"``: the delamination threshold.  Without `vary` and `cases`, of the deck alone.
     history : bool
         Store the contact force of every step.
+    build : callable, optional
+        Takes a case, a dict, and returns its :class:`Deck`, instead of `deck`.  Names and values
+        are then any.  Each case is run in full with the DT of its own deck; an exception is the
+        status of the case.  The units of all decks must be the same.
+    measure : callable, optional
+        Takes the :class:`Result` of a case and returns numbers by name: more columns of the
+        summary, without units.  Each case is then run in full, with all that its deck stores.
     workers : int
         Worker processes on this machine.  With more than 1, a script needs
         ``if __name__ == "__main__"``.
@@ -156,6 +202,8 @@ def sweep(
         Pool of threads or processes, or another executor.  It is not shut down.
     output : str or Path, optional
         Output file, which is overwritten.
+    progress : callable, optional
+        Called with the number of finished cases and that of all cases.
 
     Returns
     -------
@@ -164,7 +212,8 @@ def sweep(
     Raises
     ------
     CasesError
-        If the cases are invalid.
+        If the cases are invalid, options exclude each other, no case has a deck, or `measure`
+        returns different names in different cases.
     DeckError
         If the deck has errors.
     NotEnoughMemoryError
@@ -179,6 +228,12 @@ def sweep(
     >>> found = sweep("decks/impact-115.inp", {"velocity": [50.0, 115.0]})
     >>> [f"{force:.3f}" for force in found["peak_force"]]
     ['36.058', '86.202']
+
+    >>> def largest_w(result):
+    ...     return {"w": result.plate_w.max()}
+    >>> found = sweep("decks/appendix.inp", {"velocity": [50.0, 115.0]}, measure=largest_w)
+    >>> found["w"].shape
+    (2,)
     """
     if (vary is None) == (cases is None) and not (vary is None and until is not None):
         raise CasesError("give either vary or cases")
@@ -186,12 +241,52 @@ def sweep(
         raise CasesError(f"executor is {executor!r}, not a concurrent.futures.Executor")
     if (workers > 1) + (scheduler is not None) + (executor is not None) > 1:
         raise CasesError("give only one of workers, scheduler and executor")
-    made = combined({} if vary is None else vary) if cases is None else checked(cases)
-    problem = problem_of(deck)
-    planned = plan(problem, made, history=history, until=until)
-    here = getattr(executor, "_max_workers", 0) if isinstance(executor, LOCAL) else workers
+    for name, function in (("build", build), ("measure", measure), ("progress", progress)):
+        if not (function is None or callable(function)):
+            raise CasesError(f"{name} is {function!r}, not a function")
+    free = build is not None
+    if cases is None:
+        made = combined({} if vary is None else vary, free=free)
+    else:
+        made = checked(cases, free=free)
+    if workers > 1 or isinstance(executor, ProcessPoolExecutor):
+        _check_sendable(workers > 1, build=build, measure=measure)
+    if deck is not None and build is None:
+        prepared = _loaded(deck)
+    elif deck is None and build is not None:
+        prepared = _first_built(build, made)
+    else:
+        raise CasesError("give either deck or build")
+    for finding in prepared.findings:
+        if finding.severity == "warning":
+            warn(finding.render(prepared.source))
+    (problem,) = prepared.problems
+    planned = plan(problem, made, history=history, until=until, build=build, measure=measure)
+    here = workers if executor is None else getattr(executor, "_max_workers", 0)
     check_memory(problem, planned, 0 if scheduler is not None else here)
-    result = carry_out(problem, planned, workers=workers, scheduler=scheduler, executor=executor)
+    finished = 0
+    first: tuple[int, list[str]] | None = None
+
+    def done(task: Task, outcome: Outcome) -> None:
+        nonlocal finished, first
+        if measure is not None and outcome.status[0] in RUN:
+            case, names = task.numbers[0], sorted(outcome.measured)
+            first = first or (case, names)
+            if names != first[1]:
+                raise CasesError(
+                    f"measure returns {', '.join(names)} for case {case}, and "
+                    f"{', '.join(first[1])} for case {first[0]}; return the same names, NaN where "
+                    "there is no value"
+                )
+        finished += len(task.numbers)
+        if progress is not None:
+            progress(finished, len(made))
+
+    result = carry_out(
+        problem, planned, workers=workers, scheduler=scheduler, executor=executor, done=done
+    )
     if output is not None:
         save(result, Path(output))
+    for text in result.notes:
+        warn(text)
     return result

@@ -6,20 +6,23 @@ then stepped once under a unit force; every case follows by convolution with its
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecm._memory import require
 from fecm._typing import Floats
+from fecm.api import LoadedDeck, load_deck
 from fecm.deck.findings import Findings
 from fecm.deck.macros import compile_program, flat
 from fecm.deck.model import Deck, Impact, Projectile
 from fecm.deck.model import Indentation as LawCards
 from fecm.deck.reader import ParsedProblem
+from fecm.deck.units import unit_names
 from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, stacked
 from fecm.mechanics.impact import ContactState, couple_step
 from fecm.mechanics.mesh import Mesh
@@ -33,14 +36,24 @@ from fecm.problem.check_program import check_program
 from fecm.problem.generate import generate
 from fecm.problem.problem import Problem, check
 from fecm.results.metrics import Indentation, summarise
+from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.simulation.guard import ENERGY_WARNING
 from fecm.simulation.run import simulate
-from fecm.sweeps.cases import CasesError
+from fecm.sweeps.cases import Case, CasesError, name_fault
 from fecm.sweeps.clock import Clock, with_time_step
 from fecm.sweeps.find import search
 from fecm.sweeps.outcome import RUN, Outcome, merge, status_of
-from fecm.sweeps.plan import ADVANCED, THRESHOLD, Plan, Task, shares_plate, without_output
+from fecm.sweeps.plan import (
+    ADVANCED,
+    THRESHOLD,
+    Build,
+    Measure,
+    Plan,
+    Task,
+    shares_plate,
+    without_output,
+)
 from fecm.sweeps.responses import BLOCK, Convolution, TipState, TipSteps, plate_response
 from fecm.sweeps.vary import apply_case
 
@@ -52,6 +65,9 @@ ROUGH = 1e-4
 
 def run(task: Task) -> Outcome:
     """Run the cases of a task; a case that cannot be run becomes a row with the reason."""
+    if task.alone:
+        found = merge([_in_full(task, n, c) for n, c in zip(task.numbers, task.cases, strict=True)])
+        return found if task.history else replace(found, force=None)
     numbers: list[int] = []
     decks: list[Deck] = []
     lost: dict[int, str] = {}
@@ -83,6 +99,67 @@ def run(task: Task) -> Outcome:
         parts.append(Outcome.failed(list(lost), list(lost.values())))
     outcome = merge(parts)
     return outcome if task.history else replace(outcome, force=None)
+
+
+def _in_full(task: Task, number: int, case: Case) -> Outcome:
+    """Run a case whose deck the caller builds, or whose result the caller measures."""
+    try:
+        if task.build is None:
+            checked, _ = _timed([apply_case(task.deck, case)], task.clock)
+        else:
+            (checked,) = built(task.build, case).problems
+            if unit_names(checked.deck) != unit_names(task.deck):
+                raise CasesError("build: the units of the deck are not those of the other cases")
+        return _alone(number, checked, task.measure, case)
+    except CasesError as error:
+        return Outcome.failed([number], [str(error)])
+
+
+def built(build: Build, case: Case) -> LoadedDeck:
+    """Build and check the deck of a case.
+
+    Raises
+    ------
+    CasesError
+        If it cannot be built, or has an error.
+    """
+    try:
+        deck = build(dict(case))
+        if not isinstance(deck, Deck):
+            raise TypeError(f"returned {type(deck).__name__}, not a Deck")
+        prepared = load_deck(deck)
+    except Exception as error:
+        raise CasesError(f"build: {_told(error)}") from error
+    if errors := prepared.errors():
+        raise CasesError(errors[0].message)
+    if not any(macro.word == "RODP" for macro in deck.macros):
+        raise CasesError("build: the deck has no impact step (RODP)")
+    return prepared
+
+
+def _measured(measure: Measure, result: Result, case: Case) -> dict[str, NDArray[Any]]:
+    """Columns that the caller computes from the result of a case."""
+    try:
+        found = measure(result)
+        if not isinstance(found, Mapping):
+            raise TypeError(f"returned {type(found).__name__}, not numbers by name")
+        values = {name: np.asarray(value) for name, value in found.items()}
+    except Exception as error:
+        raise CasesError(f"measure: {_told(error)}") from error
+    for name, value in values.items():
+        fault = name_fault(name)
+        if name in case or name == "dt":
+            fault = f"`{name}` is a name of the case; choose another"
+        elif value.ndim or value.dtype.kind not in "biuf":
+            fault = f"{name} is not a number"
+        if fault:
+            raise CasesError(f"measure: {fault}")
+    return {name: value.astype(float)[None] for name, value in values.items()}
+
+
+def _told(error: Exception) -> str:
+    """Type and text of an exception in one line."""
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"
 
 
 def _runs(checked: Problem) -> Runs:
@@ -390,11 +467,15 @@ def balance_errors(
     return worst
 
 
-def _alone(number: int, checked: Problem) -> Outcome:
-    """Run one case in full, without storing fields."""
+def _alone(
+    number: int, checked: Problem, measure: Measure | None = None, case: Case | None = None
+) -> Outcome:
+    """Run one case in full, without storing fields unless it is measured."""
     sink = MemorySink()
+    if measure is None:
+        checked = replace(checked, program=without_output(checked.program))
     try:
-        simulation = simulate(replace(checked, program=without_output(checked.program)), sink)
+        simulation = simulate(checked, sink)
     except (DivergenceError, ArithmeticError) as error:
         return Outcome.failed([number], [str(error)])
     force, times = sink.arrays["history/force"], sink.arrays["history/time"]
@@ -413,4 +494,7 @@ def _alone(number: int, checked: Problem) -> Outcome:
         "steps": np.array([len(force)]),
         "unsettled": np.array([values.get("unsettled_steps", 0)]),
     }
+    if measure is not None:
+        result = Result(sink.arrays, sink.texts, sink.groups)
+        columns |= _measured(measure, result, case or {})
     return Outcome([number], columns, force[None])

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from fecm._errors import FecmError
+from fecm.results.metrics import COLUMNS
 from fecm.studies.tables import TableError, read_rows
 
 Value = float | int | str
@@ -31,6 +32,8 @@ PLATE = (
 NAMES = (*CONTACT, *PLATE)
 TEXTS = ("layup",)
 INTEGERS = ("impact_node",)
+# Names of results, which are no names of cases or of measured columns.
+RESERVED = ("case", "step", "steps", "status", "force", "unsettled_steps", *COLUMNS)
 # Largest number of cases.
 MOST = 1_000_000
 
@@ -136,8 +139,10 @@ def read_cases(path: Path) -> list[Case]:
     return cases
 
 
-def combined(vary: Mapping[str, Iterable[Any]]) -> list[Case]:
+def combined(vary: Mapping[str, Iterable[Any]], *, free: bool = False) -> list[Case]:
     """Return every combination of lists of values, given by name; see :func:`grid`.
+
+    With `free`, names and values are any.
 
     Raises
     ------
@@ -146,10 +151,10 @@ def combined(vary: Mapping[str, Iterable[Any]]) -> list[Case]:
     """
     if not isinstance(vary, Mapping):
         raise CasesError(f'vary is {vary!r}; write a mapping such as {{"velocity": [50.0, 115.0]}}')
-    return grid([(name, _listed(name, values)) for name, values in vary.items()])
+    return grid([(name, _listed(name, values, free)) for name, values in vary.items()])
 
 
-def _listed(name: str, given: Iterable[Any]) -> list[Value]:
+def _listed(name: str, given: Iterable[Any], free: bool) -> list[Value]:
     """Values of a name; a lone text or number is refused."""
     values: list[Any] | None = None
     if not isinstance(given, str | bytes):
@@ -159,11 +164,15 @@ def _listed(name: str, given: Iterable[Any]) -> list[Value]:
         raise CasesError(f'vary: {name} is one value; write a list: {{"{name}": [{given!r}]}}')
     if not values:
         raise CasesError(f"vary: {name} has no values")
-    return [case[name] for case in checked(({name: value} for value in values), "vary")]
+    return [case[name] for case in checked(({name: v} for v in values), "vary", free=free)]
 
 
-def checked(cases: Iterable[Mapping[str, Any]], source: str = "") -> list[Case]:
+def checked(
+    cases: Iterable[Mapping[str, Any]], source: str = "", *, free: bool = False
+) -> list[Case]:
     """Validate cases given as mappings, which must all have the same names.
+
+    With `free`, the names are any but those of results, and a value is a number or a text.
 
     Raises
     ------
@@ -179,17 +188,37 @@ def checked(cases: Iterable[Mapping[str, Any]], source: str = "") -> list[Case]:
         if not isinstance(case, Mapping):
             raise CasesError(f"{where} is {case!r}, not a mapping of names to values; {remedy}")
         for name in case:
-            _known(name, where)
+            if not free:
+                _known(name, where)
+            elif fault := name_fault(name):
+                raise CasesError(f"{where}: {fault}")
         if made and case.keys() != made[0].keys():
             raise CasesError(f"{where} has other names than case 0")
-        made.append({name: _given(name, value, where) for name, value in case.items()})
+        made.append({name: _given(name, v, where, free) for name, v in case.items()})
     if not made:
         raise CasesError("a sweep needs at least one case")
+    for name in made[0]:
+        if len({isinstance(case[name], str) for case in made}) > 1:
+            raise CasesError(f"{name} has numbers and texts")
     return made
 
 
-def _given(name: str, value: Any, where: str) -> Value:
+def name_fault(name: object) -> str:
+    """Why a name can't be that of a column; empty if it can."""
+    if not (isinstance(name, str) and name.isidentifier()):
+        return f"`{name}` is not a name such as width"
+    return f"`{name}` is a name of the results; choose another" if name in RESERVED else ""
+
+
+def _given(name: str, value: Any, where: str, free: bool) -> Value:
     """Validate a value given in Python."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if free:
+        if isinstance(value, str) or (isinstance(value, float | int) and math.isfinite(value)):
+            free_value: Value = value
+            return free_value
+        raise CasesError(f"{where}: {name} is {value!r}, not a finite number or a text")
     try:
         return _value(name, value if isinstance(value, str) else repr(float(value)))
     except (TypeError, ValueError) as error:

@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
-from fecm.results.metrics import SUMMARY
+from fecm.results.metrics import COLUMNS, SUMMARY
 
 FINE = "ok"
 # The run ends during contact.
 STILL = "still in contact"
 RUN = (FINE, STILL)
+# Columns that describe the run of a case.
+ABOUT = ("status", "dt", "steps", "unsettled")
 
 
 @dataclass
@@ -44,6 +46,11 @@ class Outcome:
         """Status of each case."""
         texts: list[str] = self.columns["status"].tolist()
         return texts
+
+    @property
+    def measured(self) -> list[str]:
+        """Names of the columns that the caller computes."""
+        return [name for name in self.columns if name not in (*COLUMNS, *ABOUT)]
 
     def select(self, rows: NDArray[np.intp]) -> Outcome:
         """Return the outcome of some of the cases."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -16,10 +16,14 @@ from fecm.deck.macros import Body, Loop, flat
 from fecm.deck.model import Boundary, Deck, Delamination, Impact
 from fecm.problem.memory import needed_bytes
 from fecm.problem.problem import Problem
+from fecm.results.result import Result
 from fecm.sweeps.cases import CONTACT, LOAD, PLATE, Case, CasesError
 from fecm.sweeps.clock import Clock, clock_of
 from fecm.sweeps.find import COUNT
 from fecm.sweeps.vary import apply_case
+
+Build = Callable[[dict[str, Any]], Deck]
+Measure = Callable[[Result], Mapping[str, float]]
 
 # Cases advanced together; fixed, because the last digit of sums depends on it.
 TOGETHER = 1024
@@ -45,6 +49,10 @@ class Plan:
         Rule for the time step of each plate; None if the deck's time step applies to all.
     until : float or str or None
         Peak force whose velocity is searched in every case: a number, or ``"threshold"``.
+    build : callable or None
+        Makes the deck of a case; `deck` is that of one of the cases.
+    measure : callable or None
+        Computes more columns from the result of a case.
     """
 
     deck: Deck
@@ -52,6 +60,13 @@ class Plan:
     history: bool = False
     clock: Clock | None = None
     until: float | str | None = None
+    build: Build | None = None
+    measure: Measure | None = None
+
+    @property
+    def alone(self) -> bool:
+        """Whether every case is run in full."""
+        return self.build is not None or self.measure is not None
 
     def fingerprint(self) -> str:
         """Hash that identifies this sweep."""
@@ -81,6 +96,8 @@ def plan(
     *,
     history: bool = False,
     until: float | str | None = None,
+    build: Build | None = None,
+    measure: Measure | None = None,
 ) -> Plan:
     """Create the plan of a sweep.
 
@@ -94,6 +111,8 @@ def plan(
     if not cases:
         raise CasesError("a sweep needs at least one case")
     if until is not None:
+        if build is not None or measure is not None:
+            raise CasesError("until can't be given together with build or measure")
         if "velocity" in cases[0]:
             raise CasesError("velocity is what is searched; it can't be varied as well")
         if not checked.deck.require(Impact).velocity:
@@ -102,9 +121,9 @@ def plan(
             raise CasesError("the threshold needs a DELA segment, which the deck does not have")
         if until != THRESHOLD and not (isinstance(until, float | int) and 0.0 < until < math.inf):
             raise CasesError(f"the peak force to reach is a positive number, not {until}")
-    own = "dt" not in cases[0] and not {*LOAD, *CONTACT}.issuperset(cases[0])
+    own = build is None and "dt" not in cases[0] and not {*LOAD, *CONTACT}.issuperset(cases[0])
     clock = clock_of(checked) if own else None
-    return Plan(checked.deck, tuple(cases), history, clock, until)
+    return Plan(checked.deck, tuple(cases), history, clock, until, build, measure)
 
 
 def shares_plate(checked: Problem) -> bool:
@@ -123,7 +142,7 @@ def shares_plate(checked: Problem) -> bool:
 def _together(checked: Problem, made: Plan) -> int:
     """Most runs advanced together."""
     runs = len(made.cases) * (1 if made.until is None else COUNT)
-    return min(TOGETHER, runs) if shares_plate(checked) else 1
+    return min(TOGETHER, runs) if shares_plate(checked) and not made.alone else 1
 
 
 def tasks(checked: Problem, made: Plan) -> list[Task]:
@@ -138,9 +157,8 @@ def tasks(checked: Problem, made: Plan) -> list[Task]:
         for start in range(0, len(numbers), together):
             some = tuple(numbers[start : start + together])
             cases = tuple(made.cases[n] for n in some)
-            found.append(
-                Task(made.deck, cases, made.history, made.clock, made.until, len(found), some)
-            )
+            plain = Task(**vars(made), number=len(found), numbers=some)
+            found.append(replace(plain, cases=cases))
     return found
 
 
@@ -190,13 +208,16 @@ def check_memory(checked: Problem, made: Plan, workers: int) -> None:
     """
     steps, cases = checked.work.steps, len(made.cases)
     at_once = min(workers, len(tasks(checked, made)))
-    plate = replace(checked, program=without_output(checked.program))
+    plate = checked
+    if made.measure is None:
+        plate = replace(checked, program=without_output(checked.program))
     kept = KEPT * steps * cases if made.history else 0
 
     def needed(exact: bool) -> int:
         if not at_once:
             return kept
-        one = needed_bytes(plate, exact=exact) + ADVANCED * steps * _together(checked, made)
+        one = needed_bytes(plate, in_memory=made.measure is not None, exact=exact)
+        one += ADVANCED * steps * _together(checked, made)
         return kept + at_once * one
 
     def remedy(free: int) -> str:

@@ -63,6 +63,12 @@ def summary(result: SweepResult) -> list[str]:
 
 def verdict(result: SweepResult) -> str:
     """Count the cases, the failures, and the cases with doubtful results."""
+    found = ", ".join(f"{count} {what}" for count, what in _counts(result))
+    return f"{len(result)} case{'' if len(result) == 1 else 's'}: {found or 'all ok'}"
+
+
+def _counts(result: SweepResult) -> list[tuple[int, str]]:
+    """Numbers of cases with doubtful results and of failures, which are last."""
     steps = result.unconverged_steps
     unconverged = 0 if steps is None else int((steps > 0)[result.fine].sum())
     counts = (
@@ -70,8 +76,7 @@ def verdict(result: SweepResult) -> str:
         (unconverged, "with a contact iteration that did not converge"),
         (int((~result.fine).sum()), "failed"),
     )
-    found = ", ".join(f"{count} {what}" for count, what in counts if count)
-    return f"{len(result)} case{'' if len(result) == 1 else 's'}: {found or 'all ok'}"
+    return [(count, what) for count, what in counts if count]
 
 
 Array = NDArray[Any]
@@ -154,6 +159,17 @@ class SweepResult:
     def still(self) -> NDArray[np.bool_]:
         """Cases that were run and ended in contact."""
         return np.asarray(self.summary["status"] == STILL)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Numbers of cases that failed or whose results are doubtful."""
+        texts = [f"{count} of {len(self)} cases {what}" for count, what in _counts(self)]
+        reasons = Counter(self["status"][~self.fine].tolist()).most_common()
+        if reasons:
+            texts[-1] += f": {reasons[0][0]}"
+        if others := len(reasons[1:]):
+            texts[-1] += f", and {others} other reason{'s' * (others > 1)}"
+        return tuple(texts)
 
     def unit(self, name: str) -> str:
         """Return the unit of a value or result; empty if the deck states none."""
@@ -281,8 +297,9 @@ def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
     names = list(plan.cases[0])
     cases = {name: np.array([case[name] for case in plan.cases]) for name in names}
     columns, deck = outcome.columns, plan.deck
-    found = [*SUMMARY, *(THRESHOLD if deck.last(Delamination) else ())]
-    found += [*(FOUND if plan.until is not None else ()), "status"]
+    limited = deck.last(Delamination) is not None or not columns.keys().isdisjoint(THRESHOLD)
+    found = [*SUMMARY, *(THRESHOLD if limited else ())]
+    found += [*(FOUND if plan.until is not None else ()), *outcome.measured, "status"]
     none = np.full(len(plan.cases), np.nan)
     return SweepResult(
         cases, {name: columns.get(name, none) for name in found},
@@ -312,8 +329,8 @@ def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
     columns = [
         *((f"cases/{name}", values, f"{name} of every case", DIMENSIONS.get(name, ""))
           for name, values in result.cases.items()),
-        *((f"summary/{name}", values, *COLUMNS[name])
-          for name, values in result.summary.items() if name in COLUMNS),
+        *((f"summary/{name}", values, *COLUMNS.get(name, ("measured by the caller", "")))
+          for name, values in result.summary.items() if name != "status"),
         ("summary/status", result.summary["status"],
          "ok, still in contact, or why the case failed", ""),
         ("history/dt", result.dt, "time step of every case", "time"),
@@ -387,7 +404,7 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     unconverged_steps = contents.get("history/unsettled_steps")
     rows += () if unconverged_steps is None else (unconverged_steps,)
     shape = contents.shapes.get("history/force")
-    kinds = {name: summary[name].dtype.kind for name in COLUMNS if name in summary}
+    kinds = {name: values.dtype.kind for name, values in summary.items() if name != "status"}
     if (
         any(values.shape != count for values in rows)
         or (shape is not None and (len(shape), shape[:1]) != (2, count))

@@ -23,6 +23,7 @@ from concurrent.futures import (
 )
 from contextlib import contextmanager
 from pathlib import Path
+from pickle import PicklingError
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -95,7 +96,7 @@ def _run_on(
         for task in tasks:
             try:
                 running[executor.submit(attempt, task)] = task
-            except RuntimeError as error:  # it is broken or shut down
+            except (RuntimeError, TypeError, PicklingError) as error:
                 raise SchedulerError(f"the executor takes no tasks: {error}") from None
         while running:
             idle()

@@ -18,7 +18,8 @@ from fecm.problem.generate import generate
 from fecm.results.result import Result
 from fecm.studies import quick_models
 from fecm.studies.estimate import static_stiffness
-from fecm.sweeps.api import sweep
+from fecm.sweeps.api import carry_out, problem_of
+from fecm.sweeps.plan import plan
 from fecm.verification.case import Value, case
 from fecm.verification.decks import (
     MITC,
@@ -109,7 +110,8 @@ def listing() -> Sequence[Value]:
 def convolution() -> Sequence[Value]:
     """Force of 60 in/s where the deck says 115."""
     deck = report_impact(1000)
-    swept = sweep(deck, {"velocity": [60.0]}, history=True).force
+    problem = problem_of(deck)
+    swept = carry_out(problem, plan(problem, [{"velocity": 60.0}], history=True)).force
     if swept is None:
         raise ValueError("the sweep has kept no forces")
     slower = tuple(replace(s, velocity=60.0) if isinstance(s, Impact) else s for s in deck.segments)
