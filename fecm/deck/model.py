@@ -147,21 +147,11 @@ class Material(Segment):
 
 @dataclass(frozen=True)
 class Impact(Segment):
-    """ROD: (2I5,F10.0); impact point and velocity.
+    """ROD: (2I5,F10.0); impact point and velocity."""
 
-    Attributes
-    ----------
-    node : int
-        Impact node.
-    dof : int
-        Its dof in the direction of impact, from 1 (3 is w).
-    velocity : float
-        Approach velocity, length/time.
-    """
-
-    node: int
-    dof: int
-    velocity: float
+    node: int  # impact node
+    dof: int  # its dof in the direction of impact, from 1 (3 is w)
+    velocity: float  # approach velocity, length/time
     keyword: ClassVar[str] = "ROD"
 
     fields: ClassVar[Fields] = layout(
@@ -174,26 +164,14 @@ class Indentation(Segment):
     """EXPE: (4F10.0); the measured indentation law, equations 3-1, 3-3 and 3-8.
 
     With the second word ACR the permanent indentation follows equation 3-7 instead of 3-8.
-
-    Attributes
-    ----------
-    k : float
-        Contact coefficient, force/length^1.5.
-    alpha_p : float
-        Critical indentation (length), beyond which an indentation remains; alpha_cr with ACR.
-    s_p : float
-        Slope of the permanent over the maximum indentation; 0 with ACR.
-    q : float
-        Power of the unloading curve; 5/2 or 0 (the same) with ACR.
-    word : str
-        The keyword card's second word: ``""`` for equation 3-8, ``"ACR"`` for 3-7.
     """
 
-    k: float
+    k: float  # contact coefficient, force/length^1.5
+    # Critical indentation (length), beyond which an indentation remains; alpha_cr with ACR.
     alpha_p: float
-    s_p: float
-    q: float
-    word: str = ""
+    s_p: float  # slope of the permanent over the maximum indentation; 0 with ACR
+    q: float  # power of the unloading curve; 5/2 or 0 (the same) with ACR
+    word: str = ""  # the keyword card's second word: ``""`` for equation 3-8, ``"ACR"`` for 3-7
     keyword: ClassVar[str] = "EXPE"
 
     ACR: ClassVar[str] = "ACR"
@@ -225,27 +203,16 @@ class Indentation(Segment):
 
 @dataclass(frozen=True)
 class Projectile(Segment):
-    """PROJ: (2I5,3F10.0) and, for a rod, its diameters; the projectile (not in the report).
+    """PROJ: (2I5,3F10.0) and, for a rod, its diameters; the projectile (not in the report)."""
 
-    Attributes
-    ----------
-    elements : int
-        Number of the rod's elements; 0 for a rigid mass.
-    transducer : int
-        Node at which its force is measured, from 1 at the impacted end; 0 for the middle.
-    size : float
-        Length of the rod; the mass where there are no elements.
-    modulus, density : float
-        Young's modulus, and mass per volume, of a rod.
-    diameters : tuple of RodDiameter
-        From the impacted end on; those between two cards are interpolated.
-    """
-
-    elements: int
+    elements: int  # number of the rod's elements; 0 for a rigid mass
+    # Node at which its force is measured, from 1 at the impacted end; 0 for the middle.
     transducer: int
-    size: float
+    size: float  # length of the rod; the mass where there are no elements
+    # Young's modulus, and mass per volume, of a rod.
     modulus: float = 0.0
     density: float = 0.0
+    # From the impacted end on; those between two cards are interpolated.
     diameters: tuple[RodDiameter, ...] = ()
     keyword: ClassVar[str] = "PROJ"
 
@@ -271,25 +238,15 @@ def _given(value: Value) -> float | None:
 
 @dataclass(frozen=True)
 class Patch(Segment):
-    """PATC: (A4,6X,4F10.0); the contact force acts on a circle (not in the report's program).
+    """PATC: (A4,6X,4F10.0); the contact force acts on a circle (not in the report's program)."""
 
-    Attributes
-    ----------
-    shape : str
-        ``"DISC"``, a uniform pressure, or ``"HERT"``, Hertz's.
-    radius : float or None
-        Length; None takes :data:`~fecm.mechanics.patch.RADIUS_PER_THICKNESS` times the thickness.
-    x, y : float or None
-        Centre, length; None takes the node of ROD.
-    load : float
-        Static force on the patch, scaled by PROP.
-    """
-
-    shape: str = "DISC"
+    shape: str = "DISC"  # ``"DISC"``, a uniform pressure, or ``"HERT"``, Hertz's
+    # Length; None takes :data:`~fecm.mechanics.patch.RADIUS_PER_THICKNESS` times the thickness.
     radius: float | None = None
+    # Centre, length; None takes the node of ROD.
     x: float | None = None
     y: float | None = None
-    load: float = 0.0
+    load: float = 0.0  # static force on the patch, scaled by PROP
     keyword: ClassVar[str] = "PATC"
 
     optional: ClassVar[int] = 4
@@ -311,22 +268,15 @@ class Patch(Segment):
 
 @dataclass(frozen=True)
 class Shear(Segment):
-    """SHEA: (F10.0); treatment of transverse shear (not in the report's program).
+    """SHEA: (F10.0); treatment of transverse shear (not in the report's program)."""
 
-    Attributes
-    ----------
-    factor : float
-        Shear correction factor: 1 in the report's program; its page on cut-off frequencies
-        recommends pi^2/12.
-    assumed : bool
-        Assumed strains, ``MITC`` on the keyword card; otherwise quadrature of the order L2.
-    equilibrium : bool
-        Stiffness from the equilibrium of the plies, ``EQUI`` on the keyword card; otherwise their
-        sum, equation 2-19.
-    """
-
+    # Shear correction factor: 1 in the report's program; its page on cut-off frequencies recommends
+    # pi^2/12.
     factor: float = 1.0
+    # Assumed strains, ``MITC`` on the keyword card; otherwise quadrature of the order L2.
     assumed: bool = False
+    # Stiffness from the equilibrium of the plies, ``EQUI`` on the keyword card; otherwise their
+    # sum, equation 2-19.
     equilibrium: bool = False
     keyword: ClassVar[str] = "SHEA"
 
@@ -344,28 +294,19 @@ class Shear(Segment):
 
 @dataclass(frozen=True)
 class Allowables(Segment):
-    """ALLO: (7F10.0) and (3F10.0); strengths of the ply (not in the report's program).
+    """ALLO: (7F10.0) and (3F10.0); strengths of the ply (not in the report's program)."""
 
-    Attributes
-    ----------
-    xt, xc, yt, yc : float
-        Strengths along and across the fibres, in tension and compression: all positive, force/area.
-    s12, s13, s23 : float
-        Shear strengths; a blank S13 is S12, a blank S23 is S13.
-    f12 : float
-        Tsai and Wu's F12*; -0.5 if blank.
-    p_plus, p_minus : float
-        Puck's slopes; 0.35 and 0.3 if blank.
-    """
-
+    # Strengths along and across the fibres, in tension and compression: all positive, force/area.
     xt: float
     xc: float
     yt: float
     yc: float
+    # Shear strengths; a blank S13 is S12, a blank S23 is S13.
     s12: float
     s13: float
     s23: float
-    f12: float = -0.5
+    f12: float = -0.5  # Tsai and Wu's F12*; -0.5 if blank
+    # Puck's slopes; 0.35 and 0.3 if blank.
     p_plus: float = 0.35
     p_minus: float = 0.3
     keyword: ClassVar[str] = "ALLO"
@@ -400,18 +341,10 @@ class Allowables(Segment):
 
 @dataclass(frozen=True)
 class Delamination(Segment):
-    """DELA: (2F10.0); toughness for the delamination threshold (not in the report's program).
+    """DELA: (2F10.0); toughness for the delamination threshold (not in the report's program)."""
 
-    Attributes
-    ----------
-    toughness : float
-        G_IIc, force/length.
-    number : float
-        Number of delaminations; 1 if blank.
-    """
-
-    toughness: float
-    number: float = 1.0
+    toughness: float  # G_IIc, force/length
+    number: float = 1.0  # number of delaminations; 1 if blank
     keyword: ClassVar[str] = "DELA"
 
     fields: ClassVar[Fields] = layout("F10 G_IIc", "F10? number of delaminations|number")
@@ -425,15 +358,9 @@ class Delamination(Segment):
 
 @dataclass(frozen=True)
 class Damping(Segment):
-    """DAMP: (F10.0); mass-proportional damping of the plate (not in the report's program).
+    """DAMP: (F10.0); mass-proportional damping of the plate (not in the report's program)."""
 
-    Attributes
-    ----------
-    coefficient : float
-        a of the damping matrix C = a M, 1/time.
-    """
-
-    coefficient: float
+    coefficient: float  # a of the damping matrix C = a M, 1/time
     keyword: ClassVar[str] = "DAMP"
 
     fields: ClassVar[Fields] = layout("F10 a")
@@ -450,12 +377,7 @@ class Gages(NumberedSegment):
 
 @dataclass(frozen=True)
 class Units(Segment):
-    """UNIT: names of the deck's units, for output; nothing is converted.
-
-    Attributes
-    ----------
-    length, force, time : str
-    """
+    """UNIT: names of the deck's units, for output; nothing is converted."""
 
     length: str
     force: str

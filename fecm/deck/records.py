@@ -37,14 +37,9 @@ DOF_NAMES = ("u", "v", "w", "theta_x", "theta_y")
 
 @dataclass(frozen=True, kw_only=True)
 class Record:
-    """Values of one card, as attributes in the card's order.
+    """Values of one card, as attributes in the card's order."""
 
-    Attributes
-    ----------
-    source : Source or None
-        The card; None for a record built in Python.
-    """
-
+    # The card; None for a record built in Python.
     source: Source | None = field(default=None, compare=False, repr=False)
     fields: ClassVar[Fields]
     # Values of the card that one attribute holds as a tuple.
@@ -84,19 +79,13 @@ class Record:
 
 @dataclass(frozen=True)
 class Control(Record):
-    """Control card: 6I5.
+    """Control card: 6I5."""
 
-    Attributes
-    ----------
-    numnp, numel, layers : int
-        Numbers of nodes, elements and layers.
-    ndm, ndf, nen : int
-        Spatial dimensions, dofs per node, largest number of nodes per element.
-    """
-
+    # Numbers of nodes, elements and layers.
     numnp: int
     numel: int
     layers: int
+    # Spatial dimensions, dofs per node, largest number of nodes per element.
     ndm: int
     ndf: int
     nen: int
@@ -130,23 +119,14 @@ class RodDiameter(Record):
 
 @dataclass(frozen=True)
 class Gage(Record):
-    """GAGE card: (I5,5X,4F10.0); a strain gage.
+    """GAGE card: (I5,5X,4F10.0); a strain gage."""
 
-    Attributes
-    ----------
-    number : int
-        Its name in the result.
-    x, y, z : float
-        Its position; z from the mid-plane, positive on the face away from the projectile (length).
-    direction : float
-        Degrees from the x-axis to the y-axis.
-    """
-
-    number: int
+    number: int  # its name in the result
+    # Its position; z from the mid-plane, positive on the face away from the projectile (length).
     x: float
     y: float
     z: float
-    direction: float
+    direction: float  # degrees from the x-axis to the y-axis
 
     fields: ClassVar[Fields] = layout(
         "I5 gage", "X5", "F10 gage's x|x", "F10 gage's y|y", "F10 gage's z|z",
@@ -178,20 +158,11 @@ class ElementNodes(Record):
 
 @dataclass(frozen=True)
 class Layer(Record):
-    """Layer card of MATE: (I5,F5.0,F10.0); the number is not used for placing.
-
-    Attributes
-    ----------
-    number : int
-    angle : float
-        Fibre direction in degrees, counter-clockwise from the x-axis.
-    thickness : float
-        Length.
-    """
+    """Layer card of MATE: (I5,F5.0,F10.0); the number is not used for placing."""
 
     number: int
-    angle: float
-    thickness: float
+    angle: float  # fibre direction in degrees, counter-clockwise from the x-axis
+    thickness: float  # length
 
     fields: ClassVar[Fields] = layout(
         "I5 layer|lay", "F5 fibre angle|ang", "F10 layer thickness|thickness"
@@ -200,21 +171,14 @@ class Layer(Record):
 
 @dataclass(frozen=True)
 class Integration(Record):
-    """First card of MATE: (3I5,2F10.0).
+    """First card of MATE: (3I5,2F10.0)."""
 
-    Attributes
-    ----------
-    bending, shear : int
-        Gauss orders of the bending and of the transverse shear stiffness (L1, L2).
-    points : int
-        Stress points: Gauss points of this order if positive, nodal points if negative (K).
-    thickness, width : float
-        Total thickness (length); the width is not used.
-    """
-
+    # Gauss orders of the bending and of the transverse shear stiffness (L1, L2).
     bending: int
     shear: int
+    # Stress points: Gauss points of this order if positive, nodal points if negative (K).
     points: int
+    # Total thickness (length); the width is not used.
     thickness: float
     width: float = 0.0
 
@@ -227,20 +191,11 @@ class Integration(Record):
 
 @dataclass(frozen=True)
 class Ply(Record):
-    """Second card of MATE: (7F10.0); mass density and elastic constants of every layer.
+    """Second card of MATE: (7F10.0); mass density and elastic constants of every layer."""
 
-    Attributes
-    ----------
-    density : float
-        Mass per volume.
-    nu12 : float
-        Major Poisson's ratio.
-    e1, e2, g12, g13, g23 : float
-        Moduli, force per area.
-    """
-
-    density: float
-    nu12: float
+    density: float  # mass per volume
+    nu12: float  # major Poisson's ratio
+    # Moduli, force per area.
     e1: float
     e2: float
     g12: float
@@ -256,20 +211,11 @@ class Ply(Record):
 
 @dataclass(frozen=True)
 class Macro(Record):
-    """A macro card: (A4,1X,A4,1X,2F5.0).
+    """A macro card: (A4,1X,A4,1X,2F5.0)."""
 
-    Attributes
-    ----------
-    word : str
-        Name, in capitals.
-    option : str
-        Second word, in capitals; often blank.
-    value, second : float
-        The two numbers; 0 where blank.
-    """
-
-    word: str
-    option: str = ""
+    word: str  # name, in capitals
+    option: str = ""  # second word, in capitals; often blank
+    # The two numbers; 0 where blank.
     value: float = 0.0
     second: float = 0.0
 
@@ -298,23 +244,15 @@ class Macro(Record):
 
 @dataclass(frozen=True)
 class LoadTable(Record):
-    """Card of PROP: (2I5,7F10.0), after the macro program's END.
+    """Card of PROP: (2I5,7F10.0), after the macro program's END."""
 
-    Attributes
-    ----------
-    kind, exponent : int
-        Type of the table, 1 (or blank), and the power L of the sine.
-    begin, end : float
-        Times between which the load acts.
-    constants : tuple of float
-        A1 to A5 of A1 + A2 t + A3 sin(A4 t + A5)^L.
-    """
-
+    # Type of the table, 1 (or blank), and the power L of the sine.
     kind: int
     exponent: int
+    # Times between which the load acts.
     begin: float
     end: float
-    constants: tuple[float, ...]
+    constants: tuple[float, ...]  # A1 to A5 of A1 + A2 t + A3 sin(A4 t + A5)^L
 
     packed: ClassVar[slice] = slice(4, None)
     fields: ClassVar[Fields] = layout(

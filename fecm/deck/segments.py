@@ -6,38 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
+from fecm.deck import model
 from fecm.deck.card import Card, Fields, Source, Value, read_values
 from fecm.deck.findings import Findings
-from fecm.deck.model import (
-    Allowables,
-    Boundary,
-    Coordinates,
-    Damping,
-    Delamination,
-    Elements,
-    Forces,
-    Gages,
-    Impact,
-    Indentation,
-    Material,
-    NumberedSegment,
-    Page,
-    Patch,
-    PrintOption,
-    Projectile,
-    Segment,
-    Shear,
-    Units,
-)
-from fecm.deck.records import (
-    Control,
-    ElementNodes,
-    Integration,
-    Layer,
-    Ply,
-    Record,
-    RodDiameter,
-)
+from fecm.deck.records import Control, ElementNodes, Integration, Layer, Ply, Record, RodDiameter
 
 
 class Stream:
@@ -133,7 +105,7 @@ class SegmentReader:
         self._control = control
         self.unsound: set[str] = set()  # keywords of segments with unreadable cards
 
-    def read(self, head: Card) -> Segment | None:
+    def read(self, head: Card) -> model.Segment | None:
         """Read the segment of a keyword card; None after an error."""
         segment = READERS[head.keyword](self, head)
         if segment is None:
@@ -165,7 +137,7 @@ class SegmentReader:
             )
         return tuple(records)
 
-    def _numbered(self, head: Card) -> Segment:
+    def _numbered(self, head: Card) -> model.Segment:
         kind = NUMBERED[head.keyword]
         records = self._records(head, kind.record, kind.card_fields(self._control))
         return kind(records, source=Source(head, ()))
@@ -194,12 +166,12 @@ class SegmentReader:
             return None
         return kind.from_row(*row)
 
-    def _patch(self, head: Card) -> Segment | None:
+    def _patch(self, head: Card) -> model.Segment | None:
         # The card begins with a word, but not with that of another segment.
         card = self._stream.take()
         if card is not None and card.keyword not in (*READERS, "END"):
-            row = self._stream.row(card, Patch.fields)
-            return None if row is None else Patch.from_row(*row)
+            row = self._stream.row(card, model.Patch.fields)
+            return None if row is None else model.Patch.from_row(*row)
         if card is not None:
             self._stream.give_back()
         self._stream.findings.add(
@@ -210,37 +182,37 @@ class SegmentReader:
         )
         return None
 
-    def _allowables(self, head: Card) -> Segment | None:
-        strengths = self._single(head, Allowables)
+    def _allowables(self, head: Card) -> model.Segment | None:
+        strengths = self._single(head, model.Allowables)
         card = self._stream.take()
         if card is not None and card.is_keyword:
             self._stream.give_back()
             card = None
-        row = None if card is None else self._stream.row(card, Allowables.constants)
+        row = None if card is None else self._stream.row(card, model.Allowables.constants)
         if strengths is None or (card is not None and row is None):
             return None
         return strengths if row is None else strengths.with_constants(row[0])
 
-    def _shear(self, head: Card) -> Segment | None:
+    def _shear(self, head: Card) -> model.Segment | None:
         words = head.data.replace(",", " ").upper().split()[1:]
         for word in words:
-            if word not in Shear.WORDS:
+            if word not in model.Shear.WORDS:
                 self._stream.findings.add(
                     "E446", f"`{word}` after SHEA is unknown.", head.place,
                     "SHEA takes MITC (assumed strains) and EQUI (stiffness from equilibrium)",
                 )  # fmt: skip
-        assumed, equilibrium = (word in words for word in Shear.WORDS)
+        assumed, equilibrium = (word in words for word in model.Shear.WORDS)
         following = self._stream.take()
         if following is not None:
             self._stream.give_back()
         if words and (following is None or following.is_keyword or following.is_blank):
-            return Shear(1.0, assumed, equilibrium, source=Source(head, ()))
-        found = self._single(head, Shear)
+            return model.Shear(1.0, assumed, equilibrium, source=Source(head, ()))
+        found = self._single(head, model.Shear)
         return found and replace(found, assumed=assumed, equilibrium=equilibrium)
 
-    def _indentation(self, head: Card) -> Segment | None:
+    def _indentation(self, head: Card) -> model.Segment | None:
         word = " ".join(head.data.replace(",", " ").split()[1:]).upper()
-        if word and word != Indentation.ACR:
+        if word and word != model.Indentation.ACR:
             self._stream.findings.add(
                 "W416",
                 f"`{word}` after EXPE is not read: the law is that of equation 3-8.",
@@ -248,21 +220,21 @@ class SegmentReader:
                 "EXPE ACR takes the law of equation 3-7",
             )
             word = ""
-        law = self._single(head, Indentation, Indentation.acr_fields if word else None)
+        law = self._single(head, model.Indentation, model.Indentation.acr_fields if word else None)
         return law and replace(law, word=word)
 
-    def _projectile(self, head: Card) -> Segment | None:
-        projectile = self._single(head, Projectile)
+    def _projectile(self, head: Card) -> model.Segment | None:
+        projectile = self._single(head, model.Projectile)
         if projectile is None or not projectile.elements:
             return projectile
         diameters = self._records(head, RodDiameter, RodDiameter.fields)
         return replace(projectile, diameters=diameters)
 
-    def _units(self, head: Card) -> Segment | None:
+    def _units(self, head: Card) -> model.Segment | None:
         card = self._stream.take()
         names = [] if card is None else card.data.replace(",", " ").split()
-        if card is not None and len(names) == len(Units.NAMES):
-            return Units(*names, source=Source(card, ()))
+        if card is not None and len(names) == len(model.Units.NAMES):
+            return model.Units(*names, source=Source(card, ()))
         if card is not None and card.keyword in (*READERS, "END"):
             self._stream.give_back()
         self._stream.findings.add(
@@ -273,20 +245,20 @@ class SegmentReader:
         )
         return None
 
-    def _print_option(self, head: Card) -> Segment:
-        return PrintOption(head.keyword == "PRIN", source=Source(head, ()))
+    def _print_option(self, head: Card) -> model.Segment:
+        return model.PrintOption(head.keyword == "PRIN", source=Source(head, ()))
 
-    def _page(self, head: Card) -> Segment:
+    def _page(self, head: Card) -> model.Segment:
         card = self._stream.take()
-        return Page("" if card is None else card.data[:4].rstrip(), source=Source(head, ()))
+        return model.Page("" if card is None else card.data[:4].rstrip(), source=Source(head, ()))
 
-    def _material(self, head: Card) -> Segment | None:
+    def _material(self, head: Card) -> model.Segment | None:
         integration = self._single(head, Integration)
         ply = self._single(head, Ply)
         layers = self._layers(head) if integration or ply else None
         if integration is None or ply is None or layers is None:
             return None
-        return Material(integration, ply, layers, source=Source(head, ()))
+        return model.Material(integration, ply, layers, source=Source(head, ()))
 
     def _layers(self, head: Card) -> tuple[Layer, ...] | None:
         """Layer cards, as many as the control card says; None if one is missing or unreadable."""
@@ -309,24 +281,25 @@ class SegmentReader:
         return tuple(layers) if len(layers) == count else None
 
 
-NUMBERED: dict[str, type[NumberedSegment]] = {
-    kind.keyword: kind for kind in (Coordinates, Elements, Boundary, Forces, Gages)
+NUMBERED: dict[str, type[model.NumberedSegment]] = {
+    kind.keyword: kind
+    for kind in (model.Coordinates, model.Elements, model.Boundary, model.Forces, model.Gages)
 }
 # Readers of the segments, by keyword.
-READERS: dict[str, Callable[[SegmentReader, Card], Segment | None]] = {
+READERS: dict[str, Callable[[SegmentReader, Card], model.Segment | None]] = {
     "COOR": SegmentReader._numbered,
     "ELEM": SegmentReader._numbered,
     "BOUN": SegmentReader._numbered,
     "MATE": SegmentReader._material,
-    "ROD": lambda reader, head: reader._single(head, Impact),
+    "ROD": lambda reader, head: reader._single(head, model.Impact),
     "EXPE": SegmentReader._indentation,
     "FORC": SegmentReader._numbered,
     "PROJ": SegmentReader._projectile,
     "SHEA": SegmentReader._shear,
     "PATC": SegmentReader._patch,
     "ALLO": SegmentReader._allowables,
-    "DELA": lambda reader, head: reader._single(head, Delamination),
-    "DAMP": lambda reader, head: reader._single(head, Damping),
+    "DELA": lambda reader, head: reader._single(head, model.Delamination),
+    "DAMP": lambda reader, head: reader._single(head, model.Damping),
     "GAGE": SegmentReader._numbered,
     "UNIT": SegmentReader._units,
     "PRIN": SegmentReader._print_option,

@@ -14,20 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
+from fecm.deck import model
 from fecm.deck.macros import WORDS
-from fecm.deck.model import (
-    Boundary,
-    Coordinates,
-    Deck,
-    Elements,
-    Forces,
-    Impact,
-    Indentation,
-    Material,
-    Page,
-    PrintOption,
-    Segment,
-)
 from fecm.deck.records import DOF_NAMES
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.plate import PlateModel
@@ -87,7 +75,7 @@ class Printer:
 
     # Input ---------------------------------------------------------------------------------------
 
-    def problem(self, deck: Deck, mesh: Mesh, plate: PlateModel) -> None:
+    def problem(self, deck: model.Deck, mesh: Mesh, plate: PlateModel) -> None:
         """Echo a problem: control, segments in the deck's order, equations, macro program."""
         if not self.is_on:
             return
@@ -104,9 +92,9 @@ class Printer:
         self._page("Control information", _values(counts))
         echo = True
         for segment in deck.segments:
-            if isinstance(segment, PrintOption):
+            if isinstance(segment, model.PrintOption):
                 echo = segment.on
-            elif isinstance(segment, Page):
+            elif isinstance(segment, model.Page):
                 self._control = segment.carriage_control
             else:
                 self._segment(segment, mesh, plate, echo)
@@ -115,12 +103,12 @@ class Printer:
             self._nodes(mesh.equations)
         self._program(deck)
 
-    def _segment(self, segment: Segment, mesh: Mesh, plate: PlateModel, echo: bool) -> None:
+    def _segment(self, segment: model.Segment, mesh: Mesh, plate: PlateModel, echo: bool) -> None:
         """Echo one segment; mesh data only while echoing is on."""
         match segment:
-            case Material():
+            case model.Material():
                 self._material(segment, plate)
-            case Indentation():
+            case model.Indentation():
                 law = build_constants(segment)
                 values = {"Contact coefficient k": law.k}
                 if segment.word:
@@ -130,21 +118,21 @@ class Printer:
                     values["Constant s_p"] = segment.s_p
                 values["Power of the unloading law q"] = law.q
                 self._page("Indentation law", _values(values))
-            case Impact():
+            case model.Impact():
                 dof = f"{segment.dof:8d} ({DOF_NAMES[segment.dof - 1]})"
                 values = {"Node": segment.node, "Dof": dof, "Approach velocity": segment.velocity}
                 self._page("Impact", _values(values))
-            case Coordinates() if echo:
+            case model.Coordinates() if echo:
                 self._page("Nodal coordinates")
                 self._table(("node", "x", "y"), _numbered(mesh.coordinates))
-            case Elements() if echo:
+            case model.Elements() if echo:
                 names = (f"node {i + 1}" for i in range(mesh.elements.shape[1]))
                 self._page("Elements")
                 self._table(("element", *names), _numbered(mesh.elements))
-            case Boundary() if echo:
+            case model.Boundary() if echo:
                 self._page("Restraint codes")
                 self._nodes(mesh.codes, only=(mesh.codes != 0).any(axis=1))
-            case Forces() if echo:
+            case model.Forces() if echo:
                 self._page("Nodal forces and displacements")
                 self._nodes(mesh.forces, only=(mesh.forces != 0).any(axis=1))
 
@@ -153,7 +141,7 @@ class Printer:
         chosen = np.arange(len(values)) if only is None else np.flatnonzero(only)
         self._table(("node", *DOF_NAMES), ((n + 1, *values[n].tolist()) for n in chosen.tolist()))
 
-    def _material(self, material: Material, plate: PlateModel) -> None:
+    def _material(self, material: model.Material, plate: PlateModel) -> None:
         ply, card, laminate = material.ply, material.integration, plate.laminate
         lines = [
             f"  {len(material.layers)} layers, total thickness {card.thickness:g}",
@@ -171,7 +159,7 @@ class Printer:
         for name in ("A", "B", "D", "shear"):
             self._write([f"  {name}", *_matrix(getattr(laminate, name)), ""])
 
-    def _program(self, deck: Deck) -> None:
+    def _program(self, deck: model.Deck) -> None:
         self._page("Macro program")
         depth = 0
         for macro in deck.macros:
