@@ -429,10 +429,7 @@ def _refuse_blank(
 def write_card(fields: Fields, values: Sequence[Value]) -> str:
     """Write values as a card; in free format where one does not fit its columns.
 
-    Raises
-    ------
-    ValueError
-        If a number is not finite.
+    Raises ValueError if a number is not finite.
     """
     line = ""
     for field, value in zip(fields, values, strict=True):

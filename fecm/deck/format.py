@@ -19,10 +19,7 @@ RULER = "!:"
 def format_deck(text: str, source: str = "<text>") -> str:
     """Align a deck's columns; `source` is its name in messages.
 
-    Raises
-    ------
-    DeckError
-        If the deck can't be read.
+    Raises DeckError if the deck can't be read.
     """
     reader = Reader(text, keeps_values=True)
     reader.problems()

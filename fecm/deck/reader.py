@@ -370,12 +370,8 @@ def load_text(path_or_text: str | Path) -> tuple[str, str]:
 def _bytes(path: Path) -> bytes:
     """All bytes of a deck, which may be an endless pipe.
 
-    Raises
-    ------
-    NotEnoughMemoryError
-        If its cards need more memory than is free.
-    OSError
-        If it can't be read or is not text.
+    Raises NotEnoughMemoryError if its cards need more memory than is free.  Raises OSError if it
+    can't be read or is not text.
     """
     free = available()
     most = LARGEST_FILE if free is None else min(LARGEST_FILE, free // BYTES_A_BYTE)

@@ -48,10 +48,7 @@ MOST_NODES = SHAPES[-1].nodes
 def shape_of(present: Bools) -> ElementShape:
     """Shape of an element by its last node present (NEL of the listing): up to 3, 9 or 12.
 
-    Raises
-    ------
-    ValueError
-        If a node follows the twelfth.
+    Raises ValueError if a node follows the twelfth.
     """
     found = np.flatnonzero(present)
     last = int(found[-1]) + 1 if len(found) else 0
@@ -92,10 +89,7 @@ class ElementBlock:
 def element_blocks(elements: Ints, coordinates: Floats) -> list[ElementBlock]:
     """Sort elements, (numel, nen), node numbers from 1 or 0, into blocks with the same nodes.
 
-    Raises
-    ------
-    ValueError
-        If a corner is missing: three for a triangle, four for the others.
+    Raises ValueError if a corner is missing: three for a triangle, four for the others.
     """
     nodes = np.zeros((len(elements), max(MOST_NODES, elements.shape[1])), dtype=np.intp)
     nodes[:, : elements.shape[1]] = elements

@@ -56,10 +56,7 @@ def gages(
 ) -> GageArray:
     """Express the gages' strains by the dofs of their elements.
 
-    Raises
-    ------
-    OutsideError
-        If a gage is not on the plate.
+    Raises OutsideError if a gage is not on the plate.
     """
     families = element_groups.element_blocks(mesh.elements, mesh.coordinates)
     rows = [_functional(families, record, transposed_jacobian) for record in records]

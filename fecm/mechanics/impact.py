@@ -105,12 +105,8 @@ class ImpactSystem:
     ) -> None:
         """Take one step with the load factor of FORC's values; changes the state.
 
-        A `force` replaces the contact force on the plate (the slip ``prop-contact``).
-
-        Raises
-        ------
-        DivergenceError
-            If indentation or force is no longer finite.
+        A `force` replaces the contact force on the plate (the slip ``prop-contact``).  Raises
+        DivergenceError if indentation or force is no longer finite.
         """
         self.motion.advance(state.plate, dt, factor, self.applied(state, force))
         step = state.plate.step

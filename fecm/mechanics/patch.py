@@ -33,10 +33,7 @@ class PatchError(FecmError, ValueError):
 def patch_weights(mesh: Mesh, shape: str, radius: float, x: float, y: float) -> Floats:
     """Nodal weights of w, (numnp,), of a unit pressure on a circle; their sum is 1.
 
-    Raises
-    ------
-    PatchError
-        If a part of the circle is not on the plate.
+    Raises PatchError if a part of the circle is not on the plate.
     """
     t, dt = np.polynomial.legendre.leggauss(RADII)
     t, dt = (t + 1.0) / 2.0, dt / 2.0

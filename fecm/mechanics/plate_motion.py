@@ -222,10 +222,7 @@ class PlateMotion:
     def load(self, distribution: Floats) -> Load:
         """Prepare a unit force with shares of all dofs, (numnp, 5).
 
-        Raises
-        ------
-        ValueError
-            If it acts on restrained dofs only.
+        Raises ValueError if it acts on restrained dofs only.
         """
         shares = self._reduction.gather(distribution)
         (equations,) = np.nonzero(shares)

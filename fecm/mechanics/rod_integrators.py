@@ -25,10 +25,7 @@ INTEGRATORS = (WILSON, AVERAGE)
 class RodMethod:
     """Mass matrix and integration method of a rod; the defaults are the report program's.
 
-    Raises
-    ------
-    ValueError
-        If mass or integrator is unknown.
+    Raises ValueError if mass or integrator is unknown.
     """
 
     mass: str = LUMPED  # one of `MASSES`

@@ -25,10 +25,7 @@ class SingularStiffnessError(FecmError, ArithmeticError):
 class Tangent:
     """The factorised stiffness.
 
-    Raises
-    ------
-    SingularStiffnessError
-        If the factorisation fails.
+    Raises SingularStiffnessError if the factorisation fails.
     """
 
     def __init__(self, plate: PlateModel) -> None:
@@ -52,10 +49,7 @@ class Tangent:
     def solve(self, residual: Floats) -> Floats:
         """Displacement under a load, (neq,).
 
-        Raises
-        ------
-        SingularStiffnessError
-            If the solution does not balance the load.
+        Raises SingularStiffnessError if the solution does not balance the load.
         """
         change = self._factors.solve(residual)
         left = np.abs(self._stiffness @ change - residual).max()

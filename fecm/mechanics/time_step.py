@@ -28,11 +28,7 @@ def safe_time_step(model: PlateModel) -> float:
 
     The largest frequency of the plate is at most that of its unsupported elements (theorem of Irons
     and Treharne).  The bound is a few per cent below the critical step and far cheaper to compute.
-
-    Raises
-    ------
-    UnsoundPlateError
-        If an element's stiffness is not finite.
+    Raises UnsoundPlateError if an element's stiffness is not finite.
     """
     fastest = 0.0
     for family in model.families:
@@ -64,12 +60,8 @@ def critical_time_step(model: PlateModel, spring: tuple[Floats, float] | None = 
     """Critical time step of the central differences: 2 over the largest angular frequency.
 
     Computed by Lanczos iteration without assembling the stiffness; the relative error is at most
-    5e-5.  A spring to ground has weights, (neq,), and a stiffness (force/length).
-
-    Raises
-    ------
-    UnsoundPlateError
-        If the stiffness is not finite or the iteration fails.
+    5e-5.  A spring to ground has weights, (neq,), and a stiffness (force/length).  Raises
+    UnsoundPlateError if the stiffness is not finite or the iteration fails.
     """
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 

@@ -240,12 +240,8 @@ class ImpactModel:
 def rules(material: Material) -> tuple[Quadrature, Quadrature, Quadrature]:
     """Quadrature of a MATE card: bending (L1), transverse shear (L2), stored strains (K).
 
-    L1 and L2 outside 1 to 4 count as the nearest of these, as in the listing.
-
-    Raises
-    ------
-    ValueError
-        If K is 0 or beyond 4.
+    L1 and L2 outside 1 to 4 count as the nearest of these, as in the listing.  Raises ValueError if
+    K is 0 or beyond 4.
     """
     card = material.integration
     bending, shear = (min(HIGHEST_ORDER, max(1, n)) for n in (card.bending, card.shear))
@@ -408,10 +404,7 @@ def laminate_of(material: Material, *, isotropic_g12: bool = False) -> Laminate:
 def laminate_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> Laminate:
     """Laminate of a deck, with the shear correction factor of its SHEA segment.
 
-    Raises
-    ------
-    LookupError
-        If the deck has no MATE segment.
+    Raises LookupError if the deck has no MATE segment.
     """
     shear = deck.last(Shear) or Shear()
     plain = laminate_of(deck.require(Material), isotropic_g12=isotropic_g12)

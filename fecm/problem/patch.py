@@ -31,10 +31,7 @@ class ContactPatch:
 def contact_patch(deck: Deck, mesh: Mesh) -> ContactPatch | None:
     """Return the contact patch of a deck on a sound mesh; None without a PATC segment.
 
-    Raises
-    ------
-    PatchError
-        If the patch is not entirely on the plate.
+    Raises PatchError if the patch is not entirely on the plate.
     """
     card = deck.last(Patch)
     if card is None:

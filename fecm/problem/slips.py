@@ -165,10 +165,7 @@ CLAIMS = (
 def active_slips(mode: str = REPORT, single: Iterable[str] = ()) -> frozenset[str]:
     """Names of the slips that are on: single ones in report mode, all of them in listing mode.
 
-    Raises
-    ------
-    ValueError
-        If the mode or a slip is unknown, or single slips are given in listing mode.
+    Raises ValueError if the mode or a slip is unknown, or single slips are given in listing mode.
     """
     names = frozenset(single)
     if mode not in MODES:

@@ -87,10 +87,7 @@ class Checkpointer:
     def write(self, simulation: Simulation) -> None:
         """Write a checkpoint.
 
-        Raises
-        ------
-        OSError
-            If it can't be written; the previous checkpoint then remains valid.
+        Raises OSError if it can't be written; the previous checkpoint then remains valid.
         """
         flags = os.O_RDWR
         if not self._journal.spooled.length:
@@ -111,12 +108,8 @@ class Checkpointer:
     def restore(self, simulation: Simulation) -> None:
         """Set a new simulation and its result to the state of the checkpoint.
 
-        Raises
-        ------
-        CheckpointError
-            If the checkpoint is missing, damaged, or belongs to another run.
-        OSError
-            If it can't be read.
+        Raises CheckpointError if the checkpoint is missing, damaged, or belongs to another run.
+        Raises OSError if it can't be read.
         """
         with self._reading():
             about, arrays = self._read()

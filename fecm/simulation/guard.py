@@ -36,14 +36,10 @@ class EnergyBalance:
         """Add a block of steps; end the run if it diverges or exceeds the limit.
 
         The error is relative to the energy supplied up to the end of the block: in its first steps
-        a load has done almost no work.  The work of one step is not counted as an error: the
-        work belongs to the step, the energies to its end.  `initial` is the energy before the first
-        step.  Without a limit only an energy that is not finite ends the run.
-
-        Raises
-        ------
-        DivergenceError
-            If the energy is not finite, or the error exceeds the limit.
+        a load has done almost no work.  The work of one step is not counted as an error: the work
+        belongs to the step, the energies to its end.  `initial` is the energy before the first
+        step.  Without a limit only an energy that is not finite ends the run.  Raises
+        DivergenceError if the energy is not finite, or the error exceeds the limit.
         """
         lost = ~np.isfinite(block["held_energy"])
         if lost.any():

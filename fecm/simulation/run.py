@@ -34,12 +34,9 @@ def simulate(
 ) -> Simulation:
     """Run a problem into a sink and return the finished simulation.
 
-    Raises
-    ------
-    DivergenceError
-        If the motion grows without bound, or the energy balance exceeds its limit.
-    SingularStiffnessError
-        If a static solution is requested and the plate is not held.
+    Raises DivergenceError if the motion grows without bound, or the energy balance exceeds its
+    limit.  Raises SingularStiffnessError if a static solution is requested and the plate is not
+    held.
     """
     simulation = Simulation(problem, sink, options or RunOptions(), observers=observers)
     run(simulation)
@@ -49,12 +46,8 @@ def simulate(
 def run(simulation: Simulation) -> None:
     """Carry out a program, from its beginning or from the restored state.
 
-    Raises
-    ------
-    DivergenceError
-        If the motion grows without bound; the message names the likely cause.
-    SingularStiffnessError
-        If a static solution is requested and the plate is not held.
+    Raises DivergenceError if the motion grows without bound; the message names the likely cause.
+    Raises SingularStiffnessError if a static solution is requested and the plate is not held.
     """
     problem, state = simulation.problem, simulation.state
     if not state.position:

@@ -83,12 +83,8 @@ class Journal:
     def spool(self, file: BinaryIO) -> Part:
         """Append the new operations to the spool and sync it.
 
-        The next call overwrites them unless a checkpoint names them: see :meth:`keep`.
-
-        Raises
-        ------
-        OSError
-            If the spool or the result can't be written.
+        The next call overwrites them unless a checkpoint names them: see :meth:`keep`.  Raises
+        OSError if the spool or the result can't be written.
         """
         self._sink.check()
         file.truncate(self.spooled.length)
@@ -118,12 +114,8 @@ class Journal:
     def replay(self, path: Path, part: Part) -> None:
         """Repeat the operations of a part of a spool.
 
-        Raises
-        ------
-        SpoolError
-            If the part is incomplete or damaged.
-        OSError
-            If the spool can't be read or the result can't be written.
+        Raises SpoolError if the part is incomplete or damaged.  Raises OSError if the spool can't
+        be read or the result can't be written.
         """
         with naming(path), open_ordinary(path) as file:
             if _checksum(file, part.length) != part.checksum:

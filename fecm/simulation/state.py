@@ -100,12 +100,8 @@ def _leaves(value: Any, path: str, seen: set[int]) -> Iterator[tuple[str, Any]]:
 def restore(state: object, name: str, stored: Mapping[str, Any]) -> None:
     """Set a dataclass to the state that :func:`save` returned for another of the same type.
 
-    Raises
-    ------
-    KeyError
-        If something is missing.
-    ValueError
-        If an array has another shape or type.
+    Raises KeyError if something is missing.  Raises ValueError if an array has another shape or
+    type.
     """
     _restored(state, name, stored, set())
 
