@@ -3,9 +3,9 @@
 The build writes it from the tag; a checkout that was never built has that of the last release.
 """
 
-try:
-    from fecm._built_version import __version__ as found
-except ImportError:
-    found = "0.1.0"
+from importlib import import_module
 
-__version__: str = found
+try:
+    __version__: str = import_module("fecm._built_version").__version__
+except ImportError:
+    __version__ = "0.1.0"

@@ -145,8 +145,8 @@ class Findings:
     def __init__(self) -> None:
         self._all: list[Finding] = []
         self.counts: Counter[str] = Counter()
-        self.error_count = 0
-        self.closed = False
+        self.error_count: int = 0
+        self.closed: bool = False
 
     def add(self, code: str, message: str, place: Place | None = None, hint: str = "") -> None:
         """Add a finding; after :data:`MOST` errors report that there are more, and close."""

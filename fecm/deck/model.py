@@ -77,8 +77,8 @@ class Coordinates(NumberedSegment):
     """COOR: (2I5,7F10.0); coordinates of the nodes (length), of which NDM are used."""
 
     records: tuple[NodeValues, ...]
-    record = NodeValues
-    keyword = "COOR"
+    record: ClassVar[type[Record]] = NodeValues
+    keyword: ClassVar[str] = "COOR"
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
@@ -91,8 +91,8 @@ class Elements(NumberedSegment):
     """ELEM: (16I5); nodes of the elements; the increment follows the last of the NEN nodes."""
 
     records: tuple[ElementNodes, ...]
-    record = ElementNodes
-    keyword = "ELEM"
+    record: ClassVar[type[Record]] = ElementNodes
+    keyword: ClassVar[str] = "ELEM"
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
@@ -106,8 +106,8 @@ class Boundary(NumberedSegment):
     """BOUN: (16I5); restraint codes of the nodes; a dof with a code other than 0 is restrained."""
 
     records: tuple[NodeCodes, ...]
-    record = NodeCodes
-    keyword = "BOUN"
+    record: ClassVar[type[Record]] = NodeCodes
+    keyword: ClassVar[str] = "BOUN"
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
@@ -120,8 +120,8 @@ class Forces(NumberedSegment):
     """FORC: (2I5,7F10.0); nodal forces, or displacements where the dof is restrained."""
 
     records: tuple[NodeValues, ...]
-    record = NodeValues
-    keyword = "FORC"
+    record: ClassVar[type[Record]] = NodeValues
+    keyword: ClassVar[str] = "FORC"
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
@@ -371,8 +371,8 @@ class Gages(NumberedSegment):
     """GAGE: strain gages, read at every step (not in the report's program)."""
 
     records: tuple[Gage, ...]
-    record = Gage
-    keyword = "GAGE"
+    record: ClassVar[type[Record]] = Gage
+    keyword: ClassVar[str] = "GAGE"
 
 
 @dataclass(frozen=True)

@@ -149,8 +149,8 @@ class Result(Contact):
     ) -> None:
         self._arrays = arrays
         self._groups = groups
-        self.attributes = dict(groups.get("", {}))
-        self.deck = texts.get("deck", "")
+        self.attributes: dict[str, Any] = dict(groups.get("", {}))
+        self.deck: str = texts.get("deck", "")
         self.findings: tuple[Finding, ...] = ()
 
     @property
