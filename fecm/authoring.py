@@ -116,7 +116,9 @@ def impact(
     Parameters
     ----------
     plate : Plate
+        Mesh and supports.
     laminate : Laminate
+        Layup and ply.
     projectile : Rod or RigidMass, optional
         In the deck's units; the report's rod, or the mass of a fixture's standard, by default.
     contact : Contact or str
@@ -142,14 +144,16 @@ def impact(
     shear : str
         Transverse shear: assumed strains, ``"mitc"``, or full quadrature, ``"full"``.
     gages : iterable of tuple
-        x, y, z from the mid-plane (length) and direction (degrees) of strain gages.
+        Place x, y and z from the mid-plane (length) and direction (degrees) of strain gages.
     damage : bool
         Add strengths and toughness of a named ply.
     title : str, optional
+        Title of the deck.
 
     Returns
     -------
     Deck
+        It has no errors.
 
     Raises
     ------

@@ -39,6 +39,30 @@ def test_the_page_of_the_api_has_every_public_name() -> None:
     assert sorted(listed) == sorted(set(fecm.__all__) - {"__version__"})
 
 
+# Codes of numpydoc: sections and their order, documented parameters that exist, descriptions.
+DOCSTRINGS = {
+    "GL03", "GL05", "GL06", "GL07", "GL08", "GL09", "GL10", "SS01", "SS02", "SS03", "SS04",
+    "PR02", "PR03", "PR04", "PR06", "PR07", "PR08", "PR09", "RT03", "RT04", "RT05",
+}  # fmt: skip
+
+
+def test_the_docstrings_of_public_functions_and_methods_are_numpys() -> None:
+    validate = pytest.importorskip("numpydoc.validate").validate
+    public = [getattr(fecm, name) for name in fecm.__all__]
+    found = [member for member in public if inspect.isfunction(member)]
+    for kind in filter(inspect.isclass, public):
+        found += [f for name, f in vars(kind).items()
+                  if inspect.isfunction(f) and not name.startswith("_")]  # fmt: skip
+    wrong = {
+        f.__qualname__: error
+        for f in found
+        for error in validate(f"{f.__module__}.{f.__qualname__}")["errors"]
+        if error[0] in DOCSTRINGS
+    }
+    assert wrong == {}
+    assert len(found) > 20
+
+
 def test_importing_fecm_imports_neither_numpy_nor_scipy() -> None:
     code = "import sys, fecm; print({'numpy', 'scipy', 'h5py'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

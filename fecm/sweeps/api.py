@@ -208,6 +208,7 @@ def sweep(
     Returns
     -------
     SweepResult
+        One row per case, in the order of the cases.
 
     Raises
     ------
