@@ -110,7 +110,8 @@ def restrain_resting_dofs(plate: PlateModel, contact: Floats | None) -> PlateMod
     """
     mesh = plate.mesh
     in_plane, others = mesh.equations[:, :2].any(), mesh.equations[:, 2:].any()
-    if not (in_plane and others) or not _in_plane_rests(plate, contact):
+    pulled = mesh.forces[:, :2].any() or (contact is not None and contact[:, :2].any())
+    if not (in_plane and others) or pulled or plate.laminate.is_coupled:
         return plate
     codes = mesh.codes.copy()
     codes[:, :2] = 1
@@ -127,11 +128,6 @@ def _numbered(
     numbers[leaders.ravel()] = np.arange(count)
     index = np.where(moves, numbers[dof_indices], count)
     return SymmetryReduction(count, index, sign, weights)
-
-
-def _in_plane_rests(plate: PlateModel, contact: Floats | None) -> bool:
-    pulled = plate.mesh.forces[:, :2].any() or (contact is not None and contact[:, :2].any())
-    return not (plate.laminate.is_coupled or pulled)
 
 
 def _images(

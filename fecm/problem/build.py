@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Bools, Floats
+from fecm.deck import model
 from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, moves_only
 from fecm.deck.model import Allowables, Damping, Deck, Delamination, Indentation, Material, Shear
-from fecm.deck.model import Gages as GageCards
-from fecm.deck.model import Impact as ImpactCard
-from fecm.deck.model import Projectile as ProjectileCard
 from fecm.deck.records import RodDiameter
 from fecm.mechanics.contact_law import (
     ContactParameters,
@@ -34,6 +32,7 @@ from fecm.mechanics.gages import GageArray, gages
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.patch import RADIUS_PER_THICKNESS, patch_weights
 from fecm.mechanics.plate import IntegrationRules, PlateModel
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.ply_stresses import PlyStresses, equilibrium_shear_stiffness
@@ -49,12 +48,13 @@ from fecm.mechanics.projectile import (
 from fecm.mechanics.rod_integrators import STEPS
 from fecm.mechanics.stiffness_product import CSR, Workers, available
 from fecm.mechanics.strains import StrainField
-from fecm.mechanics.symmetry import restrain_resting_dofs, symmetry_reduction
+from fecm.mechanics.symmetry import half_turn_images, restrain_resting_dofs, symmetry_reduction
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.problem.generate import generate, rod_diameters
 from fecm.problem.options import RunOptions
-from fecm.problem.patch import ContactPatch, W, contact_patch
 
+# Dof w, from 0.
+W = 2
 # Number of equations above which threads save more than they cost.
 WORTH_SHARING = 100_000
 # Slips that change the plate or its loads.
@@ -66,6 +66,18 @@ class Threshold(NamedTuple):
 
     force: float
     rigidity: float
+
+
+@dataclass(frozen=True)
+class ContactPatch:
+    """Circle on which the contact force acts, and its nodal weights."""
+
+    shape: str  # ``"DISC"`` or ``"HERT"``
+    # Radius and centre, length.
+    radius: float
+    x: float
+    y: float
+    weights: Floats  # (numnp,): shares of the nodes in a unit force; 0 where w is restrained
 
 
 @dataclass(frozen=True)
@@ -129,7 +141,7 @@ class Problem:
             return self.patch.x, self.patch.y
         if not self.has_impact:
             return None
-        x, y = self.mesh.coordinates[self.deck.require(ImpactCard).node - 1].tolist()
+        x, y = self.mesh.coordinates[self.deck.require(model.Impact).node - 1].tolist()
         return x, y
 
     @cached_property
@@ -161,7 +173,7 @@ class Problem:
         if self.patch is not None:
             contact[:, W] = self.patch.weights
         else:
-            card = self.deck.require(ImpactCard)
+            card = self.deck.require(model.Impact)
             contact[card.node - 1, card.dof - 1] = 1.0
         return contact
 
@@ -204,7 +216,7 @@ class Problem:
         """Size of the result's large datasets."""
         control, work = self.deck.control, self.work
         points = control.numel * len(self.rules[2].xi)
-        segment = self.deck.last(GageCards)
+        segment = self.deck.last(model.Gages)
         gages = 0 if segment is None else len(segment.records)
         field = control.numnp * control.ndf
         return 8 * (
@@ -249,6 +261,28 @@ def rules(material: Material) -> tuple[Quadrature, Quadrature, Quadrature]:
     return gauss(bending), gauss(shear), points
 
 
+def contact_patch(deck: Deck, mesh: Mesh) -> ContactPatch | None:
+    """Return the contact patch of a deck on a sound mesh; None without a PATC segment.
+
+    Raises PatchError if the patch is not entirely on the plate.
+    """
+    card = deck.last(model.Patch)
+    if card is None:
+        return None
+    radius = card.radius
+    if radius is None:
+        radius = RADIUS_PER_THICKNESS[card.shape] * deck.require(Material).integration.thickness
+    if card.x is None or card.y is None:
+        x, y = mesh.coordinates[deck.require(model.Impact).node - 1].tolist()
+    else:
+        x, y = card.x, card.y
+    weights = patch_weights(mesh, card.shape, radius, x, y)
+    images = half_turn_images(mesh.coordinates)
+    if images is not None and np.allclose(weights, weights[images], 0.0, 1e-12):
+        weights = (weights + weights[images]) / 2.0  # exactly symmetric
+    return ContactPatch(card.shape, radius, x, y, np.where(mesh.codes[:, W] == 0, weights, 0.0))
+
+
 def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> PlateModel:
     """Build the plate of a deck with the active slips."""
     material = deck.require(Material)
@@ -271,7 +305,7 @@ def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> 
 
 def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> Projectile:
     """Build the projectile of a deck; without a PROJ segment the report's rod."""
-    card = deck.last(ProjectileCard)
+    card = deck.last(model.Projectile)
     if card is None:
         return report_rod(LISTING_DENSITY if "density" in slips else REPORT_DENSITY)
     if not card.elements:
@@ -280,14 +314,14 @@ def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> Project
     return Rod(card.size, diameters, card.modulus, card.density)
 
 
-def projectile_segment(rod: Projectile, transducer: int = 0) -> ProjectileCard:
+def projectile_segment(rod: Projectile, transducer: int = 0) -> model.Projectile:
     """PROJ segment of a projectile."""
     if isinstance(rod, RigidMass):
-        return ProjectileCard(0, 0, rod.total_mass)
+        return model.Projectile(0, 0, rod.total_mass)
     cards = [RodDiameter(n, 0, diameter) for n, diameter in enumerate(rod.diameters, start=1)]
     if len(set(rod.diameters)) == 1 < len(cards):  # those between two cards are generated
         cards = [replace(cards[0], increment=1), cards[-1]]
-    return ProjectileCard(
+    return model.Projectile(
         rod.elements, transducer, rod.length, rod.modulus, rod.density, tuple(cards)
     )
 
@@ -304,7 +338,7 @@ def build_station(deck: Deck, projectile: Projectile, slips: frozenset[str]) -> 
     sign = 1.0 if "station" in slips else -1.0
     if isinstance(projectile, RigidMass):
         return Transducer(0, sign)
-    card = deck.last(ProjectileCard)
+    card = deck.last(model.Projectile)
     middle = projectile.elements // 2 + (2 if "station" in slips else 1)
     return Transducer(middle if card is None or not card.transducer else card.transducer, sign)
 
@@ -340,7 +374,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     contact, share = problem.contact, 1.0
     mesh = problem.mesh
     if contact is not None and "rod-force" in slips:
-        card = deck.require(ImpactCard)
+        card = deck.require(model.Impact)
         hit = card.node - 1, card.dof - 1
         forces = generate(deck, unit_force=True).forces
         share = float(forces[hit])
@@ -358,7 +392,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     motion = PlateMotion(mobile, chosen.solver, reduced, workers, problem.damping)
     impact = None
     if contact is not None:
-        card = deck.require(ImpactCard)
+        card = deck.require(model.Impact)
         conditions = ImpactConditions(
             load=motion.load(contact),
             velocity=card.velocity,
@@ -372,7 +406,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     stress_points = plate.strain_field(problem.rules[2])
     plies, failure = build_plies(problem, plate), build_failure(problem, plate)
     places = stress_points.places(mesh.coordinates) if plies or failure else None
-    cards, transposed = deck.last(GageCards), plate.rules.transposed_jacobian
+    cards, transposed = deck.last(model.Gages), plate.rules.transposed_jacobian
     return ImpactModel(
         plate=plate,
         motion=motion,

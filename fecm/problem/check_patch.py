@@ -10,8 +10,7 @@ from fecm.mechanics.element_groups import element_blocks
 from fecm.mechanics.locate import locate
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.patch import DISC, HERTZ, RADIUS_PER_THICKNESS, PatchError
-from fecm.problem.build import Problem
-from fecm.problem.patch import ContactPatch, W
+from fecm.problem.build import ContactPatch, Problem, W
 
 
 def check_patch(problem: Problem, findings: Findings) -> None:

@@ -6,6 +6,9 @@ one mistake gives one finding.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from fecm.deck.findings import Findings
@@ -29,7 +32,7 @@ from fecm.deck.model import (
     Units,
 )
 from fecm.deck.reader import ParsedProblem
-from fecm.problem.build import Problem
+from fecm.problem.build import Problem, W
 from fecm.problem.check_impact import (
     check_gages,
     check_gages_under_force,
@@ -61,7 +64,6 @@ from fecm.problem.check_plausibility import (
 )
 from fecm.problem.check_program import check_program, check_time_step
 from fecm.problem.generate import generate
-from fecm.problem.patch import W
 
 __all__ = ["Problem", "check"]
 
@@ -71,6 +73,13 @@ IN_AN_IMPACT: tuple[type[Segment], ...] = (Impact, Indentation)
 SINGLE: tuple[type[Segment], ...] = (
     Coordinates, Elements, Material, Impact, Indentation, Projectile, Shear, Patch, Gages, Units,
     Allowables, Delamination, Damping,
+)  # fmt: skip
+
+
+# Checks of a segment by itself.
+CHECKS: tuple[tuple[type[Segment], Callable[[Any, Findings], None]], ...] = (
+    (Indentation, check_law), (Allowables, check_allowables), (Delamination, check_delamination),
+    (Damping, check_damping), (Projectile, check_projectile), (Shear, check_shear_correction),
 )  # fmt: skip
 
 
@@ -94,20 +103,11 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
         check_material(material, findings)
     if (impact := deck.last(Impact)) is not None:
         check_impact(impact, deck, mesh, findings)
-    if (law := deck.last(Indentation)) is not None:
-        check_law(law, findings)
-    if (allowables := deck.last(Allowables)) is not None:
-        check_allowables(allowables, findings)
-    if (delamination := deck.last(Delamination)) is not None:
-        check_delamination(delamination, findings)
-    if (damping := deck.last(Damping)) is not None:
-        check_damping(damping, findings)
-    if (projectile := deck.last(Projectile)) is not None:
-        check_projectile(projectile, findings)
-    if (correction := deck.last(Shear)) is not None:
-        check_shear_correction(correction, findings)
-    if (segment := deck.last(Gages)) is not None and findings.error_count == before and not unsound:
-        check_gages(segment, mesh, deck, findings)
+    for kind, check_segment in CHECKS:
+        if (segment := deck.last(kind)) is not None:
+            check_segment(segment, findings)
+    if (gages := deck.last(Gages)) is not None and findings.error_count == before and not unsound:
+        check_gages(gages, mesh, deck, findings)
     checked = Problem(deck, mesh, program)
     if findings.error_count == before and not unsound:
         if deck.has(Shear):

@@ -133,14 +133,9 @@ def leave_if_converged(run: Simulation) -> bool:
     return run.state.converged
 
 
-def lump_mass(run: Simulation) -> None:
-    """LMAS."""
-    run.state.consistent_mass = False
-
-
-def form_consistent_mass(run: Simulation) -> None:
-    """CMAS."""
-    run.state.consistent_mass = True
+def form_mass(run: Simulation, *, consistent: bool) -> None:
+    """LMAS and CMAS."""
+    run.state.consistent_mass = consistent
 
 
 def find_modes(run: Simulation, n: int) -> None:
@@ -216,8 +211,8 @@ ACTIONS: dict[str, Callable[..., bool | None]] = {
     "DT": set_time_step,
     "TIME": advance_clock,
     "PROP": proportional_load,
-    "LMAS": lump_mass,
-    "CMAS": form_consistent_mass,
+    "LMAS": partial(form_mass, consistent=False),
+    "CMAS": partial(form_mass, consistent=True),
     "TANG": form_tangent,
     "FORM": form_residual,
     "SOLV": solve,
