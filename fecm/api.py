@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import BinaryIO, Literal
 
 from fecm._errors import FecmWarning
 from fecm.deck.findings import DeckError, Finding
@@ -62,13 +62,13 @@ class LoadedDeck:
         ]
 
 
-def load_deck(path_or_text: str | Path | Deck, mode: str = REPORT) -> LoadedDeck:
+def load_deck(path_or_text: str | Path | BinaryIO | Deck, mode: str = REPORT) -> LoadedDeck:
     """Read and check a deck without running it.
 
     Parameters
     ----------
-    path_or_text : str, Path or Deck
-        A file's path, a deck's text, or a model built in Python.
+    path_or_text : str, Path, binary file or Deck
+        A file's path, a deck's text, standard input, or a model built in Python.
     mode : str
         In listing mode blanks inside numbers are zeros, and decks that the printed program can't
         compute are errors.

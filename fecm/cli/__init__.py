@@ -42,12 +42,12 @@ class LazyCommand:
 
 
 COMMANDS = {
-    "check": LazyCommand("fecm.cli.decks", "Check DECK without running it, and summarise it."),
+    "check": LazyCommand("fecm.cli.decks", "Check decks without running them, and summarise them."),
     "diff": LazyCommand("fecm.cli.diff", "Compare two results dataset by dataset.", True),
     "estimate": LazyCommand("fecm.cli.estimate", "Estimate an impact and its damage threshold."),
     "example": LazyCommand("fecm.cli.example", "List the example decks and tables, or write one."),
     "export": LazyCommand("fecm.cli.export", "Write RESULT for ParaView or a spreadsheet.", True),
-    "fmt": LazyCommand("fecm.cli.decks", "Align the columns of DECK."),
+    "fmt": LazyCommand("fecm.cli.decks", "Align the columns of decks."),
     "indent": LazyCommand("fecm.cli.indent", "Indentation tests and the law of contact."),
     "info": LazyCommand("fecm.cli.info", "Describe the contents of RESULT.", True),
     "materials": LazyCommand("fecm.cli.new", "List the named plies of `fecm new`, or of a file."),
@@ -128,10 +128,17 @@ def _status(arguments: Sequence[str] | None, prog_name: str) -> int:
         echo("fecm: interrupted", err=True)
         return INTERRUPTED
     except (FecmError, OSError, MemoryError, ImportError) as error:
-        if error is not streams.failure():
-            echo(f"fecm: error: {_message(error)}", err=True)
-        return error.exit_code if isinstance(error, FecmError) else UNUSABLE
+        return _report(error)
+    except ExceptionGroup as group:
+        return max(map(_report, group.exceptions))
     return 0
+
+
+def _report(error: Exception) -> int:
+    """Print an error; return the exit status after it."""
+    if error is not streams.failure():
+        echo(f"fecm: error: {_message(error)}", err=True)
+    return error.exit_code if isinstance(error, FecmError) else UNUSABLE
 
 
 def _refusal(error: click.ClickException) -> str:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import io
 import json
-from collections.abc import Sequence
+import sys
+from collections import Counter
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import BinaryIO
 
 import click
 
+from fecm._errors import FecmError
 from fecm._files import check_outputs
 from fecm.api import LoadedDeck, load_deck
 from fecm.cli.common import (
-    DECK_PATH,
-    FORMAT_OPTION,
     MODE_OPTION,
     CheckFailedError,
     RefusedError,
@@ -21,21 +24,22 @@ from fecm.cli.common import (
     progress,
     write_text,
 )
+from fecm.cli.sarif import sarif
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.format import format_deck
 from fecm.deck.reader import load_text
 from fecm.deck.units import unit_names, unit_of
 from fecm.problem.options import RunOptions
-from fecm.problem.problem import Problem
 from fecm.problem.slips import REPORT, active_slips
 from fecm.problem.summary import summarise
+from fecm.results.schema import jsonable
 
 
-def count_errors(errors: Sequence[Finding]) -> str:
-    """Say how many errors a deck has."""
-    count = sum(error.code != "E000" for error in errors)
-    more = " or more" if count < len(errors) else ""
-    return f"the deck has {count} error{'s' if count != 1 else ''}{more}"
+def count_findings(findings: Sequence[Finding]) -> str:
+    """Say how many errors, or how many warnings, a deck has."""
+    count = sum(finding.code[1:] != "000" for finding in findings)
+    more = " or more" if count < len(findings) else ""
+    return f"the deck has {count} {findings[0].severity}{'s' if count != 1 else ''}{more}"
 
 
 def load_valid(
@@ -69,47 +73,107 @@ def load_valid(
     for finding in loaded.findings if warnings else errors:
         echo(finding.render(loaded.source), err=True)
     if errors:
-        raise RefusedError(count_errors(errors) + otherwise)
+        raise RefusedError(count_findings(errors) + otherwise)
     return loaded
 
 
-@click.command(short_help="Check DECK without running it, and summarise it.")
-@click.argument("deck", type=DECK_PATH)
+DECKS = click.argument(
+    "decks", nargs=-1, required=True, metavar="DECK...",
+    type=click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path),
+)  # fmt: skip
+
+
+def _input(deck: Path) -> Path | BinaryIO:
+    """What to read: a file, or standard input for ``-``."""
+    if str(deck) != "-":
+        return deck
+    buffer: BinaryIO = getattr(sys.stdin, "buffer", None) or io.BytesIO()
+    return buffer
+
+
+def _failures(decks: Sequence[Path], work: Callable[[Path], None]) -> list[Exception]:
+    """Do the work on every deck; its errors."""
+    failed: list[Exception] = []
+    for deck in dict.fromkeys(decks):
+        try:
+            work(deck)
+        except (FecmError, OSError) as error:
+            failed.append(error)
+    return failed
+
+
+def _end(failed: Sequence[Exception]) -> None:
+    """End with the worst exit status."""
+    if len(failed) == 1:
+        raise failed[0]
+    if failed:
+        raise ExceptionGroup("errors of several decks", failed)
+
+
+@click.command(short_help="Check decks without running them, and summarise them.")
+@DECKS
 @MODE_OPTION
-@FORMAT_OPTION
+@click.option("--format", "form", type=click.Choice(["text", "json", "sarif"]), default="text",
+              show_default=True, help="Text for people, JSON for programs, or SARIF for code "
+                                      "hosts.")  # fmt: skip
+@click.option("--strict", is_flag=True, help="Exit with 1 for warnings too.")
 @click.option("--mesh-error", is_flag=True,
               help="Run DECK twice, with its elements and with those around the load bisected, and "
                    "compare the peak forces.")  # fmt: skip
-def check(deck: Path, mode: str, form: str, mesh_error: bool) -> None:
-    """Check DECK without running it; print its findings and a summary.
+def check(decks: tuple[Path, ...], mode: str, form: str, strict: bool, mesh_error: bool) -> None:
+    """Check decks without running them; print their findings and a summary.
 
-    With --format json, each finding and each problem is a JSON object on a line.  The exit status
-    is 1 if the deck has errors.
+    A DECK of - is standard input.  Of several decks, those that pass have one line each instead of
+    a summary.  With --format json, each finding and each problem is a JSON object on a line.  The
+    exit status is the worst of all decks: 1 if one has errors, 2 if one can't be read.
     """
-    prepared = load_deck(deck, mode)
-    errors = prepared.errors()
-    views = [] if errors else [summarise(problem) for problem in prepared.problems]
+    if mesh_error and form == "sarif":
+        raise click.UsageError("--mesh-error has no form in SARIF")
+    checked: dict[Path, list[Finding]] = {}
+
+    def one(deck: Path) -> None:
+        prepared = load_deck(_input(deck), mode)
+        checked[Path(prepared.source)] = prepared.findings
+        severe = ("error", "warning") if strict else ("error",)
+        wrong = [finding for finding in prepared.findings if finding.severity in severe]
+        name = f"{prepared.source}: " if len(decks) > 1 else ""
+        _print(prepared, form, brief=bool(name), passes=not wrong)
+        if wrong:
+            raise CheckFailedError(name + count_findings(prepared.errors() or wrong))
+        if mesh_error:
+            _compare_meshes(prepared, mode, form)
+
+    failed = _failures(decks, one)
+    if form == "sarif":
+        unread = [str(error) for error in failed if not isinstance(error, CheckFailedError)]
+        click.echo(json.dumps(sarif(checked, unread)))
+    _end(failed)
+
+
+def _print(prepared: LoadedDeck, form: str, *, brief: bool, passes: bool) -> None:
+    """Print findings and, if there are no errors, a summary, or one line of a deck that passes."""
+    views = [] if prepared.errors() else [summarise(problem) for problem in prepared.problems]
     if form == "json":
+        lines = [finding.to_dict(prepared.source) for finding in prepared.findings]
+        about = {"kind": "summary", "file": prepared.source}
+        for line in (*lines, *({**about, **view.to_dict()} for view in views)):
+            click.echo(json.dumps(jsonable(line)))
+    elif form == "text":
         for finding in prepared.findings:
-            click.echo(json.dumps(finding.to_dict(str(deck))))
-        for view in views:
-            click.echo(json.dumps({"kind": "summary", **view.to_dict()}))
-    else:
-        for finding in prepared.findings:
-            echo(finding.render(str(deck)))
-        for view in views:
+            echo(finding.render(prepared.source))
+        if brief and passes:
+            counts = Counter(finding.severity for finding in prepared.findings)
+            found = [f"{n} {word}{'s' * (n != 1)}" for word, n in counts.items()]
+            echo(f"{prepared.source}: {', '.join(found) or 'no findings'}")
+        for view in [] if brief else views:
             echo("\n".join(view.lines()))
-    if errors:
-        raise CheckFailedError(count_errors(errors))
-    if mesh_error:
-        _compare_meshes(prepared.problems, mode, form)
 
 
-def _compare_meshes(problems: Sequence[Problem], mode: str, form: str) -> None:
+def _compare_meshes(prepared: LoadedDeck, mode: str, form: str) -> None:
     """Print the mesh error of the peak force of every problem."""
     from fecm.sweeps.mesh_error import bisected, mesh_error
 
-    for problem in problems:
+    for problem in prepared.problems:
         units = unit_names(problem.deck)
         force, length = (unit_of(name, units) for name in ("force", "length"))
         fine = bisected(problem)
@@ -117,9 +181,8 @@ def _compare_meshes(problems: Sequence[Problem], mode: str, form: str) -> None:
             found = mesh_error(problem, fine, RunOptions(active_slips(mode, ())), advance)
         if form == "json":
             changes = {"change": found.change, "relative_change": found.relative_change}
-            click.echo(json.dumps(
-                {"kind": "mesh_error", **found.__dict__, **changes, "units": units}
-            ))  # fmt: skip
+            head = {"kind": "mesh_error", "file": prepared.source}
+            click.echo(json.dumps({**head, **found.__dict__, **changes, "units": units}))
             continue
         share = found.relative_change
         about = "no contact" if share is None else f"{share:+.2%}"
@@ -134,37 +197,45 @@ def _compare_meshes(problems: Sequence[Problem], mode: str, form: str) -> None:
             echo(f"  {line}")
 
 
-@click.command(short_help="Align the columns of DECK.")
-@click.argument("deck", type=DECK_PATH)
+@click.command(short_help="Align the columns of decks.")
+@DECKS
 @click.option("-o", "--output", type=click.Path(path_type=Path, allow_dash=True), metavar="FILE",
               help="File to write; - is standard output.  [default: DECK itself]")  # fmt: skip
 @click.option("--check", "only_check", is_flag=True,
-              help="Write nothing; exit with 1 if the deck would change.")  # fmt: skip
+              help="Write nothing; exit with 1 if a deck would change.")  # fmt: skip
 @click.option("--overwrite", is_flag=True, help="Replace an existing FILE other than DECK.")
-def fmt(deck: Path, output: Path | None, only_check: bool, overwrite: bool) -> None:
-    """Align the columns of DECK and put a ruler above each kind of card.
+def fmt(decks: tuple[Path, ...], output: Path | None, only_check: bool, overwrite: bool) -> None:
+    """Align the columns of decks and put a ruler above each kind of card.
 
-    The model, comments and blank cards stay as they are.
+    The model, comments and blank cards stay as they are.  A DECK of - is standard input, whose
+    aligned deck goes to standard output.
     """
-    target = deck if output is None or _same(output, deck) else output
-    in_place = target is deck
-    if not only_check and str(target) != "-":
-        check_outputs([target], overwrite or in_place, [] if in_place else [deck])
-    before, _ = load_text(deck)
-    try:
-        after = format_deck(before, str(deck))
-    except DeckError as error:
-        echo(error, err=True)
-        raise RefusedError("the deck can't be read; nothing was written") from None
-    if only_check:
-        if after != before:
-            raise CheckFailedError(f"{deck} would change")
-    elif str(target) == "-":
-        echo_file(after)
-    else:
-        write_text(target, after, overwrite=overwrite or in_place)
+    if output is not None and len(decks) > 1:
+        raise click.UsageError("-o takes one DECK")
+
+    def one(deck: Path) -> None:
+        target = deck if output is None or _same(output, deck) else output
+        in_place = target is deck
+        if not only_check and str(target) != "-":
+            check_outputs([target], overwrite or in_place, [] if in_place else [deck])
+        before, source = load_text(_input(deck))
+        try:
+            after = format_deck(before, source)
+        except DeckError as error:
+            echo(error, err=True)
+            name = f"{source}: " if len(decks) > 1 else ""
+            raise RefusedError(f"{name}the deck can't be read; nothing was written") from None
+        if only_check:
+            if after != before:
+                raise CheckFailedError(f"{source} would change")
+        elif str(target) == "-":
+            echo_file(after)
+        elif after != before or not in_place:
+            write_text(target, after, overwrite=overwrite or in_place)
+
+    _end(_failures(decks, one))
 
 
 def _same(one: Path, other: Path) -> bool:
     """Whether two paths lead to one file."""
-    return one.exists() and one.samefile(other)
+    return one.exists() and other.exists() and one.samefile(other)

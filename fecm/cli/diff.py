@@ -69,7 +69,7 @@ def _tolerances(text: str) -> dict[str, Any]:
               help="Absolute tolerance, in the dataset's unit.  [default: 0]")  # fmt: skip
 @click.option("--only", multiple=True, metavar="PATTERN",
               help="Compare only this dataset (tape9/force), group (tape9) or pattern "
-                   "('*/force'); may be repeated.")  # fmt: skip
+                   "('tape?/force'); may be repeated.")  # fmt: skip
 @click.option("--exclude", multiple=True, metavar="PATTERN",
               help="Leave out a dataset, group or pattern; may be repeated.")  # fmt: skip
 @click.option("--tol", "own", type=Parsed(_own), multiple=True, metavar="PATTERN=R[,T]",

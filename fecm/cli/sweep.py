@@ -13,7 +13,7 @@ import click
 from fecm._files import check_outputs
 from fecm.api import load_deck
 from fecm.cli.common import DECK_PATH, FILE_PATH, NO, RefusedError, echo, note, signals
-from fecm.cli.decks import count_errors
+from fecm.cli.decks import count_findings
 from fecm.cli.types import ListOf, Parsed
 from fecm.deck.findings import DeckError
 from fecm.problem.problem import Problem
@@ -125,7 +125,7 @@ def _problem(deck: Path) -> Problem:
     except DeckError as error:
         echo(error, err=True)
         errors = [finding for finding in error.findings if finding.severity == "error"]
-        raise RefusedError(f"{count_errors(errors)}; nothing was run") from None
+        raise RefusedError(f"{count_findings(errors)}; nothing was run") from None
 
 
 def _carry_out(

@@ -11,6 +11,7 @@ import re
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import BinaryIO
 
 from fecm._memory import NotEnoughMemoryError, available, format_bytes, require
 from fecm.deck.card import Card, Source
@@ -39,6 +40,8 @@ BYTES_A_BYTE, BYTES_A_LINE = 12, 1100
 LINE_ENDS = b"\n\r\x0b\x0c\x1c\x1d\x1e\x85\xa8\xa9"
 # Number of bytes that identify a binary file.
 FIRST = 4096
+# Name of the deck on standard input.
+STDIN = "<stdin>"
 HDF5 = b"\x89HDF\r\n\x1a\n"
 # First lines of other programs' files.
 OTHERS = {
@@ -360,14 +363,17 @@ def _program_of(line: str) -> str:
     return next(found, "")
 
 
-def load_text(path_or_text: str | Path) -> tuple[str, str]:
-    """Text and name of a deck, see :func:`read_deck`."""
+def load_text(path_or_text: str | Path | BinaryIO) -> tuple[str, str]:
+    """Text and name of a deck, see :func:`read_deck`; of an open file it is standard input."""
     if isinstance(path_or_text, str) and ("\n" in path_or_text or not path_or_text.strip()):
         return path_or_text, "<text>"
-    return decode(_bytes(Path(path_or_text))), str(path_or_text)
+    if not isinstance(path_or_text, str | Path):
+        return decode(_bytes(path_or_text, STDIN)), STDIN
+    with Path(path_or_text).open("rb") as file:
+        return decode(_bytes(file, str(path_or_text))), str(path_or_text)
 
 
-def _bytes(path: Path) -> bytes:
+def _bytes(file: BinaryIO, path: str) -> bytes:
     """All bytes of a deck, which may be an endless pipe.
 
     Raises NotEnoughMemoryError if its cards need more memory than is free.  Raises OSError if it
@@ -375,13 +381,12 @@ def _bytes(path: Path) -> bytes:
     """
     free = available()
     most = LARGEST_FILE if free is None else min(LARGEST_FILE, free // BYTES_A_BYTE)
-    with path.open("rb") as file:
-        begin = file.read(FIRST)
-        if begin.startswith(HDF5):
-            raise OSError(f"{path} is an HDF5 file, not a deck; `fecm info {path}` shows a result")
-        if b"\0" in begin:
-            raise OSError(f"{path} is a binary file or UTF-16 text, not a deck in UTF-8 or Latin-1")
-        data = begin + file.read(max(0, most + 1 - len(begin)))
+    begin = file.read(FIRST)
+    if begin.startswith(HDF5):
+        raise OSError(f"{path} is an HDF5 file, not a deck; `fecm info {path}` shows a result")
+    if b"\0" in begin:
+        raise OSError(f"{path} is a binary file or UTF-16 text, not a deck in UTF-8 or Latin-1")
+    data = begin + file.read(max(0, most + 1 - len(begin)))
     if len(data) > most:
         raise NotEnoughMemoryError(f"{path}: a deck of more than {format_bytes(most)} is not read")
     lines = len(data) - len(data.translate(None, LINE_ENDS)) - data.count(b"\r\n")
