@@ -18,7 +18,7 @@ DECKS = [name for name in examples.names() if name.endswith(".inp")]
 
 def test_every_example_file_is_listed_with_one_line() -> None:
     folder = Path(examples.__file__).parent
-    files = {path.name for path in folder.iterdir() if path.suffix in (".inp", ".csv")}
+    files = {path.name for path in folder.iterdir() if path.suffix in (".inp", ".csv", ".msh")}
     assert set(examples.names()) == files
     lines = call("example").stdout.splitlines()
     assert [line.split()[0] for line in lines] == examples.names()
