@@ -27,7 +27,7 @@ from fecm.mechanics import assumed_shear, element_groups, interpolation
 from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature
 from fecm.mechanics.elements.shape import CUBIC, TRIANGLE
 from fecm.mechanics.mesh import Mesh, holds_the_plane
-from fecm.problem.build import Problem, rules
+from fecm.problem.build import Problem, has_assumed_shear, rules
 from fecm.problem.generate import place_of_element
 
 # Findings of one kind about elements are grouped beyond this number of cards.
@@ -82,6 +82,8 @@ def report_elements(
 
 
 CORNERS = TRIANGLE.corners
+
+Blocks = list[element_groups.ElementBlock]
 
 W, THETA_X = 2, 3
 
@@ -182,13 +184,7 @@ def check_in_plane_supports(problem: Problem, findings: Findings) -> None:
         )
 
 
-def check_geometry(deck: Deck, mesh: Mesh, findings: Findings) -> None:
-    """Warn of odd side nodes and supports of a mesh without errors."""
-    _check_side_nodes(deck, mesh, findings)
-    _check_support(deck, mesh, findings)
-
-
-def _check_side_nodes(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+def check_side_nodes(deck: Deck, mesh: Mesh, findings: Findings) -> None:
     """Warn of nodes on sides that are off the middle or the third points, seen along the side."""
     wrong: list[int] = []
     for family in element_groups.element_blocks(mesh.elements, mesh.coordinates):
@@ -218,7 +214,7 @@ def _check_side_nodes(deck: Deck, mesh: Mesh, findings: Findings) -> None:
         )
 
 
-def _check_support(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+def check_support(deck: Deck, mesh: Mesh, findings: Findings) -> None:
     """Warn of a plate that one or two nodes support, unless symmetry holds its rotations."""
     held = mesh.equations == 0
     count = int(held[:, W].sum())
@@ -255,9 +251,7 @@ def _check_shapes(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool) 
     supported = bool((mesh.equations[:, W] == 0).any())
     if not listing:
         nodal = _loads_a_node(deck, mesh, supported=supported)
-        shear = deck.last(Shear)
-        assumed = shear is not None and shear.assumed
-        _check_shear(material, families, supported, nodal, assumed, findings)
+        _check_shear(material, families, supported, nodal, has_assumed_shear(deck), findings)
 
 
 def _at_third_node(card: Integration, family: element_groups.ElementBlock) -> bool:
@@ -265,9 +259,7 @@ def _at_third_node(card: Integration, family: element_groups.ElementBlock) -> bo
     return family.shape is TRIANGLE and card.points < -1
 
 
-def _check_triangles(
-    card: Integration, families: list[element_groups.ElementBlock], findings: Findings
-) -> None:
+def _check_triangles(card: Integration, families: Blocks, findings: Findings) -> None:
     for family in families:
         if _at_third_node(card, family):
             findings.add(
@@ -280,10 +272,7 @@ def _check_triangles(
 
 
 def _check_jacobians(
-    deck: Deck,
-    families: list[element_groups.ElementBlock],
-    used: tuple[Quadrature, ...],
-    findings: Findings,
+    deck: Deck, families: Blocks, used: tuple[Quadrature, ...], findings: Findings
 ) -> None:
     card = deck.require(Material).integration
     folded: dict[str, list[int]] = {}
@@ -298,17 +287,13 @@ def _check_jacobians(
         report_elements(findings, "E313", np.unique(wrong).astype(np.intp), deck, what, numbering)
 
 
-def _check_masses(
-    material: Material, families: list[element_groups.ElementBlock], findings: Findings
-) -> None:
+def _check_masses(material: Material, families: Blocks, findings: Findings) -> None:
     card, bending = material.integration, rules(material)[0]
-    massless = [
-        family.rows
-        for family in families
-        if (
-            np.square(interpolation.local_shape_functions(family, bending)[0]).sum(axis=0) < 1e-12
-        ).any()
-    ]
+    massless = []
+    for family in families:
+        values, _ = interpolation.local_shape_functions(family, bending)
+        if (np.square(values).sum(axis=0) < 1e-12).any():
+            massless.append(family.rows)
     if massless:
         findings.add(
             "E315",
@@ -321,7 +306,7 @@ def _check_masses(
 
 def _check_shear(
     material: Material,
-    families: list[element_groups.ElementBlock],
+    families: Blocks,
     supported: bool,
     nodal: bool,
     assumed: bool,

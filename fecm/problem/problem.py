@@ -52,9 +52,10 @@ from fecm.problem.check_material import (
 from fecm.problem.check_mesh import (
     check_assumed_shear,
     check_elements,
-    check_geometry,
     check_in_plane_supports,
     check_mesh,
+    check_side_nodes,
+    check_support,
 )
 from fecm.problem.check_patch import check_patch
 from fecm.problem.check_plausibility import (
@@ -129,7 +130,8 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
             check_program(checked, findings)
             check_purpose(deck, mesh, findings)
             if findings.error_count == before:
-                check_geometry(deck, mesh, findings)
+                check_side_nodes(deck, mesh, findings)
+                check_support(deck, mesh, findings)
                 check_in_plane_supports(checked, findings)
                 check_plausibility(checked, findings)
                 if STEPS.intersection(macro.word for macro in deck.macros):
