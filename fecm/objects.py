@@ -379,12 +379,7 @@ class Contact(Indentation):
 def parse_patch(text: str) -> Patch | None:
     """Contact patch of ``disc``, ``hertz``, ``disc:RADIUS`` or ``hertz:RADIUS``.
 
-    ``none`` is a point force, None.
-
-    Raises
-    ------
-    ValueError
-        If the text is none of these.
+    ``none`` is a point force, None.  Raises ValueError if the text is none of these.
     """
     shape, colon, given = text.partition(":")
     if text == NO_PATCH:

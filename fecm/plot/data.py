@@ -32,11 +32,8 @@ MANY = 2000
 def require(result: Result, name: str, *paths: str) -> list[Array]:
     """Datasets of a result.
 
-    Raises
-    ------
-    PlotError
-        If one is missing (the message names the macro that stores it), is empty, or holds numbers
-        that an axis can't show.
+    Raises PlotError if one is missing (the message names the macro that stores it), is empty, or
+    holds numbers that an axis can't show.
     """
     for path in paths:
         if path not in result:
@@ -59,10 +56,7 @@ def _shown(name: str, path: str, values: Array) -> Array:
 def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:
     """Elements, and x and y of all nodes (length).
 
-    Raises
-    ------
-    PlotError
-        If all nodes lie on a line parallel to an axis.
+    Raises PlotError if all nodes lie on a line parallel to an axis.
     """
     elements, coordinates = require(result, name, "mesh/elements", "mesh/coordinates")
     coordinates = coordinates[:, :2]
@@ -75,13 +69,7 @@ def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:
 
 
 def deck_of(result: Result, name: str) -> Deck:
-    """Model of a result's deck.
-
-    Raises
-    ------
-    PlotError
-        If the result holds no readable deck.
-    """
+    """Model of a result's deck.  Raises PlotError if the result holds no readable deck."""
     try:
         return model_of(result)
     except ResultFileError:
@@ -91,10 +79,7 @@ def deck_of(result: Result, name: str) -> Deck:
 def circle(result: Result, name: str) -> tuple[Floats, float] | None:
     """Centre, (2,), and radius of the contact patch, length; None without a patch.
 
-    Raises
-    ------
-    PlotError
-        If the result does not say where its patch is.
+    Raises PlotError if the result does not say where its patch is.
     """
     if "patch/weight" not in result:
         return None
@@ -108,10 +93,7 @@ def circle(result: Result, name: str) -> tuple[Floats, float] | None:
 def struck(result: Result, name: str) -> Floats:
     """Centre of the contact patch, or the impact node, (1, 2), length; (0, 2) without either.
 
-    Raises
-    ------
-    PlotError
-        If the mesh lacks the deck's impact node.
+    Raises PlotError if the mesh lacks the deck's impact node.
     """
     patch = circle(result, name)
     if patch is not None:
@@ -127,10 +109,7 @@ def struck(result: Result, name: str) -> Floats:
 def impact_point(result: Result, name: str) -> Floats:
     """Centre of the contact patch, or the impact node, (2,), length.
 
-    Raises
-    ------
-    PlotError
-        If the deck has neither.
+    Raises PlotError if the deck has neither.
     """
     points = struck(result, name)
     if not len(points):
@@ -141,10 +120,7 @@ def impact_point(result: Result, name: str) -> Floats:
 def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -> Ints:
     """Rows of tape3 nearest to the given times; by default `count` rows at equal distances.
 
-    Raises
-    ------
-    PlotError
-        If there are no rows, or a time is outside them.
+    Raises PlotError if there are no rows, or a time is outside them.
     """
     (stored,) = require(result, name, "tape3/time")
     if not times:
@@ -221,10 +197,7 @@ def patches(result: Result, cuts: int, name: str = "the result") -> Patches:
 def strain_points(result: Result, name: str) -> Floats:
     """Coordinates of the points of tape8, (numel, npt, 2), length.
 
-    Raises
-    ------
-    PlotError
-        If the result holds no strains at such points.
+    Raises PlotError if the result holds no strains at such points.
     """
     (stored,) = require(result, name, "tape8/kappa_x")
     elements, _ = mesh_of(result, name)
@@ -239,10 +212,7 @@ def strain_points(result: Result, name: str) -> Floats:
 def on_plate(points: Floats, at: Floats, name: str) -> None:
     """Refuse a place outside of the plate's points, (..., 2).
 
-    Raises
-    ------
-    PlotError
-        If it is outside.
+    Raises PlotError if it is outside.
     """
     low, high = points.reshape(-1, 2).min(axis=0), points.reshape(-1, 2).max(axis=0)
     room = 0.02 * float((high - low).max())
@@ -256,10 +226,7 @@ def on_plate(points: Floats, at: Floats, name: str) -> None:
 def nearest(points: Floats, at: Floats, name: str) -> Bools:
     """Mask of the points nearest to a place; several if elements meet there.
 
-    Raises
-    ------
-    PlotError
-        If the place is outside the plate.
+    Raises PlotError if the place is outside the plate.
     """
     on_plate(points, at, name)
     distance = np.hypot(*np.moveaxis(points - at, -1, 0))

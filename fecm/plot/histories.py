@@ -155,10 +155,7 @@ def _draw_measured(axes: Sequence[Axes], measured: Measurement) -> None:
 def _thresholds(results: Results) -> dict[str, float]:
     """Delamination thresholds by the names of the results that have one.
 
-    Raises
-    ------
-    PlotError
-        If one can't be drawn.
+    Raises PlotError if one can't be drawn.
     """
     found = {}
     for name, result in results.items():

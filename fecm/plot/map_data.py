@@ -109,10 +109,7 @@ def choose(
 ) -> Choice:
     """Select the contents of a map; warn of cases without a value.
 
-    Raises
-    ------
-    PlotError
-        If the options do not fit the sweep, or no case remains.
+    Raises PlotError if the options do not fit the sweep, or no case remains.
     """
     rows = _rows(sweep, name, where)
     quantity = quantity or ("found_velocity" if "found_velocity" in sweep.summary else "peak_force")

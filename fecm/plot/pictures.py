@@ -57,10 +57,7 @@ def options_of(kind: str) -> list[str]:
 def check_options(kinds: Iterable[str], options: Iterable[str]) -> None:
     """Refuse options that none of these kinds of picture takes.
 
-    Raises
-    ------
-    PlotError
-        If there is such an option; the message names it and the kinds that take it.
+    Raises PlotError if there is such an option; the message names it and the kinds that take it.
     """
     kinds = list(kinds)
     taken = {option for kind in kinds for option in options_of(kind)}
@@ -95,6 +92,9 @@ def draw(
 ) -> Picture:
     """Draw a picture.
 
+    Raises PlotError if the kind is unknown, a result lacks what it shows, or the options do not
+    fit.  Raises ImportError if matplotlib is not installed.
+
     Parameters
     ----------
     kind : str
@@ -105,13 +105,6 @@ def draw(
         matplotlib's settings; by default those of the command line.
     **options
         Keywords of the kind's function, such as ``times`` or ``width``.
-
-    Raises
-    ------
-    PlotError
-        If the kind is unknown, a result lacks what it shows, or the options do not fit.
-    ImportError
-        If matplotlib is not installed.
     """
     properties = kind_named(kind)
     if len(results) > 1 and not properties.several:
@@ -147,7 +140,8 @@ def plot(
     """Draw a picture for Python: in a file, on given axes, or else on a new figure of pyplot.
 
     Files are those of the command line.  On axes and figures of pyplot the user's settings of
-    matplotlib hold.
+    matplotlib hold.  Raises PlotError also if the picture has several axes and `ax` is given, or
+    `path` and `ax` are.
 
     Parameters
     ----------
@@ -161,11 +155,6 @@ def plot(
     -------
     matplotlib.axes.Axes
         The picture's first axes.
-
-    Raises
-    ------
-    PlotError
-        Also if the picture has several axes and `ax` is given, or `path` and `ax` are.
     """
     if path is not None:
         if ax is not None:
@@ -197,10 +186,7 @@ def plot(
 def check_suffix(kind: str, path: Path) -> None:
     """Refuse a file name whose suffix is not a format of the kind.
 
-    Raises
-    ------
-    PlotError
-        If it is not; the message names the formats.
+    Raises PlotError if it is not; the message names the formats.
     """
     suffixes = kind_named(kind).suffixes
     if path.suffix.lower() not in suffixes:
@@ -216,6 +202,9 @@ def save(
 ) -> None:
     """Write a picture in the format of the path's suffix; equal pictures give equal bytes.
 
+    Raises PlotError if matplotlib can't draw it.  Raises OSError if the file can't be written; an
+    existing file is then untouched.
+
     Parameters
     ----------
     picture : Picture
@@ -224,13 +213,6 @@ def save(
         Replace an existing file.
     advance : callable
         Called with 1 after each frame.
-
-    Raises
-    ------
-    PlotError
-        If matplotlib can't draw it.
-    OSError
-        If the file can't be written; an existing file is then untouched.
     """
     import matplotlib
 

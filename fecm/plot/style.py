@@ -190,10 +190,7 @@ def _superscript(integer: str) -> str:
 def common_unit(results: Mapping[str, Result], dimension: str) -> str:
     """Common unit of a dimension; empty if a result names none.
 
-    Raises
-    ------
-    PlotError
-        If the results have different units.
+    Raises PlotError if the results have different units.
     """
     units = {name: result.unit(dimension) for name, result in results.items()}
     named = {unit: name for name, unit in units.items() if unit}
@@ -222,10 +219,7 @@ def scale_in(units: Mapping[str, str] | None, dimension: str, *arrays: Any) -> S
 def limit_count(count: int, what: str, most: int = len(COLOURS)) -> None:
     """Refuse more lines than there are colours or styles.
 
-    Raises
-    ------
-    PlotError
-        If `count` exceeds `most`.
+    Raises PlotError if `count` exceeds `most`.
     """
     if count > most:
         raise PlotError(f"{count} {what} can't be told apart in one picture; at most {most} can")
@@ -255,10 +249,7 @@ def panels(
 ) -> tuple[Figure, list[Axes]]:
     """Figure with equal axes, row by row; `ratio` is height over width of each.
 
-    Raises
-    ------
-    PlotError
-        If the picture does not fit the axes to draw on.
+    Raises PlotError if the picture does not fit the axes to draw on.
     """
     inches, target = WIDTHS[width], TARGET.get()
     solid = "subplot_kw" in options and options["subplot_kw"].get("projection") == "3d"

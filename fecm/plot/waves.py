@@ -27,12 +27,7 @@ def dispersion_picture(medium: Medium, curves: Sequence[Dispersion]) -> Picture:
 
     Velocities are divided by the transverse shear velocity, frequencies by that velocity over the
     thickness, as in figures 2.4 and 2.5.  The axes end just above the in-plane modes and the
-    cut-off.
-
-    Raises
-    ------
-    PlotError
-        If there are more directions than colours.
+    cut-off.  Raises PlotError if there are more directions than colours.
     """
     limit_count(len(curves), "directions")
     unit = medium.shear_velocity
@@ -101,10 +96,7 @@ def fronts_picture(
 ) -> Picture:
     """Fronts at several times with rays and cusps, one graph per mode.
 
-    Raises
-    ------
-    PlotError
-        If there are more times than colours.
+    Raises PlotError if there are more times than colours.
     """
     limit_count(len(times), "times")
     fronts, some = surfaces.fronts(AROUND), surfaces.fronts(np.arange(0.0, 360.0, RAYS))

@@ -83,10 +83,7 @@ class Contents(Mapping[str, Array]):
     def rows(self, path: str, start: int, stop: int) -> Array:
         """Read rows `start` to `stop` of a dataset; a single number is one row.
 
-        Raises
-        ------
-        ResultFileError
-            If the file can't be read there.
+        Raises ResultFileError if the file can't be read there.
         """
         if path in self.lists:
             return np.array(self.lists[path][start:stop], dtype=object)
@@ -132,18 +129,14 @@ def _troubles(path: Path) -> Iterator[None]:
 def read(path: Path, *forms: str) -> Contents:
     """List the contents of a result file.
 
+    Raises ResultFileError if it is not an HDF5 file, or not a result of these forms.  Raises
+    OSError if it can't be opened.
+
     Parameters
     ----------
     path : Path
     *forms : str
         Accepted formats; by default that of a run.
-
-    Raises
-    ------
-    ResultFileError
-        If it is not an HDF5 file, or not a result of these forms.
-    OSError
-        If it can't be opened.
     """
     path = Path(path)
     if path.exists() and not (path.is_file() or path.is_dir()):

@@ -104,13 +104,7 @@ class FileSink:
         return self._file[name]
 
     def write(self, path: str, start: int, rows: Array) -> None:
-        """Store rows of a dataset.
-
-        Raises
-        ------
-        OSError
-            If this or an earlier write failed.
-        """
+        """Store rows of a dataset.  Raises OSError if this or an earlier write failed."""
         self.check()
         # Low-level interface: slices of h5py take four times as long for a short block.
         dataset = self._datasets[path]
@@ -120,12 +114,7 @@ class FileSink:
         dataset.id.write(h5py.h5s.create_simple(values.shape), place, values)
 
     def check(self) -> None:
-        """Raise the first error of writing.
-
-        Raises
-        ------
-        OSError
-        """
+        """Raise the first error of writing, an OSError."""
         if self._guarded.error is not None:
             raise self._guarded.error
 
@@ -185,16 +174,13 @@ class _Stored(Mapping[str, Array]):
 def writing(path: Path, *, overwrite: bool = True) -> Iterator[FileSink]:
     """Open a result for writing; it gets its final name only on success.
 
+    Raises ResultWriteError if the file can't be written; an existing file is then untouched.
+
     Parameters
     ----------
     path : Path
     overwrite : bool
         Replace an existing file.
-
-    Raises
-    ------
-    ResultWriteError
-        If the file can't be written; an existing file is then untouched.
     """
     with new_hdf5(path, overwrite=overwrite) as (file, guarded):
         sink = FileSink(file, guarded)

@@ -17,6 +17,8 @@ from fecm.results.summary import summary
 def describe_groups(contents: Contents) -> list[dict[str, Any]]:
     """Describe the groups and datasets of a result file, of a run or of a sweep.
 
+    Raises ResultFileError if the file can't be read.
+
     Returns
     -------
     list of dict
@@ -25,11 +27,6 @@ def describe_groups(contents: Contents) -> list[dict[str, Any]]:
         (``"text"`` for texts), ``description``, ``dimension``, ``unit``, ``min`` and ``max`` of the
         finite numbers (None without any), ``not_finite`` and, for texts, the number of
         ``different`` ones.
-
-    Raises
-    ------
-    ResultFileError
-        If the file can't be read.
     """
     datasets = [_describe(contents, path) for path in contents]
     members: dict[str, list[dict[str, Any]]] = {name: [] for name in contents.groups}

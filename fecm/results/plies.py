@@ -103,12 +103,9 @@ def plies_of(
 ) -> Plies:
     """Stresses and strains of a result's plies; see :meth:`fecm.results.result.PlyGroup.__call__`.
 
-    Raises
-    ------
-    NotStoredError
-        If the result has no ply stresses, or not at such a time or in such an element.
-    ResultFileError
-        If the result's deck can't be read or does not fit its ply stresses.
+    Raises NotStoredError if the result has no ply stresses, or not at such a time or in such an
+    element.  Raises ResultFileError if the result's deck can't be read or does not fit its ply
+    stresses.
     """
     if "plies/sigma_1" not in result:
         raise NotStoredError(f"the result has no ply stresses{remedy('plies')}")
@@ -138,13 +135,7 @@ def plies_of(
 
 
 def model_of(result: Stored) -> Deck:
-    """Model of a result's deck.
-
-    Raises
-    ------
-    ResultFileError
-        If the result holds no readable deck.
-    """
+    """Model of a result's deck.  Raises ResultFileError if the result holds no readable deck."""
     deck = _parsed(result.deck, result.mode == "listing")
     if deck is None:
         raise ResultFileError("the result holds no deck that can be read")
@@ -169,6 +160,8 @@ def _material(result: Stored, plies: int) -> Material:
 def points_of(result: Stored, numbers: Array, count: int, at_nodes: bool) -> tuple[Floats, Floats]:
     """Coordinates x and y of the points of some elements.
 
+    Raises ResultFileError if there is no such element or no rule of so many points.
+
     Parameters
     ----------
     result : Stored
@@ -183,11 +176,6 @@ def points_of(result: Stored, numbers: Array, count: int, at_nodes: bool) -> tup
     -------
     x, y : ndarray (m, count)
         Length.
-
-    Raises
-    ------
-    ResultFileError
-        If there is no such element or no rule of so many points.
     """
     order = math.isqrt(count)
     if order**2 != count or not 1 <= order <= HIGHEST_ORDER:
@@ -204,13 +192,7 @@ def points_of(result: Stored, numbers: Array, count: int, at_nodes: bool) -> tup
 
 
 def rows_at(stored: Floats, times: Sequence[float] | Floats, what: str) -> Ints:
-    """Rows nearest to the given times.
-
-    Raises
-    ------
-    NotStoredError
-        If a time is outside of the rows.
-    """
+    """Rows nearest to the given times.  Raises NotStoredError if a time is outside of the rows."""
     spacing = float(np.diff(stored).max()) if len(stored) > 1 else float(stored[0])
     for time in times:
         if not stored[0] - spacing <= time <= stored[-1] + spacing:

@@ -465,10 +465,7 @@ def load(path: str | Path) -> Result:
 def result_of(contents: Contents) -> Result:
     """Build a run's result from the contents of its file.
 
-    Raises
-    ------
-    ResultFileError
-        If a dataset has the wrong shape or type.
+    Raises ResultFileError if a dataset has the wrong shape or type.
     """
     kinds = {name: dtype.kind for name, dtype in contents.dtypes.items()}
     if found := shape_error(contents.shapes, kinds):

@@ -82,17 +82,13 @@ class TapeText:
 def read_tapes(folder: Path) -> TapeText:
     """Read tape3, tape8 and tape9 of a folder; some may be missing.
 
+    Raises ResultFileError if there is no tape, or one is invalid.  Raises OSError if a file can't
+    be opened.
+
     Parameters
     ----------
     folder : Path
         Contains tape3, tape8, tape9 or tape3.txt, tape8.txt, tape9.txt.
-
-    Raises
-    ------
-    ResultFileError
-        If there is no tape, or one is invalid.
-    OSError
-        If a file can't be opened.
     """
     arrays: dict[str, Array] = {}
     lines = False

@@ -90,6 +90,8 @@ def _require(result: Result, paths: Iterable[str]) -> None:
 def write_tapes(result: Result, folder: Path, *, overwrite: bool = True) -> list[Path]:
     """Write all tapes into a folder, or none; a missing folder is created.
 
+    Raises OSError if a file can't be written.
+
     Parameters
     ----------
     result : Result
@@ -101,11 +103,6 @@ def write_tapes(result: Result, folder: Path, *, overwrite: bool = True) -> list
     -------
     list of Path
         The files written.
-
-    Raises
-    ------
-    OSError
-        If a file can't be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     texts = {folder / name: lines for name, lines in tape_texts(result).items()}

@@ -41,6 +41,9 @@ def write_vtkhdf(
 ) -> None:
     """Write a result as VTKHDF, one time step per row of tape3.
 
+    Raises ExportError if the result has no displacements.  Raises OSError if the file can't be
+    written.
+
     Parameters
     ----------
     result : Result
@@ -49,13 +52,6 @@ def write_vtkhdf(
         Receives a sentence about fields that are exported incompletely.
     overwrite : bool
         Replace an existing file.
-
-    Raises
-    ------
-    ExportError
-        If the result has no displacements.
-    OSError
-        If the file can't be written.
     """
     if "tape3/displacement" not in result:
         raise ExportError(

@@ -32,12 +32,7 @@ def warn(text: str) -> None:
 def problem_of(deck: str | Path | Deck) -> Problem:
     """Return the checked problem of a deck with a single problem.
 
-    Raises
-    ------
-    DeckError
-        If the deck has errors.
-    CasesError
-        If the deck has several problems.
+    Raises DeckError if the deck has errors.  Raises CasesError if the deck has several problems.
     """
     return _loaded(deck).problems[0]
 
@@ -94,6 +89,8 @@ def carry_out(
 ) -> SweepResult:
     """Run the tasks of a plan.
 
+    Raises SchedulerError if the scheduler cannot be used.
+
     Parameters
     ----------
     problem : Problem
@@ -113,11 +110,6 @@ def carry_out(
         Called regularly.
     note : callable
         Called with messages for the user.
-
-    Raises
-    ------
-    SchedulerError
-        If the scheduler cannot be used.
     """
     outcomes: list[Outcome] = []
     left: list[Task] = []

@@ -118,10 +118,7 @@ def _in_full(task: Task, number: int, case: Case) -> Outcome:
 def built(build: Build, case: Case) -> LoadedDeck:
     """Build and check the deck of a case.
 
-    Raises
-    ------
-    CasesError
-        If it cannot be built, or has an error.
+    Raises CasesError if it cannot be built, or has an error.
     """
     try:
         deck = build(dict(case))
@@ -215,10 +212,7 @@ def _found(numbers: list[int], decks: list[Deck], force: float, runs: Runs) -> O
 def deck_of(plan: Plan, case: int) -> Deck:
     """Return the deck of a case with its time step.
 
-    Raises
-    ------
-    CasesError
-        If the case cannot be run.
+    Raises CasesError if the case cannot be run.
     """
     _, (deck,) = _timed([apply_case(plan.deck, plan.cases[case])], plan.clock)
     return deck
@@ -240,13 +234,7 @@ def _timed(decks: list[Deck], clock: Clock | None) -> tuple[Problem, list[Deck]]
 
 
 def check_deck(deck: Deck) -> Problem:
-    """Check a complete deck.
-
-    Raises
-    ------
-    CasesError
-        If it has an error; the first is the message.
-    """
+    """Check a complete deck.  Raises CasesError if it has an error; the first is the message."""
     findings = Findings()
     checked = check(ParsedProblem(deck), findings)
     _raise_first(findings)

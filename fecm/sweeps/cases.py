@@ -45,10 +45,7 @@ class CasesError(FecmError, ValueError):
 def parse_vary(text: str) -> tuple[str, list[Value]]:
     """Read ``NAME=FROM:TO:N`` (N values, both ends included) or ``NAME=a,b,c``.
 
-    Raises
-    ------
-    CasesError
-        If the text has neither form, or the name is unknown.
+    Raises CasesError if the text has neither form, or the name is unknown.
     """
     name, equals, text_of_values = (part.strip() for part in text.partition("="))
     _known(name, text)
@@ -73,10 +70,7 @@ def parse_vary(text: str) -> tuple[str, list[Value]]:
 def parse_until(text: str) -> float | str:
     """Read ``peak_force=NUMBER`` or ``peak_force=threshold``.
 
-    Raises
-    ------
-    CasesError
-        If the text has neither form.
+    Raises CasesError if the text has neither form.
     """
     name, _, value = (part.strip() for part in text.partition("="))
     if name != "peak_force" or not value:
@@ -87,10 +81,7 @@ def parse_until(text: str) -> float | str:
 def grid(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
     """Return every combination of the values; the last name varies fastest.
 
-    Raises
-    ------
-    CasesError
-        If a name is repeated, or there are too many cases.
+    Raises CasesError if a name is repeated, or there are too many cases.
     """
     names = [name for name, _ in varied]
     for name in names:
@@ -108,12 +99,8 @@ def grid(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
 def read_cases(path: Path) -> list[Case]:
     """Read a CSV table with a header of names and one row per case.
 
-    Raises
-    ------
-    CasesError
-        If the table is invalid; the message states the line.
-    OSError
-        If the file cannot be read.
+    Raises CasesError if the table is invalid; the message states the line.  Raises OSError if the
+    file cannot be read.
     """
     try:
         rows = [(line, row) for line, row in read_rows(path) if any(row)]
@@ -142,12 +129,8 @@ def read_cases(path: Path) -> list[Case]:
 def combined(vary: Mapping[str, Iterable[Any]], *, free: bool = False) -> list[Case]:
     """Return every combination of lists of values, given by name; see :func:`grid`.
 
-    With `free`, names and values are any.
-
-    Raises
-    ------
-    CasesError
-        If a name is unknown, a value is invalid, or values are not in a list.
+    With `free`, names and values are any.  Raises CasesError if a name is unknown, a value is
+    invalid, or values are not in a list.
     """
     if not isinstance(vary, Mapping):
         raise CasesError(f'vary is {vary!r}; write a mapping such as {{"velocity": [50.0, 115.0]}}')
@@ -172,12 +155,9 @@ def checked(
 ) -> list[Case]:
     """Validate cases given as mappings, which must all have the same names.
 
-    With `free`, the names are any but those of results, and a value is a number or a text.
-
-    Raises
-    ------
-    CasesError
-        If the cases are invalid; the message states the source, or else the number of the case.
+    With `free`, the names are any but those of results, and a value is a number or a text.  Raises
+    CasesError if the cases are invalid; the message states the source, or else the number of the
+    case.
     """
     made: list[Case] = []
     remedy = 'write a list of mappings such as [{"velocity": 50.0}]'

@@ -56,12 +56,8 @@ class MeshError:
 def bisected(problem: Problem) -> Problem:
     """Bisect the elements around the load of a problem.
 
-    Its DT is kept, or shortened to that which DT 0 takes on the new mesh.
-
-    Raises
-    ------
-    RefineError
-        If nothing hits the plate, or its elements cannot be bisected.
+    Its DT is kept, or shortened to that which DT 0 takes on the new mesh.  Raises RefineError if
+    nothing hits the plate, or its elements cannot be bisected.
     """
     near = problem.distances <= max(_distance(problem), problem.distances.min())
     deck = refined(problem.deck, problem.mesh, near)
@@ -92,19 +88,15 @@ def mesh_error(
 ) -> MeshError:
     """Run a problem and its :func:`bisected` one, and compare their peak forces.
 
+    Raises DivergenceError if a motion grows without bound.  Raises NotEnoughMemoryError if a run
+    needs more memory than is free; a MemoryError.
+
     Parameters
     ----------
     problem, fine : Problem
     options : RunOptions
     advance : callable
         Called with numbers of steps that were taken.
-
-    Raises
-    ------
-    DivergenceError
-        If a motion grows without bound.
-    NotEnoughMemoryError
-        If a run needs more memory than is free; a MemoryError.
     """
     return MeshError(
         _peak_force(problem, options, advance),

@@ -101,10 +101,8 @@ def plan(
 ) -> Plan:
     """Create the plan of a sweep.
 
-    Raises
-    ------
-    CasesError
-        If the deck has no impact, there are no cases, or a search of velocities lacks something.
+    Raises CasesError if the deck has no impact, there are no cases, or a search of velocities lacks
+    something.
     """
     if not any(macro.word == "RODP" for macro in checked.deck.macros):
         raise CasesError("the deck has no impact step (RODP); there is nothing to sweep")
@@ -193,6 +191,9 @@ KEPT = 24
 def check_memory(checked: Problem, made: Plan, workers: int) -> None:
     """Reject a sweep that needs more memory than is free.
 
+    Raises NotEnoughMemoryError if the sweep needs more memory than is free; the message states
+    both.
+
     Parameters
     ----------
     checked : Problem
@@ -200,11 +201,6 @@ def check_memory(checked: Problem, made: Plan, workers: int) -> None:
     made : Plan
     workers : int
         Worker processes on this machine; 0 if a cluster runs the cases.
-
-    Raises
-    ------
-    NotEnoughMemoryError
-        If the sweep needs more memory than is free; the message states both.
     """
     steps, cases = checked.work.steps, len(made.cases)
     at_once = min(workers, len(tasks(checked, made)))

@@ -311,17 +311,14 @@ def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
 def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
     """Write the result of a sweep.
 
+    Raises ResultWriteError if the file cannot be written; an existing file is then unchanged.
+
     Parameters
     ----------
     result : SweepResult
     path : Path
     overwrite : bool
         Replace an existing file.
-
-    Raises
-    ------
-    ResultWriteError
-        If the file cannot be written; an existing file is then unchanged.
     """
     from fecm.results.hdf5_writer import writing
 
@@ -376,16 +373,13 @@ def load(path: Path) -> SweepResult:
 def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     """Create the result of a sweep from the contents of its file.
 
+    Raises ResultFileError if data are missing, or their number of cases differs.
+
     Parameters
     ----------
     contents : Contents
     history : bool
         Also read the forces, which may be large.
-
-    Raises
-    ------
-    ResultFileError
-        If data are missing, or their number of cases differs.
     """
     path = contents.path
 

@@ -86,10 +86,7 @@ def _run_on(
 ) -> Iterator[tuple[Task, Future[Outcome]]]:
     """Run tasks on an executor; yield them with their futures as they finish.
 
-    Raises
-    ------
-    SchedulerError
-        If the executor takes no tasks.
+    Raises SchedulerError if the executor takes no tasks.
     """
     running: dict[Future[Outcome], Task] = {}
     try:
@@ -175,12 +172,8 @@ def _client(scheduler: Any) -> Iterator[Any]:
 def on_dask(tasks: Sequence[Task], scheduler: Any, done: Done, idle: Idle) -> None:
     """Run tasks on a Dask cluster, given by address, client or cluster object.
 
-    It reruns the tasks of a dead worker.
-
-    Raises
-    ------
-    SchedulerError
-        If dask.distributed is missing, or nothing answers at the address.
+    It reruns the tasks of a dead worker.  Raises SchedulerError if dask.distributed is missing, or
+    nothing answers at the address.
     """
     with _client(scheduler) as client:
         if getattr(client, "status", "running") != "running":
@@ -191,10 +184,7 @@ def on_dask(tasks: Sequence[Task], scheduler: Any, done: Done, idle: Idle) -> No
 def on_executor(tasks: Sequence[Task], executor: Executor, done: Done, idle: Idle) -> None:
     """Run tasks on any executor; those that it loses become failed cases.
 
-    Raises
-    ------
-    SchedulerError
-        If the executor takes no tasks.
+    Raises SchedulerError if the executor takes no tasks.
     """
     for task, future in _run_on(executor, tasks, idle):
         try:
@@ -208,12 +198,7 @@ def on_executor(tasks: Sequence[Task], executor: Executor, done: Done, idle: Idl
 def address_in(file: Path) -> str:
     """Address in the file that ``dask scheduler --scheduler-file`` writes.
 
-    Raises
-    ------
-    SchedulerError
-        If the file has none.
-    OSError
-        If it cannot be read.
+    Raises SchedulerError if the file has none.  Raises OSError if it cannot be read.
     """
     try:
         return str(json.loads(file.read_bytes())["address"])

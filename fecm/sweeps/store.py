@@ -35,6 +35,9 @@ class DamagedPartError(FecmError, ValueError):
 class PartialResults:
     """Outcomes of finished tasks.
 
+    Raises OtherSweepError if the folder holds another sweep's outcomes.  Raises OSError if the
+    folder cannot be created.
+
     Parameters
     ----------
     result : Path
@@ -43,13 +46,6 @@ class PartialResults:
         Identification of the sweep.
     restart : bool
         Delete the outcomes of another sweep.
-
-    Raises
-    ------
-    OtherSweepError
-        If the folder holds another sweep's outcomes.
-    OSError
-        If the folder cannot be created.
     """
 
     def __init__(self, result: Path, fingerprint: str, *, restart: bool = False) -> None:
@@ -71,10 +67,7 @@ class PartialResults:
     def get(self, task: Task) -> Outcome | None:
         """Return the outcome of a finished task; None if there is none.
 
-        Raises
-        ------
-        DamagedPartError
-            If the file is damaged.
+        Raises DamagedPartError if the file is damaged.
         """
         path = self._path(task)
         try:

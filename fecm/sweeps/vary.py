@@ -44,12 +44,7 @@ def apply_case(deck: Deck, case: Case) -> Deck:
     A deck with B = 0 may restrain u and v at every node, because they are zero anyway.  If the case
     has B != 0, they are restrained only at the nodes that restrain w, as in a deck of ``fecm new``.
 
-    A deck without a patch gets a disc.
-
-    Raises
-    ------
-    CasesError
-        If a value is invalid for this deck.
+    A deck without a patch gets a disc.  Raises CasesError if a value is invalid for this deck.
     """
     if "rod_mass" in case and "rod_density" in case:
         raise CasesError("rod_mass and rod_density exclude each other")
