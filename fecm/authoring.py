@@ -72,19 +72,11 @@ MITC, FULL = "mitc", "full"
 
 @dataclass(frozen=True)
 class Authored:
-    """A new deck, not yet checked.
-
-    Attributes
-    ----------
-    deck : Deck
-    comments : str
-        Comment lines for the deck's head.
-    notes, doubts : list of str
-        What was filled in, and what differs from what was asked.
-    """
+    """A new deck, not yet checked."""
 
     deck: Deck
-    comments: str
+    comments: str  # comment lines for the deck's head
+    # What was filled in, and what differs from what was asked.
     notes: list[str]
     doubts: list[str]
 

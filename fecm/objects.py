@@ -283,17 +283,10 @@ class Laminate:
 
 @dataclass(frozen=True)
 class Sphere:
-    """Elastic contact of a sphere, its k estimated from the ply's constants.
+    """Elastic contact of a sphere, its k estimated from the ply's constants."""
 
-    Attributes
-    ----------
-    radius : float or None
-        Length; None where a standard prescribes it.
-    modulus, poisson : float or None
-        Elastic constants; None for steel.
-    """
-
-    radius: float | None = None
+    radius: float | None = None  # length; None where a standard prescribes it
+    # Elastic constants; None for steel.
     modulus: float | None = None
     poisson: float | None = None
 

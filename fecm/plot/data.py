@@ -134,23 +134,13 @@ def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -
 
 @dataclass(frozen=True)
 class Patches:
-    """The plate divided into small quadrilaterals, equally many per element.
+    """The plate divided into small quadrilaterals, equally many per element."""
 
-    Attributes
-    ----------
-    points : ndarray (n, 2)
-        Corners (length).
-    quads : ndarray (m, 4)
-        Rows of the corners in `points`.
-    edges : list of ndarray (k,)
-        Rows of the points around each element; the first is repeated at the end.
-    parts : list of (ElementBlock, ndarray)
-        Elements, and the shape functions at their points.
-    """
-
-    points: Floats
-    quads: Ints
+    points: Floats  # (n, 2): corners (length)
+    quads: Ints  # (m, 4): rows of the corners in `points`
+    # (k,) each: rows of the points around an element; the first is repeated at the end.
     edges: list[Ints]
+    # Elements, and the shape functions at their points.
     parts: list[tuple[ElementBlock, Floats]]
 
     def values(self, nodal: Array) -> Floats:

@@ -52,24 +52,14 @@ TICKS = 16
 
 @dataclass(frozen=True)
 class Exposures:
-    """What is drawn of a result.
+    """What is drawn of a result."""
 
-    Attributes
-    ----------
-    under_load : ndarray (numel, points) of bool
-        Points that are left out.
-    over_plate : ndarray (numel, points)
-        Largest exposure of all plies (or interfaces) at every point.
-    over_plies : dict of str to ndarray (plies,) or (plies - 1,)
-        Largest exposure outside the load, by criterion.
-    worst : LargestExposure
-        The largest of them.
-    """
-
-    under_load: Bools
+    under_load: Bools  # (numel, points): mask of the points that are left out
+    # (numel, points): largest exposure of all plies (or interfaces) at every point.
     over_plate: Floats
+    # (plies,) or (plies - 1,) each: largest exposure outside the load, by criterion.
     over_plies: dict[str, Floats]
-    worst: LargestExposure
+    worst: LargestExposure  # the largest of them
 
 
 def failure(results: Mapping[str, Result], *, quantity: str = "", width: str = "column") -> Picture:

@@ -40,27 +40,13 @@ class Picture:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of picture.
+    """A kind of picture."""
 
-    Attributes
-    ----------
-    function : str
-        Module of this package, and the function in it.
-    summary : str
-        What it shows.
-    several : bool
-        Whether several results go into one picture.
-    suffixes : tuple of str
-        Formats it can be written in, the usual one first.
-    sweep : bool
-        Whether it shows the result of a sweep, not of a run.
-    """
-
-    function: str
-    summary: str
-    several: bool = False
-    suffixes: tuple[str, ...] = SUFFIXES
-    sweep: bool = False
+    function: str  # module of this package, and the function in it
+    summary: str  # what it shows
+    several: bool = False  # whether several results go into one picture
+    suffixes: tuple[str, ...] = SUFFIXES  # formats it can be written in, the usual one first
+    sweep: bool = False  # whether it shows the result of a sweep, not of a run
 
 
 KINDS = {

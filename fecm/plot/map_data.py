@@ -38,22 +38,12 @@ LABELS = {
 
 @dataclass(frozen=True)
 class Axis:
-    """A parameter or quantity, shown by an axis or by colours.
-
-    Attributes
-    ----------
-    name : str
-    scale : Scale
-    values : ndarray (cases,)
-        Numbers; for texts their positions in `ticks`.
-    ticks : tuple of str
-        Texts in the order of the cases; empty for numbers.
-    """
+    """A parameter or quantity, shown by an axis or by colours."""
 
     name: str
     scale: Scale
-    values: Array
-    ticks: tuple[str, ...] = ()
+    values: Array  # (cases,): numbers; for texts their positions in `ticks`
+    ticks: tuple[str, ...] = ()  # texts in the order of the cases; empty for numbers
 
     @property
     def label(self) -> str:
@@ -70,32 +60,15 @@ class Axis:
 
 @dataclass(frozen=True)
 class Choice:
-    """Contents of a map.
+    """Contents of a map."""
 
-    Attributes
-    ----------
-    over : list of Axis
-        One or two.
-    shown : Axis
-        Quantity; NaN where a case has none.
-    levels : list of float
-        Values to mark.
-    title : str
-        Values that select the cases; empty for all cases.
-    other : Axis or None
-        Second varying parameter of a map over one.
-    still : ndarray (cases,) of bool
-        Mask of the cases that ended in contact.
-    limits : ndarray (cases,)
-        Delamination thresholds, if they differ and peak forces are shown; else empty.
-    """
-
-    over: list[Axis]
-    shown: Axis
-    levels: list[float]
-    title: str
-    other: Axis | None
-    still: NDArray[np.bool_]
+    over: list[Axis]  # one or two
+    shown: Axis  # quantity; NaN where a case has none
+    levels: list[float]  # values to mark
+    title: str  # values that select the cases; empty for all cases
+    other: Axis | None  # second varying parameter of a map over one
+    still: NDArray[np.bool_]  # (cases,): mask of the cases that ended in contact
+    # (cases,): delamination thresholds, if they differ and peak forces are shown; else empty.
     limits: Array
 
 

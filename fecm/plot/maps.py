@@ -43,19 +43,11 @@ MARKERS = "osD^vP*"
 
 @dataclass(frozen=True)
 class MapGrid:
-    """A quantity on a full grid of two parameters.
+    """A quantity on a full grid of two parameters."""
 
-    Attributes
-    ----------
-    x, y : ndarray (nx,), (ny,)
-        Ascending.
-    values : masked array (ny, nx)
-        Masked where a case has no value.
-    """
-
-    x: Floats
-    y: Floats
-    values: Any = field(repr=False)
+    x: Floats  # (nx,), ascending
+    y: Floats  # (ny,), ascending
+    values: Any = field(repr=False)  # (ny, nx), masked where a case has no value
 
 
 def parameter_map(

@@ -54,18 +54,10 @@ BLOCK = 100_000
 
 @dataclass(frozen=True)
 class Table:
-    """A table.
+    """A table."""
 
-    Attributes
-    ----------
-    header : tuple of str
-        Names of the columns.
-    rows : iterator of tuple
-        Values of the columns, row by row.
-    """
-
-    header: tuple[str, ...]
-    rows: Iterator[tuple[float, ...]]
+    header: tuple[str, ...]  # names of the columns
+    rows: Iterator[tuple[float, ...]]  # values of the columns, row by row
 
     def lines(self) -> Iterator[str]:
         """All lines with line ends, beginning with the header."""

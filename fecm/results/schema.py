@@ -116,26 +116,13 @@ class ResultWriteError(FecmError, OSError):
 
 @dataclass(frozen=True, slots=True)
 class Dataset:
-    """One dataset of a result.
+    """One dataset of a result."""
 
-    Attributes
-    ----------
-    path : str
-        Group and name.
-    shape : tuple
-        Sizes by name, or numbers.
-    description : str
-    dimension : str
-        Physical dimension; may be empty.
-    dtype : str
-        NumPy's name of the type.
-    """
-
-    path: str
-    shape: tuple[str | int, ...]
+    path: str  # group and name
+    shape: tuple[str | int, ...]  # sizes by name, or numbers
     description: str
-    dimension: str = ""
-    dtype: str = "f8"
+    dimension: str = ""  # physical dimension; may be empty
+    dtype: str = "f8"  # NumPy's name of the type
 
     @property
     def group(self) -> str:

@@ -57,22 +57,12 @@ def _threshold(result: Result) -> list[str]:
 
 @dataclass(frozen=True)
 class LargestExposure:
-    """Largest exposure of a criterion outside the elements under the load.
-
-    Attributes
-    ----------
-    criterion : str
-    exposure : float
-    mode : str
-    ply : int
-        From 1 at the struck face; of an interface the ply above it.
-    x, y, time : float
-    """
+    """Largest exposure of a criterion outside the elements under the load."""
 
     criterion: str
     exposure: float
     mode: str
-    ply: int
+    ply: int  # from 1 at the struck face; of an interface the ply above it
     x: float
     y: float
     time: float

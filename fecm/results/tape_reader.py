@@ -43,18 +43,12 @@ _SPECIAL = re.compile(rb"[+-]?(?:inf(?:inity)?|nan)", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class TapeText:
-    """Contents of a folder of tapes.
+    """Contents of a folder of tapes."""
 
-    Attributes
-    ----------
-    arrays : mapping of str to ndarray
-        Datasets by their paths in a result: ``tape3/w`` (rows, nodes), ``tape8/kappa_x`` etc.
-        (rows, elements, points), ``tape9/force`` etc. (rows,).
-    lines : bool
-        Whether ``tape3/w`` has the shape (lines, 6), because the number of nodes is not known.
-    """
-
+    # Datasets by their paths in a result: ``tape3/w`` (rows, nodes), ``tape8/kappa_x`` etc. (rows,
+    # elements, points), ``tape9/force`` etc. (rows,).
     arrays: Mapping[str, Array]
+    # Whether ``tape3/w`` has the shape (lines, 6), because the number of nodes is not known.
     lines: bool = False
     form = TAPES
 

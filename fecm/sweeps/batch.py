@@ -335,28 +335,16 @@ def _together(
 
 @dataclass(frozen=True)
 class Impacts:
-    """Histories of many impacts on one plate.
+    """Histories of many impacts on one plate."""
 
-    Attributes
-    ----------
-    force : ndarray (steps, cases)
-        Contact force after every step.
-    indentation : Indentation
-        Indentation of each case.
-    unconverged_steps : ndarray (cases,)
-        Steps whose contact iteration did not converge.
-    work : ndarray (blocks, cases)
-        Work of the contact force on plate and indentation, after every block of steps and after
-        the last step (force*length).
-    excess : ndarray (cases,)
-        Largest dt^2/8 m a^2 of the impact node (force*length): its share of the difference
-        between the plate's energy and the work done on it.
-    """
-
-    force: Floats
+    force: Floats  # (steps, cases): contact force after every step
     indentation: Indentation
-    unconverged_steps: NDArray[np.int64]
+    unconverged_steps: NDArray[np.int64]  # (cases,): steps whose contact iteration did not converge
+    # (blocks, cases): work of the contact force on plate and indentation, after every block of
+    # steps and after the last step (force*length).
     work: Floats
+    # (cases,): largest dt^2/8 m a^2 of the impact node (force*length): its share of the difference
+    # between the plate's energy and the work done on it.
     excess: Floats
 
 

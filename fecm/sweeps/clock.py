@@ -24,18 +24,10 @@ STORING = ("RODP", "DISP", "STRE", "PLYS")
 
 @dataclass(frozen=True)
 class Clock:
-    """Rule for the time step of each plate.
+    """Rule for the time step of each plate."""
 
-    Attributes
-    ----------
-    dt : float
-        Time step of the deck (time).
-    rounded : bool
-        Whether the rule is that of ``fecm new`` instead of that of DT 0.
-    """
-
-    dt: float
-    rounded: bool
+    dt: float  # time step of the deck (time)
+    rounded: bool  # whether the rule is that of ``fecm new`` instead of that of DT 0
 
     def time_step(self, critical: float) -> float:
         """Return the time step for a critical time step."""

@@ -26,20 +26,13 @@ from fecm.sweeps.plan import without_output
 
 @dataclass(frozen=True)
 class MeshError:
-    """Peak force on a mesh and on one with bisected elements around the load.
-
-    Attributes
-    ----------
-    peak_force, refined_peak_force : float
-    elements, refined_elements : int
-    distance : float
-        Elements up to this distance from the load are bisected: a bending wave of the contact.
-    """
+    """Peak force on a mesh and on one with bisected elements around the load."""
 
     peak_force: float
     refined_peak_force: float
     elements: int
     refined_elements: int
+    # Elements up to this distance from the load are bisected: a bending wave of the contact.
     distance: float
 
     @property

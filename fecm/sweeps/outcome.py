@@ -22,23 +22,15 @@ ABOUT = ("status", "dt", "steps", "unsettled")
 
 @dataclass
 class Outcome:
-    """Results of some cases.
+    """Results of some cases."""
 
-    Attributes
-    ----------
-    numbers : list of int
-        Numbers of the cases, from 0.
-    columns : dict of ndarray (cases,)
-        Values by name: those of :data:`~fecm.results.metrics.METRICS` are NaN if the case failed,
-        or if they are unknown because the run ended in contact.  ``status`` is ``"ok"``, ``"still
-        in contact"``, or the reason for the failure; ``dt``, ``steps``; ``unsettled`` counts the
-        steps whose contact iteration did not converge.
-    force : ndarray (cases, steps) or None
-        Contact force after every step.
-    """
-
-    numbers: list[int]
+    numbers: list[int]  # numbers of the cases, from 0
+    # (cases,) each, by name: those of :data:`~fecm.results.metrics.METRICS` are NaN if the case
+    # failed, or if they are unknown because the run ended in contact.  ``status`` is ``"ok"``,
+    # ``"still in contact"``, or the reason for the failure; ``dt``, ``steps``; ``unsettled`` counts
+    # the steps whose contact iteration did not converge.
     columns: dict[str, NDArray[Any]]
+    # (cases, steps) or None: contact force after every step.
     force: Floats | None = field(default=None, repr=False)
 
     @property

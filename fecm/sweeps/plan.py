@@ -35,33 +35,17 @@ THRESHOLD = "threshold"
 
 @dataclass(frozen=True)
 class Plan:
-    """Definition of a sweep.
+    """Definition of a sweep."""
 
-    Attributes
-    ----------
-    deck : Deck
-        Deck that is varied.
-    cases : tuple of dict
-        Values of every case.
-    history : bool
-        Whether contact forces are stored.
-    clock : Clock or None
-        Rule for the time step of each plate; None if the deck's time step applies to all.
-    until : float or str or None
-        Peak force whose velocity is searched in every case: a number, or ``"threshold"``.
-    build : callable or None
-        Makes the deck of a case; `deck` is that of one of the cases.
-    measure : callable or None
-        Computes more columns from the result of a case.
-    """
-
-    deck: Deck
-    cases: tuple[Case, ...]
-    history: bool = False
+    deck: Deck  # deck that is varied
+    cases: tuple[Case, ...]  # values of every case
+    history: bool = False  # whether contact forces are stored
+    # Rule for the time step of each plate; None if the deck's time step applies to all.
     clock: Clock | None = None
+    # Peak force whose velocity is searched in every case: a number, or ``"threshold"``.
     until: float | str | None = None
-    build: Build | None = None
-    measure: Measure | None = None
+    build: Build | None = None  # makes the deck of a case; `deck` is that of one of the cases
+    measure: Measure | None = None  # computes more columns from the result of a case
 
     @property
     def alone(self) -> bool:
@@ -76,18 +60,10 @@ class Plan:
 
 @dataclass(frozen=True)
 class Task(Plan):
-    """The part of a plan whose cases are run together.
+    """The part of a plan whose cases are run together."""
 
-    Attributes
-    ----------
-    number : int
-        Number of the task.
-    numbers : tuple of int
-        Numbers of the cases.
-    """
-
-    number: int = 0
-    numbers: tuple[int, ...] = ()
+    number: int = 0  # number of the task
+    numbers: tuple[int, ...] = ()  # numbers of the cases
 
 
 def plan(

@@ -143,12 +143,7 @@ class Convolution:
 
 @dataclass(slots=True)
 class TipState:
-    """Motion of the tips of projectiles, one per case.
-
-    Attributes
-    ----------
-    tip, velocity, acceleration : ndarray (cases,)
-    """
+    """Motion of the tips of projectiles, (cases,) each."""
 
     tip: Floats
     velocity: Floats
