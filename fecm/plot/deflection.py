@@ -47,23 +47,10 @@ EXAGGERATION = 0.3
 
 
 def profile(result: Result, name: str, along: str, rows: Array) -> tuple[Floats, Floats]:
-    """Deflection on a line through the impact point.
+    """Deflection on a line through the impact point along x or y, at some rows of tape3.
 
-    Parameters
-    ----------
-    result : Result
-    name : str
-        Its name in messages.
-    along : str
-        ``"x"`` or ``"y"``.
-    rows : ndarray of int
-        Rows of tape3.
-
-    Returns
-    -------
-    position : ndarray (n,)
-        Positions of the nodes on the line if they cover it, else of equidistant points.
-    w : ndarray (rows, n)
+    Returns the positions, (n,), and w, (rows, n), of the nodes on the line if they cover it, else
+    of equidistant points.
     """
     coordinates, w = result["mesh/coordinates"], result["tape3/w"][rows]
     axis, across = AXES[along], 1 - AXES[along]
@@ -110,15 +97,8 @@ def line(
 ) -> Picture:
     """Deflection along a line through the impact point; of several results, one graph per time.
 
-    Parameters
-    ----------
-    results : mapping of str to Result
-    times : sequence of float
-        Times (the deck's unit), for which the nearest stored rows are drawn; by default a few.
-    along : str
-        Direction, ``"x"`` or ``"y"``.
-    width : str
-        ``"column"`` or ``"full"``.
+    Drawn are the stored rows nearest to `times` (the deck's unit), by default a few, in the
+    direction `along`, ``"x"`` or ``"y"``.
     """
     data = {}
     for name, result in results.items():

@@ -66,17 +66,9 @@ def failure(results: Mapping[str, Result], *, quantity: str = "", width: str = "
     """Largest exposures over time: of the worst ply on the plate, and of every ply in bars.
 
     Points under the load are hatched; the bars leave them out.  Values between two plies belong to
-    an element, which the bars leave out if one of its points is under the load.
-
-    Parameters
-    ----------
-    results : mapping of str to Result
-        One result.
-    quantity : str
-        A criterion; by default the largest of all criteria of the plies, and bars of the
-        interlaminar exposure between them.
-    width : str
-        ``"column"`` or ``"full"``.
+    an element, which the bars leave out if one of its points is under the load.  `quantity` is a
+    criterion; by default the plate shows the largest of all criteria of the plies, and the bars
+    also the interlaminar exposure between them.
     """
     ((name, result),) = results.items()
     found = _exposures(result, name, quantity)

@@ -83,16 +83,9 @@ def _mark_open_ends(axes: Axes, results: Results, width: str) -> None:
 def force(results: Results, *, overlay: Source | None = None, width: str = "column") -> Picture:
     """Contact force and transducer against time; of several results, one above the other.
 
-    A dashed line marks the delamination threshold of a result that has one.
-
-    Parameters
-    ----------
-    results : mapping of str to Result
-    overlay : str, Path or tuple, optional
-        A measured force: a CSV file with the columns time and force (or transducer), or times and
-        forces, in the deck's units.
-    width : str
-        ``"column"`` or ``"full"``.
+    A dashed line marks the delamination threshold of a result that has one.  `overlay` is a
+    measured force: a CSV file with the columns time and force (or transducer), or times and forces,
+    in the deck's units.
     """
     limit_count(len(results), "forces")
     paths = ("history/time", "history/force", "history/transducer")
@@ -170,15 +163,8 @@ def _thresholds(results: Results) -> dict[str, float]:
 def loop(results: Results, *, against: str = "indentation", width: str = "column") -> Picture:
     """Contact force against indentation or displacement, beginning at rest.
 
-    Parameters
-    ----------
-    results : mapping of str to Result
-    against : str
-        ``"indentation"``; ``"deflection"``: displacement of the plate under the load;
-        ``"displacement"``: that of the projectile's impacted end towards the plate, in contact the
-        sum of both.
-    width : str
-        ``"column"`` or ``"full"``.
+    ``"deflection"`` is the displacement of the plate under the load, ``"displacement"`` that of the
+    projectile's impacted end towards the plate, in contact the sum of both others.
     """
     limit_count(len(results), "loops")
     if against not in AGAINST:
@@ -259,7 +245,6 @@ def strain(
     face : str
         ``"far"`` (z = h/2), ``"struck"`` (z = -h/2), or ``"curvature"``.
     width : str
-        ``"column"`` or ``"full"``.
     """
     lines: dict[str, tuple[Array, Array]] = {}
     for name, result in results.items():

@@ -36,15 +36,7 @@ POINTS = 100
 def fit_picture(
     indentation: Floats, force: Floats, found: Fit, units: Mapping[str, str]
 ) -> Picture:
-    """Points of a test with the fitted curves, and permanent against largest indentation.
-
-    Parameters
-    ----------
-    indentation, force : ndarray (n,)
-    found : Fit
-    units : mapping
-        Names of the units; may be empty.
-    """
+    """Points of a test with the fitted curves, and permanent against largest indentation."""
     length, pound = scale_in(units, "length", indentation), scale_in(units, "force", force)
     both = len(found.cycles) > 1
     width = "full" if both else "column"
@@ -113,16 +105,7 @@ def rigidity_picture(
 ) -> Picture:
     """Unloading rigidity against largest indentation (figure 3.19).
 
-    Parameters
-    ----------
-    peaks : ndarray (n,)
-        Largest indentations (length).
-    relations : mapping of str to ndarray (n,)
-        Rigidities, force/length^power, by their names in the legend.
-    power : float
-        q.
-    units : mapping
-        Names of the units.
+    Drawn are the rigidities, force/length^power, of each relation at the `peaks`, (n,).
     """
     length = scale_in(units, "length", peaks)
     # The rigidity is unbounded towards zero: the deeper half sets the height of the axis.

@@ -78,7 +78,6 @@ def parameter_map(
     level : sequence of float
         Values to mark (the deck's unit).
     width : str
-        ``"column"`` or ``"full"``.
     """
     ((name, sweep),) = results.items()
     choice = choose(sweep, name, quantity, over, where or {}, level)

@@ -90,21 +90,11 @@ def draw(
     style: Mapping[str, Any] | None = None,
     **options: Any,
 ) -> Picture:
-    """Draw a picture.
+    """Draw a picture of the kind from results by their names in the legend, and the kind's options.
 
-    Raises PlotError if the kind is unknown, a result lacks what it shows, or the options do not
-    fit.  Raises ImportError if matplotlib is not installed.
-
-    Parameters
-    ----------
-    kind : str
-        One of `KINDS`.
-    results : mapping of str to Result or SweepResult
-        Results by their names in the legend.
-    style : mapping of str to Any, optional
-        matplotlib's settings; by default those of the command line.
-    **options
-        Keywords of the kind's function, such as ``times`` or ``width``.
+    `style` are matplotlib's settings; by default those of the command line.  Raises PlotError if
+    the kind is unknown, a result lacks what it shows, or the options do not fit.  Raises
+    ImportError if matplotlib is not installed.
     """
     properties = kind_named(kind)
     if len(results) > 1 and not properties.several:
@@ -139,22 +129,10 @@ def plot(
 ) -> Axes:
     """Draw a picture for Python: in a file, on given axes, or else on a new figure of pyplot.
 
-    Files are those of the command line.  On axes and figures of pyplot the user's settings of
-    matplotlib hold.  Raises PlotError also if the picture has several axes and `ax` is given, or
-    `path` and `ax` are.
-
-    Parameters
-    ----------
-    kind, results, **options
-        As of :func:`draw`.
-    path : str or Path, optional
-        File to write; an existing one is replaced.
-    ax : matplotlib.axes.Axes, optional
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The picture's first axes.
+    Files are those of the command line; an existing one is replaced.  On axes and figures of pyplot
+    the user's settings of matplotlib hold.  Returns the picture's first axes.  Raises the errors of
+    :func:`draw`, and PlotError if the picture has several axes and `ax` is given, or `path` and
+    `ax` are.
     """
     if path is not None:
         if ax is not None:
@@ -202,17 +180,8 @@ def save(
 ) -> None:
     """Write a picture in the format of the path's suffix; equal pictures give equal bytes.
 
-    Raises PlotError if matplotlib can't draw it.  Raises OSError if the file can't be written; an
-    existing file is then untouched.
-
-    Parameters
-    ----------
-    picture : Picture
-    path : Path
-    overwrite : bool
-        Replace an existing file.
-    advance : callable
-        Called with 1 after each frame.
+    `advance` is called with 1 after each frame.  Raises PlotError if matplotlib can't draw it.
+    Raises OSError if the file can't be written; an existing file is then untouched.
     """
     import matplotlib
 

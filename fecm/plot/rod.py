@@ -59,13 +59,7 @@ def pulse_picture(
 ) -> Picture:
     """Forces above, accelerations below, as in figures 4.7 and 4.8.
 
-    Parameters
-    ----------
-    history : RodHistory
-    filtered : ndarray (rows, stations), optional
-        Filtered forces at the stations.
-    units : mapping, optional
-        Names of the units.
+    `filtered` are the filtered forces at the stations, (rows, stations).
     """
     figure, (above, below) = panels(WIDTH, 2, ratio=RATIO[WIDTH], sharex=True)
     forces: list[Line] = [("applied", history.applied, COLOURS[-1], STYLES[2])]
@@ -95,17 +89,9 @@ def filter_picture(
     units: Mapping[str, str] | None = None,
     dimension: str = "",
 ) -> Picture:
-    """A history, the filtered history, and others beside them, against time.
+    """A history, the filtered history, and others beside them, (rows,) each, against time.
 
-    Parameters
-    ----------
-    time : ndarray (rows,)
-    named : mapping of str to ndarray (rows,)
-        Histories by their names in the legend.
-    units : mapping, optional
-        Names of the units.
-    dimension : str
-        Of the histories; empty if unknown.
+    The histories have their names in the legend; their dimension is empty if it is unknown.
     """
     figure, (axes,) = panels(WIDTH, ratio=RATIO[WIDTH])
     lines: list[Line] = [

@@ -50,7 +50,6 @@ def thickness(
         At most one time (the deck's unit), for which the nearest stored row is drawn; by default
         that of the element's largest abs(sigma_1).
     width : str
-        ``"column"`` or ``"full"``.
     """
     ((name, result),) = results.items()
     plies, point = _chosen(result, name, at, times)

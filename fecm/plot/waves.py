@@ -59,14 +59,7 @@ def dispersion_picture(medium: Medium, curves: Sequence[Dispersion]) -> Picture:
 
 @styled
 def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
-    """Polar graphs of the normal velocities of in-plane and flexural fronts.
-
-    Parameters
-    ----------
-    surfaces : WaveSurfaces
-    units : mapping of str to str
-        As :func:`fecm.deck.units.unit_names` gives them.
-    """
+    """Polar graphs of the normal velocities of in-plane and flexural fronts."""
     fronts = surfaces.fronts(AROUND)
     speed = scale_in(units, "length/time", fronts.velocity)
     figure, axes = panels("full", 1, 2, ratio=1.16, subplot_kw={"projection": "polar"})

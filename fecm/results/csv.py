@@ -67,16 +67,10 @@ class Table:
 
 
 def table(result: Result, name: str = "history") -> Table:
-    """Table of one dataset, or of all datasets of a group.
+    """Table of one dataset such as ``tape3/w``, or of all datasets of a group such as ``history``.
 
     Raises ExportError if there is no such dataset or group, or the group's datasets differ in
     shape.
-
-    Parameters
-    ----------
-    result : Result
-    name : str
-        A dataset such as ``tape3/w``, or a group such as ``history``.
     """
     members = _members(result, name.strip("/"))
     group = members[0].rpartition("/")[0]

@@ -127,16 +127,10 @@ def _troubles(path: Path) -> Iterator[None]:
 
 
 def read(path: Path, *forms: str) -> Contents:
-    """List the contents of a result file.
+    """List the contents of a result file of one of these formats; by default that of a run.
 
     Raises ResultFileError if it is not an HDF5 file, or not a result of these forms.  Raises
     OSError if it can't be opened.
-
-    Parameters
-    ----------
-    path : Path
-    *forms : str
-        Accepted formats; by default that of a run.
     """
     path = Path(path)
     if path.exists() and not (path.is_file() or path.is_dir()):

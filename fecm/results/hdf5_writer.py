@@ -175,12 +175,6 @@ def writing(path: Path, *, overwrite: bool = True) -> Iterator[FileSink]:
     """Open a result for writing; it gets its final name only on success.
 
     Raises ResultWriteError if the file can't be written; an existing file is then untouched.
-
-    Parameters
-    ----------
-    path : Path
-    overwrite : bool
-        Replace an existing file.
     """
     with new_hdf5(path, overwrite=overwrite) as (file, guarded):
         sink = FileSink(file, guarded)

@@ -158,24 +158,10 @@ def _material(result: Stored, plies: int) -> Material:
 
 
 def points_of(result: Stored, numbers: Array, count: int, at_nodes: bool) -> tuple[Floats, Floats]:
-    """Coordinates x and y of the points of some elements.
+    """Coordinates x and y, (m, count) each, of the points of the elements with the numbers (m,).
 
-    Raises ResultFileError if there is no such element or no rule of so many points.
-
-    Parameters
-    ----------
-    result : Stored
-    numbers : ndarray (m,)
-        Numbers of the elements.
-    count : int
-        Points of an element.
-    at_nodes : bool
-        Whether the points are nodes, not Gauss points.
-
-    Returns
-    -------
-    x, y : ndarray (m, count)
-        Length.
+    Of each element these are `count` nodes or Gauss points.  Raises ResultFileError if there is no
+    such element or no rule of so many points.
     """
     order = math.isqrt(count)
     if order**2 != count or not 1 <= order <= HIGHEST_ORDER:

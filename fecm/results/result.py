@@ -479,14 +479,9 @@ def _number(value: Any) -> float:
 
 
 def still_in_contact(force: Array) -> bool:
-    """Whether a history ends in contact.
+    """Whether a history of the contact force, (steps,), ends in contact.
 
     End of contact, permanent indentation and final energies are then not known.
-
-    Parameters
-    ----------
-    force : ndarray (steps,)
-        Contact force.
     """
     return bool(len(force) and force[-1] > 0.0)
 

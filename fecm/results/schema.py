@@ -342,12 +342,7 @@ AXIS_NAMES: dict[str | int, tuple[str, ...]] = {"ndf": DOF_NAMES, "ndm": AXES}
 def shape_error(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str]) -> str:
     """Message about the first dataset with a wrong shape or type; empty if there is none.
 
-    Parameters
-    ----------
-    shapes : mapping
-        Shape of every dataset, by path.
-    kinds : mapping
-        NumPy's letter for the kind of number: ``"f"``, ``"i"``, ``"u"`` or ``"b"``.
+    Both are by path; kinds are NumPy's letters: ``"f"``, ``"i"``, ``"u"`` or ``"b"``.
     """
     sizes = {name: (size, "every result") for name, size in FIXED.items()}
     for path, shape in shapes.items():

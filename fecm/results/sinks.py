@@ -81,19 +81,7 @@ class MemorySink:
 class RowBuffer:
     """Collects the rows of one group and writes them to a sink in blocks.
 
-    Parameters
-    ----------
-    sink : Sink
-        Receives the rows.
-    datasets : sequence of Dataset
-        The group's datasets.
-    shapes : sequence of tuple of int
-        Their full shapes, rows first.
-
-    Attributes
-    ----------
-    stored : int
-        Rows written.
+    The shapes are the full shapes of the datasets, rows first; `stored` counts the rows written.
     """
 
     # Most bytes of a block.

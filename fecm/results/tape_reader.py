@@ -74,15 +74,10 @@ class TapeText:
 
 
 def read_tapes(folder: Path) -> TapeText:
-    """Read tape3, tape8 and tape9 of a folder; some may be missing.
+    """Read tape3, tape8 and tape9 of a folder, with or without ``.txt``; some may be missing.
 
     Raises ResultFileError if there is no tape, or one is invalid.  Raises OSError if a file can't
     be opened.
-
-    Parameters
-    ----------
-    folder : Path
-        Contains tape3, tape8, tape9 or tape3.txt, tape8.txt, tape9.txt.
     """
     arrays: dict[str, Array] = {}
     lines = False
@@ -182,11 +177,8 @@ class _Lines:
 def fortran_number(field: bytes) -> float | None:
     """Value of a field of Fortran's format E12.4; None if it is invalid or too large.
 
-    Parameters
-    ----------
-    field : bytes
-        Such as ``  0.1234E+01``, ``  0.1234+100`` (a three-digit exponent has no letter),
-        ``         NaN``, ``   -Infinity``.
+    Such are ``  0.1234E+01``, ``  0.1234+100`` (a three-digit exponent has no letter),
+    ``         NaN``, ``   -Infinity``.
     """
     text = field.strip(b" ")
     if _SPECIAL.fullmatch(text):

@@ -90,19 +90,7 @@ def _require(result: Result, paths: Iterable[str]) -> None:
 def write_tapes(result: Result, folder: Path, *, overwrite: bool = True) -> list[Path]:
     """Write all tapes into a folder, or none; a missing folder is created.
 
-    Raises OSError if a file can't be written.
-
-    Parameters
-    ----------
-    result : Result
-    folder : Path
-    overwrite : bool
-        Replace existing tapes.
-
-    Returns
-    -------
-    list of Path
-        The files written.
+    Returns the paths of the files.  Raises OSError if a file can't be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     texts = {folder / name: lines for name, lines in tape_texts(result).items()}

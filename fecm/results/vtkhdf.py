@@ -41,17 +41,8 @@ def write_vtkhdf(
 ) -> None:
     """Write a result as VTKHDF, one time step per row of tape3.
 
-    Raises ExportError if the result has no displacements.  Raises OSError if the file can't be
-    written.
-
-    Parameters
-    ----------
-    result : Result
-    path : Path
-    note : callable
-        Receives a sentence about fields that are exported incompletely.
-    overwrite : bool
-        Replace an existing file.
+    `note` receives a sentence about fields that are exported incompletely.  Raises ExportError if
+    the result has no displacements.  Raises OSError if the file can't be written.
     """
     if "tape3/displacement" not in result:
         raise ExportError(

@@ -87,29 +87,11 @@ def carry_out(
     idle: Idle = lambda: None,
     note: Callable[[str], None] = warn,
 ) -> SweepResult:
-    """Run the tasks of a plan.
+    """Run the tasks of a plan in this process, on an executor, a scheduler or several workers.
 
-    Raises SchedulerError if the scheduler cannot be used.
-
-    Parameters
-    ----------
-    problem : Problem
-        Checked problem of the deck.
-    made : Plan
-    workers : int
-        Worker processes on this machine; 1 runs all tasks in this process.
-    scheduler : str, distributed.Client or cluster, optional
-        Dask cluster whose workers run the tasks instead.
-    executor : concurrent.futures.Executor, optional
-        Runs the tasks instead; it is not shut down.
-    parts : PartialResults, optional
-        Store of finished tasks, which are not run again.
-    done : callable
-        Called with each task and its outcome, including tasks finished earlier.
-    idle : callable
-        Called regularly.
-    note : callable
-        Called with messages for the user.
+    Tasks that `parts` has stored are not run again.  `done` is called with each task and its
+    outcome, including tasks finished earlier, `idle` regularly, `note` with messages for the user.
+    The executor is not shut down.  Raises SchedulerError if the scheduler cannot be used.
     """
     outcomes: list[Outcome] = []
     left: list[Task] = []

@@ -351,21 +351,11 @@ class Impacts:
 def impacts(
     response: Floats, tips: TipSteps, law: HystereticLaw, speed: Floats, node_mass: float
 ) -> Impacts:
-    """Compute many impacts on a plate from its response to a unit force.
+    """Compute many impacts on a plate from its response to a unit force, (steps,).
 
-    Parameters
-    ----------
-    response : ndarray (steps,)
-        See :func:`~fecm.sweeps.responses.plate_response`.
-    tips : TipSteps
-        Steps of the projectiles.
-    law : HystereticLaw
-        Contact law with arrays of constants.
-    speed : ndarray (cases,)
-        Approach velocities.
-    node_mass : float
-        Mass that the contact force accelerates: the lumped mass of the impact node, or
-        1/(g M^-1 g) of a patch with the weights g.
+    The law has arrays of constants, `speed` (cases,) are the approach velocities.  `node_mass` is
+    the mass that the contact force accelerates: the lumped mass of the impact node, or 1/(g M^-1 g)
+    of a patch with the weights g.
     """
     steps, cases = len(response), len(speed)
     none = np.zeros(cases)
@@ -406,7 +396,7 @@ def balance_errors(
     kind: NDArray[np.intp],
     speed: Floats,
 ) -> Floats:
-    """Estimate the error of the energy balance relative to the initial energy.
+    """Estimate the error of the energy balance of cases relative to the initial energy, (cases,).
 
     The energy of the projectile and the work done on plate and indentation must add up to the
     initial energy, after every block of steps and after the last.  Central differences conserve
@@ -414,20 +404,8 @@ def balance_errors(
     the plate.  The energy that a run reports is larger by dt^2/8 a' M a, of which only the part of
     the impact node is known here.
 
-    Parameters
-    ----------
-    found : Impacts
-    tips : TipSteps
-    kinds : sequence of Projectile
-    kind : ndarray (cases,) of int
-        Index of the projectile of each case.
-    speed : ndarray (cases,)
-        Approach velocities.
-
-    Returns
-    -------
-    ndarray (cases,)
-        0 if the initial energy is 0; not finite if the motion is not finite.
+    Case n has the projectile ``kinds[kind[n]]`` and the approach velocity ``speed[n]``.  Its error
+    is 0 if the initial energy is 0, and not finite if the motion is not finite.
     """
     worst = np.zeros(len(speed))
     for number, projectile in enumerate(kinds):

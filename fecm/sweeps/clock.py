@@ -49,18 +49,9 @@ def clock_of(checked: Problem) -> Clock | None:
 def with_time_step(deck: Deck, dt: float, taken: float = 0.0) -> Deck:
     """Change every DT of a deck, and the loops so that the duration is kept.
 
-    Parameters
-    ----------
-    deck : Deck
-    dt : float
-        New time step (time).  If it is not positive, only the DT cards change.
-    taken : float
-        Time step that DT 0 means in the deck; 0 if no DT is 0.
-
-    Returns
-    -------
-    Deck
-        Macros that store rows keep approximately their number of rows.
+    `taken` is the time step that DT 0 means in the deck; 0 if no DT is 0.  If the new one is not
+    positive, only the DT cards change.  Macros that store rows keep approximately their number of
+    rows.
     """
     loops = _innermost_loops(deck.macros)
     ratios: dict[int, float] = {}

@@ -25,14 +25,9 @@ CASES, HISTORY = "cases", "history"
 def lines(sweep: SweepResult, name: str = CASES) -> Iterator[str]:
     """Return the lines of a table, with line ends.
 
-    Raises ExportError if the table is unknown, or the sweep has no stored forces.
-
-    Parameters
-    ----------
-    sweep : SweepResult
-    name : str
-        ``"cases"``: values and results of every case.  ``"history"``: the contact force after
-        every step of every case that was run.
+    ``"cases"`` has the values and results of every case, ``"history"`` the contact force after
+    every step of every case that was run.  Raises ExportError if the table is unknown, or the sweep
+    has no stored forces.
     """
     if name not in (CASES, HISTORY):
         raise ExportError(f"unknown table {name}; a sweep has {CASES} and {HISTORY}")

@@ -18,20 +18,9 @@ def search(
     """Find the lowest velocity of each case at which the contact force reaches a value.
 
     The range from 1/100 to 100 times the start is searched, by rounds of velocities.  Later rounds
-    gather around the interpolated velocity of the bracket, whose upper end is the result.
-
-    Parameters
-    ----------
-    starts : sequence of float
-        A velocity of each case.
-    force : float
-    peaks : callable
-        Peak forces of pairs of case and velocity; NaN where unknown.
-
-    Returns
-    -------
-    list of float or str
-        Velocities, or the reasons why there is none.
+    gather around the interpolated velocity of the bracket, whose upper end is the result.  `peaks`
+    returns peak forces of pairs of case and velocity; NaN where unknown.  A text is the reason why
+    a case has no velocity.
     """
     found: list[float | str] = [""] * len(starts)
     trials = {n: np.geomspace(v / RANGE, v * RANGE, COUNT) for n, v in enumerate(starts)}

@@ -81,15 +81,8 @@ def mesh_error(
 ) -> MeshError:
     """Run a problem and its :func:`bisected` one, and compare their peak forces.
 
-    Raises DivergenceError if a motion grows without bound.  Raises NotEnoughMemoryError if a run
-    needs more memory than is free; a MemoryError.
-
-    Parameters
-    ----------
-    problem, fine : Problem
-    options : RunOptions
-    advance : callable
-        Called with numbers of steps that were taken.
+    `advance` is called with numbers of steps that were taken.  Raises DivergenceError if a motion
+    grows without bound.  Raises NotEnoughMemoryError if a run needs more memory than is free.
     """
     return MeshError(
         _peak_force(problem, options, advance),

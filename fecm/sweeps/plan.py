@@ -165,18 +165,9 @@ KEPT = 24
 
 
 def check_memory(checked: Problem, made: Plan, workers: int) -> None:
-    """Reject a sweep that needs more memory than is free.
+    """Reject a sweep that needs more memory than is free, by a NotEnoughMemoryError.
 
-    Raises NotEnoughMemoryError if the sweep needs more memory than is free; the message states
-    both.
-
-    Parameters
-    ----------
-    checked : Problem
-        Deck that is varied.
-    made : Plan
-    workers : int
-        Worker processes on this machine; 0 if a cluster runs the cases.
+    `workers` are those on this machine; 0 if a cluster runs the cases.
     """
     steps, cases = checked.work.steps, len(made.cases)
     at_once = min(workers, len(tasks(checked, made)))

@@ -28,21 +28,9 @@ SMALL = BLOCK**3
 
 
 def plate_response(motion: PlateMotion, load: Load, dt: float, steps: int) -> Floats:
-    """Compute the displacement under a load after 1 to `steps` steps, the first with a unit force.
+    """Displacement per force under a load after 1 to `steps` steps, the first with a unit force.
 
-    Parameters
-    ----------
-    motion : PlateMotion
-        A plate without nodal loads.
-    load : Load
-    dt : float
-        Time step.
-    steps : int
-
-    Returns
-    -------
-    ndarray (steps,)
-        Length per force.
+    The plate has no nodal loads.
     """
     state = motion.start()
     response = np.empty(steps)
@@ -53,13 +41,7 @@ def plate_response(motion: PlateMotion, load: Load, dt: float, steps: int) -> Fl
 
 
 def tip_response(step: RodIntegrator, steps: int) -> Floats:
-    """Compute the acceleration of a tip after 1 to `steps` steps, the first under a unit force.
-
-    Returns
-    -------
-    ndarray (steps,)
-        1/mass.
-    """
+    """Acceleration per force of a tip after 1 to `steps` steps, the first under a unit force."""
     state = step.advance(RodState(np.zeros((3, step.n))), 1.0)
     response = np.empty(steps)
     response[0] = state.acceleration[0]
@@ -79,12 +61,8 @@ def _product(a: Floats, b: Floats) -> Floats:
 class Convolution:
     """Sums x_n = sum over m < n of r_(n-m) f_m of many cases, where f_n may depend on x_n.
 
-    Parameters
-    ----------
-    responses : ndarray (steps,) or (steps, kinds)
-        r_1, r_2, ... of each kind.
-    kinds : ndarray (cases,) of int
-        Response of each case; cases of a kind are adjacent.
+    `responses` are r_1, r_2, ... of each kind, (steps,) or (steps, kinds); `kinds` (cases,) is the
+    kind of each case; cases of a kind are adjacent.
     """
 
     def __init__(self, responses: Floats, kinds: NDArray[np.intp]) -> None:
@@ -153,14 +131,9 @@ class TipState:
 class TipSteps:
     """Time steps of many projectiles that compute only the motion of the tips.
 
-    Parameters
-    ----------
-    steps : sequence of RodIntegrator
-        One per kind of projectile, all with the same time step and method.
-    kinds : ndarray (cases,) of int
-        Kind of each case; cases of a kind are adjacent.
-    count : int
-        Number of time steps.
+    `steps` has one integrator per kind of projectile, all with the same time step and method;
+    `kinds` (cases,) is the kind of each case, with cases of a kind adjacent; `count` is the number
+    of steps.
     """
 
     def __init__(self, steps: Sequence[RodIntegrator], kinds: NDArray[np.intp], count: int) -> None:
@@ -174,18 +147,10 @@ class TipSteps:
         self._carried = Convolution(responses, kinds)
 
     def motions(self, kind: int, speed: Floats) -> Iterator[Floats]:
-        """Compute the motion of complete projectiles after every block of steps and after the last.
+        """Motion of complete projectiles of a kind after every block of steps and after the last.
 
-        Parameters
-        ----------
-        kind : int
-        speed : ndarray (cases,)
-            Impact velocity of each case, of all kinds.
-
-        Yields
-        ------
-        ndarray (3 n, cases of the kind)
-            Motion as in :class:`~fecm.mechanics.rod_integrators.RodState`.
+        `speed` (cases,) are the impact velocities of the cases of all kinds; yields arrays (3 n,
+        cases of the kind) as in :class:`~fecm.mechanics.rod_integrators.RodState`.
         """
         step, cases = self._steps[kind], np.flatnonzero(self._kinds == kind)
         forces = self._carried.given[:, cases]

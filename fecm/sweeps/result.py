@@ -312,13 +312,6 @@ def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
     """Write the result of a sweep.
 
     Raises ResultWriteError if the file cannot be written; an existing file is then unchanged.
-
-    Parameters
-    ----------
-    result : SweepResult
-    path : Path
-    overwrite : bool
-        Replace an existing file.
     """
     from fecm.results.hdf5_writer import writing
 
@@ -373,13 +366,8 @@ def load(path: Path) -> SweepResult:
 def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     """Create the result of a sweep from the contents of its file.
 
-    Raises ResultFileError if data are missing, or their number of cases differs.
-
-    Parameters
-    ----------
-    contents : Contents
-    history : bool
-        Also read the forces, which may be large.
+    Without `history` the forces, which may be large, are not read.  Raises ResultFileError if data
+    are missing, or their number of cases differs.
     """
     path = contents.path
 

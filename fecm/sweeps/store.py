@@ -33,19 +33,10 @@ class DamagedPartError(FecmError, ValueError):
 
 
 class PartialResults:
-    """Outcomes of finished tasks.
+    """Outcomes of finished tasks of the sweep with a fingerprint, for its result file.
 
-    Raises OtherSweepError if the folder holds another sweep's outcomes.  Raises OSError if the
-    folder cannot be created.
-
-    Parameters
-    ----------
-    result : Path
-        Result file of the sweep.
-    fingerprint : str
-        Identification of the sweep.
-    restart : bool
-        Delete the outcomes of another sweep.
+    `restart` deletes the outcomes of another sweep.  Raises OtherSweepError if the folder holds
+    another sweep's outcomes.  Raises OSError if the folder cannot be created.
     """
 
     def __init__(self, result: Path, fingerprint: str, *, restart: bool = False) -> None:
