@@ -60,8 +60,8 @@ def _mathml(self: Any, node: Any) -> None:
 
 
 def _literally(app: Any, context: Any, lines: list[str]) -> None:
-    """Keep bars in help texts from being substitutions."""
-    lines[:] = [line.replace("|", "\\|") for line in lines]
+    """Keep bars and stars in help texts from being markup."""
+    lines[:] = [line.replace("|", "\\|").replace("*", "\\*") for line in lines]
 
 
 def setup(app: Any) -> None:
