@@ -1,0 +1,14 @@
+"""A measured force beside the computed one, with peak, impulse, rms and correlation."""
+
+import fecm
+
+measured = fecm.examples.path("measured-force.csv")  # columns time, force
+result = fecm.run_one(fecm.examples.path("impact-115.inp"))
+
+found = result.compare(measured)
+print(found)
+print(f"correlation {found.correlation:.4f}")
+
+ax = result.plot("force", overlay=measured)
+ax.set_title("115 in/s")
+ax.figure.savefig("overlay.png")
