@@ -20,7 +20,7 @@ PASSES = 50
 
 
 def locate(family: ElementBlock, points: Floats) -> tuple[Indices, Indices, Floats]:
-    """Find every element of a block that contains a point of some, (n, 2), edges included.
+    """Find every element of a block that contains one of the points, (n, 2), edges included.
 
     Positions of the elements in the block (k,), their points (k,), and the points' local
     coordinates in the elements (k, 2).

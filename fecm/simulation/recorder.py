@@ -32,14 +32,13 @@ class Recorder:
         sink: Sink,
         model: ImpactModel,
         sizes: WorkEstimate,
-        *,
-        contact_at_every_step: bool = False,
-        on_block: OnBlock = lambda block, initial: None,
+        all_contact: bool,
+        on_block: OnBlock,
     ) -> None:
         self._sink = sink
         self._model = model
-        self.steps = StepRecorder(sink, model, contact_at_every_step, on_block)
-        self._room = self._rows_to_come(sizes, contact_at_every_step)
+        self.steps = StepRecorder(sink, model, all_contact, on_block)
+        self._room = self._rows_to_come(sizes, all_contact)
         self._datasets = [
             (dataset, self._shape(dataset))
             for dataset in DATASETS.values()
@@ -52,15 +51,14 @@ class Recorder:
             if members:
                 self._buffers[group] = RowBuffer(sink, *zip(*members, strict=True))
 
-    def _rows_to_come(self, sizes: WorkEstimate, contact_at_every_step: bool) -> dict[str, int]:
+    def _rows_to_come(self, sizes: WorkEstimate, all_contact: bool) -> dict[str, int]:
         """Upper bound of the rows of each group."""
         has_impact = self._model.impact is not None
+        contact_rows = sizes.steps if all_contact else sizes.contact_rows
         return {
             "tape3": sizes.passes["DISP"],
             "tape8": sizes.contact_rows if has_impact else 0,
-            "tape9": (sizes.steps if contact_at_every_step else sizes.contact_rows)
-            if has_impact
-            else 0,
+            "tape9": contact_rows if has_impact else 0,
             "history": sizes.steps if has_impact else 0,
             "energy": sizes.steps,
             "gages": sizes.steps if self._model.gages is not None else 0,
@@ -135,7 +133,7 @@ class Recorder:
             self._sink.write("stresses/y", 0, y)
 
     def row(self, group: str, step: int, time: float, columns: Mapping[str, Any]) -> None:
-        """Store a row of one of the groups :data:`BUFFERED`, with a value or an array a dataset."""
+        """Store a row of one of the groups :data:`BUFFERED`: a value or an array per dataset."""
         self._buffers[group].put({"step": step, "time": time, **columns})
 
     def displacements(self, step: int, time: float, field: Floats) -> None:

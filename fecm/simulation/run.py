@@ -32,12 +32,7 @@ def simulate(
     options: RunOptions | None = None,
     observers: Sequence[Observer] = (),
 ) -> Simulation:
-    """Run a problem into a sink and return the finished simulation.
-
-    Raises DivergenceError if the motion grows without bound, or the energy balance exceeds its
-    limit.  Raises SingularStiffnessError if a static solution is requested and the plate is not
-    held.
-    """
+    """Run a problem into a sink and return the finished simulation; see :func:`run`."""
     simulation = Simulation(problem, sink, options or RunOptions(), observers=observers)
     run(simulation)
     return simulation
@@ -46,8 +41,9 @@ def simulate(
 def run(simulation: Simulation) -> None:
     """Carry out a program, from its beginning or from the restored state.
 
-    Raises DivergenceError if the motion grows without bound; the message names the likely cause.
-    Raises SingularStiffnessError if a static solution is requested and the plate is not held.
+    Raises DivergenceError, with the likely cause, if the motion grows without bound or the energy
+    balance exceeds its limit.  Raises SingularStiffnessError if a static solution is
+    requested and the plate is not held.
     """
     problem, state = simulation.problem, simulation.state
     if not state.position:

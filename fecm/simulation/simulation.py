@@ -60,7 +60,7 @@ class Simulation:
             self.sink,
             self.model,
             problem.work,
-            contact_at_every_step="tapes" in options.slips,
+            all_contact="tapes" in options.slips,
             # Without a reference to the run, which would keep it alive.
             on_block=partial(state.judge, limit=limit, threshold=problem.threshold),
         )

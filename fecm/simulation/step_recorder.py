@@ -34,18 +34,18 @@ OnBlock = Callable[[Mapping[str, Floats], float], object]
 class StepRecorder:
     """Stores every step in a sink; of a plate alone energies and gages only.
 
-    `contact_at_every_step` stores contact on tape9 at every step instead of every N-th (the slip
+    `all_contact` stores contact on tape9 at every step instead of every N-th (the slip
     ``tapes``); `on_block` is called with the columns of each block and the initial energy.
     """
 
     def __init__(
-        self, sink: Sink, model: ImpactModel, contact_at_every_step: bool, on_block: OnBlock
+        self, sink: Sink, model: ImpactModel, all_contact: bool, on_block: OnBlock
     ) -> None:
         self._sink = sink
         self._motion = model.motion
         self._impact = impact = model.impact
         self._on_block = on_block
-        self._all_contact = contact_at_every_step
+        self._all_contact = all_contact
         self._rows: list[tuple[float, ...]] = []
         self._contact_rows: list[int] = []
         self._stored = self._tape9_rows = 0
