@@ -21,15 +21,15 @@ from fecm.studies.rod_test.pulse_test import (
     force_row,
     simulate_pulse,
 )
-from fecm.studies.rod_test.pulses import GaussPulse, Pulse, SinePulse, TablePulse, pulse_of
+from fecm.studies.rod_test.pulses import Pulse, gauss_pulse, pulse_of, sine_pulse, table_pulse
 from tests.builders import table
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, small
 
 Floats = NDArray[np.float64]
 
-GAUSS = GaussPulse(1000.0, 200e-6, 40e-6)
-SINE = SinePulse(1000.0, 400e-6)
+GAUSS = gauss_pulse(1000.0, 200e-6, 40e-6)
+SINE = sine_pulse(1000.0, 400e-6)
 STEEL = 7.33e-4
 SHAPE = ("--length", 1, "--modulus", 30e6, "--density", STEEL, "--diameter", 0.625)
 PUSH = ("--pulse", "gauss:1000,200e-6,40e-6", "--dt", 2e-7)
@@ -130,13 +130,13 @@ def test_a_pulse_by_its_table_is_the_pulse() -> None:
     time = np.arange(0.0, 600.1e-6, 2e-7)
     tabulated, exact = (
         simulate_pulse(rod(), pulse, 2e-7, 600e-6, (0.5,)).forces
-        for pulse in (TablePulse(time, GAUSS.force(time)), GAUSS)
+        for pulse in (table_pulse(time, GAUSS.force(time)), GAUSS)
     )
     np.testing.assert_allclose(tabulated, exact, rtol=0, atol=1e-6)
 
 
 def test_a_table_is_linear_between_its_rows_and_zero_outside() -> None:
-    pulse = TablePulse(np.array([1.0, 2.0, 4.0]), np.array([3.0, 5.0, 1.0]))
+    pulse = table_pulse(np.array([1.0, 2.0, 4.0]), np.array([3.0, 5.0, 1.0]))
     times = np.array([0.5, 1.0, 1.5, 3.0, 4.0, 4.1])
     assert pulse.force(times).tolist() == [0.0, 3.0, 4.0, 3.0, 1.0, 0.0]
 

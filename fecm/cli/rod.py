@@ -25,7 +25,7 @@ from fecm.studies.rod_test.filters import Filter, filter_of
 from fecm.studies.rod_test.history import recorded
 from fecm.studies.rod_test.pulse_test import RodHistory, default_time_step, simulate_pulse, table
 from fecm.studies.rod_test.pulses import Pulse, pulse_of
-from fecm.studies.tables import names_of, read_columns, units_of
+from fecm.studies.tables import read_table
 
 FILTER_HELP = ("first-order:RISE or moving-average:RISE; RISE is the time from 10 to 90 % of the "
                "step response.")  # fmt: skip
@@ -239,8 +239,8 @@ def calibrate(
     the accelerometer on a free target.  The slope of V_F over V_a gives c_F = (c_a / m) V_F / V_a.
     """
     targets = OutputPaths(STANDARD_OUTPUT, picture, overwrite)
-    columns = read_columns(test, ("time", "V_F", "V_a"), increasing="time")
-    time, v_f, v_a = columns.values()
+    measured = read_table(test)
+    time, v_f, v_a = measured.columns(("time", "V_F", "V_a"), increasing="time").values()
     try:
         found = fit_sensitivity(v_f, v_a, mass, c_a, through_origin=through_origin)
     except StudyError as error:
@@ -248,7 +248,7 @@ def calibrate(
     if targets.picture:
         from fecm.plot.rod import calibration_picture
 
-        names = dict(zip(map(str.casefold, names_of(test)), units_of(test), strict=True))
+        names = dict(zip(map(str.casefold, measured.names), measured.units, strict=True))
         units = [names.get(name, "") for name in ("time", "v_f", "v_a")]
         targets.draw(calibration_picture(time, v_f, v_a, found, units))
     text = json.dumps(vars(found)) if form == "json" else "\n".join(_lines(found))

@@ -384,10 +384,9 @@ class Result(Contact):
 
         Raises
         ------
-        TableError
-            If the file is invalid or in other units.
         StudyError
-            If the numbers are invalid, or no two of the times are within those of the result.
+            If the file is invalid or in other units, the numbers are invalid, or no two of the
+            times are within those of the result.
 
         Examples
         --------

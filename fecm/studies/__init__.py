@@ -4,4 +4,4 @@ from fecm._errors import FecmError
 
 
 class StudyError(FecmError, ValueError):
-    """A study can't be computed from these numbers."""
+    """A study can't be computed from these numbers, or their table is invalid."""

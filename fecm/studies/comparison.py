@@ -15,7 +15,7 @@ from fecm.deck.units import KNOWN
 from fecm.results.result import Result
 from fecm.results.schema import declared_units, printable
 from fecm.studies import StudyError
-from fecm.studies.tables import TableError, names_of, read_columns, same_name, units_of
+from fecm.studies.tables import read_table, same_name
 
 # A CSV file, or times and forces.
 Source = str | Path | tuple[Any, Any]
@@ -110,10 +110,9 @@ def measurement_of(source: Source, units: Mapping[str, str]) -> Measurement:
 
     Raises
     ------
-    TableError
-        If the file is invalid, or names other units.
     StudyError
-        If times and forces are not finite numbers, equally many, at increasing times.
+        If the file is invalid, or names other units; or if times and forces are not finite numbers,
+        equally many, at increasing times.
     OSError
         If the file can't be read.
     """
@@ -134,11 +133,12 @@ def measurement_of(source: Source, units: Mapping[str, str]) -> Measurement:
 
 
 def _from_file(path: Path, units: Mapping[str, str]) -> Measurement:
-    names = names_of(path)
+    table = read_table(path)
+    names = table.names
     known = [n for n in ("force", "transducer") if any(same_name(n, name) for name in names)]
     column = (known or ["force"])[0]
-    columns = read_columns(path, ("time", column), increasing="time")
-    for place, (name, unit) in enumerate(zip(names, units_of(path), strict=True)):
+    columns = table.columns(("time", column), increasing="time")
+    for place, (name, unit) in enumerate(zip(names, table.units, strict=True)):
         for wanted, dimension in (("time", "time"), (column, "force")):
             first = not any(same_name(wanted, one) for one in names)
             if same_name(name, wanted) or (first and place == (wanted != "time")):
@@ -150,7 +150,7 @@ def _check_unit(path: Path, name: str, own: str, deck: str, known: Mapping[str, 
     """Refuse a column in another unit than the deck's."""
     same = own == deck or (own in known and known[own] == known.get(deck))
     if own and deck and not same:
-        raise TableError(f"{path}: {name} is in {own}, and the deck in {deck}; convert the column")
+        raise StudyError(f"{path}: {name} is in {own}, and the deck in {deck}; convert the column")
 
 
 def compare(result: Result, measured: Measurement) -> Comparison:

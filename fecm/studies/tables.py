@@ -10,14 +10,15 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain, repeat
 from pathlib import Path
 
 import numpy as np
 
-from fecm._errors import FecmError
 from fecm._typing import Floats
+from fecm.studies import StudyError
 
 Row = tuple[int, list[str]]
 
@@ -27,95 +28,107 @@ _COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 _UNIT = re.compile(r"[^(\[]*[(\[]([^)\]]*)[)\]]")
 
 
-class TableError(FecmError, ValueError):
-    """A table is invalid; the message states the file, and the line if known."""
+@dataclass(frozen=True)
+class Table:
+    """Rows of a file below the names and units of its columns; both are empty if it has none."""
+
+    path: Path
+    head: Row  # number and fields of the line of names
+    units: list[str]  # empty texts for columns without unit
+    rows: list[Row]
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the columns, without units."""
+        return [_without_unit(name) for name in self.head[1]]
+
+    def columns(
+        self, names: Sequence[str], *, increasing: str = "", places: Sequence[int] = ()
+    ) -> dict[str, Floats]:
+        """Numbers of some columns, (rows,) each.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Columns to read.  If the file has none of them, the first columns are taken in this
+            order.
+        increasing : str
+            Name of the column whose values must increase.
+        places : sequence of int
+            Numbers of the columns from 0; the names in the file are then ignored.
+
+        Raises
+        ------
+        StudyError
+            If a column is missing, a field is not a finite number, there are fewer than two rows,
+            or the values do not increase.
+        """
+        own = list(places) or self._places(names)
+        if len(self.rows) < 2:
+            raise StudyError(f"{self.path}: the table has fewer than two rows of numbers")
+        values = np.array([self._values(row, names, own) for row in self.rows])
+        columns = dict(zip(names, values.T, strict=True))
+        if increasing:
+            for before, after, (line, _) in zip(
+                columns[increasing], columns[increasing][1:], self.rows[1:], strict=False
+            ):
+                if not after > before:
+                    raise StudyError(
+                        f"{self.path}:{line}: {increasing} must increase: {after:g} follows "
+                        f"{before:g}"
+                    )
+        return columns
+
+    def _places(self, names: Sequence[str]) -> list[int]:
+        """Return the numbers of the columns from the line of names."""
+        line, head = self.head
+        known = [_plain(name) for name in head]
+        missing = [name for name in names if _plain(name) not in known]
+        if not head or (len(missing) == len(names) and len(known) >= len(names)):
+            return list(range(len(names)))
+        if missing:
+            raise StudyError(
+                f"{self.path}:{line}: there is no column {missing[0]}; the columns are "
+                f"{', '.join(head)}; {', '.join(names)} are required"
+            )
+        return [known.index(_plain(name)) for name in names]
+
+    def _values(self, row: Row, names: Sequence[str], places: Sequence[int]) -> list[float]:
+        """Return the numbers of one row in the order of `names`."""
+        line, fields = row
+        values = []
+        for name, place in zip(names, places, strict=True):
+            field = fields[place] if place < len(fields) else ""
+            value = _number(field)
+            if value is None or not math.isfinite(value):
+                found = repr(field) if field else "empty"
+                raise StudyError(f"{self.path}:{line}: {name} is {found}, not a finite number")
+            values.append(value)
+        return values
 
 
-def read_columns(
-    path: Path, names: Sequence[str], *, increasing: str = "", places: Sequence[int] = ()
-) -> Mapping[str, Floats]:
-    """Read columns of a CSV file.
-
-    If the first line contains none of the names, or contains numbers, the first columns are taken
-    in the order of `names`.
-
-    Parameters
-    ----------
-    path : Path
-    names : sequence of str
-        Columns to read.
-    increasing : str
-        Name of the column whose values must increase.
-    places : sequence of int
-        Numbers of the columns from 0; the names in the first line are then ignored.
-
-    Returns
-    -------
-    mapping of str to ndarray (rows,)
+def read_table(path: Path) -> Table:
+    """Read a table; the first line contains names, and the second units, if they aren't numbers.
 
     Raises
     ------
-    TableError
-        If the file is not text, a column is missing, a field is not a finite number, there are
-        fewer than two rows, or the values do not increase.
-    OSError
-        If the file cannot be read.
-    """
-    rows = read_rows(path)
-    own = list(places or range(len(names)))
-    if _names_columns(rows):
-        head = rows.pop(0)
-        own = list(places) or _places(path, head, names)
-        if _names_units(rows):
-            del rows[0]
-    if len(rows) < 2:
-        raise TableError(f"{path}: the table has fewer than two rows of numbers")
-    values = np.array([_values(path, row, names, own) for row in rows])
-    columns = dict(zip(names, values.T, strict=True))
-    if increasing:
-        for (_, before), (number, after) in pairwise(
-            (line, value) for (line, _), value in zip(rows, columns[increasing], strict=True)
-        ):
-            if not after > before:
-                raise TableError(
-                    f"{path}:{number}: {increasing} must increase: {after:g} follows {before:g}"
-                )
-    return columns
-
-
-def names_of(path: Path) -> list[str]:
-    """Return the names in the first line without units; empty if it contains numbers.
-
-    Raises
-    ------
-    TableError
+    StudyError
         If the file is not text.
     OSError
         If the file cannot be read.
     """
     rows = read_rows(path)
-    return [_without_unit(name) for name in rows[0][1]] if _names_columns(rows) else []
-
-
-def units_of(path: Path) -> list[str]:
-    """Return the units of the columns from brackets or the line below; empty if none is given.
-
-    Raises
-    ------
-    TableError
-        If the file is not text.
-    OSError
-        If the file cannot be read.
-    """
-    rows = read_rows(path)
-    if not _names_columns(rows):
-        return []
-    below = [field.strip("()[] ") for field in rows[1][1]] if _names_units(rows[1:]) else []
-    found = []
-    for place, name in enumerate(rows[0][1]):
-        unit = _UNIT.match(name)
-        found.append(unit[1].strip() if unit else below[place] if place < len(below) else "")
-    return found
+    if not rows or all(_number(field) is not None for field in rows[0][1]):
+        return Table(path, (0, []), [], rows)
+    head, *rows = rows
+    below: list[str] = []
+    if len(rows) > 1 and not _has_number(rows[0]) and _has_number(rows[1]):
+        below = [field.strip("()[] ") for field in rows.pop(0)[1]]
+    units = [
+        found[1].strip() if (found := _UNIT.match(name)) else under
+        for name, under in zip(head[1], chain(below, repeat("")), strict=False)
+    ]
+    return Table(path, head, units, rows)
 
 
 def same_name(one: str, other: str) -> bool:
@@ -123,33 +136,15 @@ def same_name(one: str, other: str) -> bool:
     return _plain(one) == _plain(other)
 
 
-def _names_columns(rows: Sequence[Row]) -> bool:
-    """Whether the first line contains names instead of numbers."""
-    return bool(rows) and any(_number(field) is None for field in rows[0][1])
-
-
-def _names_units(rows: Sequence[Row]) -> bool:
-    """Whether the second line contains units: it has no numbers, and the next line has."""
-    return (
-        len(rows) > 1
-        and not any(_number(field) is not None for field in rows[0][1])
-        and any(_number(field) is not None for field in rows[1][1])
-    )
+def _has_number(row: Row) -> bool:
+    return any(_number(field) is not None for field in row[1])
 
 
 def read_rows(path: Path) -> list[Row]:
-    """Read the number and the fields of every line with content.
-
-    Raises
-    ------
-    TableError
-        If the file is not text.
-    OSError
-        If the file cannot be read.
-    """
+    """Read the number and the fields of every line with content; raises as :func:`read_table`."""
     data = path.read_bytes()
     if b"\0" in data:
-        raise TableError(f"{path} is not a text file")
+        raise StudyError(f"{path} is not a text file")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -166,7 +161,7 @@ def read_rows(path: Path) -> list[Row]:
         try:
             fields = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
         except csv.Error as error:
-            raise TableError(f"{path}:{number}: {error}") from None
+            raise StudyError(f"{path}:{number}: {error}") from None
         found.append((number, [field.strip() for field in fields]))
     return found if separator == "," else _with_points(found)
 
@@ -191,37 +186,9 @@ def _plain(name: str) -> str:
     return _without_unit(name).casefold()
 
 
-def _places(path: Path, head: Row, names: Sequence[str]) -> list[int]:
-    """Return the numbers of the columns from the line of names."""
-    known = [_plain(name) for name in head[1]]
-    missing = [name for name in names if _plain(name) not in known]
-    if len(missing) == len(names) and len(known) >= len(names):
-        return list(range(len(names)))
-    if missing:
-        raise TableError(
-            f"{path}:{head[0]}: there is no column {missing[0]}; the columns are "
-            f"{', '.join(head[1])}; {', '.join(names)} are required"
-        )
-    return [known.index(_plain(name)) for name in names]
-
-
 def _number(field: str) -> float | None:
     """Return the number in a field, or None."""
     try:
         return float(field)
     except ValueError:
         return None
-
-
-def _values(path: Path, row: Row, names: Sequence[str], places: Sequence[int]) -> list[float]:
-    """Return the numbers of one row in the order of `names`."""
-    line, fields = row
-    values = []
-    for name, place in zip(names, places, strict=True):
-        field = fields[place] if place < len(fields) else ""
-        value = _number(field)
-        if value is None or not math.isfinite(value):
-            found = repr(field) if field else "empty"
-            raise TableError(f"{path}:{line}: {name} is {found}, not a finite number")
-        values.append(value)
-    return values

@@ -14,7 +14,8 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm.results.metrics import COLUMNS
-from fecm.studies.tables import TableError, read_rows
+from fecm.studies import StudyError
+from fecm.studies.tables import read_rows
 
 Value = float | int | str
 Case = dict[str, Value]
@@ -104,7 +105,7 @@ def read_cases(path: Path) -> list[Case]:
     """
     try:
         rows = [(line, row) for line, row in read_rows(path) if any(row)]
-    except TableError as error:
+    except StudyError as error:
         raise CasesError(str(error)) from None
     if len(rows) < 2:
         raise CasesError(f"{path}: a table of cases has a header of names and at least one row")

@@ -25,7 +25,7 @@ from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.projectile import Rod, report_rod
 from fecm.mechanics.rod_integrators import CONSISTENT
 from fecm.studies.rod_test.pulse_test import simulate_pulse
-from fecm.studies.rod_test.pulses import GaussPulse, SinePulse
+from fecm.studies.rod_test.pulses import gauss_pulse, sine_pulse
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from fecm.verification.case import Value, case
 from fecm.verification.decks import REPORT_ANGLES, REPORT_PLY, REPORT_THICKNESS, isotropic
@@ -117,7 +117,7 @@ def bar(length: float) -> Rod:
 @case("rod-pulse")
 def rod_pulse() -> Sequence[Value]:
     """Forces in the middle, final velocity, mass."""
-    pulse, later = (GaussPulse(1000.0, middle, 40e-6) for middle in (200e-6, 300e-6))
+    pulse, later = (gauss_pulse(1000.0, middle, 40e-6) for middle in (200e-6, 300e-6))
     found = simulate_pulse(bar(1.0), pulse, DT, 600e-6, (0.5,))
     second = simulate_pulse(bar(1.0), later, DT, 300e-6, (0.5,))
     at = np.interp(250e-6, second.time, second.forces[:, 0])
@@ -129,7 +129,7 @@ def rod_pulse() -> Sequence[Value]:
 def rod_waves() -> Sequence[Value]:
     """Speed of the pulse's centroid between two stations; frequencies."""
     ends = (1.0, 4.0)
-    found = simulate_pulse(bar(5.0), SinePulse(1000.0, 8e-6), DT / 2.0, 29e-6, ends)
+    found = simulate_pulse(bar(5.0), sine_pulse(1000.0, 8e-6), DT / 2.0, 29e-6, ends)
     centroids = (found.time @ found.forces) / found.forces.sum(axis=0)
     speed = (ends[1] - ends[0]) / (centroids[1] - centroids[0])
     rods = (bar(1.0), bar(1.0).with_mass(CONSISTENT))

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fecm._typing import Floats
-from fecm.studies.tables import TableError, names_of, read_columns, same_name, units_of
+from fecm.studies import StudyError
+from fecm.studies.tables import Table, read_table, same_name
 
 # Accepted names of the columns; the first is the default.
 NAMES = {
@@ -66,20 +67,20 @@ def read_test(
 
     Raises
     ------
-    TableError
+    StudyError
         If a column is missing, a unit is unknown, or a number is invalid.
     OSError
         If the file cannot be read.
     """
-    present, known = names_of(path), units_of(path)
-    places = [_place(path, present, name, column) for name, column in _asked(columns)]
-    table = read_columns(path, tuple(NAMES), places=places)
-    length, force = (known[place] if place < len(known) else "" for place in places)
+    table = read_table(path)
+    places = [_place(table, *asked) for asked in zip(NAMES, columns or ("", ""), strict=True)]
+    indentation, load = table.columns(tuple(NAMES), places=places).values()
+    length, force = (table.units[n] if n < len(table.units) else "" for n in places)
     if not (length or force):
         names = {} if units is None else dict(zip(("length", "force"), units, strict=True))
-        return Test(table["indentation"], table["force"], names, ("", ""))
+        return Test(indentation, load, names, ("", ""))
     if units is None and not (length and force):
-        raise TableError(
+        raise StudyError(
             f"{path}: one column is in {length or force}, the other has no unit; state both, or "
             "use --unit LENGTH,FORCE"
         )
@@ -89,20 +90,16 @@ def read_test(
     target = units or _system(length, force)
     wanted = _size(path, target[0], "length"), _size(path, target[1], "force")
     return Test(
-        table["indentation"] * (sizes[0] / wanted[0]),
-        table["force"] * (sizes[1] / wanted[1]),
+        indentation * (sizes[0] / wanted[0]),
+        load * (sizes[1] / wanted[1]),
         {"length": target[0], "force": target[1]},
         (length, force),
     )
 
 
-def _asked(columns: Sequence[str]) -> list[tuple[str, str]]:
-    """Return each name with the requested column, or an empty text."""
-    return list(zip(NAMES, columns or ("", ""), strict=True))
-
-
-def _place(path: Path, present: Sequence[str], name: str, column: str) -> int:
+def _place(table: Table, name: str, column: str) -> int:
     """Return the number of a column, from 0."""
+    present = table.names
     if column.isdecimal() and int(column) and not any(same_name(column, one) for one in present):
         return int(column) - 1
     if not present and not column:
@@ -114,8 +111,8 @@ def _place(path: Path, present: Sequence[str], name: str, column: str) -> int:
         if found:
             break
     names = ", ".join(present)[:80] or "unnamed"
-    raise TableError(
-        f"{path}: the columns are {names}; one must be named {column or name}"
+    raise StudyError(
+        f"{table.path}: the columns are {names}; one must be named {column or name}"
         + (f" (or {', '.join(NAMES[name][1:])})" if not column else "")
         + "; --columns INDENTATION,FORCE selects others by name or number"
     )
@@ -130,7 +127,7 @@ def _size(path: Path, unit: str, dimension: str) -> float:
     if len(folded) == 1:
         return sizes[folded[0]]
     known = ", ".join(sizes)
-    raise TableError(f"{path}: unknown unit of {dimension} `{unit}`; known units: {known}")
+    raise StudyError(f"{path}: unknown unit of {dimension} `{unit}`; known units: {known}")
 
 
 def _system(length: str, force: str) -> tuple[str, str]:

@@ -9,39 +9,26 @@ from pathlib import Path
 import numpy as np
 
 from fecm._typing import Floats
+from fecm.deck.reader import HDF5
 from fecm.results.result import Result, load
 from fecm.results.schema import DATASETS, declared_units
-from fecm.studies.tables import TableError, names_of, read_columns, same_name
+from fecm.studies import StudyError
+from fecm.studies.tables import read_table, same_name
 
 TRANSDUCER = "transducer"
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 @dataclass(frozen=True)
 class TimeHistory:
-    """A quantity in time.
-
-    Attributes
-    ----------
-    name : str
-    time, values : ndarray (rows,)
-    first : int
-        First recorded row; the rows before it are the state of rest.
-    beside : mapping of str to ndarray (rows,)
-        Other histories for the same plot.
-    units : mapping
-        Names of the units; empty if unknown.
-    dimension : str
-        Physical dimension; empty if unknown.
-    """
+    """A quantity in time."""
 
     name: str
-    time: Floats
-    values: Floats
-    first: int = 0
-    beside: Mapping[str, Floats] = field(default_factory=dict)
-    units: Mapping[str, str] = field(default_factory=dict)
-    dimension: str = "force"
+    time: Floats  # (rows,)
+    values: Floats  # (rows,)
+    dimension: str  # empty if unknown
+    first: int = 0  # first recorded row; the rows before it are the state of rest
+    beside: Mapping[str, Floats] = field(default_factory=dict)  # others for the same plot
+    units: Mapping[str, str] = field(default_factory=dict)  # names; empty if unknown
 
 
 def recorded(path: Path, column: str | None = None) -> TimeHistory:
@@ -55,7 +42,7 @@ def recorded(path: Path, column: str | None = None) -> TimeHistory:
 
     Raises
     ------
-    TableError
+    StudyError
         If the history does not exist, or the CSV file is invalid.
     ResultFileError
         If the result file is damaged.
@@ -63,18 +50,18 @@ def recorded(path: Path, column: str | None = None) -> TimeHistory:
         If the file cannot be read.
     """
     with path.open("rb") as file:
-        is_result = file.read(len(SIGNATURE)) == SIGNATURE
+        is_result = file.read(len(HDF5)) == HDF5
     return _of_result(path, load(path), column) if is_result else _of_table(path, column)
 
 
 def _of_result(path: Path, result: Result, column: str | None) -> TimeHistory:
     known = [name.partition("/")[2] for name in result if name.startswith("history/")]
     if not known:
-        raise TableError(f"{path} has no history: the run has no impact step")
+        raise StudyError(f"{path} has no history: the run has no impact step")
     choice = [name for name in known if name not in ("step", "time")]
     name = column or TRANSDUCER
     if name not in choice:
-        raise TableError(f"{path} has no history of {name}; it has {', '.join(choice)}")
+        raise StudyError(f"{path} has no history of {name}; it has {', '.join(choice)}")
 
     def since_rest(values: Floats) -> Floats:
         return np.concatenate(([0.0], values))
@@ -97,16 +84,17 @@ def _of_result(path: Path, result: Result, column: str | None) -> TimeHistory:
 
 
 def _of_table(path: Path, column: str | None) -> TimeHistory:
-    names = names_of(path)
+    table = read_table(path)
+    names = table.names
 
     def found(name: str) -> str | None:
         return next((known for known in names if same_name(name, known)), None)
 
     if column is not None and found(column) is None:
         known = f"it has {', '.join(names)}" if names else "the first line has no names"
-        raise TableError(f"{path} has no column {column}; {known}")
+        raise StudyError(f"{path} has no column {column}; {known}")
     clock = found("time") or (names[0] if names else "time")
     others = [name for name in names if name != clock]
     name = found(column or TRANSDUCER) or (others[0] if others else "value")
-    columns = read_columns(path, (clock, name), increasing=clock)
-    return TimeHistory(name=name, time=columns[clock], values=columns[name], dimension="")
+    columns = table.columns((clock, name), increasing=clock)
+    return TimeHistory(name, columns[clock], columns[name], dimension="")

@@ -6,109 +6,57 @@ A pulse is positive in compression and acts from t = 0.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
 from fecm._typing import Floats
 from fecm.studies import StudyError
-from fecm.studies.tables import read_columns
+from fecm.studies.tables import read_table
 
 FORMS = {"gauss": ("F0", "TAU", "B"), "sine": ("F0", "B")}
 USAGE = "gauss:F0,TAU,B, sine:F0,B or a CSV file of time and force"
 
 
-class Pulse(Protocol):
-    """A force as a function of time."""
-
-    @property
-    def duration(self) -> float:
-        """Default duration of a test."""
-
-    def force(self, time: Floats) -> Floats:
-        """Force at times of any shape."""
-
-
 @dataclass(frozen=True)
-class GaussPulse:
+class Pulse:
+    """A force as a function of times of any shape, and the default duration of a test."""
+
+    force: Callable[[Floats], Floats]
+    duration: float
+
+
+def gauss_pulse(peak: float, tau: float, b: float) -> Pulse:
     """Exponential pulse F0 exp(-(t - tau)^2 / 4 b^2), equation 4-5.
 
-    It starts at t = 0 with a jump of F0 exp(-tau^2 / 4 b^2).
-
-    Attributes
-    ----------
-    peak : float
-        F0, force.
-    tau : float
-        Time of the peak.
-    b : float
-        Width, time.
+    It starts at t = 0 with a jump of F0 exp(-tau^2 / 4 b^2), and has fallen to 1/500 of its peak at
+    the end of the test.
     """
 
-    peak: float
-    tau: float
-    b: float
+    def force(time: Floats) -> Floats:
+        return np.asarray(peak * np.exp(-(((time - tau) / (2.0 * b)) ** 2)))
 
-    @property
-    def duration(self) -> float:
-        """Time until the force has fallen to 1/500 of its peak."""
-        return max(0.0, self.tau) + 10.0 * self.b
-
-    def force(self, time: Floats) -> Floats:
-        """Force at times of any shape."""
-        return np.asarray(self.peak * np.exp(-(((time - self.tau) / (2.0 * self.b)) ** 2)))
+    return Pulse(force, max(0.0, tau) + 10.0 * b)
 
 
-@dataclass(frozen=True)
-class SinePulse:
-    """Half wave F0 sin(pi t / b), equation 4-6; zero after t = b.
+def sine_pulse(peak: float, b: float) -> Pulse:
+    """Half wave F0 sin(pi t / b), equation 4-6; the rod rings for b/2 after it."""
 
-    Attributes
-    ----------
-    peak : float
-        F0, force.
-    b : float
-        Duration, time.
-    """
+    def force(time: Floats) -> Floats:
+        return np.where((time >= 0.0) & (time < b), peak * np.sin(np.pi * time / b), 0.0)
 
-    peak: float
-    b: float
-
-    @property
-    def duration(self) -> float:
-        """Duration of the pulse, and half of it again for the ringing of the rod."""
-        return 1.5 * self.b
-
-    def force(self, time: Floats) -> Floats:
-        """Force at times of any shape."""
-        inside = (time >= 0.0) & (time < self.b)
-        return np.where(inside, self.peak * np.sin(np.pi * time / self.b), 0.0)
+    return Pulse(force, 1.5 * b)
 
 
-@dataclass(frozen=True)
-class TablePulse:
-    """Table of forces, linear between rows, and zero before the first and after the last.
+def table_pulse(times: Floats, forces: Floats) -> Pulse:
+    """Table of forces, linear between rows, and zero before the first and after the last."""
 
-    Attributes
-    ----------
-    times, forces : ndarray (rows,)
-        Times increase.
-    """
+    def force(time: Floats) -> Floats:
+        return np.asarray(np.interp(time, times, forces, left=0.0, right=0.0))
 
-    times: Floats
-    forces: Floats
-
-    @property
-    def duration(self) -> float:
-        """Last time of the table."""
-        return float(self.times[-1])
-
-    def force(self, time: Floats) -> Floats:
-        """Force at times of any shape."""
-        return np.asarray(np.interp(time, self.times, self.forces, left=0.0, right=0.0))
+    return Pulse(force, float(times[-1]))
 
 
 def pulse_of(text: str) -> Pulse:
@@ -135,7 +83,7 @@ def pulse_of(text: str) -> Pulse:
         raise StudyError(f"{text}: {kind} takes {len(names)} numbers, {kind}:{','.join(names)}")
     if not values[-1] > 0.0:
         raise StudyError(f"{text}: the width B must be positive")
-    return GaussPulse(*values) if kind == "gauss" else SinePulse(*values)
+    return gauss_pulse(*values) if kind == "gauss" else sine_pulse(*values)
 
 
 def _numbers(text: str) -> Sequence[float]:
@@ -147,11 +95,11 @@ def _numbers(text: str) -> Sequence[float]:
     return values if all(map(math.isfinite, values)) else []
 
 
-def _table(text: str) -> TablePulse:
+def _table(text: str) -> Pulse:
     path = Path(text)
     if not path.is_file():
         raise StudyError(f"{text} is neither a file nor a pulse; use {USAGE}")
-    columns = read_columns(path, ("time", "force"), increasing="time")
+    columns = read_table(path).columns(("time", "force"), increasing="time")
     if columns["time"][-1] <= 0.0:
         raise StudyError(f"{path}: the pulse ends before time 0")
-    return TablePulse(columns["time"], columns["force"])
+    return table_pulse(columns["time"], columns["force"])
