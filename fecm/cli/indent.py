@@ -12,7 +12,7 @@ import click
 from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError, note
 from fecm.cli.indent_curve import curve
 from fecm.cli.laminate_options import laminate_options, ply_of_options
-from fecm.cli.outputs import OVERWRITE, PLOT, STANDARD_OUTPUT, OutputPaths
+from fecm.cli.outputs import OutputPaths, outputs
 from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, ListOf
 from fecm.deck.catalogue import CONTACTS, NU23, SYSTEM, SYSTEMS, NamedPly
 from fecm.deck.model import Indentation
@@ -53,8 +53,7 @@ indent.add_command(curve)
               metavar="LENGTH,FORCE",
               help="Units of the card, to which a file that names its units is converted.  "
                    "[default: in,lbf or mm,N or m,N, as the file's]")  # fmt: skip
-@PLOT
-@OVERWRITE
+@outputs("test", table=False)
 @FORMAT_OPTION
 def fit(
     test: Path,
@@ -63,8 +62,7 @@ def fit(
     turn: float | None,
     columns: tuple[str, str] | None,
     units: tuple[str, str] | None,
-    picture: Path | None,
-    overwrite: bool,
+    targets: OutputPaths,
     form: str,
 ) -> None:
     """Fit the indentation law to a test, and print its parameters and EXPE card.
@@ -75,7 +73,6 @@ def fit(
     """
     if acr and q not in (None, 2.5):
         raise click.UsageError("--acr requires q = 5/2: equation 3-7 holds for no other power")
-    targets = OutputPaths(STANDARD_OUTPUT, picture, overwrite, test)
     read = read_test(test, columns or (), units)
     try:
         found = fitted(read.indentation, read.force, retreat=turn, q=q, acr=acr)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ import click
 import numpy as np
 
 from fecm.cli.common import DECK_PATH, RefusedError, echo, note
-from fecm.cli.outputs import OUTPUT, OVERWRITE, PLOT, OutputPaths
+from fecm.cli.outputs import OutputPaths, outputs
 from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, ListOf
 from fecm.deck.catalogue import ALPHA_CR, ALPHA_P, S_P, SYSTEM, SYSTEMS, convert
 from fecm.deck.model import Deck, Indentation
@@ -64,17 +63,13 @@ def _law(deck: Path) -> tuple[Deck, Indentation]:
 @click.option("--line", type=ListOf("ALPHA_P,S_P", NOT_NEGATIVE, [2]), metavar="ALPHA_P,S_P",
               help="With --rigidity: parameters of 3-8.  [default: the deck's, or the report's]",
               )  # fmt: skip
-@OUTPUT
-@PLOT
-@OVERWRITE
+@outputs("deck")
 def curve(
     deck: Path,
     path: tuple[float, ...] | None,
     points: int,
     rigidity: bool,
-    output: Path,
-    picture: Path | None,
-    overwrite: bool,
+    targets: OutputPaths,
     **parameters: Any,
 ) -> None:
     """Write the force along an indentation path, by the law of DECK, as CSV.
@@ -82,7 +77,6 @@ def curve(
     The columns are indentation, force and the branch of the law; with --rigidity alpha_m, s_3_9 and
     s_3_7.
     """
-    targets = OutputPaths(output, picture, overwrite, deck)
     if rigidity:
         _rigidities(deck, path, points, targets, **parameters)
     elif not path:
@@ -109,8 +103,8 @@ def _forces(deck: Path, path: Sequence[float], points: int, targets: OutputPaths
         columns = np.array([point for point, _ in walk])
         targets.draw(path_picture(columns[:, 0], columns[:, 1], unit_names(problem)))
     branches = ("loading", "unloading", "reloading")
-    rows = (f"{p.indentation!r},{p.force!r},{branches[branch]}\n" for p, branch in walk)
-    targets.write(chain(["indentation,force,branch\n"], rows))
+    rows = ((point.indentation, point.force, branches[branch]) for point, branch in walk)
+    targets.write("indentation,force,branch", rows)
 
 
 def _rigidities(
@@ -150,8 +144,7 @@ def _rigidities(
 
         named = dict(zip(("equation 3-9", "equation 3-7"), by, strict=True))
         targets.draw(rigidity_picture(peaks, named, slope.q, unit_names(problem)))
-    rows = (",".join(map(repr, row)) + "\n" for row in np.column_stack([peaks, *by]).tolist())
-    targets.write(chain(["alpha_m,s_3_9,s_3_7\n"], rows))
+    targets.write("alpha_m,s_3_9,s_3_7", np.column_stack([peaks, *by]).tolist())
 
 
 def _report_length(deck: Deck, value: float, name: str, option: str) -> float:

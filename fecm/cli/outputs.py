@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -13,39 +16,43 @@ from fecm.cli.common import FILE_PATH, RefusedError, note, writing
 from fecm.plot.kinds import MISSING, SUFFIXES, Picture
 from fecm.plot.pictures import save
 
+Decorated = Callable[..., None]
+
 STANDARD_OUTPUT = Path("-")
 
-OUTPUT = click.option("-o", "--output", type=click.Path(path_type=Path, allow_dash=True),
-                      metavar="FILE", default=STANDARD_OUTPUT,
-                      help="CSV file to write.  [default: standard output]")  # fmt: skip
-PLOT = click.option("--plot", "picture", type=FILE_PATH, metavar="FILE",
-                    help="Also draw a picture: .png, .svg or .pdf.")  # fmt: skip
-OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
+_OUTPUT = click.option("-o", "--output", type=click.Path(path_type=Path, allow_dash=True),
+                       metavar="FILE", default=STANDARD_OUTPUT,
+                       help="CSV file to write.  [default: standard output]")  # fmt: skip
+_PLOT = click.option("--plot", "picture", type=FILE_PATH, metavar="FILE",
+                     help="Also draw a picture: .png, .svg or .pdf.")  # fmt: skip
+_OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
+
+
+def outputs(source: str = "", *, table: bool = True) -> Callable[[Decorated], Decorated]:
+    """Add ``--output`` for a table, ``--plot`` and ``--overwrite``; their files are `targets`.
+
+    `source` is the parameter with the file that the command reads, which is never replaced.
+    """
+
+    def decorate(function: Decorated) -> Decorated:
+        @functools.wraps(function)
+        def command(
+            picture: Path | None, overwrite: bool, output: Path = STANDARD_OUTPUT, **values: Any
+        ) -> None:
+            function(**values, targets=OutputPaths(output, picture, overwrite, values.get(source)))
+
+        for option in (_OVERWRITE, _PLOT, *([_OUTPUT] if table else [])):
+            option(command)
+        return command
+
+    return decorate
 
 
 class OutputPaths:
-    """Files of a table and its picture, checked before anything is computed.
-
-    Parameters
-    ----------
-    table : Path
-        ``-`` is standard output.
-    picture : Path or None
-    overwrite : bool
-        Whether existing files may be replaced.
-    source : Path, optional
-        File that the command reads; never replaced.
-
-    Raises
-    ------
-    RefusedError
-        If pictures of this format can't be drawn.
-    OutputError
-        If a file can't be written.
-    """
+    """Files of a table, ``-`` for standard output, and its picture, checked before all else."""
 
     def __init__(
-        self, table: Path, picture: Path | None, overwrite: bool, source: Path | None = None
+        self, table: Path, picture: Path | None, overwrite: bool, source: Path | None
     ) -> None:
         if picture is not None:
             _check_picture(picture)
@@ -59,8 +66,9 @@ class OutputPaths:
             save(picture, self.picture, overwrite=self._overwrite)
             note(f"drew {self.picture}")
 
-    def write(self, lines: Iterable[str]) -> None:
-        """Write the lines of the table, which have line ends."""
+    def write(self, header: str, rows: Iterable[Iterable[object]]) -> None:
+        """Write the table as CSV."""
+        lines = (",".join(map(str, row)) + "\n" for row in chain([[header]], rows))
         write_lines(lines, self.table, overwrite=self._overwrite)
         if self.table != STANDARD_OUTPUT:
             note(f"wrote {self.table}")

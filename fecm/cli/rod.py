@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 
 from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError
 from fecm.cli.decks import load_valid
-from fecm.cli.outputs import OUTPUT, OVERWRITE, PLOT, STANDARD_OUTPUT, OutputPaths
+from fecm.cli.outputs import STANDARD_OUTPUT, OutputPaths, outputs
 from fecm.cli.types import POSITIVE, Finite, Parsed
 from fecm.deck.catalogue import SYSTEMS
 from fecm.deck.units import unit_names
@@ -77,9 +78,7 @@ def rod() -> None:
               help="Mass matrix; the report's program lumps it.")  # fmt: skip
 @click.option("--integrator", type=click.Choice(INTEGRATORS), default=WILSON, show_default=True,
               help="Time integration; the report's is Wilson's.")  # fmt: skip
-@OUTPUT
-@PLOT
-@OVERWRITE
+@outputs()
 def pulse(
     deck: Path | None,
     applied: Pulse,
@@ -89,9 +88,7 @@ def pulse(
     transducer: Filter | None,
     mass_matrix: str,
     integrator: str,
-    output: Path,
-    picture: Path | None,
-    overwrite: bool,
+    targets: OutputPaths,
     **shape: Any,
 ) -> None:
     """Compute forces and accelerations of a free rod under a pulse on one end, as CSV.
@@ -99,7 +96,6 @@ def pulse(
     The rod is the projectile of DECK, or uniform by --length, --modulus, --density and --diameter.
     Force is positive in compression.
     """
-    targets = OutputPaths(output, picture, overwrite)
     system = shape.pop("units")
     _check_shape(deck, shape | ({"units": system} if system and deck else {}))
     units: Mapping[str, str] = SYSTEMS[system] if system else {}
@@ -124,7 +120,7 @@ def pulse(
         from fecm.plot.rod import pulse_picture
 
         targets.draw(pulse_picture(history, filtered, units))
-    targets.write(table(history, filtered))
+    targets.write(*table(history, filtered))
     if targets.table != STANDARD_OUTPUT:
         click.echo("\n".join(_summary(struck, history)))
 
@@ -181,38 +177,28 @@ def _summary(struck: Rod, history: RodHistory) -> list[str]:
 @click.option("--column", metavar="NAME",
               help="Column of a result's history, or of a CSV, to filter.  [default: transducer; "
                    "of a CSV without one, the second]")  # fmt: skip
-@OUTPUT
-@PLOT
-@OVERWRITE
+@outputs("history")
 def filter_(
     history: Path,
     transducer: Filter,
     column: str | None,
-    output: Path,
-    picture: Path | None,
-    overwrite: bool,
+    targets: OutputPaths,
 ) -> None:
     """Filter a history as a transducer with a rise time does.
 
     RESULT is a result of `fecm run`, or a CSV with a column of times.  The output is a CSV with the
     columns time, the history, and filtered.
     """
-    targets = OutputPaths(output, picture, overwrite, history)
     series = recorded(history, column)
     filtered = transducer(series.time, series.values)
-
-    def lines() -> Iterable[str]:
-        yield f"time,{series.name},filtered\n"
-        columns = (series.time.tolist(), series.values.tolist(), filtered.tolist())
-        for row in list(zip(*columns, strict=True))[series.first :]:
-            yield ",".join(map(repr, row)) + "\n"
 
     if targets.picture:
         from fecm.plot.rod import filter_picture
 
         named = {**series.beside, series.name: series.values, "filtered": filtered}
         targets.draw(filter_picture(series.time, named, series.units, series.dimension))
-    targets.write(lines())
+    columns = np.stack([series.time, series.values, filtered], axis=1)
+    targets.write(f"time,{series.name},filtered", columns[series.first :].tolist())
 
 
 @rod.command()
@@ -222,23 +208,20 @@ def filter_(
               help="Sensitivity of the accelerometer, V_a per acceleration.")  # fmt: skip
 @click.option("--through-origin", is_flag=True, help="Fit a line without an offset.")
 @FORMAT_OPTION
-@PLOT
-@OVERWRITE
+@outputs("test", table=False)
 def calibrate(
     test: Path,
     mass: float,
     c_a: float,
     through_origin: bool,
     form: str,
-    picture: Path | None,
-    overwrite: bool,
+    targets: OutputPaths,
 ) -> None:
     """Calibrate the impact-force transducer with TEST.csv.
 
     TEST.csv has the columns time, V_F and V_a: outputs of the transducer on the projectile and of
     the accelerometer on a free target.  The slope of V_F over V_a gives c_F = (c_a / m) V_F / V_a.
     """
-    targets = OutputPaths(STANDARD_OUTPUT, picture, overwrite)
     measured = read_table(test)
     time, v_f, v_a = measured.columns(("time", "V_F", "V_a"), increasing="time").values()
     try:
@@ -251,8 +234,7 @@ def calibrate(
         names = dict(zip(map(str.casefold, measured.names), measured.units, strict=True))
         units = [names.get(name, "") for name in ("time", "v_f", "v_a")]
         targets.draw(calibration_picture(time, v_f, v_a, found, units))
-    text = json.dumps(vars(found)) if form == "json" else "\n".join(_lines(found))
-    targets.write([text + "\n"])
+    click.echo(json.dumps(vars(found)) if form == "json" else "\n".join(_lines(found)))
 
 
 def _lines(found: Calibration) -> list[str]:

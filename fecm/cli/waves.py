@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
-from itertools import chain
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ import click
 from fecm.cli.common import DECK_PATH, RefusedError, note
 from fecm.cli.decks import load_valid
 from fecm.cli.laminate_options import laminate_of_options, laminate_options
-from fecm.cli.outputs import OUTPUT, OVERWRITE, PLOT, OutputPaths
+from fecm.cli.outputs import OutputPaths, outputs
 from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, ListCommand, ListOf, Parsed, joined
 from fecm.deck.units import unit_names
 from fecm.mechanics.laminate import Laminate
@@ -55,7 +54,7 @@ def _shared(function: Callable[..., None]) -> Callable[..., None]:
         help="Factor of the transverse shear stiffness, in addition to a deck's SHEA; with "
              "pi^2/12 = 0.822467 the cut-off frequencies are exact.",
     )  # fmt: skip
-    for decorate in (OVERWRITE, PLOT, OUTPUT, shear_factor, laminate_options(required=False)):
+    for decorate in (outputs("deck"), shear_factor, laminate_options(required=False)):
         function = decorate(function)
     return click.argument("deck", type=DECK_PATH, required=False)(function)
 
@@ -64,34 +63,12 @@ STEP = click.option("--step", type=POSITIVE, default=5.0, show_default=True, met
                     help="Angle between two normals, degrees.")  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Job:
-    """A laminate, the names of its units, and the files to write."""
-
-    medium: Medium
-    units: dict[str, str]
-    targets: OutputPaths
-
-    def write(self, header: str, rows: Iterable[Sequence[object]]) -> None:
-        """Write the table."""
-        lines = (",".join(map(str, row)) + "\n" for row in rows)
-        self.targets.write(chain([header + "\n"], lines))
-
-
-def _job(
-    *,
-    deck: Path | None,
-    shear_factor: float,
-    output: Path,
-    picture: Path | None,
-    overwrite: bool,
-    **options: Any,
-) -> _Job:
-    """Check the outputs and build the laminate."""
-    targets = OutputPaths(output, picture, overwrite, deck)
+def _medium(
+    deck: Path | None, shear_factor: float, **options: Any
+) -> tuple[Medium, dict[str, str]]:
+    """Build the laminate, from a deck or from options, and name its units."""
     laminate, units = _laminate(deck, options)
-    medium = Medium(replace(laminate, shear=shear_factor * laminate.shear))
-    return _Job(medium, units, targets)
+    return Medium(replace(laminate, shear=shear_factor * laminate.shear)), units
 
 
 def _laminate(deck: Path | None, options: dict[str, Any]) -> tuple[Laminate, dict[str, str]]:
@@ -132,11 +109,13 @@ def waves() -> None:
               show_default=True, metavar="FROM:TO:N",
               help="N wavelengths at equal distances, in thicknesses.")  # fmt: skip
 @_shared
-def dispersion(angles: tuple[float, ...], wavelengths: tuple[float, ...], **shared: Any) -> None:
+def dispersion(
+    angles: tuple[float, ...], wavelengths: tuple[float, ...], targets: OutputPaths, **shared: Any
+) -> None:
     """Phase velocity and frequency of all modes against wavelength (figures 2.4, 2.5)."""
     _bound(5 * len(angles) * len(wavelengths))
-    job = _job(**shared)
-    curves = [compute(job.medium, angle, wavelengths) for angle in angles]
+    medium, _ = _medium(**shared)
+    curves = [compute(medium, angle, wavelengths) for angle in angles]
     rows = (
         (curve.angle, wavelength, mode, velocity, frequency)
         for curve in curves
@@ -149,33 +128,33 @@ def dispersion(angles: tuple[float, ...], wavelengths: tuple[float, ...], **shar
         for mode, velocity, frequency in zip(MODES, velocities, frequencies, strict=True)
     )
 
-    if job.targets.picture:
+    if targets.picture:
         from fecm.plot.waves import dispersion_picture
 
-        job.targets.draw(dispersion_picture(job.medium, curves))
-    job.write("angle_deg,wavelength_over_h,mode,phase_velocity,angular_frequency", rows)
+        targets.draw(dispersion_picture(medium, curves))
+    targets.write("angle_deg,wavelength_over_h,mode,phase_velocity,angular_frequency", rows)
 
 
 @waves.command()
 @STEP
 @_shared
-def speeds(step: float, **shared: Any) -> None:
+def speeds(step: float, targets: OutputPaths, **shared: Any) -> None:
     """Normal velocities of the five wave fronts (figures 2.7, 2.8)."""
     _bound(360.0 / step)
-    job = _job(**shared)
-    surfaces = WaveSurfaces(job.medium)
+    medium, units = _medium(**shared)
+    surfaces = WaveSurfaces(medium)
     fronts = surfaces.fronts(_normals(step))
     rows = (
         (normal, *velocities)
         for normal, velocities in zip(fronts.normal.tolist(), fronts.velocity.tolist(), strict=True)
     )
 
-    if job.targets.picture:
+    if targets.picture:
         from fecm.plot.waves import speeds_picture
 
-        job.targets.draw(speeds_picture(surfaces, job.units))
+        targets.draw(speeds_picture(surfaces, units))
     _note_names(surfaces)
-    job.write(",".join(("angle_deg", *FRONTS)), rows)
+    targets.write(",".join(("angle_deg", *FRONTS)), rows)
 
 
 @waves.command(cls=ListCommand)
@@ -187,12 +166,14 @@ def speeds(step: float, **shared: Any) -> None:
               )  # fmt: skip
 @STEP
 @_shared
-def fronts(times: tuple[float, ...], radius: float | None, step: float, **shared: Any) -> None:
+def fronts(
+    times: tuple[float, ...], radius: float | None, step: float, targets: OutputPaths, **shared: Any
+) -> None:
     """Front positions and rays (figures 2.9 to 2.12); cusps go to standard error."""
     _bound(5 * len(times) * 360.0 / step)
-    job = _job(**shared)
-    start = job.medium.laminate.thickness if radius is None else radius
-    surfaces = WaveSurfaces(job.medium)
+    medium, units = _medium(**shared)
+    start = medium.laminate.thickness if radius is None else radius
+    surfaces = WaveSurfaces(medium)
     found = surfaces.fronts(_normals(step))
     if not math.isfinite(max(times) * float(found.velocity.max()) + start):
         raise RefusedError("the positions of the fronts overflow at these times")
@@ -205,14 +186,14 @@ def fronts(times: tuple[float, ...], radius: float | None, step: float, **shared
         for at, time in enumerate(times)
     )
 
-    if job.targets.picture:
+    if targets.picture:
         from fecm.plot.waves import fronts_picture
 
-        job.targets.draw(fronts_picture(surfaces, times, start, job.units))
+        targets.draw(fronts_picture(surfaces, times, start, units))
     _note_names(surfaces)
     for time in times:
         _note_cusps(surfaces, time, start)
-    job.write("mode,normal_deg,time,x,y,ray_deg", rows)
+    targets.write("mode,normal_deg,time,x,y,ray_deg", rows)
 
 
 def _bound(rows: float) -> None:

@@ -7,7 +7,7 @@ struck end.  Forces are positive in compression, accelerations in the direction 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -195,15 +195,8 @@ def displacement_row(rod: Rod, x: float) -> Floats:
     return row
 
 
-def table(history: RodHistory, filtered: Floats | None = None) -> Iterator[str]:
-    """Return the lines of a CSV of the complete history, with line ends.
-
-    Parameters
-    ----------
-    history : RodHistory
-    filtered : ndarray (rows, stations), optional
-        Filtered forces at the stations.
-    """
+def table(history: RodHistory, filtered: Floats | None = None) -> tuple[str, list[list[float]]]:
+    """Return header and rows of a CSV of the history, with the filtered forces at the stations."""
     names = [f"{x:.12g}" for x in history.stations]
     header = ["time", "force", *(f"force_at_{x}" for x in names)]
     columns = [history.time[:, None], history.applied[:, None], history.forces]
@@ -212,6 +205,4 @@ def table(history: RodHistory, filtered: Floats | None = None) -> Iterator[str]:
         columns.append(filtered)
     header += [f"ratio_at_{x}" for x in names] + [f"acceleration_{point}" for point in POINTS]
     columns += [history.ratios, history.accelerations]
-    yield ",".join(header) + "\n"
-    for row in np.hstack(columns).tolist():
-        yield ",".join(map(repr, row)) + "\n"
+    return ",".join(header), np.hstack(columns).tolist()
