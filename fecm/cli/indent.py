@@ -17,9 +17,9 @@ from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, ListOf
 from fecm.deck.catalogue import CONTACTS, NU23, SYSTEM, SYSTEMS, NamedPly
 from fecm.deck.model import Indentation
 from fecm.mechanics.contact_law import hertz_coefficient
+from fecm.studies import StudyError
 from fecm.studies.indentation_test import LIMITS_Q
 from fecm.studies.indentation_test.constants import fit as fitted
-from fecm.studies.indentation_test.cycles import NoTestError
 from fecm.studies.indentation_test.modulus import effective_stiffness, indentation_modulus
 from fecm.studies.indentation_test.report import card, lines, notes, plain
 from fecm.studies.indentation_test.table import Test, read_test
@@ -76,7 +76,7 @@ def fit(
     read = read_test(test, columns or (), units)
     try:
         found = fitted(read.indentation, read.force, retreat=turn, q=q, acr=acr)
-    except NoTestError as error:
+    except StudyError as error:
         raise RefusedError(f"{test}: {error}") from None
     if targets.picture:
         from fecm.plot.indentation import fit_picture

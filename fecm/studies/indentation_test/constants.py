@@ -15,6 +15,7 @@ from fecm.mechanics.contact_law import (
     LinearPermanent,
     YangSunPermanent,
 )
+from fecm.studies import StudyError
 from fecm.studies.indentation_test.curves import (
     Curves,
     Estimate,
@@ -24,24 +25,16 @@ from fecm.studies.indentation_test.curves import (
     scaled,
     solve,
 )
-from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING, NoTestError, divide
+from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING, divide
 from fecm.studies.indentation_test.permanent import Critical, Line, critical, line
 
 
 @dataclass(frozen=True)
 class FreePower:
-    """First loading with a free power, F = k a^n (equation 3-1).
-
-    Attributes
-    ----------
-    n : Estimate
-    k : Estimate
-        Force/length^n.
-    r_squared : float or None
-    """
+    """First loading with a free power, F = k a^n (equation 3-1)."""
 
     n: Estimate
-    k: Estimate
+    k: Estimate  # force/length^n
     r_squared: float | None
 
 
@@ -80,62 +73,29 @@ LARGEST = 1e60
 
 @dataclass(frozen=True)
 class Cycle:
-    """Unloading and reloading from a point of the first loading curve.
+    """Unloading and reloading from a point of the first loading curve."""
 
-    Attributes
-    ----------
-    alpha_m, alpha_0 : Estimate
-        Largest and permanent indentation (length); the error of alpha_m is 0 if it is the
-        recorded value.
-    recorded : float
-        Largest recorded indentation, smoothed if noisy (length).
-    k_1 : Estimate
-        Reloading rigidity, equation 3-12, force/length^1.5.
-    k_1_measured : Estimate or None
-        The same from the origin of the first reloading curve; None if there is no reloading, or if
-        it began without contact, where both are equal.
-    """
-
-    alpha_m: Estimate
-    alpha_0: Estimate
-    recorded: float
-    k_1: Estimate
+    alpha_m: Estimate  # largest indentation (length); its error is 0 if it is the recorded value
+    alpha_m_recorded: float  # smoothed if noisy
+    alpha_0: Estimate  # permanent indentation (length)
+    k_1: Estimate  # reloading rigidity, equation 3-12, force/length^1.5
+    # The same from the origin of the first reloading curve; None if there is no reloading, or if
+    # it began without contact, where both are equal.
     k_1_measured: Estimate | None
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Result of a fit.
+    """Result of a fit."""
 
-    Attributes
-    ----------
-    k : Estimate
-        Contact coefficient with n = 3/2, force/length^1.5.
-    free : FreePower
-        First loading with a free power.
-    q : Estimate or None
-        Unloading power; None if the test has no unloading.
-    cycles : tuple of Cycle
-    line : Line or None
-        s_p and alpha_p; None if fewer than two cycles leave an indentation.
-    critical : Critical or None
-        alpha_cr, if the law of equation 3-7 was requested.
-    r_squared : dict
-        R² by ``loading``, ``unloading``, ``reloading``, ``permanent``.
-    scatter : float
-        Root mean square of the residuals, relative to the largest force.
-    solution : Solution
-        Fitted curves.
-    """
-
-    k: Estimate
+    k: Estimate  # contact coefficient with n = 3/2, force/length^1.5
     free: FreePower
-    q: Estimate | None
+    q: Estimate | None  # unloading power; None if the test has no unloading
     cycles: tuple[Cycle, ...]
-    line: Line | None
-    critical: Critical | None
-    r_squared: dict[str, float | None]
-    scatter: float
+    line: Line | None  # None if fewer than two cycles leave an indentation
+    critical: Critical | None  # if the law of equation 3-7 was requested
+    r_squared: dict[str, float | None]  # of loading, unloading, reloading and permanent
+    scatter: float  # root mean square of the residuals, relative to the largest force
     solution: Solution
 
     def relation(self) -> ContactParameters | None:
@@ -174,17 +134,17 @@ def fit(
 
     Raises
     ------
-    NoTestError
+    StudyError
         If the points are not an indentation test.
     """
     a, f = np.asarray(indentation, dtype=float), np.asarray(force, dtype=float)
     if a.shape != f.shape or a.ndim != 1:
-        raise NoTestError("indentation and force differ in length")
+        raise StudyError("indentation and force differ in length")
     if len(a) < 10:
-        raise NoTestError(f"{len(a)} points are too few for a test")
+        raise StudyError(f"{len(a)} points are too few for a test")
     for name, values in (("indentations", a), ("forces", f)):
         if not 1.0 / LARGEST < float(np.abs(values).max()) < LARGEST:
-            raise NoTestError(f"the {name} are not between {1.0 / LARGEST:g} and {LARGEST:g}")
+            raise StudyError(f"the {name} are not between {1.0 / LARGEST:g} and {LARGEST:g}")
     curves = scaled(divide(a, retreat), a, f)
     solution = solve(curves, ACR_POWER if acr else q)
     at, division, p = solution.curves.layout, curves.division, solution.values
@@ -203,10 +163,12 @@ def fit(
         line=straight,
         critical=critical(*found) if acr and cycles else None,
         r_squared={
-            kind: solution.curves.r_squared(solution.scaled, kind)
-            for kind in (LOADING, FALLING, RISING)
-        }
-        | {"permanent": _explained(straight, found[0], found[1])},
+            **{
+                kind: r_squared(*solution.curves.of(solution.scaled, kind))
+                for kind in (LOADING, FALLING, RISING)
+            },
+            "permanent": _explained(straight, found[0], found[1]),
+        },
         scatter=float(np.sqrt(np.mean((fitted - measured) ** 2))),
         solution=solution,
     )
@@ -237,13 +199,11 @@ def _cycle(solution: Solution, number: int) -> Cycle:
 
         return solution.estimate(k_1)
 
-    own = [
-        place for n, place in at.origins.items() if division.stretches[n].cycle == number
-    ]  # fmt: skip
+    own = [place for n, place in at.origins.items() if division.stretches[n].cycle == number]
     return Cycle(
         alpha_m=_parameter(solution, peak),
+        alpha_m_recorded=division.corners[corner].indentation,
         alpha_0=_parameter(solution, permanent),
-        recorded=division.corners[corner].indentation,
         k_1=rigidity(permanent),
         k_1_measured=rigidity(own[0]) if own else None,
     )

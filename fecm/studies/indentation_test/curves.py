@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 
 from fecm._typing import Bools, Floats
 from fecm.mechanics.contact_law import LOADING_POWER, power_curve
+from fecm.studies import StudyError
 from fecm.studies.indentation_test import LIMITS_Q
-from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING, Division, NoTestError
+from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING, Division
 
 
 @dataclass(frozen=True)
@@ -81,20 +82,13 @@ STEP = 1e-6
 class ParameterLayout:
     """Index of each parameter in the vector of parameters.
 
-    Attributes
-    ----------
-    corners, permanents : list of int
-        Indices by corner and by cycle.
-    origins : dict
-        Indices by RISING stretch.  Stretches that begin without contact use the permanent
-        indentation of the cycle; those with too few points are not fitted.
-    size : int
-        Number of parameters.
+    Stretches that begin without contact have no origin of their own, but the permanent indentation
+    of their cycle; those with too few points are not fitted.
     """
 
     corners: list[int]
-    permanents: list[int]
-    origins: dict[int, int]
+    permanents: list[int]  # by cycle
+    origins: dict[int, int]  # by RISING stretch
     size: int
 
     K, Q = 0, 1
@@ -117,23 +111,13 @@ def layout_of(division: Division, tied: frozenset[int] = frozenset()) -> Paramet
 
 @dataclass(frozen=True)
 class Curves:
-    """Curves of a test, scaled by its largest indentation and force.
-
-    Attributes
-    ----------
-    division : Division
-    a, f : ndarray (n,)
-        Indentation and force divided by their largest values.
-    length, force : float
-        Largest indentation and force.
-    layout : ParameterLayout
-    """
+    """Curves of a test, scaled by its largest indentation and force."""
 
     division: Division
-    a: Floats
-    f: Floats
-    length: float
-    force: float
+    a: Floats  # scaled indentation, (n,)
+    f: Floats  # scaled force, (n,)
+    length: float  # largest indentation
+    force: float  # largest force
     layout: ParameterLayout
 
     @property
@@ -186,56 +170,35 @@ class Curves:
         measured = [self.f[rows] for _, rows in parts]
         return np.concatenate([[], *fitted]), np.concatenate([[], *measured])
 
-    def r_squared(self, p: Floats, *kinds: str) -> float | None:
-        """Return R² of the stretches of some kinds; None without points."""
-        fitted, measured = self.of(p, *kinds)
-        return r_squared(fitted, measured)
-
 
 def scaled(division: Division, indentation: Floats, force: Floats) -> Curves:
-    """Prepare a divided test for fitting.
-
-    Raises
-    ------
-    NoTestError
-        If no force is positive, or a curve has too few points.
-    """
+    """Prepare a divided test for fitting."""
     length, top = float(division.path.smooth.max()), float(force.max())
     if length <= 0.0 or top <= 0.0:
-        raise NoTestError("indentation and force are never positive")
-    curves = Curves(
-        division, indentation / length, force / top, length, top, layout_of(division)
-    )  # fmt: skip
+        raise StudyError("indentation and force are never positive")
+    curves = Curves(division, indentation / length, force / top, length, top, layout_of(division))
     loading = division.rows(LOADING)
     if np.count_nonzero(curves.a[loading] > 0.0) < FEWEST:
-        raise NoTestError(f"the first loading has fewer than {FEWEST} points")
+        raise StudyError(f"the first loading has fewer than {FEWEST} points")
     for cycle in range(len(division.peaks)):
         falls = [s for s in division.stretches if s.kind == FALLING and s.cycle == cycle]
         if sum(len(s.rows) for s in falls) < FEWEST:
-            raise NoTestError(f"cycle {cycle + 1} has fewer than {FEWEST} points of unloading")
+            raise StudyError(f"cycle {cycle + 1} has fewer than {FEWEST} points of unloading")
     return curves
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Fitted parameters in the units of the test.
+    """Fitted parameters in the units of the test, numbered by :class:`ParameterLayout`.
 
-    Attributes
-    ----------
-    values : ndarray (m,)
-        Numbered by :class:`ParameterLayout`.
-    covariance : ndarray (m, m)
-    held : frozenset of int
-        Corners held at their recorded values.
-    at_limit : bool
-        Whether a value is at a bound: the curves do not fit, and the errors are meaningless.
+    A value at a bound means that the curves do not fit, and that the errors are meaningless.
     """
 
     curves: Curves
-    values: Floats
-    covariance: Floats
-    held: frozenset[int]
-    at_limit: bool
+    values: Floats  # (m,)
+    covariance: Floats  # (m, m)
+    held: frozenset[int]  # corners held at their recorded values
+    at_limit: bool  # whether a value is at a bound
 
     @property
     def scaled(self) -> Floats:
@@ -253,15 +216,10 @@ class Solution:
 def solve(curves: Curves, q: float | None = None) -> Solution:
     """Fit all curves; corners that the curves do not determine keep their recorded values.
 
-    In a first fit, every reloading has a separate origin.  If it is significantly above the turn at
-    which the reloading began, contact was lost, and the origin is the permanent indentation; a
-    reloading that began in contact has its origin below the turn.
-
-    Parameters
-    ----------
-    curves : Curves
-    q : float, optional
-        Prescribed unloading power; fitted if None.
+    The unloading power is fitted unless `q` prescribes it.  In a first fit, every reloading has a
+    separate origin.  If it is significantly above the turn at which the reloading began, contact
+    was lost, and the origin is the permanent indentation; a reloading that began in contact has its
+    origin below the turn.
     """
     solution = _held_or_not(curves, q)
     errors = np.sqrt(np.diag(solution.covariance))

@@ -13,8 +13,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._errors import FecmError
 from fecm._typing import Floats
+from fecm.studies import StudyError
 
 Ints = NDArray[np.int64]
 
@@ -27,28 +27,13 @@ GUARD = 2.0
 NEGLIGIBLE = 0.1
 
 
-class NoTestError(FecmError, ValueError):
-    """The points are not an indentation test."""
-
-
 @dataclass(frozen=True)
 class Path:
-    """Measured indentations and an estimate of their noise.
+    """Moving mean of measured indentations, and their noise."""
 
-    Attributes
-    ----------
-    raw, smooth : ndarray (n,)
-        Measured values and their moving mean (length).
-    noise : float
-        Standard deviation of a smoothed point (length); 0 if noise reverses no step.
-    reach : int
-        Points of the moving mean on either side.
-    """
-
-    raw: Floats
-    smooth: Floats
-    noise: float
-    reach: int
+    smooth: Floats  # (n,), length
+    noise: float  # standard deviation of a smoothed point; 0 if noise reverses no step
+    reach: int  # points of the moving mean on either side
 
     @property
     def range(self) -> float:
@@ -59,29 +44,21 @@ class Path:
 def smoothed(indentation: Floats) -> Path:
     """Estimate the noise of a path, and smooth it only as much as needed to find its turns.
 
-    Parameters
-    ----------
-    indentation : ndarray (n,)
-
-    Notes
-    -----
     Third differences of a path without noise are almost zero; their median gives the noise.  A
     moving mean over w points divides the noise by sqrt(w) and cuts off about w/4 steps at a turn; w
     balances both.
     """
     n = len(indentation)
     if n < 5:
-        return Path(indentation, indentation, 0.0, 0)
+        return Path(indentation, 0.0, 0)
     noise = float(np.median(np.abs(np.diff(indentation, 3)))) / (0.6745 * math.sqrt(20.0))
     rough = _moving_mean(indentation, max(1, n // 200))
     step = float(np.abs(np.diff(rough)).sum()) / (n - 1)
     if noise <= NEGLIGIBLE * step:
-        return Path(indentation, indentation, 0.0, 0)
+        return Path(indentation, 0.0, 0)
     reach = max(1, round((4.0 * noise / step) ** (2.0 / 3.0) / 2.0))
     reach = min(reach, n // 50 + 1)
-    return Path(
-        indentation, _moving_mean(indentation, reach), noise / math.sqrt(2 * reach + 1), reach
-    )
+    return Path(_moving_mean(indentation, reach), noise / math.sqrt(2 * reach + 1), reach)
 
 
 def _moving_mean(values: Floats, reach: int) -> Floats:
@@ -94,14 +71,7 @@ def _moving_mean(values: Floats, reach: int) -> Floats:
 
 
 def turns(path: Path, retreat: float) -> list[int]:
-    """Find points at which the direction changes, including the first and last point.
-
-    Parameters
-    ----------
-    path : Path
-    retreat : float
-        Retreat of the path that counts as a turn (length).
-    """
+    """Find points from which the path retreats by more than `retreat`, and the first and last."""
     s = path.smooth
     found, high, low, direction = [0], 0, 0, 0
     for i in range(1, len(s)):
@@ -127,67 +97,31 @@ LOADING, FALLING, RISING = "loading", "unloading", "reloading"
 
 @dataclass(frozen=True)
 class Stretch:
-    """Points on one curve.
+    """Points on one curve."""
 
-    Attributes
-    ----------
-    kind : str
-        LOADING, FALLING or RISING.
-    cycle : int
-        Number of the last peak, from 0; of LOADING, of the next peak.
-    rows : ndarray of int
-        Numbers of the points.
-    begin : int
-        Of FALLING, the corner at which it begins: the peak of its cycle, or a turn during
-        reloading.
-    turn : float
-        Of RISING, the recorded indentation at its beginning (length).
-    """
-
-    kind: str
-    cycle: int
-    rows: Ints
+    kind: str  # LOADING, FALLING or RISING
+    cycle: int  # number of the last peak, from 0; of LOADING, of the next peak
+    rows: Ints  # numbers of the points
+    # Of FALLING, the corner at which it begins: the peak of its cycle, or a turn during reloading.
     begin: int = -1
-    turn: float = 0.0
+    turn: float = 0.0  # of RISING, the recorded indentation at its beginning
 
 
 @dataclass(frozen=True)
 class Corner:
-    """An upper turn.
+    """An upper turn."""
 
-    Attributes
-    ----------
-    indentation : float
-        Largest value of the smoothed path near the turn (length).
-    cycle : int
-        Number of its cycle.
-    is_peak : bool
-        Whether it is on the first loading curve.
-    rise : int
-        Otherwise, the number of the RISING stretch that ends there.
-    """
-
-    indentation: float
+    indentation: float  # largest value of the smoothed path near the turn
     cycle: int
-    is_peak: bool
-    rise: int = -1
+    is_peak: bool  # whether it is on the first loading curve
+    rise: int = -1  # otherwise, the number of the RISING stretch that ends there
 
 
 @dataclass(frozen=True)
 class Division:
-    """A test divided into stretches.
-
-    Attributes
-    ----------
-    path : Path
-    retreat : float
-        Threshold of a turn (length).
-    stretches : tuple of Stretch
-    corners : tuple of Corner
-    """
+    """A test divided into stretches."""
 
     path: Path
-    retreat: float
     stretches: tuple[Stretch, ...]
     corners: tuple[Corner, ...]
 
@@ -205,30 +139,20 @@ class Division:
 def divide(indentation: Floats, retreat: float | None = None) -> Division:
     """Divide a test into stretches on the curves of the law.
 
-    Parameters
-    ----------
-    indentation : ndarray (n,)
-        In the order of measurement from first contact.
-    retreat : float, optional
-        Retreat of the path that counts as a turn (length); by default the larger of 2 % of its
-        range and eight standard deviations of its noise.
-
-    Raises
-    ------
-    NoTestError
-        If the test does not begin with loading.
+    A retreat of the path counts as a turn; by default if it exceeds 2 % of the range of the path
+    and eight standard deviations of its noise.
     """
     path = smoothed(indentation)
     if path.range <= 0.0:
-        raise NoTestError("the indentation never changes")
+        raise StudyError("the indentation never changes")
     if retreat is None:
         retreat = max(LEAST_RETREAT * path.range, SURE * path.noise)
     if retreat >= path.range:
-        raise NoTestError(f"the range of the path is below the threshold of a turn ({retreat:g})")
+        raise StudyError(f"the range of the path is below the threshold of a turn ({retreat:g})")
     found = turns(path, retreat)
     s = path.smooth
     if s[found[1]] <= s[0]:
-        raise NoTestError("the test begins with unloading; it must begin with the first loading")
+        raise StudyError("the test begins with unloading; it must begin with the first loading")
     return _Divider(path, retreat).divide(found)
 
 
@@ -237,7 +161,6 @@ class _Divider:
 
     def __init__(self, path: Path, retreat: float) -> None:
         self.path = path
-        self.retreat = retreat
         # Peaks within this distance are one.
         self.near = max(retreat / 2.0, 4.0 * path.noise)
         self.stretches: list[Stretch] = []
@@ -254,7 +177,7 @@ class _Divider:
                 self._rise(rows, first, end, ends_in_turn=n < last)
             else:
                 self.stretches.append(Stretch(FALLING, self.cycle, rows, self.begin))
-        return Division(self.path, self.retreat, tuple(self.stretches), tuple(self.corners))
+        return Division(self.path, tuple(self.stretches), tuple(self.corners))
 
     def _between(self, first: int, end: int, turns: bool) -> Ints:
         """Return the points between two turns, without the turns and points too close to them.

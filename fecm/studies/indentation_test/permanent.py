@@ -25,39 +25,18 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Line:
-    """Equation 3-8.
-
-    Attributes
-    ----------
-    s_p, alpha_p : Estimate
-        Slope; critical indentation (length).
-    elastic : tuple of int
-        Cycles below alpha_p, without permanent indentation.
-    scatter : float
-        Root of chi² per degree of freedom, which multiplies the errors, if the scatter exceeds the
-        noise; else 1.
-    """
+    """Equation 3-8."""
 
     s_p: Estimate
     alpha_p: Estimate
-    elastic: tuple[int, ...]
-    scatter: float
+    elastic: tuple[int, ...]  # cycles below alpha_p, without permanent indentation
+    scatter: float  # of :func:`_scatter`; it multiplies the errors
 
 
 def line(peaks: Floats, permanents: Floats, covariance: Floats) -> Line | None:
-    """Fit alpha_0 = max(0, s_p (alpha_m - alpha_p)).
+    """Fit alpha_0 = max(0, s_p (alpha_m - alpha_p)); None if fewer than two cycles exceed alpha_p.
 
-    Parameters
-    ----------
-    peaks, permanents : ndarray (cycles,)
-        alpha_m and alpha_0 (length).
-    covariance : ndarray (2 cycles, 2 cycles)
-        Covariance of all peaks, then all permanent indentations.
-
-    Returns
-    -------
-    Line or None
-        None if fewer than two cycles exceed alpha_p.
+    The covariance is that of all peaks alpha_m, then all permanent indentations alpha_0.
     """
     covariance = covariance + np.eye(len(covariance)) * (ROUNDING * peaks.max()) ** 2
     order = np.argsort(peaks)
@@ -119,18 +98,10 @@ def _scatter(chi: float, freedom: int) -> float:
 
 @dataclass(frozen=True)
 class Critical:
-    """Equation 3-7.
-
-    Attributes
-    ----------
-    alpha_cr : Estimate
-        Length.
-    scatter : float
-        As :attr:`Line.scatter`.
-    """
+    """Equation 3-7."""
 
     alpha_cr: Estimate
-    scatter: float
+    scatter: float  # as that of a line
 
 
 def critical(peaks: Floats, permanents: Floats, covariance: Floats) -> Critical:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from fecm.deck.model import Indentation
@@ -145,33 +146,23 @@ def _table(cycles: tuple[Cycle, ...]) -> list[str]:
     ]
 
 
-def _plain(estimate: Estimate | None) -> dict[str, float] | None:
-    return None if estimate is None else {"value": estimate.value, "error": estimate.error}
-
-
 def plain(fit: Fit) -> dict[str, Any]:
     """Return the fit as plain values for JSON."""
     straight = fit.line
+    constants = {
+        "k": fit.k,
+        "n": fit.free.n,
+        "k_with_n": fit.free.k,
+        "q": fit.q,
+        "s_p": straight.s_p if straight else None,
+        "alpha_p": straight.alpha_p if straight else None,
+        "alpha_cr": fit.critical.alpha_cr if fit.critical else None,
+    }
     return {
-        "k": _plain(fit.k),
-        "n": _plain(fit.free.n),
-        "k_with_n": _plain(fit.free.k),
-        "q": _plain(fit.q),
-        "s_p": _plain(straight.s_p) if straight else None,
-        "alpha_p": _plain(straight.alpha_p) if straight else None,
-        "alpha_cr": _plain(fit.critical.alpha_cr) if fit.critical else None,
+        **{name: asdict(estimate) if estimate else None for name, estimate in constants.items()},
         "r_squared": {**fit.r_squared, "loading_with_n": fit.free.r_squared},
         "scatter": fit.scatter,
-        "cycles": [
-            {
-                "alpha_m": _plain(cycle.alpha_m),
-                "alpha_m_recorded": cycle.recorded,
-                "alpha_0": _plain(cycle.alpha_0),
-                "k_1": _plain(cycle.k_1),
-                "k_1_measured": _plain(cycle.k_1_measured),
-            }
-            for cycle in fit.cycles
-        ],
+        "cycles": [asdict(cycle) for cycle in fit.cycles],
         "notes": notes(fit),
         "card": card(fit) or None,
     }

@@ -31,22 +31,12 @@ IMPERIAL = {"in", "inch", "inches", "mil", "mils", "lbf", "lb", "lbs", "kip", "k
 
 @dataclass(frozen=True)
 class Test:
-    """An indentation test.
+    """An indentation test."""
 
-    Attributes
-    ----------
-    indentation, force : ndarray (rows,)
-        Values in `units`.
-    units : mapping of str to str
-        Names of the units of ``length`` and ``force``; empty if unknown.
-    stated : tuple of str
-        Units of the indentation and the force stated in the file; empty texts if none.
-    """
-
-    indentation: Floats
-    force: Floats
-    units: Mapping[str, str]
-    stated: tuple[str, str]
+    indentation: Floats  # (rows,), in `units`
+    force: Floats  # (rows,)
+    units: Mapping[str, str]  # names of the units of length and force; empty if unknown
+    stated: tuple[str, str]  # units of both in the file; empty texts if none
 
 
 def read_test(
