@@ -28,43 +28,22 @@ from fecm.studies.quick_models import (
 
 @dataclass(frozen=True)
 class Model:
-    """One quick model of an impact.
-
-    Attributes
-    ----------
-    name : str
-    impact : QuickImpact
-    threshold : float
-        Delamination threshold that applies to the model, force; NaN without DELA.
-    velocity : float
-        Velocity at which the model reaches it; NaN without DELA.
-    """
+    """One quick model of an impact."""
 
     name: str
     impact: QuickImpact
-    threshold: float
-    velocity: float
+    threshold: float  # delamination threshold that applies to the model, force; NaN without DELA
+    velocity: float  # at which the model reaches it; NaN without DELA
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Quick estimates of an impact.
+    """Quick estimates of an impact."""
 
-    Attributes
-    ----------
-    mass, mass_ratio : float
-        Projectile's mass, and its ratio to the plate's.
-    parameter : float
-        Zener's lambda.
-    stiffness : float
-        Static stiffness of the plate under its load, force/length; NaN for a free plate.
-    models : tuple of Model
-    """
-
-    mass: float
-    mass_ratio: float
-    parameter: float
-    stiffness: float
+    mass: float  # of the projectile
+    mass_ratio: float  # to the plate's
+    parameter: float  # Zener's lambda
+    stiffness: float  # of the plate under its load, force/length; NaN for a free plate
     models: tuple[Model, ...]
 
     @property

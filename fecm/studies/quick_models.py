@@ -22,21 +22,11 @@ SMALL, LARGE = 0.1, 50.0
 
 @dataclass(frozen=True)
 class QuickImpact:
-    """Result of a quick model.
+    """Result of a quick model."""
 
-    Attributes
-    ----------
-    peak : float
-        Contact force.
-    time : float
-        Time of the peak.
-    duration : float
-        Duration of the contact.
-    """
-
-    peak: float
-    time: float
-    duration: float
+    peak: float  # contact force
+    time: float  # of the peak
+    duration: float  # of the contact
 
 
 def inelasticity(

@@ -17,28 +17,15 @@ from fecm.studies import StudyError
 
 @dataclass(frozen=True)
 class Calibration:
-    """Straight line through V_F against V_a, and the sensitivity.
-
-    Attributes
-    ----------
-    points : int
-    slope, slope_error : float
-        V_F over V_a and its standard error.
-    offset, offset_error : float
-        V_F at V_a = 0 and its standard error; 0 for a line through the origin.
-    r_squared : float
-        Explained fraction of the variation of V_F, about zero for a line through the origin.
-    sensitivity, sensitivity_error : float
-        c_F of the transducer, V_F per force, and its standard error.
-    """
+    """Straight line through V_F against V_a, and the sensitivity, with standard errors."""
 
     points: int
-    slope: float
+    slope: float  # V_F over V_a
     slope_error: float
-    offset: float
+    offset: float  # V_F at V_a = 0; 0 for a line through the origin
     offset_error: float
-    r_squared: float
-    sensitivity: float
+    r_squared: float  # of the variation of V_F, about zero for a line through the origin
+    sensitivity: float  # c_F of the transducer, V_F per force
     sensitivity_error: float
 
 

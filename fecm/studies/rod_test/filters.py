@@ -24,17 +24,12 @@ USAGE = "first-order:RISE or moving-average:RISE"
 class Filter:
     """A filter of unit static gain.
 
-    Attributes
-    ----------
-    kind : str
-        ``"first-order"``: T y' + y = x, whose rise time is T ln 9; ``"moving-average"``: the mean
-        of x over the last W, whose rise time is 0.8 W.
-    rise : float
-        Time from 10 to 90 % of the step response (10 us in Table 4.1).
+    ``"first-order"`` is T y' + y = x, whose rise time is T ln 9; ``"moving-average"`` is the mean
+    of x over the last W, whose rise time is 0.8 W.
     """
 
     kind: str
-    rise: float
+    rise: float  # time from 10 to 90 % of the step response (10 us in Table 4.1)
 
     @property
     def time_constant(self) -> float:
@@ -47,19 +42,7 @@ class Filter:
         return self.rise / 0.8
 
     def __call__(self, time: Floats, values: Floats) -> Floats:
-        """Filter a history.
-
-        Parameters
-        ----------
-        time : ndarray (rows,)
-            Increasing.
-        values : ndarray (rows,) or (rows, columns)
-
-        Returns
-        -------
-        ndarray
-            Same shape as `values`.
-        """
+        """Filter values, (rows,) or (rows, columns), at increasing times."""
         columns = values.reshape(len(time), -1)
         apply = self._first_order if self.kind == FIRST_ORDER else self._moving_average
         filtered = np.column_stack([apply(time, column) for column in columns.T])

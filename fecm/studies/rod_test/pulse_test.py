@@ -29,27 +29,13 @@ POINTS = ("struck_end", "middle", "far_end")
 
 @dataclass(frozen=True)
 class RodHistory:
-    """History of a rod under a pulse.
+    """History of a rod under a pulse."""
 
-    Attributes
-    ----------
-    time : ndarray (rows,)
-        Times from 0.
-    applied : ndarray (rows,)
-        Force on the struck end.
-    stations : tuple of float
-        Distances from the struck end.
-    forces : ndarray (rows, stations)
-        Force at the stations, positive in compression.
-    accelerations : ndarray (rows, 3)
-        Accelerations of the struck end, the middle and the far end.
-    """
-
-    time: Floats
-    applied: Floats
-    stations: tuple[float, ...]
-    forces: Floats
-    accelerations: Floats
+    time: Floats  # (rows,), from 0
+    applied: Floats  # force on the struck end, (rows,)
+    stations: tuple[float, ...]  # distances from the struck end
+    forces: Floats  # at the stations, (rows, stations)
+    accelerations: Floats  # of the struck end, the middle and the far end, (rows, 3)
 
     @property
     def ratios(self) -> Floats:

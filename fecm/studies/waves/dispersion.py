@@ -103,21 +103,10 @@ def _problem(medium: Medium, angle: float, k: Floats) -> tuple[Floats, Floats, F
 def graded_modes(stiffness: Floats, inertia: Floats) -> tuple[Floats, Floats]:
     """Frequencies and modes of K a = omega^2 M a with diagonals of very different magnitude.
 
-    Parameters
-    ----------
-    stiffness, inertia : ndarray (n, m, m)
-        Symmetric, positive definite, and well conditioned after scaling to a unit diagonal: then
-        every frequency, not only the highest, is accurate to nearly all digits.
-
-    Returns
-    -------
-    tuple of ndarray
-        omega (n, m), descending, and the modes as columns (n, m, m), with unit generalized mass.
-
-    Raises
-    ------
-    StudyError
-        If a matrix is not positive definite or not finite.
+    The matrices, (n, m, m), must be symmetric, positive definite, and well conditioned after
+    scaling to a unit diagonal: then every frequency, not only the highest, is accurate to nearly
+    all digits.  omega, (n, m), is descending; the modes are columns, (n, m, m), with unit
+    generalized mass.
     """
     of_k, of_m = (np.sqrt(np.diagonal(matrix, axis1=1, axis2=2)) for matrix in (stiffness, inertia))
     order = np.argsort(of_k / of_m, axis=1)
@@ -144,18 +133,9 @@ def _outer(scale: Floats) -> Floats:
 
 
 def _singular_values(matrices: Floats) -> tuple[Floats, Floats]:
-    """Singular values, descending, and right singular vectors as columns.
+    """Singular values, descending, and right singular vectors as columns of matrices (n, m, m).
 
     LAPACK's Jacobi method keeps small singular values of column-scaled matrices accurate.
-
-    Parameters
-    ----------
-    matrices : ndarray (n, m, m)
-
-    Raises
-    ------
-    StudyError
-        If a number is not finite or not positive.
     """
     if not np.isfinite(matrices).all():
         raise StudyError(BEYOND)

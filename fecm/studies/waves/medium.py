@@ -71,16 +71,7 @@ class Medium:
 
 
 def trigonometry(degrees: ArrayLike) -> tuple[Floats, Floats]:
-    """Cosine and sine, exact at multiples of 90 degrees.
-
-    Parameters
-    ----------
-    degrees : array_like (n,)
-
-    Returns
-    -------
-    tuple of ndarray (n,)
-    """
+    """Cosine and sine, (n,) each, exact at multiples of 90 degrees."""
     angle = np.atleast_1d(np.asarray(degrees, dtype=np.float64))
     quarter = np.round(angle / 90.0)
     rest = np.deg2rad(angle - 90.0 * quarter)
@@ -92,12 +83,9 @@ def trigonometry(degrees: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def gradients(degrees: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """Strains xx, yy, xy of a unit gradient along n of u_n and u_t, and their derivatives.
+    """Strains xx, yy, xy of a unit gradient along n of u_n and u_t, (n, 3, 2).
 
-    Returns
-    -------
-    tuple of ndarray (n, 3, 2)
-        The strains, their first and their second derivative with respect to the angle (radian).
+    The first and second derivative with respect to the angle (radian) follow.
     """
     cos, sin = trigonometry(degrees)
     one, two = cos**2 - sin**2, 2.0 * sin * cos  # cosine and sine of twice the angle
@@ -112,17 +100,7 @@ def gradients(degrees: ArrayLike) -> tuple[Floats, Floats, Floats]:
 
 
 def in_normal_axes(tensor: Floats, degrees: ArrayLike) -> Floats:
-    """Components nn, nt; tn, tt of a symmetric tensor with components xx, xy; yx, yy.
-
-    Parameters
-    ----------
-    tensor : ndarray (2, 2)
-    degrees : array_like (n,)
-
-    Returns
-    -------
-    ndarray (n, 2, 2)
-    """
+    """Components nn, nt; tn, tt, (n, 2, 2), of a symmetric tensor with xx, xy; yx, yy."""
     cos, sin = trigonometry(degrees)
     axes = np.stack([np.stack([cos, -sin], axis=-1), np.stack([sin, cos], axis=-1)], axis=1)
     turned: Floats = axes.transpose(0, 2, 1) @ tensor @ axes
@@ -130,18 +108,9 @@ def in_normal_axes(tensor: Floats, degrees: ArrayLike) -> Floats:
 
 
 def shares(inertia: Floats, vectors: Floats) -> Floats:
-    """Share of every component in the kinetic energy of modes.
+    """Share of every component in the kinetic energy of modes, (..., modes, 5).
 
-    Parameters
-    ----------
-    inertia : ndarray (5, 5)
-    vectors : ndarray (..., 5, modes)
-        Modes as columns.
-
-    Returns
-    -------
-    ndarray (..., modes, 5)
-        The sum over the components is 1.
+    The modes are the columns of `vectors`, (..., 5, modes).
     """
     energy = vectors * (inertia @ vectors)
     found: Floats = np.swapaxes(energy / energy.sum(axis=-2, keepdims=True), -1, -2)
@@ -151,10 +120,7 @@ def shares(inertia: Floats, vectors: Floats) -> Floats:
 def best(scores: Floats) -> NDArray[np.intp]:
     """Index of the largest score of every row; the first of those equal up to rounding.
 
-    Parameters
-    ----------
-    scores : ndarray (n, choices)
-        Sums of shares, of the order of 1.
+    The scores, (n, choices), are sums of shares, of the order of 1.
     """
     equal = scores > scores.max(axis=-1, keepdims=True) - 1e-9
     place: NDArray[np.intp] = equal.argmax(axis=-1)

@@ -28,43 +28,19 @@ _ORDERS = np.array(list(permutations(range(5))))
 
 @dataclass(frozen=True)
 class Sheets:
-    """Solutions for a series of normals, in descending order of velocity.
+    """Solutions for a series of normals, in descending order of velocity."""
 
-    Attributes
-    ----------
-    normal : ndarray (n,)
-        Angles of the normals, degrees.
-    velocity, slope, curvature : ndarray (n, 5)
-        Normal velocity c_n (length/time), its first and its second derivative with respect to the
-        normal's angle (radian).
-    mode : ndarray (n, 5, 5)
-        Modes as columns, orthonormal after scaling by the inertia's Cholesky factor.
-    share : ndarray (n, 5, 5)
-        Shares of the components (last axis) in the kinetic energy of the modes (second).
-    """
-
-    normal: Floats
-    velocity: Floats
-    slope: Floats
-    curvature: Floats
+    normal: Floats  # angles, (n,), degrees
+    velocity: Floats  # c_n, (n, 5), length/time
+    slope: Floats  # its derivative with respect to the normal's angle (radian), (n, 5)
+    curvature: Floats  # its second derivative, (n, 5)
+    # Modes as columns, (n, 5, 5), orthonormal after scaling by the inertia's Cholesky factor.
     mode: Floats
-    share: Floats
+    share: Floats  # of the components (last axis) in the kinetic energy of the modes, (n, 5, 5)
 
 
 def sheets(medium: Medium, normal: Floats) -> Sheets:
-    """Solve L(n) a = c_n^2 M a, with derivatives by perturbation.
-
-    Parameters
-    ----------
-    medium : Medium
-    normal : ndarray (n,)
-        Degrees.
-
-    Raises
-    ------
-    StudyError
-        If the velocities are out of the floating-point range.
-    """
+    """Solve L(n) a = c_n^2 M a, with derivatives by perturbation, for normals in degrees, (n,)."""
     with np.errstate(all="ignore"):
         root = np.linalg.inv(np.linalg.cholesky(medium.inertia))
         operators = [root @ matrix @ root.T for matrix in _stiffness(medium, normal)]
@@ -86,18 +62,10 @@ def sheets(medium: Medium, normal: Floats) -> Sheets:
 
 
 def match_modes(before: Floats, after: Floats) -> tuple[NDArray[np.intp], Floats]:
-    """Match modes of neighbouring normals.
+    """Match modes of neighbouring normals; the modes are columns, (n, 5, 5).
 
-    Parameters
-    ----------
-    before, after : ndarray (n, 5, 5)
-        Modes as columns.
-
-    Returns
-    -------
-    tuple of ndarray
-        Indices in `after` of the modes that continue those of `before`, (n, 5), and the smallest
-        squared scalar product of such a pair, (n,), at most 1.
+    Indices in `after` of the modes that continue those of `before`, (n, 5), and the smallest
+    squared scalar product of such a pair, (n,), at most 1.
     """
     likeness = (before.transpose(0, 2, 1) @ after) ** 2
     pairs = likeness[:, np.arange(5), _ORDERS]
@@ -106,20 +74,10 @@ def match_modes(before: Floats, after: Floats) -> tuple[NDArray[np.intp], Floats
 
 
 def track_branch(medium: Medium, first: float, last: float) -> NDArray[np.intp]:
-    """Match the sheets of two normals, bisecting the step as necessary.
+    """Match the sheets of two close normals in degrees, (5,), bisecting the step as necessary.
 
     Sheets that approach each other without crossing exchange their modes within a small angle;
     sheets that cross keep them.
-
-    Parameters
-    ----------
-    medium : Medium
-    first, last : float
-        Two normals close to each other, degrees.
-
-    Returns
-    -------
-    ndarray (5,)
     """
     before, after = sheets(medium, np.array([first, last])).mode
     place, likeness = match_modes(before[None], after[None])
@@ -131,16 +89,9 @@ def track_branch(medium: Medium, first: float, last: float) -> NDArray[np.intp]:
 
 
 def assigned(share: Floats) -> NDArray[np.intp]:
-    """Assign a mode to each component so that the sum of the shares is largest.
+    """Assign a mode to each component, (5,), so that the sum of the shares is largest.
 
-    Parameters
-    ----------
-    share : ndarray (5, 5)
-        Shares of the components (columns) in the modes (rows).
-
-    Returns
-    -------
-    ndarray (5,)
+    The components are the columns of `share`, the modes its rows.
     """
     scores = share[_ORDERS, np.arange(5)].sum(axis=1)
     found: NDArray[np.intp] = _ORDERS[best(scores[None])[0]]
