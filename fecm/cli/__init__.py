@@ -24,21 +24,11 @@ from fecm.results.schema import printable
 
 @dataclass(frozen=True)
 class LazyCommand:
-    """A command that is imported when it is called.
+    """A command that is imported when it is called."""
 
-    Attributes
-    ----------
-    module : str
-        Module of the command, which has the command's name there.
-    summary : str
-        Its line in ``fecm --help``.
-    isolated : bool
-        Whether it reads result files and runs in a child process.
-    """
-
-    module: str
-    summary: str
-    isolated: bool = False
+    module: str  # in which it has its name
+    summary: str  # its line in ``fecm --help``
+    isolated: bool = False  # whether it reads result files and runs in a child process
 
 
 COMMANDS = {

@@ -21,7 +21,7 @@ from fecm.sweeps.plan import plan
 COLUMNS = ("model", "peak force", "duration", "threshold", "velocity", "energy")
 
 
-@click.command(short_help="Estimate an impact and its damage threshold.")
+@click.command()
 @click.argument("deck", type=DECK_PATH)
 @FORMAT_OPTION
 def estimate(deck: Path, form: str) -> None:

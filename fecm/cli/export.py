@@ -20,7 +20,7 @@ from fecm.sweeps import csv as sweep_csv
 from fecm.sweeps.result import sweep_of
 
 
-@click.command(short_help="Write tape3, tape8 and tape9 as text.")
+@click.command()
 @click.argument("result", type=DECK_PATH)
 @click.option("-d", "--directory", type=FILE_PATH, default=Path(), metavar="DIR",
               help="Folder for the tapes.  [default: this folder]")  # fmt: skip
@@ -37,7 +37,7 @@ def tapes(result: Path, directory: Path, overwrite: bool) -> None:
         echo(path)
 
 
-@click.command(short_help="Write RESULT for ParaView or a spreadsheet.")
+@click.command()
 @click.argument("result", type=DECK_PATH)
 @click.option("--to", "target", type=click.Choice(["vtkhdf", "csv"]), required=True,
               help="vtkhdf for ParaView and VTK, csv for spreadsheets.")  # fmt: skip

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -13,7 +14,7 @@ from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError, note
 from fecm.cli.indent_curve import curve
 from fecm.cli.laminate_options import laminate_options, ply_of_options
 from fecm.cli.outputs import OutputPaths, outputs
-from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, ListOf
+from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, ListOf, stacked
 from fecm.deck.catalogue import CONTACTS, NU23, SYSTEM, SYSTEMS, NamedPly
 from fecm.deck.model import Indentation
 from fecm.mechanics.contact_law import hertz_coefficient
@@ -25,7 +26,7 @@ from fecm.studies.indentation_test.report import card, lines, notes, plain
 from fecm.studies.indentation_test.table import Test, read_test
 
 
-@click.group(short_help="Indentation tests and the law of contact.")
+@click.group()
 def indent() -> None:
     """Indentation tests and the law of contact (the report's chapter 3)."""
 
@@ -105,39 +106,28 @@ def _units_line(read: Test) -> str:
 # hertz and contacts ------------------------------------------------------------------------------
 
 
-RADIUS = click.option("--radius", type=float, required=True, help="Radius of the sphere.")
-E_S = click.option("--es", "e_s", type=float, required=True, help="Young's modulus of the sphere.")
-NU_S = click.option(
-    "--nus", "nu_s", type=float, required=True, help="Poisson's ratio of the sphere."
+SPHERE = stacked(
+    click.option("--radius", type=float, required=True, help="Radius of the sphere."),
+    click.option("--es", "e_s", type=float, required=True, help="Young's modulus of the sphere."),
+    click.option("--nus", "nu_s", type=float, required=True, help="Poisson's ratio of the sphere."),
 )
-ALPHA_P = click.option("--alpha-p", type=NOT_NEGATIVE, default=0.0, show_default=True,
-                       help="Critical indentation for the card.")  # fmt: skip
-S_P = click.option("--s-p", type=Finite(0.0, 1.0, max_open=True), default=0.0, show_default=True,
-                   help="Slope of permanent indentation for the card.")  # fmt: skip
-Q = click.option("--q", type=POSITIVE, default=1.5, show_default=True,
-                 help="Unloading power for the card; 1.5 is elastic.")  # fmt: skip
+CARD = stacked(
+    click.option("--alpha-p", type=NOT_NEGATIVE, default=0.0, show_default=True,
+                 help="Critical indentation for the card."),
+    click.option("--s-p", type=Finite(0.0, 1.0, max_open=True), default=0.0, show_default=True,
+                 help="Slope of permanent indentation for the card."),
+    click.option("--q", type=POSITIVE, default=1.5, show_default=True,
+                 help="Unloading power for the card; 1.5 is elastic."),
+)  # fmt: skip
 
 
 @indent.command()
-@RADIUS
-@E_S
-@NU_S
+@SPHERE
 @click.option("--et", "e_t", type=float, required=True,
               help="Young's modulus of the laminate through its thickness.")  # fmt: skip
-@ALPHA_P
-@S_P
-@Q
+@CARD
 @FORMAT_OPTION
-def hertz(
-    radius: float,
-    e_s: float,
-    nu_s: float,
-    e_t: float,
-    alpha_p: float,
-    s_p: float,
-    q: float,
-    form: str,
-) -> None:
+def hertz(radius: float, e_s: float, nu_s: float, e_t: float, form: str, **card: Any) -> None:
     """Print the EXPE card of a sphere in Hertzian contact, with k of equation 3-2.
 
     All values are in one system of units.  By default the law is elastic.
@@ -148,7 +138,7 @@ def hertz(
         raise click.UsageError(str(error)) from None
     if not 0.0 < k < math.inf:
         raise click.UsageError("k is not a finite number: check radius and moduli, and their units")
-    law = Indentation(float(f"{k:.6g}"), alpha_p, s_p, q)
+    law = Indentation(float(f"{k:.6g}"), **card)
     if form == "json":
         click.echo(json.dumps({"k": k, "card": law.text()}))
     else:
@@ -159,12 +149,8 @@ def hertz(
 @laminate_options(required=True)
 @click.option("--nu23", type=Finite(), help="Poisson's ratio of the ply across the fibres.  "
                                             "[default: the named ply's, or 0.4]")  # fmt: skip
-@RADIUS
-@E_S
-@NU_S
-@ALPHA_P
-@S_P
-@Q
+@SPHERE
+@CARD
 @FORMAT_OPTION
 def estimate(
     layup: Sequence[float],
@@ -176,10 +162,8 @@ def estimate(
     radius: float,
     e_s: float,
     nu_s: float,
-    alpha_p: float,
-    s_p: float,
-    q: float,
     form: str,
+    **card: Any,
 ) -> None:
     """Estimate k of a laminate from its elastic constants, and print its EXPE card.
 
@@ -196,7 +180,7 @@ def estimate(
         k, by_e2 = (hertz_coefficient(radius, e_s, nu_s, e) for e in (modulus, constants.e2))
     except ValueError as error:
         raise click.UsageError(str(error)) from None
-    law = Indentation(float(f"{k:.6g}"), alpha_p, s_p, q)
+    law = Indentation(float(f"{k:.6g}"), **card)
     if form == "json":
         values = {"k": k, "modulus": modulus, "k_by_e2": by_e2, "card": law.text()}
         click.echo(json.dumps(values))

@@ -68,21 +68,11 @@ switch = _State()
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a child.
+    """Limits of a child."""
 
-    Attributes
-    ----------
-    memory : int
-        Bytes.
-    call : float
-        Time of one call of a library (s).
-    total : float
-        Processor time of the command (s).
-    """
-
-    memory: int
-    call: float
-    total: float
+    memory: int  # bytes
+    call: float  # time of one call of a library (s)
+    total: float  # processor time of the command (s)
 
 
 def limits_for(size: int, free: int | None) -> Limits:
@@ -123,10 +113,7 @@ def fork() -> None:
 def reads(*names: str) -> Callable[[Command], Command]:
     """Put limits on a command when it runs in a child process.
 
-    Parameters
-    ----------
-    *names : str
-        Parameters that are the files to read: a path, or a tuple of paths.
+    The parameters of these names are the files to read: a path, or a tuple of paths.
     """
 
     def decorate(function: Command) -> Command:
@@ -244,18 +231,7 @@ def _watch(child: int, pipe: int, received: Sequence[int]) -> tuple[dict[str, An
     """Wait until a child closes its pipe; kill it if it hangs, or after a signal.
 
     Silence is counted in waits instead of seconds: a stop of both processes (Ctrl-Z) is one wait.
-
-    Parameters
-    ----------
-    child, pipe : int
-        Process id, and file descriptor.
-    received : sequence of int
-        Signals that this process has received.
-
-    Returns
-    -------
-    tuple
-        What the child said about its job, and whether it was killed because it hung.
+    The result is what the child said about its job, and whether it was killed because it hung.
     """
     job: dict[str, Any] | None = None
     start, silent, hangs = b"", 0, False

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import click
 
-from fecm.cli.types import POSITIVE, Finite, ListOf, Parsed, file_of
+from fecm.cli.types import POSITIVE, Decorated, Finite, ListOf, Parsed, file_of, stacked
 from fecm.deck.catalogue import MATERIALS, SYSTEMS, NamedPly, read_plies
 from fecm.deck.findings import Findings
 from fecm.deck.layup import parse_layup
@@ -17,8 +17,6 @@ from fecm.mechanics.laminate import Laminate
 from fecm.problem.build import laminate_of
 from fecm.problem.check_material import check_material
 
-Decorated = Callable[..., None]
-
 # Key of the plies of --materials among the values of a context.
 _META = "fecm.plies"
 
@@ -27,7 +25,7 @@ PLIES = file_of(read_plies)
 
 def laminate_options(*, required: bool) -> Callable[[Decorated], Decorated]:
     """Add ``--layup``, ``--ply-thickness``, ``--ply``, ``--material`` and ``--units``."""
-    options = (
+    return stacked(
         click.option("--layup", type=Parsed(parse_layup), required=required, metavar="LAYUP",
                      help='Layup from the struck face, as in "[0/45/0/-45/0]2s".'),
         click.option("--ply-thickness", type=POSITIVE, required=required, metavar="T",
@@ -43,13 +41,6 @@ def laminate_options(*, required: bool) -> Callable[[Decorated], Decorated]:
                      help="in-lbf-s, m-N-s or mm-N-s: names the units, and converts a named ply "
                           "to them.  [default for a named ply: its source's]"),
     )  # fmt: skip
-
-    def decorate(function: Decorated) -> Decorated:
-        for option in reversed(options):
-            function = option(function)
-        return function
-
-    return decorate
 
 
 def _own(context: click.Context, _: click.Parameter, plies: dict[str, NamedPly] | None) -> None:

@@ -13,10 +13,9 @@ import click
 
 from fecm._files import check_outputs
 from fecm.cli.common import FILE_PATH, RefusedError, note, writing
+from fecm.cli.types import Decorated, stacked
 from fecm.plot.kinds import MISSING, SUFFIXES, Picture
 from fecm.plot.pictures import save
-
-Decorated = Callable[..., None]
 
 STANDARD_OUTPUT = Path("-")
 
@@ -41,9 +40,7 @@ def outputs(source: str = "", *, table: bool = True) -> Callable[[Decorated], De
         ) -> None:
             function(**values, targets=OutputPaths(output, picture, overwrite, values.get(source)))
 
-        for option in (_OVERWRITE, _PLOT, *([_OUTPUT] if table else [])):
-            option(command)
-        return command
+        return stacked(*([_OUTPUT] if table else []), _PLOT, _OVERWRITE)(command)
 
     return decorate
 

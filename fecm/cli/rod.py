@@ -42,7 +42,7 @@ class _PulseGroup(click.Group):
         return super().parse_args(ctx, args)
 
 
-@click.group(cls=_PulseGroup, short_help="The rod of the projectile by itself.")
+@click.group(cls=_PulseGroup)
 def rod() -> None:
     """The projectile's rod by itself: response to a pulse, filters, calibration.
 

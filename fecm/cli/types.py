@@ -11,6 +11,19 @@ from typing import Any
 
 import click
 
+Decorated = Callable[..., None]
+
+
+def stacked(*options: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
+    """Add several options to a command, in this order on its help page."""
+
+    def decorate(function: Decorated) -> Decorated:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return decorate
+
 
 class Finite(click.FloatRange):
     """A float in a range; never infinite, never NaN."""
@@ -36,28 +49,15 @@ NOT_NEGATIVE = Finite(min=0.0)
 
 
 class ListOf(click.ParamType):  # type: ignore[type-arg]
-    """A tuple of values with a separator between them.
+    """A tuple of values of a type, in any number but 0 or in one of the admissible `counts`.
 
-    Parameters
-    ----------
-    form : str
-        How the values are written, for messages: ``X,Y``.
-    item : click.ParamType
-        Type of each value.
-    counts : sequence of int
-        Admissible numbers of values; by default any but 0.
-    separator : str
-        Regular expression.
+    The form, as in ``X,Y``, is for messages; the separator is a regular expression.
     """
 
     name = "list"
 
     def __init__(
-        self,
-        form: str,
-        item: Any,
-        counts: Sequence[int] = (),
-        separator: str = ",",
+        self, form: str, item: Any, counts: Sequence[int] = (), separator: str = ","
     ) -> None:
         self._form = form
         self._item = item

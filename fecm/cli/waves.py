@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,16 @@ from fecm.cli.common import DECK_PATH, RefusedError, note
 from fecm.cli.decks import load_valid
 from fecm.cli.laminate_options import laminate_of_options, laminate_options
 from fecm.cli.outputs import OutputPaths, outputs
-from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, ListCommand, ListOf, Parsed, joined
+from fecm.cli.types import (
+    NOT_NEGATIVE,
+    POSITIVE,
+    Finite,
+    ListCommand,
+    ListOf,
+    Parsed,
+    joined,
+    stacked,
+)
 from fecm.deck.units import unit_names
 from fecm.mechanics.laminate import Laminate
 from fecm.problem.build import laminate_of_deck
@@ -47,17 +55,15 @@ def _wavelengths(text: str) -> tuple[float, ...]:
     return (*(first + n * step for n in range(count - 1)), last)
 
 
-def _shared(function: Callable[..., None]) -> Callable[..., None]:
-    """Add the argument and the options of all three commands."""
-    shear_factor = click.option(
-        "--shear-factor", type=POSITIVE, default=1.0, metavar="F", show_default=True,
-        help="Factor of the transverse shear stiffness, in addition to a deck's SHEA; with "
-             "pi^2/12 = 0.822467 the cut-off frequencies are exact.",
-    )  # fmt: skip
-    for decorate in (outputs("deck"), shear_factor, laminate_options(required=False)):
-        function = decorate(function)
-    return click.argument("deck", type=DECK_PATH, required=False)(function)
-
+# The argument and the options of all three commands.
+_SHARED = stacked(
+    click.argument("deck", type=DECK_PATH, required=False),
+    laminate_options(required=False),
+    click.option("--shear-factor", type=POSITIVE, default=1.0, metavar="F", show_default=True,
+                 help="Factor of the transverse shear stiffness, in addition to a deck's SHEA; "
+                      "with pi^2/12 = 0.822467 the cut-off frequencies are exact."),
+    outputs("deck"),
+)  # fmt: skip
 
 STEP = click.option("--step", type=POSITIVE, default=5.0, show_default=True, metavar="DEG",
                     help="Angle between two normals, degrees.")  # fmt: skip
@@ -96,7 +102,7 @@ def _normals(step: float) -> list[float]:
 # Commands ----------------------------------------------------------------------------------------
 
 
-@click.group(short_help="Waves in a laminate.")
+@click.group()
 def waves() -> None:
     """Waves in the laminate of a DECK, or of a layup: the report's chapter 2, for any laminate."""
 
@@ -108,7 +114,7 @@ def waves() -> None:
 @click.option("--wavelengths", type=Parsed(_wavelengths), default="0.1:20:200",
               show_default=True, metavar="FROM:TO:N",
               help="N wavelengths at equal distances, in thicknesses.")  # fmt: skip
-@_shared
+@_SHARED
 def dispersion(
     angles: tuple[float, ...], wavelengths: tuple[float, ...], targets: OutputPaths, **shared: Any
 ) -> None:
@@ -137,7 +143,7 @@ def dispersion(
 
 @waves.command()
 @STEP
-@_shared
+@_SHARED
 def speeds(step: float, targets: OutputPaths, **shared: Any) -> None:
     """Normal velocities of the five wave fronts (figures 2.7, 2.8)."""
     _bound(360.0 / step)
@@ -165,7 +171,7 @@ def speeds(step: float, targets: OutputPaths, **shared: Any) -> None:
               help="Radius of the circular fronts at time 0.  [default: the thickness]",
               )  # fmt: skip
 @STEP
-@_shared
+@_SHARED
 def fronts(
     times: tuple[float, ...], radius: float | None, step: float, targets: OutputPaths, **shared: Any
 ) -> None:
