@@ -57,13 +57,7 @@ class Estimate:
 
 
 def estimate(problem: Problem) -> Estimate:
-    """Estimate the impact of a checked problem.
-
-    Raises
-    ------
-    StudyError
-        If nothing hits the plate.
-    """
+    """Estimate the impact of a checked problem; without an impact, raise a StudyError."""
     contact = problem.contact
     if contact is None:
         raise StudyError("the deck has no impact: RODP in the program, with ROD and EXPE")

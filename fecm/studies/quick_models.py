@@ -34,16 +34,8 @@ def inelasticity(
 ) -> float:
     """Zener's parameter lambda = k^0.4 V^0.2 M^0.6/(8 sqrt(m D*)).
 
-    Parameters
-    ----------
-    mass, velocity : float
-        Of the projectile.
-    k : float
-        Contact coefficient, force/length^1.5.
-    plate_mass : float
-        Mass per area.
-    rigidity : float
-        Effective bending stiffness D*, force*length.
+    M and V are of the projectile, m is the plate's mass per area, k the contact coefficient in
+    force/length^1.5, and D* the effective bending stiffness in force*length.
     """
     return float(k**0.4 * velocity**0.2 * mass**0.6) / (8.0 * math.sqrt(plate_mass * rigidity))
 
@@ -78,12 +70,7 @@ def infinite_plate(mass: float, velocity: float, k: float, parameter: float) -> 
 def static_plate(mass: float, velocity: float, k: float, stiffness: float) -> QuickImpact:
     """Impact whose energy M V^2/2 is F^2/(2 k_b) in bending and (2/5) F^(5/3)/k^(2/3) in contact.
 
-    Parameters
-    ----------
-    mass, velocity, k : float
-        See :func:`inelasticity`.
-    stiffness : float
-        Static stiffness k_b of the plate under its patch, force/length.
+    k_b is the static stiffness of the plate under its patch, force/length.
     """
     energy = 0.5 * mass * velocity**2
     most = velocity * math.sqrt(stiffness * mass)  # without indentation

@@ -2,8 +2,8 @@
 
 The laminate is replaced by a homogeneous half-space of its effective stiffness; its indentation
 modulus, which takes the place of E_t in equation 3-2, follows from the Barnett-Lothe tensor
-(Vlassak and Nix 1994).  Axes: 3 is the normal of the
-plate; strains in the order 11, 22, 33, 23, 13, 12.
+(Vlassak and Nix 1994).  Axis 3 is the normal of the plate; strains are in the order 11, 22, 33, 23,
+13, 12.
 """
 
 from __future__ import annotations
@@ -26,10 +26,7 @@ _VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 def ply_stiffness(ply: PlyConstants, nu23: float) -> Floats:
     """Three-dimensional stiffness of a transversely isotropic ply in its own axes, (6, 6).
 
-    Raises
-    ------
-    StudyError
-        If the compliance is not positive definite, or the ply is a fabric.
+    A fabric, or a compliance that is not positive definite, is a StudyError.
     """
     nu12, e1, e2 = ply.nu12, ply.e1, ply.e2
     if e2 > 0.5 * e1 and ply.g12 < 0.25 * e2:
@@ -66,11 +63,6 @@ def effective_stiffness(
     """Stiffness of the homogeneous solid with the laminate's averages, (6, 6).
 
     In-plane strains and out-of-plane stresses are those of all plies.
-
-    Raises
-    ------
-    StudyError
-        As :func:`ply_stiffness`.
     """
     share = np.array(thicknesses) / np.sum(thicknesses)
     own = ply_stiffness(ply, nu23)

@@ -31,16 +31,6 @@ class Filter:
     kind: str
     rise: float  # time from 10 to 90 % of the step response (10 us in Table 4.1)
 
-    @property
-    def time_constant(self) -> float:
-        """T of a first-order filter: rise / ln 9."""
-        return self.rise / math.log(9.0)
-
-    @property
-    def window(self) -> float:
-        """W of a moving average: rise / 0.8."""
-        return self.rise / 0.8
-
     def __call__(self, time: Floats, values: Floats) -> Floats:
         """Filter values, (rows,) or (rows, columns), at increasing times."""
         columns = values.reshape(len(time), -1)
@@ -49,7 +39,8 @@ class Filter:
         return np.asarray(filtered.reshape(values.shape))
 
     def _first_order(self, time: Floats, x: Floats) -> Floats:
-        r = np.maximum(np.diff(time) / self.time_constant, 1e-300)
+        time_constant = self.rise / math.log(9.0)
+        r = np.maximum(np.diff(time) / time_constant, 1e-300)
         decay = np.exp(-r)
         mean = -np.expm1(-r) / r  # of exp(-t/T) over the interval
         driven = (mean - decay) * x[:-1] + (1.0 - mean) * x[1:]
@@ -59,24 +50,18 @@ class Filter:
         return np.array(y)
 
     def _moving_average(self, time: Floats, x: Floats) -> Floats:
-        dt = np.diff(time)
+        window, dt = self.rise / 0.8, np.diff(time)
         slope = np.concatenate(([0.0], np.diff(x) / dt))  # towards each sample
         integral = np.concatenate(([0.0], np.cumsum((x[:-1] + x[1:]) / 2.0 * dt)))
         # The first sample inside the window, and its distance from the start of the window.
-        first = np.searchsorted(time, time - self.window, side="right").clip(max=np.arange(len(x)))
-        inside = time[first] - time + self.window
+        first = np.searchsorted(time, time - window, side="right").clip(max=np.arange(len(x)))
+        inside = time[first] - time + window
         part = inside * (x[first] - slope[first] * inside / 2.0)
-        return np.asarray((integral - integral[first] + part) / self.window)
+        return np.asarray((integral - integral[first] + part) / window)
 
 
 def filter_of(text: str) -> Filter:
-    """Parse a filter: ``first-order:10e-6`` or ``moving-average:10e-6``.
-
-    Raises
-    ------
-    StudyError
-        If the kind is unknown, or the rise time is not a positive number.
-    """
+    """Parse ``first-order:10e-6`` or ``moving-average:10e-6``; anything else is a StudyError."""
     kind, _, rise = text.partition(":")
     if kind not in KINDS:
         raise StudyError(f"unknown filter {text}; use {USAGE}")

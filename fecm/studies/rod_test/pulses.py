@@ -60,19 +60,9 @@ def table_pulse(times: Floats, forces: Floats) -> Pulse:
 
 
 def pulse_of(text: str) -> Pulse:
-    """Parse a pulse.
+    """Parse ``gauss:F0,TAU,B``, ``sine:F0,B``, or the path of a CSV file of time and force.
 
-    Parameters
-    ----------
-    text : str
-        ``gauss:F0,TAU,B``, ``sine:F0,B``, or the path of a CSV file of time and force.
-
-    Raises
-    ------
-    StudyError
-        If the text has none of these forms, a width is not positive, or the table is invalid.
-    OSError
-        If the file cannot be read.
+    Anything else, a width that is not positive, and an invalid table are a StudyError.
     """
     kind, colon, rest = text.partition(":")
     if not colon or kind not in FORMS:
