@@ -47,26 +47,13 @@ NU23 = 0.4
 
 @dataclass(frozen=True)
 class NamedPly:
-    """A ply with a name.
-
-    Attributes
-    ----------
-    name : str
-    values : dict
-        Constants by :data:`KEYS`, in the units of `system`.
-    system : str
-        A key of :data:`SYSTEMS`.
-    source : str
-        Publication of the constants.
-    assumed : str
-        Values that the source does not give.
-    """
+    """A ply with a name."""
 
     name: str
-    values: dict[str, float]
-    system: str
-    source: str = ""
-    assumed: str = ""
+    values: dict[str, float]  # constants by :data:`KEYS`, in the units of `system`
+    system: str  # a key of :data:`SYSTEMS`
+    source: str = ""  # publication of the constants
+    assumed: str = ""  # values that the source does not give
 
     @property
     def ply(self) -> Ply:
@@ -165,20 +152,11 @@ COEFFICIENT = "force/length^1.5"
 
 @dataclass(frozen=True)
 class NamedContact:
-    """A contact with a name.
-
-    Attributes
-    ----------
-    name : str
-    law : Indentation
-        Constants in in, lbf and s.
-    source : str
-        Indenter, target and publication.
-    """
+    """A contact with a name."""
 
     name: str
-    law: Indentation
-    source: str
+    law: Indentation  # constants in in, lbf and s
+    source: str  # indenter, target and publication
 
     def converted(self, system: str) -> Indentation:
         """Constants in a system of units, a key of :data:`~fecm.deck.catalogue.SYSTEMS`."""

@@ -27,19 +27,12 @@ EDGES = ("left", "right", "bottom", "top")
 
 @dataclass(frozen=True)
 class Section:
-    """A run of equally long elements in one direction.
+    """A run of equally long elements in one direction."""
 
-    Attributes
-    ----------
-    start, end : float
-        Coordinates of its ends (length).
-    elements : int
-        Number of elements.
-    """
-
+    # Coordinates of its ends (length).
     start: float
     end: float
-    elements: int
+    elements: int  # number of elements
 
 
 def uniform(length: float, elements: int) -> list[Section]:
@@ -179,14 +172,9 @@ def _edges(sections: Sequence[Section], side: float) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class Grid:
-    """A grid of 9-node elements; node numbers run along x first.
+    """A grid of 9-node elements; node numbers run along x first."""
 
-    Attributes
-    ----------
-    columns, rows : list of Section
-        Sections along x and along y.
-    """
-
+    # Sections along x and along y.
     columns: list[Section]
     rows: list[Section]
 

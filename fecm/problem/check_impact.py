@@ -256,25 +256,15 @@ def check_law(law: Indentation, findings: Findings) -> None:
 
 @dataclass(frozen=True)
 class Resolution:
-    """Resolution of an impact by the mesh.
+    """Resolution of an impact by the mesh."""
 
-    Attributes
-    ----------
-    contact : float
-        Duration of a Hertz contact on a rigid target, 2.94 (5 m v^2/4 k)^(2/5)/v: S. P. Timoshenko
-        and J. N. Goodier, Theory of Elasticity, on the impact of spheres.
-    wave : float
-        Length of the bending wave of that half period, 2 pi (D/(m (pi/contact)^2))^(1/4).
-    side : float
-        Longest side of the elements at the impact node, length.
-    error : float or None
-        Estimated mesh error of the peak force, relative to it; None for elements without mid-side
-        nodes.
-    """
-
+    # Duration of a Hertz contact on a rigid target, 2.94 (5 m v^2/4 k)^(2/5)/v: S. P.
+    # Timoshenko and J. N. Goodier, Theory of Elasticity, on the impact of spheres.
     contact: float
-    wave: float
-    side: float
+    wave: float  # length of the bending wave of that half period, 2 pi (D/(m (pi/contact)^2))^(1/4)
+    side: float  # longest side of the elements at the impact node, length
+    # Estimated mesh error of the peak force, relative to it; None for elements without
+    # mid-side nodes.
     error: float | None
 
     @property

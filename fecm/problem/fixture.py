@@ -10,42 +10,26 @@ CUSTOM = "window:LXxLY,WXxWY"
 
 @dataclass(frozen=True)
 class DropWeight:
-    """What a test standard prescribes besides its fixture, in mm, N, s and t.
+    """What a test standard prescribes besides its fixture, in mm, N, s and t."""
 
-    Attributes
-    ----------
-    mass, radius : float
-        Of the rigid projectile.
-    energy : float
-        Impact energy per thickness, force.
-    thickest, thinnest : float
-        Limits of the laminate's thickness, length.
-    """
-
+    # Mass and radius of the rigid projectile.
     mass: float
     radius: float
-    energy: float
+    energy: float  # impact energy per thickness, force
     thinnest: float
+    # Limits of the laminate's thickness, length.
     thickest: float
 
 
 @dataclass(frozen=True)
 class Fixture:
-    """A plate on the edges of a window in its middle.
-
-    Attributes
-    ----------
-    name : str
-    size, window : tuple of float
-        Sides of the plate and of the window, length.
-    test : DropWeight or None
-        What the standard prescribes; None for a custom fixture.
-    """
+    """A plate on the edges of a window in its middle."""
 
     name: str
+    # Sides of the plate and of the window, length.
     size: tuple[float, float]
     window: tuple[float, float]
-    test: DropWeight | None = None
+    test: DropWeight | None = None  # what the standard prescribes; None for a custom fixture
 
     @property
     def comment(self) -> str:

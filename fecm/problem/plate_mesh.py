@@ -39,24 +39,12 @@ class MeshError(FecmError, ValueError):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PlateMesh:
-    """Quadrilaterals of 4 or 9 nodes, counter-clockwise in the deck's order.
+    """Quadrilaterals of 4 or 9 nodes, counter-clockwise in the deck's order."""
 
-    Attributes
-    ----------
-    points : ndarray (numnp, 2)
-        Coordinates, length.
-    cells : ndarray (numel, 4) or (numel, 9)
-        Nodes of the elements, from 0.
-    groups : dict
-        Nodes by the name of a group, from 0.
-    middles : ndarray
-        Nodes put in the middles of straight sides, from 0.
-    """
-
-    points: Floats
-    cells: Integers
-    groups: dict[str, Integers]
-    middles: Integers
+    points: Floats  # coordinates, length
+    cells: Integers  # nodes of the elements, from 0
+    groups: dict[str, Integers]  # nodes by the name of a group, from 0
+    middles: Integers  # nodes put in the middles of straight sides, from 0
 
     def __repr__(self) -> str:
         return f"<{self.nodes} nodes, {self.elements} elements, groups {list(self.groups)}>"

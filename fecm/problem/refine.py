@@ -22,7 +22,6 @@ from fecm.mechanics.mesh import Ints, Mesh
 _SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))
 _ALONG = (0, 1, 0, 1)
 # The other one's value on the side.
-_AT = (-1.0, 1.0, 1.0, -1.0)
 
 
 class RefineError(FecmError, ValueError):
