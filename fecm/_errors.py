@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 
 class FecmError(Exception):
     """Base class of all errors that fecm raises on purpose.
@@ -17,3 +19,8 @@ class FecmError(Exception):
 
 class FecmWarning(UserWarning):
     """A reason to doubt a deck or the result of a run."""
+
+
+def warn(text: str) -> None:
+    """Warn with a :class:`FecmWarning` of the caller's caller."""
+    warnings.warn(FecmWarning(text), stacklevel=3)

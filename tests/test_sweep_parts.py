@@ -55,7 +55,7 @@ def test_cases_lost_with_their_workers_are_not_stored_as_finished(
     made: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def attempt(task: Task) -> Outcome:
-        return run(task) if task.number else Outcome.failed(list(task.numbers), [LOST])
+        return run(task) if task.number else Outcome.failed(dict.fromkeys(task.numbers, LOST))
 
     monkeypatch.setattr(schedule, "attempt", attempt)
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())

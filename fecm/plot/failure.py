@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from fecm._errors import warn
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Material
 from fecm.mechanics.element_groups import element_blocks
@@ -22,7 +23,7 @@ from fecm.mechanics.elements.quadrature import Quadrature
 from fecm.mechanics.failure import CRITERIA
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.plot.data import deck_of, mesh_of, require, struck
-from fecm.plot.kinds import Picture, PlotError, warn
+from fecm.plot.kinds import Picture, PlotError
 from fecm.plot.meshes import draw_circle
 from fecm.plot.style import COLOURS, IN_ORDER, WIDTHS, Scale, colour_bar, legend, panels, scale_of
 from fecm.problem.build import rules

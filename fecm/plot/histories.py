@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from fecm._errors import warn
 from fecm.deck.model import Material
 from fecm.plot.data import (
     LARGEST,
@@ -21,7 +22,7 @@ from fecm.plot.data import (
     require,
     strain_points,
 )
-from fecm.plot.kinds import Picture, PlotError, warn
+from fecm.plot.kinds import Picture, PlotError
 from fecm.plot.style import (
     COLOURS,
     RATIO,

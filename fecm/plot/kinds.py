@@ -5,12 +5,11 @@ Imports no matplotlib: the command line lists the kinds without it.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from fecm._errors import FecmError, FecmWarning
+from fecm._errors import FecmError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,11 +21,6 @@ MISSING = "pictures need matplotlib: pip install 'fecm[plot]'"
 
 class PlotError(FecmError, ValueError):
     """A result lacks what a picture needs, or the options do not fit it."""
-
-
-def warn(text: str) -> None:
-    """Warn with a :class:`FecmWarning`; other warnings come from libraries."""
-    warnings.warn(text, FecmWarning, stacklevel=3)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,14 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.plot.kinds import PlotError, warn
+from fecm._errors import warn
+from fecm.plot.kinds import PlotError
 from fecm.plot.style import COLOURS, Scale, peak, scale
 from fecm.results.metrics import COLUMNS
 from fecm.results.metrics import INTEGERS as WHOLE_NUMBERS
 from fecm.sweeps.cases import INTEGERS as WHOLE_VALUES
 from fecm.sweeps.cases import NAMES
 from fecm.sweeps.outcome import RUN, STILL
-from fecm.sweeps.result import SweepResult
+from fecm.sweeps.result import SweepResult, reasons
 
 Array = NDArray[Any]
 Ints = NDArray[np.intp]
@@ -191,17 +191,11 @@ def _quantity(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
     status, values = sweep["status"][rows], sweep[quantity][rows].astype(float)
     run, still = np.isin(status, RUN), status == STILL
     values = np.where(run, values, np.nan)
-    failed = Counter(status[~run].tolist()).most_common()
     failures = ""
-    if failed:
-        more = ""
-        if len(failed) > 1:
-            more = f", and {len(failed) - 1} other reason{'s' * (len(failed) > 2)}"
-        total = sum(count for _, count in failed)
-        failures = f"{total} of {len(rows)} cases of {name} failed ({failed[0][0]}{more})"
-    open_ends = (
-        f"{int(still.sum())} of {len(rows)} cases of {name} were still in contact at the end"
-    )
+    if not run.all():
+        failed = f"{(~run).sum()} of {len(rows)} cases of {name} failed"
+        failures = f"{failed} ({reasons(status[~run])})"
+    open_ends = f"{still.sum()} of {len(rows)} cases of {name} were still in contact at the end"
     if np.isnan(values).all():
         nothing = f"no case of {name} has a {quantity}"
         if still.any():

@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from fecm._errors import warn
 from fecm._typing import Floats
 from fecm.mechanics.element_groups import element_blocks, element_centres
 from fecm.mechanics.locate import locate
 from fecm.plot.data import Array, circle, mesh_of, on_plate, require, struck
-from fecm.plot.kinds import Picture, PlotError, warn
+from fecm.plot.kinds import Picture, PlotError
 from fecm.plot.style import colours, literal, panels, scale_of
 from fecm.results.plies import Plies, rows_at
 from fecm.results.result import Result

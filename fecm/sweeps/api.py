@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import pickle
 import sys
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from pathlib import Path
 from typing import Any, Literal
 
-from fecm._errors import FecmWarning
+from fecm._errors import warn
 from fecm.api import LoadedDeck, Progress, load_deck
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
@@ -22,11 +21,6 @@ from fecm.sweeps.plan import Build, Measure, Plan, Task, check_memory, plan, tas
 from fecm.sweeps.result import SweepResult, result_of, save
 from fecm.sweeps.schedule import Done, Idle, lost, on_dask, on_executor, on_workers, run_serial
 from fecm.sweeps.store import DamagedPartError, PartialResults
-
-
-def warn(text: str) -> None:
-    """Warn with a :class:`FecmWarning`."""
-    warnings.warn(FecmWarning(text), stacklevel=3)
 
 
 def problem_of(deck: str | Path | Deck) -> Problem:

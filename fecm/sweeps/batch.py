@@ -43,7 +43,7 @@ from fecm.simulation.run import simulate
 from fecm.sweeps.cases import Case, CasesError, name_fault
 from fecm.sweeps.clock import Clock, with_time_step
 from fecm.sweeps.find import search
-from fecm.sweeps.outcome import RUN, Outcome, merge, status_of
+from fecm.sweeps.outcome import RUN, Outcome, merge, outcome_of
 from fecm.sweeps.plan import (
     ADVANCED,
     THRESHOLD,
@@ -96,7 +96,7 @@ def run(task: Task) -> Outcome:
                 else _found(numbers, decks, _force(checked, task.until), runs)
             )
     if lost:
-        parts.append(Outcome.failed(list(lost), list(lost.values())))
+        parts.append(Outcome.failed(lost))
     outcome = merge(parts)
     return outcome if task.history else replace(outcome, force=None)
 
@@ -112,7 +112,7 @@ def _in_full(task: Task, number: int, case: Case) -> Outcome:
                 raise CasesError("build: the units of the deck are not those of the other cases")
         return _alone(number, checked, task.measure, case)
     except CasesError as error:
-        return Outcome.failed([number], [str(error)])
+        return Outcome.failed({number: str(error)})
 
 
 def built(build: Build, case: Case) -> LoadedDeck:
@@ -170,11 +170,8 @@ def _runs(checked: Problem) -> Runs:
 
 def _force(checked: Problem, until: float | str) -> float:
     """Peak force to reach."""
-    return (
-        float(until)
-        if checked.threshold is None or until != THRESHOLD
-        else (checked.threshold.force)
-    )
+    threshold = _threshold(checked)
+    return float(until) if threshold is None or until != THRESHOLD else threshold
 
 
 def _found(numbers: list[int], decks: list[Deck], force: float, runs: Runs) -> Outcome:
@@ -189,7 +186,7 @@ def _found(numbers: list[int], decks: list[Deck], force: float, runs: Runs) -> O
     found = search([deck.require(Impact).velocity for deck in decks], force, peaks)
     pairs = [(case, v) for case, v in enumerate(found) if isinstance(v, float)]
     reasons = {numbers[case]: v for case, v in enumerate(found) if isinstance(v, str)}
-    parts = [Outcome.failed(list(reasons), list(reasons.values()))]
+    parts = [Outcome.failed(reasons)]
     if pairs:
         outcome = runs([numbers[case] for case, _ in pairs], at(pairs), True)
         velocity = np.array([v for _, v in pairs])
@@ -205,7 +202,7 @@ def _found(numbers: list[int], decks: list[Deck], force: float, runs: Runs) -> O
                     f"no peak force of {force:.6g}: from velocity {velocity[row]:.6g} on it is "
                     f"{peak[row]:.6g}, and below it jumps or the run ends before its peak"
                 )
-            parts.append(Outcome.failed([outcome.numbers[row]], [text]))
+            parts.append(Outcome.failed({outcome.numbers[row]: text}))
     return merge(parts)
 
 
@@ -316,14 +313,8 @@ def _together(
     back = np.argsort(order)
     force = np.ascontiguousarray(found.force.T[back])
     unsettled = found.unconverged_steps[back]
-    columns = {
-        **{name: values[back] for name, values in summary.items()},
-        "status": status_of(force.T),
-        "dt": np.full(len(numbers), dt),
-        "steps": np.full(len(numbers), steps, dtype=np.int64),
-        "unsettled": unsettled,
-    }
-    outcome = Outcome(numbers, columns, force)
+    columns = {name: values[back] for name, values in summary.items()}
+    outcome = outcome_of(numbers, columns, force, dt, unsettled)
     doubtful = np.flatnonzero(~(error[back] < ENERGY_WARNING) | (unsettled > 0))
     if not (judged and len(doubtful)):
         return outcome
@@ -431,7 +422,7 @@ def _alone(
     try:
         simulation = simulate(checked, sink)
     except (DivergenceError, ArithmeticError) as error:
-        return Outcome.failed([number], [str(error)])
+        return Outcome.failed({number: str(error)})
     force, times = sink.arrays["history/force"], sink.arrays["history/time"]
     indentation = sink.arrays["history/indentation"]
     largest = np.maximum(indentation.max(keepdims=True), 0.0)
@@ -441,14 +432,9 @@ def _alone(
     permanent = values.get("permanent_indentation", 0.0)
     found = Indentation(largest, indentation[-1:], np.array([permanent]))
     summary = summarise(force[:, None], times, found, mass, np.array([speed]), _threshold(checked))
-    columns = {
-        **summary,
-        "status": status_of(force[:, None]),
-        "dt": np.array([simulation.state.dt]),
-        "steps": np.array([len(force)]),
-        "unsettled": np.array([values.get("unsettled_steps", 0)]),
-    }
+    unsettled = np.array([values.get("unsettled_steps", 0)])
+    outcome = outcome_of([number], summary, force[None], simulation.state.dt, unsettled)
     if measure is not None:
         result = Result(sink.arrays, sink.texts, sink.groups)
-        columns |= _measured(measure, result, case or {})
-    return Outcome([number], columns, force[None])
+        outcome.columns |= _measured(measure, result, case or {})
+    return outcome

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -51,13 +51,13 @@ class Outcome:
         return Outcome([self.numbers[row] for row in rows], columns, force)
 
     @classmethod
-    def failed(cls, numbers: Sequence[int], reasons: Sequence[str]) -> Outcome:
-        """Return the outcome of cases that could not be run."""
-        count = len(numbers)
+    def failed(cls, reasons: Mapping[int, str]) -> Outcome:
+        """Return the outcome of cases that could not be run, from the reasons by their numbers."""
+        count, texts = len(reasons), list(reasons.values())
         columns: dict[str, NDArray[Any]] = {name: np.full(count, np.nan) for name in SUMMARY}
-        columns |= {"status": np.array(reasons, dtype=np.str_), "dt": np.full(count, np.nan)}
+        columns |= {"status": np.array(texts, dtype=np.str_), "dt": np.full(count, np.nan)}
         columns |= {name: np.zeros(count, dtype=np.int64) for name in ("steps", "unsettled")}
-        return cls(list(numbers), columns)
+        return cls(list(reasons), columns)
 
 
 def merge(parts: Sequence[Outcome]) -> Outcome:
@@ -81,6 +81,12 @@ def merge(parts: Sequence[Outcome]) -> Outcome:
     return Outcome([numbers[i] for i in order], columns, force[order])
 
 
-def status_of(force: Floats) -> NDArray[np.str_]:
-    """Return the status of cases from their contact forces (steps, cases)."""
-    return np.where(force[-1] > 0.0, STILL, FINE)
+def outcome_of(
+    numbers: list[int], summary: Mapping[str, Floats], force: Floats, dt: float,
+    unsettled: NDArray[np.int64],
+) -> Outcome:  # fmt: skip
+    """Return the outcome of cases that were run with one time step; `force` is (cases, steps)."""
+    cases, steps = force.shape
+    status = np.where(force[:, -1] > 0.0, STILL, FINE)
+    about = status, np.full(cases, dt), np.full(cases, steps, dtype=np.int64), unsettled
+    return Outcome(numbers, {**summary, **dict(zip(ABOUT, about, strict=True))}, force)

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from fecm.results.hdf5_reader import Contents
 
 
+Array = NDArray[Any]
 # Letters of the names in the lines of the summary.
 WORDS = 18
 # Reasons of failure that the summary lists.
@@ -53,10 +54,10 @@ def summary(result: SweepResult) -> list[str]:
             lines.append(
                 f"{size} {word:{16 - len(size)}} {found}{f' ({values})' if values else ''}"
             )
-    reasons = Counter(result["status"][~fine].tolist())
-    for reason, times in reasons.most_common(LISTED):
+    failed = Counter(result["status"][~fine].tolist())
+    for reason, times in failed.most_common(LISTED):
         lines.append(f"failed            {times}: {reason}")
-    if (others := len(reasons) - LISTED) > 0:
+    if (others := len(failed) - LISTED) > 0:
         lines.append(f"failed            for {others} other reason{'s' * (others > 1)}")
     return lines
 
@@ -65,6 +66,13 @@ def verdict(result: SweepResult) -> str:
     """Count the cases, the failures, and the cases with doubtful results."""
     found = ", ".join(f"{count} {what}" for count, what in _counts(result))
     return f"{len(result)} case{'' if len(result) == 1 else 's'}: {found or 'all ok'}"
+
+
+def reasons(status: Array) -> str:
+    """The most common reason of failure, and the number of others."""
+    (first, _), *others = Counter(status.tolist()).most_common()
+    more = f", and {len(others)} other reason{'s' * (len(others) > 1)}" if others else ""
+    return f"{first}{more}"
 
 
 def _counts(result: SweepResult) -> list[tuple[int, str]]:
@@ -78,8 +86,6 @@ def _counts(result: SweepResult) -> list[tuple[int, str]]:
     )
     return [(count, what) for count, what in counts if count]
 
-
-Array = NDArray[Any]
 
 # Physical dimensions of the values, and of the stored force.
 DIMENSIONS = {
@@ -164,11 +170,8 @@ class SweepResult:
     def notes(self) -> tuple[str, ...]:
         """Numbers of cases that failed or whose results are doubtful."""
         texts = [f"{count} of {len(self)} cases {what}" for count, what in _counts(self)]
-        reasons = Counter(self["status"][~self.fine].tolist()).most_common()
-        if reasons:
-            texts[-1] += f": {reasons[0][0]}"
-        if others := len(reasons[1:]):
-            texts[-1] += f", and {others} other reason{'s' * (others > 1)}"
+        if not self.fine.all():
+            texts[-1] += f": {reasons(self['status'][~self.fine])}"
         return tuple(texts)
 
     def unit(self, name: str) -> str:

@@ -59,8 +59,7 @@ def attempt(task: Task) -> Outcome:
     try:
         return run(task)
     except Exception as error:  # a failed case must not end the sweep
-        reason = f"{type(error).__name__}: {error}"
-        return Outcome.failed(task.numbers, [reason] * len(task.numbers))
+        return Outcome.failed(dict.fromkeys(task.numbers, f"{type(error).__name__}: {error}"))
 
 
 def run_serial(tasks: Sequence[Task], done: Done, idle: Idle) -> None:
@@ -121,7 +120,7 @@ def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> Non
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
     for task in left.values():
-        done(task, Outcome.failed(task.numbers, [LOST] * len(task.numbers)))
+        done(task, Outcome.failed(dict.fromkeys(task.numbers, LOST)))
 
 
 def _check_address(address: str) -> None:
@@ -191,7 +190,7 @@ def on_executor(tasks: Sequence[Task], executor: Executor, done: Done, idle: Idl
             outcome = future.result()
         except Exception as error:
             reason = f"{LOST} ({type(error).__name__}: {' '.join(str(error).split())})"
-            outcome = Outcome.failed(task.numbers, [reason] * len(task.numbers))
+            outcome = Outcome.failed(dict.fromkeys(task.numbers, reason))
         done(task, outcome)
 
 

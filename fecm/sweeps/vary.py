@@ -86,7 +86,10 @@ def _free_in_plane(deck: Deck) -> Deck:
     return replace(deck, segments=segments)
 
 
-def _swap(deck: Deck, old: Segment, new: Segment) -> Deck:
+def _swap(deck: Deck, old: Segment | None, new: Segment) -> Deck:
+    """Replace a segment, or add one."""
+    if old is None:
+        return replace(deck, segments=(*deck.segments, new))
     segments = tuple(new if segment is old else segment for segment in deck.segments)
     return replace(deck, segments=segments)
 
@@ -128,8 +131,6 @@ def _rod(deck: Deck, name: str, value: Value) -> Deck:
             new = replace(new, density=number)
         else:
             new = replace(new, density=rod.density * number / rod.total_mass)
-    if old is None:
-        return replace(deck, segments=(*deck.segments, new))
     return _swap(deck, old, new)
 
 
@@ -137,10 +138,7 @@ def _patch(deck: Deck, name: str, value: Value) -> Deck:
     """Change the contact patch; add the segment if the deck has none."""
     old = deck.last(Patch)
     field: dict[str, Any] = {_PATCH[name]: float(value), "source": None}
-    new = replace(old or Patch(), **field)
-    if old is None:
-        return replace(deck, segments=(*deck.segments, new))
-    return _swap(deck, old, new)
+    return _swap(deck, old, replace(old or Patch(), **field))
 
 
 def _ply(deck: Deck, name: str, value: Value) -> Deck:
