@@ -89,11 +89,7 @@ def _longest_side(result: Result) -> float:
 
 
 def line(
-    results: Results,
-    *,
-    times: Sequence[float] = (),
-    along: str = "x",
-    width: str = "column",
+    results: Results, *, times: Sequence[float] = (), along: str = "x", width: str = "column"
 ) -> Picture:
     """Deflection along a line through the impact point; of several results, one graph per time.
 

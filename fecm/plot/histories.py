@@ -270,11 +270,7 @@ def strain(
 
 
 def _strains(
-    result: Result,
-    name: str,
-    at: Sequence[tuple[float, float]],
-    gages: Sequence[float],
-    face: str,
+    result: Result, name: str, at: Sequence[tuple[float, float]], gages: Sequence[float], face: str
 ) -> dict[str, Array]:
     """Histories of one result, by point and direction."""
     columns = require(result, name, "tape8/kappa_x", "tape8/kappa_y", "tape8/kappa_xy")

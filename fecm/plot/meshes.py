@@ -31,11 +31,7 @@ def supports(result: Result) -> dict[str, Bools]:
     w, rotations = held[:, 0], held[:, 1:]
     clamped = w & rotations.all(axis=1)
     clamped &= ~_corners(result["mesh/elements"], w, clamped)
-    return {
-        "clamped": clamped,
-        "w held": w & ~clamped,
-        "rotation held": ~w & rotations.any(axis=1),
-    }
+    return {"clamped": clamped, "w held": w & ~clamped, "rotation held": ~w & rotations.any(axis=1)}
 
 
 def _corners(elements: Array, w: Bools, full: Bools) -> Bools:
@@ -61,10 +57,7 @@ def draw_circle(axes: Axes, result: Result, name: str, **style: Any) -> list[Lin
 
 
 def mesh(
-    results: Mapping[str, Result],
-    *,
-    at: Sequence[tuple[float, float]] = (),
-    width: str = "column",
+    results: Mapping[str, Result], *, at: Sequence[tuple[float, float]] = (), width: str = "column"
 ) -> Picture:
     """Elements, supports, impact point, contact patch, and points to mark (`at`)."""
     ((name, result),) = results.items()

@@ -113,10 +113,7 @@ def draw(
     from fecm.plot.style import RC
 
     settings: Any = RC if style is None else style
-    with (
-        matplotlib.rc_context(settings),
-        _errors_as_one(f"{kind} of {' and '.join(results)}"),
-    ):
+    with matplotlib.rc_context(settings), _errors_as_one(f"{kind} of {' and '.join(results)}"):
         return _function(kind)(results, **options)
 
 

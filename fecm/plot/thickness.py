@@ -95,10 +95,7 @@ def thickness(
 
 
 def _chosen(
-    result: Result,
-    name: str,
-    at: Sequence[tuple[float, float]],
-    times: Sequence[float],
+    result: Result, name: str, at: Sequence[tuple[float, float]], times: Sequence[float]
 ) -> tuple[Plies, int]:
     """Plies of one element at one time, and the number of the point in it, from 0."""
     if len(at) > 1 or len(times) > 1:

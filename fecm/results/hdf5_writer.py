@@ -185,10 +185,7 @@ def writing(path: Path, *, overwrite: bool = True) -> Iterator[FileSink]:
 @contextlib.contextmanager
 def new_hdf5(path: Path, *, overwrite: bool = True) -> Iterator[tuple[h5py.File, _Guarded]]:
     """Open an HDF5 file for writing; see :func:`writing`."""
-    with (
-        beside(path, overwrite=overwrite) as partial,
-        partial.open("w+b", buffering=0) as raw,
-    ):
+    with beside(path, overwrite=overwrite) as partial, partial.open("w+b", buffering=0) as raw:
         guarded = _Guarded(raw)
         with h5py.File(guarded, "w") as file:
             try:
