@@ -193,10 +193,9 @@ def strain_points(result: Result, name: str) -> Floats:
     elements, _ = mesh_of(result, name)
     at_nodes = result.tape8.attributes.get("location") == "nodes"
     try:
-        places = points_of(result, 1 + np.arange(len(elements)), stored.shape[2], at_nodes)
+        return points_of(result, 1 + np.arange(len(elements)), stored.shape[2], at_nodes)
     except ResultFileError as error:
         raise PlotError(f"{name}: {error}") from None
-    return np.stack(places, axis=-1)
 
 
 def on_plate(points: Floats, at: Floats, name: str) -> None:

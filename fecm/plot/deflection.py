@@ -15,9 +15,9 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 from fecm._typing import Floats
-from fecm.plot.data import Array, Patches, impact_point, patches, require, stored_rows, struck
+from fecm.plot.data import Array, Patches, impact_point, patches, require, stored_rows
 from fecm.plot.kinds import Picture, PlotError
-from fecm.plot.meshes import draw_circle
+from fecm.plot.meshes import mark_impact
 from fecm.plot.style import (
     IN_ORDER,
     RATIO,
@@ -144,14 +144,8 @@ def contour(results: Results, *, times: Sequence[float] = (), width: str = "colu
     columns = min(len(rows), 2 if width == "column" else 4)
     height, wide = np.ptp(cut.points[:, 1]), np.ptp(cut.points[:, 0])
     lines = math.ceil(len(rows) / columns)
-    figure, axes = panels(
-        width,
-        lines,
-        columns,
-        sharex=True,
-        sharey=True,
-        ratio=float(np.clip(height / wide, 0.3, 2.0)) + 0.65 * columns / lines / WIDTHS[width],
-    )
+    ratio = float(np.clip(height / wide, 0.3, 2.0)) + 0.65 * columns / lines / WIDTHS[width]
+    figure, axes = panels(width, lines, columns, sharex=True, sharey=True, ratio=ratio)
     fields = [cut.values(row) for row in w]
     peak = float(np.abs(fields).max()) or 1.0  # may exceed the nodal values
     levels = MaxNLocator(LEVELS).tick_values(np.min(fields), np.max(fields))
@@ -161,8 +155,7 @@ def contour(results: Results, *, times: Sequence[float] = (), width: str = "colu
         norm = Normalize(-peak, peak)
         fills.append(ax.tricontourf(triangles, values, levels, cmap=SIGNED, norm=norm))
         fills[-1].set(edgecolor="face", linewidth=0.2)  # hides white seams
-        ax.plot(*struck(result, name).T, "+", color="black", ms=4, mew=0.6, clip_on=False)
-        draw_circle(ax, result, name, color="black")
+        mark_impact(ax, result, name)
         ax.set_title(f"time {clock.show(float(result['tape3/time'][row]))}", loc="left")
         ax.set_aspect("equal")
     for ax in axes[-columns:]:
@@ -206,9 +199,8 @@ class _Plate:
             axis.pane.set_visible(False)
             axis._axinfo["grid"]["linewidth"] = 0.3
         axes.tick_params(pad=-3.0)
+        axes.locator_params(nbins=5)
         axes.locator_params(axis="z", nbins=4)
-        axes.locator_params(axis="x", nbins=5)
-        axes.locator_params(axis="y", nbins=5)
 
     def _at(self, values: Floats) -> Floats:
         heights = values[self._cut.quads]
@@ -252,17 +244,10 @@ def _plates(
     for ax in axes[count:]:
         ax.set_axis_off()
     plates = [_Plate(ax, cut, place, length, span) for ax in axes[:count]]
-    locator = MaxNLocator(5)
     bar = colour_bar(
-        axes,
-        plates[0].collection,
-        length,
-        "Deflection",
-        locator,
-        shrink=0.6,
-        pad=0.0,
-        fraction=0.06,
-    )
+        axes, plates[0].collection, length, "Deflection", MaxNLocator(5),
+        shrink=0.6, pad=0.0, fraction=0.06,
+    )  # fmt: skip
     if span[0] < span[1]:
         bar.ax.set_xlim(span)
     return figure, plates

@@ -18,15 +18,14 @@ from matplotlib.ticker import MaxNLocator
 from fecm._errors import warn
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Material
-from fecm.mechanics.element_groups import element_blocks
 from fecm.mechanics.elements.quadrature import Quadrature
 from fecm.mechanics.failure import CRITERIA
-from fecm.mechanics.interpolation import local_shape_functions
-from fecm.plot.data import deck_of, mesh_of, require, struck
+from fecm.plot.data import deck_of, mesh_of, require
 from fecm.plot.kinds import Picture, PlotError
-from fecm.plot.meshes import draw_circle
+from fecm.plot.meshes import mark_impact
 from fecm.plot.style import COLOURS, IN_ORDER, WIDTHS, Scale, colour_bar, legend, panels, scale_of
 from fecm.problem.build import rules
+from fecm.results.plies import places
 from fecm.results.result import Result
 from fecm.results.summary import LargestExposure, largest_exposures
 
@@ -77,8 +76,7 @@ def failure(results: Mapping[str, Result], *, quantity: str = "", width: str = "
     place = scale_of(results, "length", [corners])
     figure, plate, bars = _axes(corners, max(map(len, found.over_plies.values())), width)
     _map(plate, corners, found)
-    plate.plot(*struck(result, name).T, "+", color="black", ms=4, mew=0.6, clip_on=False)
-    draw_circle(plate, result, name, color="black")
+    mark_impact(plate, result, name)
     plate.plot(found.worst.x, found.worst.y, clip_on=False, **LARGEST)
     plate.set_title(_worst(found.worst), loc="left")
     place.name(plate.xaxis, "$x$")
@@ -123,12 +121,8 @@ def _exposures(result: Result, name: str, quantity: str) -> Exposures:
 
 def _worst(worst: LargestExposure) -> str:
     """Text of the largest exposure: value, criterion, mode and ply."""
-    plies = (
-        f"plies {worst.ply} and {worst.ply + 1}"
-        if worst.criterion == BETWEEN
-        else (f"ply {worst.ply}")
-    )
-    return f"{worst.exposure:.4g} ({worst.criterion.replace('_', ' ')}): {worst.mode}, {plies}"
+    criterion = worst.criterion.replace("_", " ")
+    return f"{worst.exposure:.4g} ({criterion}): {worst.mode}, {worst.plies}"
 
 
 def _cells(result: Result, name: str, count: int) -> Floats:
@@ -144,13 +138,7 @@ def _cells(result: Result, name: str, count: int) -> Floats:
     right, upper = np.array([0, 1, 1, 0]), np.array([0, 0, 1, 1])
     xi, eta = bounds[column[:, None] + right].ravel(), bounds[row[:, None] + upper].ravel()
     grid = Quadrature(xi, eta, np.zeros(len(xi)))  # points only; nothing is integrated
-    elements, coordinates = mesh_of(result, name)
-    found = np.empty((len(elements), count, 4, 2))
-    for family in element_blocks(elements, coordinates):
-        N = local_shape_functions(family, grid)[0]
-        places = np.einsum("pn,eni->epi", N, family.coordinates)
-        found[family.rows] = places.reshape(-1, count, 4, 2)
-    return found
+    return places(*mesh_of(result, name), grid).reshape(-1, count, 4, 2)
 
 
 def outline(cells: Floats) -> Floats:

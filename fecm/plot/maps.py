@@ -197,13 +197,11 @@ def _finish_curves(axes: Axes, over: Axis, shown: Axis, levels: list[float]) -> 
 
 def _name_axes(axes: Axes, x: Axis, y: Axis | None) -> None:
     """Label the axes; counts have ticks at integers only."""
-    x.scale.name(axes.xaxis, x.label)
-    if x.whole:
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    if y is not None:
-        y.scale.name(axes.yaxis, y.label)
-        if y.whole:
-            axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    for axis, shown in ((axes.xaxis, x), (axes.yaxis, y)):
+        if shown is not None:
+            shown.scale.name(axis, shown.label)
+            if shown.whole:
+                axis.set_major_locator(MaxNLocator(integer=True))
 
 
 def _text_rows(width: str, over: Axis, more: float) -> Axes:

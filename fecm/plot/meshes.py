@@ -56,6 +56,12 @@ def draw_circle(axes: Axes, result: Result, name: str, **style: Any) -> list[Lin
     return axes.plot(x, y, lw=0.7, **style)
 
 
+def mark_impact(axes: Axes, result: Result, name: str) -> None:
+    """Mark the impact point and the contact patch in black."""
+    axes.plot(*struck(result, name).T, "+", color="black", ms=4, mew=0.6, clip_on=False)
+    draw_circle(axes, result, name, color="black")
+
+
 def mesh(
     results: Mapping[str, Result], *, at: Sequence[tuple[float, float]] = (), width: str = "column"
 ) -> Picture:

@@ -177,14 +177,9 @@ def scale(peak: float, unit: str) -> Scale:
     if base and power + own in _PREFIXES:
         return Scale(10.0**-power, _PREFIXES[power + own] + base)
     text = f"{unit[2:]}⁻¹" if unit.startswith("1/") else unit
-    text = re.sub(r"\^(\d+)(?![\d.])", lambda found: _superscript(found[1]), text)
-    power_of_ten = f"10{_superscript(str(power))} " if power else ""
+    text = re.sub(r"\^(\d+)(?![\d.])", lambda found: found[1].translate(_SUPERSCRIPTS), text)
+    power_of_ten = f"10{str(power).translate(_SUPERSCRIPTS)} " if power else ""
     return Scale(10.0**-power, f"{power_of_ten}{text.replace('*', '·')}".strip())
-
-
-def _superscript(integer: str) -> str:
-    """An integer in superscript."""
-    return integer.translate(_SUPERSCRIPTS)
 
 
 def common_unit(results: Mapping[str, Result], dimension: str) -> str:
@@ -323,10 +318,6 @@ def legend(
 
 def lines_legend(figure: Figure, axes: Axes, title: str = "") -> None:
     """Draw the legend of the labelled lines of axes."""
-    handles = [line for line in axes.get_lines() if not _unlabelled(str(line.get_label()))]
-    legend(figure, handles, [str(line.get_label()) for line in handles], title)
-
-
-def _unlabelled(label: str) -> bool:
-    """Whether a line has no label for the legend."""
-    return label == "_" or label.startswith("_child")
+    named = [(str(line.get_label()), line) for line in axes.get_lines()]
+    named = [(text, line) for text, line in named if text != "_" and not text.startswith("_child")]
+    legend(figure, [line for _, line in named], [text for text, _ in named], title)

@@ -19,6 +19,9 @@ WORDS = {name: name.replace("_", " ").replace("in plane", "in-plane") for name i
 DASHES: tuple[Any, ...] = (
     "-", (0, (5, 1.5)), (0, (1, 1)), (0, (7, 1.5, 1, 1.5)), (0, (7, 1.5, 1, 1.5, 1, 1.5))
 )  # fmt: skip
+_DOT: dict[str, Any] = {
+    "ls": "", "marker": "o", "ms": 3.0, "mfc": "white", "mec": "black", "mew": 0.6
+}  # fmt: skip
 
 
 @styled
@@ -66,12 +69,8 @@ def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
     figure.set_layout_engine("constrained")
     graphs: Any = axes  # polar axes have additional methods
     for place, colour in enumerate(COLOURS[: len(FRONTS)]):
-        graphs[0 if place < 2 else 1].plot(
-            np.deg2rad(fronts.normal),
-            fronts.velocity[:, place],
-            color=colour,
-            label=WORDS[FRONTS[place]],
-        )
+        curve = np.deg2rad(fronts.normal), fronts.velocity[:, place]
+        graphs[0 if place < 2 else 1].plot(*curve, color=colour, label=WORDS[FRONTS[place]])
     for ax, title in zip(graphs, ("In-plane fronts", "Flexural fronts"), strict=True):
         ax.set_title(speed.label(f"{title}: normal velocity"))
         ax.set_rlim(0.0, 1.06 * float(fronts.velocity.max()))
@@ -122,16 +121,6 @@ def fronts_picture(
         labels.append("cusps")
     axes[5].legend(handles, labels, loc="center")
     return Picture(figure)
-
-
-_DOT: dict[str, Any] = {
-    "ls": "",
-    "marker": "o",
-    "ms": 3.0,
-    "mfc": "white",
-    "mec": "black",
-    "mew": 0.6,
-}
 
 
 def _circle(ax: Axes, radius: float) -> None:

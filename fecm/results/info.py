@@ -39,15 +39,10 @@ def describe_groups(contents: Contents) -> list[dict[str, Any]]:
         attributes = dict(contents.groups.get(name, {})) if name else {}
         description = str(attributes.pop("description", ""))
         clock = contents.shapes.get(f"{name}/step", ())
-        groups.append(
-            {
-                "name": name,
-                "description": description,
-                "rows": clock[0] if clock else None,
-                "attributes": attributes,
-                "datasets": sorted(members[name], key=lambda d: _order(DATASETS, d["name"])),
-            }
-        )
+        own = sorted(members[name], key=lambda d: _order(DATASETS, d["name"]))
+        rows = clock[0] if clock else None
+        groups.append({"name": name, "description": description, "rows": rows,
+                       "attributes": attributes, "datasets": own})  # fmt: skip
     return groups
 
 

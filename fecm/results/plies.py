@@ -15,7 +15,7 @@ from fecm._typing import Bools, Floats
 from fecm.deck.model import Deck, Material
 from fecm.deck.reader import Reader
 from fecm.mechanics.element_groups import element_blocks
-from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, gauss, nodal
+from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.results.schema import NotStoredError, ResultFileError, remedy
 
@@ -123,7 +123,8 @@ def plies_of(
     if "g12" in result.slips and ply.e1 == ply.e2:
         g12 = ply.e1 / (2.0 * (1.0 + ply.nu12))
     one, two, shear = (chosen[name] for name in IN_PLANE)
-    x, y = points_of(result, numbers[members], one.shape[2], material.integration.points < 0)
+    place = points_of(result, numbers[members], one.shape[2], material.integration.points < 0)
+    x, y = np.moveaxis(place, -1, 0)
     return Plies(
         step=result["plies/step"][rows], time=times[rows], element=numbers[members], x=x, y=y, z=z,
         angles=np.array([layer.angle for layer in material.layers]),
@@ -157,8 +158,8 @@ def _material(result: Stored, plies: int) -> Material:
     return material
 
 
-def points_of(result: Stored, numbers: Array, count: int, at_nodes: bool) -> tuple[Floats, Floats]:
-    """Coordinates x and y, (m, count) each, of the points of the elements with the numbers (m,).
+def points_of(result: Stored, numbers: Array, count: int, at_nodes: bool) -> Floats:
+    """Places of the points of the elements with the numbers (m,): (m, count, 2).
 
     Of each element these are `count` nodes or Gauss points.  Raises ResultFileError if there is no
     such element or no rule of so many points.
@@ -170,11 +171,16 @@ def points_of(result: Stored, numbers: Array, count: int, at_nodes: bool) -> tup
     if len(numbers) and not 1 <= numbers.min() <= numbers.max() <= len(elements):
         raise ResultFileError(f"elements outside 1 to {len(elements)} have stored values")
     rule = nodal(order) if at_nodes else gauss(order)
-    found = np.empty((2, len(numbers), count))
-    for family in element_blocks(elements[numbers - 1], coordinates):
+    return places(elements[numbers - 1], coordinates, rule)
+
+
+def places(elements: Array, coordinates: Floats, rule: Quadrature) -> Floats:
+    """Places of the points of a rule in elements: (elements, points, 2), length."""
+    found = np.empty((len(elements), len(rule.xi), 2))
+    for family in element_blocks(elements, coordinates):
         N = local_shape_functions(family, rule)[0]
-        found[:, family.rows] = np.einsum("pn,eni->iep", N, family.coordinates)
-    return found[0], found[1]
+        found[family.rows] = np.einsum("pn,eni->epi", N, family.coordinates)
+    return found
 
 
 def rows_at(stored: Floats, times: Sequence[float] | Floats, what: str) -> Ints:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -67,14 +68,18 @@ class LargestExposure:
     y: float
     time: float
 
+    @property
+    def plies(self) -> str:
+        """The ply, or the plies of the interface, in words."""
+        between = self.criterion == "interlaminar"
+        return f"plies {self.ply} and {self.ply + 1}" if between else f"ply {self.ply}"
+
     def line(self, result: Result) -> str:
         """One line of the summary."""
-        place = "interface of plies" if self.criterion == "interlaminar" else "ply"
-        plies = f"{self.ply} and {self.ply + 1}" if self.criterion == "interlaminar" else self.ply
+        where = f"{'interface of ' if self.criterion == 'interlaminar' else ''}{self.plies}"
         return (
-            f"{self.criterion.replace('_', ' '):18}{self.exposure:.4g}: {self.mode}, {place} "
-            f"{plies} at ({self.x:.6g}, {self.y:.6g}), time "
-            f"{_quantity(result, self.time, 'time')}"
+            f"{self.criterion.replace('_', ' '):18}{self.exposure:.4g}: {self.mode}, {where} at "
+            f"({self.x:.6g}, {self.y:.6g}), time {_quantity(result, self.time, 'time')}"
         )
 
 
@@ -94,18 +99,13 @@ def largest_exposures(result: Result) -> list[LargestExposure]:
         if not outside.size or not (outside >= 0.0).any():
             continue
         place = np.unravel_index(int(np.nanargmax(outside)), outside.shape)
-        element, ply = place[0], place[-2] if exposure.ndim > 2 else place[1]
-        at_point = exposure.ndim > 2
+        # (element, point, ply, face), or (element, interface)
+        at, ply = (place[:2], place[2]) if exposure.ndim > 2 else (place[:1], place[1])
+        mode = modes[int(result[f"failure/{name}/mode"][place])]
+        time = float(result[f"failure/{name}/time"][place])
+        centre = float(x[at].mean()), float(y[at].mean())
         found.append(
-            LargestExposure(
-                name,
-                float(exposure[place]),
-                modes[int(result[f"failure/{name}/mode"][place])],
-                int(ply) + 1,
-                float(x[element, place[1]] if at_point else x[element].mean()),
-                float(y[element, place[1]] if at_point else y[element].mean()),
-                float(result[f"failure/{name}/time"][place]),
-            )
+            LargestExposure(name, float(exposure[place]), mode, int(ply) + 1, *centre, time)
         )
     return found
 
@@ -125,10 +125,7 @@ def _quantity(result: Result, value: float, dimension: str) -> str:
 
 def _impact(result: Result) -> list[str]:
     """Lines about forces, contacts, indentation and energy of an impact."""
-
-    def quantity(value: float, dimension: str) -> str:
-        return _quantity(result, value, dimension)
-
+    quantity = partial(_quantity, result)
     force, time = result["history/force"], result["history/time"]
     peak = int(np.argmax(force))
     lines = [f"steps             {len(time)}, up to time {quantity(time[-1], 'time')}"]

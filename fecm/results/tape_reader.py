@@ -87,8 +87,6 @@ def read_tapes(folder: Path) -> TapeText:
             raise ResultFileError(f"{folder}: there is both a {name} and a {name}.txt")
         if not found:
             continue
-        if not found[0].is_file():
-            raise ResultFileError(f"{found[0]}: not a regular file")
         text = _Lines(found[0])
         if not text.lines:
             continue  # opened by the program, but never written

@@ -35,15 +35,11 @@ def fortran_e(value: float) -> str:
     return f"{sign}0.{digits}{mark}".rjust(12)
 
 
-def _lines(numbers: Floats) -> Iterator[str]:
-    """Lines of six numbers; the last line may be shorter."""
-    for start in range(0, len(numbers), 6):
-        yield "".join(map(fortran_e, numbers[start : start + 6].tolist()))
-
-
-def _displacements(result: Result) -> Iterator[str]:
-    for row in result["tape3/w"]:
-        yield from _lines(row)
+def _lines(table: Floats) -> Iterator[str]:
+    """Lines of six numbers; the last line of a row may be shorter."""
+    for row in table:
+        for start in range(0, len(row), 6):
+            yield "".join(map(fortran_e, row[start : start + 6].tolist()))
 
 
 def _strains(result: Result, shears: tuple[str, str]) -> Iterator[str]:
@@ -57,12 +53,6 @@ def _strains(result: Result, shears: tuple[str, str]) -> Iterator[str]:
                 yield f"{element + 1:6d}{point + 1:6d}{text}"
 
 
-def _contact(result: Result) -> Iterator[str]:
-    columns = [result[f"tape9/{name}"] for name in CONTACT]
-    for row in np.stack(columns, axis=-1):
-        yield from _lines(row)
-
-
 def tape_texts(result: Result) -> dict[str, Iterator[str]]:
     """Lines of every tape that the run stored, by name."""
     listing = result.has_listing_tapes
@@ -70,13 +60,13 @@ def tape_texts(result: Result) -> dict[str, Iterator[str]]:
     shears = ("gamma_xz", "gamma_yz") if listing else ("gamma_yz", "gamma_xz")
     texts: dict[str, Iterator[str]] = {}
     if "tape3/w" in result:
-        texts["tape3"] = _displacements(result)
+        texts["tape3"] = _lines(result["tape3/w"])
     if "tape8/kappa_x" in result:
         _require(result, [f"tape8/{name}" for name in (*CURVATURES, *shears)])
         texts[strains] = _strains(result, shears)
     if "tape9/force" in result:
         _require(result, [f"tape9/{name}" for name in CONTACT])
-        texts[contact] = _contact(result)
+        texts[contact] = _lines(np.stack([result[f"tape9/{n}"] for n in CONTACT], axis=-1))
     return dict(sorted(texts.items()))
 
 
