@@ -34,9 +34,10 @@ LINES = 8  # contour lines, approximately
 # Heights of a row of texts, of everything around the rows, and of a colour bar (in).
 ROW, HEAD, BAR = 0.17, 0.75, 0.45
 DASHES = (0, (5, 1.5))
-# Style of a level among curves, and its colour on a map.
+# Style of a level among curves, and its colour and contour lines on a map.
 LEVEL: Any = {"color": "0.2", "linestyle": DASHES, "linewidth": 1.1}
 LEVEL_COLOUR = COLOURS[1]
+CONTOUR: Any = {"colors": LEVEL_COLOUR, "linestyles": [DASHES], "linewidths": 1.2}
 SHADES = 256  # of a colour map
 MARKERS = "osD^vP*"
 
@@ -140,10 +141,7 @@ def _mark_limits(axes: Axes, x: Axis, y: Axis, choice: Choice) -> None:
     elif y.ticks:
         _crossings(axes, grid, 0.0)
     elif grid.values.min() < 0.0 < grid.values.max():
-        axes.contour(
-            grid.x, grid.y, grid.values, [0.0], colors=LEVEL_COLOUR, linestyles=[DASHES],
-            linewidths=1.2,
-        )  # fmt: skip
+        axes.contour(grid.x, grid.y, grid.values, [0.0], **CONTOUR)
 
 
 # One value ---------------------------------------------------------------------------------------
@@ -286,10 +284,7 @@ def _cells(axes: Axes, grid: MapGrid, shown: Axis, levels: list[float], *, rows:
         lines = axes.contour(grid.x, grid.y, grid.values, inner, colors="white", linewidths=0.5)
         axes.clabel(lines, fontsize=6.0, inline_spacing=2, fmt=Multiple(shown.scale.factor))
     if inside := sorted({level for level in levels if low < level < high}):
-        marked = axes.contour(
-            grid.x, grid.y, grid.values, inside, colors=LEVEL_COLOUR,
-            linestyles=[DASHES], linewidths=1.2,
-        )  # fmt: skip
+        marked = axes.contour(grid.x, grid.y, grid.values, inside, **CONTOUR)
         form = Multiple(shown.scale.factor)
         axes.clabel(marked, fontsize=6.0, inline_spacing=2, colors="white", fmt=form)
 

@@ -32,34 +32,18 @@ PACKED = 2000
 
 
 class Contents(Mapping[str, Array]):
-    """Contents of a result file: its datasets by path, read on demand.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    attributes : dict
-        Attributes of the file; a value of an unsupported type is replaced by the type's name.
-    groups : dict of dict
-        Attributes of the groups, by path.
-    shapes : dict
-        Shape of every dataset.
-    dtypes : dict
-        Type of every dataset in native byte order; objects for texts.
-    texts : dict of str
-        Single texts, by path.
-    lists : dict of list of str
-        Datasets of texts, by path; sweeps only.
-    """
+    """Contents of a result file: its datasets by path, read on demand."""
 
     def __init__(self, path: Path, attributes: dict[str, Any]) -> None:
         self.path = path
+        # A value of an unsupported type is replaced by the type's name.
         self.attributes = attributes
+        # All by path: attributes of groups; shapes, and types in native byte order, of datasets.
         self.groups: dict[str, dict[str, Any]] = {}
         self.shapes: dict[str, tuple[int, ...]] = {}
-        self.dtypes: dict[str, np.dtype[Any]] = {}
-        self.texts: dict[str, str] = {}
-        self.lists: dict[str, list[str]] = {}
+        self.dtypes: dict[str, np.dtype[Any]] = {}  # objects for texts
+        self.texts: dict[str, str] = {}  # single texts
+        self.lists: dict[str, list[str]] = {}  # datasets of texts; sweeps only
         self._read: dict[str, Array] = {}
 
     @property
