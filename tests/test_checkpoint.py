@@ -131,6 +131,7 @@ NEXT
 """
 
 
+@pytest.mark.long
 def test_a_run_stopped_between_any_two_macros_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
     text = small(STATIC, mesh=HELD, data=LOADED + DATA_CARDS)
     whole, path = tmp_path / "whole.h5", tmp_path / "stopped.h5"

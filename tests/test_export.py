@@ -67,6 +67,7 @@ def exported(result: Result, name: str) -> list[dict[str, str]]:
 # VTKHDF -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_vtk_reads_every_time_step_as_the_result_holds_it(tmp_path: Path, result: Result) -> None:
     vtk = pytest.importorskip("vtk")
     numpy_support = pytest.importorskip("vtk.util.numpy_support")

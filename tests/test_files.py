@@ -6,6 +6,7 @@ import contextlib
 import errno
 import os
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -278,11 +279,12 @@ def test_tapes_are_replaced_only_when_asked_for_and_all_or_none(
     assert names(folder) == ["d.h5", "d.inp", "tape8", "two.inp"]
     assert call("tapes", "d.h5", "-d", "out").exit_code == 0
 
-    def strains(*_: object) -> list[str]:
+    def strains(*_: object) -> Iterator[str]:
+        yield "a line\n"
         raise OSError(errno.ENOSPC, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("fecm.results.tapes._contact", strains)
+        patch.setattr("fecm.results.tapes._strains", strains)
         assert call("tapes", "d.h5", "--overwrite").exit_code == 2
     assert Path("tape8").read_text() == "precious"
     assert names(folder) == ["d.h5", "d.inp", "out", "tape8", "two.inp"]

@@ -73,6 +73,7 @@ def assert_fair(found: dict[str, Floats]) -> None:
 # What the fit finds ------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_constants_lie_inside_their_errors_as_often_as_they_should() -> None:
     found = deviations(indentation=0.0)
     assert_fair(found)
