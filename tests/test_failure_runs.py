@@ -20,6 +20,9 @@ from fecm.mechanics.laminate import laminate
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import PlyStresses
 from fecm.results.result import Result
+from fecm.results.sinks import MemorySink
+from fecm.simulation.run import simulate
+from fecm.sweeps.plan import without_output
 from tests.builders import nothing, rules, square, table, with_restraints
 from tests.calls import call
 from tests.decks import PROGRAM, small
@@ -154,3 +157,12 @@ def test_interlaminar_exposures_of_elements_without_nine_nodes_are_nan() -> None
     monitor.update(envelope, np.random.default_rng(2).normal(size=(len(coordinates), 5)), 1.0)
     assert np.isnan(envelope.interfaces.exposure).all()
     assert (envelope.plies.exposure > 0.0).any()
+
+
+def test_a_sweep_evaluates_no_criteria_in_its_cases() -> None:
+    (problem,) = fecm.api.load_deck(failing()).problems
+    sink = MemorySink()
+    simulate(replace(problem, program=without_output(problem.program)), sink)
+    groups = {name.split("/")[0] for name in sink.arrays}
+    assert "history" in groups
+    assert not groups & {"failure", "tape3", "tape8"}

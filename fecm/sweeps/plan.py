@@ -155,7 +155,7 @@ def without_output(body: Body) -> Body:
             kept.append(replace(item, body=without_output(item.body)))
         elif item.word == "RODP":
             kept.append(replace(item, value=1e9))
-        elif item.word not in ("DISP", "STRE", "PLYS", "REAC", "EIGE"):
+        elif item.word not in ("DISP", "STRE", "PLYS", "FAIL", "REAC", "EIGE"):
             kept.append(item)
     return tuple(kept)
 
