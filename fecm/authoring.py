@@ -263,35 +263,17 @@ def author(
     if damage:
         damages, more = _damage(named, system)
         notes += more
-    mesh, (x, y) = _mesh(plate, at, None if patch is None else patch.radius)
-    if isinstance(mesh, PlateMesh) and mesh.groups and not plate.supports:
-        doubts.append(
-            f"the plate is free: no group of the mesh has a support, of {', '.join(mesh.groups)}"
-        )
-    node, node_x, node_y = mesh.nearest(x, y)
-    distance = math.hypot(node_x - x, node_y - y)
-    if distance > 1e-9 * max(map(abs, (x, y, node_x, node_y))):
-        asked = "the plate's centre" if at is None else "`at`"
-        if patch is not None and isinstance(mesh, PlateMesh):
-            patch = replace(patch, x=float(f"{x:.6g}"), y=float(f"{y:.6g}"))
-        else:
-            doubts.append(
-                f"the impact point is moved by {distance:.4g}: from {asked} at {x:g}, {y:g} to the "
-                f"nearest node, {node} at {node_x:g}, {node_y:g}"
-            )
-    if isinstance(mesh, Grid) and plate.mesh and not plate.fixture and patch and patch.radius:
-        counts = mesh.across // 2, mesh.up // 2
-        if counts != plate.mesh:
-            doubts.append(
-                f"the mesh has {counts[0]}x{counts[1]} elements instead of {plate.mesh[0]}x"
-                f"{plate.mesh[1]}: their sides at the patch are at most its radius "
-                f"{patch.radius:g}"
-            )
+    mesh, node, patch, moved = _placed(plate, at, patch)
+    doubts += moved
     angles = laminate.angles
     layers = tuple(Layer(n, a, laminate.ply_thickness) for n, a in enumerate(angles, start=1))
     coupled = stiffness_of(ply, angles, [laminate.ply_thickness] * len(angles)).is_coupled
     everywhere = (0, 0, 0, 0, 0) if coupled else (1, 1, 0, 0, 0)
-    window = plate.fixture.window if plate.fixture else None
+    if isinstance(mesh, Grid):
+        window = plate.fixture.window if plate.fixture else None
+        supported = mesh.supported(everywhere, plate.supports, window)
+    else:
+        supported = mesh.supported(everywhere, plate.supports)
     try:
         records = tuple(Gage(n, *map(float, gage)) for n, gage in enumerate(gages, start=1))
     except (TypeError, ValueError):
@@ -300,8 +282,7 @@ def author(
         projectile = projectile_segment(projectile)
     segments = (
         None if shown is None else Units(*SYSTEMS[shown].values()),
-        mesh.coordinates(), mesh.element_cards(),
-        mesh.supported(everywhere, plate.supports, window), projectile,
+        mesh.coordinates(), mesh.element_cards(), supported, projectile,
         Impact(node, 3, 1.0 if velocity is None else velocity), patch,
         Gages(records) if records else None, *damages, law,
         Shear(assumed=True) if shear == MITC else None,
@@ -389,6 +370,38 @@ def _damage(named: NamedPly | None, system: str | None) -> tuple[tuple[Segment, 
         raise ObjectError(f"`damage`: {named.name} has {'; '.join(missing)}")
     notes = [f"{named.name} has {text}" for text in missing]
     return tuple(part for part, _ in parts.values() if part is not None), notes
+
+
+def _placed(
+    plate: Plate, at: Sequence[float] | None, patch: Patch | None
+) -> tuple[Grid | PlateMesh, int, Patch | None, list[str]]:
+    """Mesh, node that is hit, patch, and how they differ from what was asked."""
+    doubts: list[str] = []
+    mesh, (x, y) = _mesh(plate, at, None if patch is None else patch.radius)
+    if isinstance(mesh, PlateMesh) and mesh.groups and not plate.supports:
+        doubts.append(
+            f"the plate is free: no group of the mesh has a support, of {', '.join(mesh.groups)}"
+        )
+    node, node_x, node_y = mesh.nearest(x, y)
+    distance = math.hypot(node_x - x, node_y - y)
+    if distance > 1e-9 * max(map(abs, (x, y, node_x, node_y))):
+        asked = "the plate's centre" if at is None else "`at`"
+        if patch is not None and isinstance(mesh, PlateMesh):
+            patch = replace(patch, x=float(f"{x:.6g}"), y=float(f"{y:.6g}"))
+        else:
+            doubts.append(
+                f"the impact point is moved by {distance:.4g}: from {asked} at {x:g}, {y:g} to the "
+                f"nearest node, {node} at {node_x:g}, {node_y:g}"
+            )
+    if isinstance(mesh, Grid) and plate.mesh and not plate.fixture and patch and patch.radius:
+        counts = mesh.across // 2, mesh.up // 2
+        if counts != plate.mesh:
+            doubts.append(
+                f"the mesh has {counts[0]}x{counts[1]} elements instead of {plate.mesh[0]}x"
+                f"{plate.mesh[1]}: their sides at the patch are at most its radius "
+                f"{patch.radius:g}"
+            )
+    return mesh, node, patch, doubts
 
 
 def _mesh(

@@ -84,9 +84,7 @@ class PlateMesh:
         rows = enumerate((self.cells + 1).tolist(), start=1)
         return Elements(tuple(ElementNodes(n, tuple(nodes), 0) for n, nodes in rows))
 
-    def supported(
-        self, everywhere: Sequence[int], supports: Mapping[str, str], _: object = None
-    ) -> Boundary | None:
+    def supported(self, everywhere: Sequence[int], supports: Mapping[str, str]) -> Boundary | None:
         """BOUN cards; None where nothing is restrained.
 
         Parameters
