@@ -349,7 +349,7 @@ class Contact(Indentation):
             If there is none of this name.
         """
         if name not in CONTACTS:
-            raise ObjectError(f"{name!r} is no named contact: {', '.join(CONTACTS)}")
+            raise ObjectError(f"{name!r} is not a named contact: {', '.join(CONTACTS)}")
         return CONTACTS[name]
 
     @staticmethod

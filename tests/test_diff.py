@@ -291,8 +291,8 @@ def test_the_last_tolerance_that_matches_a_dataset_holds(
     [
         ("rtol = true", "rtol: `True` is not R"),
         ("atol = [1, 2]", "atol: `[1, 2]` is not R"),
-        ('exclude = "tape8"', "exclude is no list of texts"),
-        ("tol = 3", "tol is no table; begin it with [tol]"),
+        ('exclude = "tape8"', "exclude is not a list of texts"),
+        ("tol = 3", "tol is not a table; begin it with [tol]"),
         ("tolerance = 3", "tolerance is unknown; the keys are rtol, atol, exclude and tol"),
         ("rtol 3", "at line 1"),
     ],

@@ -1,4 +1,4 @@
-"""Named plies: strengths and toughness of the catalogue, and files of one's own."""
+"""Named plies: strengths and toughness of the catalogue, and users' files."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_what_a_ply_lacks_is_told_or_refused() -> None:
         assert "--damage" in refused.stderr
 
 
-def test_a_file_of_ones_own_is_used_and_listed(tmp_path: Path) -> None:
+def test_a_users_file_is_used_and_listed(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text('units = "m-N-s"\n' + OWN.replace("1.6e-9", "1600").replace("e3", "e9"))
     made = new("--material", "mine", "--materials", file, "--units", "mm-N-s")
@@ -116,7 +116,7 @@ def test_a_file_of_ones_own_is_used_and_listed(tmp_path: Path) -> None:
         (OWN.replace('"a test"', "7"), "[mine] source: 7 is not a text in quotes"),
         (OWN.replace("E2=9e3\nG12=5e3\n", ""), "[mine] E2 and G12 missing"),
         ('units="psi"\n' + OWN, "[mine] units: 'psi' is none of in-lbf-s, m-N-s, mm-N-s"),
-        ("E1=1\n" + OWN, 'E1 stands in no ply; begin a ply with ["its name"]'),
+        ("E1=1\n" + OWN, 'E1 is outside the table of a ply; begin each ply with ["its name"]'),
         (OWN + "XT 2000", "(at line 8, column 4)"),
         ("", "no plies"),
         ("a=" + "[" * 9000, "recursion"),

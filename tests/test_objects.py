@@ -429,7 +429,7 @@ def test_what_makes_no_deck_is_refused_in_the_words_of_the_call(
         (lambda: fecm.Plate.rectangle((1, 1), (2, 2), grading=0.5), "`grading` is 0.5"),
         (lambda: fecm.Plate.rectangle((1, 1), (2, 2), edges={"up": "free"}), "up=free"),
         (lambda: fecm.Plate.on_fixture("D1"), "'D1' is not a fixture"),
-        (lambda: fecm.Contact.named("cheese"), "'cheese' is no named contact"),
+        (lambda: fecm.Contact.named("cheese"), "'cheese' is not a named contact"),
         (lambda: fecm.Contact.estimate(-1.0), "`radius` is -1.0"),
         (lambda: fecm.impact(PLATE, fecm.Laminate("[0]", "cheese", 1.0)), "no.* named ply"),
         (lambda: fecm.impact(PLATE, PLIES, None, LAW, **QUICK), "give `projectile`"),

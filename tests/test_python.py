@@ -198,7 +198,7 @@ class Bilinear:
         return 0.0
 
 
-def test_a_run_follows_a_law_of_ones_own_and_names_it() -> None:
+def test_a_run_follows_a_users_law_and_stores_its_name() -> None:
     result = fecm.run_one(LONG, law=Bilinear())
     a = np.maximum(result.indentation, 0.0)
     np.testing.assert_allclose(result.force, np.minimum(1e5 * a, 45.0 + 1e4 * a), atol=2e-3)

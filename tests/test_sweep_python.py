@@ -123,7 +123,7 @@ def readings(result: fecm.Result) -> dict[str, float]:
 OWN: dict[str, list[Any]] = {"speed": [50, 100], "kind": ["", "long", "lost", "metric"]}
 
 
-def test_decks_of_ones_own_are_run_as_runs_and_keep_their_names_and_readings(
+def test_built_decks_give_the_results_of_runs_and_keep_names_and_measured_columns(
     tmp_path: Path,
 ) -> None:
     path, seen = tmp_path / "s.h5", list[tuple[int, int]]()

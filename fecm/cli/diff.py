@@ -49,9 +49,9 @@ def _tolerances(text: str) -> dict[str, Any]:
         raise ValueError(f"{min(unknown)} is unknown; the keys are rtol, atol, exclude and tol")
     exclude, own = given.get("exclude", []), given.get("tol", {})
     if not isinstance(exclude, list) or not all(isinstance(name, str) for name in exclude):
-        raise ValueError("exclude is no list of texts")
+        raise ValueError("exclude is not a list of texts")
     if not isinstance(own, dict):
-        raise ValueError('tol is no table; begin it with [tol], and give "NAME" = RTOL')
+        raise ValueError('tol is not a table; begin it with [tol], and give "NAME" = RTOL')
     return {
         **{name: _tolerance(name, [given.get(name, 0.0)])[0] for name in ("rtol", "atol")},
         "exclude": exclude,

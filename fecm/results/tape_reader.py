@@ -76,8 +76,12 @@ class TapeText:
 def read_tapes(folder: Path) -> TapeText:
     """Read tape3, tape8 and tape9 of a folder, with or without ``.txt``; some may be missing.
 
-    Raises ResultFileError if there is no tape, or one is invalid.  Raises OSError if a file can't
-    be opened.
+    Raises
+    ------
+    ResultFileError
+        If the folder has no tape, or a tape is invalid.
+    OSError
+        If a file cannot be opened.
     """
     arrays: dict[str, Array] = {}
     lines = False

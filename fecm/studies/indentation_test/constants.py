@@ -79,8 +79,8 @@ class Cycle:
     alpha_m_recorded: float  # smoothed if noisy
     alpha_0: Estimate  # permanent indentation (length)
     k_1: Estimate  # reloading rigidity, equation 3-12, force/length^1.5
-    # The same from the origin of the first reloading curve; None if there is no reloading, or if
-    # it began without contact, where both are equal.
+    # Like `k_1`, from the origin of the first reloading curve; None without reloading, and if the
+    # reloading began without contact, where both are equal.
     k_1_measured: Estimate | None
 
 
