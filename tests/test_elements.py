@@ -330,6 +330,12 @@ def test_an_element_without_one_of_its_corners_is_named(nodes: list[int], messag
         sorted_elements([1, 2, 3, 4], nodes)
 
 
+def test_the_longest_side_of_a_triangle_is_one_of_its_three() -> None:
+    coordinates = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0], [0.0, 4.0], [100.0, 0.0]])
+    elements = np.array([[1, 2, 3, 0], [1, 2, 3, 4]], dtype=np.int32)
+    assert element_groups.longest_sides(elements, coordinates).tolist() == [5.0, 4.0]
+
+
 def test_shape_functions_of_a_family_come_for_the_nodes_it_has() -> None:
     rule = Quadrature(np.array([0.1, 0.3]), np.array([-0.2, 0.5]), np.ones(2))
     (family,) = sorted_elements([1, 2, 3, 4, 5, 0, 0, 0, 0, 10])

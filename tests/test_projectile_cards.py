@@ -1,4 +1,4 @@
-"""PROJ, SHEA and GAGE: a projectile, a shear correction and strain gages of one's own."""
+"""PROJ, SHEA and GAGE: the projectile, the shear correction and strain gages of the deck."""
 
 from __future__ import annotations
 

@@ -109,7 +109,9 @@ def read_plies(text: str) -> dict[str, NamedPly]:
     units = tables.pop("units", SYSTEM_OF_FILES)
     for name, table in tables.items():
         if not isinstance(table, dict):
-            raise ValueError(f'{name} is outside the table of a ply; begin each ply with ["its name"]')
+            raise ValueError(
+                f'{name} is outside the table of a ply; begin each ply with ["its name"]'
+            )
     if not tables:
         raise ValueError('no plies; begin each with ["its name"]')
     return {name: _ply(name, {"units": units, **table}) for name, table in tables.items()}

@@ -118,3 +118,13 @@ def element_centres(elements: Ints, coordinates: Floats) -> Floats:
     for block in element_blocks(elements, coordinates):
         centres[block.rows] = block.coordinates[:, : block.shape.corners].mean(axis=1)
     return centres
+
+
+def longest_sides(elements: Ints, coordinates: Floats) -> Floats:
+    """Longest side of every element, corner to corner, (numel,)."""
+    longest = np.empty(len(elements))
+    for block in element_blocks(elements, coordinates):
+        corners = block.coordinates[:, : block.shape.corners]
+        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        longest[block.rows] = sides.max(axis=1)
+    return longest

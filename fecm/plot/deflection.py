@@ -15,6 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 from fecm._typing import Floats
+from fecm.mechanics.element_groups import longest_sides
 from fecm.plot.data import Array, Patches, impact_point, patches, require, stored_rows
 from fecm.plot.kinds import Picture, PlotError
 from fecm.plot.meshes import mark_impact
@@ -62,7 +63,8 @@ def profile(result: Result, name: str, along: str, rows: Array) -> tuple[Floats,
     position = np.linspace(*_chord(cut, axis, level), SAMPLES)
     inside = coordinates[on, axis]
     sides = np.diff(inside).max() if len(on) > 2 else math.inf
-    if sides <= 2.0 * _longest_side(result) and np.isclose(np.ptp(inside), np.ptp(position)):
+    longest = longest_sides(result["mesh/elements"], coordinates).max()
+    if sides <= 2.0 * longest and np.isclose(np.ptp(inside), np.ptp(position)):
         return inside, w[:, on]
     points = [position, np.full(SAMPLES, level)]
     triangles = Triangulation(cut.points[:, 0], cut.points[:, 1], cut.triangles)
@@ -81,11 +83,6 @@ def _chord(cut: Patches, axis: int, level: float) -> tuple[float, float]:
     share = a[crossed] / (a[crossed] - b[crossed])
     at = corners[crossed][:, axis] + share * (ends[crossed] - corners[crossed])[:, axis]
     return float(at.min()), float(at.max())
-
-
-def _longest_side(result: Result) -> float:
-    corners = result["mesh/coordinates"][result["mesh/elements"][:, :4] - 1]
-    return float(np.hypot(*np.moveaxis(np.roll(corners, -1, axis=1) - corners, -1, 0)).max())
 
 
 def line(

@@ -291,11 +291,7 @@ def resolution(problem: Problem) -> Resolution | None:
     rigidity = float(min(laminate.D[0, 0], laminate.D[1, 1]))
     wave = 2.0 * np.pi * (rigidity / (laminate.mass * (np.pi / contact) ** 2)) ** 0.25
     touching = (mesh.elements == impact.node).any(axis=1)
-    nodes = mesh.elements[touching, :4]
-    nodes = np.where(nodes == 0, nodes[:, :1], nodes)  # a triangle returns to its first corner
-    corners = mesh.coordinates[nodes - 1]
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    side = float(sides.max())
+    side = float(element_groups.longest_sides(mesh.elements[touching], mesh.coordinates).max())
     if not np.isfinite(wave):
         return None
     quadratic = bool((mesh.elements[touching, 4:8] > 0).all()) and mesh.elements.shape[1] <= 9

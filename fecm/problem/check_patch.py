@@ -6,7 +6,7 @@ import numpy as np
 
 from fecm.deck.findings import Findings
 from fecm.deck.model import Impact, Patch
-from fecm.mechanics.element_groups import element_blocks
+from fecm.mechanics.element_groups import element_blocks, longest_sides
 from fecm.mechanics.locate import locate
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.patch import DISC, HERTZ, RADIUS_PER_THICKNESS, PatchError
@@ -109,10 +109,9 @@ def _held(mesh: Mesh, patch: ContactPatch) -> str:
 
 def _side(mesh: Mesh, patch: ContactPatch) -> float:
     """Longest side of the elements that contain the centre of a patch."""
-    longest = 0.0
-    for family in element_blocks(mesh.elements, mesh.coordinates):
-        members, _, _ = locate(family, np.array([[patch.x, patch.y]]))
-        corners = family.coordinates[members, : family.shape.corners]
-        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-        longest = max(longest, sides.max(initial=0.0))
-    return longest
+    longest = longest_sides(mesh.elements, mesh.coordinates)
+    at = np.array([[patch.x, patch.y]])
+    blocks = element_blocks(mesh.elements, mesh.coordinates)
+    return max(
+        float(longest[block.rows[locate(block, at)[0]]].max(initial=0.0)) for block in blocks
+    )
