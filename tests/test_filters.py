@@ -65,9 +65,61 @@ def test_a_first_order_filter_weakens_a_wave_by_its_transfer_function() -> None:
     assert np.ptp(settled) / 2 == pytest.approx(1 / math.hypot(1.0, w), rel=1e-4)
 
 
-@pytest.mark.parametrize("text", ["", "first-order", "first-order:x", "first-order:0",
+@pytest.mark.parametrize("text", ["", "first-order", "first-order:x", "first-order:0", "cfc:100",
                                   "moving-average:-1", "moving-average:nan", "second:1"],
                          )  # fmt: skip
 def test_what_is_no_filter_is_refused_with_what_one_is(text: str) -> None:
-    with pytest.raises(ValueError, match="first-order:RISE or moving-average:RISE"):
+    with pytest.raises(ValueError, match="first-order:RISE, moving-average:RISE or cfc:CLASS"):
         filter_of(text)
+
+
+@pytest.mark.parametrize("unit", ["s", "ms"])
+@pytest.mark.parametrize("size", [60, 180, 600, 1000])
+def test_a_class_follows_the_corridor_of_sae_j211(size: int, unit: str) -> None:
+    second = {"s": 1.0, "ms": 1e3}[unit]
+    filtered = filter_of(f"cfc:{size}").in_unit(unit)
+    period = 1.0 / size
+    time = np.arange(-8.0 * period, 8.0 * period, 1e-3 * period)
+
+    def gain(frequency: float) -> float:
+        answer = filtered(time * second, np.cos(2.0 * np.pi * frequency * time))
+        return float(20.0 * np.log10(answer[len(time) // 2]))  # also: no delay
+
+    assert abs(gain(0.1 * size)) < 0.01
+    assert -1.0 < gain(size) < 0.5
+    assert -4.0 < gain(5 / 3 * size) < 0.5
+    assert gain(5 / 3 * size) == pytest.approx(20.0 * np.log10(math.sqrt(0.5)), abs=0.03)
+    assert gain(2.0775 * size) == pytest.approx(20.0 * np.log10(0.5), abs=0.03)
+    assert gain(3.5 * size) < -12.0
+
+
+def test_a_class_is_the_recursion_of_the_standard_forward_and_backward() -> None:
+    dt, size = 1e-4, 180.0
+    wa = math.tan(2.0 * math.pi * size * 2.0775 * dt / 2.0)
+    d = 1.0 + math.sqrt(2.0) * wa + wa**2
+    b1, b2 = -2.0 * (wa**2 - 1.0) / d, (-1.0 + math.sqrt(2.0) * wa - wa**2) / d
+    x = np.zeros(1200)
+    x[500:540] = np.hanning(40)
+
+    def passed(x: list[float]) -> list[float]:
+        y = [0.0, 0.0]
+        for n in range(2, len(x)):
+            y.append(wa**2 / d * (x[n] + 2 * x[n - 1] + x[n - 2]) + b1 * y[-1] + b2 * y[-2])
+        return y
+
+    expected = passed(passed(x.tolist())[::-1])[::-1]
+    found = filter_of("cfc:180")(dt * np.arange(1200.0), x)
+    np.testing.assert_allclose(found, np.array(expected), atol=1e-12)
+
+
+@pytest.mark.parametrize(("time", "told"), [
+    ([0.0, 1e-4, 3e-4, 4e-4], "equal time steps"), ([0.0, 1e-3, 2e-3, 3e-3], "10 samples"),
+])  # fmt: skip
+def test_a_class_refuses_samples_that_it_is_not_made_for(time: list[float], told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        filter_of("cfc:180")(np.array(time), np.ones(4))
+
+
+def test_a_class_refuses_a_unit_of_time_that_it_does_not_know() -> None:
+    with pytest.raises(ValueError, match="unit of time is fortnight"):
+        filter_of("cfc:180").in_unit("fortnight")

@@ -28,8 +28,8 @@ from fecm.studies.rod_test.pulse_test import RodHistory, default_time_step, simu
 from fecm.studies.rod_test.pulses import Pulse, pulse_of
 from fecm.studies.tables import read_table
 
-FILTER_HELP = ("first-order:RISE or moving-average:RISE; RISE is the time from 10 to 90 % of the "
-               "step response.")  # fmt: skip
+FILTER_HELP = ("first-order:RISE or moving-average:RISE, with the time RISE from 10 to 90 % of the "
+               "step response; or cfc:60, 180, 600 or 1000 of SAE J211.")  # fmt: skip
 
 
 class _PulseGroup(click.Group):
@@ -115,7 +115,9 @@ def pulse(
         tuple(dict.fromkeys(stations)) or (station,),
         integrator,
     )
-    filtered = None if transducer is None else transducer(history.time, history.forces)
+    filtered = None
+    if transducer is not None:
+        filtered = transducer.in_unit(units.get("time", ""))(history.time, history.forces)
     if targets.picture:
         from fecm.plot.rod import pulse_picture
 
@@ -184,13 +186,13 @@ def filter_(
     column: str | None,
     targets: OutputPaths,
 ) -> None:
-    """Filter a history as a transducer with a rise time does.
+    """Filter a history as a transducer with a rise time does, or by a channel frequency class.
 
     RESULT is a result of `fecm run`, or a CSV with a column of times.  The output is a CSV with the
     columns time, the history, and filtered.
     """
     series = recorded(history, column)
-    filtered = transducer(series.time, series.values)
+    filtered = transducer.in_unit(series.units.get("time", ""))(series.time, series.values)
 
     if targets.picture:
         from fecm.plot.rod import filter_picture

@@ -1,23 +1,33 @@
-"""Filters with a given rise time, which model a transducer.
+"""Filters of measured histories: with a given rise time, which model a transducer, and CFC.
 
 The rise time is the time in which the response to a unit step rises from 0.1 to 0.9.  The filters
 take the history as linear between samples at any spacing, and as constant before the first sample;
 their response at the samples is exact.
+
+Channel frequency classes (CFC) are those of SAE J211-1: two poles forward and two backward, so
+that nothing is delayed.  They need equal time steps, and take the history as constant before the
+first and after the last sample.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fecm._typing import Floats
+from fecm.deck.units import KNOWN
 from fecm.studies import StudyError
 
-FIRST_ORDER, MOVING_AVERAGE = "first-order", "moving-average"
+FIRST_ORDER, MOVING_AVERAGE, CFC = "first-order", "moving-average", "cfc"
 KINDS = (FIRST_ORDER, MOVING_AVERAGE)
-USAGE = "first-order:RISE or moving-average:RISE"
+CLASSES = ("60", "180", "600", "1000")
+USAGE = f"first-order:RISE, moving-average:RISE or cfc:CLASS with the class {', '.join(CLASSES)}"
+# Cut-off frequency of the two poles over the class, and fewest samples in 1/class (SAE J211-1).
+CUT_OFF, SAMPLES = 2.0775, 10
+# Relative difference of time steps that count as equal: of rounded times.
+UNEQUAL = 0.05
 
 
 @dataclass(frozen=True)
@@ -25,21 +35,40 @@ class Filter:
     """A filter of unit static gain.
 
     ``"first-order"`` is T y' + y = x, whose rise time is T ln 9; ``"moving-average"`` is the mean
-    of x over the last W, whose rise time is 0.8 W.
+    of x over the last W, whose rise time is 0.8 W.  ``"cfc"`` weakens sines by 3 dB at 5/3 of the
+    class.
     """
 
     kind: str
-    rise: float  # time from 10 to 90 % of the step response (10 us in Table 4.1)
+    # Time from 10 to 90 % of the step response (10 us in Table 4.1); or the class, 1/time.
+    size: float
+
+    def in_unit(self, time: str) -> Filter:
+        """The same filter for times in a unit; the class of :func:`filter_of` is in Hz.
+
+        Raises
+        ------
+        StudyError
+            If the filter has a class, and the unit is unknown.
+        """
+        if self.kind != CFC or not time:
+            return self
+        if time not in KNOWN["time"]:
+            raise StudyError(
+                f"a class is in Hz, but the unit of time is {time}; s, ms, us are known"
+            )
+        return replace(self, size=self.size * KNOWN["time"][time])
 
     def __call__(self, time: Floats, values: Floats) -> Floats:
         """Filter values, (rows,) or (rows, columns), at increasing times."""
         columns = values.reshape(len(time), -1)
-        apply = self._first_order if self.kind == FIRST_ORDER else self._moving_average
+        kinds = {FIRST_ORDER: self._first_order, MOVING_AVERAGE: self._moving_average}
+        apply = kinds.get(self.kind, self._cfc)
         filtered = np.column_stack([apply(time, column) for column in columns.T])
         return np.asarray(filtered.reshape(values.shape))
 
     def _first_order(self, time: Floats, x: Floats) -> Floats:
-        time_constant = self.rise / math.log(9.0)
+        time_constant = self.size / math.log(9.0)
         r = np.maximum(np.diff(time) / time_constant, 1e-300)
         decay = np.exp(-r)
         mean = -np.expm1(-r) / r  # of exp(-t/T) over the interval
@@ -50,7 +79,7 @@ class Filter:
         return np.array(y)
 
     def _moving_average(self, time: Floats, x: Floats) -> Floats:
-        window, dt = self.rise / 0.8, np.diff(time)
+        window, dt = self.size / 0.8, np.diff(time)
         slope = np.concatenate(([0.0], np.diff(x) / dt))  # towards each sample
         integral = np.concatenate(([0.0], np.cumsum((x[:-1] + x[1:]) / 2.0 * dt)))
         # The first sample inside the window, and its distance from the start of the window.
@@ -59,10 +88,33 @@ class Filter:
         part = inside * (x[first] - slope[first] * inside / 2.0)
         return np.asarray((integral - integral[first] + part) / window)
 
+    def _cfc(self, time: Floats, x: Floats) -> Floats:
+        from scipy.signal import filtfilt
+
+        dt = float(time[-1] - time[0]) / (len(time) - 1)
+        if np.abs(np.diff(time) - dt).max() > UNEQUAL * dt:
+            raise StudyError("a cfc filter needs equal time steps; resample the history")
+        if SAMPLES * self.size * dt > 1.0:
+            raise StudyError(
+                f"a cfc filter needs {SAMPLES} samples or more in the time 1/class, "
+                f"{1 / self.size:g}, and the time step is {dt:g}: take a lower class"
+            )
+        a = math.tan(math.pi * CUT_OFF * self.size * dt)
+        d = 1.0 + math.sqrt(2.0) * a + a**2
+        poles = [1.0, 2.0 * (a**2 - 1.0) / d, (1.0 - math.sqrt(2.0) * a + a**2) / d]
+        pad = math.ceil(2.0 / (self.size * dt))  # until a step has decayed to 1e-8
+        zeros = np.array([1.0, 2.0, 1.0]) * a**2 / d
+        return np.asarray(filtfilt(zeros, poles, np.pad(x, pad, "edge"), padlen=0)[pad:-pad])
+
 
 def filter_of(text: str) -> Filter:
-    """Parse ``first-order:10e-6`` or ``moving-average:10e-6``; anything else is a StudyError."""
+    """Parse ``first-order:10e-6``, ``moving-average:10e-6`` or ``cfc:600``, a class in Hz.
+
+    Anything else is a StudyError.
+    """
     kind, _, rise = text.partition(":")
+    if kind == CFC and rise in CLASSES:
+        return Filter(kind, float(rise))
     if kind not in KINDS:
         raise StudyError(f"unknown filter {text}; use {USAGE}")
     try:

@@ -97,4 +97,6 @@ def _of_table(path: Path, column: str | None) -> TimeHistory:
     others = [name for name in names if name != clock]
     name = found(column or TRANSDUCER) or (others[0] if others else "value")
     columns = table.columns((clock, name), increasing=clock)
-    return TimeHistory(name, columns[clock], columns[name], dimension="")
+    unit = next((u for n, u in zip(names, table.units, strict=True) if n == clock), "")
+    units = {"time": unit} if unit else {}
+    return TimeHistory(name, columns[clock], columns[name], dimension="", units=units)
