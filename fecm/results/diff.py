@@ -46,10 +46,8 @@ CASES = (("case", 0), ("step", 1))
 LINES = (("line", 1), ("column", 1))
 
 SOURCE_NAMES = {
-    FORMAT: "the result of a run",
-    SWEEP: "the result of a sweep",
-    TAPES: "a folder of tapes",
-}
+    FORMAT: "the result of a run", SWEEP: "the result of a sweep", TAPES: "a folder of tapes"
+}  # fmt: skip
 
 # Names of the indices along each size of a dataset; rows are named by their step and time.
 AXES = {size: name for size, (name, _) in SCALES.items()}
@@ -80,53 +78,21 @@ class IncomparableError(FecmError, ValueError):
 Source = Contents | TapeText
 
 
-def open_source(path: Path) -> Source:
-    """Open a result file or a folder of tapes.
-
-    Raises
-    ------
-    ResultFileError
-        If it is neither, or is damaged.
-    OSError
-        If it can't be opened.
-    """
-    return read_tapes(path) if path.is_dir() else read(path, FORMAT, SWEEP)
-
-
 @dataclass
 class Comparison:
-    """One dataset of two sources.
-
-    Attributes
-    ----------
-    path : str
-    sources : tuple of Source
-        A and B.
-    maximum, scale, tolerance : float
-        Largest finite absolute value in both, scale of the differences (`maximum` except for
-        `SCALE_NAMES`), and largest difference of equal numbers.
-    largest : float
-        Largest difference; infinite if only one of two numbers is finite.
-    at : dict or None
-        Its place: ``index``, ``step``, ``time`` and names of other indices; None if all is equal.
-    values : tuple or None
-        The values of A and B there.
-    differing : int
-        Number of differences beyond the tolerance.
-    first : dict or None
-        First row with such a difference, for rows that are instants.
-    """
+    """One dataset of two sources."""
 
     path: str
-    sources: tuple[Source, Source] = field(repr=False)
-    maximum: float = 0.0
-    scale: float = 0.0
-    tolerance: float = 0.0
-    largest: float = 0.0
+    sources: tuple[Source, Source] = field(repr=False)  # A and B
+    maximum: float = 0.0  # largest finite absolute value in both
+    scale: float = 0.0  # of the differences: `maximum` except for `SCALE_NAMES`
+    tolerance: float = 0.0  # largest difference of equal numbers
+    largest: float = 0.0  # largest difference; infinite if only one of two numbers is finite
+    # Its place: index, step, time and names of other indices; None if all is equal.
     at: dict[str, Any] | None = None
-    values: tuple[float, float] | tuple[str, str] | None = None
-    differing: int = 0
-    first: dict[str, Any] | None = None
+    values: tuple[float, float] | tuple[str, str] | None = None  # those of A and B there
+    differing: int = 0  # number of differences beyond the tolerance
+    first: dict[str, Any] | None = None  # first row with one, if the rows are instants
 
     @property
     def shapes(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -170,24 +136,13 @@ class Comparison:
 
 @dataclass
 class Difference:
-    """Outcome of a comparison.
+    """Outcome of a comparison."""
 
-    Attributes
-    ----------
-    compared : list of Comparison
-        Datasets of both sources, by name.
-    only : tuple of list of str
-        Datasets that only A has, and only B.
-    listed : list of dict
-        Attributes and texts that differ, which are not judged: ``name``, ``a``, ``b``, ``line``.
-    excluded : list of str
-        Datasets that were not compared.
-    """
-
-    compared: list[Comparison]
-    only: tuple[list[str], list[str]]
+    compared: list[Comparison]  # datasets of both sources, by name
+    only: tuple[list[str], list[str]]  # datasets that only A has, and only B
+    # Attributes and texts that differ, which are not judged: name, a, b, line.
     listed: list[dict[str, Any]]
-    excluded: list[str]
+    excluded: list[str]  # datasets that were not compared
 
     @property
     def same(self) -> bool:
@@ -204,35 +159,18 @@ def difference(
     exclude: Sequence[str] = (),
     own: Sequence[tuple[str, Sequence[float]]] = (),
 ) -> Difference:
-    """Compare two results.
+    """Compare two results: files, or folders of tapes.
 
-    Parameters
-    ----------
-    a, b : Path
-        Result files or folders of tapes.
-    rtol : float
-        Largest difference of equal numbers as a fraction of the dataset's scale.
-    atol : float
-        Largest difference in the dataset's unit; both are added.
-    only : sequence of str
-        Datasets and groups to compare, or patterns of their names; all by default.
-    exclude : sequence of str
-        Those not to compare.
-    own : sequence of tuple
-        Datasets, groups or patterns, each with ``(rtol,)`` or ``(rtol, atol)`` instead of the
-        general ones; of several that match, the last one holds.
+    Two numbers are equal if they differ by at most `rtol` times the dataset's scale plus `atol` (in
+    its unit).  `only` and `exclude` are datasets, groups, or patterns of their names.  `own` are
+    such names, each with ``(rtol,)`` or ``(rtol, atol)`` instead of the general ones; of several
+    that match, the last one holds.
 
-    Raises
-    ------
-    IncomparableError
-        If only one is the result of a sweep, if `only` matches no dataset of the results, if
-        another pattern matches neither that nor one that a result can have, or if nothing is left.
-    ResultFileError
-        If a file can't be read.
-    OSError
-        If a file can't be opened.
+    Raises IncomparableError if only one is the result of a sweep, if `only` matches no dataset of
+    the results, if another pattern matches neither that nor one that a result can have, or if
+    nothing is left.  Raises ResultFileError if a file can't be read, OSError if it can't be opened.
     """
-    left, right = open_source(a), open_source(b)
+    left, right = (read_tapes(p) if p.is_dir() else read(p, FORMAT, SWEEP) for p in (a, b))
     forms = left.form, right.form
     if left.form != right.form and SWEEP in forms:
         names = " and B ".join(SOURCE_NAMES[form] for form in forms)

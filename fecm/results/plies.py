@@ -6,7 +6,7 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,29 +19,14 @@ from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss,
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.results.schema import NotStoredError, ResultFileError, remedy
 
+if TYPE_CHECKING:
+    from fecm.results.result import Result
+
 Array = NDArray[Any]
 Ints = NDArray[np.intp]
 
 IN_PLANE = ("sigma_1", "sigma_2", "tau_12")
 INTERLAMINAR = ("tau_xz", "tau_yz")
-
-
-class Stored(Protocol):
-    """What is needed of a :class:`~fecm.results.result.Result`."""
-
-    deck: str
-
-    @property
-    def mode(self) -> str:
-        """``"report"`` or ``"listing"``."""
-
-    @property
-    def slips(self) -> tuple[str, ...]:
-        """Names of the active slips."""
-
-    def __getitem__(self, path: str) -> Array: ...
-
-    def __contains__(self, path: str) -> bool: ...
 
 
 @dataclass(frozen=True)
@@ -52,52 +37,30 @@ class Plies:
     ply, (rows, elements, points, plies, 2).  Interlaminar stresses are in the axes of the plate,
     from equilibrium, at the centre of each element and three levels of each ply, (rows, elements,
     plies, 3).  sigma_z is not computed.
-
-    Attributes
-    ----------
-    step, time : ndarray (rows,)
-        Step and time of every row.
-    element : ndarray (elements,)
-        Numbers of the elements.
-    x, y : ndarray (elements, points)
-        Places of the points, length.
-    z : ndarray (plies, 3)
-        Lower, middle and upper z of every ply, from the struck face at -h/2, length.
-    angles : ndarray (plies,)
-        Fibre angles, degrees.
-    under_load : ndarray (elements,)
-        Whether the element is so near to the load that plate theory does not hold.
-    sigma_1, sigma_2, tau_12 : ndarray (rows, elements, points, plies, 2)
-        Stresses along and across the fibres, and shear stress.
-    eps_1, eps_2, gamma_12 : ndarray (rows, elements, points, plies, 2)
-        Strains by the compliance of the ply.
-    tau_xz, tau_yz : ndarray (rows, elements, plies, 3)
-        Interlaminar shear stresses; NaN in elements without nine nodes.
-    residual : ndarray (rows, elements, 2)
-        tau_xz and tau_yz of equilibrium at z = h/2, which were removed linearly in z.
     """
 
-    step: Array
+    step: Array  # (rows,), as `time`
     time: Floats
-    element: Array
-    x: Floats
+    element: Array  # (elements,): numbers
+    x: Floats  # (elements, points), as `y`: places of the points, length
     y: Floats
-    z: Floats
-    angles: Floats
-    under_load: Bools
-    sigma_1: Floats
+    z: Floats  # (plies, 3): lower, middle and upper z, from the struck face at -h/2, length
+    angles: Floats  # (plies,): of the fibres, degrees
+    under_load: Bools  # (elements,): mask of those so near to the load that plate theory fails
+    sigma_1: Floats  # (rows, elements, points, plies, 2): stresses along and across the fibres
     sigma_2: Floats
     tau_12: Floats
-    eps_1: Floats
+    eps_1: Floats  # of the same shape: strains by the compliance of the ply
     eps_2: Floats
     gamma_12: Floats
-    tau_xz: Floats
+    tau_xz: Floats  # (rows, elements, plies, 3); NaN in elements without nine nodes
     tau_yz: Floats
+    # (rows, elements, 2): tau_xz and tau_yz of equilibrium at z = h/2, removed linearly in z.
     residual: Floats
 
 
 def plies_of(
-    result: Stored,
+    result: Result,
     time: float | Sequence[float] | None = None,
     elements: int | Sequence[int] | None = None,
 ) -> Plies:
@@ -135,7 +98,7 @@ def plies_of(
     )  # fmt: skip
 
 
-def model_of(result: Stored) -> Deck:
+def model_of(result: Result) -> Deck:
     """Model of a result's deck.  Raises ResultFileError if the result holds no readable deck."""
     deck = _parsed(result.deck, result.mode == "listing")
     if deck is None:
@@ -150,7 +113,7 @@ def _parsed(text: str, blanks_are_zeros: bool) -> Deck | None:
     return next((problem.deck for problem in problems if problem.deck is not None), None)
 
 
-def _material(result: Stored, plies: int) -> Material:
+def _material(result: Result, plies: int) -> Material:
     """Material of a result's deck, which must have as many layers as there are plies."""
     material = model_of(result).last(Material)
     if material is None or len(material.layers) != plies:
@@ -158,7 +121,7 @@ def _material(result: Stored, plies: int) -> Material:
     return material
 
 
-def points_of(result: Stored, numbers: Array, count: int, at_nodes: bool) -> Floats:
+def points_of(result: Result, numbers: Array, count: int, at_nodes: bool) -> Floats:
     """Places of the points of the elements with the numbers (m,): (m, count, 2).
 
     Of each element these are `count` nodes or Gauss points.  Raises ResultFileError if there is no

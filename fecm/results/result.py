@@ -15,25 +15,8 @@ from fecm._html import html_table
 from fecm._typing import Floats
 from fecm.deck.model import Impact
 from fecm.deck.units import unit_of
-from fecm.results.groups import (
-    Contact,
-    Energy,
-    Failure,
-    GageGroup,
-    History,
-    Ints,
-    LaminateStiffness,
-    Mesh,
-    Modes,
-    PatchGroup,
-    PlyRows,
-    Reactions,
-    Stresses,
-    Tape3,
-    Tape8,
-    Tape9,
-    group,
-)
+from fecm.results import groups
+from fecm.results.groups import Ints
 from fecm.results.metrics import INTEGERS, METRICS, Indentation, summarise
 from fecm.results.schema import (
     DATASETS,
@@ -60,7 +43,7 @@ Array = NDArray[Any]
 HISTORY = "history"
 
 
-class PlyGroup(PlyRows):
+class PlyGroup(groups.PlyRows):
     """The datasets of ``plies``; called, the stresses and strains of some plies."""
 
     def __init__(self, result: Result) -> None:
@@ -98,7 +81,7 @@ class PlyGroup(PlyRows):
         return plies_of(self._result, time, elements)
 
 
-class Result(Contact):
+class Result(groups.Contact):
     """Result of a run.
 
     Every dataset is available as ``result["tape3/w"]`` and ``result.tape3.w``; the columns of the
@@ -127,19 +110,19 @@ class Result(Contact):
     step: Ints
     time: Floats
     plate_w: Floats
-    mesh: Mesh
-    laminate: LaminateStiffness
-    tape3: Tape3
-    tape8: Tape8
-    tape9: Tape9
-    history: History
-    energy: Energy
-    gages: GageGroup
-    stresses: Stresses
-    patch: PatchGroup
-    failure: Failure
-    reactions: Reactions
-    modes: Modes
+    mesh: groups.Mesh
+    laminate: groups.LaminateStiffness
+    tape3: groups.Tape3
+    tape8: groups.Tape8
+    tape9: groups.Tape9
+    history: groups.History
+    energy: groups.Energy
+    gages: groups.GageGroup
+    stresses: groups.Stresses
+    patch: groups.PatchGroup
+    failure: groups.Failure
+    reactions: groups.Reactions
+    modes: groups.Modes
 
     def __init__(
         self,
@@ -414,7 +397,7 @@ class Result(Contact):
             if f"{HISTORY}/{name}" in self._arrays:
                 return self._arrays[f"{HISTORY}/{name}"]
             if any(path.startswith(f"{name}/") for path in self._arrays):
-                return group(name, self._arrays, self._groups)
+                return groups.group(name, self._arrays, self._groups)
             raise NotStoredError(f"there is no {name} in this result")
 
     def __dir__(self) -> list[str]:
