@@ -5,9 +5,11 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -231,3 +233,16 @@ def test_hooks_and_action_call_commands_with_options_that_exist() -> None:
     values = {value for step in action["runs"]["steps"] for value in step.get("env", {}).values()}
     used = {value.split(".")[1].rstrip(" }") for value in values if "inputs." in value}
     assert used == action["inputs"].keys()
+
+
+def test_the_page_of_the_package_index_has_absolute_links_only() -> None:
+    build = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["metadata"]
+    text = readme = (ROOT / "README.md").read_text()
+    for change in build["hooks"]["fancy-pypi-readme"]["substitutions"]:
+        text = re.sub(change["pattern"], change["replacement"], text)
+    links = re.findall(r"(!?)\[[^\]]*\]\(([^)]+)\)", text)
+    assert len(links) == len(re.findall(r"\]\(", readme)) > 30
+    for picture, link in links:
+        where = "raw.githubusercontent.com/fecm/fecm" if picture else "github.com/fecm/fecm/blob"
+        assert link.startswith(f"https://{where}/main/")
+        assert (ROOT / link.partition("/main/")[2]).exists()
