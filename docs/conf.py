@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
+import sys
 from importlib.metadata import version as installed
+from pathlib import Path
 from typing import Any
 
 from latex2mathml.converter import convert
@@ -17,6 +20,8 @@ extensions = [
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx_click",
+    "sphinx_design",
+    "sphinx_gallery.gen_gallery",
 ]
 if os.environ.get("FECM_DOCS_ONLINE"):  # links to the documentation of other projects
     extensions.append("sphinx.ext.intersphinx")
@@ -28,6 +33,7 @@ intersphinx_mapping = {
 }
 
 exclude_patterns = ["schemas"]
+smartquotes_action = "qe"  # keeps two hyphens, those of options
 myst_enable_extensions = ["colon_fence", "dollarmath", "attrs_inline"]
 myst_heading_anchors = 4
 numpydoc_show_class_members = False
@@ -35,14 +41,31 @@ numpydoc_xref_param_type = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 
+sys.path.insert(0, str(Path(__file__).parent))
+sphinx_gallery_conf = {
+    "examples_dirs": "../examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": "",  # all run
+    "within_subsection_order": "scraper.order",
+    "image_scrapers": ("scraper.written_pictures",),
+    "capture_repr": (),
+    "download_all_examples": False,
+    "show_signature": False,
+    "min_reported_time": 60,
+    "write_computation_times": False,
+    "abort_on_example_error": True,
+}
+
 html_theme = "pydata_sphinx_theme"
 html_title = "fecm"
 html_theme_options = {
     "navigation_with_keys": False,
     "show_toc_level": 2,
     "navbar_align": "left",
-    "header_links_before_dropdown": 6,
+    "header_links_before_dropdown": 7,
+    "github_url": "https://github.com/fecm/fecm",
 }
+html_sidebars = {page: [] for page in ("install", "tutorial", "changelog")}  # no pages below them
 html_show_sourcelink = False
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
@@ -60,8 +83,8 @@ def _mathml(self: Any, node: Any) -> None:
 
 
 def _literally(app: Any, context: Any, lines: list[str]) -> None:
-    """Keep bars and stars in help texts from being markup."""
-    lines[:] = [line.replace("|", "\\|").replace("*", "\\*") for line in lines]
+    """Keep bars, stars and addresses in help texts from being markup."""
+    lines[:] = [re.sub(r"[|*]|(?<=:)//", r"\\\g<0>", line) for line in lines]
 
 
 def setup(app: Any) -> None:

@@ -1,4 +1,9 @@
-"""The moving plate as a GIF, and a picture of its largest deflection."""
+"""Animation of the plate
+======================
+
+The report's plate and rod, from objects: the moving plate as a GIF, and its largest deflection.
+Deflections are drawn many times larger than they are.
+"""
 
 import fecm
 
@@ -14,4 +19,7 @@ deck = fecm.impact(
 )
 result = fecm.run_one(deck)
 result.plot("animation", "plate.gif")
+
+# %%
+# One instant, the one with the largest range of deflection unless ``times`` says otherwise:
 result.plot("surface", "plate.png")

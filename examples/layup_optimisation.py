@@ -1,5 +1,10 @@
-"""The angle of [a/-a]4s at which a plate deflects least under an impact, by scipy."""
+"""Optimising a layup
+==================
 
+The angle of a laminate [a/-a]4s at which a plate deflects least under an impact, by SciPy.
+"""
+
+import matplotlib.pyplot as plt
 from scipy.optimize import minimize_scalar
 
 import fecm
@@ -14,12 +19,19 @@ deck = fecm.impact(
     dt=3e-7,  # stable for all angles
     units="mm-N-s",
 )
+tried = {}
 
 
 def deflection(angle):
     """Largest deflection under the load, mm."""
-    return fecm.run_one(deck.with_(layup=f"[{angle:.2f}/{-angle:.2f}]4s")).metrics["max_deflection"]
+    run = fecm.run_one(deck.with_(layup=f"[{angle:.2f}/{-angle:.2f}]4s"))
+    return tried.setdefault(angle, run.metrics["max_deflection"])
 
 
 best = minimize_scalar(deflection, bounds=(0, 90), options={"xatol": 2.0})
 print(f"{best.fun:.4f} mm at {best.x:.0f} degrees; {deflection(0.0):.4f} mm at 0")
+
+figure, ax = plt.subplots(figsize=(5, 3), layout="constrained")
+ax.plot(*zip(*sorted(tried.items()), strict=True), "o")
+ax.set(xlabel="Angle (degrees)", ylabel="Largest deflection (mm)")
+figure.savefig("angles.png")

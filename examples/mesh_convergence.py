@@ -1,4 +1,9 @@
-"""Peak force over the number of elements, with a patch of fixed radius."""
+"""Convergence with the mesh
+=========================
+
+Peak force over the number of elements, under a patch of fixed radius. Under a point force it would
+not converge.
+"""
 
 import fecm
 
@@ -19,3 +24,7 @@ found = fecm.sweep(build=deck_of, vary={"elements": [10, 14, 20]})
 peak = found["peak_force"]
 for elements, force in zip(found["elements"], peak, strict=True):
     print(f"{elements:3.0f} elements a side: {force:.2f} N ({force / peak[-1] - 1:+.2%})")
+
+ax = found.plot("peak_force")
+ax.set(xlabel="Elements a side", ylim=(179, 180))
+ax.figure.savefig("convergence.png")

@@ -1,4 +1,8 @@
-"""A measured force beside the computed one, with peak, impulse, rms and correlation."""
+"""A measurement beside a run
+==========================
+
+A measured force over the computed one, with peak, impulse, rms of the difference and correlation.
+"""
 
 import fecm
 
@@ -9,6 +13,6 @@ found = result.compare(measured)
 print(found)
 print(f"correlation {found.correlation:.4f}")
 
-ax = result.plot("force", overlay=measured)
+ax = result.plot("force", overlay=measured, width="full")
 ax.set_title("115 in/s")
 ax.figure.savefig("overlay.png")

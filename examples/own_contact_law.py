@@ -1,6 +1,12 @@
-"""A contact law of your own: Hertz's law up to a force at which the surface yields."""
+"""A contact law of your own
+=========================
+
+Hertz's law up to a force at which the surface yields, in the place of the deck's law. Any object
+with these four methods is a :class:`law <fecm.mechanics.contact_law.Law>`.
+"""
 
 import fecm
+from fecm.plot.pictures import plot
 
 
 class Yielding:
@@ -24,5 +30,7 @@ class Yielding:
 
 
 deck = fecm.read_one(fecm.examples.path("impact-115.inp"))
-for law in (None, Yielding()):
-    print(f"{fecm.run_one(deck, law=law).force.max():.1f} lbf")
+results = {"deck": fecm.run_one(deck), "yielding": fecm.run_one(deck, law=Yielding())}
+for name, result in results.items():
+    print(f"{name}: {result.force.max():.1f} lbf")
+plot("loop", results, "laws.png")

@@ -1,4 +1,9 @@
-"""Impact on a plate with a hole, on a mesh of Gmsh (needs meshio)."""
+"""A plate with a hole
+===================
+
+Impact beside a hole, on a mesh of Gmsh that comes with the package. Needs meshio:
+``pip install 'fecm[mesh,plot]'``.
+"""
 
 import fecm
 
@@ -17,3 +22,4 @@ deck = fecm.impact(
 result = fecm.run_one(deck)
 print(f"{result.metrics['peak_force']:.0f} N, w {result.metrics['max_deflection']:.4f} mm")
 result.plot("contour", times=(1.2e-4,), path="hole.png")
+result.plot("mesh", path="mesh.png")

@@ -1,5 +1,10 @@
-"""Largest strain along the fibres, ply by ply, away from the load."""
+"""Strains ply by ply
+==================
 
+The largest strain along the fibres of every ply, away from the load.
+"""
+
+import matplotlib.pyplot as plt
 import numpy as np
 
 import fecm
@@ -11,9 +16,13 @@ result = fecm.run_one(text.replace("\nRODP ", "\nPLYS,,20\nRODP "))  # every 20t
 plies = result.plies()
 strain = abs(plies.eps_1)  # rows, elements, points, plies, faces
 away = plies.under_load == 0  # plate theory does not hold under the load
-largest = strain[:, away].max(axis=(0, 1, 2, 4))
-for number, (angle, value) in enumerate(zip(plies.angles, largest, strict=True), start=1):
-    print(f"ply {number:2d} {angle:4.0f} degrees {1e6 * value:6.0f} um/m")
-
+largest = 1e6 * strain[:, away].max(axis=(0, 1, 2, 4))
 row = np.unravel_index(strain[:, away].argmax(), strain[:, away].shape)[0]
-print(f"largest at {1e3 * plies.time[row]:.3f} ms")
+print(f"{largest.max():.0f} um/m at {1e3 * plies.time[row]:.3f} ms")
+
+names = [f"{number} ({angle:.0f}°)" for number, angle in enumerate(plies.angles, start=1)]
+figure, ax = plt.subplots(figsize=(5, 4), layout="constrained")
+ax.barh(names, largest)
+ax.invert_yaxis()
+ax.set(xlabel="Strain along the fibres (µm/m)", ylabel="Ply, from the struck face")
+figure.savefig("strains.png")

@@ -124,12 +124,38 @@ def plot(
     ax: Axes | None = None,
     **options: Any,
 ) -> Axes:
-    """Draw a picture for Python: in a file, on given axes, or else on a new figure of pyplot.
+    """Draw one or more results: in a file, on given axes, or on a new figure of pyplot.
 
-    Files are those of the command line; an existing one is replaced.  On axes and figures of pyplot
-    the user's settings of matplotlib hold.  Returns the picture's first axes.  Raises the errors of
-    :func:`draw`, and PlotError if the picture has several axes and `ax` is given, or `path` and
-    `ax` are.
+    On axes and figures of pyplot the user's settings of matplotlib hold; files are those of the
+    command line.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of picture, such as ``"force"`` or ``"loop"``.
+    results : mapping
+        Results, or one sweep, by the names in the legend.
+    path : str or Path, optional
+        File to write; an existing one is replaced.  The suffix selects the format.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw on.
+    **options
+        Options of the kind.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The picture's first axes.
+
+    Raises
+    ------
+    PlotError
+        If results lack the data, options are invalid, both `path` and `ax` are given, or `ax` is
+        and the picture has several axes.
+
+    Examples
+    --------
+    >>> plot("loop", {"lumped": one, "consistent": other}, "rods.pdf")  # doctest: +SKIP
     """
     if path is not None:
         if ax is not None:
