@@ -21,9 +21,18 @@ from fecm.results import hdf5_writer
 from fecm.simulation.run import simulate
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.batch import deck_of
-from fecm.sweeps.cases import CasesError, Value, grid, parse_until, parse_vary, read_cases
+from fecm.sweeps.cases import (
+    CONTACT,
+    PLATE,
+    CasesError,
+    Value,
+    grid,
+    parse_until,
+    parse_vary,
+    read_cases,
+)
 from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.plan import Plan, Task, check_memory, freed, plan, tasks
+from fecm.sweeps.plan import MEASURES, Plan, Task, check_memory, freed, plan, tasks
 from fecm.sweeps.result import SweepResult, save, summary, verdict
 from fecm.sweeps.schedule import LOST, SchedulerError, address_in
 from fecm.sweeps.store import PartialResults
@@ -32,10 +41,8 @@ from fecm.sweeps.store import PartialResults
 @click.command()
 @click.argument("deck", type=DECK_PATH)
 @click.option("--vary", "varied", type=Parsed(parse_vary), multiple=True, metavar="NAME=VALUES",
-              help="FROM:TO:N or A,B,C; may be repeated, for a full grid.  Names: velocity, k, "
-                   "alpha_p, s_p, q, rod_length, rod_modulus, rod_density, rod_mass; impact_node, "
-                   "patch, x0, y0, thickness, density, nu12, e1, e2, g12, g13, g23, layup, "
-                   "dt.")  # fmt: skip
+              help="FROM:TO:N or A,B,C; may be repeated, for a full grid.  Names: "
+                   f"{', '.join(CONTACT)}; {', '.join(PLATE)}.")  # fmt: skip
 @click.option("--cases", "table", type=DECK_PATH, metavar="CASES.csv",
               help="A table instead of --vary: a header of names, one row per case.")  # fmt: skip
 @click.option("--find", type=click.Choice(["velocity"]),
@@ -46,6 +53,10 @@ from fecm.sweeps.store import PartialResults
               help="Result file.  [default: the deck's name with -sweep.h5, in this "
                    "folder]")  # fmt: skip
 @click.option("--history", is_flag=True, help="Also store the contact force of every step.")
+@click.option("--measure", "extra", type=ListOf("NAME,...", click.Choice(MEASURES)), default=(),
+              metavar="NAME,...",
+              help=f"Also store {', '.join(MEASURES)}: the largest deflection, strains of gages "
+                   "(GAGE), exposures (FAIL).")  # fmt: skip
 @click.option("--full", type=ListOf("CASE,...", click.IntRange(min=0)), metavar="CASE,...",
               help="Also run these cases in full, into SWEEP-CASE.h5; cases count from "
                    "0.")  # fmt: skip
@@ -65,6 +76,7 @@ def sweep(
     until: float | str | None,
     output: Path | None,
     history: bool,
+    extra: tuple[str, ...],
     full: tuple[int, ...] | None,
     workers: int,
     scheduler: str | None,
@@ -95,7 +107,7 @@ def sweep(
     check_outputs([path, *fulls.values()], overwrite, [deck] if table is None else [deck, table])
     scheduler = scheduler if scheduler_file is None else address_in(scheduler_file)
     problem = _problem(deck)
-    planned = plan(problem, cases, history=history, until=until)
+    planned = plan(problem, cases, history=history, until=until, extra=extra)
     check_memory(problem, planned, 0 if scheduler is not None else workers)
     if count := freed(tasks(problem, planned)):
         note(

@@ -7,7 +7,7 @@ and elements between them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from textwrap import shorten
 from typing import ClassVar, Self, TypeVar
@@ -497,12 +497,7 @@ class Deck(Record):
         from fecm.sweeps.cases import checked
         from fecm.sweeps.vary import apply_case
 
-        case = {
-            name: value if isinstance(value, str) or not isinstance(value, Iterable)
-            else "/".join(map(str, value))
-            for name, value in values.items()
-        }  # fmt: skip
-        return apply_case(self, *checked([case]))
+        return apply_case(self, *checked([values]))
 
     def to_text(self) -> str:
         """Write the problem as cards, ended by STOP; reading them gives the same model.

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fecm._typing import Floats
+from fecm.mechanics.failure import CRITERIA
 
 # Description and dimension of every quantity, by name.
 SUMMARY = {
@@ -44,8 +45,24 @@ FOUND = {
     "found_velocity": ("velocity at which the peak force reaches the value", "length/time"),
     "found_energy": ("kinetic energy of the projectile at that velocity", "force*length"),
 }
-COLUMNS = {**METRICS, **FOUND}
+# Those of a sweep that are measured on request; and the place that is hit instead of the one given.
+EXPOSURES = {
+    f"exposure_{name}": (f"largest exposure {name.replace('_', ' ')} outside the load", "")
+    for name in (*CRITERIA, "interlaminar")
+}
+HIT = {f"hit_{axis}": (f"{axis} of the impact node or of the patch", "length") for axis in "xy"}
+COLUMNS = {**METRICS, **FOUND, **EXPOSURES, **HIT}
+GAGE = "gage_"
 INTEGERS = ("contacts",)
+
+
+def described(name: str) -> str:
+    """Description of a column of a sweep."""
+    if name.startswith(GAGE):
+        return f"largest absolute strain of gage {name.removeprefix(GAGE)}"
+    return COLUMNS.get(name, ("measured by the caller",))[0]
+
+
 # Peaks: valid even if the run ends in contact, unless they occur at the end.
 PEAKS = ("peak_force", "time_of_peak", "max_indentation")
 

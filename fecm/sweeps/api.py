@@ -129,7 +129,7 @@ def sweep(
     until: float | Literal["threshold"] | None = None,
     history: bool = False,
     build: Build | None = None,
-    measure: Measure | None = None,
+    measure: Measure | str | Sequence[str] | None = None,
     workers: int = 1,
     scheduler: object = None,
     executor: Executor | None = None,
@@ -158,9 +158,10 @@ def sweep(
         Takes a case, a dict, and returns its :class:`Deck`, instead of `deck`.  Names and values
         are then any.  Each case is run in full with the DT of its own deck; an exception is the
         status of the case.  The units of all decks must be the same.
-    measure : callable, optional
-        Takes the :class:`Result` of a case and returns numbers by name: more columns of the
-        summary, without units.  Each case is then run in full, with all that its deck stores.
+    measure : str, sequence of str or callable, optional
+        More columns of the summary: ``"max_deflection"``, ``"gages"``, ``"failure"``.  A callable
+        takes the :class:`Result` of a case and returns numbers by name, without units; each case is
+        then run in full, with all that its deck stores.
     workers : int
         Worker processes on this machine.  With more than 1, a script needs
         ``if __name__ == "__main__"``.
@@ -210,7 +211,11 @@ def sweep(
         raise CasesError(f"executor is {executor!r}, not a concurrent.futures.Executor")
     if (workers > 1) + (scheduler is not None) + (executor is not None) > 1:
         raise CasesError("give only one of workers, scheduler and executor")
-    for name, function in (("build", build), ("measure", measure), ("progress", progress)):
+    own = measure if callable(measure) else None
+    extra = (measure,) if isinstance(measure, str) else () if own or measure is None else measure
+    if not (isinstance(extra, Sequence) and all(isinstance(name, str) for name in extra)):
+        raise CasesError(f"measure is {measure!r}, not a function or names")
+    for name, function in (("build", build), ("progress", progress)):
         if not (function is None or callable(function)):
             raise CasesError(f"{name} is {function!r}, not a function")
     free = build is not None
@@ -219,7 +224,7 @@ def sweep(
     else:
         made = checked(cases, free=free)
     if workers > 1 or isinstance(executor, ProcessPoolExecutor):
-        _check_sendable(workers > 1, build=build, measure=measure)
+        _check_sendable(workers > 1, build=build, measure=own)
     if deck is not None and build is None:
         prepared = _loaded(deck)
     elif deck is None and build is not None:
@@ -230,7 +235,9 @@ def sweep(
         if finding.severity == "warning":
             warn(finding.render(prepared.source))
     (problem,) = prepared.problems
-    planned = plan(problem, made, history=history, until=until, build=build, measure=measure)
+    planned = plan(
+        problem, made, history=history, until=until, build=build, measure=own, extra=extra
+    )
     here = workers if executor is None else getattr(executor, "_max_workers", 0)
     check_memory(problem, planned, 0 if scheduler is not None else here)
     finished = 0
@@ -238,7 +245,7 @@ def sweep(
 
     def done(task: Task, outcome: Outcome) -> None:
         nonlocal finished, first
-        if measure is not None and outcome.status[0] in RUN:
+        if own is not None and outcome.status[0] in RUN:
             case, names = task.numbers[0], sorted(outcome.measured)
             first = first or (case, names)
             if names != first[1]:

@@ -21,12 +21,11 @@ from fecm.deck.findings import Findings
 from fecm.deck.macros import compile_program, flat
 from fecm.deck.model import Deck, Impact, Projectile
 from fecm.deck.model import Indentation as LawCards
-from fecm.deck.reader import ParsedProblem
 from fecm.deck.units import unit_names
 from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, stacked
 from fecm.mechanics.impact import ContactState, couple_step
 from fecm.mechanics.mesh import Mesh
-from fecm.mechanics.plate_motion import DivergenceError
+from fecm.mechanics.plate_motion import DivergenceError, PlateState
 from fecm.mechanics.projectile import Projectile as ProjectileModel
 from fecm.mechanics.rod_integrators import WilsonStep
 from fecm.mechanics.time_step import taken_time_step
@@ -34,18 +33,22 @@ from fecm.problem.build import build_law, build_model, build_projectile
 from fecm.problem.check_impact import check_impact, check_law, check_projectile
 from fecm.problem.check_program import check_program
 from fecm.problem.generate import generate
-from fecm.problem.problem import Problem, check
-from fecm.results.metrics import Indentation, summarise
+from fecm.problem.problem import Problem
+from fecm.results.metrics import GAGE, HIT, Indentation, summarise
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
+from fecm.results.summary import largest_exposures
 from fecm.simulation.guard import ENERGY_WARNING
 from fecm.simulation.run import simulate
-from fecm.sweeps.cases import Case, CasesError, name_fault
+from fecm.sweeps.cases import PLATE, Case, CasesError, name_fault
 from fecm.sweeps.clock import Clock, with_time_step
 from fecm.sweeps.find import search
 from fecm.sweeps.outcome import RUN, Outcome, merge, outcome_of
 from fecm.sweeps.plan import (
     ADVANCED,
+    DEFLECTION,
+    FAILURE,
+    GAGES,
     THRESHOLD,
     Build,
     Measure,
@@ -54,8 +57,15 @@ from fecm.sweeps.plan import (
     shares_plate,
     without_output,
 )
-from fecm.sweeps.responses import BLOCK, Convolution, TipState, TipSteps, plate_response
-from fecm.sweeps.vary import apply_case
+from fecm.sweeps.responses import (
+    BLOCK,
+    Convolution,
+    TipState,
+    TipSteps,
+    largest_sums,
+    plate_response,
+)
+from fecm.sweeps.vary import apply_case, check_deck, raise_first
 
 # Runs decks by their numbers; doubtful ones in full if they are judged.
 Runs = Callable[[list[int], list[Deck], bool], Outcome]
@@ -72,9 +82,14 @@ def run(task: Task) -> Outcome:
     decks: list[Deck] = []
     lost: dict[int, str] = {}
     mesh: Mesh | None = None
+    first = task.cases[0]
+    try:
+        plate = apply_case(task.deck, {n: value for n, value in first.items() if n in PLATE})
+    except CasesError as error:
+        return Outcome.failed(dict.fromkeys(task.numbers, str(error)))
     for number, case in zip(task.numbers, task.cases, strict=True):
         try:
-            deck = apply_case(task.deck, case)
+            deck = apply_case(plate, {n: value for n, value in case.items() if n not in PLATE})
             mesh = mesh or generate(deck)  # of the plate that the cases share
             _check_contact(deck, mesh)
         except CasesError as error:
@@ -85,16 +100,17 @@ def run(task: Task) -> Outcome:
     parts: list[Outcome] = []
     if decks:
         try:
-            checked, decks = _timed(decks, task.clock)
+            checked, decks = _timed(decks, task.clock, first)
         except CasesError as error:
             lost |= dict.fromkeys(numbers, str(error))
         else:
-            runs = _runs(checked)
-            parts.append(
+            runs = _runs(checked, task.extra)
+            outcome = (
                 runs(numbers, decks, True)
                 if task.until is None
                 else _found(numbers, decks, _force(checked, task.until), runs)
             )
+            parts.append(_with_hit(outcome, checked, first))
     if lost:
         parts.append(Outcome.failed(lost))
     outcome = merge(parts)
@@ -105,14 +121,24 @@ def _in_full(task: Task, number: int, case: Case) -> Outcome:
     """Run a case whose deck the caller builds, or whose result the caller measures."""
     try:
         if task.build is None:
-            checked, _ = _timed([apply_case(task.deck, case)], task.clock)
+            checked, _ = _timed([apply_case(task.deck, case)], task.clock, case)
         else:
             (checked,) = built(task.build, case).problems
             if unit_names(checked.deck) != unit_names(task.deck):
                 raise CasesError("build: the units of the deck are not those of the other cases")
-        return _alone(number, checked, task.measure, case)
+        outcome = _alone(number, checked, task.measure, case, task.extra)
+        return _with_hit(outcome, checked, {} if task.build else case)
     except CasesError as error:
         return Outcome.failed({number: str(error)})
+
+
+def _with_hit(outcome: Outcome, checked: Problem, case: Case) -> Outcome:
+    """Add the place that is hit, of cases that give one."""
+    if "at" in case and checked.load_place is not None:
+        fine = np.isin(outcome.columns["status"], RUN)
+        for name, value in zip(HIT, checked.load_place, strict=True):
+            outcome.columns[name] = np.where(fine, value, np.nan)
+    return outcome
 
 
 def built(build: Build, case: Case) -> LoadedDeck:
@@ -159,13 +185,14 @@ def _told(error: Exception) -> str:
     return f"{type(error).__name__}: {' '.join(str(error).split())}"
 
 
-def _runs(checked: Problem) -> Runs:
+def _runs(checked: Problem, extra: Sequence[str]) -> Runs:
     """Return the function that runs decks which share the plate of a problem."""
     if shares_plate(checked):
-        return partial(_together, checked, _plate(checked))
+        return partial(_together, checked, _plate(checked, extra), extra)
     return lambda numbers, decks, judged: merge(
-        [_alone(n, replace(checked, deck=deck)) for n, deck in zip(numbers, decks, strict=True)]
-    )
+        [_alone(n, replace(checked, deck=deck), extra=extra)
+         for n, deck in zip(numbers, decks, strict=True)]
+    )  # fmt: skip
 
 
 def _force(checked: Problem, until: float | str) -> float:
@@ -211,33 +238,25 @@ def deck_of(plan: Plan, case: int) -> Deck:
 
     Raises CasesError if the case cannot be run.
     """
-    _, (deck,) = _timed([apply_case(plan.deck, plan.cases[case])], plan.clock)
+    values = plan.cases[case]
+    _, (deck,) = _timed([apply_case(plan.deck, values)], plan.clock, values)
     return deck
 
 
-def _timed(decks: list[Deck], clock: Clock | None) -> tuple[Problem, list[Deck]]:
+def _timed(decks: list[Deck], clock: Clock | None, case: Case) -> tuple[Problem, list[Deck]]:
     """Check the plate and program shared by decks, and set the time step of the plate."""
     if clock is None:
         return check_deck(decks[0]), decks
     # DT 0 is below the critical time step of any plate.
     checked = check_deck(with_time_step(decks[0], 0.0))
     dt = clock.time_step(checked.critical_time_step)
-    timed = [with_time_step(deck, dt, clock.dt) for deck in decks]
+    duration = float(case["duration"]) if "duration" in case else None
+    timed = [with_time_step(deck, dt, clock.dt, duration) for deck in decks]
     findings = Findings()
     problem = Problem(timed[0], checked.mesh, compile_program(timed[0].macros, findings))
     check_program(problem, findings)
-    _raise_first(findings)
+    raise_first(findings)
     return problem, timed
-
-
-def check_deck(deck: Deck) -> Problem:
-    """Check a complete deck.  Raises CasesError if it has an error; the first is the message."""
-    findings = Findings()
-    checked = check(ParsedProblem(deck), findings)
-    _raise_first(findings)
-    if checked is None:
-        raise CasesError("the deck has no problem that can be run")
-    return checked
 
 
 def _check_contact(deck: Deck, mesh: Mesh) -> None:
@@ -247,13 +266,7 @@ def _check_contact(deck: Deck, mesh: Mesh) -> None:
     check_law(deck.require(LawCards), findings)
     if (projectile := deck.last(Projectile)) is not None:
         check_projectile(projectile, findings)
-    _raise_first(findings)
-
-
-def _raise_first(findings: Findings) -> None:
-    """Raise the first error as that of a case."""
-    if findings.errors:
-        raise CasesError(findings.errors[0].message)
+    raise_first(findings)
 
 
 def _time_step(checked: Problem) -> float:
@@ -274,20 +287,35 @@ class Plate:
     response: Floats
     dt: float
     node_mass: float
+    strains: dict[str, Floats]  # response of every gage that is measured, by the name of its column
 
 
-def _plate(checked: Problem) -> Plate:
+def _plate(checked: Problem, extra: Sequence[str]) -> Plate:
     setup = build_model(checked)
     if setup.impact is None:
         raise ValueError("the deck has no impact")
-    load, dt = setup.impact.contact.load, _time_step(checked)
+    load, dt, steps = setup.impact.contact.load, _time_step(checked), checked.work.steps
+    gages = setup.gages if GAGES in extra else None
+    names = [] if gages is None else [f"{GAGE}{number}" for number in gages.numbers]
+    strains = np.empty((len(names), steps))
+    sums = None if gages is None else setup.motion.dof_sums(gages.dof_indices, gages.weights)
+
+    def read(step: int, state: PlateState) -> None:
+        if sums is not None:
+            strains[:, step] = sums.evaluate(state, 0.0)
+
     with np.errstate(all="ignore"):
-        response = plate_response(setup.motion, load, dt, checked.work.steps)
-        return Plate(response, dt, 1.0 / load.inverse_mass)
+        response = plate_response(setup.motion, load, dt, steps, read)
+    return Plate(response, dt, 1.0 / load.inverse_mass, dict(zip(names, strains, strict=True)))
 
 
 def _together(
-    checked: Problem, plate: Plate, numbers: list[int], decks: list[Deck], judged: bool
+    checked: Problem,
+    plate: Plate,
+    extra: Sequence[str],
+    numbers: list[int],
+    decks: list[Deck],
+    judged: bool,
 ) -> Outcome:
     """Run cases that share a plate by its response to a unit force.
 
@@ -310,6 +338,10 @@ def _together(
         mass = np.array([projectiles[case].total_mass for case in order])
         summary = summarise(found.force, times, found.indentation, mass, speed, _threshold(checked))
         error = balance_errors(found, tips, list(kinds), kind, speed) if judged else 0.0 * speed
+        peaks = {n: largest_sums(r, found.force) for n, r in plate.strains.items() if judged}
+    if DEFLECTION in extra:
+        peaks[DEFLECTION] = found.deflection
+    summary |= {name: _known(*peak, found.force[-1]) for name, peak in peaks.items()}
     back = np.argsort(order)
     force = np.ascontiguousarray(found.force.T[back])
     unsettled = found.unconverged_steps[back]
@@ -320,7 +352,9 @@ def _together(
         return outcome
     rest = np.setdiff1d(np.arange(len(numbers)), doubtful)
     # Cases near the limits of a run are run in full, which accepts or rejects them.
-    full = [_alone(numbers[case], replace(checked, deck=decks[case])) for case in doubtful]
+    full = [
+        _alone(numbers[case], replace(checked, deck=decks[case]), extra=extra) for case in doubtful
+    ]
     return merge([outcome.select(rest), *full])
 
 
@@ -334,6 +368,7 @@ class Impacts:
     # (blocks, cases): work of the contact force on plate and indentation, after every block of
     # steps and after the last step (force*length).
     work: Floats
+    deflection: tuple[Floats, Floats]  # (cases,): largest and last displacement of the plate
     # (cases,): largest dt^2/8 m a^2 of the impact node (force*length): its share of the difference
     # between the plate's energy and the work done on it.
     excess: Floats
@@ -356,7 +391,7 @@ def impacts(
         unconverged_steps=np.zeros(cases, dtype=np.int64),
     )  # fmt: skip
     force, deepest = np.empty((steps, cases)), none
-    plate_work, dw, largest_ddw = none, none, none
+    plate_work, dw, largest_ddw, highest = none, none, none, none
     work: list[Floats] = []
     for step in range(steps):
         last, w = state.contact.force, state.plate_w
@@ -364,6 +399,7 @@ def impacts(
         plate.give(state.contact.force)
         force[step] = state.contact.force
         deepest = np.maximum(deepest, state.contact.indentation)
+        highest = np.maximum(highest, state.plate_w)
         # Central differences conserve the work 1/2 (F + F') (w' - w) on the plate.
         before, dw = dw, state.plate_w - w
         plate_work = plate_work + 0.5 * (last + state.contact.force) * dw
@@ -376,6 +412,7 @@ def impacts(
         Indentation(deepest, state.contact.indentation, permanent),
         state.unconverged_steps,
         np.array(work),
+        (highest, state.plate_w),
         node_mass * largest_ddw**2 / (8.0 * tips.dt**2),
     )
 
@@ -412,13 +449,39 @@ def balance_errors(
     return worst
 
 
+def _known(largest: Floats, last: Floats, force: Floats) -> Floats:
+    """Largest values; NaN where the last step is in contact and has the largest."""
+    return np.where((force > 0.0) & (last >= largest), np.nan, largest)
+
+
+def _extra(extra: Sequence[str], result: Result) -> dict[str, NDArray[Any]]:
+    """Columns measured of a full run."""
+    peaks: dict[str, Floats] = {}
+    if DEFLECTION in extra:
+        peaks[DEFLECTION] = result["history/plate_w"]
+    if GAGES in extra and "gages/number" in result:
+        strains = np.abs(result["gages/strain"]).T
+        peaks |= {f"{GAGE}{n}": s for n, s in zip(result["gages/number"], strains, strict=True)}
+    force = result["history/force"][-1:]
+    found = {name: _known(v.max(keepdims=True), v[-1:], force) for name, v in peaks.items()}
+    for one in largest_exposures(result) if FAILURE in extra else ():
+        last = np.array([one.exposure if one.time >= result["history/time"][-1] else 0.0])
+        found[f"exposure_{one.criterion}"] = _known(np.array([one.exposure]), last, force)
+    return found
+
+
 def _alone(
-    number: int, checked: Problem, measure: Measure | None = None, case: Case | None = None
+    number: int,
+    checked: Problem,
+    measure: Measure | None = None,
+    case: Case | None = None,
+    extra: Sequence[str] = (),
 ) -> Outcome:
     """Run one case in full, without storing fields unless it is measured."""
     sink = MemorySink()
     if measure is None:
-        checked = replace(checked, program=without_output(checked.program))
+        words = ("FAIL",) if FAILURE in extra else ()
+        checked = replace(checked, program=without_output(checked.program, words))
     try:
         simulation = simulate(checked, sink)
     except (DivergenceError, ArithmeticError) as error:
@@ -434,7 +497,8 @@ def _alone(
     summary = summarise(force[:, None], times, found, mass, np.array([speed]), _threshold(checked))
     unsettled = np.array([values.get("unsettled_steps", 0)])
     outcome = outcome_of([number], summary, force[None], simulation.state.dt, unsettled)
-    if measure is not None:
+    if measure is not None or extra:
         result = Result(sink.arrays, sink.texts, sink.groups)
-        outcome.columns |= _measured(measure, result, case or {})
+        outcome.columns |= _extra(extra, result)
+        outcome.columns |= {} if measure is None else _measured(measure, result, case or {})
     return outcome

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from fecm._errors import FecmError
+from fecm.deck.grid import SUPPORTS
 from fecm.results.metrics import COLUMNS
 from fecm.studies import StudyError
 from fecm.studies.tables import read_rows
@@ -21,17 +22,26 @@ Value = float | int | str
 Case = dict[str, Value]
 
 # Names that change the projectile, its velocity or the contact law; where the force acts, which
-# needs another response of the plate; and the plate.
+# needs another response of the plate; and the plate or its time steps.
 CONTACT = (
-    "velocity", "k", "alpha_p", "s_p", "q",
-    "rod_length", "rod_modulus", "rod_density", "rod_mass",
+    "velocity", "energy", "k", "radius", "alpha_p", "s_p", "q",
+    "mass", "rod_length", "rod_modulus", "rod_density", "rod_mass",
 )  # fmt: skip
-LOAD = ("impact_node", "patch", "x0", "y0")
-PLATE = (
-    *LOAD, "thickness", "density", "nu12", "e1", "e2", "g12", "g13", "g23", "layup", "dt",
+LOAD = ("at", "impact_node", "patch", "x0", "y0")
+LAMINATE = (
+    "thickness", "density", "nu12", "e1", "e2", "g12", "g13", "g23", "layup", "angle",
 )  # fmt: skip
+PLATE = (*LOAD, *LAMINATE, "size", "support", "dt", "duration")
 NAMES = (*CONTACT, *PLATE)
-TEXTS = ("layup",)
+# Of each of these names only one can vary.
+EXCLUDING = (
+    ("velocity", "energy"), ("k", "radius"), ("mass", "rod_mass", "rod_density"),
+    ("at", "impact_node"), ("at", "x0"), ("at", "y0"),
+)  # fmt: skip
+# Names with texts; two numbers as a text have a form and separators.
+TEXTS = ("layup", "at", "size", "support")
+PAIRS = {"at": ("({},{})", r"[,;\s]+"), "size": ("{}x{}", "[xX×]")}
+AUTO = "auto"
 INTEGERS = ("impact_node",)
 # Names of results, which are no names of cases or of measured columns.
 RESERVED = ("case", "step", "steps", "status", "force", "unsettled_steps", *COLUMNS)
@@ -77,6 +87,22 @@ def parse_until(text: str) -> float | str:
     if name != "peak_force" or not value:
         raise CasesError(f"`{text}`: write peak_force=NUMBER or peak_force=threshold")
     return value if value == "threshold" else _number(name, value)
+
+
+def check_names(names: Collection[str]) -> None:
+    """Raise CasesError if names exclude each other."""
+    for group in EXCLUDING:
+        if len(given := [name for name in group if name in names]) > 1:
+            raise CasesError(f"{given[0]} and {given[1]} exclude each other; vary one of them")
+
+
+def pair(name: str, text: str) -> tuple[float, float]:
+    """Two numbers of a text, as in ``(3,2)`` or ``6x4``; raises CasesError if it has none."""
+    form, separators = PAIRS[name]
+    parts = re.split(separators, text.strip().removeprefix("(").removesuffix(")").strip())
+    if len(parts) != 2:
+        raise CasesError(f"{name} must be two numbers as in {form.format(6, 4)}, not `{text}`")
+    return _number(name, parts[0]), _number(name, parts[1])
 
 
 def grid(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
@@ -200,6 +226,8 @@ def _given(name: str, value: Any, where: str, free: bool) -> Value:
             free_value: Value = value
             return free_value
         raise CasesError(f"{where}: {name} is {value!r}, not a finite number or a text")
+    if name in TEXTS and isinstance(value, Iterable) and not isinstance(value, str):
+        value = {"at": ",", "size": "x"}.get(name, "/").join(map(str, value))
     try:
         return _value(name, value if isinstance(value, str) else repr(float(value)))
     except (TypeError, ValueError) as error:
@@ -223,9 +251,13 @@ def _number(name: str, text: str) -> float:
 
 
 def _value(name: str, text: str) -> Value:
+    if name in PAIRS:
+        return PAIRS[name][0].format(*(repr(v).removesuffix(".0") for v in pair(name, text)))
+    if name == "support" and text.strip() not in SUPPORTS:
+        raise CasesError(f"support must be {', '.join(SUPPORTS)}, not `{text.strip()}`")
     if name in TEXTS:
         return text.strip()
-    value = _number(name, text)
+    value = 0.0 if name == "dt" and text.strip() == AUTO else _number(name, text)
     if name in INTEGERS:
         if not value.is_integer():
             raise CasesError(f"{name} must be an integer, not {value:g}")
@@ -235,4 +267,4 @@ def _value(name: str, text: str) -> Value:
 
 def _split(text: str) -> list[str]:
     """Split at commas outside brackets."""
-    return [part for part in re.split(r",(?![^\[]*\])", text) if part.strip()]
+    return [part for part in re.split(r",(?![^\[]*\]|[^(]*\))", text) if part.strip()]

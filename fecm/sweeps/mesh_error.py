@@ -18,10 +18,10 @@ from fecm.problem.refine import RefineError, refined
 from fecm.results.sinks import MemorySink
 from fecm.simulation.run import run
 from fecm.simulation.simulation import Simulation
-from fecm.sweeps.batch import check_deck
 from fecm.sweeps.cases import CasesError
 from fecm.sweeps.clock import with_time_step
 from fecm.sweeps.plan import without_output
+from fecm.sweeps.vary import check_deck
 
 
 @dataclass(frozen=True)

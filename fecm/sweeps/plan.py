@@ -13,11 +13,11 @@ from typing import Any
 from fecm import _memory
 from fecm._version import __version__
 from fecm.deck.macros import Body, Loop, flat
-from fecm.deck.model import Boundary, Deck, Delamination, Impact
+from fecm.deck.model import Boundary, Deck, Delamination, Gages, Impact
 from fecm.problem.memory import needed_bytes
 from fecm.problem.problem import Problem
 from fecm.results.result import Result
-from fecm.sweeps.cases import CONTACT, LOAD, PLATE, Case, CasesError
+from fecm.sweeps.cases import CONTACT, LAMINATE, LOAD, PLATE, Case, CasesError, check_names
 from fecm.sweeps.clock import Clock, clock_of
 from fecm.sweeps.find import COUNT
 from fecm.sweeps.vary import apply_case
@@ -31,6 +31,8 @@ TOGETHER = 1024
 ADVANCED = 28
 # Delamination threshold instead of a number.
 THRESHOLD = "threshold"
+# Names of columns that are measured on request.
+DEFLECTION, GAGES, FAILURE = MEASURES = ("max_deflection", "gages", "failure")
 
 
 @dataclass(frozen=True)
@@ -46,15 +48,17 @@ class Plan:
     until: float | str | None = None
     build: Build | None = None  # makes the deck of a case; `deck` is that of one of the cases
     measure: Measure | None = None  # computes more columns from the result of a case
+    extra: tuple[str, ...] = ()  # more columns, of :data:`MEASURES`
 
     @property
     def alone(self) -> bool:
         """Whether every case is run in full."""
-        return self.build is not None or self.measure is not None
+        return self.build is not None or self.measure is not None or FAILURE in self.extra
 
     def fingerprint(self) -> str:
         """Hash that identifies this sweep."""
         parts = [__version__, self.deck.to_text(), self.cases, self.history, TOGETHER, self.until]
+        parts += [self.extra] if self.extra else []
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
@@ -74,20 +78,29 @@ def plan(
     until: float | str | None = None,
     build: Build | None = None,
     measure: Measure | None = None,
+    extra: Sequence[str] = (),
 ) -> Plan:
     """Create the plan of a sweep.
 
-    Raises CasesError if the deck has no impact, there are no cases, or a search of velocities lacks
-    something.
+    Raises CasesError if the deck has no impact, there are no cases, names exclude each other, or
+    the deck lacks what is searched or measured.
     """
     if not any(macro.word == "RODP" for macro in checked.deck.macros):
         raise CasesError("the deck has no impact step (RODP); there is nothing to sweep")
     if not cases:
         raise CasesError("a sweep needs at least one case")
+    if build is None:
+        check_names(cases[0])
+    if unknown := sorted({*extra} - {*MEASURES}):
+        raise CasesError(f"measure has {unknown[0]!r}; the names are {', '.join(MEASURES)}")
+    if GAGES in extra and not checked.deck.has(Gages):
+        raise CasesError("measure gages: the deck has no strain gages; add a GAGE segment")
+    if FAILURE in extra and all(macro.word != "FAIL" for macro in checked.deck.macros):
+        raise CasesError("measure failure: the program of the deck has no FAIL; add it to the loop")
     if until is not None:
-        if build is not None or measure is not None:
-            raise CasesError("until can't be given together with build or measure")
-        if "velocity" in cases[0]:
+        if build is not None or measure is not None or FAILURE in extra:
+            raise CasesError("until can't be given together with build, measure or failure")
+        if not {"velocity", "energy"}.isdisjoint(cases[0]):
             raise CasesError("velocity is what is searched; it can't be varied as well")
         if not checked.deck.require(Impact).velocity:
             raise CasesError("the search begins at the velocity of ROD, which must not be 0")
@@ -95,9 +108,11 @@ def plan(
             raise CasesError("the threshold needs a DELA segment, which the deck does not have")
         if until != THRESHOLD and not (isinstance(until, float | int) and 0.0 < until < math.inf):
             raise CasesError(f"the peak force to reach is a positive number, not {until}")
-    own = build is None and "dt" not in cases[0] and not {*LOAD, *CONTACT}.issuperset(cases[0])
+    same = {*LOAD, *CONTACT, "duration"}  # names of cases that keep the critical time step
+    own = build is None and "dt" not in cases[0] and not same.issuperset(cases[0])
     clock = clock_of(checked) if own else None
-    return Plan(checked.deck, tuple(cases), history, clock, until, build, measure)
+    chosen = tuple(name for name in MEASURES if name in extra)
+    return Plan(checked.deck, tuple(cases), history, clock, until, build, measure, chosen)
 
 
 def shares_plate(checked: Problem) -> bool:
@@ -140,22 +155,27 @@ def freed(some: Sequence[Task]) -> int:
     """Count cases with B != 0 in which u and v, restrained at every node, are released."""
     count = 0
     for task in some:
-        plate = {name: value for name, value in task.cases[0].items() if name in PLATE}
+        if "support" in task.cases[0]:  # which has its own u and v
+            continue
+        plate = {name: value for name, value in task.cases[0].items() if name in LAMINATE}
         with suppress(CasesError):
             if apply_case(task.deck, plate).all(Boundary) != task.deck.all(Boundary):
                 count += len(task.numbers)
     return count
 
 
-def without_output(body: Body) -> Body:
-    """Return a program that stores no fields."""
+FIELDS = ("DISP", "STRE", "PLYS", "FAIL", "REAC", "EIGE")
+
+
+def without_output(body: Body, kept_words: Sequence[str] = ()) -> Body:
+    """Return a program that stores no fields, but those of some words."""
     kept: list[Any] = []
     for item in body:
         if isinstance(item, Loop):
-            kept.append(replace(item, body=without_output(item.body)))
+            kept.append(replace(item, body=without_output(item.body, kept_words)))
         elif item.word == "RODP":
             kept.append(replace(item, value=1e9))
-        elif item.word not in ("DISP", "STRE", "PLYS", "FAIL", "REAC", "EIGE"):
+        elif item.word in kept_words or item.word not in FIELDS:
             kept.append(item)
     return tuple(kept)
 
@@ -173,7 +193,8 @@ def check_memory(checked: Problem, made: Plan, workers: int) -> None:
     at_once = min(workers, len(tasks(checked, made)))
     plate = checked
     if made.measure is None:
-        plate = replace(checked, program=without_output(checked.program))
+        words = ("FAIL",) if FAILURE in made.extra else ()
+        plate = replace(checked, program=without_output(checked.program, words))
     kept = KEPT * steps * cases if made.history else 0
 
     def needed(exact: bool) -> int:

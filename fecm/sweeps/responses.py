@@ -9,7 +9,7 @@ block are added one by one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
-from fecm.mechanics.plate_motion import AppliedForce, Load, PlateMotion
+from fecm.mechanics.plate_motion import AppliedForce, Load, PlateMotion, PlateState
 from fecm.mechanics.rod_integrators import RodIntegrator, RodState
 
 # Steps of a block, and steps and cases of a matrix product with earlier blocks: small enough for
@@ -27,16 +27,23 @@ BLOCK = 64
 SMALL = BLOCK**3
 
 
-def plate_response(motion: PlateMotion, load: Load, dt: float, steps: int) -> Floats:
+def plate_response(
+    motion: PlateMotion,
+    load: Load,
+    dt: float,
+    steps: int,
+    read: Callable[[int, PlateState], None] = lambda step, state: None,
+) -> Floats:
     """Displacement per force under a load after 1 to `steps` steps, the first with a unit force.
 
-    The plate has no nodal loads.
+    The plate has no nodal loads.  `read` is called with each step, from 0, and its state.
     """
     state = motion.start()
     response = np.empty(steps)
     for step in range(steps):
         motion.advance(state, dt, 0.0, AppliedForce(load, 1.0) if step == 0 else None)
         response[step] = load.dot(state.padded)
+        read(step, state)
     return response
 
 
@@ -49,6 +56,20 @@ def tip_response(step: RodIntegrator, steps: int) -> Floats:
         state = step.advance(state)
         response[number] = state.acceleration[0]
     return response
+
+
+def largest_sums(response: Floats, force: Floats) -> tuple[Floats, Floats]:
+    """Largest and last absolute value (cases,) of the sums of a response and forces.
+
+    `response` is (steps,), `force` (steps, cases).
+    """
+    sums = Convolution(response, np.zeros(force.shape[1], dtype=np.intp))
+    largest = last = np.zeros(force.shape[1])
+    for values in force:
+        last = np.abs(sums.next())
+        largest = np.maximum(largest, last)
+        sums.give(values)
+    return largest, last
 
 
 def _product(a: Floats, b: Floats) -> Floats:

@@ -16,8 +16,9 @@ from fecm._html import html_table
 from fecm._version import __version__
 from fecm.deck.model import Delamination
 from fecm.deck.units import unit_names, unit_of
-from fecm.results.metrics import COLUMNS, FOUND, SUMMARY, THRESHOLD
+from fecm.results.metrics import COLUMNS, FOUND, SUMMARY, THRESHOLD, described
 from fecm.results.schema import FORMAT_VERSION, SWEEP, Dataset, ResultFileError, declared_units
+from fecm.sweeps.cases import pair
 from fecm.sweeps.outcome import RUN, STILL, Outcome
 from fecm.sweeps.plan import Plan
 
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 Array = NDArray[Any]
 # Letters of the names in the lines of the summary.
 WORDS = 18
+# Distance from the place given, relative to its coordinates, that is rounding.
+SAME = 1e-9
 # Reasons of failure that the summary lists.
 LISTED = 5
 
@@ -54,6 +57,12 @@ def summary(result: SweepResult) -> list[str]:
             lines.append(
                 f"{size} {word:{16 - len(size)}} {found}{f' ({values})' if values else ''}"
             )
+    if "at" in result.cases and "hit_x" in result.summary:
+        asked = np.array([pair("at", text) for text in result.cases["at"].tolist()]).T
+        moved = np.hypot(*(asked - (result["hit_x"], result["hit_y"])))
+        if count := np.count_nonzero(moved > SAME * np.abs(asked).max()):
+            distance = f"{np.nanmax(moved):.4g} {result.unit('hit_x')}".rstrip()
+            lines.append(f"moved             {count}: to the nearest node, up to {distance} away")
     failed = Counter(result["status"][~fine].tolist())
     for reason, times in failed.most_common(LISTED):
         lines.append(f"failed            {times}: {reason}")
@@ -91,9 +100,10 @@ def _counts(result: SweepResult) -> list[tuple[int, str]]:
 DIMENSIONS = {
     "velocity": "length/time", "k": "force/length^1.5", "alpha_p": "length",
     "rod_length": "length", "rod_modulus": "force/length^2",
-    "rod_density": "force*time^2/length^4", "rod_mass": "force*time^2/length",
-    **dict.fromkeys(("patch", "x0", "y0", "thickness"), "length"),
-    "density": "force*time^2/length^4", "dt": "time", "force": "force",
+    "rod_density": "force*time^2/length^4", "energy": "force*length",
+    **dict.fromkeys(("mass", "rod_mass"), "force*time^2/length"),
+    **dict.fromkeys(("patch", "x0", "y0", "thickness", "radius"), "length"),
+    "density": "force*time^2/length^4", "dt": "time", "duration": "time", "force": "force",
     **dict.fromkeys(("e1", "e2", "g12", "g13", "g23"), "force/length^2"),
 }  # fmt: skip
 
@@ -302,7 +312,9 @@ def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
     columns, deck = outcome.columns, plan.deck
     limited = deck.last(Delamination) is not None or not columns.keys().isdisjoint(THRESHOLD)
     found = [*SUMMARY, *(THRESHOLD if limited else ())]
-    found += [*(FOUND if plan.until is not None else ()), *outcome.measured, "status"]
+    found += FOUND if plan.until is not None else ()
+    found += [name for name in COLUMNS if name in columns and name not in found]
+    found += [*outcome.measured, "status"]
     none = np.full(len(plan.cases), np.nan)
     return SweepResult(
         cases, {name: columns.get(name, none) for name in found},
@@ -322,7 +334,7 @@ def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
     columns = [
         *((f"cases/{name}", values, f"{name} of every case", DIMENSIONS.get(name, ""))
           for name, values in result.cases.items()),
-        *((f"summary/{name}", values, *COLUMNS.get(name, ("measured by the caller", "")))
+        *((f"summary/{name}", values, described(name), COLUMNS.get(name, ("", ""))[1])
           for name, values in result.summary.items() if name != "status"),
         ("summary/status", result.summary["status"],
          "ok, still in contact, or why the case failed", ""),

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
+from fecm.deck.catalogue import NU23, SYSTEMS
 from fecm.deck.findings import Findings
 from fecm.deck.layup import LayupError, parse_layup
 from fecm.deck.model import (
     Boundary,
+    Coordinates,
     Deck,
+    Forces,
+    Gages,
     Impact,
     Indentation,
     Material,
@@ -21,15 +28,24 @@ from fecm.deck.model import (
 )
 from fecm.deck.reader import ParsedProblem
 from fecm.deck.records import Layer, NodeCodes, Ply
+from fecm.deck.units import MODULUS, in_si, unit_names
+from fecm.mechanics.contact_law import hertz_coefficient
+from fecm.mechanics.element_groups import element_blocks
+from fecm.mechanics.locate import locate
 from fecm.mechanics.mesh import holds_the_plane
 from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.time_step import taken_time_step
+from fecm.objects import E_S, NU_S, STANDARD
 from fecm.problem.build import build_projectile, is_coupled, projectile_segment
-from fecm.problem.generate import restraint_codes
-from fecm.problem.problem import check
-from fecm.sweeps.cases import NAMES, Case, CasesError, Value
+from fecm.problem.check_program import UNSTABLE
+from fecm.problem.generate import generate, restraint_codes
+from fecm.problem.plate_mesh import BOUNDARY, PlateMesh
+from fecm.problem.problem import Problem, check
+from fecm.studies.indentation_test.modulus import effective_stiffness, indentation_modulus
+from fecm.sweeps.cases import Case, CasesError, Value, check_names, pair
 from fecm.sweeps.clock import with_time_step
 
+MASS = ("mass", "rod_mass")
 # Fields of a ply card.
 PLY = ("density", "nu12", "e1", "e2", "g12", "g13", "g23")
 
@@ -39,26 +55,52 @@ def apply_case(deck: Deck, case: Case) -> Deck:
 
     A layup uses the ply thickness of the deck, so that more plies give a thicker plate; a thickness
     scales every layer.  A mass scales the density of a rod.  A time step changes the number of
-    steps, so that the duration is kept.
+    steps, so that the duration is kept; 0 is 0.9 of the critical time step of the case.
 
     A deck with B = 0 may restrain u and v at every node, because they are zero anyway.  If the case
     has B != 0, they are restrained only at the nodes that restrain w, as in a deck of ``fecm new``.
 
     A deck without a patch gets a disc.  Raises CasesError if a value is invalid for this deck.
     """
-    if "rod_mass" in case and "rod_density" in case:
-        raise CasesError("rod_mass and rod_density exclude each other")
+    check_names(case)
     made = deck
-    # Apply the layup before the laminate thickness, and the mass after the other rod properties.
-    for name in sorted(case, key=lambda name: (name != "layup", NAMES.index(name))):
-        if name != "dt":
-            made = _SETTERS[name](made, name, case[name])
-    if "dt" in case:
-        made = with_time_step(made, float(case["dt"]), _taken_time_step(deck))
+    for name, setter in _SETTERS.items():
+        if name in case:
+            made = setter(made, name, case[name])
     material = deck.last(Material)
     if material is not None and not is_coupled(material) and is_coupled(made.require(Material)):
         made = _free_in_plane(made)
+    if "dt" in case or "duration" in case:
+        made = _timed(made, case, _taken_time_step(deck))
     return replace(made, text="")
+
+
+def check_deck(deck: Deck) -> Problem:
+    """Check a complete deck.  Raises CasesError if it has an error; the first is the message."""
+    findings = Findings()
+    checked = check(ParsedProblem(deck), findings)
+    raise_first(findings)
+    if checked is None:
+        raise CasesError("the deck has no problem that can be run")
+    return checked
+
+
+def raise_first(findings: Findings) -> None:
+    """Raise the first error as that of a case."""
+    if findings.errors:
+        first = findings.errors[0]
+        remedy = " Vary dt=auto, or take DT 0." if first.code == UNSTABLE else ""
+        raise CasesError(f"{first.message}{remedy}")
+
+
+def _timed(deck: Deck, case: Case, taken: float) -> Deck:
+    """The deck with the time step and the duration of a case."""
+    dt, duration = (None if n not in case else float(case[n]) for n in ("dt", "duration"))
+    if duration is not None and not duration > 0.0:
+        raise CasesError(f"duration must be positive, not {duration:g}")
+    if dt == 0.0:
+        dt = taken_time_step(check_deck(with_time_step(deck, 0.0)).critical_time_step)
+    return with_time_step(deck, dt, taken, duration)
 
 
 @lru_cache(maxsize=8)
@@ -118,7 +160,7 @@ def _rod(deck: Deck, name: str, value: Value) -> Deck:
     rod, old = build_projectile(deck), deck.last(Projectile)
     number = float(value)
     if isinstance(rod, RigidMass):
-        if name != "rod_mass":
+        if name not in MASS:
             raise CasesError(f"{name}: the projectile of the deck is a rigid mass")
         new = projectile_segment(RigidMass(number))
     else:
@@ -132,6 +174,101 @@ def _rod(deck: Deck, name: str, value: Value) -> Deck:
         else:
             new = replace(new, density=rod.density * number / rod.total_mass)
     return _swap(deck, old, new)
+
+
+def _energy(deck: Deck, name: str, value: Value) -> Deck:
+    mass, energy = build_projectile(deck).total_mass, float(value)
+    if not (mass > 0.0 and energy >= 0.0):
+        raise CasesError(f"no velocity gives the energy {energy:g} to the mass {mass:g}")
+    return _field(deck, "velocity", math.sqrt(2.0 * energy / mass))
+
+
+def _radius(deck: Deck, name: str, value: Value) -> Deck:
+    """Change k to that of a steel sphere on the laminate of the deck."""
+    unit = in_si(MODULUS, unit_names(deck))
+    if unit is None:
+        raise CasesError(
+            "radius: the modulus of steel needs the units of the deck; add a UNIT segment, or vary "
+            "k instead"
+        )
+    steel = E_S * (in_si(MODULUS, SYSTEMS[STANDARD]) or 1.0) / unit
+    try:
+        modulus = _indentation_modulus(deck.require(Material))
+        k = hertz_coefficient(float(value), steel, NU_S, modulus)
+    except ValueError as error:
+        raise CasesError(f"k cannot be estimated: {error}") from None
+    return _field(deck, "k", k)
+
+
+@lru_cache(maxsize=256)
+def _indentation_modulus(material: Material) -> float:
+    angles = [layer.angle for layer in material.layers]
+    thicknesses = [layer.thickness for layer in material.layers]
+    return indentation_modulus(effective_stiffness(material.ply, angles, thicknesses, NU23))
+
+
+def _at(deck: Deck, name: str, value: Value) -> Deck:
+    """Move the centre of the patch; without one, hit the nearest node."""
+    x, y = pair(name, str(value))
+    patch = deck.last(Patch)
+    if patch is not None:
+        return _swap(deck, patch, replace(patch, x=x, y=y, source=None))
+    mesh = generate(deck)
+    blocks = element_blocks(mesh.elements, mesh.coordinates)
+    if not any(len(locate(block, np.array([[x, y]]))[0]) for block in blocks):
+        raise CasesError(f"at {value} is outside the plate")
+    distances = np.hypot(*(mesh.coordinates - (x, y)).T)
+    return _field(deck, "impact_node", int(np.where(mesh.used, distances, np.inf).argmin()) + 1)
+
+
+def _size(deck: Deck, name: str, value: Value) -> Deck:
+    """Scale coordinates, the centre of the patch and the gages."""
+    sides = np.array(pair(name, str(value)))
+    if not (sides > 0.0).all():
+        raise CasesError(f"the sides of the plate must be positive, not {value}")
+    mesh = generate(deck)
+    extent = np.ptp(mesh.coordinates[mesh.used], axis=0)
+
+    def scaled(*place: float) -> Any:
+        return tuple((np.array(place) * sides / extent).tolist())
+
+    def changed(segment: Segment) -> Segment:
+        if isinstance(segment, Coordinates):
+            nodes = (replace(r, values=scaled(*r.values[:2]), source=None) for r in segment.records)
+            return replace(segment, records=tuple(nodes), source=None)
+        if isinstance(segment, Patch) and segment.x is not None and segment.y is not None:
+            x, y = scaled(segment.x, segment.y)
+            return replace(segment, x=x, y=y, source=None)
+        if isinstance(segment, Gages):
+            places = (scaled(gage.x, gage.y) for gage in segment.records)
+            gages = (
+                replace(gage, x=x, y=y, source=None)
+                for gage, (x, y) in zip(segment.records, places, strict=True)
+            )
+            return replace(segment, records=tuple(gages), source=None)
+        return segment
+
+    return replace(deck, segments=tuple(map(changed, deck.segments)))
+
+
+def _support(deck: Deck, name: str, value: Value) -> Deck:
+    """Replace all restraints by a support of the outline, as ``fecm new`` writes it."""
+    mesh, support = generate(deck), str(value)
+    if deck.has(Forces) or mesh.elements.shape[1] not in (4, 9) or not mesh.elements.all():
+        raise CasesError(
+            "support: the deck must have no FORC, and elements of four nodes, or all of nine"
+        )
+    plate = PlateMesh(mesh.coordinates, mesh.elements.astype(int) - 1, {}, np.array([], int))
+    everywhere = (0, 0, 0, 0, 0) if is_coupled(deck.require(Material)) else (1, 1, 0, 0, 0)
+    made = plate.supported(everywhere, {BOUNDARY: support})
+    others = tuple(s for s in deck.segments if not isinstance(s, Boundary))
+    if made is not None and support == "simple" and mesh.elements.shape[1] == 4:
+        codes = restraint_codes([made], deck.control.numnp, deck.control.ndf) != 0
+        if (codes[:, 2] & ~codes[:, 3:].any(axis=1)).any():
+            raise CasesError(
+                "support simple: the sides of elements of four nodes must run along x or y"
+            )
+    return replace(deck, segments=others if made is None else (*others, made))
 
 
 def _patch(deck: Deck, name: str, value: Value) -> Deck:
@@ -158,6 +295,13 @@ def _thickness(deck: Deck, name: str, value: Value) -> Deck:
     return _swap(deck, old, replace(old, integration=integration, layers=layers))
 
 
+def _angle(deck: Deck, name: str, value: Value) -> Deck:
+    """Turn all plies."""
+    old = deck.require(Material)
+    layers = (replace(y, angle=y.angle + float(value), source=None) for y in old.layers)
+    return _swap(deck, old, replace(old, layers=tuple(layers)))
+
+
 def _layup(deck: Deck, name: str, value: Value) -> Deck:
     old = deck.require(Material)
     thicknesses = {layer.thickness for layer in old.layers}
@@ -180,15 +324,21 @@ def _taken_time_step(deck: Deck) -> float:
     """Time step that DT 0 means in a deck; 0 if no DT is 0."""
     if all(macro.value for macro in deck.macros if macro.word == "DT"):
         return 0.0
-    checked = check(ParsedProblem(deck), Findings())
-    return 0.0 if checked is None else taken_time_step(checked.critical_time_step)
+    return taken_time_step(check_deck(deck).critical_time_step)
 
 
+# In the order in which they are applied.
 _SETTERS: dict[str, Callable[[Deck, str, Value], Deck]] = {
-    **dict.fromkeys(_FIELDS, _field),
-    **dict.fromkeys(("rod_length", "rod_modulus", "rod_density", "rod_mass"), _rod),
-    **dict.fromkeys(_PATCH, _patch),
-    **dict.fromkeys(PLY, _ply),
-    "thickness": _thickness,
     "layup": _layup,
+    "angle": _angle,
+    "thickness": _thickness,
+    **dict.fromkeys(PLY, _ply),
+    "size": _size,
+    "support": _support,
+    **dict.fromkeys(_FIELDS, _field),
+    **dict.fromkeys(_PATCH, _patch),
+    "at": _at,
+    "radius": _radius,
+    **dict.fromkeys(("rod_length", "rod_modulus", "rod_density", *MASS), _rod),
+    "energy": _energy,
 }
