@@ -31,7 +31,7 @@ from fecm.deck.reader import load_text
 from fecm.deck.units import unit_names, unit_of
 from fecm.problem.options import RunOptions
 from fecm.problem.slips import REPORT, active_slips
-from fecm.problem.summary import summarise
+from fecm.problem.summary import ProblemSummary
 from fecm.results.schema import jsonable
 
 
@@ -152,7 +152,7 @@ def check(decks: tuple[Path, ...], mode: str, form: str, strict: bool, mesh_erro
 
 def _print(prepared: LoadedDeck, form: str, *, brief: bool, passes: bool) -> None:
     """Print findings and, if there are no errors, a summary, or one line of a deck that passes."""
-    views = [] if prepared.errors() else [summarise(problem) for problem in prepared.problems]
+    views = [] if prepared.errors() else [ProblemSummary(problem) for problem in prepared.problems]
     if form == "json":
         lines = [finding.to_dict(prepared.source) for finding in prepared.findings]
         about = {"kind": "summary", "file": prepared.source}

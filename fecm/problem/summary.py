@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from fecm._memory import format_bytes
@@ -16,37 +14,39 @@ from fecm.problem.build import Problem, build_projectile
 from fecm.problem.check_impact import resolution, said_error
 
 
-@dataclass(frozen=True)
 class ProblemSummary:
-    """A problem in numbers."""
+    """A problem without errors in numbers."""
 
-    title: str
-    nodes: int
-    elements: int
-    layers: int
-    equations: int
-    steps: int
-    # Laminate stiffnesses.
-    A: Floats
-    B: Floats
-    D: Floats
-    shear: Floats
-    # Mass of the plate, and of the projectile even without impact.
-    plate_mass: float
-    projectile_mass: float
-    critical_time_step: float
-    time_steps: list[float]  # every DT of the program
-    output_bytes: int  # approximate size of the result
-    # Elements at the impact node per bending wave of the contact; None without impact.
-    elements_per_wave: float | None
-    mesh_error: float | None  # estimated mesh error of the peak force, relative to it
-    units: dict[str, str]  # names of the units; empty if the deck has none
+    def __init__(self, problem: Problem) -> None:
+        deck, plate, laminate = problem.deck, problem.plate, problem.laminate
+        try:
+            critical = problem.critical_time_step
+        except UnsoundPlateError:  # the check reports it if the program takes steps
+            critical = float("nan")
+        resolved = resolution(problem) if problem.has_impact else None
+        self.title = deck.title
+        self.nodes = deck.control.numnp
+        self.elements = deck.control.numel
+        self.layers = deck.control.layers
+        self.equations = plate.neq
+        self.steps = problem.work.steps
+        self.A, self.B, self.D, self.shear = laminate.A, laminate.B, laminate.D, laminate.shear
+        self.plate_mass = plate.area() * laminate.mass
+        self.projectile_mass = build_projectile(deck).total_mass  # even without impact
+        self.critical_time_step = critical
+        self.time_steps = [m.value for m in flat(problem.program) if m.word == "DT"]
+        self.output_bytes = problem.output_bytes  # approximate size of the result
+        # Elements at the impact node per bending wave of the contact, and the estimated mesh error
+        # of the peak force, relative to it; None without impact.
+        self.elements_per_wave = None if resolved is None else resolved.elements
+        self.mesh_error = None if resolved is None else resolved.error
+        self.units = unit_names(deck)  # empty if the deck has none
 
     def to_dict(self) -> dict[str, object]:
         """Plain values, for JSON."""
         return {
             name: value.tolist() if isinstance(value, np.ndarray) else value
-            for name, value in self.__dict__.items()
+            for name, value in vars(self).items()
         }
 
     def lines(self) -> list[str]:
@@ -97,33 +97,3 @@ def _matrix(name: str, values: Floats, unit: str) -> list[str]:
     lines = [f"{head}{row}" for head, row in zip(heads, rows, strict=True)]
     lines[0] = f"{lines[0]}  {unit}".rstrip()
     return lines
-
-
-def summarise(problem: Problem) -> ProblemSummary:
-    """Summarise a problem without errors."""
-    deck, plate, laminate = problem.deck, problem.plate, problem.laminate
-    try:
-        critical = problem.critical_time_step
-    except UnsoundPlateError:  # the check reports it if the program takes steps
-        critical = float("nan")
-    resolved = resolution(problem) if problem.has_impact else None
-    return ProblemSummary(
-        title=deck.title,
-        nodes=deck.control.numnp,
-        elements=deck.control.numel,
-        layers=deck.control.layers,
-        equations=plate.neq,
-        steps=problem.work.steps,
-        A=laminate.A,
-        B=laminate.B,
-        D=laminate.D,
-        shear=laminate.shear,
-        plate_mass=plate.area() * laminate.mass,
-        projectile_mass=build_projectile(deck).total_mass,
-        critical_time_step=critical,
-        time_steps=[m.value for m in flat(problem.program) if m.word == "DT"],
-        output_bytes=problem.output_bytes,
-        elements_per_wave=None if resolved is None else resolved.elements,
-        mesh_error=None if resolved is None else resolved.error,
-        units=unit_names(deck),
-    )
