@@ -37,21 +37,11 @@ LOGGER = logging.getLogger("fecm")
 
 @dataclass(frozen=True)
 class LoadedDeck:
-    """A file that was read and checked.
+    """A file that was read and checked."""
 
-    Attributes
-    ----------
-    source : str
-        Its name.
-    problems : list of Problem
-        The problems that could be read.
-    findings : list of Finding
-        All findings, in the deck's order.
-    """
-
-    source: str
-    problems: list[Problem]
-    findings: list[Finding]
+    source: str  # its name
+    problems: list[Problem]  # the problems that could be read
+    findings: list[Finding]  # all findings, in the deck's order
 
     def errors(self, force: bool = False) -> list[Finding]:
         """Findings that make the deck unusable; with `force`, without unstable motions."""
@@ -63,20 +53,10 @@ class LoadedDeck:
 
 
 def load_deck(path_or_text: str | Path | BinaryIO | Deck, mode: str = REPORT) -> LoadedDeck:
-    """Read and check a deck without running it.
+    """Read and check the deck of a path, a text, standard input or a model, without running it.
 
-    Parameters
-    ----------
-    path_or_text : str, Path, binary file or Deck
-        A file's path, a deck's text, standard input, or a model built in Python.
-    mode : str
-        In listing mode blanks inside numbers are zeros, and decks that the printed program can't
-        compute are errors.
-
-    Raises
-    ------
-    OSError
-        If the file can't be read.
+    In listing mode blanks inside numbers are zeros, and decks that the printed program can't
+    compute are errors.  Raises OSError if the file can't be read.
     """
     if isinstance(path_or_text, Deck):
         text, source = path_or_text.to_text(), "<deck>"

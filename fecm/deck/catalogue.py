@@ -98,12 +98,8 @@ def read_plies(text: str) -> dict[str, NamedPly]:
     """Plies of a TOML file, by name.
 
     Each table is a ply: numbers by :data:`KEYS`, and the texts `source` and `assumed`.  `units`, of
-    the file or of a ply, is a key of :data:`SYSTEMS`; mm-N-s if it is missing.
-
-    Raises
-    ------
-    ValueError
-        If a name, value or unit cannot be meant, or the file is not TOML.
+    the file or of a ply, is a key of :data:`SYSTEMS`; mm-N-s if it is missing.  Raises ValueError
+    if a name, value or unit cannot be meant, or the file is not TOML.
     """
     tables = tomllib.loads(text)
     units = tables.pop("units", SYSTEM_OF_FILES)

@@ -61,13 +61,7 @@ class Finding:
         return SEVERITIES[self.code[0]]
 
     def to_dict(self, source: str) -> dict[str, object]:
-        """The finding as plain values, for JSON.
-
-        Parameters
-        ----------
-        source : str
-            Name of the deck's file.
-        """
+        """The finding as plain values, for JSON; `source` is the name of the deck's file."""
         place = self.place
         return {
             "kind": "finding",
@@ -86,12 +80,7 @@ class Finding:
     def render(self, source: str) -> str:
         """Format the finding as text, with the card and a caret under the field.
 
-        A note is one line, without its card.
-
-        Parameters
-        ----------
-        source : str
-            Name of the deck's file, for the ``FILE:LINE:COLUMN`` that opens the text.
+        A note is one line, without its card.  The text opens with `source`, the name of the file.
         """
         head = f"{self.severity}[{self.code}]: {self.message}"
         place = self.place
@@ -130,23 +119,13 @@ def _printable(text: str) -> str:
 
 
 class Findings:
-    """A list of findings that grows while a deck is read and checked.
-
-    Attributes
-    ----------
-    counts : Counter
-        Number of findings by code, including those that are not kept.
-    error_count : int
-        Number of errors.
-    closed : bool
-        Whether no more findings are kept, so that reading can stop.
-    """
+    """A list of findings that grows while a deck is read and checked."""
 
     def __init__(self) -> None:
         self._all: list[Finding] = []
-        self.counts: Counter[str] = Counter()
-        self.error_count: int = 0
-        self.closed: bool = False
+        self.counts = Counter[str]()  # findings by code, including those that are not kept
+        self.error_count = 0
+        self.closed = False  # whether no more findings are kept, so that reading can stop
 
     def add(self, code: str, message: str, place: Place | None = None, hint: str = "") -> None:
         """Add a finding; after :data:`MOST` errors report that there are more, and close."""

@@ -41,13 +41,7 @@ def uniform(length: float, elements: int) -> list[Section]:
 
 
 def listed(text: str) -> list[Section]:
-    """Sections from a list of counts and sizes: ``3*0.5,8*0.375,3*0.5``.
-
-    Raises
-    ------
-    ValueError
-        If the text is not such a list.
-    """
+    """Sections from a list of counts and sizes, ``3*0.5,8*0.375,3*0.5``, or a ValueError."""
     sections: list[Section] = []
     start = 0.0
     for part in text.split(","):
@@ -62,18 +56,9 @@ def listed(text: str) -> list[Section]:
 
 
 def graded(length: float, elements: int, centre: float, ratio: float) -> list[Section]:
-    """Elements that shrink towards `centre`, each side in a geometric series.
+    """Elements that shrink towards `centre`, a corner of elements, each side in a geometric series.
 
-    Parameters
-    ----------
-    length : float
-        Total length.
-    elements : int
-        Number of elements.
-    centre : float
-        Where they are smallest; becomes a corner of elements.
-    ratio : float
-        Ratio of the largest to the smallest element of a side.
+    `ratio` is that of the largest to the smallest element of a side.
     """
     if not 0.0 < centre < length or elements < 2:
         side = _series(length, elements, ratio)
@@ -263,16 +248,8 @@ class Grid:
     ) -> Boundary | None:
         """BOUN cards; None where nothing is restrained.
 
-        Parameters
-        ----------
-        everywhere : sequence of int
-            Codes of every node.
-        edges : dict
-            Codes of the nodes of the edges ``left``, ``right``, ``bottom`` and ``top``.
-        window : tuple of float, optional
-            Sides of a window in the middle of the plate.
-        held : sequence of int
-            Codes of the nodes of its edges.
+        Codes are those of every node, of the nodes of each of the :data:`EDGES`, and of the edges
+        of a window in the middle of the plate, given by its sides.
         """
         codes = np.tile(np.array(everywhere), (self.up, self.across, 1))
         parts = {"left": codes[:, 0], "right": codes[:, -1], "bottom": codes[0], "top": codes[-1]}

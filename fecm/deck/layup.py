@@ -29,17 +29,9 @@ class LayupError(FecmError, ValueError):
 
 
 def parse_layup(text: str) -> list[float]:
-    """Angles of a layup's plies, from the struck face on.
+    """Angles of the plies of a layup such as ``"[0_2/(±45)2/90]s"``, from the struck face on.
 
-    Parameters
-    ----------
-    text : str
-        For example ``"[0/45/0/-45/0]2s"`` or ``"[0_2/(±45)2/90]s"``.
-
-    Raises
-    ------
-    LayupError
-        If the text is not a layup; the message shows where.
+    Raises LayupError, whose message shows where, if the text is not a layup.
     """
     compact = re.sub(r"\s", "", text)
     if not compact.startswith("["):

@@ -276,10 +276,7 @@ class Resolution:
 def resolution(problem: Problem) -> Resolution | None:
     """Compare the elements at the impact node with the bending waves of the impact.
 
-    Returns
-    -------
-    Resolution or None
-        None without an approach, or where a number overflows.
+    None without an approach, or where a number overflows.
     """
     deck, mesh = problem.deck, problem.mesh
     impact, law = deck.require(Impact), deck.require(Indentation)
@@ -309,14 +306,8 @@ def mesh_error(elements: float, slenderness: float, shear: int) -> float:
     with L2 = 2, each against a mesh of 15 to 30 elements per wave: AS/3501 plates of
     100 x 100 x 1, 2 and 4 mm, and the report's plate.
 
-    Parameters
-    ----------
-    elements : float
-        Elements per bending wave of the contact's duration.
-    slenderness : float
-        Side of an element over the thickness; under L2 = 3 a slender element locks.
-    shear : int
-        Shear order L2.
+    `elements` are those per bending wave of the contact's duration, `slenderness` is the side of an
+    element over the thickness (under L2 = 3 a slender element locks), `shear` the order L2.
     """
     if shear < FULL:
         return 0.045 * ENOUGH_PER_WAVE / elements

@@ -54,10 +54,7 @@ FIXTURES = {
 def parse_fixture(text: str) -> Fixture:
     """Fixture of a name, or of ``window:LXxLY,WXxWY``.
 
-    Raises
-    ------
-    ValueError
-        If it is neither, or the window is not smaller than the plate.
+    Raises ValueError if it is neither, or the window is not smaller than the plate.
     """
     if text in FIXTURES:
         return FIXTURES[text]

@@ -85,14 +85,9 @@ class PlateMesh:
         return Elements(tuple(ElementNodes(n, tuple(nodes), 0) for n, nodes in rows))
 
     def supported(self, everywhere: Sequence[int], supports: Mapping[str, str]) -> Boundary | None:
-        """BOUN cards; None where nothing is restrained.
+        """BOUN cards of the supports of groups; None where nothing is restrained.
 
-        Parameters
-        ----------
-        everywhere : sequence of int
-            Codes of every node.
-        supports : dict
-            Support by the name of a group; that of the boundary leaves out the other groups.
+        The support of the boundary leaves out the other groups.
         """
         codes = np.tile(np.array(everywhere), (self.nodes, 1))
         for name, support in supports.items():
@@ -125,12 +120,9 @@ class PlateMesh:
         return np.unique(sides[counts == 1])
 
     def supports(self, wanted: Mapping[str, str]) -> dict[str, str]:
-        """Supports of groups, checked; groups named after a support have it.
+        """Supports of groups; those named after a support have it.
 
-        Raises
-        ------
-        MeshError
-            If a group or a support is unknown.
+        Raises MeshError if a group or a support is unknown.
         """
         for name, support in wanted.items():
             if name not in self.groups and name != BOUNDARY:
@@ -155,12 +147,7 @@ class MeshLike(Protocol):
 def read_mesh(path: str | Path) -> PlateMesh:
     """Read a mesh with meshio: Gmsh's `.msh`, or what else it reads.
 
-    Raises
-    ------
-    MeshError
-        If the file is not the mesh of a plane plate.
-    ImportError
-        If meshio is not installed.
+    Raises MeshError if the file is not the mesh of a plane plate, ImportError without meshio.
     """
     try:
         import meshio
@@ -225,21 +212,9 @@ def plate_mesh(
     Cells are turned counter-clockwise and nodes without a cell dropped.  Three quadrilaterals of 4
     nodes replace a triangle; a quadrilateral of 8 nodes gets its centre as the ninth.
 
-    Parameters
-    ----------
-    points : array_like (n, 2) or (n, 3)
-        Coordinates in a plane z = const.
-    cells : array_like (m, 3), (m, 4), (m, 6), (m, 8) or (m, 9)
-        Points of the cells, from 0: corners, mid-sides (the first between corners 1 and 2), centre.
-    groups : dict
-        Points by the name of a group.
-    where : str
-        Beginning of messages.
-
-    Raises
-    ------
-    MeshError
-        If they are not the mesh of a plane plate.
+    The points, (n, 2) or (n, 3), are in a plane z = const.  Cells, (m, k), and groups have points
+    from 0; a cell has corners, mid-sides (the first between corners 1 and 2), centre.  `where`
+    begins messages.  Raises MeshError if they are not the mesh of a plane plate.
     """
     try:
         places, nodes = np.array(points, float), np.array(cells)

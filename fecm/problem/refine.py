@@ -29,23 +29,11 @@ class RefineError(FecmError, ValueError):
 
 
 def refined(deck: Deck, mesh: Mesh, marked: Bools | None = None) -> Deck:
-    """Bisect elements of a deck.
+    """Bisect elements of a deck with a mesh in both directions: all, or those marked, (numel,).
 
     Old nodes keep their numbers.  A new node is restrained where all nodes of its side, or of its
-    element, are; nodal forces stay where they are.
-
-    Parameters
-    ----------
-    deck : Deck
-    mesh : Mesh
-        Its mesh.
-    marked : ndarray (numel,) of bool, optional
-        Elements that are bisected in both directions; all by default.
-
-    Raises
-    ------
-    RefineError
-        If an element is not a quadrilateral with four or nine nodes.
+    element, are; nodal forces stay where they are.  Raises RefineError if an element is not a
+    quadrilateral with four or nine nodes.
     """
     nodes = _Nodes(mesh)
     elements: list[tuple[int, list[int]]] = []

@@ -23,21 +23,12 @@ Source = str | Path | tuple[Any, Any]
 
 @dataclass(frozen=True)
 class Measurement:
-    """A measured force in the deck's units.
-
-    Attributes
-    ----------
-    name : str
-    column : str
-        What it is compared with: ``"force"`` or ``"transducer"``.
-    time, force : ndarray (points,)
-        The times increase.
-    """
+    """A measured force in the deck's units."""
 
     name: str
-    column: str
-    time: Floats
-    force: Floats
+    column: str  # what it is compared with: ``"force"`` or ``"transducer"``
+    time: Floats  # (points,), increasing
+    force: Floats  # (points,)
 
     @property
     def quantity(self) -> str:
@@ -99,22 +90,11 @@ def _against(name: str, own: float, measured: float, unit: str) -> str:
 
 
 def measurement_of(source: Source, units: Mapping[str, str]) -> Measurement:
-    """Read a measured force.
+    """Measured force of a CSV file (time and force, or time and transducer), or of two arrays.
 
-    Parameters
-    ----------
-    source : str, Path or tuple
-        CSV file with the columns time and force, or time and transducer; or times and forces.
-    units : mapping of str to str
-        Names of the deck's units; may be empty.
-
-    Raises
-    ------
-    StudyError
-        If the file is invalid, or names other units; or if times and forces are not finite numbers,
-        equally many, at increasing times.
-    OSError
-        If the file can't be read.
+    `units` are the names of the deck's, which may be empty.  Raises StudyError if the file is
+    invalid, or names other units, or if times and forces are not finite numbers, equally many, at
+    increasing times.  Raises OSError if the file can't be read.
     """
     if isinstance(source, str | Path):
         return _from_file(Path(source), units)
@@ -156,10 +136,7 @@ def _check_unit(path: Path, name: str, own: str, deck: str, known: Mapping[str, 
 def compare(result: Result, measured: Measurement) -> Comparison:
     """Compare a result's force with a measured one, at the measured times of the run.
 
-    Raises
-    ------
-    StudyError
-        If the result has no impact, or fewer than two times are in both.
+    Raises StudyError if the result has no impact, or fewer than two times are in both.
     """
     if "history/force" not in result:
         raise StudyError("the result has no history to compare with: no impact step was taken")

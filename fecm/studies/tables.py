@@ -45,23 +45,12 @@ class Table:
     def columns(
         self, names: Sequence[str], *, increasing: str = "", places: Sequence[int] = ()
     ) -> dict[str, Floats]:
-        """Numbers of some columns, (rows,) each.
+        """Numbers of some columns, (rows,) each, by name.
 
-        Parameters
-        ----------
-        names : sequence of str
-            Columns to read.  If the file has none of them, the first columns are taken in this
-            order.
-        increasing : str
-            Name of the column whose values must increase.
-        places : sequence of int
-            Numbers of the columns from 0; the names in the file are then ignored.
-
-        Raises
-        ------
-        StudyError
-            If a column is missing, a field is not a finite number, there are fewer than two rows,
-            or the values do not increase.
+        If the file has none of the names, the first columns are taken in this order; with `places`,
+        numbers of the columns from 0, the names in the file are ignored.  Raises StudyError if a
+        column is missing, a field is not a finite number, there are fewer than two rows, or the
+        values of the column `increasing` do not increase.
         """
         own = list(places) or self._places(names)
         if len(self.rows) < 2:
@@ -110,12 +99,7 @@ class Table:
 def read_table(path: Path) -> Table:
     """Read a table; the first line contains names, and the second units, if they aren't numbers.
 
-    Raises
-    ------
-    StudyError
-        If the file is not text.
-    OSError
-        If the file cannot be read.
+    Raises StudyError if the file is not text.  Raises OSError if the file cannot be read.
     """
     rows = read_rows(path)
     if not rows or all(_number(field) is not None for field in rows[0][1]):

@@ -121,21 +121,11 @@ def fit(
 ) -> Fit:
     """Fit the contact law to a test.
 
-    Parameters
-    ----------
-    indentation, force : array_like (n,)
-        In the order of measurement from first contact at zero; positive in compression.
-    retreat : float, optional
-        Decrease of the indentation that counts as a turn (length); automatic if None.
-    q : float, optional
-        Fixed unloading power; fitted if None.
-    acr : bool
-        Fit alpha_cr of equation 3-7 with q = 5/2 instead of s_p and alpha_p of equation 3-8.
-
-    Raises
-    ------
-    StudyError
-        If the points are not an indentation test.
+    Indentation and force, (n,), are in the order of measurement from first contact at zero, and
+    positive in compression.  A decrease of the indentation by `retreat` (automatic if None) counts
+    as a turn.  The unloading power `q` is fitted if None.  With `acr` alpha_cr of equation 3-7 is
+    fitted with q = 5/2 instead of s_p and alpha_p of equation 3-8.  Raises StudyError if the points
+    are not an indentation test.
     """
     a, f = np.asarray(indentation, dtype=float), np.asarray(force, dtype=float)
     if a.shape != f.shape or a.ndim != 1:

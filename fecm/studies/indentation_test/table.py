@@ -44,23 +44,11 @@ def read_test(
 ) -> Test:
     """Read an indentation test in consistent units.
 
-    Parameters
-    ----------
-    path : Path
-        Table with columns for indentation and force, named as in `NAMES`.
-    columns : sequence of str
-        Names or numbers (from 1) of the two columns, if they have other names.
-    units : tuple of str, optional
-        Units of length and force to convert to.  By default, a file in inches and pounds is
-        converted to in and lbf, others to m and N or mm and N.  A file without units is assumed to
-        be in `units`.
-
-    Raises
-    ------
-    StudyError
-        If a column is missing, a unit is unknown, or a number is invalid.
-    OSError
-        If the file cannot be read.
+    The columns are named as in `NAMES`, or `columns` has their names or numbers (from 1).  Values
+    are converted to `units` of length and force; by default, a file in inches and pounds to in and
+    lbf, others to m and N or mm and N.  A file without units is assumed to be in `units`.  Raises
+    StudyError if a column is missing, a unit is unknown, or a number is invalid.  Raises OSError
+    if the file cannot be read.
     """
     table = read_table(path)
     places = [_place(table, *asked) for asked in zip(NAMES, columns or ("", ""), strict=True)]

@@ -37,21 +37,10 @@ def calibrate(
     The scatter is attributed to V_F.  Scatter of V_a flattens the line: the true slope is between
     the fitted slope and the fitted slope divided by R².
 
-    Parameters
-    ----------
-    v_f, v_a : ndarray (points,)
-        Output of the transducer and of the accelerometer at the same instants.
-    mass : float
-        Mass of the target (force*time^2/length).
-    c_a : float
-        Sensitivity of the accelerometer (output per length/time^2).
-    through_origin : bool
-        Fit without an offset.
-
-    Raises
-    ------
-    StudyError
-        If there are fewer than three points, V_a or V_F is constant, or a sum overflows.
+    The outputs, (points,), are of the same instants, `mass` is that of the target
+    (force*time^2/length), `c_a` the sensitivity of the accelerometer (output per length/time^2).
+    Raises StudyError if there are fewer than three points, V_a or V_F is constant, or a sum
+    overflows.
     """
     parameters = 1 if through_origin else 2
     if len(v_f) < 3:

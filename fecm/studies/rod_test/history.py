@@ -34,20 +34,9 @@ class TimeHistory:
 def recorded(path: Path, column: str | None = None) -> TimeHistory:
     """Read a history from a result file or a CSV file.
 
-    Parameters
-    ----------
-    path : Path
-    column : str, optional
-        Name of the column; by default the transducer, or the second column of a CSV file.
-
-    Raises
-    ------
-    StudyError
-        If the history does not exist, or the CSV file is invalid.
-    ResultFileError
-        If the result file is damaged.
-    OSError
-        If the file cannot be read.
+    The column is by default the transducer, or the second of a CSV file.  Raises StudyError if the
+    history does not exist, or the CSV file is invalid, ResultFileError if the result file is
+    damaged, OSError if the file cannot be read.
     """
     with path.open("rb") as file:
         is_result = file.read(len(HDF5)) == HDF5

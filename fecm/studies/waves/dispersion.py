@@ -53,10 +53,6 @@ def dispersion(medium: Medium, angle: float, wavelengths: ArrayLike) -> Dispersi
     wavelengths : array_like (n,)
         Wavelengths over thickness, positive.
 
-    Returns
-    -------
-    Dispersion
-
     Raises
     ------
     StudyError

@@ -111,15 +111,7 @@ class WaveSurfaces:
     """The five fronts of a laminate, tracked over all normals.
 
     Fronts that cross keep their names, as do fronts that approach each other without crossing.
-
-    Parameters
-    ----------
-    medium : Medium
-
-    Raises
-    ------
-    StudyError
-        If the velocities are out of the floating-point range.
+    Raises StudyError if the velocities are out of the floating-point range.
     """
 
     def __init__(self, medium: Medium) -> None:
@@ -143,17 +135,7 @@ class WaveSurfaces:
         self._place = place[:, assigned(share)]
 
     def fronts(self, normals: ArrayLike) -> Fronts:
-        """Normal velocities of the five fronts and their derivatives.
-
-        Parameters
-        ----------
-        normals : array_like (n,)
-            Angles of the normals, degrees.
-
-        Returns
-        -------
-        Fronts
-        """
+        """The five fronts at normals, (n,), in degrees."""
         found = sheets(self.medium, np.atleast_1d(np.asarray(normals, dtype=np.float64)))
         turn = np.mod(found.normal, 360.0) * STEPS
         near = np.round(turn).astype(np.intp)
@@ -210,13 +192,9 @@ class WaveSurfaces:
         return sorted(found, key=lambda cusp: (FRONTS.index(cusp.mode), cusp.normal))
 
     def misnamed(self) -> dict[str, list[tuple[float, float]]]:
-        """Normals at which a component other than the name's dominates.
+        """Intervals of the normal (degrees) where another component than the name's dominates.
 
-        Returns
-        -------
-        dict
-            First and last normal (degrees) of every such interval, by front; fronts without one are
-            left out.
+        They are listed by front; fronts without one are left out.
         """
         normals = np.arange(360 * STEPS + 1) / STEPS
         share = self.fronts(normals).share
