@@ -136,14 +136,12 @@ class Reader:
 
     def _control(self, title: Card) -> Control | None:
         """Read the control card; None if it is missing or invalid."""
-        card = self.stream.take()
-        if card is None or card.is_keyword:
-            if card is not None:
-                self.stream.give_back()
+        card = self.stream.take_data()
+        if card is None:
             self.findings.add(
                 "E003",
                 "The control card is missing.",
-                (card or title).place,
+                (self.stream.peek() or title).place,
                 "(6I5): NUMNP, NUMEL, LAYER, NDM, NDF, NEN",
             )
             return None
@@ -318,10 +316,8 @@ class Reader:
         for macro in macros:
             if macro.word != "PROP" or macro.value <= 0:
                 continue
-            card = self.stream.take()
-            if card is None or card.is_keyword or card.is_blank:
-                if card is not None:
-                    self.stream.give_back()
+            card = self.stream.take_data()
+            if card is None or card.is_blank:
                 self.findings.add(
                     "E011",
                     "The card of PROP's load table is missing after the macro program's END.",

@@ -64,6 +64,20 @@ class Stream:
         """Return the last card to the stream."""
         self.position -= 1
 
+    def peek(self) -> Card | None:
+        """The next card as :meth:`take` gives it, which stays in the stream."""
+        position, card = self.position, self.take()
+        self.position = position
+        return card
+
+    def take_data(self) -> Card | None:
+        """The next card; None where that is a keyword card, which stays, or as in :meth:`take`."""
+        card = self.take()
+        if card is None or not card.is_keyword:
+            return card
+        self.give_back()
+        return None
+
     def text_since(self, position: int) -> str:
         """Text of the cards taken since a position."""
         taken = self.lines[position : self.position]
@@ -71,22 +85,17 @@ class Stream:
 
     def skip_data(self) -> None:
         """Skip cards up to the next keyword."""
-        while (card := self.take()) is not None:
-            if card.is_keyword:
-                self.give_back()
-                return
-
-    def values(self, card: Card, fields: Fields) -> list[Value] | None:
-        """Values of a card; None after an error, which is reported."""
-        values = read_values(card, fields, self.findings, blanks_are_zeros=self._blanks_are_zeros)
-        if values is not None and self._keeps_values:
-            self.read[card.line] = (fields, values)
-        return values
+        while self.take_data() is not None:
+            pass
 
     def row(self, card: Card, fields: Fields) -> tuple[list[Value], Source] | None:
-        """Values of a card and their source; None after an error."""
-        values = self.values(card, fields)
-        return None if values is None else (values, Source(card, fields))
+        """Values of a card and their source; None after an error, which is reported."""
+        values = read_values(card, fields, self.findings, blanks_are_zeros=self._blanks_are_zeros)
+        if values is None:
+            return None
+        if self._keeps_values:
+            self.read[card.line] = (fields, values)
+        return values, Source(card, fields)
 
 
 def _is_comment(line: str) -> bool:
@@ -117,10 +126,7 @@ class SegmentReader:
     def _records(self, head: Card, kind: type[_R], fields: Fields) -> tuple[_R, ...]:
         """Records of numbered cards up to a blank card, or up to the last element's card."""
         records: list[_R] = []
-        while (card := self._stream.take()) is not None and not card.is_blank:
-            if card.is_keyword:
-                self._stream.give_back()
-                break
+        while (card := self._stream.take_data()) is not None and not card.is_blank:
             row = self._stream.row(card, fields)
             if row is None:
                 self.unsound.add(head.keyword)
@@ -128,12 +134,13 @@ class SegmentReader:
                 records.append(kind.from_row(*row))
         last = records[-1] if records else None
         complete = isinstance(last, ElementNodes) and last.element >= self._control.numel
-        if (card is None or card.is_keyword) and not complete:
+        if card is None and not complete:
+            following = self._stream.peek()
             self._stream.findings.add(
                 "E007",
                 f"The {head.keyword} cards are not ended by a blank card.",
-                (card or head).place,
-                "put a blank card before this one" if card else "put a blank card at the end",
+                (following or head).place,
+                "put a blank card before this one" if following else "put a blank card at the end",
             )
         return tuple(records)
 
@@ -147,20 +154,15 @@ class SegmentReader:
     def _single(self, head: Card, kind: type[_R], fields: Fields | None = None) -> _R | None:
         """Record of a mandatory card; None if it is missing or unreadable."""
         fields = fields or kind.fields
-        card = self._stream.take()
-        row = None
-        if card is not None and not card.is_keyword:
-            row = self._stream.row(card, fields)
-        else:
-            if card is not None:
-                self._stream.give_back()
-            if head.keyword not in self.unsound:
-                self._stream.findings.add(
-                    "E008",
-                    f"A card of {head.keyword} is missing.",
-                    (card or head).place,
-                    f"its fields are {', '.join(field.name for field in fields)}",
-                )
+        card = self._stream.take_data()
+        if card is None and head.keyword not in self.unsound:
+            self._stream.findings.add(
+                "E008",
+                f"A card of {head.keyword} is missing.",
+                (self._stream.peek() or head).place,
+                f"its fields are {', '.join(field.name for field in fields)}",
+            )
+        row = None if card is None else self._stream.row(card, fields)
         if row is None:
             self.unsound.add(head.keyword)
             return None
@@ -168,12 +170,11 @@ class SegmentReader:
 
     def _patch(self, head: Card) -> model.Segment | None:
         # The card begins with a word, but not with that of another segment.
-        card = self._stream.take()
+        card = self._stream.peek()
         if card is not None and card.keyword not in (*READERS, "END"):
+            self._stream.take()
             row = self._stream.row(card, model.Patch.fields)
             return None if row is None else model.Patch.from_row(*row)
-        if card is not None:
-            self._stream.give_back()
         self._stream.findings.add(
             "E008",
             "A card of PATC is missing.",
@@ -184,10 +185,7 @@ class SegmentReader:
 
     def _allowables(self, head: Card) -> model.Segment | None:
         strengths = self._single(head, model.Allowables)
-        card = self._stream.take()
-        if card is not None and card.is_keyword:
-            self._stream.give_back()
-            card = None
+        card = self._stream.take_data()
         row = None if card is None else self._stream.row(card, model.Allowables.constants)
         if strengths is None or (card is not None and row is None):
             return None
@@ -202,9 +200,7 @@ class SegmentReader:
                     "SHEA takes MITC (assumed strains) and EQUI (stiffness from equilibrium)",
                 )  # fmt: skip
         assumed, equilibrium = (word in words for word in model.Shear.WORDS)
-        following = self._stream.take()
-        if following is not None:
-            self._stream.give_back()
+        following = self._stream.peek()
         if words and (following is None or following.is_keyword or following.is_blank):
             return model.Shear(1.0, assumed, equilibrium, source=Source(head, ()))
         found = self._single(head, model.Shear)
@@ -265,14 +261,12 @@ class SegmentReader:
         count = self._control.layers
         layers: list[Layer] = []
         for number in range(count):
-            card = self._stream.take()
-            if card is None or card.is_keyword or card.is_blank:
-                if card is not None:
-                    self._stream.give_back()
+            card = self._stream.take_data()
+            if card is None or card.is_blank:
                 self._stream.findings.add(
                     "E202",
                     f"MATE has {number} layer cards where the control card says {count}.",
-                    (card or head).place,
+                    (card or self._stream.peek() or head).place,
                 )
                 return None
             row = self._stream.row(card, Layer.fields)
