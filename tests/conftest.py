@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,6 +16,21 @@ from tests.decks import APPENDIX, small
 # A busy machine fails no example.
 settings.register_profile("fecm", deadline=None)
 settings.load_profile("fecm")
+
+
+def pytest_collection_finish() -> None:
+    """Keep the garbage collector from looking at modules and tests again and again."""
+    gc.collect()
+    gc.freeze()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _few_pixels() -> Iterator[None]:
+    """Draw pictures with few pixels."""
+    with pytest.MonkeyPatch.context() as patch:
+        if "matplotlib" in sys.modules:  # not without the extra for plots
+            patch.setattr("fecm.plot.style.RESOLUTION", 50)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -26,13 +26,20 @@ pytest.importorskip("matplotlib")
 OF_RUNS = [name for name, kind in KINDS.items() if not kind.sweep]
 
 
-@pytest.fixture
-def file(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Result file of the small plate under a patch, with ply stresses and exposures."""
     program = PLY_PROGRAM.replace("NEXT", "FAIL          5\nNEXT")
     data = "ALLO\n200000,200000,7000,28000,13000\n\n" + DISC + DATA_CARDS
-    fecm.run(small(program, data=data), output=tmp_path / "small.h5")
-    return tmp_path / "small.h5"
+    path = tmp_path_factory.mktemp("made") / "small.h5"
+    fecm.run(small(program, data=data), output=path)
+    return path
+
+
+@pytest.fixture
+def file(made: Path, tmp_path: Path) -> Path:
+    """A copy of that file in a folder of its own."""
+    return Path(shutil.copy(made, tmp_path))
 
 
 def test_the_command_writes_every_kind_and_keeps_what_is_there(file: Path) -> None:

@@ -67,7 +67,7 @@ def test_a_run_is_done_whatever_becomes_of_its_streams(
 
 @pytest.mark.parametrize(
     ("command", "streams", "status"),
-    [("info d.h5", ">&-", 2), ("info d.h5", "2>&-", 0), ("check d.inp", ">&-", 2),
+    [("info d.h5", ">&-", 2), long("info d.h5", "2>&-", 0), long("check d.inp", ">&-", 2),
      ("tapes d.h5 -d t", ">&-", 2), ("--help", ">&-", 2), ("--help", "2>&-", 0)],
 )  # fmt: skip
 def test_other_commands_end_with_2_when_they_can_not_print(

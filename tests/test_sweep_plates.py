@@ -36,10 +36,11 @@ def new(layup: str, *options: str) -> str:
 @pytest.mark.parametrize("support", ["free", "simple", "clamped"])
 @pytest.mark.parametrize("base", LAYUPS[:2])
 def test_a_sweep_of_layups_is_new_and_run_of_each(base: str, support: str) -> None:
-    found = fecm.sweep(new(base, "--support", support), {"layup": LAYUPS}, history=True)
+    options = "--support", support, "--duration", "5e-5"
+    found = fecm.sweep(new(base, *options), {"layup": LAYUPS}, history=True)
     assert found.force is not None
     for case, layup in enumerate(LAYUPS):
-        result = fecm.run(new(layup, "--support", support))
+        result = fecm.run(new(layup, *options))
         assert isinstance(result, fecm.Result)
         assert found.dt[case] == pytest.approx(result.time[0], rel=1e-12)
         steps = min(len(result.force), int(found.steps[case]))

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
-from functools import cache
+from functools import cache, lru_cache
 from itertools import pairwise
 
 from fecm.deck.findings import Findings, Place
@@ -63,8 +63,14 @@ def format_real(value: float, width: int) -> str | None:
     The most readable form that fits, not padded; None if none fits.  Only fields of ten columns or
     more get an exponent without its letter: 2.5E-7 as ``25-8`` is hard to read.
     """
+    return _formatted(repr(value), width)
+
+
+@lru_cache(4096)
+def _formatted(numeral: str, width: int) -> str | None:
+    """Write the number of a numeral of Python into `width` columns; decks repeat their numbers."""
     for letter in ("E", "") if width >= _LETTERLESS else ("E",):
-        forms = list(_forms(value, letter))
+        forms = list(_forms(numeral, letter))
         for room in (width - 1, width):  # with a blank between two numbers if it fits
             for text in forms:
                 if len(text) <= room:
@@ -72,13 +78,13 @@ def format_real(value: float, width: int) -> str | None:
     return None
 
 
-def _forms(value: float, letter: str) -> Iterator[str]:
+def _forms(numeral: str, letter: str) -> Iterator[str]:
     """Forms of a number, the most readable first, with `letter` before an exponent."""
-    number = Decimal(repr(value)).normalize()
+    number = Decimal(numeral).normalize()
     sign, numerals, exponent = number.as_tuple()
     if not isinstance(exponent, int):  # infinite or no number
-        raise ValueError(f"{value} can't be written on a card")
-    if value == 0.0:
+        raise ValueError(f"{numeral} can't be written on a card")
+    if not number:
         exponent = 0
     minus = "-" if sign else ""
     digits = "".join(map(str, numerals))

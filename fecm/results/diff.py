@@ -12,6 +12,7 @@ Datasets are read in blocks of rows: memory does not grow with the results.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -188,12 +189,17 @@ def difference(
     for pattern, (relative, *absolute) in own:
         for path in _chosen(both, [pattern], DATASETS) & chosen:
             tolerances[path] = (relative, absolute[0] if absolute else atol)
-    return Difference(
-        [_compare((left, right), path, *tolerances[path]) for path in sorted(in_a & in_b & chosen)],
-        (sorted((in_a - in_b) & chosen), sorted((in_b - in_a) & chosen)),
-        _listed(left, right),
-        sorted(excluded),
-    )
+    with contextlib.ExitStack() as stack:
+        for source in (left, right):
+            if isinstance(source, Contents):
+                stack.enter_context(source.held())
+        pair = left, right
+        return Difference(
+            [_compare(pair, path, *tolerances[path]) for path in sorted(in_a & in_b & chosen)],
+            (sorted((in_a - in_b) & chosen), sorted((in_b - in_a) & chosen)),
+            _listed(*pair),
+            sorted(excluded),
+        )
 
 
 def _fitted(source: Source, other: Source) -> Source:

@@ -45,6 +45,26 @@ class Contents(Mapping[str, Array]):
         self.texts: dict[str, str] = {}  # single texts
         self.lists: dict[str, list[str]] = {}  # datasets of texts; sweeps only
         self._read: dict[str, Array] = {}
+        self._held: h5py.File | None = None
+
+    @contextlib.contextmanager
+    def held(self) -> Iterator[None]:
+        """Keep the file open for many reads; each of them opens it otherwise."""
+        with _troubles(self.path):
+            file = h5py.File(self.path)
+        with file:
+            self._held = file
+            try:
+                yield
+            finally:
+                self._held = None
+
+    @contextlib.contextmanager
+    def _file(self) -> Iterator[h5py.File]:
+        """The open file; its errors become those of this module."""
+        held = self._held and contextlib.nullcontext(self._held)
+        with _troubles(self.path), held or h5py.File(self.path) as file:
+            yield file
 
     @property
     def form(self) -> str:
@@ -57,7 +77,7 @@ class Contents(Mapping[str, Array]):
         if key in self.lists:
             return np.array(self.lists[key])
         if key not in self._read:
-            with _troubles(self.path), h5py.File(self.path) as file:
+            with self._file() as file:
                 values = np.asarray(file[key][()])
             if key == ELEMENTS:
                 self._check_nodes(values)
@@ -71,7 +91,7 @@ class Contents(Mapping[str, Array]):
         """
         if path in self.lists:
             return np.array(self.lists[path][start:stop], dtype=object)
-        with _troubles(self.path), h5py.File(self.path) as file:
+        with self._file() as file:
             dataset = file[path]
             if not dataset.shape:
                 return np.asarray(dataset[()]).reshape(1)[start:stop]
@@ -79,7 +99,7 @@ class Contents(Mapping[str, Array]):
 
     def attributes_of(self, path: str) -> dict[str, Any]:
         """Read the attributes of a dataset or group."""
-        with _troubles(self.path), h5py.File(self.path) as file:
+        with self._file() as file:
             return _attributes(file[path])
 
     def _check_nodes(self, elements: Array) -> None:
