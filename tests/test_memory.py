@@ -64,8 +64,8 @@ def plate(folder: Path, elements: int, macros: str, *options: str) -> Path:
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="Linux tells the peak")
 @pytest.mark.parametrize(
     ("macros", "elements", "options"),
-    [(IMPACT, 40, ()), (IMPACT, 30, ("--grading", "3", "--at", "2.1,1.3")), (STATIC, 40, ()),
-     (MODES, 30, ())],
+    [(IMPACT, 40, ()), (IMPACT, 20, ("--grading", "3", "--at", "2.1,1.3")), (STATIC, 28, ()),
+     (MODES, 20, ())],
     ids=["impact", "graded", "static", "modes"],
 )  # fmt: skip
 def test_the_estimate_bounds_what_is_measured(

@@ -280,9 +280,9 @@ def test_a_table_of_cases_that_can_not_be_read_says_where(
 
 
 @functools.cache
-def serial() -> SweepResult:
+def serial(program: str = STEPS) -> SweepResult:
     """Sixteen layups in this process."""
-    return fecm.sweep(model(small(STEPS)), {"layup": LAYUPS}, history=True)
+    return fecm.sweep(model(small(program)), {"layup": LAYUPS}, history=True)
 
 
 @pytest.mark.long
@@ -398,7 +398,7 @@ def test_a_scheduler_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatc
 
 
 def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
-    problem = problem_of(model(small(STEPS)))
+    problem = problem_of(model(small()))
     made = plan(problem, grid([("layup", list(LAYUPS))]), history=True)
     path = tmp_path / "sweep.h5"
     begun: list[int] = []
@@ -416,7 +416,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
     # A part that is not whole is run again.
     (again.folder / "task-000002.npz").write_bytes(b"PK\x03\x04 and no more")
     notes: list[str] = []
-    assert_same(carry_out(problem, made, parts=again, note=notes.append), serial())
+    assert_same(carry_out(problem, made, parts=again, note=notes.append), serial(PROGRAM))
     assert len(notes) == 1
     assert "task-000002.npz is damaged; its cases are run again" in notes[0]
     with pytest.raises(OtherSweepError):
@@ -443,7 +443,7 @@ main()
 
 
 def test_a_sweep_that_is_interrupted_from_outside_ends_in_the_same_file(tmp_path: Path) -> None:
-    (tmp_path / "plate.inp").write_text(small(STEPS))
+    (tmp_path / "plate.inp").write_text(small())
     command = ["sweep", "plate.inp", "--vary", "layup=" + ",".join(LAYUPS[:4]), "-o"]
     done = subprocess.run(
         [sys.executable, "-c", SIGNALLED, *command, "s.h5"],
