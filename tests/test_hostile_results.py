@@ -76,9 +76,9 @@ def start(folder: Path, what: str, patience: str = "0.4") -> subprocess.Popen[st
     )  # fmt: skip
 
 
-def ended(folder: Path, what: str) -> tuple[int, str, str]:
+def ended(folder: Path, what: str, patience: str = "0.4") -> tuple[int, str, str]:
     """How such a command ends."""
-    program = start(folder, what)
+    program = start(folder, what, patience)
     out, err = program.communicate(timeout=60)
     return program.returncode, out, err
 
@@ -112,7 +112,7 @@ def test_a_call_that_waits_for_ever_is_one_line(tmp_path: Path) -> None:
 
 
 def test_waiting_for_a_reader_of_the_output_has_no_limit(tmp_path: Path) -> None:
-    program = start(tmp_path, "write")
+    program = start(tmp_path, "write", "1")
     with pytest.raises(subprocess.TimeoutExpired):
         program.wait(timeout=1.6)
     out, err = program.communicate(timeout=60)
@@ -129,18 +129,18 @@ def test_a_child_ends_with_its_parent(tmp_path: Path) -> None:
 
 
 def test_more_memory_than_is_free_is_one_line(tmp_path: Path) -> None:
-    status, out, err = ended(tmp_path, "swallow")
+    status, out, err = ended(tmp_path, "swallow", "20")
     assert (status, out) == (2, "")
     assert err.startswith("fecm: error: x.h5: this takes more memory than the ")
     assert err.count("\n") == 1
 
 
 def test_honest_work_may_take_longer_than_one_call(tmp_path: Path) -> None:
-    assert ended(tmp_path, "work") == (0, "done\n", "")
+    assert ended(tmp_path, "work", "1") == (0, "done\n", "")
 
 
 def test_the_exit_status_of_the_child_is_the_programs(tmp_path: Path) -> None:
-    assert ended(tmp_path, "no") == (1, "", "")
+    assert ended(tmp_path, "no", "20") == (1, "", "")
 
 
 @pytest.mark.parametrize(

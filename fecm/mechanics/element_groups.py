@@ -125,6 +125,6 @@ def longest_sides(elements: Ints, coordinates: Floats) -> Floats:
     longest = np.empty(len(elements))
     for block in element_blocks(elements, coordinates):
         corners = block.coordinates[:, : block.shape.corners]
-        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        sides = np.hypot(*np.moveaxis(corners - np.roll(corners, 1, axis=1), 2, 0))
         longest[block.rows] = sides.max(axis=1)
     return longest
