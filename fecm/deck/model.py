@@ -231,11 +231,6 @@ class Projectile(Segment):
             yield ""
 
 
-def _given(value: Value) -> float | None:
-    """A number of a card; None where its field is blank."""
-    return None if value == "" else float(value)
-
-
 @dataclass(frozen=True)
 class Patch(Segment):
     """PATC: (A4,6X,4F10.0); the contact force acts on a circle (not in the report's program)."""
@@ -257,9 +252,8 @@ class Patch(Segment):
 
     @classmethod
     def from_row(cls, values: Sequence[Value], source: Source) -> Self:
-        """Build the segment from the card's values; a blank radius or centre is None."""
-        radius, x, y = map(_given, values[1:4])
-        return cls(str(values[0]).upper() or "DISC", radius, x, y, float(values[4]), source=source)
+        """Build the segment from the card's values."""
+        return super().from_row([str(values[0]).upper(), *values[1:]], source)
 
     def row(self) -> list[Value]:
         """Values in the card's order; None is a blank."""
@@ -348,12 +342,6 @@ class Delamination(Segment):
     keyword: ClassVar[str] = "DELA"
 
     fields: ClassVar[Fields] = layout("F10 G_IIc", "F10? number of delaminations|number")
-
-    @classmethod
-    def from_row(cls, values: Sequence[Value], source: Source) -> Self:
-        """Build the segment from the card's values; a blank number is 1."""
-        toughness, number = values
-        return cls(float(toughness), 1.0 if number == "" else float(number), source=source)
 
 
 @dataclass(frozen=True)

@@ -49,11 +49,15 @@ class Record:
 
     @classmethod
     def from_row(cls, values: Sequence[Value], source: Source) -> Self:
-        """Build the record from a card's values."""
+        """Build the record from a card's values; ``""`` takes the attribute's default."""
         arguments: list[Any] = list(values)
         if cls.packed is not None:
             arguments[cls.packed] = [tuple(arguments[cls.packed])]
-        return cls(*arguments, source=source)
+        if "" not in arguments:
+            return cls(*arguments, source=source)
+        names = (attribute.name for attribute in dataclasses.fields(cls)[1:])
+        given = {n: value for n, value in zip(names, arguments, strict=False) if value != ""}
+        return cls(**given, source=source)
 
     def row(self) -> list[Value]:
         """Values in the card's order."""
