@@ -250,16 +250,12 @@ def _check_units(deck: Deck, findings: Findings, *, hits: bool) -> None:
 
 def check_time_step_of_contact(problem: Problem, findings: Findings) -> None:
     """Warn of a DT that the contact makes unstable, and of one far below the stable step."""
-    deck, plate = problem.deck, problem.moving_plate
-    steps = [macro for macro in deck.macros if macro.word == "DT"]
+    steps = [macro for macro in problem.deck.macros if macro.word == "DT"]
     if not steps:
         return
     bound = problem.safe_time_step
     largest = max(macro.value or SAFE * bound for macro in steps)
-    distribution = problem.contact
-    contact = None
-    if distribution is not None:
-        contact = contact_step(deck, plate, distribution, largest, bound)
+    contact = contact_step(problem, problem.moving_plate, largest, bound)
     stable = bound if contact is None else min(bound, contact.limit)
     for macro in steps:
         dt = macro.value

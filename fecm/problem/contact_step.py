@@ -11,14 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fecm._typing import Floats
 from fecm.deck.model import Deck, Impact, Indentation
 from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError
 from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.time_step import critical_time_step
-from fecm.problem.build import build_constants, build_projectile
+from fecm.problem.build import Problem, build_constants, build_projectile
 
 # A clamped square plate under a central force has the stiffness D/(0.0056 a^2): Timoshenko and
 # Woinowsky-Krieger, Theory of Plates and Shells, Table 35.  In terms of the force 8 v (m D)^(1/2)
@@ -76,16 +75,18 @@ class ContactStep:
 
 
 def contact_step(
-    deck: Deck, plate: PlateModel, contact: Floats, dt: float, bound: float
-) -> ContactStep:
-    """Largest time step at which plate and a unit contact force, (numnp, 5), are stable together.
+    problem: Problem, plate: PlateModel, dt: float, bound: float
+) -> ContactStep | None:
+    """Largest time step at which plate and contact are stable together; None without impact.
 
     `bound` is a lower bound of the plate's critical time step, `dt` the deck's, 0 for 0.9 of the
     critical one.  The limit is computed only where the bound does not show that this is stable.
     """
-    weights = contact[plate.mesh.equations > 0]
-    stiffness = contact_stiffness(deck, plate)
-    projectile = build_projectile(deck)
+    if problem.contact is None:
+        return None
+    weights = problem.contact[plate.mesh.equations > 0]
+    stiffness = contact_stiffness(problem.deck, plate)
+    projectile = build_projectile(problem.deck)
     rigid = isinstance(projectile, RigidMass)
     tip = projectile.total_mass if rigid else float(projectile.mass()[0])
     at_node = 1.0 / float((weights**2 / plate.mass).sum())

@@ -70,9 +70,7 @@ def likely_cause(problem: Problem, model: ImpactModel, dt: float) -> str:
     try:
         plate = model.motion.plate
         critical = critical_time_step(plate)
-        distribution, contact = problem.contact, None
-        if distribution is not None:
-            contact = contact_step(problem.deck, plate, distribution, dt, critical)
+        contact = contact_step(problem, plate, dt, critical)
     except UnsoundPlateError as error:
         return str(error)
     above = dt > critical
