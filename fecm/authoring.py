@@ -54,7 +54,6 @@ from fecm.objects import (
     parse_patch,
 )
 from fecm.problem.build import build_plate, build_projectile, projectile_segment
-from fecm.problem.fixture import DropWeight
 from fecm.problem.generate import generate
 from fecm.problem.plate_mesh import PlateMesh
 from fecm.studies.estimate import static_stiffness
@@ -219,11 +218,15 @@ def author(
     notes: list[str] = []
     doubts: list[str] = []
     test = plate.fixture.test if plate.fixture else None
-    if test is not None:
+    if plate.fixture is not None and test is not None:
         if units not in (None, STANDARD):
             raise ObjectError(f"the fixture's standard is in {STANDARD}; leave out `units`")
         units = STANDARD
-        doubts += _outside(plate, test, laminate)
+        if not test.thinnest <= round(laminate.thickness, 9) <= test.thickest:
+            doubts.append(
+                f"warning: {plate.fixture.name} is for laminates of {test.thinnest:g} to "
+                f"{test.thickest:g} mm; this one has {laminate.thickness:.4g} mm"
+            )
         if projectile is None:
             projectile = RigidMass(test.mass)
         if velocity is None and energy is None:
@@ -315,17 +318,6 @@ def _program(duration: float, dt: float, every: int | None, fails: bool) -> tupl
         *([Macro("FAIL", value=rows)] if fails else []),
         Macro("NEXT"),
     )
-
-
-def _outside(plate: Plate, test: DropWeight, laminate: Laminate) -> list[str]:
-    """Warning of a laminate that a standard does not cover."""
-    assert plate.fixture is not None
-    if test.thinnest <= round(laminate.thickness, 9) <= test.thickest:
-        return []
-    return [
-        f"warning: {plate.fixture.name} is for laminates of {test.thinnest:g} to "
-        f"{test.thickest:g} mm; this one has {laminate.thickness:.4g} mm"
-    ]
 
 
 def _named(ply: str | Ply | NamedPly) -> NamedPly | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
 from decimal import Context, Decimal
 
 import numpy as np
@@ -116,7 +115,15 @@ def check_time_step(problem: Problem, findings: Findings) -> None:
         return
     try:
         safe = problem.safe_time_step
-        _check_least_step(steps, safe, findings)
+        for macro in steps:
+            if 0.0 < macro.value < LEAST_STEP * safe:
+                findings.add(
+                    "E515",
+                    f"DT = {macro.value:.4g} is so far below the plate's critical time step (about "
+                    f"{safe:.4g}) that the motion is lost by rounding.",
+                    macro.place("value"),
+                    "check the unit of time; DT without a number takes 0.9 of the critical step",
+                )
         _check_damping(problem, max(m.value or safe for m in steps), findings)
         if min(m.value for m in steps) > 0.0 and max(m.value for m in steps) < safe:
             return
@@ -151,16 +158,3 @@ def _check_damping(problem: Problem, dt: float, findings: Findings) -> None:
             card.place("a"),
             "check the unit of time, or take a smaller DT",
         )
-
-
-def _check_least_step(steps: Sequence[Macro], safe: float, findings: Findings) -> None:
-    """Report every DT at which the motion is lost by rounding."""
-    for macro in steps:
-        if 0.0 < macro.value < LEAST_STEP * safe:
-            findings.add(
-                "E515",
-                f"DT = {macro.value:.4g} is so far below the plate's critical time step (about "
-                f"{safe:.4g}) that the motion is lost by rounding.",
-                macro.place("value"),
-                "check the unit of time; DT without a number takes 0.9 of the critical step",
-            )

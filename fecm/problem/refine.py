@@ -21,7 +21,6 @@ from fecm.mechanics.mesh import Ints, Mesh
 # Corners at the ends of each side, and the local coordinate that runs along it.
 _SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))
 _ALONG = (0, 1, 0, 1)
-# The other one's value on the side.
 
 
 class RefineError(FecmError, ValueError):

@@ -12,7 +12,7 @@ import numpy as np
 from fecm._typing import Floats
 from fecm.deck.records import load_factor
 from fecm.mechanics.statics import Tangent
-from fecm.problem.build import ImpactModel, build_model
+from fecm.problem.build import build_model
 from fecm.problem.options import RunOptions
 from fecm.problem.problem import Problem
 from fecm.results.sinks import Sink
@@ -36,16 +36,12 @@ class Simulation:
     # Called with the simulation every `interval` steps; may write a checkpoint or raise.
     observers: Sequence[Observer] = ()
     on_macro: Observer = lambda simulation: None  # the same after every macro; must be fast
-    model: ImpactModel = field(init=False)  # plate, projectile and contact
-    state: RunState = field(init=False)  # state that a checkpoint stores
-    recorder: Recorder = field(init=False)
-    interpreter: Interpreter = field(init=False)
-    interval: int = field(init=False)  # steps between two calls of the observers
 
     def __post_init__(self) -> None:
         problem, options = self.problem, self.options
         with np.errstate(all="ignore"):
             self.model = build_model(problem, options)
+        # The state that a checkpoint stores.
         self.state = state = RunState(self.model.motion.start())
         if self.model.impact is not None:
             state.impact = self.model.impact.start(state.plate)
@@ -54,6 +50,7 @@ class Simulation:
         if "prop-contact" in options.slips:
             state.prop_force = 1.0  # PROP's first value in the listing
         self.interpreter = Interpreter(problem.program)
+        # Steps between two calls of the observers.
         self.interval = max(1, min(64, 100_000 // self.model.plate.neq))
         limit = None if options.slips else options.energy_limit
         self.recorder = Recorder(
