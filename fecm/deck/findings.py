@@ -136,13 +136,9 @@ class Findings:
             return
         self._all.append(Finding(code, _shortened(message), place, _shortened(hint)))
         if self.error_count == MOST:
-            self.close()
+            self.closed = True
             message = f"There are {MOST} errors or more; the rest of the file is not checked."
             self._all.append(Finding(TOO_MANY, message))
-
-    def close(self) -> None:
-        """Keep no more findings."""
-        self.closed = True
 
     def __iter__(self) -> Iterator[Finding]:
         """Iterate in the order of the deck; findings without a place come last."""
@@ -159,11 +155,6 @@ class Findings:
     def errors(self) -> list[Finding]:
         """The errors, which make the deck unusable."""
         return [finding for finding in self if finding.severity == "error"]
-
-    @property
-    def warnings(self) -> list[Finding]:
-        """The warnings."""
-        return [finding for finding in self if finding.severity == "warning"]
 
 
 class DeckError(FecmError, ValueError):

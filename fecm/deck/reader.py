@@ -86,7 +86,7 @@ class Reader:
                     "E013", f"This is {other}, not a deck.", card.place,
                     "`fecm new DECK --mesh FILE`, or fecm.Plate.from_mesh, takes a mesh from it",
                 )  # fmt: skip
-                self.findings.close()
+                self.findings.closed = True
                 break
             if card.keyword == STOP:
                 stopped = True
@@ -110,7 +110,7 @@ class Reader:
     def _end(self, message: str, card: Card) -> None:
         """Report that a limit is exceeded, and stop reading."""
         self.findings.add("E012", message, card.place, "write several files")
-        self.findings.close()
+        self.findings.closed = True
 
     def _problem(self, title: Card) -> ParsedProblem:
         """Read one problem, from its FECM card on."""

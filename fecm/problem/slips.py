@@ -129,17 +129,10 @@ SLIPS = (
 NAMES = tuple(slip.name for slip in SLIPS)
 
 
-@dataclass(frozen=True, slots=True)
-class Claim:
-    """A statement of the report that the computation does not confirm and no slip explains."""
-
-    place: str  # its section of the report
-    report: str  # what the report says
-    found: str  # result of the computation
-
-
+# Statements that the computation does not confirm and no slip explains: section of the report, what
+# it says, and the result of the computation.
 CLAIMS = (
-    Claim(
+    (
         "section 4.4",
         "The present mesh of 14 x 10 elements yielded converged solutions.",
         "With 2, 4 and 8 times as many elements along each side the peak force of the first "
@@ -151,7 +144,7 @@ CLAIMS = (
         "refinement, transverse shear with the refinement itself. See "
         "[how far to trust a peak](trust.md).",
     ),
-    Claim(
+    (
         "section 4.4",
         "The time between two peaks of the ringing is about the time that a longitudinal wave "
         "takes from one end of the projectile to the other.",
@@ -203,7 +196,7 @@ def errata() -> str:
         "",
         "| where | the report | the computation |",
         "|---|---|---|",
-        *(f"| {claim.place} | {claim.report} | {claim.found} |" for claim in CLAIMS),
+        *(f"| {place} | {report} | {found} |" for place, report, found in CLAIMS),
         "",
     ]
     return "\n".join(lines)
