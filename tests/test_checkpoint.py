@@ -15,10 +15,10 @@ import pytest
 from fecm.api import load_deck
 from fecm.results import hdf5_writer
 from fecm.results.sinks import RowBuffer
-from fecm.simulation.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
+from fecm.simulation.checkpoint import Checkpointer, checkpoint_of, spool_of
 from fecm.simulation.run import run as simulate_run
 from fecm.simulation.simulation import Simulation
-from fecm.simulation.spool import Journal, SpoolError
+from fecm.simulation.spool import CheckpointError, Journal
 from tests.calls import call
 from tests.decks import DATA_CARDS, MESH, small
 from tests.stopped_runs import StoppedError, run, stop_at_once
@@ -165,7 +165,7 @@ def test_a_checkpoint_of_another_run_is_refused_and_says_why(tmp_path: Path) -> 
         run(deck(), path, resume=True)
     checkpoint_of(path).write_bytes(stored)
     spool_of(path).write_bytes(spool_of(path).read_bytes()[:-9])
-    with pytest.raises(SpoolError, match="damaged, or was written by another run"):
+    with pytest.raises(CheckpointError, match="damaged, or was written by another run"):
         run(deck(), path, resume=True)
     checkpoint_of(path).unlink()
     with pytest.raises(CheckpointError, match="there is no checkpoint"):
@@ -181,7 +181,7 @@ def test_a_spool_with_one_other_bit_is_refused(tmp_path: Path, place: float) -> 
     spool = bytearray(spool_of(path).read_bytes())
     spool[int(place * len(spool))] ^= 1
     spool_of(path).write_bytes(spool)
-    with pytest.raises(SpoolError, match="damaged, or was written by another run"):
+    with pytest.raises(CheckpointError, match="damaged, or was written by another run"):
         run(deck(), path, resume=True)
     assert not path.exists()
 

@@ -41,11 +41,11 @@ from fecm.results.info import about_run
 from fecm.results.result import Result, load
 from fecm.results.schema import declared_units, jsonable
 from fecm.results.summary import largest_exposures, summary
-from fecm.simulation.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
+from fecm.simulation.checkpoint import Checkpointer, checkpoint_of, spool_of
 from fecm.simulation.printout import Printer
 from fecm.simulation.run import run as simulate_run
 from fecm.simulation.simulation import Simulation
-from fecm.simulation.spool import Journal, SpoolError
+from fecm.simulation.spool import CheckpointError, Journal
 
 
 @click.command()
@@ -241,7 +241,7 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
         raise CheckFailedError(
             f"the run diverged at step {diverged.step}: {diverged.reason}; {path} was not written"
         ) from None
-    except (CheckpointError, SpoolError) as error:
+    except CheckpointError as error:
         raise RefusedError(
             f"{error}; --overwrite without --resume discards the checkpoint and starts over"
         ) from None

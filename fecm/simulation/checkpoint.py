@@ -21,17 +21,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._errors import FecmError
 from fecm._files import beside, naming, open_ordinary, packed
 from fecm._version import __version__
 from fecm.simulation.simulation import Simulation
-from fecm.simulation.spool import Journal, Part
+from fecm.simulation.spool import CheckpointError, Journal, Part
 
 FORMAT = 2
-
-
-class CheckpointError(FecmError, ValueError):
-    """The checkpoint can't be used."""
 
 
 def checkpoint_of(result: Path) -> Path:

@@ -27,8 +27,8 @@ Array = NDArray[Any]
 CHUNK = 1_000_000
 
 
-class SpoolError(FecmError, ValueError):
-    """A spool is incomplete or damaged."""
+class CheckpointError(FecmError, ValueError):
+    """The checkpoint, or its spool, can't be used."""
 
 
 @dataclass(frozen=True)
@@ -114,19 +114,19 @@ class Journal:
     def replay(self, path: Path, part: Part) -> None:
         """Repeat the operations of a part of a spool.
 
-        Raises SpoolError if the part is incomplete or damaged.  Raises OSError if the spool can't
-        be read or the result can't be written.
+        Raises CheckpointError if the part is incomplete or damaged.  Raises OSError if the spool
+        can't be read or the result can't be written.
         """
         with naming(path), open_ordinary(path) as file:
             if _checksum(file, part.length) != part.checksum:
-                raise SpoolError(f"{path} is damaged, or was written by another run")
+                raise CheckpointError(f"{path} is damaged, or was written by another run")
             file.seek(0)
             while file.tell() < part.length:
                 try:
                     self._do(json.loads(file.readline()), file)
                 except Exception as error:  # a damaged file raises anything in json, NumPy and h5py
                     self._sink.check()
-                    raise SpoolError(f"{path} is damaged ({error})") from None
+                    raise CheckpointError(f"{path} is damaged ({error})") from None
         self.spooled = part
 
     def _do(self, entry: dict[str, Any], file: BinaryIO) -> None:
