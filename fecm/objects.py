@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
@@ -31,7 +32,6 @@ from fecm.deck.records import Ply
 from fecm.deck.units import MODULUS
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.mechanics.patch import DISC, HERTZ
-from fecm.problem.fixture import Fixture, parse_fixture
 from fecm.problem.plate_mesh import (
     BOUNDARY,
     MeshLike,
@@ -54,12 +54,75 @@ STANDARD, E_S, NU_S = "mm-N-s", 207e3, 0.3
 # Shapes of the contact patch; "none" is a point force.
 PATCHES = {"disc": DISC, "hertz": HERTZ}
 NO_PATCH = "none"
+CUSTOM = "window:LXxLY,WXxWY"
 
 Support = Literal["free", "simple", "clamped"]
 
 
 class ObjectError(FecmError, ValueError):
     """Objects that make no deck; messages quote the names of parameters in backquotes."""
+
+
+@dataclass(frozen=True)
+class DropWeight:
+    """What a test standard prescribes besides its fixture, in mm, N, s and t."""
+
+    # Mass and radius of the rigid projectile.
+    mass: float
+    radius: float
+    energy: float  # impact energy per thickness, force
+    thinnest: float
+    # Limits of the laminate's thickness, length.
+    thickest: float
+
+
+@dataclass(frozen=True)
+class Fixture:
+    """A plate on the edges of a window in its middle."""
+
+    name: str
+    # Sides of the plate and of the window, length.
+    size: tuple[float, float]
+    window: tuple[float, float]
+    test: DropWeight | None = None  # what the standard prescribes; None for a custom fixture
+
+    @property
+    def comment(self) -> str:
+        """Comment lines of a deck."""
+        (lx, ly), (wx, wy) = self.size, self.window
+        return (
+            f"! Fixture {self.name}: a plate of {lx:g} x {ly:g}, w = 0 along the edges of a "
+            f"window of {wx:g} x {wy:g}.\n"
+            "! Clamps and lift-off are not modelled.\n"
+        )
+
+
+# ASTM D7136/D7136M: 5.5 kg, hemisphere of 16 mm diameter, 6.7 J per mm of thickness.
+FIXTURES = {
+    fixture.name: fixture
+    for fixture in (
+        Fixture("D7136", (150.0, 100.0), (125.0, 75.0), DropWeight(5.5e-3, 8.0, 6700.0, 4.0, 6.0)),
+    )
+}
+
+
+def parse_fixture(text: str) -> Fixture:
+    """Fixture of a name, or of ``window:LXxLY,WXxWY``.
+
+    Raises ObjectError if it is neither, or the window is not smaller than the plate.
+    """
+    if text in FIXTURES:
+        return FIXTURES[text]
+    number = r"\s*(\d+\.?\d*|\.\d+)\s*"
+    match = re.fullmatch(f"window:{number}[xX×]{number},{number}[xX×]{number}", text)
+    if match is None:
+        raise ObjectError(f"{text!r} is not a fixture: {', '.join(FIXTURES)} or {CUSTOM}")
+    lx, ly, wx, wy = (float(value) for value in match.groups())
+    if not (0.0 < wx < lx < 1e30 and 0.0 < wy < ly < 1e30):
+        raise ObjectError(
+            f"the window of {wx:g} x {wy:g} is not smaller than the plate of {lx:g} x {ly:g}"
+        )
+    return Fixture("window", (lx, ly), (wx, wy))
 
 
 @dataclass(frozen=True)
@@ -175,10 +238,7 @@ class Plate:
         ValueError
             If the name or a value makes no sense.
         """
-        try:
-            fixture = parse_fixture(name)
-        except ValueError as error:
-            raise ObjectError(str(error)) from None
+        fixture = parse_fixture(name)
         ratio = grading or (WINDOW_GRADING if mesh is None else 1.0)
         plain = cls.rectangle(fixture.window, mesh or WINDOW_MESH, grading=ratio)
         return replace(plain, fixture=fixture)

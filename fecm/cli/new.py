@@ -23,8 +23,7 @@ from fecm.deck.grid import SUPPORTS
 from fecm.deck.model import Deck, Indentation, Material, Patch, Shear
 from fecm.mechanics.patch import DISC, RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass, Rod
-from fecm.objects import MOST, Laminate, ObjectError, Plate, Sphere, parse_patch
-from fecm.problem.fixture import CUSTOM, FIXTURES
+from fecm.objects import CUSTOM, FIXTURES, MOST, Laminate, ObjectError, Plate, Sphere, parse_patch
 from fecm.problem.plate_mesh import BOUNDARY
 
 ESTIMATE = "estimate:RADIUS[,ES,NUS]"
