@@ -32,6 +32,15 @@ measured: fecm.SweepResult = fecm.sweep(
     build=lambda case: deck, vary={"width": [1.0]}, measure=lambda r: {"w": r.plate_w.max()}
 )
 peaks: xarray.DataArray = sweep.to_xarray().peak_force
+drawn: fecm.SweepResult = fecm.sweep(
+    deck, random={"k": "lognormal:1.9e6,0.15"}, samples=4096, seed=0, design="sobol",
+    sensitivity=True, exceed={"peak_force": [500.0]},
+)  # fmt: skip
+if drawn.random is not None:
+    mean: float = float(drawn.random.statistics["peak_force"].mean)
+    first: NDArray[np.float64] = drawn.random.sensitivity["peak_force"].first_interval
+    chance: NDArray[np.float64] = drawn.random.exceedance.probability
+    scattered: Axes = drawn.plot("peak_force", kind="scatter")
 plate: fecm.Plate = fecm.Plate.from_mesh("plate.msh", {"rim": "clamped"})
 ply: fecm.Ply = fecm.Ply(1.6e-9, 0.3, 140e3, 9e3, 5e3, 5e3, 3e3)
 laminates: list[fecm.Laminate] = [fecm.Laminate(x, ply, 0.2) for x in ("[0/90]s", [0, 45.0])]
@@ -48,6 +57,7 @@ several.force  # type: ignore[union-attr]  # pyright: ignore[reportAttributeAcce
 fecm.run_one("plate.inp", mode="raport")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.run_one("plate.inp", solver="gpu")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.sweep(deck, {"velocity": 5.0})  # type: ignore[dict-item]  # pyright: ignore[reportArgumentType]
+fecm.sweep(deck, random={"k": 3.0}, samples=16)  # type: ignore[dict-item]  # pyright: ignore[reportArgumentType]
 fecm.sweep(deck, until="treshold")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.sweep(deck, {"k": [1e6]}, executor=2)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.runn("plate.inp")  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]

@@ -16,6 +16,7 @@ from fecm.results.hdf5_reader import Contents, read
 from fecm.results.info import about_run, describe_groups
 from fecm.results.result import result_of
 from fecm.results.schema import FORMAT, SWEEP, declared_units, jsonable, printable, shown
+from fecm.sweeps.random_result import tables
 from fecm.sweeps.result import summary, sweep_of
 
 # Attributes of the file with lines of their own.
@@ -61,7 +62,8 @@ def _of_sweep(contents: Contents) -> dict[str, Any]:
     """Cases, failed cases and summary of a sweep."""
     result = sweep_of(contents, history=False)
     failed = len(result) - int(result.fine.sum())
-    return {"cases": len(result), "failed": failed, "summary": summary(result)}
+    lines = [] if result.random is None else tables(result.random, result.unit)
+    return {"cases": len(result), "failed": failed, "summary": [*summary(result), *lines]}
 
 
 def _extent(about: Mapping[str, Any]) -> tuple[str, str]:
@@ -95,7 +97,7 @@ def _page(about: Mapping[str, Any]) -> list[str]:
     ]  # fmt: skip
     lines = [printable(str(about["title"] or "(no title)"))]
     lines += [f"  {printable(name):17} {printable(str(value))}" for name, value in rows]
-    lines += ["", "summary", *(f"  {printable(line)}" for line in about["summary"])]
+    lines += ["", "summary", *(f"  {printable(line)}".rstrip() for line in about["summary"])]
     for group in about["groups"]:
         lines += ["", *_group(group)]
     if about["texts"]:

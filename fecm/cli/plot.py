@@ -39,7 +39,7 @@ def _by_name(
 @click.option("--kind", "kinds", type=click.Choice(list(KINDS)), multiple=True,
               metavar="KIND",
               help=f"Picture to draw; may be repeated.  {_KIND_HELP}.  [default: force; map of a "
-                   "sweep]")  # fmt: skip
+                   "sweep, exceedance of a random one]")  # fmt: skip
 @click.option("-o", "--output", type=FILE_PATH, metavar="PATH",
               help="Picture (.png, .svg, .pdf; .gif for animation), or folder for several.  "
                    "[default: RESULT-KIND.png in this folder]")  # fmt: skip
@@ -64,17 +64,17 @@ def _by_name(
 @click.option("--width", type=click.Choice(["column", "full"]),
               help="3.5 in, or 7.2 in.  [default: column]")  # fmt: skip
 @click.option("--quantity", metavar="NAME",
-              help="Quantity of map: a name of the sweep's summary; of failure: a criterion.  "
+              help="Quantity of a sweep: a name of its summary; of failure: a criterion.  "
                    "[default: peak_force, found_velocity; the largest of all]")  # fmt: skip
 @click.option("--over", type=ListOf("NAME or NAME,NAME", click.STRING, [1, 2]),
               metavar="NAME[,NAME]",
               help="Parameters on the axes of map.  [default: those that vary]")  # fmt: skip
 @click.option("--where", type=Parsed(assignment), callback=_by_name, multiple=True,
               metavar="NAME=VALUE",
-              help="Show in map only the cases nearest to this value; may be "
+              help="Show of a sweep only the cases nearest to this value; may be "
                    "repeated.")  # fmt: skip
 @click.option("--level", type=ListOf("VALUE,...", Finite()), metavar="VALUE,...",
-              help="Values to mark in map, in the deck's unit.")  # fmt: skip
+              help="Values of the quantity to mark, in the deck's unit.")  # fmt: skip
 @click.option("--overwrite", is_flag=True, help="Replace existing pictures.")
 @reads("results")
 def plot(
@@ -124,7 +124,9 @@ def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path
 
 def _usual(result: Result | SweepResult) -> str:
     """Kind of picture to draw by default."""
-    return "force" if isinstance(result, Result) else "map"
+    if isinstance(result, Result):
+        return "force"
+    return "map" if result.random is None else "exceedance"
 
 
 def _named(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:

@@ -19,21 +19,34 @@ from fecm.deck.findings import DeckError
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
 from fecm.simulation.run import simulate
-from fecm.sweeps.api import carry_out, problem_of
+from fecm.sweeps.api import carry_out, check_draws, problem_of, random_plan
 from fecm.sweeps.batch import deck_of
 from fecm.sweeps.cases import (
     CONTACT,
     PLATE,
     CasesError,
+    Limit,
     Value,
     grid,
+    parse_exceed,
     parse_until,
     parse_vary,
     read_cases,
 )
 from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.plan import MEASURES, Plan, Task, check_memory, freed, plan, tasks
+from fecm.sweeps.plan import (
+    MEASURES,
+    Plan,
+    Task,
+    check_memory,
+    freed,
+    plan,
+    shares_plate,
+    tasks,
+)
+from fecm.sweeps.random_result import tables
 from fecm.sweeps.result import SweepResult, save, summary, verdict
+from fecm.sweeps.sampling import DESIGNS, DesignKind, Law, cost, doubt, parse_random
 from fecm.sweeps.schedule import LOST, SchedulerError, address_in
 from fecm.sweeps.store import PartialResults
 
@@ -45,6 +58,21 @@ from fecm.sweeps.store import PartialResults
                    f"{', '.join(CONTACT)}; {', '.join(PLATE)}.")  # fmt: skip
 @click.option("--cases", "table", type=DECK_PATH, metavar="CASES.csv",
               help="A table instead of --vary: a header of names, one row per case.")  # fmt: skip
+@click.option("--random", "laws", type=Parsed(parse_random), multiple=True, metavar="NAME=LAW",
+              help="Random value: normal:MEAN,SD, lognormal:MEDIAN,SIGMA, uniform:A,B or "
+                   "triangular:A,MODE,B; may be repeated, together with --vary.")  # fmt: skip
+@click.option("--samples", type=int, metavar="N", help="Number of samples of --random.")
+@click.option("--seed", type=int, metavar="S", help="Seed of --random.  [default: 0]")
+@click.option("--design", "kind", type=click.Choice(DESIGNS),
+              help="Design of --random: Latin hypercube, Sobol' sequence, or independent draws "
+                   "(Monte Carlo).  [default: lhs]")  # fmt: skip
+@click.option("--sensitivity", is_flag=True,
+              help="Sobol' indices of the random values, from N times (their number + 2) "
+                   "cases.")  # fmt: skip
+@click.option("--exceed", "limits", type=Parsed(parse_exceed), multiple=True,
+              metavar="QUANTITY=VALUE",
+              help="Probability that a quantity of the summary exceeds a value; of peak_force also "
+                   "threshold, that of DELA.  May be repeated.")  # fmt: skip
 @click.option("--find", type=click.Choice(["velocity"]),
               help="Search in every case for the velocity at which --until holds.")  # fmt: skip
 @click.option("--until", type=Parsed(parse_until), metavar="peak_force=VALUE",
@@ -72,6 +100,12 @@ def sweep(
     deck: Path,
     varied: tuple[tuple[str, list[Value]], ...],
     table: Path | None,
+    laws: tuple[tuple[str, Law], ...],
+    samples: int | None,
+    seed: int | None,
+    kind: DesignKind | None,
+    sensitivity: bool,
+    limits: tuple[Limit, ...],
     find: str | None,
     until: float | str | None,
     output: Path | None,
@@ -91,8 +125,18 @@ def sweep(
     failed, for which the exit status is 1, and those that ended in contact.
     """
     path = output or Path(f"{deck.stem}-sweep.h5")
-    if bool(varied) == (table is not None) and (varied or until is None):
+    if bool(varied) == (table is not None) and (varied or (until is None and not laws)):
         raise click.UsageError("give either --vary or --cases")
+    if laws and table is not None:
+        raise click.UsageError("--random goes with --vary, not with --cases")
+    asked = {"--samples": samples, "--seed": seed, "--design": kind, "--exceed": limits}
+    for option, value in {**asked, "--sensitivity": sensitivity}.items():
+        if not laws and value not in (None, (), False):
+            raise click.UsageError(f"{option} needs --random NAME=LAW")
+    if laws and samples is None:
+        raise click.UsageError("--random needs --samples N")
+    if len({name for name, _ in laws}) < len(laws):
+        raise click.UsageError("--random: a name is given twice")
     if (find is None) != (until is None):
         raise click.UsageError("--find velocity and --until peak_force=VALUE belong together")
     if (workers > 1) + (scheduler is not None) + (scheduler_file is not None) > 1:
@@ -100,6 +144,11 @@ def sweep(
     if full and find:
         raise click.UsageError("--full runs given velocities: --vary velocity=FOUND --full 0")
     cases = grid(varied) if table is None else read_cases(table)
+    design = None
+    if laws:
+        design, cases = random_plan(
+            dict(laws), cases, samples, seed or 0, kind or "lhs", sensitivity=sensitivity
+        )
     chosen = tuple(dict.fromkeys(full or ()))
     if chosen and max(chosen) >= len(cases):
         raise click.UsageError(f"--full {max(chosen)}: the cases are 0 to {len(cases) - 1}")
@@ -107,7 +156,15 @@ def sweep(
     check_outputs([path, *fulls.values()], overwrite, [deck] if table is None else [deck, table])
     scheduler = scheduler if scheduler_file is None else address_in(scheduler_file)
     problem = _problem(deck)
-    planned = plan(problem, cases, history=history, until=until, extra=extra)
+    planned = plan(
+        problem, cases, history=history, until=until, extra=extra, design=design, limits=limits
+    )
+    check_draws(planned)
+    if design is not None:
+        shared = shares_plate(problem) and not planned.alone
+        for text in (doubt(design), cost(cases, design, shared=shared)):
+            if text:
+                note(text)
     check_memory(problem, planned, 0 if scheduler is not None else workers)
     if count := freed(tasks(problem, planned)):
         note(
@@ -123,8 +180,12 @@ def sweep(
     echo(result.title or "sweep")
     for line in summary(result):
         echo(f"  {line}")
+    for line in () if result.random is None else tables(result.random, result.unit):
+        echo(f"  {line}".rstrip())
     echo(f"  result            {path}")
     _run_in_full(planned, fulls, overwrite=overwrite)
+    for text in () if result.random is None else result.random.notes:
+        note(text)
     echo(verdict(result))
     if not (allow_failed or result.fine.all()):
         raise SystemExit(NO)

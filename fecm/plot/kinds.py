@@ -56,4 +56,7 @@ KINDS = {
     "mesh": Kind("meshes:mesh", "mesh, supports, impact point and contact patch"),
     "animation": Kind("deflection:animation", "the moving plate", suffixes=(".gif",)),
     "map": Kind("maps:parameter_map", "a quantity of a sweep over its parameters", sweep=True),
+    "exceedance": Kind("random_sweep:exceedance", "probabilities of a random sweep", sweep=True),
+    "sensitivity": Kind("random_sweep:sensitivity", "indices of a random sweep", sweep=True),
+    "scatter": Kind("random_sweep:scatter", "a quantity over the random values", sweep=True),
 }

@@ -86,19 +86,18 @@ def choose(
 
     Raises PlotError if the options do not fit the sweep, or no case remains.
     """
-    rows = _rows(sweep, name, where)
-    quantity = quantity or ("found_velocity" if "found_velocity" in sweep.summary else "peak_force")
+    rows = case_rows(sweep, name, where)
     varying = [n for n, values in sweep.cases.items() if len(np.unique(values[rows])) > 1]
     axes = [_parameter(sweep, parameter, rows) for parameter in _over(sweep, name, varying, over)]
     others = [parameter for parameter in varying if parameter not in [axis.name for axis in axes]]
     other = _parameter(sweep, others[0], rows) if others and len(axes) == 1 else None
     if others:
         _check_others(axes, others, other)
-    shown = _quantity(sweep, name, rows, quantity)
+    shown = quantity_of(sweep, name, rows, quantity)
     title = ", ".join(f"{held} {_text(sweep, held, rows[0])}" for held in where)
     still = sweep["status"][rows] == STILL
     limits = np.empty(0)
-    if quantity == "peak_force" and "threshold_force" in sweep.summary:
+    if shown.name == "peak_force" and "threshold_force" in sweep.summary:
         limits = sweep["threshold_force"][rows]
         highest = float(np.nanmax(limits))
         if highest - np.nanmin(limits) <= 1e-9 * highest:
@@ -107,7 +106,7 @@ def choose(
     return Choice(axes, shown, list(level), title, other, still, limits)
 
 
-def _rows(sweep: SweepResult, name: str, where: Mapping[str, Any]) -> Ints:
+def case_rows(sweep: SweepResult, name: str, where: Mapping[str, Any]) -> Ints:
     """Cases at given values; numbers select the nearest value."""
     kept = np.ones(len(sweep), dtype=bool)
     for parameter, wanted in where.items():
@@ -185,8 +184,9 @@ def _check_others(axes: list[Axis], others: list[str], other: Axis | None) -> No
         )
 
 
-def _quantity(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
+def quantity_of(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
     """The quantity to show, with a note about cases that lack it."""
+    quantity = quantity or ("found_velocity" if "found_velocity" in sweep.summary else "peak_force")
     known = [name for name in sweep.summary if name != "status"]
     if quantity not in known:
         raise PlotError(f"unknown quantity {quantity}; the sweep has {_listed(known)}")
@@ -210,20 +210,20 @@ def _quantity(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
         warn(f"{open_ends}{gaps}")
     if lacking := int((np.isnan(values) & run & ~still).sum()):
         warn(f"{lacking} cases of {name} without contact have no {quantity}")
-    return _numbers(sweep, quantity, values)
+    return numbers(sweep, quantity, values)
 
 
 def _parameter(sweep: SweepResult, name: str, rows: Ints) -> Axis:
     """Axis of a parameter."""
     values = sweep[name][rows]
     if values.dtype.kind != "U":
-        return _numbers(sweep, name, values)
+        return numbers(sweep, name, values)
     ticks = tuple(dict.fromkeys(values.tolist()))
     places = {text: place for place, text in enumerate(ticks)}
     return Axis(name, Scale(1.0, ""), np.array([places[v] for v in values.tolist()]), ticks)
 
 
-def _numbers(sweep: SweepResult, name: str, values: Array) -> Axis:
+def numbers(sweep: SweepResult, name: str, values: Array) -> Axis:
     """Axis of numbers; counts are not scaled."""
     shown = Scale(1.0, "") if name in INTEGERS else scale(peak(values), sweep.unit(name))
     return Axis(name, shown, values)

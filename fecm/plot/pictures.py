@@ -102,7 +102,8 @@ def draw(
     check_options([kind], options)
     for name, result in results.items():
         if properties.sweep == isinstance(result, Result):
-            source, remedy = "sweep", "the kind map does"
+            kinds = ", ".join(name for name, one in KINDS.items() if one.sweep)
+            source, remedy = "sweep", f"the kinds {kinds} do"
             if properties.sweep:
                 source, remedy = "run", "the other kinds do"
             raise PlotError(

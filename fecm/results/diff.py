@@ -417,7 +417,8 @@ def _index_names(
     """Numbers of a place by the names of its axes, from 1; a row with a clock needs none."""
     path, source = found.path, found.sources[0]
     lines = isinstance(source, TapeText) and source.lines and path == W
-    if axes := CASES if source.form == SWEEP else LINES if lines else ():
+    of_cases = source.form == SWEEP and path.startswith(("cases/", "summary/", "history/"))
+    if axes := CASES if of_cases else LINES if lines else ():
         return {name: first + i for (name, first), i in zip(axes, index, strict=False)}
     dataset = DATASETS.get(path)
     names: dict[str, int | str] = {}

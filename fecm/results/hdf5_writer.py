@@ -16,6 +16,7 @@ from fecm._files import beside
 from fecm.deck.units import unit_of
 from fecm.results.schema import (
     AXIS_NAMES,
+    FROM_0,
     GROUP_DESCRIPTIONS,
     SCALES,
     Dataset,
@@ -36,6 +37,7 @@ class FileSink:
         self._units: dict[str, str] = {}
         self._datasets: dict[str, h5py.Dataset] = {}
         self._made: list[Dataset] = []
+        self.axis_names = dict(AXIS_NAMES)
 
     def _group(self, name: str) -> h5py.Group:
         if not name:
@@ -93,11 +95,11 @@ class FileSink:
         """Scale of an axis, created on first use."""
         name, description = SCALES[size]
         if name not in self._file:
-            if size in AXIS_NAMES:
-                texts = AXIS_NAMES[size][:length]
+            if size in self.axis_names:
+                texts = self.axis_names[size][:length]
                 made = self._file.create_dataset(name, data=texts, dtype=h5py.string_dtype())
             else:
-                numbers = np.arange(length, dtype="i4") + (size != "cases")
+                numbers = np.arange(length, dtype="i4") + (size not in FROM_0)
                 made = self._file.create_dataset(name, data=numbers)
             made.make_scale(name)
             made.attrs["description"] = made.attrs["long_name"] = description
@@ -141,12 +143,18 @@ class FileSink:
         elif not len(group):
             del self._file[path.rpartition("/")[0]]
 
-    def text(self, path: str, value: str | list[str], description: str) -> None:
-        """Store a text, or one text per case."""
+    def text(
+        self,
+        path: str,
+        value: str | list[str],
+        description: str,
+        axes: tuple[str, ...] = ("cases",),
+    ) -> None:
+        """Store a text, or texts along an axis."""
         made = self._file.create_dataset(path, data=value, dtype=h5py.string_dtype())
         if not isinstance(value, str):
             self._datasets[path] = made
-            self._made.append(Dataset(path, ("cases",), description))
+            self._made.append(Dataset(path, axes, description))
         made.attrs["description"] = description
 
 

@@ -334,9 +334,20 @@ SCALES = {
     "gages": ("gage", "position of the gage among the gages, from 1"),
     "cases": ("case", "number of the case, from 0"),
     "steps": ("step", "number of time steps taken"),
+    "combinations": ("combination", "number of the combination of varied values, from 0"),
+    "laws": ("random_name", "name of the random value"),
+    "limits": ("limit", "number of the limit, from 1"),
+    "statistics": ("statistic", "name of the statistic; percentages are quantiles"),
+    "bounds": ("bound", "ends of the 95 % interval"),
 }
+FROM_0 = ("cases", "combinations")
 # Names of the positions of some axes.
-AXIS_NAMES: dict[str | int, tuple[str, ...]] = {"ndf": DOF_NAMES, "ndm": AXES}
+AXIS_NAMES: dict[str | int, tuple[str, ...]] = {
+    "ndf": DOF_NAMES,
+    "ndm": AXES,
+    "statistics": ("draws", "mean", "standard_deviation", "1 %", "5 %", "50 %", "95 %", "99 %"),
+    "bounds": ("lower", "upper"),
+}
 
 
 def shape_error(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str]) -> str:

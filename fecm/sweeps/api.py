@@ -14,11 +14,21 @@ from fecm.api import LoadedDeck, Progress, load_deck
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
 from fecm.problem.problem import Problem
-from fecm.sweeps.batch import built
-from fecm.sweeps.cases import Case, CasesError, checked, combined
+from fecm.sweeps.batch import built, deck_of
+from fecm.sweeps.cases import Case, CasesError, Limit, checked, combined, parse_exceed
 from fecm.sweeps.outcome import RUN, Outcome, merge
 from fecm.sweeps.plan import Build, Measure, Plan, Task, check_memory, plan, tasks
 from fecm.sweeps.result import SweepResult, result_of, save
+from fecm.sweeps.sampling import (
+    REMEDY,
+    Design,
+    DesignKind,
+    Law,
+    design_of,
+    doubt,
+    parse_law,
+    random_cases,
+)
 from fecm.sweeps.schedule import Done, Idle, lost, on_dask, on_executor, on_workers, run_serial
 from fecm.sweeps.store import DamagedPartError, PartialResults
 
@@ -38,6 +48,57 @@ def _loaded(deck: str | Path | Deck) -> LoadedDeck:
     if (count := len(prepared.problems)) != 1:
         raise CasesError(f"{prepared.source} has {count} problems; a sweep takes one")
     return prepared
+
+
+def random_plan(
+    random: Mapping[str, str] | Mapping[str, Law],
+    varied: Sequence[Case],
+    samples: int | None,
+    seed: int = 0,
+    kind: DesignKind = "lhs",
+    *,
+    sensitivity: bool = False,
+    free: bool = False,
+) -> tuple[Design, list[Case]]:
+    """Return the design of random values, and its cases.
+
+    Raises CasesError if an argument is invalid.
+    """
+    laws = {
+        name: law if isinstance(law, Law) else parse_law(name, law, free=free)
+        for name, law in random.items()
+    }
+    design = design_of(laws, samples, seed, kind, sensitivity=sensitivity)
+    return design, random_cases(design, varied)
+
+
+def _limits(exceed: Mapping[str, Any]) -> list[Limit]:
+    """Limits by quantity, each a value or a sequence of values."""
+    return [
+        parse_exceed(f"{name}={value}")
+        for name, given in exceed.items()
+        for value in ([given] if isinstance(given, str | float | int) else given)
+    ]
+
+
+def check_draws(planned: Plan) -> None:
+    """Raise CasesError if a draw of a sensitivity study is impossible.
+
+    The smallest and the largest value of every random name are tried.
+    """
+    design = planned.design
+    if design is None or not design.sensitivity or planned.build is not None:
+        return
+    for name in design.laws:
+        values = [case[name] for case in planned.cases[: design.draws]]
+        for value in (min(values), max(values)):
+            try:
+                deck_of(planned, values.index(value))
+            except CasesError as error:
+                raise CasesError(
+                    f"{name} {value:.6g}: {str(error).rstrip('.')}; sensitivity needs "
+                    f"all draws; {REMEDY}"
+                ) from None
 
 
 def _first_built(build: Build, cases: Sequence[Case]) -> LoadedDeck:
@@ -126,6 +187,12 @@ def sweep(
     vary: Mapping[str, Sequence[Any]] | None = None,
     cases: Iterable[Mapping[str, Any]] | None = None,
     *,
+    random: Mapping[str, str] | None = None,
+    samples: int | None = None,
+    seed: int = 0,
+    design: DesignKind = "lhs",
+    sensitivity: bool = False,
+    exceed: Mapping[str, float | Literal["threshold"] | Sequence[float]] | None = None,
     until: float | Literal["threshold"] | None = None,
     history: bool = False,
     build: Build | None = None,
@@ -149,6 +216,21 @@ def sweep(
         Values by name; all combinations are run.
     cases : iterable of mapping, optional
         Cases instead, one mapping each.
+    random : mapping of str to str, optional
+        Laws of random values by name: ``"normal:MEAN,SD"``, ``"lognormal:MEDIAN,SIGMA"``,
+        ``"uniform:A,B"`` or ``"triangular:A,MODE,B"``.  With `vary` all combinations get the same
+        draws.
+    samples : int, optional
+        Number of samples of the design; with `random`.
+    seed : int
+        Seed of the design.
+    design : {"lhs", "sobol", "mc"}
+        Latin hypercube, scrambled Sobol' sequence, or independent draws.
+    sensitivity : bool
+        Estimate Sobol' indices, from `samples` times (number of random names + 2) cases.
+    exceed : mapping of str to float, str or sequence of float, optional
+        Limits of quantities, whose probability of exceedance is estimated; ``"threshold"`` for
+        the peak force: the delamination threshold.
     until : float or str, optional
         Search in every case for the velocity at which the peak force reaches this value;
         ``"threshold"``: the delamination threshold.  Without `vary` and `cases`, of the deck alone.
@@ -199,14 +281,27 @@ def sweep(
     >>> [f"{force:.3f}" for force in found["peak_force"]]
     ['36.058', '86.202']
 
+    >>> found = sweep("decks/appendix.inp", random={"k": "lognormal:1.9e6,0.15"}, samples=64,
+    ...               exceed={"peak_force": 5.0})
+    >>> found.random.statistics["peak_force"].quantiles.shape
+    (5,)
+
     >>> def largest_w(result):
     ...     return {"w": result.plate_w.max()}
     >>> found = sweep("decks/appendix.inp", {"velocity": [50.0, 115.0]}, measure=largest_w)
     >>> found["w"].shape
     (2,)
     """
-    if (vary is None) == (cases is None) and not (vary is None and until is not None):
+    if random is None and (samples is not None or seed or sensitivity or exceed):
+        raise CasesError("samples, seed, sensitivity and exceed need random values")
+    if cases is not None and random is not None:
+        raise CasesError("give random values together with vary, not with cases")
+    if (vary is None) == (cases is None) and (vary or (until is None and random is None)):
         raise CasesError("give either vary or cases")
+    if not (random is None or (isinstance(random, Mapping) and random)):
+        raise CasesError(
+            f'random is {random!r}; write a mapping such as {{"k": "uniform:1e6,2e6"}}'
+        )
     if executor is not None and not isinstance(executor, Executor):
         raise CasesError(f"executor is {executor!r}, not a concurrent.futures.Executor")
     if (workers > 1) + (scheduler is not None) + (executor is not None) > 1:
@@ -223,6 +318,13 @@ def sweep(
         made = combined({} if vary is None else vary, free=free)
     else:
         made = checked(cases, free=free)
+    drawn: Design | None = None
+    if random is not None:
+        drawn, made = random_plan(
+            random, made, samples, seed, design, sensitivity=sensitivity, free=free
+        )
+        if text := doubt(drawn):
+            warn(text)
     if workers > 1 or isinstance(executor, ProcessPoolExecutor):
         _check_sendable(workers > 1, build=build, measure=own)
     if deck is not None and build is None:
@@ -236,8 +338,10 @@ def sweep(
             warn(finding.render(prepared.source))
     (problem,) = prepared.problems
     planned = plan(
-        problem, made, history=history, until=until, build=build, measure=own, extra=extra
-    )
+        problem, made, history=history, until=until, build=build, measure=own, extra=extra,
+        design=drawn, limits=_limits(exceed or {}),
+    )  # fmt: skip
+    check_draws(planned)
     here = workers if executor is None else getattr(executor, "_max_workers", 0)
     check_memory(problem, planned, 0 if scheduler is not None else here)
     finished = 0

@@ -27,6 +27,7 @@ from fecm.mechanics.impact import ContactState, couple_step
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.plate_motion import DivergenceError, PlateState
 from fecm.mechanics.projectile import Projectile as ProjectileModel
+from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.rod_integrators import WilsonStep
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import build_law, build_model, build_projectile
@@ -40,7 +41,7 @@ from fecm.results.sinks import MemorySink
 from fecm.results.summary import largest_exposures
 from fecm.simulation.guard import ENERGY_WARNING
 from fecm.simulation.run import simulate
-from fecm.sweeps.cases import PLATE, Case, CasesError, name_fault
+from fecm.sweeps.cases import PLATE, THRESHOLD, Case, CasesError, name_fault
 from fecm.sweeps.clock import Clock, with_time_step
 from fecm.sweeps.find import search
 from fecm.sweeps.outcome import RUN, Outcome, merge, outcome_of
@@ -49,7 +50,6 @@ from fecm.sweeps.plan import (
     DEFLECTION,
     FAILURE,
     GAGES,
-    THRESHOLD,
     Build,
     Measure,
     Plan,
@@ -69,6 +69,7 @@ from fecm.sweeps.vary import apply_case, check_deck, raise_first
 
 # Runs decks by their numbers; doubtful ones in full if they are judged.
 Runs = Callable[[list[int], list[Deck], bool], Outcome]
+UNIT = RigidMass(1.0)
 # Relative difference of the peak force from the value searched, beyond which it jumps.
 ROUGH = 1e-4
 
@@ -323,19 +324,24 @@ def _together(
     """
     steps, dt = len(plate.response), plate.dt
     projectiles = [build_projectile(deck) for deck in decks]
+    mass = np.array([projectile.total_mass for projectile in projectiles])
+    # All rigid masses are one kind: a unit mass under the force over the mass.
+    rigid = np.array([isinstance(projectile, RigidMass) for projectile in projectiles])
+    projectiles = [UNIT if one else rod for one, rod in zip(rigid, projectiles, strict=True)]
     kinds = {projectile: number for number, projectile in enumerate(dict.fromkeys(projectiles))}
     # Cases with the same projectile are adjacent.
     order = sorted(range(len(decks)), key=lambda case: kinds[projectiles[case]])
     kind = np.array([kinds[projectiles[case]] for case in order], dtype=np.intp)
+    mass = mass[order]
+    scale = np.where(rigid[order], mass, 1.0)
     require(ADVANCED * steps * len(decks), f"{len(decks)} cases of {steps} steps")
     with np.errstate(all="ignore"):
         rods = [WilsonStep(rod.stiffness(), rod.mass(), dt) for rod in kinds]
         law = HystereticLaw(stacked([build_law(decks[case]).constants for case in order]))
         speed = np.array([decks[case].require(Impact).velocity for case in order])
-        tips = TipSteps(rods, kind, steps)
+        tips = TipSteps(rods, kind, steps, scale)
         found = impacts(plate.response, tips, law, speed, plate.node_mass)
         times = np.add.accumulate(np.full(steps, dt))
-        mass = np.array([projectiles[case].total_mass for case in order])
         summary = summarise(found.force, times, found.indentation, mass, speed, _threshold(checked))
         error = balance_errors(found, tips, list(kinds), kind, speed) if judged else 0.0 * speed
         peaks = {n: largest_sums(r, found.force) for n, r in plate.strains.items() if judged}
@@ -432,19 +438,21 @@ def balance_errors(
     the plate.  The energy that a run reports is larger by dt^2/8 a' M a, of which only the part of
     the impact node is known here.
 
-    Case n has the projectile ``kinds[kind[n]]`` and the approach velocity ``speed[n]``.  Its error
-    is 0 if the initial energy is 0, and not finite if the motion is not finite.
+    Case n has the projectile ``kinds[kind[n]]`` times ``tips.scale[n]``, and the approach velocity
+    ``speed[n]``.  Its error is 0 if the initial energy is 0, and not finite if the motion is not
+    finite.
     """
     worst = np.zeros(len(speed))
     for number, projectile in enumerate(kinds):
         cases = np.flatnonzero(kind == number)
-        initial = 0.5 * projectile.total_mass * speed[cases] ** 2
+        scale = tips.scale[cases]
+        initial = 0.5 * projectile.total_mass * scale * speed[cases] ** 2
         lost = np.zeros(len(cases))
         for work, motion in zip(found.work, tips.motions(number, speed), strict=True):
             deformation, velocity, _ = motion.reshape(3, -1, len(cases)).swapaxes(1, 2)
             deformation[:, 0] = 0.0
             held = projectile.kinetic_energy(velocity) + projectile.strain_energy(deformation)
-            lost = np.maximum(lost, np.abs(held + work[cases] - initial))
+            lost = np.maximum(lost, np.abs(scale * held + work[cases] - initial))
         worst[cases] = (lost + found.excess[cases]) / np.where(initial > 0.0, initial, 1.0)
     return worst
 

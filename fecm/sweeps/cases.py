@@ -20,6 +20,9 @@ from fecm.studies.tables import read_rows
 
 Value = float | int | str
 Case = dict[str, Value]
+# A limit of a quantity whose probability of exceedance is asked for: a number, or this.
+THRESHOLD = "threshold"
+Limit = tuple[str, float | str]
 
 # Names that change the projectile, its velocity or the contact law; where the force acts, which
 # needs another response of the plate; and the plate or its time steps.
@@ -87,6 +90,17 @@ def parse_until(text: str) -> float | str:
     if name != "peak_force" or not value:
         raise CasesError(f"`{text}`: write peak_force=NUMBER or peak_force=threshold")
     return value if value == "threshold" else _number(name, value)
+
+
+def parse_exceed(text: str) -> Limit:
+    """Read ``QUANTITY=NUMBER`` or ``peak_force=threshold``.
+
+    Raises CasesError if the text has neither form.
+    """
+    name, _, value = (part.strip() for part in text.partition("="))
+    if not name or not value or (value == THRESHOLD and name != "peak_force"):
+        raise CasesError(f"`{text}`: write QUANTITY=NUMBER or peak_force={THRESHOLD}")
+    return name, value if value == THRESHOLD else _number(name, value)
 
 
 def check_names(names: Collection[str]) -> None:

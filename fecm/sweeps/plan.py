@@ -16,10 +16,24 @@ from fecm.deck.macros import Body, Loop, flat
 from fecm.deck.model import Boundary, Deck, Delamination, Gages, Impact
 from fecm.problem.memory import needed_bytes
 from fecm.problem.problem import Problem
+from fecm.results.metrics import FOUND, SUMMARY
+from fecm.results.metrics import THRESHOLD as LIMITED
 from fecm.results.result import Result
-from fecm.sweeps.cases import CONTACT, LAMINATE, LOAD, PLATE, Case, CasesError, check_names
+from fecm.sweeps.cases import (
+    CONTACT,
+    LAMINATE,
+    LOAD,
+    PLATE,
+    THRESHOLD,
+    Case,
+    CasesError,
+    Limit,
+    check_names,
+)
 from fecm.sweeps.clock import Clock, clock_of
 from fecm.sweeps.find import COUNT
+from fecm.sweeps.random_result import check_limits
+from fecm.sweeps.sampling import Design
 from fecm.sweeps.vary import apply_case
 
 Build = Callable[[dict[str, Any]], Deck]
@@ -29,8 +43,6 @@ Measure = Callable[[Result], Mapping[str, float]]
 TOGETHER = 1024
 # Bytes per step and case advanced together: above the measured value.
 ADVANCED = 28
-# Delamination threshold instead of a number.
-THRESHOLD = "threshold"
 # Names of columns that are measured on request.
 DEFLECTION, GAGES, FAILURE = MEASURES = ("max_deflection", "gages", "failure")
 
@@ -49,6 +61,8 @@ class Plan:
     build: Build | None = None  # makes the deck of a case; `deck` is that of one of the cases
     measure: Measure | None = None  # computes more columns from the result of a case
     extra: tuple[str, ...] = ()  # more columns, of :data:`MEASURES`
+    design: Design | None = None  # of random cases
+    limits: tuple[Limit, ...] = ()  # whose probability of exceedance is asked for
 
     @property
     def alone(self) -> bool:
@@ -79,6 +93,8 @@ def plan(
     build: Build | None = None,
     measure: Measure | None = None,
     extra: Sequence[str] = (),
+    design: Design | None = None,
+    limits: Sequence[Limit] = (),
 ) -> Plan:
     """Create the plan of a sweep.
 
@@ -108,11 +124,19 @@ def plan(
             raise CasesError("the threshold needs a DELA segment, which the deck does not have")
         if until != THRESHOLD and not (isinstance(until, float | int) and 0.0 < until < math.inf):
             raise CasesError(f"the peak force to reach is a positive number, not {until}")
+    if measure is None and not extra:
+        known = [*SUMMARY, *(FOUND if until is not None else ())]
+        limited = checked.deck.last(Delamination) is not None
+        known += LIMITED if limited else ()
+        check_limits(limits, known, threshold=limited)
     same = {*LOAD, *CONTACT, "duration"}  # names of cases that keep the critical time step
     own = build is None and "dt" not in cases[0] and not same.issuperset(cases[0])
     clock = clock_of(checked) if own else None
     chosen = tuple(name for name in MEASURES if name in extra)
-    return Plan(checked.deck, tuple(cases), history, clock, until, build, measure, chosen)
+    return Plan(
+        checked.deck, tuple(cases), history, clock, until, build, measure, chosen, design,
+        tuple(limits),
+    )  # fmt: skip
 
 
 def shares_plate(checked: Problem) -> bool:

@@ -154,15 +154,22 @@ class TipSteps:
 
     `steps` has one integrator per kind of projectile, all with the same time step and method;
     `kinds` (cases,) is the kind of each case, with cases of a kind adjacent; `count` is the number
-    of steps.
+    of steps.  The stiffness and mass of a case are those of its kind times `scale` (cases,).
     """
 
-    def __init__(self, steps: Sequence[RodIntegrator], kinds: NDArray[np.intp], count: int) -> None:
+    def __init__(
+        self,
+        steps: Sequence[RodIntegrator],
+        kinds: NDArray[np.intp],
+        count: int,
+        scale: Floats | float = 1.0,
+    ) -> None:
         first = steps[0]
         self._steps, self._kinds = steps, kinds
         self.theta, self.weight, self.dt = first.theta, first.weight, first.dt
         self._begin = first.weights[0]
-        self.gain: Floats = np.array([step.gain for step in steps])[kinds]
+        self.scale = np.broadcast_to(scale, kinds.shape)
+        self.gain: Floats = np.array([step.gain for step in steps])[kinds] / self.scale
         # `end` adds r_1 = gain; the sum over earlier forces starts with r_2.
         responses = np.column_stack([tip_response(step, count + 1)[1:] for step in steps])
         self._carried = Convolution(responses, kinds)
@@ -200,7 +207,7 @@ class TipSteps:
     def end(self, state: TipState, motion: Floats, force: Any) -> TipState:
         """Return the state after a step under the forces at t + theta dt."""
         acceleration = motion + self.gain * force
-        self._carried.give(force)
+        self._carried.give(force / self.scale)
         tip = state.tip + self.dt * state.velocity + self._begin * state.acceleration
         return TipState(
             tip + self.weight * acceleration,

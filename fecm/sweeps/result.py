@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from fecm.results.schema import FORMAT_VERSION, SWEEP, Dataset, ResultFileError,
 from fecm.sweeps.cases import pair
 from fecm.sweeps.outcome import RUN, STILL, Outcome
 from fecm.sweeps.plan import Plan
+from fecm.sweeps.random_result import RandomResult, attributes, evaluate, random_of, stored
 
 if TYPE_CHECKING:
     import pandas
@@ -47,9 +48,12 @@ def summary(result: SweepResult) -> list[str]:
     if "found_velocity" in result.summary:
         word, names = "found", ["found_velocity", "found_energy"]
     shown = np.where(fine, result[names[0]], np.nan)
+    show = "{}".format if result.random is None else _short
     if np.isfinite(shown).any():
         for size, case in (("smallest", np.nanargmin(shown)), ("largest", np.nanargmax(shown))):
-            values = ", ".join(f"{name} {values[case]}" for name, values in result.cases.items())
+            values = ", ".join(
+                f"{name} {show(values[case])}" for name, values in result.cases.items()
+            )
             texts = [
                 f"{result[n][case]:.{8 if n in FOUND else 6}g} {result.unit(n)}" for n in names
             ]
@@ -68,7 +72,14 @@ def summary(result: SweepResult) -> list[str]:
         lines.append(f"failed            {times}: {reason}")
     if (others := len(failed) - LISTED) > 0:
         lines.append(f"failed            for {others} other reason{'s' * (others > 1)}")
+    if result.random is not None and failed:
+        lines.append(f"failed share      {(~fine).mean():.3%} of the draws")
     return lines
+
+
+def _short(value: Any) -> str:
+    """A value with few digits."""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def verdict(result: SweepResult) -> str:
@@ -138,6 +149,8 @@ class SweepResult:
         Title of the deck.
     units : dict
         Names of the units; empty if the deck states none.
+    random : RandomResult or None
+        Statistics, sensitivity indices and probabilities of a random sweep.
     """
 
     cases: dict[str, Array]
@@ -149,6 +162,7 @@ class SweepResult:
     deck: str = ""
     title: str = ""
     units: dict[str, str] = field(default_factory=dict)
+    random: RandomResult | None = None
 
     def __len__(self) -> int:
         return len(self.dt)
@@ -182,7 +196,7 @@ class SweepResult:
         texts = [f"{count} of {len(self)} cases {what}" for count, what in _counts(self)]
         if not self.fine.all():
             texts[-1] += f": {reasons(self['status'][~self.fine])}"
-        return tuple(texts)
+        return (*texts, *(() if self.random is None else self.random.notes))
 
     def unit(self, name: str) -> str:
         """Return the unit of a value or result; empty if the deck states none."""
@@ -250,10 +264,11 @@ class SweepResult:
         over: str | Sequence[str] = (),
         path: str | Path | None = None,
         *,
+        kind: Literal["map", "exceedance", "sensitivity", "scatter"] = "map",
         ax: Axes | None = None,
         **options: Any,
     ) -> Axes:
-        """Draw a map on a new figure of pyplot, on given axes, or in a file.
+        """Draw a map on a new figure of pyplot, on given axes, or in a file; or another kind.
 
         Parameters
         ----------
@@ -264,15 +279,17 @@ class SweepResult:
         path : str or Path, optional
             File to write instead, as ``fecm plot`` does; an existing one is replaced.  The suffix
             selects the format.
+        kind : {"map", "exceedance", "sensitivity", "scatter"}
+            Kind of picture; those but map are of random sweeps.
         ax : matplotlib.axes.Axes, optional
             Axes to draw on.
         **options
-            Other options of the kind map: ``where``, ``level``, ``width``.
+            Other options of the kind, such as ``where``, ``level``, ``width``.
 
         Returns
         -------
         matplotlib.axes.Axes
-            The map's axes.
+            The picture's first axes.
 
         Raises
         ------
@@ -285,7 +302,9 @@ class SweepResult:
 
         names = (over,) if isinstance(over, str) else tuple(over)
         named = {self.title or "the sweep": self}
-        return plot("map", named, path, ax, quantity=quantity, over=names, **options)
+        if names or kind == "map":
+            options["over"] = names
+        return plot(kind, named, path, ax, quantity=quantity, **options)
 
 
 def _grid(cases: Mapping[str, Array], count: int) -> tuple[dict[str, Array], NDArray[np.intp]]:
@@ -316,10 +335,14 @@ def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
     found += [name for name in COLUMNS if name in columns and name not in found]
     found += [*outcome.measured, "status"]
     none = np.full(len(plan.cases), np.nan)
+    summary = {name: columns.get(name, none) for name in found}
+    random = None
+    if plan.design is not None:
+        random = evaluate(plan.design, cases, summary, plan.limits)
     return SweepResult(
-        cases, {name: columns.get(name, none) for name in found},
+        cases, summary,
         columns["dt"], columns["steps"], outcome.force, columns["unsettled"],
-        deck.text or deck.to_text(), deck.title, unit_names(deck),
+        deck.text or deck.to_text(), deck.title, unit_names(deck), random,
     )  # fmt: skip
 
 
@@ -331,7 +354,7 @@ def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
     from fecm.results.hdf5_writer import writing
 
     units = {f"unit_{name}": unit for name, unit in result.units.items()}
-    columns = [
+    columns: list[tuple[Any, ...]] = [
         *((f"cases/{name}", values, f"{name} of every case", DIMENSIONS.get(name, ""))
           for name, values in result.cases.items()),
         *((f"summary/{name}", values, described(name), COLUMNS.get(name, ("", ""))[1])
@@ -351,12 +374,17 @@ def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
         about = {"format": SWEEP, "format_version": FORMAT_VERSION, "fecm_version": __version__}
         sink.attributes("", {**about, "title": result.title, **units})
         sink.text("deck", result.deck, "the cards of the deck that was varied")
-        for name, values, text, dimension in columns:
+        if result.random is not None:
+            columns += stored(result.random)
+            sink.axis_names["laws"] = tuple(result.random.design.laws)
+            for group, values in attributes(result.random).items():
+                sink.attributes(group, values)
+        for name, values, text, dimension, *own in columns:
+            axes = own[0] if own else ("cases", "steps")[: values.ndim]
             if values.dtype.kind in "US":
-                sink.text(name, values.tolist(), text)
+                sink.text(name, values.tolist(), text, axes)
                 continue
             dtype = "i8" if values.dtype.kind in "iu" else "f8"
-            axes = ("cases", "steps")[: values.ndim]
             sink.create(Dataset(name, axes, text, dimension, dtype), values.shape)
             sink.write(name, 0, values)
         for group, text in GROUPS.items():
@@ -420,4 +448,5 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
         unconverged_steps,
         contents.texts.get("deck", ""), str(contents.attributes.get("title", "")),
         declared_units(contents.attributes),
+        random_of(contents, cases, summary, count[0]),
     )  # fmt: skip

@@ -1,0 +1,211 @@
+"""Pictures of a random sweep: probabilities of exceedance, sensitivity indices, scatter plots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from fecm.plot.kinds import Picture, PlotError
+from fecm.plot.map_data import Axis, Ints, case_rows, quantity_of
+from fecm.plot.map_data import numbers as axis_of
+from fecm.plot.maps import LEVEL
+from fecm.plot.style import RATIO, WIDTHS, colours, legend, limit_count, lines_legend, panels
+from fecm.sweeps.random_result import RandomResult
+from fecm.sweeps.result import SweepResult
+from fecm.sweeps.sensitivity import Indices, wilson
+
+Sweeps = Mapping[str, SweepResult]
+# Scatter plots side by side.
+BESIDE = {"column": 2, "full": 4}
+# Height of a pair of bars, and of what is around them (in).
+PAIR, AROUND = 0.3, 0.75
+
+
+def _random(
+    results: Sweeps, where: Mapping[str, Any] | None
+) -> tuple[str, SweepResult, RandomResult, list[int]]:
+    """The sweep, its random result, and the combinations of varied values to show."""
+    where = where or {}
+    ((name, sweep),) = results.items()
+    if sweep.random is None:
+        raise PlotError(f"{name} has no random values; `fecm sweep --random` makes such a sweep")
+    if wrong := [one for one in where if one in sweep.random.design.laws]:
+        raise PlotError(f"{wrong[0]} is random; where selects values that are varied")
+    rows = case_rows(sweep, name, where)
+    firsts = np.arange(0, len(sweep), sweep.random.design.rows)
+    return name, sweep, sweep.random, np.flatnonzero(np.isin(firsts, rows)).tolist()
+
+
+def _one(random: RandomResult, name: str, chosen: Sequence[int]) -> int:
+    """The only combination."""
+    if len(chosen) > 1:
+        raise PlotError(
+            f"{name} has {len(chosen)} combinations of varied values; select one of them with "
+            f"--where {next(iter(random.combinations))}=VALUE"
+        )
+    return chosen[0]
+
+
+def _draws(random: RandomResult, combination: int) -> Ints:
+    """Numbers of the cases of a combination that are independent draws."""
+    return combination * random.design.rows + np.arange(random.design.draws)
+
+
+def _limits(random: RandomResult, quantity: str, level: Sequence[float]) -> list[float]:
+    """Limits to mark: those given, or else those of the sweep."""
+    found = random.exceedance
+    own = found.limit[(found.quantity == quantity) & np.isfinite(found.limit)]
+    return list(level) or own.tolist()
+
+
+def exceedance(
+    results: Sweeps,
+    *,
+    quantity: str = "",
+    where: Mapping[str, float | str] | None = None,
+    level: Sequence[float] = (),
+    width: str = "column",
+) -> Picture:
+    """Draw the probability that a quantity is larger than a value, with 95 % intervals at limits.
+
+    Parameters
+    ----------
+    results : mapping of str to SweepResult
+        One random sweep; each combination of its varied values has a curve.
+    quantity : str
+        A name of the sweep's summary; the peak force, or the velocity found, if empty.
+    where : mapping of str to float or str
+        Show only these varied values.
+    level : sequence of float
+        Limits (the deck's unit); by default those of the sweep.
+    width : str
+    """
+    name, sweep, random, chosen = _random(results, where)
+    limit_count(len(chosen), "curves")
+    figure, (axes,) = panels(width, ratio=RATIO[width])
+    notes: list[str] = []
+    shown: Axis | None = None
+    for place, colour in zip(chosen, colours(), strict=False):
+        shown = quantity_of(sweep, name, _draws(random, place), quantity)
+        values = np.sort(shown.values[np.isfinite(shown.values)])
+        count = len(values)
+        above = (count - np.arange(count) - 0.5) / count
+        label = random.label(place)
+        axes.plot(values, above, color=colour, label=label or "_")
+        for limit in _limits(random, shown.name, level):
+            hits = np.array((values > limit).sum())
+            low, high = wilson(hits, np.array(count))
+            p = float(hits) / count
+            bar: Any = {"color": colour, "capsize": 2.0, "markersize": 3.0, "linewidth": 0.9}
+            axes.errorbar(limit, p, [[p - low], [high - p]], fmt="o", **bar)
+            case = f", {label}" if label else ""
+            notes.append(f"P({shown.name} > {limit:g}) = {p:.5g} ({low:.5g} to {high:.5g}){case}")
+    if shown is None:
+        raise PlotError(f"{name} has no draws")
+    for limit in _limits(random, shown.name, level):
+        axes.axvline(limit, zorder=0, **LEVEL)
+    axes.set_yscale("log")
+    axes.set_ylim(top=1.15)
+    axes.set_ylabel("Probability of exceedance")
+    shown.scale.name(axes.xaxis, shown.label)
+    if len(chosen) > 1:
+        lines_legend(figure, axes)
+    return Picture(figure, notes=notes)
+
+
+def sensitivity(
+    results: Sweeps,
+    *,
+    quantity: str = "",
+    where: Mapping[str, float | str] | None = None,
+    width: str = "column",
+) -> Picture:
+    """Draw the Sobol' indices of a quantity as bars, with their 95 % intervals.
+
+    Parameters
+    ----------
+    results : mapping of str to SweepResult
+        One random sweep with sensitivity indices.
+    quantity : str
+        A name of the sweep's summary; the peak force, or the velocity found, if empty.
+    where : mapping of str to float or str
+        Varied values, if the sweep has several combinations of them.
+    width : str
+    """
+    name, sweep, random, chosen = _random(results, where)
+    if not random.sensitivity:
+        raise PlotError(f"{name} has no indices; run the sweep with --sensitivity")
+    place = _one(random, name, chosen)
+    shown = quantity_of(sweep, name, _draws(random, place), quantity)
+    found = random.sensitivity[shown.name]
+    if random.combinations:
+        found = Indices(*(values[place] for values in found))
+    if np.isnan(found.total).all():
+        raise PlotError(f"{shown.name} has no indices: it is constant, or a case has no value")
+    names = [axis_of(sweep, law, sweep[law][:1]).label for law in random.design.laws]
+    figure, (axes,) = panels(width, ratio=(AROUND + PAIR * len(names)) / WIDTHS[width])
+    rows = np.arange(len(names))
+    for part, interval, offset, colour, label in (
+        (found.first, found.first_interval, -0.19, colours()[0], "first order"),
+        (found.total, found.total_interval, 0.19, colours()[1], "total"),
+    ):
+        ends = np.abs(interval.T - part)
+        style: Any = {"error_kw": {"elinewidth": 0.8, "capsize": 2.0, "ecolor": "0.2"}}
+        axes.barh(rows + offset, part, 0.36, xerr=ends, color=colour, label=label, **style)
+    axes.set_yticks(rows, names)
+    axes.invert_yaxis()
+    axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
+    axes.axvline(0.0, color="0.2", linewidth=0.6)
+    axes.set_xlabel(f"Sobol' index: {shown.label}")
+    legend(figure, *axes.get_legend_handles_labels())
+    return Picture(figure)
+
+
+def scatter(
+    results: Sweeps,
+    *,
+    quantity: str = "",
+    where: Mapping[str, float | str] | None = None,
+    level: Sequence[float] = (),
+    width: str = "column",
+) -> Picture:
+    """Draw a quantity over every random value.
+
+    Parameters
+    ----------
+    results : mapping of str to SweepResult
+        One random sweep.
+    quantity : str
+        A name of the sweep's summary; the peak force, or the velocity found, if empty.
+    where : mapping of str to float or str
+        Varied values, if the sweep has several combinations of them.
+    level : sequence of float
+        Limits (the deck's unit); by default those of the sweep.
+    width : str
+    """
+    name, sweep, random, chosen = _random(results, where)
+    rows = _draws(random, _one(random, name, chosen))
+    shown = quantity_of(sweep, name, rows, quantity)
+    laws = list(random.design.laws)
+    columns = min(len(laws), BESIDE[width])
+    lines = -(-len(laws) // columns)
+    figure, every = panels(width, lines, columns, ratio=0.85, sharey=True)
+    for place, axes in enumerate(every):
+        if place >= len(laws):
+            axes.set_visible(False)
+            continue
+        over = axis_of(sweep, laws[place], sweep[laws[place]][rows])
+        axes.plot(
+            over.values, shown.values, ".", color=colours()[0], markersize=1.5, alpha=0.5,
+            markeredgewidth=0.0, rasterized=True,
+        )  # fmt: skip
+        for limit in _limits(random, shown.name, level):
+            axes.axhline(limit, **LEVEL)
+        over.scale.name(axes.xaxis, over.label)
+        if not place % columns:
+            shown.scale.name(axes.yaxis, shown.label)
+        for axis in (axes.xaxis, axes.yaxis):  # a half column is narrow
+            axis.set_label_text(axis.get_label_text().replace(" (", "\n("))
+    return Picture(figure)

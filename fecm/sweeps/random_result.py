@@ -1,0 +1,332 @@
+"""Results of a random sweep: statistics, sensitivity indices and probabilities."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._typing import Floats
+from fecm.results.metrics import COLUMNS
+from fecm.results.schema import ResultFileError
+from fecm.sweeps.cases import THRESHOLD, CasesError, Limit
+from fecm.sweeps.outcome import RUN
+from fecm.sweeps.sampling import DESIGNS, REMEDY, Design, Law
+from fecm.sweeps.sensitivity import (
+    ENDS,
+    QUANTILES,
+    Indices,
+    Statistics,
+    indices,
+    statistics,
+    wilson,
+)
+
+if TYPE_CHECKING:
+    from fecm.results.hdf5_reader import Contents
+
+Array = NDArray[Any]
+# Share of failed draws above which the results are doubtful.
+FEW = 0.01
+# Most quantities and combinations that are printed, and the quantities in their order.
+PRINTED = 4
+MAIN = ("found_velocity", "found_energy", "peak_force", "max_indentation", "contact_time",
+        "energy_absorbed")  # fmt: skip
+FORCE = "threshold_force"
+# Description and axes of the parts of the indices in the file.
+PARTS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "first": ("first-order Sobol' index of every random value", ("laws",)),
+    "total": ("total Sobol' index of every random value", ("laws",)),
+    "first_interval": ("its 95 % interval", ("laws", "bounds")),
+    "total_interval": ("its 95 % interval", ("laws", "bounds")),
+}
+GROUPS = {
+    "random": "laws of the random values",
+    "design": "design that the random values were drawn from",
+    "statistics": "statistics of every quantity over the draws",
+    "sensitivity": "Sobol' indices of every quantity",
+    "exceedance": "probabilities that quantities exceed limits",
+}
+LIMIT_PARTS = {
+    "quantity": "name of the quantity",
+    "limit": "limit, in the unit of the quantity; NaN: the threshold of each case",
+    "probability": "probability that the quantity exceeds the limit",
+    "lower": "lower end of its 95 % interval",
+    "upper": "upper end of its 95 % interval",
+    "draws": "number of draws that have a value",
+}
+
+
+class Exceedance(NamedTuple):
+    """Probabilities that quantities exceed limits; with varied values, the combinations first."""
+
+    quantity: NDArray[np.str_]  # (e,)
+    limit: Floats  # (e,): in the unit of the quantity; that of the first case for a threshold
+    probability: Floats  # (e,)
+    lower: Floats  # (e,): ends of Wilson's 95 % interval
+    upper: Floats
+    draws: NDArray[np.int64]  # (e,): number of draws that have a value
+
+
+@dataclass(frozen=True)
+class RandomResult:
+    """Results of a random sweep.
+
+    With varied values, arrays have one more axis, the first: the combinations of these values.
+
+    Attributes
+    ----------
+    design : Design
+        Laws by name, samples, seed, kind, and whether sensitivity indices were asked for.
+    statistics : dict of Statistics
+        ``draws``, ``mean``, ``standard_deviation`` and ``quantiles`` (1, 5, 50, 95 and 99 %) of
+        every quantity over the draws that have a value.
+    sensitivity : dict of Indices
+        Sobol' indices ``first`` and ``total`` (d,) of every quantity, in the order of
+        ``design.laws``, and their 95 % intervals ``first_interval`` and ``total_interval`` (d, 2).
+        Empty unless asked for; NaN of a quantity that is constant or lacks values.
+    exceedance : Exceedance
+        ``quantity``, ``limit``, ``probability``, its 95 % interval from ``lower`` to ``upper``, and
+        ``draws``, those that have a value, for every limit asked for.
+    combinations : dict of ndarray
+        Varied values of every combination.
+    notes : tuple of str
+        What is doubtful.
+    """
+
+    design: Design
+    statistics: dict[str, Statistics]
+    sensitivity: dict[str, Indices]
+    exceedance: Exceedance
+    combinations: dict[str, Array] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def label(self, combination: int) -> str:
+        """Varied values of a combination, in words."""
+        return ", ".join(f"{n} {values[combination]}" for n, values in self.combinations.items())
+
+
+def check_limits(limits: Sequence[Limit], known: Sequence[str], *, threshold: bool) -> None:
+    """Raise CasesError if a quantity is not among the known ones, or the deck has no threshold."""
+    for name, value in limits:
+        if name not in known:
+            raise CasesError(f"there is no quantity `{name}`; there are {', '.join(known)}")
+        if value == THRESHOLD and not threshold:
+            raise CasesError("the threshold needs a DELA segment, which the deck does not have")
+
+
+def evaluate(
+    design: Design,
+    cases: Mapping[str, Array],
+    summary: Mapping[str, Array],
+    limits: Sequence[Limit],
+) -> RandomResult:
+    """Evaluate the cases of a random sweep, (combinations * rows,) each."""
+    fine = np.isin(summary["status"], RUN)
+    made = combinations(design, cases)
+    shape = (-1, design.rows) if made else (design.rows,)
+    columns = {
+        name: np.where(fine, values, np.nan).reshape(shape)
+        for name, values in summary.items()
+        if name != "status"
+    }
+    draws = {name: values[..., : design.draws] for name, values in columns.items()}
+    check_limits(limits, list(columns), threshold=FORCE in columns)
+    found: dict[str, Indices] = {}
+    notes: list[str] = []
+    if (lost := int((~fine).sum())) > FEW * len(fine):
+        notes.append(
+            f"{lost / len(fine):.3%} of the draws failed, and the statistics are those of the "
+            f"others; {REMEDY}"
+        )
+    if design.sensitivity:
+        table = np.array(list(columns.values()))
+        flat = table.reshape(-1, len(design.laws) + 2, design.samples)
+        split = [p.reshape(*table.shape[:-1], *p.shape[1:]) for p in indices(flat, design.seed)]
+        found = {n: Indices(*(part[row] for part in split)) for row, n in enumerate(columns)}
+        lacking = {n: int(np.isnan(v).sum()) for n, v in columns.items()}
+        if names := [name for name, count in lacking.items() if 0 < count < len(fine)]:
+            notes.append(
+                f"no indices where a case has no value: {', '.join(names)} "
+                f"({max(lacking.values())} of {len(fine)} cases)"
+            )
+    return RandomResult(
+        design, {name: statistics(values) for name, values in draws.items()}, found,
+        _exceedance(draws, limits), made, tuple(notes),
+    )  # fmt: skip
+
+
+def combinations(design: Design, cases: Mapping[str, Array]) -> dict[str, Array]:
+    """Varied values of every combination."""
+    return {n: values[:: design.rows] for n, values in cases.items() if n not in design.laws}
+
+
+def _exceedance(draws: Mapping[str, Array], limits: Sequence[Limit]) -> Exceedance:
+    """Probabilities that quantities (..., draws) exceed limits."""
+    thresholds = draws.get(FORCE, np.full(1, np.nan))
+    known = thresholds[np.isfinite(thresholds)]
+    common = known[0] if len(known) and not np.ptp(known) else np.nan
+    over = [draws[n] - (thresholds if isinstance(v, str) else v) for n, v in limits]
+    axes = next(iter(draws.values())).shape[:-1]
+    count, hits = (
+        np.array([one.sum(axis=-1) for one in which], dtype=np.int64).reshape(len(limits), *axes).T
+        for which in ([np.isfinite(one) for one in over], [one > 0.0 for one in over])
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = hits / count
+    return Exceedance(
+        np.array([name for name, _ in limits], dtype=np.str_),
+        np.array([common if isinstance(v, str) else v for _, v in limits], dtype=float),
+        share, *wilson(hits, count), count,
+    )  # fmt: skip
+
+
+def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
+    """Lines of the most important quantities: statistics, indices and probabilities."""
+    design, found = random.design, random.exceedance
+    lines = [f"design            {design.kind}, {design.samples} samples, seed {design.seed}"]
+    lines += [f"random            {name} {law}" for name, law in design.laws.items()]
+    chosen = [name for name in MAIN if name in random.statistics][:PRINTED]
+    labels = ["mean", "std. dev.", *(f"{q:.0%}".replace("%", " %") for q in QUANTILES)]
+    count = len(next(iter(random.combinations.values()), [0]))
+    for number in range(min(count, PRINTED)):
+        place = (number,) if random.combinations else ()
+        lines += ["", *([random.label(number)] if place else [])]
+        own = [random.statistics[name] for name in chosen]
+        rows = [[s.mean[place], s.standard_deviation[place], *s.quantiles[place]] for s in own]
+        columns = [chosen, [unit(name) for name in chosen]]
+        columns += [[f"{value:.6g}" for value in row] for row in zip(*rows, strict=True)]
+        lines += [
+            f"{label:12}{''.join(f'{text:>16}' for text in row)}".rstrip()
+            for label, row in zip(["", "", *labels], columns, strict=True)
+            if any(row)
+        ]
+        if random.sensitivity:
+            lines += ["", *_index_lines(design, chosen[0], random.sensitivity[chosen[0]], place)]
+        for row, (name, limit) in enumerate(zip(found.quantity, found.limit, strict=True)):
+            p, low, high, n = (values[(*place, row)] for values in found[2:])
+            lacking = design.draws - n
+            more = f"; {lacking} draws have no value" if lacking else ""
+            value = THRESHOLD if np.isnan(limit) else f"{limit:.6g}"
+            lines.append(f"P({name} > {value}) = {p:.5g} ({low:.5g} to {high:.5g}){more}")
+    if count > PRINTED:
+        lines += ["", f"{count - PRINTED} more combinations of varied values are in the file"]
+    return lines
+
+
+def _index_lines(
+    design: Design, name: str, found: Indices, place: tuple[int, ...]
+) -> Iterator[str]:
+    """Table of the indices of a quantity."""
+    width = max(12, *map(len, (name, *design.laws)))
+    yield f"{name:{width}}{'first-order index (95 %)':>29}{'total index (95 %)':>29}"
+    columns = [values[place].tolist() for values in found]
+    for law, first, total, *intervals in zip(design.laws, *columns, strict=True):
+        texts = [
+            f"{value:.4f} ({low:.4f} to {high:.4f})"
+            for value, (low, high) in zip((first, total), intervals, strict=True)
+        ]
+        yield f"{law:{width}}{texts[0]:>29}{texts[1]:>29}"
+
+
+def stored(random: RandomResult) -> Iterator[tuple[str, Array, str, str, tuple[str, ...]]]:
+    """Path, values, description, dimension and axes of every dataset of the file."""
+    first = ("combinations",) if random.combinations else ()
+    for name, made in random.statistics.items():
+        text, dimension = COLUMNS.get(name, (name, ""))
+        values = np.concatenate([np.stack(made[:3], axis=-1), made.quantiles], axis=-1)
+        text = f"draws with a value, and their statistics: {text}"
+        yield f"statistics/{name}", values, text, dimension, (*first, "statistics")
+    for name, found in random.sensitivity.items():
+        for part, values in found._asdict().items():
+            yield (
+                f"sensitivity/{name}/{part}",
+                values,
+                PARTS[part][0],
+                "",
+                (*first, *PARTS[part][1]),
+            )
+    if len(random.exceedance.quantity):
+        for part, values in random.exceedance._asdict().items():
+            axes = ("limits",) if part in ("quantity", "limit") else (*first, "limits")
+            yield f"exceedance/{part}", values, LIMIT_PARTS[part], "", axes
+
+
+def attributes(random: RandomResult) -> dict[str, dict[str, Any]]:
+    """Attributes of the groups of the file."""
+    design = random.design
+    about: dict[str, Any] = {"kind": design.kind, "samples": design.samples, "seed": design.seed}
+    about |= {"sensitivity": design.sensitivity, "names": list(design.laws)}
+    laws = {
+        f"random/{name}": {"law": law.kind, "parameters": np.array(law.parameters)}
+        for name, law in design.laws.items()
+    }
+    texts = {name: {"description": text} for name, text in GROUPS.items()}
+    if not random.sensitivity:
+        del texts["sensitivity"]
+    if not len(random.exceedance.quantity):
+        del texts["exceedance"]
+    return {**texts, "design": {**texts["design"], **about, "notes": random.notes}, **laws}
+
+
+def random_of(
+    contents: Contents, cases: Mapping[str, Array], quantities: Iterable[str], count: int
+) -> RandomResult | None:
+    """Read the results of a random sweep; None if it is none.
+
+    Raises ResultFileError if they are incomplete.
+    """
+    if "design" not in contents.groups:
+        return None
+    try:
+        about, groups = contents.groups["design"], contents.groups
+        laws = {
+            name: Law(str(own["law"]), tuple(map(float, own["parameters"])))
+            for name in about["names"]
+            for own in [groups[f"random/{name}"]]
+        }
+        kind = DESIGNS[DESIGNS.index(about["kind"])]
+        samples, seed = int(about["samples"]), int(about["seed"])
+        design = Design(laws, samples, seed, kind, bool(about["sensitivity"]))
+        made = combinations(design, cases)
+        first = (count // design.rows,) if made else ()
+        sizes = {"laws": len(laws), "bounds": len(ENDS), "statistics": 3 + len(QUANTILES)}
+
+        def read(path: str, *axes: str) -> Any:
+            values = contents[path]
+            if values.shape != (*first, *map(sizes.get, axes)) or values.dtype.kind != "f":
+                raise ValueError(path)
+            return values
+
+        def statistics_of(name: str) -> Statistics:
+            values = read(f"statistics/{name}", "statistics")
+            draws, mean, deviation = np.moveaxis(values[..., :3], -1, 0)
+            return Statistics(draws.astype(int), mean, deviation, values[..., 3:])
+
+        known = [name for name in quantities if name != "status"]
+        exceedance = _exceedance({name: np.empty((*first, 0)) for name in known}, [])
+        if "exceedance/quantity" in contents:
+            exceedance = Exceedance(*(contents[f"exceedance/{p}"] for p in Exceedance._fields))
+            shape = (*first, len(exceedance.quantity))
+            if exceedance.limit.shape != shape[-1:] or {v.shape for v in exceedance[2:]} != {shape}:
+                raise ValueError("exceedance")
+        if (
+            count % design.rows
+            or not laws.keys() <= cases.keys()
+            or (not made and count != design.rows)
+        ):
+            raise ValueError("cases")
+        return RandomResult(
+            design,
+            {name: statistics_of(name) for name in known},
+            {name: Indices(*(read(f"sensitivity/{name}/{part}", *PARTS[part][1]) for part in PARTS))
+             for name in known if design.sensitivity},
+            exceedance, made, tuple(map(str, about["notes"])),
+        )  # fmt: skip
+    except (KeyError, ValueError, TypeError, AttributeError, ZeroDivisionError) as error:
+        raise ResultFileError(
+            f"{contents.path}: the results of this random sweep are incomplete ({error})"
+        ) from None

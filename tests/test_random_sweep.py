@@ -1,0 +1,462 @@
+"""Random sweeps: laws, designs, Sobol' indices, probabilities, and what becomes of them."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import fecm
+from fecm.results.schema import ResultFileError
+from fecm.sweeps.cases import CasesError
+from fecm.sweeps.plan import plan
+from fecm.sweeps.sampling import (
+    DESIGNS,
+    Design,
+    DesignKind,
+    Law,
+    matrix,
+    random_cases,
+    unit_samples,
+)
+from fecm.sweeps.sensitivity import QUANTILES, Indices, indices, wilson
+from tests.calls import Done, assert_unusable, call
+from tests.decks import DATA, DATA_CARDS, small
+
+Floats = NDArray[np.float64]
+
+# A rigid mass on a plate too heavy to move, through the loading branch of the law: Hertz's impact.
+# Its peak force is k^0.4 (5/4 M v^2)^0.6.
+HERTZ = """\
+FECM RIGID MASS ON A PLATE THAT CANNOT MOVE
+    9    1    1    2    5    9
+COOR
+    1    1       0.0       0.0
+    3    0       2.0       0.0
+    4    1       0.0       1.0
+    6    0       2.0       1.0
+    7    1       0.0       2.0
+    9    0       2.0       2.0
+
+ELEM
+    1    1    3    9    7    2    6    8    4    5    1
+
+BOUN
+    1    1   -1   -1    0    0    0
+    9    0    1    1    0    0    0
+
+ROD
+    5    3     115.0
+PROJ
+0,0,1.81E-4
+EXPE
+  1912000.        1.     0.094       2.0
+MATE
+    3    3   -3      .106
+      1.E6       0.3 17500000.  1150000.   800000.   800000.   800000.
+    1   0.     0.106
+END
+MACR
+LMAS
+DT        .4E-6
+LOOP        400
+TIME
+RODP        400
+NEXT
+END
+STOP
+"""
+# The same with fewer steps.
+QUICK = HERTZ.replace("       .4E-6", "       2.E-6").replace("        400", "         90")
+LAWS = {"k": "lognormal:1912000,0.15", "rod_mass": "lognormal:0.000181,0.02",
+        "velocity": "lognormal:115,0.08"}  # fmt: skip
+UNIFORM = ("--random", "k=uniform:1,2", "--samples", 16)
+NORMAL = ("--random", "k=normal:1.9e6,1e6", "--samples", 64)
+pytestmark = pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
+
+
+def tables() -> list[list[dict[str, str]]]:
+    """Tables of the file of closed forms."""
+    parts = (DATA / "lognormal_hertz.csv").read_text().strip().split("\n\n")
+    return [list(csv.DictReader(part.splitlines())) for part in parts]
+
+
+def exact_indices() -> Floats:
+    """First-order and total indices of Hertz's peak force, (2, 3)."""
+    names = ("first-order Sobol of F", "total Sobol of F")
+    return np.array([[float(row[name]) for row in tables()[0]] for name in names])
+
+
+def assert_inside(found: Indices, exact: Floats) -> None:
+    """The exact indices lie in the intervals of the estimated ones."""
+    for interval, values in zip((found.first_interval, found.total_interval), exact, strict=True):
+        low, high = interval.reshape(-1, 2).T
+        assert ((low <= values) & (values <= high)).all()
+
+
+def ishigami(kind: DesignKind, samples: int, seed: int) -> Indices:
+    law = Law("uniform", (-np.pi, np.pi))
+    design = Design({f"x{i}": law for i in range(3)}, samples, seed, kind, sensitivity=True)
+    x, y, z = matrix(design).T
+    values = np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
+    return indices(values.reshape(1, 5, samples), seed)
+
+
+def ishigami_exact() -> Floats:
+    with (DATA / "ishigami.csv").open() as file:
+        rows = dict(list(csv.reader(file))[1:])
+    return np.array([[float(rows[f"{kind}{i}"]) for i in (1, 2, 3)] for kind in "ST"])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("random")
+    (made / "small.inp").write_text(QUICK)
+    options = ("--random", "k=uniform:1e6,3e6", "--random", "velocity=normal:115,9")
+    done = call("sweep", "small.inp", *options, "--samples", 32, "--sensitivity", "--exceed",
+                "peak_force=600", "-o", "one.h5", cwd=made)  # fmt: skip
+    assert done.exit_code == 0
+    return made
+
+
+def sweep(folder: Path, *options: object) -> Done:
+    return call("sweep", "small.inp", *options, "-o", "new.h5", "--overwrite", cwd=folder)
+
+
+def test_laws_are_those_of_scipy() -> None:
+    from scipy import stats
+
+    unit = np.linspace(0.001, 0.999, 99)
+    for law, exact in (
+        (Law("normal", (3.0, 0.5)), stats.norm(3.0, 0.5)),
+        (Law("lognormal", (3.0, 0.5)), stats.lognorm(0.5, scale=3.0)),
+        (Law("uniform", (-1.0, 3.0)), stats.uniform(-1.0, 4.0)),
+        (Law("triangular", (-1.0, 0.5, 3.0)), stats.triang(0.375, -1.0, 4.0)),
+        (Law("triangular", (0.0, 0.0, 3.0)), stats.triang(0.0, 0.0, 3.0)),
+        (Law("triangular", (0.0, 3.0, 3.0)), stats.triang(1.0, 0.0, 3.0)),
+    ):
+        np.testing.assert_allclose(law.values(unit), exact.ppf(unit), rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["lhs", "sobol"])
+def test_a_design_has_one_sample_in_each_of_n_equal_intervals(kind: DesignKind) -> None:
+    unit = unit_samples(kind, 64, 6, 3)
+    np.testing.assert_array_equal(np.sort((64 * unit).astype(int), axis=0).T, [range(64)] * 6)
+
+
+@pytest.mark.parametrize("kind", DESIGNS)
+def test_the_seed_decides_the_design(kind: DesignKind) -> None:
+    first, again, other = (unit_samples(kind, 32, 2, seed) for seed in (5, 5, 6))
+    np.testing.assert_array_equal(first, again)
+    assert (first != other).all()
+
+
+def test_the_mixed_matrices_are_a_with_one_column_of_b() -> None:
+    laws = {name: Law("uniform", (0.0, 1.0)) for name in ("k", "q", "velocity")}
+    a, b, *mixed = matrix(Design(laws, 16, sensitivity=True)).reshape(5, 16, 3)
+    for column, found in enumerate(mixed):
+        kept = [other for other in range(3) if other != column]
+        np.testing.assert_array_equal(found[:, column], b[:, column])
+        np.testing.assert_array_equal(found[:, kept], a[:, kept])
+    assert not np.isin(a, b).any()
+
+
+def test_the_indices_of_ishigamis_function_are_the_exact_ones() -> None:
+    found, exact = ishigami("sobol", 4096, 0), ishigami_exact()
+    assert_inside(found, exact)
+    np.testing.assert_allclose([found.first[0], found.total[0]], exact, atol=2e-3)
+
+
+@pytest.mark.long
+def test_95_percent_of_the_intervals_cover_the_exact_indices() -> None:
+    exact = ishigami_exact()
+    covered = []
+    for seed in range(200):
+        made = ishigami("mc", 1024, seed)
+        for interval, values in zip((made.first_interval, made.total_interval), exact, strict=True):
+            covered.append((interval[0, :, 0] <= values) & (values <= interval[0, :, 1]))
+    assert np.mean(covered) == pytest.approx(0.95, abs=0.02)
+
+
+def test_a_constant_quantity_has_no_indices() -> None:
+    values = np.random.default_rng(0).normal(size=(3, 3, 64))
+    values[1] = 4.2
+    values[2, 2, 5] = np.nan
+    found = indices(values, 0)
+    assert np.isfinite(found.total_interval[0]).all()
+    assert all(np.isnan(part[1]).all() for part in found)
+    assert np.isnan(found.total[2]).all()
+
+
+def test_the_interval_of_a_probability_is_wilsons() -> None:
+    from scipy import stats
+
+    for hits, count in ((0, 16), (3, 40), (4004, 4096), (64, 64)):
+        exact = stats.binomtest(hits, count).proportion_ci(method="wilson")
+        found = wilson(np.array(hits), np.array(count))
+        np.testing.assert_allclose(found, [exact.low, exact.high], rtol=1e-9, atol=1e-15)
+
+
+def test_random_masses_hit_as_in_their_own_runs() -> None:
+    values = [1.5e-4, 1.8e-4, 2.4e-4]
+    found = fecm.sweep(fecm.read_one(HERTZ), {"rod_mass": values})
+    for mass, peak in zip(values, found["peak_force"], strict=True):
+        assert peak == pytest.approx(1912000**0.4 * (1.25 * mass * 115.0**2) ** 0.6, rel=4e-5)
+    plate = fecm.read_one(small(data=f"PROJ\n0,0,2e-4\n{DATA_CARDS}"))
+    found = fecm.sweep(plate, {"rod_mass": values}, history=True)
+    assert found.force is not None
+    for mass, force in zip(values, found.force, strict=True):
+        own = fecm.run_one(plate.with_(rod_mass=mass)).force
+        np.testing.assert_allclose(force, own, rtol=1e-12)
+
+
+def check_hertz(found: fecm.SweepResult) -> None:
+    """Compare a sensitivity study of Hertz's impact with the closed forms."""
+    random = found.random
+    assert random is not None
+    assert_inside(random.sensitivity["peak_force"], exact_indices())
+    made = random.statistics["peak_force"]
+    moments, limits, quantiles = tables()[1:]
+    error = float(moments[0]["standard deviation"]) / np.sqrt(made.draws)
+    assert made.mean == pytest.approx(float(moments[0]["mean"]), abs=2.0 * float(error))
+    for row, q, value in zip(quantiles, QUANTILES, made.quantiles, strict=True):
+        assert float(row["quantile"]) == q
+        spread = float(moments[0]["standard deviation"]) * np.sqrt(q * (1.0 - q) / made.draws)
+        density = max(0.05, 4.0 * q * (1.0 - q) * 0.4)  # at least that of a normal law, times SD
+        assert value == pytest.approx(float(row["F"]), abs=2.0 * float(spread) / density)
+    exact = {float(row["threshold lb"]): float(row["P(F > threshold)"]) for row in limits}
+    for limit, low, high in zip(
+        random.exceedance.limit, random.exceedance.lower, random.exceedance.upper, strict=True
+    ):
+        assert low <= exact[limit] <= high
+
+
+def test_a_small_study_of_hertzs_impact_agrees_with_the_closed_forms() -> None:
+    check_hertz(
+        fecm.sweep(
+            fecm.read_one(QUICK), random=LAWS, samples=256, design="sobol", sensitivity=True,
+            exceed={"peak_force": [500.0, 600.0]},
+        )
+    )  # fmt: skip
+
+
+@pytest.mark.long
+def test_4096_samples_of_hertzs_impact_agree_with_the_closed_forms() -> None:
+    check_hertz(
+        fecm.sweep(
+            fecm.read_one(HERTZ), random=LAWS, samples=4096, design="sobol", sensitivity=True,
+            exceed={"peak_force": [450.0, 500.0, 550.0, 600.0]},
+        )
+    )  # fmt: skip
+
+
+def test_the_same_seed_gives_the_same_bytes(folder: Path) -> None:
+    options = ("--random", "k=uniform:1e6,3e6", "--random", "velocity=normal:115,9",
+               "--samples", 32, "--sensitivity", "--exceed", "peak_force=600")  # fmt: skip
+    assert sweep(folder, *options).exit_code == 0
+    first = (folder / "one.h5").read_bytes()
+    assert (folder / "new.h5").read_bytes() == first
+    assert sweep(folder, *options, "--seed", 1).exit_code == 0
+    assert (folder / "new.h5").read_bytes() != first
+
+
+def test_the_cases_of_a_design_identify_an_interrupted_sweep() -> None:
+    problem = fecm.api.load_deck(fecm.read_one(small())).problems[0]
+    made = {
+        seed: plan(problem, random_cases(design, [{}]), design=design).fingerprint()
+        for seed in (0, 1)
+        for design in [Design({"k": Law("uniform", (1e6, 2e6))}, 16, seed)]
+    }
+    assert made[0] != made[1]
+
+
+def test_a_file_gives_back_the_results_of_the_sweep(folder: Path) -> None:
+    loaded = fecm.load_sweep(folder / "one.h5")
+    again = fecm.sweep(
+        folder / "small.inp", random={"k": "uniform:1e6,3e6", "velocity": "normal:115,9"},
+        samples=32, sensitivity=True, exceed={"peak_force": 600},
+    )  # fmt: skip
+    assert loaded.random is not None
+    assert again.random is not None
+    assert loaded.random.design == again.random.design
+    pairs: list[tuple[Any, Any]] = [(loaded.random.exceedance, again.random.exceedance)]
+    for name in again.random.statistics:
+        pairs.append((loaded.random.statistics[name], again.random.statistics[name]))
+        pairs.append((loaded.random.sensitivity[name], again.random.sensitivity[name]))
+    for a, b in pairs:
+        for x, y in zip(a, b, strict=True):
+            np.testing.assert_array_equal(x, y)
+
+
+def test_the_statistics_are_those_of_the_draws(folder: Path) -> None:
+    loaded = fecm.load_sweep(folder / "one.h5")
+    assert loaded.random is not None
+    force = loaded["peak_force"][:64]  # 128 cases, of which A and B are independent
+    made = loaded.random.statistics["peak_force"]
+    assert made.draws == 64
+    assert made.mean == force.mean()
+    assert made.standard_deviation == pytest.approx(force.std(ddof=1), rel=1e-12)
+    np.testing.assert_array_equal(made.quantiles, np.quantile(force, QUANTILES))
+    assert loaded.random.exceedance.probability == [(force > 600.0).mean()]
+
+
+def test_info_diff_and_export_read_the_file(folder: Path) -> None:
+    told = call("info", "one.h5", cwd=folder).stdout
+    assert "  design            lhs, 32 samples, seed 0\n" in told
+    assert "  law = uniform\n  parameters = [1e+06, 3e+06]\n" in told
+    assert call("diff", "one.h5", "one.h5", cwd=folder).exit_code == 0
+    done = call("export", "one.h5", "--to", "csv", "-o", "-", cwd=folder)
+    assert done.stdout.startswith("case,k,velocity,peak_force,")
+    assert len(done.stdout.splitlines()) == 129
+
+
+def test_the_axes_of_the_file_are_named(folder: Path) -> None:
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    group = "sensitivity/peak_force"
+    with xarray.open_dataset(folder / "one.h5", group=group, engine="h5netcdf") as found:
+        assert found.first_interval.dims == ("random_name", "bound")
+
+
+def test_every_combination_of_varied_values_gets_the_same_draws(folder: Path) -> None:
+    random = {"k": "normal:1.9e6,1e5"}
+    found = fecm.sweep(folder / "small.inp", {"velocity": [50.0, 115.0]}, random=random,
+                       samples=16, exceed={"peak_force": [500.0, 600.0]},
+                       output=folder / "two.h5")  # fmt: skip
+    np.testing.assert_array_equal(found["k"][:16], found["k"][16:])
+    np.testing.assert_array_equal(found["velocity"], np.repeat([50.0, 115.0], 16))
+    assert found.random is not None
+    force = found["peak_force"].reshape(2, 16)
+    np.testing.assert_array_equal(found.random.statistics["peak_force"].mean, force.mean(axis=1))
+    exceeded = np.column_stack([(force > limit).mean(axis=1) for limit in (500.0, 600.0)])
+    np.testing.assert_array_equal(found.random.exceedance.probability, exceeded)
+    loaded = fecm.load_sweep(folder / "two.h5").random
+    assert loaded is not None
+    assert loaded.label(1) == "velocity 115.0"
+
+
+def test_a_threshold_of_the_deck_is_a_limit(folder: Path) -> None:
+    (folder / "dela.inp").write_text(QUICK.replace("EXPE", "DELA\n1.\nEXPE"))
+    options = ("--random", "velocity=uniform:20,115", "--samples", 64, "--exceed")
+    call("sweep", "dela.inp", *options, "peak_force=threshold", "-o", "dela.h5", cwd=folder)
+    found = fecm.load_sweep(folder / "dela.h5")
+    assert found.random is not None
+    above = found["peak_force"] > found["threshold_force"]
+    assert 0.0 < above.mean() < 1.0
+    assert found.random.exceedance.probability == [above.mean()]
+    assert found.random.exceedance.limit == found["threshold_force"][:1]
+
+
+def test_impossible_draws_are_failed_cases_and_their_share_is_told(folder: Path) -> None:
+    done = sweep(folder, *NORMAL)
+    failed = int((fecm.load_sweep(folder / "new.h5")["k"] <= 0.0).sum())
+    assert failed > 0
+    assert f"failed share      {failed / 64:.3%} of the draws\n" in done.stdout
+    assert f"{failed / 64:.3%} of the draws failed" in done.stderr
+    assert done.exit_code == 1
+    assert sweep(folder, *NORMAL, "--allow-failed").exit_code == 0
+
+
+def test_impossible_draws_are_refused_before_a_sensitivity_study(folder: Path) -> None:
+    done = sweep(folder, *NORMAL, "--sensitivity")
+    assert_unusable(done)
+    assert "lognormal" in done.stderr
+
+
+def test_the_cost_is_told_beforehand(folder: Path) -> None:
+    done = sweep(folder, "--random", "e1=normal:17.5e6,5e5", "--samples", 16, "--design", "mc")
+    assert "16 draws need 16 plates, because e1 is random" in done.stderr
+    done = sweep(folder, "--random", "k=uniform:1e6,2e6", "--samples", 17, "--design", "sobol")
+    assert "17 draws share 1 plate" in done.stderr
+    assert "17 samples are no power of 2" in done.stderr
+    assert "take 16" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--random", "k=normal:1e6,0", "--samples", 16), "SD must be positive"),
+        (("--random", "k=uniform:2,1", "--samples", 16), "A must be less than B"),
+        (("--random", "k=triangular:1,3,2", "--samples", 16), "MODE must be from A to B"),
+        (("--random", "k=lognormal:1e6", "--samples", 16), "lognormal:MEDIAN,SIGMA"),
+        (("--random", "k=lognormal:1e6,nan", "--samples", 16), "lognormal:MEDIAN,SIGMA"),
+        (("--random", "k=gauss:1,2", "--samples", 16), "the laws are normal:MEAN,SD"),
+        (("--random", "k", "--samples", 16), "NAME=LAW"),
+        (("--random", "layup=uniform:1,2", "--samples", 16), "the names are velocity"),
+        (("--random", "kk=uniform:1,2", "--samples", 16), "the names are velocity"),
+        (("--random", "k=uniform:1e6,2e6", "--samples", 15), "at least 16"),
+        (("--random", "k=uniform:1e6,2e6"), "needs --samples"),
+        (("--random", "k=lognormal:1e6,900", "--samples", 16), "beyond the range"),
+        (("--random", "k=uniform:1e6,2e6", "--samples", 16, "--seed", -1), "seed"),
+        (("--random", "k=uniform:1e6,2e6", "--samples", 2_000_000), "at most 1000000"),
+        (("--random", "k=uniform:1,2", "--random", "k=uniform:1,2", "--samples", 16), "twice"),
+        (("--random", "k=uniform:1,2", "--vary", "k=1e6", "--samples", 16), "varied and random"),
+        (("--random", "k=uniform:1,2", "--cases", "small.inp", "--samples", 16), "--vary"),
+        (("--vary", "k=1e6", "--samples", 16), "--samples needs --random"),
+        (("--vary", "k=1e6", "--sensitivity"), "--sensitivity needs --random"),
+        ((*UNIFORM, "--exceed", "f=1"), "no quantity `f`"),
+        ((*UNIFORM, "--exceed", "contacts"), "QUANTITY=NUMBER"),
+        ((*UNIFORM, "--exceed", "contacts=x"), "finite number"),
+        ((*UNIFORM, "--exceed", "peak_force=threshold"), "DELA"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_line(folder: Path, options: tuple[object, ...], told: str) -> None:
+    done = sweep(folder, *options)
+    assert_unusable(done)
+    assert told in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ({"samples": 16}, "random values"),
+        ({"random": {}}, "random is"),
+        ({"random": {"k": "uniform:1,2"}}, "number of samples"),
+        ({"random": {"k": "uniform:1,2"}, "samples": 16, "design": "halton"}, "lhs, sobol, mc"),
+        ({"random": {"k": "uniform:1,2"}, "cases": [{"q": 2.0}]}, "not with cases"),
+        ({"random": {"case": "uniform:1,2"}, "samples": 16, "build": len}, "name of the results"),
+    ],
+)
+def test_bad_arguments_are_named(arguments: dict[str, Any], told: str) -> None:
+    deck = None if "build" in arguments else fecm.read_one(small())
+    with pytest.raises(CasesError, match=told):
+        fecm.sweep(deck, **arguments)
+
+
+def test_an_incomplete_file_is_refused(folder: Path) -> None:
+    import h5py
+
+    copy = folder / "damaged.h5"
+    for damage in ("statistics/peak_force", "sensitivity", "random/k"):
+        copy.write_bytes((folder / "one.h5").read_bytes())
+        with h5py.File(copy, "r+") as file:
+            del file[damage]
+        with pytest.raises(ResultFileError, match="incomplete"):
+            fecm.load_sweep(copy)
+
+
+@pytest.mark.parametrize("kind", ["exceedance", "sensitivity", "scatter"])
+def test_pictures_need_a_random_sweep(folder: Path, kind: str) -> None:
+    pytest.importorskip("matplotlib")
+    assert call("plot", "one.h5", "--kind", kind, "-o", f"{kind}.png", cwd=folder).exit_code == 0
+    call("sweep", "small.inp", "--vary", "k=1e6,2e6", "-o", "plain.h5", "--overwrite", cwd=folder)
+    done = call("plot", "plain.h5", "--kind", kind, cwd=folder)
+    assert_unusable(done)
+    assert "no random values" in done.stderr
+
+
+def test_the_picture_of_exceedance_goes_through_the_probabilities(folder: Path) -> None:
+    pytest.importorskip("matplotlib")
+    from fecm.plot.pictures import draw
+
+    loaded = fecm.load_sweep(folder / "one.h5")
+    assert loaded.random is not None
+    picture = draw("exceedance", {"one": loaded})
+    curve = picture.figure.axes[0].get_lines()[0]
+    x, y = np.asarray(curve.get_xdata(), float), np.asarray(curve.get_ydata(), float)
+    assert np.interp(600.0, x, y) == pytest.approx(loaded.random.exceedance.probability, abs=1 / 64)
+    assert picture.notes[0].startswith("P(peak_force > 600) = ")
