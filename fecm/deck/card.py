@@ -23,9 +23,6 @@ JUSTIFY = "right-justify each number in its own columns"
 # Characters of the longest number that is read.
 LONGEST = 100
 
-# Columns from which on an exponent may be written without its letter.
-_LETTERLESS = 10
-
 # No two parts of a pattern match the same characters, so that a mismatch takes linear time.
 _INTEGER = re.compile(r"[+-]?[0-9]+")
 
@@ -69,7 +66,7 @@ def format_real(value: float, width: int) -> str | None:
 @lru_cache(4096)
 def _formatted(numeral: str, width: int) -> str | None:
     """Write the number of a numeral of Python into `width` columns; decks repeat their numbers."""
-    for letter in ("E", "") if width >= _LETTERLESS else ("E",):
+    for letter in ("E", "") if width >= 10 else ("E",):
         forms = list(_forms(numeral, letter))
         for room in (width - 1, width):  # with a blank between two numbers if it fits
             for text in forms:

@@ -156,9 +156,5 @@ def _checksum(file: BinaryIO, length: int) -> int:
 
 
 def _line(entry: Mapping[str, Any]) -> bytes:
-    return json.dumps(entry, default=_plain).encode() + b"\n"
-
-
-def _plain(value: Any) -> Any:
-    """Convert NumPy numbers and arrays to Python's."""
-    return value.tolist()
+    """An operation in JSON, with NumPy's numbers and arrays as Python's."""
+    return json.dumps(entry, default=lambda value: value.tolist()).encode() + b"\n"

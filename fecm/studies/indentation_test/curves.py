@@ -56,25 +56,18 @@ Ints = NDArray[np.int64]
 
 # Fewest points of a curve.
 FEWEST = 5
-
+# Initial guess of the unloading power.
 FIRST_Q = 2.2
-
 # Distance from a bound at which a value counts as at it, relative to the range.
 AT_LIMIT = 1e-4
-
 # Bounds of peaks relative to the recorded value, and of origins relative to the peak.
 PEAK_MOVES = 0.15
-
-LIMITS_PERMANENT = (-0.5, 0.8)
-
-LIMITS_ORIGIN = (-3.0, 0.8)
-
+LIMITS_PERMANENT, LIMITS_ORIGIN = (-0.5, 0.8), (-3.0, 0.8)
 # Relative error above which the curves do not determine a peak.
 VAGUE = 0.05
-
 # Standard errors by which an origin must exceed a turn.
 SURE = 3.0
-
+# Step of the scaled parameters in derivatives.
 STEP = 1e-6
 
 

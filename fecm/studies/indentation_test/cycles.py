@@ -66,8 +66,7 @@ def _moving_mean(values: Floats, reach: int) -> Floats:
     sums = np.concatenate([[0.0], np.cumsum(values)])
     n = np.arange(len(values))
     first, last = np.maximum(n - reach, 0), np.minimum(n + reach + 1, len(values))
-    means: Floats = (sums[last] - sums[first]) / (last - first)
-    return means
+    return np.asarray((sums[last] - sums[first]) / (last - first))
 
 
 def turns(path: Path, retreat: float) -> list[int]:

@@ -62,8 +62,7 @@ class Fronts:
         """Direction of the rays, (n, 5), degrees in (-180, 180]."""
         ray = self.ray
         angle = np.rad2deg(np.arctan2(ray[..., 1], ray[..., 0]))
-        found: Floats = np.where(angle <= -180.0 + 1e-9, angle + 360.0, angle)
-        return found
+        return np.asarray(np.where(angle <= -180.0 + 1e-9, angle + 360.0, angle))
 
     def positions(self, time: float, radius: float) -> Floats:
         """Positions of fronts that start as a circle, equations 2-85 to 2-87.
@@ -79,8 +78,7 @@ class Fronts:
         ndarray (n, 5, 2)
         """
         start = radius * np.stack(trigonometry(self.normal), axis=-1)
-        found: Floats = start[:, None] + time * self.ray
-        return found
+        return np.asarray(start[:, None] + time * self.ray)
 
     def growth(self, time: float, radius: float) -> Floats:
         """Length of the front per radian of the normal, (n, 5); zero at a cusp, then negative."""

@@ -103,8 +103,7 @@ def in_normal_axes(tensor: Floats, degrees: ArrayLike) -> Floats:
     """Components nn, nt; tn, tt, (n, 2, 2), of a symmetric tensor with xx, xy; yx, yy."""
     cos, sin = trigonometry(degrees)
     axes = np.stack([np.stack([cos, -sin], axis=-1), np.stack([sin, cos], axis=-1)], axis=1)
-    turned: Floats = axes.transpose(0, 2, 1) @ tensor @ axes
-    return turned
+    return np.asarray(axes.transpose(0, 2, 1) @ tensor @ axes)
 
 
 def shares(inertia: Floats, vectors: Floats) -> Floats:
@@ -113,8 +112,7 @@ def shares(inertia: Floats, vectors: Floats) -> Floats:
     The modes are the columns of `vectors`, (..., 5, modes).
     """
     energy = vectors * (inertia @ vectors)
-    found: Floats = np.swapaxes(energy / energy.sum(axis=-2, keepdims=True), -1, -2)
-    return found
+    return np.asarray(np.swapaxes(energy / energy.sum(axis=-2, keepdims=True), -1, -2))
 
 
 def best(scores: Floats) -> NDArray[np.intp]:
@@ -123,8 +121,7 @@ def best(scores: Floats) -> NDArray[np.intp]:
     The scores, (n, choices), are sums of shares, of the order of 1.
     """
     equal = scores > scores.max(axis=-1, keepdims=True) - 1e-9
-    place: NDArray[np.intp] = equal.argmax(axis=-1)
-    return place
+    return np.asarray(equal.argmax(axis=-1))
 
 
 def _correlation(matrix: Floats) -> Floats:

@@ -94,8 +94,7 @@ def assigned(share: Floats) -> NDArray[np.intp]:
     The components are the columns of `share`, the modes its rows.
     """
     scores = share[_ORDERS, np.arange(5)].sum(axis=1)
-    found: NDArray[np.intp] = _ORDERS[best(scores[None])[0]]
-    return found
+    return np.asarray(_ORDERS[best(scores[None])[0]])
 
 
 def _stiffness(medium: Medium, normal: Floats) -> tuple[Floats, Floats, Floats]:
