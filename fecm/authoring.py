@@ -369,7 +369,12 @@ def _placed(
 ) -> tuple[Grid | PlateMesh, int, Patch | None, list[str]]:
     """Mesh, node that is hit, patch, and how they differ from what was asked."""
     doubts: list[str] = []
-    mesh, (x, y) = _mesh(plate, at, None if patch is None else patch.radius)
+    place = None if at is None else pair("at", at)
+    mesh = plate.imported or grid_of(plate, place, None if patch is None else patch.radius)
+    low, high = mesh.extent
+    x, y = place or ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0)
+    if not (low[0] <= x <= high[0] and low[1] <= y <= high[1]):
+        raise ObjectError("`at` is outside the plate")
     if isinstance(mesh, PlateMesh) and mesh.groups and not plate.supports:
         doubts.append(
             f"the plate is free: no group of the mesh has a support, of {', '.join(mesh.groups)}"
@@ -394,20 +399,6 @@ def _placed(
                 f"{patch.radius:g}"
             )
     return mesh, node, patch, doubts
-
-
-def _mesh(
-    plate: Plate, at: Sequence[float] | None, radius: float | None
-) -> tuple[Grid | PlateMesh, tuple[float, float]]:
-    """Mesh of the plate and the impact point."""
-    place = None if at is None else pair("at", at)
-    mesh = plate.imported or grid_of(plate, place, radius)
-    low, high = mesh.extent
-    if place is None:
-        return mesh, ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0)
-    if not all(a <= x <= b for a, x, b in zip(low, place, high, strict=True)):
-        raise ObjectError("`at` is outside the plate")
-    return mesh, place
 
 
 def _with_energy(deck: Deck, energy: float) -> Deck:

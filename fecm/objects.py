@@ -51,9 +51,8 @@ LEAST_RADIUS = 1e-3
 WINDOW_MESH, WINDOW_GRADING = (20, 12), 3.0
 # Units of the standards; Young's modulus and Poisson's ratio of steel in them.
 STANDARD, E_S, NU_S = "mm-N-s", 207e3, 0.3
-# Shapes of the contact patch; "none" is a point force.
+# Shapes of the contact patch.
 PATCHES = {"disc": DISC, "hertz": HERTZ}
-NO_PATCH = "none"
 CUSTOM = "window:LXxLY,WXxWY"
 
 Support = Literal["free", "simple", "clamped"]
@@ -435,7 +434,7 @@ def parse_patch(text: str) -> Patch | None:
     ``none`` is a point force, None.  Raises ValueError if the text is none of these.
     """
     shape, colon, given = text.partition(":")
-    if text == NO_PATCH:
+    if text == "none":
         return None
     try:
         radius = float(given) if colon else None
