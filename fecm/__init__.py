@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from fecm.objects import Contact, Laminate, Plate
     from fecm.results.result import Result, load
     from fecm.sweeps.api import sweep
+    from fecm.sweeps.identify import Identification, identify
     from fecm.sweeps.result import SweepResult
     from fecm.sweeps.result import load as load_sweep
 
@@ -37,6 +38,7 @@ __all__ = [
     "DivergenceError",
     "FecmError",
     "FecmWarning",
+    "Identification",
     "Laminate",
     "Plate",
     "Ply",
@@ -46,6 +48,7 @@ __all__ = [
     "SweepResult",
     "__version__",
     "examples",
+    "identify",
     "impact",
     "load",
     "load_sweep",
@@ -75,6 +78,8 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "Result": "fecm.results.result",
         "load": "fecm.results.result",
         "sweep": "fecm.sweeps.api",
+        "Identification": "fecm.sweeps.identify",
+        "identify": "fecm.sweeps.identify",
         "SweepResult": "fecm.sweeps.result",
         "load_sweep": "fecm.sweeps.result:load",
     }

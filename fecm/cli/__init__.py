@@ -38,6 +38,7 @@ COMMANDS = {
     "example": LazyCommand("fecm.cli.example", "List the example decks and tables, or write one."),
     "export": LazyCommand("fecm.cli.export", "Write RESULT for ParaView or a spreadsheet.", True),
     "fmt": LazyCommand("fecm.cli.decks", "Align the columns of decks."),
+    "identify": LazyCommand("fecm.cli.identify", "Fit parameters to a measured contact force."),
     "indent": LazyCommand("fecm.cli.indent", "Indentation tests and the law of contact."),
     "info": LazyCommand("fecm.cli.info", "Describe the contents of RESULT.", True),
     "materials": LazyCommand("fecm.cli.new", "List the named plies of `fecm new`, or of a file."),

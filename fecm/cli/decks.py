@@ -30,6 +30,7 @@ from fecm.deck.format import format_deck
 from fecm.deck.reader import load_text
 from fecm.deck.units import unit_names, unit_of
 from fecm.problem.options import RunOptions
+from fecm.problem.problem import Problem
 from fecm.problem.slips import REPORT, active_slips
 from fecm.problem.summary import ProblemSummary
 from fecm.results.schema import jsonable
@@ -75,6 +76,14 @@ def load_valid(
     if errors:
         raise RefusedError(count_findings(errors) + otherwise)
     return loaded
+
+
+def load_single(deck: Path, command: str) -> Problem:
+    """The problem of a deck, for a command that takes one; raises as :func:`load_valid`."""
+    problems = load_valid(deck).problems
+    if len(problems) != 1:
+        raise RefusedError(f"{deck} has {len(problems)} problems; {command} takes one")
+    return problems[0]
 
 
 DECKS = click.argument(

@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
-from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError, echo, note
-from fecm.cli.decks import load_valid
+from fecm.cli.common import DECK_PATH, FORMAT_OPTION, echo, note
+from fecm.cli.decks import load_single
 from fecm.deck.units import unit_names, unit_of
 from fecm.problem.problem import Problem
 from fecm.results.schema import jsonable
@@ -31,10 +31,7 @@ def estimate(deck: Path, form: str) -> None:
     velocity and energy are those at which the peak force reaches the delamination threshold.
     The models without a mesh neglect DAMP.
     """
-    problems = load_valid(deck).problems
-    if len(problems) != 1:
-        raise RefusedError(f"{deck} has {len(problems)} problems; estimate takes one")
-    (problem,) = problems
+    problem = load_single(deck, "estimate")
     found = estimate_problem(problem)
     rows = [
         {

@@ -49,13 +49,13 @@ class OutputPaths:
     """Files of a table, ``-`` for standard output, and its picture, checked before all else."""
 
     def __init__(
-        self, table: Path, picture: Path | None, overwrite: bool, source: Path | None
+        self, table: Path, picture: Path | None, overwrite: bool, *sources: Path | None
     ) -> None:
         if picture is not None:
             _check_picture(picture)
         self.table, self.picture, self._overwrite = table, picture, overwrite
         files = [path for path in (table, picture) if path and path != STANDARD_OUTPUT]
-        check_outputs(files, overwrite, [source] if source else [])
+        check_outputs(files, overwrite, [source for source in sources if source])
 
     def draw(self, picture: Picture) -> None:
         """Write the picture."""

@@ -36,11 +36,14 @@ from fecm.plot.style import (
     panels,
     peak,
     scale,
+    scale_in,
     scale_of,
+    styled,
 )
 from fecm.results.result import Result
 from fecm.results.schema import declared_units
 from fecm.studies.comparison import Measurement, Source, compare, measurement_of
+from fecm.sweeps.identify import Identification
 
 Results = Mapping[str, Result]
 
@@ -144,6 +147,26 @@ def _draw_measured(axes: Sequence[Axes], measured: Measurement) -> None:
     if ax is not axes[0]:
         axes[0].plot([], [], **style)  # for the legend
     ax.plot(measured.time, measured.force, **style)
+
+
+@styled
+def fit_picture(found: Identification, units: Mapping[str, str]) -> Picture:
+    """Measured and fitted force above, the residual below with plus and minus its rms."""
+    clock = scale_in(units, "time", found.time)
+    figure, (above, below) = panels("column", 2, sharex=True, ratio=0.6 * RATIO["column"])
+    few: dict[str, Any] = {"ls": "none", "marker": ".", "ms": 3.0}
+    style = few if len(found.time) <= POINTS else {"lw": 0.6}
+    above.plot(found.time, found.force, color="0.4", label="measured", **style)
+    above.plot(found.time, found.model, color=COLOURS[0], label="fitted")
+    below.plot(found.time, found.residual, color="0.4", **style)
+    below.axhline(0.0, color=COLOURS[0])
+    for value in (-found.rms, found.rms):
+        below.axhline(value, color=COLOURS[0], ls=STYLES[1], lw=0.6)
+    for axes, name, values in ((above, "Force", found.force), (below, "Residual", found.residual)):
+        scale_in(units, "force", values).name(axes.yaxis, name)
+    clock.name(below.xaxis, "Time")
+    lines_legend(figure, above)
+    return Picture(figure)
 
 
 def _thresholds(results: Results) -> dict[str, float]:

@@ -101,14 +101,14 @@ def measurement_of(source: Source, units: Mapping[str, str]) -> Measurement:
     try:
         time, force = (np.asarray(values, dtype=float) for values in source)
     except (TypeError, ValueError):
-        raise StudyError("an overlay is a CSV file, or a pair of times and forces") from None
+        raise StudyError("a measurement is a CSV file, or a pair of times and forces") from None
     if time.ndim != 1 or time.shape != force.shape or len(time) < 2:
         raise StudyError(
-            f"an overlay needs as many times as forces, two at least: {time.shape} and "
+            f"a measurement needs as many times as forces, two at least: {time.shape} and "
             f"{force.shape} were given"
         )
     if not (np.isfinite([time, force]).all() and (np.diff(time) > 0.0).all()):
-        raise StudyError("an overlay needs finite numbers at increasing times")
+        raise StudyError("a measurement needs finite numbers at increasing times")
     return Measurement("measured", "force", time, force)
 
 

@@ -62,9 +62,13 @@ class Table:
                 columns[increasing], columns[increasing][1:], self.rows[1:], strict=False
             ):
                 if not after > before:
+                    others = [
+                        n for n in names if n != increasing and (np.diff(columns[n]) > 0).all()
+                    ]
+                    swapped = f"; are {increasing} and {others[0]} swapped?" if others else ""
                     raise StudyError(
                         f"{self.path}:{line}: {increasing} must increase: {after:g} follows "
-                        f"{before:g}"
+                        f"{before:g}{swapped}"
                     )
         return columns
 

@@ -105,7 +105,7 @@ def run(task: Task) -> Outcome:
         except CasesError as error:
             lost |= dict.fromkeys(numbers, str(error))
         else:
-            runs = _runs(checked, task.extra)
+            runs = runs_of(checked, task.extra)
             outcome = (
                 runs(numbers, decks, True)
                 if task.until is None
@@ -186,7 +186,7 @@ def _told(error: Exception) -> str:
     return f"{type(error).__name__}: {' '.join(str(error).split())}"
 
 
-def _runs(checked: Problem, extra: Sequence[str]) -> Runs:
+def runs_of(checked: Problem, extra: Sequence[str] = ()) -> Runs:
     """Return the function that runs decks which share the plate of a problem."""
     if shares_plate(checked):
         return partial(_together, checked, _plate(checked, extra), extra)
