@@ -111,6 +111,13 @@ def test_k_mass_and_velocity_are_one_too_many_for_hertzs_contact(tmp_path: Path)
     assert found.values == pytest.approx({"k": 1.2e5, "velocity": 100.0})
 
 
+def test_one_unloading_gives_one_permanent_indentation_and_not_its_line() -> None:
+    with pytest.raises(
+        IdentifyError, match=r"only a combination of (s_p|alpha_p) and (s_p|alpha_p)"
+    ):
+        fecm.identify(plate(12, 4e-7, **TRUE), TIME, measured(), ["s_p", "alpha_p"])
+
+
 def test_a_standard_error_above_the_value_is_refused() -> None:
     noise = 4.0 * measured().max() * np.random.default_rng(3).normal(size=len(TIME))
     with pytest.raises(IdentifyError, match=r"does not determine alpha_p \(\d+ %\)"):

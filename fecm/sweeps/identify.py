@@ -43,7 +43,7 @@ OFF = 20.0
 # Fewest measured points, and fewest above half of the peak.
 POINTS, TOP_POINTS = 10, 3
 # Smallest singular value of the Jacobian with unit columns, and smallest column (rms over peak).
-SINGULAR, NO_EFFECT = 1e-4, 1e-6
+SINGULAR, NO_EFFECT = 1e-3, 1e-6
 # Share of a parameter in a singular vector above which the vector concerns it.
 SHARE = 0.1
 # Correlation of parameters, and of neighbouring residuals above a share of the peak, that is told.
