@@ -22,7 +22,7 @@ from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, model, small
 
 PLATE = {
-    "--size": "100x100", "--mesh": "4x4", "--layup": "[0]8", "--ply-thickness": ".25",
+    "--size": "100x100", "--mesh": "2x2", "--layup": "[0]8", "--ply-thickness": ".25",
     "--material": "T300/5208", "--units": "mm-N-s", "--velocity": "3000",
     "--law": "45000,.016,.094,2.5", "--projectile": "mass:2e-5", "--duration": "5e-5",
     "--support": "simple",
@@ -43,9 +43,9 @@ def new(**options: str) -> Deck:
 def gaged() -> Deck:
     """A plate with gages and failure criteria, hit for a time after which it is free."""
     return fecm.impact(
-        fecm.Plate.rectangle((100, 80), (4, 4), support="clamped"),
+        fecm.Plate.rectangle((100, 80), (3, 3), support="clamped"),
         fecm.Laminate("[0/45/-45/90]s", "AS4/3501-6", 0.25), fecm.RigidMass(2e-6),
-        fecm.Contact.estimate(radius=8), velocity=3000, duration=2e-4, units="mm-N-s",
+        fecm.Contact.estimate(radius=8), velocity=3000, duration=1.2e-4, units="mm-N-s",
         gages=[(30, 20, 1, 0), (60, 60, -1, 45)], damage=True, every=20,
     )  # fmt: skip
 
@@ -56,18 +56,16 @@ def gaged() -> Deck:
 CASES: list[tuple[Case, dict[str, str]]] = [
     ({"size": "150x60"}, {"size": "150x60"}),
     ({"support": "clamped"}, {"support": "clamped"}),
-    ({"support": "free"}, {"support": "free"}),
-    ({"at": "(25,62.5)"}, {"at": "25,62.5"}),
+    ({"at": "(25,75)"}, {"at": "25,75"}),
     ({"duration": 3.3e-5}, {"duration": "3.3e-5"}),
     ({"angle": 90.0}, {"layup": "[90]8"}),
-    ({"mass": 5e-5}, {"projectile": "mass:5e-5"}),
     ({"layup": "[0_4/90_4]", "support": "clamped"}, {"layup": "[0_4/90_4]", "support": "clamped"}),
-    ({"size": "200x150", "support": "simple", "angle": 90.0, "duration": 4e-5, "at": "(75,75)"},
-     {"size": "200x150", "layup": "[90]8", "duration": "4e-5", "at": "75,75"}),
+    ({"size": "200x150", "support": "simple", "angle": 90.0, "duration": 4e-5, "at": "(50,75)"},
+     {"size": "200x150", "layup": "[90]8", "duration": "4e-5", "at": "50,75"}),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("number", "patch"), [(n, "disc" if n % 2 else "none") for n in range(9)])
+@pytest.mark.parametrize(("number", "patch"), [(n, "disc" if n % 2 else "none") for n in range(7)])
 def test_a_case_is_the_deck_that_new_writes_with_its_values(number: int, patch: str) -> None:
     case, options = CASES[number]
     found = fecm.sweep(new(patch=patch), cases=[case], history=True)
@@ -82,7 +80,7 @@ def test_a_case_is_the_deck_that_new_writes_with_its_values(number: int, patch: 
     assert difference <= 1e-10 * expected.force.max()
 
 
-@pytest.mark.parametrize("number", [0, 1, 2, 7, 8])
+@pytest.mark.parametrize("number", [0, 1, 5, 6])
 def test_the_mesh_of_a_case_is_that_of_new(number: int) -> None:
     case, options = CASES[number]
     made, expected = generate(apply_case(new(), case)), generate(new(**options))
@@ -156,7 +154,7 @@ def test_places_that_can_not_be_hit_are_cases_with_a_reason() -> None:
     found = fecm.sweep(new(patch="none"), {"at": places, "velocity": [2000.0, 3000.0]})
     assert found["at"].tolist()[::2] == ["(50,50)", "(49,52)", "(0,50)", "(130,50)"]
     assert found.fine.tolist() == [True] * 4 + [False] * 4
-    assert found["status"][4].startswith("Dof 3 of the impact node 37 is restrained")
+    assert found["status"][4].startswith("Dof 3 of the impact node 11 is restrained")
     assert found["status"][6] == "at (130,50) is outside the plate"
     np.testing.assert_array_equal(found["hit_x"], [50.0] * 4 + [np.nan] * 4)
     np.testing.assert_array_equal(found["peak_force"][:2], found["peak_force"][2:4])
@@ -186,18 +184,18 @@ def test_dt_auto_is_dt_0_of_the_deck_of_the_case() -> None:
 
 def test_an_unstable_case_names_the_critical_step_and_the_remedy() -> None:
     deck = new(dt="5e-7")
-    found = fecm.sweep(deck, {"size": ["100x100", "30x30"]})
+    found = fecm.sweep(deck, {"size": ["100x100", "15x15"]})
     assert found.fine.tolist() == [True, False]
     assert "critical time step" in found["status"][1]
     assert found["status"][1].endswith("Vary dt=auto, or take DT 0.")
-    assert fecm.sweep(deck, {"size": ["30x30"], "dt": ["auto"]}).fine.all()
+    assert fecm.sweep(deck, {"size": ["15x15"], "dt": ["auto"]}).fine.all()
 
 
 def test_a_duration_is_reached_with_any_time_step_and_rounded_up_to_a_step() -> None:
-    deck = new(dt="1e-7")
-    found = fecm.sweep(deck, {"duration": [2e-5, 2.001e-5, 6e-5], "dt": [1e-7, 3e-7]})
+    deck = new(dt="2e-7")
+    found = fecm.sweep(deck, {"duration": [2e-5, 2.01e-5], "dt": [2e-7, 4e-7]})
     expected = [math.ceil(d / dt - 1e-9) for d, dt in zip(found["duration"], found.dt, strict=True)]
-    assert found.steps.tolist() == expected == [200, 67, 201, 67, 600, 200]
+    assert found.steps.tolist() == expected == [100, 50, 101, 51]
     bad = fecm.sweep(deck, {"duration": [0.0, -1.0]})
     assert bad["status"].tolist() == [f"duration must be positive, not {d}" for d in (0, -1)]
 

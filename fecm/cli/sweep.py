@@ -22,8 +22,7 @@ from fecm.simulation.run import simulate
 from fecm.sweeps.api import carry_out, check_draws, problem_of, random_plan
 from fecm.sweeps.batch import deck_of
 from fecm.sweeps.cases import (
-    CONTACT,
-    PLATE,
+    NAMES,
     CasesError,
     Limit,
     Value,
@@ -55,7 +54,7 @@ from fecm.sweeps.store import PartialResults
 @click.argument("deck", type=DECK_PATH)
 @click.option("--vary", "varied", type=Parsed(parse_vary), multiple=True, metavar="NAME=VALUES",
               help="FROM:TO:N or A,B,C; may be repeated, for a full grid.  Names: "
-                   f"{', '.join(CONTACT)}; {', '.join(PLATE)}.")  # fmt: skip
+                   f"{', '.join(NAMES)}.")  # fmt: skip
 @click.option("--cases", "table", type=DECK_PATH, metavar="CASES.csv",
               help="A table instead of --vary: a header of names, one row per case.")  # fmt: skip
 @click.option("--random", "laws", type=Parsed(parse_random), multiple=True, metavar="NAME=LAW",

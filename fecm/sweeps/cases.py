@@ -28,7 +28,7 @@ Limit = tuple[str, float | str]
 # needs another response of the plate; and the plate or its time steps.
 CONTACT = (
     "velocity", "energy", "k", "radius", "alpha_p", "s_p", "q",
-    "mass", "rod_length", "rod_modulus", "rod_density", "rod_mass",
+    "mass", "rod_mass", "rod_length", "rod_modulus", "rod_density",
 )  # fmt: skip
 LOAD = ("at", "impact_node", "patch", "x0", "y0")
 LAMINATE = (

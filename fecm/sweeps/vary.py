@@ -27,7 +27,7 @@ from fecm.deck.model import (
     Segment,
 )
 from fecm.deck.reader import ParsedProblem
-from fecm.deck.records import Layer, NodeCodes, Ply
+from fecm.deck.records import Layer, NodeCodes, NodeValues, Ply
 from fecm.deck.units import MODULUS, in_si, unit_names
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.mechanics.element_groups import element_blocks
@@ -223,41 +223,31 @@ def _at(deck: Deck, name: str, value: Value) -> Deck:
 
 def _size(deck: Deck, name: str, value: Value) -> Deck:
     """Scale coordinates, the centre of the patch and the gages."""
-    sides = np.array(pair(name, str(value)))
-    if not (sides > 0.0).all():
+    a, b = pair(name, str(value))
+    if not min(a, b) > 0.0:
         raise CasesError(f"the sides of the plate must be positive, not {value}")
     mesh = generate(deck)
-    extent = np.ptp(mesh.coordinates[mesh.used], axis=0)
+    width, height = np.ptp(mesh.coordinates[mesh.used], axis=0).tolist()
 
-    def scaled(*place: float) -> Any:
-        return tuple((np.array(place) * sides / extent).tolist())
+    def moved(part: Any) -> Any:
+        """A node, gage or patch, or all that a segment has."""
+        if type(part) in (Coordinates, Gages):
+            return replace(part, records=tuple(map(moved, part.records)), source=None)
+        if isinstance(part, NodeValues):
+            x, y = part.values[:2]
+            return replace(part, values=(x * a / width, y * b / height), source=None)
+        if getattr(part, "x", None) is not None:
+            return replace(part, x=part.x * a / width, y=part.y * b / height, source=None)
+        return part
 
-    def changed(segment: Segment) -> Segment:
-        if isinstance(segment, Coordinates):
-            nodes = (replace(r, values=scaled(*r.values[:2]), source=None) for r in segment.records)
-            return replace(segment, records=tuple(nodes), source=None)
-        if isinstance(segment, Patch) and segment.x is not None and segment.y is not None:
-            x, y = scaled(segment.x, segment.y)
-            return replace(segment, x=x, y=y, source=None)
-        if isinstance(segment, Gages):
-            places = (scaled(gage.x, gage.y) for gage in segment.records)
-            gages = (
-                replace(gage, x=x, y=y, source=None)
-                for gage, (x, y) in zip(segment.records, places, strict=True)
-            )
-            return replace(segment, records=tuple(gages), source=None)
-        return segment
-
-    return replace(deck, segments=tuple(map(changed, deck.segments)))
+    return replace(deck, segments=tuple(map(moved, deck.segments)))
 
 
 def _support(deck: Deck, name: str, value: Value) -> Deck:
     """Replace all restraints by a support of the outline, as ``fecm new`` writes it."""
     mesh, support = generate(deck), str(value)
     if deck.has(Forces) or mesh.elements.shape[1] not in (4, 9) or not mesh.elements.all():
-        raise CasesError(
-            "support: the deck must have no FORC, and elements of four nodes, or all of nine"
-        )
+        raise CasesError("support: the deck must have no FORC, and all elements four or nine nodes")
     plate = PlateMesh(mesh.coordinates, mesh.elements.astype(int) - 1, {}, np.array([], int))
     everywhere = (0, 0, 0, 0, 0) if is_coupled(deck.require(Material)) else (1, 1, 0, 0, 0)
     made = plate.supported(everywhere, {BOUNDARY: support})
@@ -265,9 +255,7 @@ def _support(deck: Deck, name: str, value: Value) -> Deck:
     if made is not None and support == "simple" and mesh.elements.shape[1] == 4:
         codes = restraint_codes([made], deck.control.numnp, deck.control.ndf) != 0
         if (codes[:, 2] & ~codes[:, 3:].any(axis=1)).any():
-            raise CasesError(
-                "support simple: the sides of elements of four nodes must run along x or y"
-            )
+            raise CasesError("support simple: elements of four nodes need sides along x or y")
     return replace(deck, segments=others if made is None else (*others, made))
 
 
