@@ -83,9 +83,27 @@ def test_a_plates_displacement_is_the_sum_of_its_impulse_responses() -> None:
     found = np.empty(steps)
     blocks.give(np.array([force[0]]))  # f_0 pushes in the first step
     for step in range(steps):
-        found[step] = blocks.next()[0]
+        found[step] = blocks.next()[0, 0]
         blocks.give(np.array([force[step + 1] if step + 1 < steps else 0.0]))
     np.testing.assert_allclose(found, direct, atol=1e-12 * np.abs(direct).max())
+
+
+def test_no_case_depends_on_the_others_of_its_plate() -> None:
+    deck, random = model(small(STEPS)), np.random.default_rng(2)
+    cases: list[Case] = [
+        {"velocity": v, "k": k, "mass": m}
+        for v, k, m in zip(
+            random.uniform(50, 150, 40), random.uniform(1e6, 3e6, 40), [1.8e-4, 3e-4] * 20,
+            strict=True,
+        )
+    ]  # fmt: skip
+    many = fecm.sweep(deck, cases=cases, history=True)
+    some = [33, 2, 7]
+    few = fecm.sweep(deck, cases=[cases[n] for n in some], history=True)
+    assert many.force is not None
+    np.testing.assert_array_equal(many.force[some], few.force)
+    for name, values in few.summary.items():
+        np.testing.assert_array_equal(many[name][some], values)
 
 
 def test_the_law_of_many_cases_is_the_law_of_each() -> None:

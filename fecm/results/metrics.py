@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecm._typing import Floats
 from fecm.mechanics.failure import CRITERIA
@@ -75,6 +76,12 @@ class Indentation(NamedTuple):
     permanent: Floats
 
 
+def _total(weights: Floats, values: NDArray[Any]) -> Floats:
+    """Weighted sums over the steps, in their order whatever the number of cases."""
+    weighted = weights[:, None] * values
+    return np.array(np.add.accumulate(weighted, out=weighted)[-1])
+
+
 def summarise(
     force: Floats,
     times: Floats,
@@ -113,13 +120,13 @@ def summarise(
     met = touching.any(axis=0)
     # The force is linear between steps, and 0 before the first.
     weights = 0.5 * (dt + np.append(dt[1:], 0.0))
-    impulse = weights @ force
+    impulse = _total(weights, force)
     rebound = impulse / mass - velocity
     found = {
         "peak_force": force.max(axis=0),
         "time_of_peak": np.where(met, times[peak], np.nan),
         "contacts": (touching & ~before).sum(axis=0).astype(float),
-        "contact_time": dt @ touching,
+        "contact_time": _total(dt, touching),
         "last_contact": np.where(met, times[last], np.nan),
         "max_indentation": indentation.largest,
         "permanent_indentation": indentation.permanent,
@@ -135,7 +142,7 @@ def summarise(
         found["threshold_force"] = np.full(force.shape[1], threshold)
         found["threshold_margin"] = 1.0 - found["peak_force"] / threshold
         found["threshold_time"] = np.where(above.any(axis=0), first, np.nan)
-        found["time_above"] = dt @ above
+        found["time_above"] = _total(dt, above)
         unknown["threshold_margin"] = unknown["peak_force"]
         unknown |= dict.fromkeys(("threshold_force", "threshold_time"), np.zeros_like(still))
     unknown["max_indentation"] = still & (indentation.last >= indentation.largest)

@@ -391,19 +391,20 @@ def impacts(
     """
     steps, cases = len(response), len(speed)
     none = np.zeros(cases)
-    plate = Convolution(response, np.zeros(cases, dtype=np.intp))
+    of_plate = np.broadcast_to(response[:, None], tips.responses.shape)
+    sums = Convolution(np.stack([of_plate, tips.responses]), tips.kinds)
     state = ContactState(
         TipState(none, -speed, none), law.start(), ContactPoint(none, none), none,
         unconverged_steps=np.zeros(cases, dtype=np.int64),
     )  # fmt: skip
-    force, deepest = np.empty((steps, cases)), none
+    deepest = none
     plate_work, dw, largest_ddw, highest = none, none, none, none
     work: list[Floats] = []
     for step in range(steps):
         last, w = state.contact.force, state.plate_w
-        couple_step(tips, law, state, plate.next().copy())
-        plate.give(state.contact.force)
-        force[step] = state.contact.force
+        moved, tips.sums = sums.next()
+        couple_step(tips, law, state, moved)
+        sums.give(state.contact.force)
         deepest = np.maximum(deepest, state.contact.indentation)
         highest = np.maximum(highest, state.plate_w)
         # Central differences conserve the work 1/2 (F + F') (w' - w) on the plate.
@@ -414,7 +415,7 @@ def impacts(
             work.append(state.contact_work + plate_work)
     permanent = law.permanent(state.memory, state.contact)
     return Impacts(
-        force,
+        sums.given,
         Indentation(deepest, state.contact.indentation, permanent),
         state.unconverged_steps,
         np.array(work),
@@ -448,7 +449,7 @@ def balance_errors(
         scale = tips.scale[cases]
         initial = 0.5 * projectile.total_mass * scale * speed[cases] ** 2
         lost = np.zeros(len(cases))
-        for work, motion in zip(found.work, tips.motions(number, speed), strict=True):
+        for work, motion in zip(found.work, tips.motions(number, speed, found.force), strict=True):
             deformation, velocity, _ = motion.reshape(3, -1, len(cases)).swapaxes(1, 2)
             deformation[:, 0] = 0.0
             held = projectile.kinetic_energy(velocity) + projectile.strain_energy(deformation)

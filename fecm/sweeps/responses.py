@@ -15,14 +15,20 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, rfft
 
 from fecm._typing import Floats
 from fecm.mechanics.plate_motion import AppliedForce, Load, PlateMotion, PlateState
 from fecm.mechanics.rod_integrators import RodIntegrator, RodState
 
-# Steps of a block, and steps and cases of a matrix product with earlier blocks: small enough for
-# BLAS to use one thread.
+# Steps of a block.
 BLOCK = 64
+# Other blocks of a convolution.  A force acts at once on the rest of the smallest block, which acts
+# on the rest of the next larger one by a matrix product, and so on; complete largest blocks act on
+# later ones by Fourier transforms.
+NEAR, FAR = 8, 256
+# Cases of a matrix product: all have the same size, so that no case depends on the others.
+TILE = 16
 # Multiplications of a matrix product small enough for BLAS to use one thread.
 SMALL = BLOCK**3
 
@@ -66,7 +72,7 @@ def largest_sums(response: Floats, force: Floats) -> tuple[Floats, Floats]:
     sums = Convolution(response, np.zeros(force.shape[1], dtype=np.intp))
     largest = last = np.zeros(force.shape[1])
     for values in force:
-        last = np.abs(sums.next())
+        last = np.abs(sums.next()[0])
         largest = np.maximum(largest, last)
         sums.give(values)
     return largest, last
@@ -82,62 +88,78 @@ def _product(a: Floats, b: Floats) -> Floats:
 class Convolution:
     """Sums x_n = sum over m < n of r_(n-m) f_m of many cases, where f_n may depend on x_n.
 
-    `responses` are r_1, r_2, ... of each kind, (steps,) or (steps, kinds); `kinds` (cases,) is the
-    kind of each case; cases of a kind are adjacent.
+    `responses` are r_1, r_2, ... of each sum and kind of case, (steps,) or (sums, steps, kinds);
+    `kinds` (cases,), in ascending order, is the kind of each case.
     """
 
     def __init__(self, responses: Floats, kinds: NDArray[np.intp]) -> None:
-        self._responses = responses.reshape(len(responses), -1)
-        self._kinds = kinds
-        self._cuts = [
-            (kind, slice(int(rows[0]), int(rows[-1]) + 1))
-            for kind in np.unique(kinds)
-            for rows in [np.flatnonzero(kinds == kind)]
-        ]
-        steps, cases = len(responses), len(kinds)
-        self._given = np.zeros((steps + 1, cases))
-        self._block = np.zeros((BLOCK, cases))
-        # r_1 to r_BLOCK of each case, for the steps within a block.
-        self._near = np.zeros((BLOCK, cases))
-        self._near[:steps] = self._responses[:BLOCK, kinds]
+        r = responses[None, :, None] if responses.ndim == 1 else responses
+        sums, self._steps, count = r.shape
+        cases = np.bincount(kinds, minlength=count)
+        tiles = -(-cases // TILE)  # of each kind; the last is filled up
+        last, blocks = np.cumsum(tiles), -(-self._steps // FAR)
+        self._cuts = [slice(end - n, end) for n, end in zip(tiles, last, strict=True)]
+        self._place = (
+            np.arange(len(kinds)) + (TILE * (last - tiles) - np.cumsum(cases) + cases)[kinds]
+        )
+        known = np.zeros((count, sums, FAR * (blocks + 1)))
+        known[:, :, : self._steps] = r.transpose(2, 0, 1)
+        self._near = np.repeat(known[:, :, :NEAR, None], tiles, axis=0)
+        # Row t, column s: r_(t + size - s), the effect of a block of some size on later steps.
+        windows = np.lib.stride_tricks.sliding_window_view
+        self._tables = {
+            size: windows(known[:, :, 1:], size, axis=2)[:, :, : end - size, ::-1].copy()
+            for size, end in ((NEAR, BLOCK), (BLOCK, FAR))
+        }
+        parts = [known[:, :, FAR * n : FAR * (n + 2)] for n in range(blocks - 1)]
+        self._filters = [rfft(np.roll(part, -FAR, axis=2))[..., None] for part in parts]
+        self._spectra = np.empty((last[-1], len(parts), FAR + 1, TILE), dtype=complex)
+        self._given = np.zeros((last[-1], FAR * blocks + 1, TILE))
+        self._block = np.zeros((last[-1], sums, FAR, TILE))
+        self._values = np.zeros(last[-1] * TILE)
         self._step = 0
 
     def next(self) -> Floats:
-        """Return x_n (cases,) of the next step n = 1, 2, ..."""
-        row = self._step % BLOCK
+        """Return x_n (sums, cases) of the next step n = 1, 2, ..."""
+        rows = self._block[:, :, self._step % FAR].swapaxes(0, 1)
+        found = rows.reshape(len(rows), -1)[:, self._place]
         self._step += 1
-        if row == 0:
-            self._begin_block()
-        return np.asarray(self._block[row])
+        if not self._step % NEAR and self._step < self._steps:
+            for kind, tiles in enumerate(self._cuts):
+                self._add_block(self._step, kind, tiles)
+        return found
 
     def give(self, values: Floats) -> None:
         """Set f_n of the step last returned by :meth:`next`; f_0 before the first step."""
-        self._given[self._step] = values
-        row = self._step % BLOCK  # of the next step's x in its block
-        left = BLOCK - row
-        if row:
-            self._block[row:] += self._near[:left] * values
+        self._values[self._place] = values
+        given = self._values.reshape(-1, 1, 1, TILE)
+        self._given[:, self._step] = given[:, 0, 0]
+        row, left = self._step % FAR, NEAR - self._step % NEAR
+        self._block[:, :, row : row + left] += self._near[:, :, :left] * given
 
     @property
     def given(self) -> Floats:
         """f_1, f_2, ... up to the last one set, (steps, cases)."""
-        return self._given[1 : self._step + 1]
+        given = self._given[:, 1 : self._step + 1].swapaxes(0, 1)
+        return given.reshape(self._step, -1).take(self._place, axis=1)
 
-    def _begin_block(self) -> None:
-        """Compute the contribution of all earlier steps to each step of the block."""
-        known = self._step  # f_0 to f_(known - 1)
-        rows = min(BLOCK, len(self._responses) - self._step + 1)
-        for kind, cases in self._cuts:
-            # Entry (i, m): r_(known + i - m), with r_1 first in memory.
-            windows = np.lib.stride_tricks.sliding_window_view(self._responses[:, kind], known)
-            table = windows[:rows, ::-1]
-            self._block[:rows, cases] = 0.0
-            for start in range(0, known, BLOCK):
-                part = slice(start, min(start + BLOCK, known))
-                factors = np.ascontiguousarray(table[:, part])
-                for first in range(cases.start, cases.stop, BLOCK):
-                    some = slice(first, min(first + BLOCK, cases.stop))
-                    self._block[:rows, some] += factors @ self._given[part, some]
+    def _add_block(self, known: int, kind: int, tiles: slice) -> None:
+        """Add the effect of a complete block, the last one, of forces on the later steps."""
+        if known % FAR:
+            size, end = (NEAR, BLOCK) if known % BLOCK else (BLOCK, FAR)
+            row, rows = known % FAR, end - known % end
+            factors = self._tables[size][kind, :, :rows]
+            part = self._given[tiles, None, known - size : known]
+            self._block[tiles, :, row : row + rows] += factors @ part
+            return
+        number = known // FAR
+        for tile in range(tiles.start, tiles.stop):
+            spectra = self._spectra[tile]
+            spectra[number - 1] = rfft(self._given[tile, known - FAR : known], 2 * FAR, axis=0)
+            total = self._filters[0][kind] * spectra[number - 1]
+            for distance in range(1, number):
+                total += self._filters[distance][kind] * spectra[number - 1 - distance]
+            self._block[tile] = irfft(total, axis=1)[:, :FAR]
 
 
 @dataclass(slots=True)
@@ -165,23 +187,31 @@ class TipSteps:
         scale: Floats | float = 1.0,
     ) -> None:
         first = steps[0]
-        self._steps, self._kinds = steps, kinds
+        self._steps, self.kinds = steps, kinds
         self.theta, self.weight, self.dt = first.theta, first.weight, first.dt
         self._begin = first.weights[0]
         self.scale = np.broadcast_to(scale, kinds.shape)
         self.gain: Floats = np.array([step.gain for step in steps])[kinds] / self.scale
-        # `end` adds r_1 = gain; the sum over earlier forces starts with r_2.
-        responses = np.column_stack([tip_response(step, count + 1)[1:] for step in steps])
-        self._carried = Convolution(responses, kinds)
+        # `end` adds r_1 = gain; the sum over earlier forces starts with r_2.  The force of a step
+        # is that at t + theta dt.
+        r = np.column_stack([tip_response(step, count + 1)[1:] for step in steps])
+        before = np.vstack([np.zeros_like(r[:1]), r[:-1]])
+        # Acceleration per contact force 1 to `count` steps earlier, (count, kinds).
+        self.responses: Floats = self.theta * r + (1.0 - self.theta) * before
+        # Sums over the contact forces before the next step, (cases,).
+        self.sums: Floats = np.zeros(len(kinds))
 
-    def motions(self, kind: int, speed: Floats) -> Iterator[Floats]:
+    def motions(self, kind: int, speed: Floats, force: Floats) -> Iterator[Floats]:
         """Motion of complete projectiles of a kind after every block of steps and after the last.
 
-        `speed` (cases,) are the impact velocities of the cases of all kinds; yields arrays (3 n,
-        cases of the kind) as in :class:`~fecm.mechanics.rod_integrators.RodState`.
+        `speed` (cases,) and `force` (steps, cases) are the impact velocities and contact forces of
+        the cases of all kinds; yields arrays (3 n, cases of the kind) as in
+        :class:`~fecm.mechanics.rod_integrators.RodState`.
         """
-        step, cases = self._steps[kind], np.flatnonzero(self._kinds == kind)
-        forces = self._carried.given[:, cases]
+        step, cases = self._steps[kind], np.flatnonzero(self.kinds == kind)
+        forces = self.theta * force[:, cases]
+        forces[1:] += (1.0 - self.theta) * force[:-1, cases]
+        forces /= self.scale[cases]
         motion = np.zeros((3 * step.n, len(cases)))
         motion[step.n : 2 * step.n : 2] = -speed[cases]
         # T^1, T^2, T^4, ...; column j of `reach` is the effect of a unit force after j steps.
@@ -200,14 +230,13 @@ class TipSteps:
 
     def begin(self, state: TipState) -> tuple[Floats, Floats, Floats, Floats]:
         """Return the free acceleration (twice), the drift and the previous acceleration."""
-        base = self._carried.next()
+        base = self.sums / self.scale
         drift = state.tip + self.dt * state.velocity + self._begin * state.acceleration
         return base, base, drift, state.acceleration
 
     def end(self, state: TipState, motion: Floats, force: Any) -> TipState:
         """Return the state after a step under the forces at t + theta dt."""
         acceleration = motion + self.gain * force
-        self._carried.give(force / self.scale)
         tip = state.tip + self.dt * state.velocity + self._begin * state.acceleration
         return TipState(
             tip + self.weight * acceleration,
