@@ -24,7 +24,7 @@ FREE = ["k", "alpha_p", "mass", "velocity"]
 TRUE = {"k": 1.2e5, "alpha_p": 0.01, "mass": 2e-5, "velocity": 3000.0}
 DURATION, NOISE = 1.6e-4, 0.02
 TIME = np.linspace(DURATION / 200, DURATION, 200)
-STEPS = PROGRAM.replace("LOOP         10", "LOOP        240")
+STEPS = PROGRAM.replace("LOOP         10", "LOOP        160")
 UNITS = "UNIT\nin lbf s\n"
 
 
@@ -83,11 +83,13 @@ def test_true_parameters_are_within_two_standard_errors_in_95_of_100_cases() -> 
 # What a measurement does not determine -----------------------------------------------------------
 
 
-def test_an_elastic_contact_below_alpha_p_does_not_determine_alpha_p() -> None:
+def test_a_contact_below_alpha_p_neither_determines_it_nor_describes_a_plastic_one() -> None:
     hard = plate(12, 4e-7, **{**TRUE, "alpha_p": 1.0})
     result = fecm.run_one(hard)
     with pytest.raises(IdentifyError, match="does not depend on alpha_p here"):
         fecm.identify(hard, result.time, result.force, ["k", "alpha_p"])
+    with pytest.warns(fecm.FecmWarning, match="neighbouring residuals"):
+        fecm.identify(hard, TIME, measured(), ["velocity"])
 
 
 def test_k_mass_and_velocity_are_one_too_many_for_hertzs_contact(tmp_path: Path) -> None:
@@ -112,10 +114,10 @@ def test_k_mass_and_velocity_are_one_too_many_for_hertzs_contact(tmp_path: Path)
 
 
 def test_one_unloading_gives_one_permanent_indentation_and_not_its_line() -> None:
-    with pytest.raises(
-        IdentifyError, match=r"only a combination of (s_p|alpha_p) and (s_p|alpha_p)"
-    ):
-        fecm.identify(plate(12, 4e-7, **TRUE), TIME, measured(), ["s_p", "alpha_p"])
+    deck = plate(12, 4e-7, **TRUE)
+    result = fecm.run_one(deck)
+    with pytest.raises(IdentifyError, match="only a combination of s_p and alpha_p"):
+        fecm.identify(deck, result.time, result.force, ["s_p", "alpha_p"])
 
 
 def test_a_standard_error_above_the_value_is_refused() -> None:
@@ -226,8 +228,3 @@ def test_names_that_cant_be_fitted_are_refused(free: list[str], told: str) -> No
 def test_a_rigid_mass_has_no_length() -> None:
     with pytest.raises(StudyError, match="rod_length: the projectile of the deck is a rigid mass"):
         fecm.identify(started(), TIME, measured(), ["rod_length"])
-
-
-def test_a_model_that_differs_from_the_measurement_is_told() -> None:
-    with pytest.warns(fecm.FecmWarning, match="neighbouring residuals"):
-        fecm.identify(started(), TIME, measured(), ["velocity"])
