@@ -415,7 +415,20 @@ def test_bad_input_is_one_line(folder: Path, options: tuple[object, ...], told: 
     [
         ({"samples": 16}, "random values"),
         ({"random": {}}, "random is"),
-        ({"random": {"k": "uniform:1,2"}}, "number of samples"),
+        ({"random": {"k": "uniform:1,2"}}, "samples of random values must be an integer"),
+        ({"random": {"k": 3.0}, "samples": 16}, "not a law"),
+        ({"random": {"k": "uniform:1,2"}, "samples": 16, "seed": 0.5}, "seed of random values"),
+        ({"random": {"k": "uniform:1,2"}, "samples": 16, "exceed": [3]}, "exceed is"),
+        ({"random": {"k": "uniform:1,2"}, "samples": 16, "exceed": {"q": None}}, "not `None`"),
+        (
+            {
+                "random": {"k": "uniform:1,2"},
+                "samples": 16,
+                "exceed": {"contakts": 1},
+                "measure": "max_deflection",
+            },
+            "no quantity `contakts`",
+        ),
         ({"random": {"k": "uniform:1,2"}, "samples": 16, "design": "halton"}, "lhs, sobol, mc"),
         ({"random": {"k": "uniform:1,2"}, "cases": [{"q": 2.0}]}, "not with cases"),
         ({"random": {"case": "uniform:1,2"}, "samples": 16, "build": len}, "name of the results"),

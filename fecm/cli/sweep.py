@@ -19,7 +19,7 @@ from fecm.deck.findings import DeckError
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
 from fecm.simulation.run import simulate
-from fecm.sweeps.api import carry_out, check_draws, problem_of, random_plan
+from fecm.sweeps.api import carry_out, check_draws, problem_of
 from fecm.sweeps.batch import deck_of
 from fecm.sweeps.cases import (
     NAMES,
@@ -45,7 +45,16 @@ from fecm.sweeps.plan import (
 )
 from fecm.sweeps.random_result import tables
 from fecm.sweeps.result import SweepResult, save, summary, verdict
-from fecm.sweeps.sampling import DESIGNS, DesignKind, Law, cost, doubt, parse_random
+from fecm.sweeps.sampling import (
+    DESIGNS,
+    DesignKind,
+    Law,
+    cost,
+    design_of,
+    doubt,
+    parse_random,
+    random_cases,
+)
 from fecm.sweeps.schedule import LOST, SchedulerError, address_in
 from fecm.sweeps.store import PartialResults
 
@@ -145,9 +154,8 @@ def sweep(
     cases = grid(varied) if table is None else read_cases(table)
     design = None
     if laws:
-        design, cases = random_plan(
-            dict(laws), cases, samples, seed or 0, kind or "lhs", sensitivity=sensitivity
-        )
+        design = design_of(dict(laws), samples, seed or 0, kind or "lhs", sensitivity=sensitivity)
+        cases = random_cases(design, cases)
     chosen = tuple(dict.fromkeys(full or ()))
     if chosen and max(chosen) >= len(cases):
         raise click.UsageError(f"--full {max(chosen)}: the cases are 0 to {len(cases) - 1}")

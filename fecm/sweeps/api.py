@@ -9,6 +9,8 @@ from concurrent.futures import Executor, ProcessPoolExecutor
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from fecm._errors import warn
 from fecm.api import LoadedDeck, Progress, load_deck
 from fecm.deck.findings import DeckError
@@ -23,7 +25,6 @@ from fecm.sweeps.sampling import (
     REMEDY,
     Design,
     DesignKind,
-    Law,
     design_of,
     doubt,
     parse_law,
@@ -50,34 +51,14 @@ def _loaded(deck: str | Path | Deck) -> LoadedDeck:
     return prepared
 
 
-def random_plan(
-    random: Mapping[str, str] | Mapping[str, Law],
-    varied: Sequence[Case],
-    samples: int | None,
-    seed: int = 0,
-    kind: DesignKind = "lhs",
-    *,
-    sensitivity: bool = False,
-    free: bool = False,
-) -> tuple[Design, list[Case]]:
-    """Return the design of random values, and its cases.
-
-    Raises CasesError if an argument is invalid.
-    """
-    laws = {
-        name: law if isinstance(law, Law) else parse_law(name, law, free=free)
-        for name, law in random.items()
-    }
-    design = design_of(laws, samples, seed, kind, sensitivity=sensitivity)
-    return design, random_cases(design, varied)
-
-
 def _limits(exceed: Mapping[str, Any]) -> list[Limit]:
     """Limits by quantity, each a value or a sequence of values."""
+    if not isinstance(exceed, Mapping):
+        raise CasesError(f'exceed is {exceed!r}; write {{"peak_force": [100.0]}} or the like')
     return [
         parse_exceed(f"{name}={value}")
         for name, given in exceed.items()
-        for value in ([given] if isinstance(given, str | float | int) else given)
+        for value in np.atleast_1d(given).tolist()
     ]
 
 
@@ -320,9 +301,9 @@ def sweep(
         made = checked(cases, free=free)
     drawn: Design | None = None
     if random is not None:
-        drawn, made = random_plan(
-            random, made, samples, seed, design, sensitivity=sensitivity, free=free
-        )
+        laws = {name: parse_law(name, law, free=free) for name, law in random.items()}
+        drawn = design_of(laws, samples, seed, design, sensitivity=sensitivity)
+        made = random_cases(drawn, made)
         if text := doubt(drawn):
             warn(text)
     if workers > 1 or isinstance(executor, ProcessPoolExecutor):

@@ -16,7 +16,7 @@ from fecm.deck.macros import Body, Loop, flat
 from fecm.deck.model import Boundary, Deck, Delamination, Gages, Impact
 from fecm.problem.memory import needed_bytes
 from fecm.problem.problem import Problem
-from fecm.results.metrics import FOUND, SUMMARY
+from fecm.results.metrics import COLUMNS, FOUND, GAGE, SUMMARY
 from fecm.results.metrics import THRESHOLD as LIMITED
 from fecm.results.result import Result
 from fecm.sweeps.cases import (
@@ -124,8 +124,10 @@ def plan(
             raise CasesError("the threshold needs a DELA segment, which the deck does not have")
         if until != THRESHOLD and not (isinstance(until, float | int) and 0.0 < until < math.inf):
             raise CasesError(f"the peak force to reach is a positive number, not {until}")
-    if measure is None and not extra:
+    if measure is None:
         known = [*SUMMARY, *(FOUND if until is not None else ())]
+        if extra:
+            known += [name for name, _ in limits if name in COLUMNS or name.startswith(GAGE)]
         limited = checked.deck.last(Delamination) is not None
         known += LIMITED if limited else ()
         check_limits(limits, known, threshold=limited)

@@ -64,7 +64,7 @@ class Exceedance(NamedTuple):
     """Probabilities that quantities exceed limits; with varied values, the combinations first."""
 
     quantity: NDArray[np.str_]  # (e,)
-    limit: Floats  # (e,): in the unit of the quantity; that of the first case for a threshold
+    limit: Floats  # (e,): in the unit of the quantity; NaN: the threshold of each case
     probability: Floats  # (e,)
     lower: Floats  # (e,): ends of Wilson's 95 % interval
     upper: Floats

@@ -128,15 +128,16 @@ def design_of(
     sensitivity: bool = False,
 ) -> Design:
     """Check and create a design.  Raises CasesError if it is invalid."""
-    if samples is None:
-        raise CasesError("random values need the number of samples")
-    if samples < FEWEST:
+    for name, value in (("samples", samples), ("seed", seed)):
+        if not isinstance(value, int | np.integer):
+            raise CasesError(f"the {name} of random values must be an integer, not {value!r}")
+    if samples is None or samples < FEWEST:
         raise CasesError(f"{samples} samples are too few; take at least {FEWEST}")
     if kind not in DESIGNS:
         raise CasesError(f"unknown design {kind}; the designs are {', '.join(DESIGNS)}")
     if seed < 0:
         raise CasesError(f"the seed must not be negative, not {seed}")
-    return Design(dict(laws), samples, seed, kind, sensitivity)
+    return Design(dict(laws), int(samples), int(seed), kind, sensitivity)
 
 
 def doubt(design: Design) -> str:
