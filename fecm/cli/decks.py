@@ -51,23 +51,10 @@ def load_valid(
     force: bool = True,
     warnings: bool = True,
 ) -> LoadedDeck:
-    """Load a deck and print its findings on standard error.
+    """Load a deck and print its findings on standard error; without `warnings` only errors.
 
-    Parameters
-    ----------
-    deck : Path
-    otherwise : str
-        End of the message if the deck has errors.
-    mode : str
-    force : bool
-        Whether errors that `--force` permits are permitted.
-    warnings : bool
-        Whether warnings are printed too.
-
-    Raises
-    ------
-    RefusedError
-        If the deck has errors.
+    Errors that `--force` permits are permitted if `force`.  Raises RefusedError, whose message ends
+    with `otherwise`, if the deck has other errors.
     """
     loaded = load_deck(deck, mode)
     errors = loaded.errors(force)

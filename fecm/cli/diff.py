@@ -13,13 +13,7 @@ import click
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, RefusedError
 from fecm.cli.isolation import reads
 from fecm.cli.types import NOT_NEGATIVE, Parsed, assignment, file_of
-from fecm.results.diff import (
-    SCALE_NAMES,
-    Comparison,
-    Difference,
-    IncomparableError,
-    difference,
-)
+from fecm.results.diff import SCALE_NAMES, Comparison, Difference, IncomparableError, difference
 from fecm.results.schema import jsonable, printable, shown_apart
 
 
@@ -119,20 +113,21 @@ def diff(
     except IncomparableError as error:
         raise RefusedError(printable(str(error))) from None
     if form == "json":
-        judged = {"rtol": rtol, "atol": atol, "tol": dict(own)}
-        head = {"a": printable(str(a)), "b": printable(str(b)), **judged}
-        click.echo(json.dumps(jsonable(_json(found, head, brief))))
+        about = {
+            "verdict": "same" if found.same else "different",
+            "a": printable(str(a)), "b": printable(str(b)),
+            "rtol": rtol, "atol": atol, "tol": dict(own),
+            "datasets": [_entry(c) for c in found.compared if not (brief and c.same)],
+            "only_in_a": found.only[0], "only_in_b": found.only[1],
+            "excluded": found.excluded, "listed": found.listed,
+        }  # fmt: skip
+        click.echo(json.dumps(jsonable(about)))
     else:
-        lines = _brief(found) if brief else _lines(found)
+        lines = list(map(printable, sorted(_different(found)))) if brief else _lines(found)
         within = f"rtol {rtol:g}, atol {atol:g}" + ", --tol" * bool(own)
         click.echo("\n".join([*lines, _verdict(found, within)]))
     if not found.same:
         raise SystemExit(NO)
-
-
-def _brief(found: Difference) -> list[str]:
-    """Names of the datasets that differ."""
-    return [printable(name) for name in sorted(_different(found))]
 
 
 def _different(found: Difference) -> list[str]:
@@ -219,19 +214,6 @@ def _listed(item: dict[str, Any]) -> str:
     )
     line = f" line {item['line']}" if item["line"] else ""
     return f"listed     {printable(item['name'])}{line}: {left} against {right}"
-
-
-def _json(found: Difference, head: dict[str, Any], brief: bool) -> dict[str, Any]:
-    """Content of the JSON output."""
-    return {
-        "verdict": "same" if found.same else "different",
-        **head,
-        "datasets": [_entry(c) for c in found.compared if not (brief and c.same)],
-        "only_in_a": found.only[0],
-        "only_in_b": found.only[1],
-        "excluded": found.excluded,
-        "listed": found.listed,
-    }
 
 
 def _entry(found: Comparison) -> dict[str, Any]:

@@ -79,11 +79,8 @@ def fit(
         found = fitted(read.indentation, read.force, retreat=turn, q=q, acr=acr)
     except StudyError as error:
         raise RefusedError(f"{test}: {error}") from None
-    if targets.picture:
-        from fecm.plot.indentation import fit_picture
-
-        names = {**read.units, "time": "s"} if read.units else {}
-        targets.draw(fit_picture(read.indentation, read.force, found, names))
+    names = {**read.units, "time": "s"} if read.units else {}
+    targets.draw("indentation:fit_picture", read.indentation, read.force, found, names)
     for text in notes(found):
         note(text)
     if form == "json":

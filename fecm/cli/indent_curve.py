@@ -97,11 +97,8 @@ def _forces(deck: Path, path: Sequence[float], points: int, targets: OutputPaths
         walk = []
     if not walk or not all(math.isfinite(point.force) for point, _ in walk):
         raise RefusedError("the forces along --path overflow")
-    if targets.picture:
-        from fecm.plot.indentation import path_picture
-
-        columns = np.array([point for point, _ in walk])
-        targets.draw(path_picture(columns[:, 0], columns[:, 1], unit_names(problem)))
+    columns = np.array([point for point, _ in walk]).T
+    targets.draw("indentation:path_picture", *columns, unit_names(problem))
     branches = ("loading", "unloading", "reloading")
     rows = ((point.indentation, point.force, branches[branch]) for point, branch in walk)
     targets.write("indentation,force,branch", rows)
@@ -139,11 +136,8 @@ def _rigidities(
         by = [np.asarray(relation.rigidity(peaks)) for relation in (slope, critical)]
     if not np.all(np.isfinite(by)):
         raise RefusedError("the rigidities along --path overflow")
-    if targets.picture:
-        from fecm.plot.indentation import rigidity_picture
-
-        named = dict(zip(("equation 3-9", "equation 3-7"), by, strict=True))
-        targets.draw(rigidity_picture(peaks, named, slope.q, unit_names(problem)))
+    named = dict(zip(("equation 3-9", "equation 3-7"), by, strict=True))
+    targets.draw("indentation:rigidity_picture", peaks, named, slope.q, unit_names(problem))
     targets.write("alpha_m,s_3_9,s_3_7", np.column_stack([peaks, *by]).tolist())
 
 

@@ -14,8 +14,8 @@ import click
 from fecm._files import check_outputs
 from fecm.cli.common import FILE_PATH, RefusedError, note, writing
 from fecm.cli.types import Decorated, stacked
-from fecm.plot.kinds import MISSING, SUFFIXES, Picture
-from fecm.plot.pictures import save
+from fecm.plot.kinds import MISSING, SUFFIXES
+from fecm.plot.pictures import imported, save
 
 STANDARD_OUTPUT = Path("-")
 
@@ -57,10 +57,10 @@ class OutputPaths:
         files = [path for path in (table, picture) if path and path != STANDARD_OUTPUT]
         check_outputs(files, overwrite, [source for source in sources if source])
 
-    def draw(self, picture: Picture) -> None:
-        """Write the picture."""
+    def draw(self, place: str, *data: Any) -> None:
+        """Write the picture that a function of :mod:`fecm.plot`, ``module:name``, makes of data."""
         if self.picture is not None:
-            save(picture, self.picture, overwrite=self._overwrite)
+            save(imported(place)(*data), self.picture, overwrite=self._overwrite)
             note(f"drew {self.picture}")
 
     def write(self, header: str, rows: Iterable[Iterable[object]]) -> None:

@@ -118,10 +118,7 @@ def pulse(
     filtered = None
     if transducer is not None:
         filtered = transducer.in_unit(units.get("time", ""))(history.time, history.forces)
-    if targets.picture:
-        from fecm.plot.rod import pulse_picture
-
-        targets.draw(pulse_picture(history, filtered, units))
+    targets.draw("rod:pulse_picture", history, filtered, units)
     targets.write(*table(history, filtered))
     if targets.table != STANDARD_OUTPUT:
         click.echo("\n".join(_summary(struck, history)))
@@ -180,12 +177,7 @@ def _summary(struck: Rod, history: RodHistory) -> list[str]:
               help="Column of a result's history, or of a CSV, to filter.  [default: transducer; "
                    "of a CSV without one, the second]")  # fmt: skip
 @outputs("history")
-def filter_(
-    history: Path,
-    transducer: Filter,
-    column: str | None,
-    targets: OutputPaths,
-) -> None:
+def filter_(history: Path, transducer: Filter, column: str | None, targets: OutputPaths) -> None:
     """Filter a history as a transducer with a rise time does, or by a channel frequency class.
 
     RESULT is a result of `fecm run`, or a CSV with a column of times.  The output is a CSV with the
@@ -193,12 +185,8 @@ def filter_(
     """
     series = recorded(history, column)
     filtered = transducer.in_unit(series.units.get("time", ""))(series.time, series.values)
-
-    if targets.picture:
-        from fecm.plot.rod import filter_picture
-
-        named = {**series.beside, series.name: series.values, "filtered": filtered}
-        targets.draw(filter_picture(series.time, named, series.units, series.dimension))
+    named = {**series.beside, series.name: series.values, "filtered": filtered}
+    targets.draw("rod:filter_picture", series.time, named, series.units, series.dimension)
     columns = np.stack([series.time, series.values, filtered], axis=1)
     targets.write(f"time,{series.name},filtered", columns[series.first :].tolist())
 
@@ -212,12 +200,7 @@ def filter_(
 @FORMAT_OPTION
 @outputs("test", table=False)
 def calibrate(
-    test: Path,
-    mass: float,
-    c_a: float,
-    through_origin: bool,
-    form: str,
-    targets: OutputPaths,
+    test: Path, mass: float, c_a: float, through_origin: bool, form: str, targets: OutputPaths
 ) -> None:
     """Calibrate the impact-force transducer with TEST.csv.
 
@@ -230,12 +213,9 @@ def calibrate(
         found = fit_sensitivity(v_f, v_a, mass, c_a, through_origin=through_origin)
     except StudyError as error:
         raise RefusedError(f"{test}: {error}") from None
-    if targets.picture:
-        from fecm.plot.rod import calibration_picture
-
-        names = dict(zip(map(str.casefold, measured.names), measured.units, strict=True))
-        units = [names.get(name, "") for name in ("time", "v_f", "v_a")]
-        targets.draw(calibration_picture(time, v_f, v_a, found, units))
+    names = dict(zip(map(str.casefold, measured.names), measured.units, strict=True))
+    units = [names.get(name, "") for name in ("time", "v_f", "v_a")]
+    targets.draw("rod:calibration_picture", time, v_f, v_a, found, units)
     click.echo(json.dumps(vars(found)) if form == "json" else "\n".join(_lines(found)))
 
 

@@ -56,25 +56,14 @@ from fecm.simulation.spool import CheckpointError, Journal
 @click.option("--slip", "slips", type=click.Choice(NAMES), multiple=True, metavar="NAME",
               help=f"Add a single slip of the program to report mode; may be repeated.  Names: "
                    f"{', '.join(NAMES)}.")  # fmt: skip
-@click.option(
-    "--overwrite",
-    is_flag=True,
-    help="Replace existing results and the checkpoints of interrupted runs.",
-)
-@click.option(
-    "--solver",
-    type=click.Choice(SOLVERS),
-    default=AUTO,
-    show_default=True,
-    help="Computation of K·u: by the method that suits the mesh, or by a sparse matrix.",
-)
-@click.option(
-    "--threads",
-    type=click.IntRange(0, 1024),
-    default=0,
-    metavar="N",
-    help="Threads that share the work of a step; 0 uses every core for a large mesh.  [default: 0]",
-)
+@click.option("--overwrite", is_flag=True,
+              help="Replace existing results and the checkpoints of interrupted runs.")  # fmt: skip
+@click.option("--solver", type=click.Choice(SOLVERS), default=AUTO, show_default=True,
+              help="Computation of K·u: by the method that suits the mesh, or by a sparse "
+                   "matrix.")  # fmt: skip
+@click.option("--threads", type=click.IntRange(0, 1024), default=0, metavar="N",
+              help="Threads that share the work of a step; 0 uses every core for a large mesh.  "
+                   "[default: 0]")  # fmt: skip
 @click.option("--rod-mass", type=click.Choice(MASSES), default=LUMPED, show_default=True,
               help="The projectile's mass matrix; the report's program lumps it.")  # fmt: skip
 @click.option("--rod-integrator", type=click.Choice(INTEGRATORS), default=WILSON,
@@ -89,18 +78,11 @@ from fecm.simulation.spool import CheckpointError, Journal
               help="Relative energy error that ends a run without slips.")  # fmt: skip
 @click.option("--fail-limit", type=POSITIVE, metavar="EXPOSURE",
               help="Exit with status 1 if an exposure of FAIL exceeds this value.")  # fmt: skip
-@click.option(
-    "--force",
-    is_flag=True,
-    help="Run despite a time step above the critical one (E508) or L2 = 2 in a free plate (E321).",
-)
-@click.option(
-    "--print",
-    "printed",
-    type=FILE_PATH,
-    metavar="OUT.txt",
-    help="Also write the printed output of the original program.",
-)
+@click.option("--force", is_flag=True,
+              help="Run despite a time step above the critical one (E508) or L2 = 2 in a free "
+                   "plate (E321).")  # fmt: skip
+@click.option("--print", "printed", type=FILE_PATH, metavar="OUT.txt",
+              help="Also write the printed output of the original program.")  # fmt: skip
 @FORMAT_OPTION
 def run(
     deck: Path,
@@ -139,9 +121,8 @@ def run(
     # Outputs up to the interrupted problem belong to the run that is resumed.
     own = interrupted + 1 if resume else 0
     check_outputs([*paths[own:], *filter(None, prints[own:])], overwrite)
-    choices = RunOptions(
-        active, solver, threads, RodMethod(rod_mass, rod_integrator), energy_limit
-    )  # fmt: skip
+    rod = RodMethod(rod_mass, rod_integrator)
+    choices = RunOptions(active, solver, threads, rod, energy_limit)
     if fail_limit is not None and not any(problem.work.passes["FAIL"] for problem in problems):
         raise RefusedError(f"--fail-limit needs the macro FAIL; {deck} has none")
     exceeded: list[str] = []
@@ -200,8 +181,7 @@ def _run_one(
         )
         if resumes:
             checkpointer.restore(simulation)
-            step = simulation.state.plate.step
-            note(f"{path} resumes after step {step}")
+            note(f"{path} resumes after step {simulation.state.plate.step}")
         simulate_run(simulation)
     checkpointer.clear()
     result = load(path)
@@ -275,13 +255,7 @@ class _StoppedError(Exception):
 class _Observer:
     """Shows the progress of a run, writes its checkpoints, and stops it after a signal.
 
-    Parameters
-    ----------
-    checkpointer : Checkpointer
-    every : float or None
-        Seconds between two checkpoints; None writes one only when a signal stops the run.
-    advance : callable
-        Advances the progress bar by a number of steps.
+    `every` are the seconds between two checkpoints; without them only a signal writes one.
     """
 
     def __init__(

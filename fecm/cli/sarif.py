@@ -40,7 +40,7 @@ def sarif(checked: Mapping[Path, Sequence[Finding]], failures: Sequence[str]) ->
                 "ruleId": finding.code,
                 "ruleIndex": codes.index(finding.code),
                 "level": finding.severity,
-                "message": {"text": " ".join(filter(None, (finding.message, _hint(finding))))},
+                "message": {"text": finding.message + (finding.hint and f" Hint: {finding.hint}.")},
                 "locations": [{"physicalLocation": _location(deck, finding)}],
             }
             for deck, findings in checked.items()
@@ -48,10 +48,6 @@ def sarif(checked: Mapping[Path, Sequence[Finding]], failures: Sequence[str]) ->
         ],
     }
     return {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
-
-
-def _hint(finding: Finding) -> str:
-    return finding.hint and f"Hint: {finding.hint}."
 
 
 def _location(deck: Path, finding: Finding) -> dict[str, Any]:

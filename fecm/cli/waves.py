@@ -24,7 +24,6 @@ from fecm.cli.types import (
     stacked,
 )
 from fecm.deck.units import unit_names
-from fecm.mechanics.laminate import Laminate
 from fecm.problem.build import laminate_of_deck
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces
 from fecm.studies.waves import dispersion as compute
@@ -73,24 +72,22 @@ def _medium(
     deck: Path | None, shear_factor: float, **options: Any
 ) -> tuple[Medium, dict[str, str]]:
     """Build the laminate, from a deck or from options, and name its units."""
-    laminate, units = _laminate(deck, options)
-    return Medium(replace(laminate, shear=shear_factor * laminate.shear)), units
-
-
-def _laminate(deck: Path | None, options: dict[str, Any]) -> tuple[Laminate, dict[str, str]]:
-    """Laminate and names of its units, from a deck or from options."""
-    if deck is None and options["layup"] is None:
-        raise click.UsageError("give a DECK, or --layup, --ply-thickness and --ply or --material")
     if deck is None:
-        return laminate_of_options(**options)
-    for name, value in options.items():
-        if value is not None:
-            option = name.replace("_", "-")
-            raise click.UsageError(f"--{option} describes a laminate; {deck} has one already")
-    problems = load_valid(deck, "; no waves were computed", warnings=False).problems
-    if len(problems) > 1:
-        note(f"{deck} has {len(problems)} problems; the laminate of the first is used")
-    return laminate_of_deck(problems[0].deck), unit_names(problems[0].deck)
+        if options["layup"] is None:
+            raise click.UsageError(
+                "give a DECK, or --layup, --ply-thickness and --ply or --material"
+            )
+        laminate, units = laminate_of_options(**options)
+    else:
+        for name, value in options.items():
+            if value is not None:
+                option = name.replace("_", "-")
+                raise click.UsageError(f"--{option} describes a laminate; {deck} has one already")
+        problems = load_valid(deck, "; no waves were computed", warnings=False).problems
+        if len(problems) > 1:
+            note(f"{deck} has {len(problems)} problems; the laminate of the first is used")
+        laminate, units = laminate_of_deck(problems[0].deck), unit_names(problems[0].deck)
+    return Medium(replace(laminate, shear=shear_factor * laminate.shear)), units
 
 
 def _normals(step: float) -> list[float]:
@@ -133,11 +130,7 @@ def dispersion(
         )
         for mode, velocity, frequency in zip(MODES, velocities, frequencies, strict=True)
     )
-
-    if targets.picture:
-        from fecm.plot.waves import dispersion_picture
-
-        targets.draw(dispersion_picture(medium, curves))
+    targets.draw("waves:dispersion_picture", medium, curves)
     targets.write("angle_deg,wavelength_over_h,mode,phase_velocity,angular_frequency", rows)
 
 
@@ -154,11 +147,7 @@ def speeds(step: float, targets: OutputPaths, **shared: Any) -> None:
         (normal, *velocities)
         for normal, velocities in zip(fronts.normal.tolist(), fronts.velocity.tolist(), strict=True)
     )
-
-    if targets.picture:
-        from fecm.plot.waves import speeds_picture
-
-        targets.draw(speeds_picture(surfaces, units))
+    targets.draw("waves:speeds_picture", surfaces, units)
     _note_names(surfaces)
     targets.write(",".join(("angle_deg", *FRONTS)), rows)
 
@@ -191,11 +180,7 @@ def fronts(
         for row, normal in enumerate(normals)
         for at, time in enumerate(times)
     )
-
-    if targets.picture:
-        from fecm.plot.waves import fronts_picture
-
-        targets.draw(fronts_picture(surfaces, times, start, units))
+    targets.draw("waves:fronts_picture", surfaces, times, start, units)
     _note_names(surfaces)
     for time in times:
         _note_cusps(surfaces, time, start)

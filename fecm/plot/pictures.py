@@ -38,9 +38,9 @@ def kind_named(name: str) -> Kind:
     return KINDS[name]
 
 
-def _function(kind: str) -> Callable[..., Picture]:
-    """Return the function that draws a kind."""
-    module, _, name = kind_named(kind).function.partition(":")
+def imported(place: str) -> Callable[..., Picture]:
+    """Import the function at ``module:name`` of this package."""
+    module, _, name = place.partition(":")
     try:
         import matplotlib  # noqa: F401
     except ImportError:
@@ -51,7 +51,7 @@ def _function(kind: str) -> Callable[..., Picture]:
 
 def options_of(kind: str) -> list[str]:
     """Names of the options that a kind takes."""
-    return list(inspect.signature(_function(kind)).parameters)[1:]
+    return list(inspect.signature(imported(kind_named(kind).function)).parameters)[1:]
 
 
 def check_options(kinds: Iterable[str], options: Iterable[str]) -> None:
@@ -115,7 +115,7 @@ def draw(
 
     settings: Any = RC if style is None else style
     with matplotlib.rc_context(settings), _errors_as_one(f"{kind} of {' and '.join(results)}"):
-        return _function(kind)(results, **options)
+        return imported(properties.function)(results, **options)
 
 
 def plot(
@@ -165,7 +165,7 @@ def plot(
         picture = draw(kind, results, **options)
         save(picture, Path(path))
         return picture.figure.axes[0]
-    _function(kind)  # without matplotlib, this says what to install
+    imported(kind_named(kind).function)  # without matplotlib, this says what to install
     pyplot: Any = import_module("matplotlib.pyplot")
     from fecm.plot.style import TARGET, style_on
 

@@ -5,14 +5,14 @@ Axes hold numbers in the deck's units; their ticks show them times the factor of
 
 from __future__ import annotations
 
-import functools
 import itertools
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ContextDecorator
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import Any, Literal, ParamSpec
+from typing import Any, Literal, cast
 
 import matplotlib
 import numpy as np
@@ -24,7 +24,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import Formatter, Locator
 
 from fecm.deck.units import unit_of
-from fecm.plot.kinds import Picture, PlotError
+from fecm.plot.kinds import PlotError
 from fecm.results.result import Result
 from fecm.results.schema import printable
 
@@ -97,18 +97,8 @@ _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
-Drawn = ParamSpec("Drawn")
-
-
-def styled(function: Callable[Drawn, Picture]) -> Callable[Drawn, Picture]:
-    """Decorate a function to draw in this style."""
-
-    @functools.wraps(function)
-    def draw(*arguments: Drawn.args, **options: Drawn.kwargs) -> Picture:
-        with matplotlib.rc_context(RC):
-            return function(*arguments, **options)
-
-    return draw
+# Decorates functions to draw in this style.
+styled = cast(ContextDecorator, matplotlib.rc_context(RC))
 
 
 def literal(text: str) -> str:
