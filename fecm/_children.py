@@ -11,12 +11,9 @@ PR_SET_PDEATHSIG = 1
 
 
 def die_with_parent(parent: int) -> None:
-    """Have the system kill this process when its parent ends; elsewhere than on Linux do nothing.
+    """Have Linux kill this process when its parent ends; do nothing on other systems.
 
-    Parameters
-    ----------
-    parent : int
-        The parent's process id, taken before the fork: the parent may have ended since.
+    `parent` is its process id, taken before the fork: it may have ended since.
     """
     if sys.platform != "linux":
         return

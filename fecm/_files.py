@@ -34,27 +34,12 @@ class OutputError(FecmError, OSError):
 
 
 def check_outputs(
-    paths: Sequence[Path],
-    overwrite: bool,
-    inputs: Iterable[Path] = (),
-    own: Iterable[Path] = (),
+    paths: Sequence[Path], overwrite: bool, inputs: Iterable[Path] = (), own: Iterable[Path] = ()
 ) -> None:
     """Refuse outputs that conflict, exist, or can't be written, before the computation.
 
-    Parameters
-    ----------
-    paths : sequence of Path
-        All outputs of a command.
-    overwrite : bool
-        Whether files that exist may be replaced.
-    inputs : iterable of Path
-        Files that the command reads; never replaced.
-    own : iterable of Path
-        Other files that the command writes, such as checkpoints; no output may have their names.
-
-    Raises
-    ------
-    OutputError
+    `inputs` are files that the command reads, which are never replaced; `own` other files that it
+    writes, such as checkpoints, whose names no output may have.
     """
     read = {key for path in inputs for key in _keys(path)}
     taken = {key for path in own for key in _keys(path)}
@@ -112,13 +97,7 @@ def _refuse_special(path: Path, mode: int | None) -> None:
 
 
 def final(path: Path) -> Path:
-    """Target of a symbolic link, which need not exist; any other path itself.
-
-    Raises
-    ------
-    OutputError
-        If the links form a loop.
-    """
+    """Target of a symbolic link, which need not exist; any other path itself."""
     if not path.is_symlink():
         return path
     target = Path(os.path.realpath(path))
@@ -140,18 +119,9 @@ def beside(path: Path, *, overwrite: bool = True, follow: bool = True) -> Iterat
     keeps its permissions and, where the user may set them, its owner and group; other hard links to
     it keep the old contents.
 
-    Parameters
-    ----------
-    path : Path
-    overwrite : bool
-        Replace an existing file, even one created during the block.
-    follow : bool
-        Replace the target of a symbolic link instead of the link.
-
-    Raises
-    ------
-    OSError
-        If the file can't be written; an existing one is then unchanged.
+    `overwrite` replaces an existing file, even one created during the block; `follow` the target of
+    a symbolic link instead of the link.  Raises OSError if the file can't be written; an existing
+    one is then unchanged.
     """
     target = final(path) if follow else path
     partial = partial_of(target)
@@ -303,13 +273,7 @@ def _rename_exclusively(partial: Path, target: Path) -> None:
 
 
 def open_ordinary(path: Path, flags: int = os.O_RDONLY) -> BinaryIO:
-    """Open a regular file named by the program itself; links are not followed.
-
-    Raises
-    ------
-    OSError
-        If it can't be opened, or is a link, a device or a FIFO.
-    """
+    """Open a regular file named by the program itself: no link, device or FIFO."""
     handle = os.open(path, flags | NO_FOLLOW | NO_WAIT, 0o666)
     if not stat.S_ISREG(os.fstat(handle).st_mode):
         os.close(handle)

@@ -13,7 +13,6 @@ MEMINFO = Path("/proc/meminfo")
 CGROUP = Path("/proc/self/cgroup")
 CGROUPS = Path("/sys/fs/cgroup")
 
-
 # Bytes that are allocated without a check.
 UNNOTICED = 100_000_000
 
@@ -33,13 +32,7 @@ def available() -> int | None:
 
 
 def require(count: int, what: str) -> None:
-    """Refuse to allocate more memory than is free.
-
-    Raises
-    ------
-    NotEnoughMemoryError
-        With both numbers.
-    """
+    """Refuse to allocate more memory than is free."""
     if count < UNNOTICED:
         return
     free = available()
@@ -52,28 +45,14 @@ def require(count: int, what: str) -> None:
 def check(what: str, needed: Callable[[bool], int], remedy: Callable[[int], str]) -> None:
     """Refuse a computation that needs more memory than is free.
 
-    Parameters
-    ----------
-    what : str
-        Its name.
-    needed : callable
-        Returns the bytes that it needs: a quick bound for False, the best estimate for True.
-    remedy : callable
-        Returns advice for a number of free bytes.
-
-    Raises
-    ------
-    NotEnoughMemoryError
-        With both numbers.
+    `needed` returns the bytes: a quick bound for False, the best estimate for True; `remedy` advice
+    for a number of free bytes.
     """
     free = available()
     if free is None:
         return
-    count = 0
-    for exact in (False, True):
-        count = needed(exact)
-        if count <= free:
-            return
+    if needed(False) <= free or (count := needed(True)) <= free:
+        return
     raise NotEnoughMemoryError(
         f"{what} takes about {format_bytes(count)} of memory, and {format_bytes(free)} are free; "
         f"{remedy(free)}"

@@ -1,4 +1,7 @@
-"""Data of pictures: rows by time, points of the plate, segments of the deck."""
+"""Data of pictures: rows by time, points of the plate, segments of the deck.
+
+What a result lacks, or can't be drawn, is a :class:`~fecm.plot.kinds.PlotError`.
+"""
 
 from __future__ import annotations
 
@@ -38,26 +41,20 @@ def require(result: Result, name: str, *paths: str) -> list[Array]:
     for path in paths:
         if path not in result:
             raise PlotError(f"{name} has no {path}{remedy(path)}")
-    return [_shown(name, path, result[path]) for path in paths]
-
-
-def _shown(name: str, path: str, values: Array) -> Array:
-    """Return numbers that a picture can show, or raise a PlotError."""
-    if not values.size:
-        raise PlotError(f"{name} has no rows of {path}")
-    if not (np.abs(values) <= LARGEST).all():
-        raise PlotError(
-            f"{path} of {name} holds numbers beyond ±{LARGEST:g}, infinities or NaN, which "
-            "can't be drawn"
-        )
-    return values
+    found = [result[path] for path in paths]
+    for path, values in zip(paths, found, strict=True):
+        if not values.size:
+            raise PlotError(f"{name} has no rows of {path}")
+        if not (np.abs(values) <= LARGEST).all():
+            raise PlotError(
+                f"{path} of {name} holds numbers beyond ±{LARGEST:g}, infinities or NaN, which "
+                "can't be drawn"
+            )
+    return found
 
 
 def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:
-    """Elements, and x and y of all nodes (length).
-
-    Raises PlotError if all nodes lie on a line parallel to an axis.
-    """
+    """Elements, and x and y of all nodes (length), which do not lie on a line along an axis."""
     elements, coordinates = require(result, name, "mesh/elements", "mesh/coordinates")
     coordinates = coordinates[:, :2]
     extent = np.ptp(coordinates, axis=0)
@@ -69,7 +66,7 @@ def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:
 
 
 def deck_of(result: Result, name: str) -> Deck:
-    """Model of a result's deck.  Raises PlotError if the result holds no readable deck."""
+    """Model of a result's deck."""
     try:
         return model_of(result)
     except ResultFileError:
@@ -77,10 +74,7 @@ def deck_of(result: Result, name: str) -> Deck:
 
 
 def circle(result: Result, name: str) -> tuple[Floats, float] | None:
-    """Centre, (2,), and radius of the contact patch, length; None without a patch.
-
-    Raises PlotError if the result does not say where its patch is.
-    """
+    """Centre, (2,), and radius of the contact patch, length; None without a patch."""
     if "patch/weight" not in result:
         return None
     values: list[Any] = [result.patch.attributes.get(key) for key in ("x", "y", "radius")]
@@ -91,10 +85,7 @@ def circle(result: Result, name: str) -> tuple[Floats, float] | None:
 
 
 def struck(result: Result, name: str) -> Floats:
-    """Centre of the contact patch, or the impact node, (1, 2), length; (0, 2) without either.
-
-    Raises PlotError if the mesh lacks the deck's impact node.
-    """
+    """Centre of the contact patch, or the impact node, (1, 2), length; (0, 2) without either."""
     patch = circle(result, name)
     if patch is not None:
         return patch[0][None]
@@ -107,10 +98,7 @@ def struck(result: Result, name: str) -> Floats:
 
 
 def impact_point(result: Result, name: str) -> Floats:
-    """Centre of the contact patch, or the impact node, (2,), length.
-
-    Raises PlotError if the deck has neither.
-    """
+    """Centre of the contact patch, or the impact node, (2,), length; refuse a deck without."""
     points = struck(result, name)
     if not len(points):
         raise PlotError(f"nothing strikes the plate of {name}: its deck has no ROD segment")
@@ -118,10 +106,7 @@ def impact_point(result: Result, name: str) -> Floats:
 
 
 def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -> Ints:
-    """Rows of tape3 nearest to the given times; by default `count` rows at equal distances.
-
-    Raises PlotError if there are no rows, or a time is outside them.
-    """
+    """Rows of tape3 nearest to the given times; by default `count` rows at equal distances."""
     (stored,) = require(result, name, "tape3/time")
     if not times:
         ends = np.arange(1, min(count, len(stored)) + 1) / min(count, len(stored))
@@ -185,10 +170,7 @@ def patches(result: Result, cuts: int, name: str = "the result") -> Patches:
 
 
 def strain_points(result: Result, name: str) -> Floats:
-    """Coordinates of the points of tape8, (numel, npt, 2), length.
-
-    Raises PlotError if the result holds no strains at such points.
-    """
+    """Coordinates of the points of tape8, (numel, npt, 2), length."""
     (stored,) = require(result, name, "tape8/kappa_x")
     elements, _ = mesh_of(result, name)
     at_nodes = result.tape8.attributes.get("location") == "nodes"
@@ -199,10 +181,7 @@ def strain_points(result: Result, name: str) -> Floats:
 
 
 def on_plate(points: Floats, at: Floats, name: str) -> None:
-    """Refuse a place outside of the plate's points, (..., 2).
-
-    Raises PlotError if it is outside.
-    """
+    """Refuse a place outside of the plate's points, (..., 2)."""
     low, high = points.reshape(-1, 2).min(axis=0), points.reshape(-1, 2).max(axis=0)
     room = 0.02 * float((high - low).max())
     if not ((at >= low - room) & (at <= high + room)).all():
@@ -213,10 +192,7 @@ def on_plate(points: Floats, at: Floats, name: str) -> None:
 
 
 def nearest(points: Floats, at: Floats, name: str) -> Bools:
-    """Mask of the points nearest to a place; several if elements meet there.
-
-    Raises PlotError if the place is outside the plate.
-    """
+    """Mask of the points nearest to a place on the plate; several if elements meet there."""
     on_plate(points, at, name)
     distance = np.hypot(*np.moveaxis(points - at, -1, 0))
     size = float(np.ptp(points, axis=(0, 1)).max())

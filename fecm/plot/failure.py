@@ -77,8 +77,12 @@ def failure(results: Mapping[str, Result], *, quantity: str = "", width: str = "
     figure, plate, bars = _axes(corners, max(map(len, found.over_plies.values())), width)
     _map(plate, corners, found)
     mark_impact(plate, result, name)
-    plate.plot(found.worst.x, found.worst.y, clip_on=False, **LARGEST)
-    plate.set_title(_worst(found.worst), loc="left")
+    worst = found.worst
+    plate.plot(worst.x, worst.y, clip_on=False, **LARGEST)
+    plate.set_title(
+        f"{worst.exposure:.4g} ({worst.criterion.replace('_', ' ')}): {worst.mode}, {worst.plies}",
+        loc="left",
+    )
     place.name(plate.xaxis, "$x$")
     place.name(plate.yaxis, "$y$")
     _bars(bars, found)
@@ -119,12 +123,6 @@ def _exposures(result: Result, name: str, quantity: str) -> Exposures:
     return Exposures(fields[0][0], over_plate, over_plies, worst)
 
 
-def _worst(worst: LargestExposure) -> str:
-    """Text of the largest exposure: value, criterion, mode and ply."""
-    criterion = worst.criterion.replace("_", " ")
-    return f"{worst.exposure:.4g} ({criterion}): {worst.mode}, {worst.plies}"
-
-
 def _cells(result: Result, name: str, count: int) -> Floats:
     """Corners of the part of the element around each point, (numel, points, 4, 2), length."""
     rule = rules(deck_of(result, name).require(Material))[2]
@@ -149,13 +147,11 @@ def outline(cells: Floats) -> Floats:
     # An offset keeps coordinates of regular meshes off the borders between integers.
     whole = np.floor(sides / (1e-6 * np.ptp(sides, axis=(0, 1)).max()) + 0.377)
     first, second = whole[:, 0], whole[:, 1]
-    back = (first[:, 0] > second[:, 0]) | (
-        (first[:, 0] == second[:, 0]) & (first[:, 1] > second[:, 1])
-    )
+    turned = first[:, 1] > second[:, 1]
+    back = (first[:, 0] > second[:, 0]) | ((first[:, 0] == second[:, 0]) & turned)
     whole[back] = whole[back][:, ::-1]
-    _, index, times = np.unique(
-        whole.reshape(-1, 4), axis=0, return_index=True, return_counts=True
-    )  # fmt: skip
+    ends = whole.reshape(-1, 4)
+    _, index, times = np.unique(ends, axis=0, return_index=True, return_counts=True)
     return np.asarray(sides[index[times == 1]])
 
 

@@ -66,8 +66,8 @@ ENERGIES = {
     "projectile_kinetic": "projectile, kinetic",
     "projectile_strain": "projectile, strain",
     "contact_work": "indentation",
+    "damping_work": "damping",
 }
-DAMPING = {"damping_work": "damping"}
 
 
 def _time_axis(axes: Axes, clock: Scale, times: Iterable[Array]) -> None:
@@ -170,10 +170,7 @@ def fit_picture(found: Identification, units: Mapping[str, str]) -> Picture:
 
 
 def _thresholds(results: Results) -> dict[str, float]:
-    """Delamination thresholds by the names of the results that have one.
-
-    Raises PlotError if one can't be drawn.
-    """
+    """Delamination thresholds by the names of the results that have one."""
     found = {}
     for name, result in results.items():
         if result.threshold:
@@ -220,8 +217,9 @@ def loop(results: Results, *, against: str = "indentation", width: str = "column
 def energy(results: Results, *, width: str = "column") -> Picture:
     """Energies of plate, projectile and indentation, and their sum; one line style per result."""
     limit_count(len(results), "results", len(STYLES))
-    damped = all("energy/damping_work" in result for result in results.values())
-    energies = ENERGIES | (DAMPING if damped else {})
+    energies = dict(ENERGIES)
+    if not all("energy/damping_work" in result for result in results.values()):
+        del energies["damping_work"]
     paths = ("energy/time", *(f"energy/{column}" for column in energies))
     data = {name: require(result, name, *paths) for name, result in results.items()}
     times = [columns[0] for columns in data.values()]
@@ -258,17 +256,9 @@ def strain(
     At an angle θ from the x-axis κ = κx cos² θ + κy sin² θ + κxy sin θ cos θ, with the engineering
     twist κxy.  At a node it is the mean of the adjacent elements.
 
-    Parameters
-    ----------
-    results : mapping of str to Result
-    at : sequence of (float, float)
-        Points of the plate (length); by default the centre of the contact patch, or the point
-        nearest to the impact node that is at least the thickness h away.
-    gages : sequence of float
-        Directions, degrees from the x-axis.
-    face : str
-        ``"far"`` (z = h/2), ``"struck"`` (z = -h/2), or ``"curvature"``.
-    width : str
+    The points `at` (length) are by default the centre of the contact patch, or the point nearest to
+    the impact node that is at least the thickness h away; `gages` are degrees from the x-axis;
+    `face` is ``"far"`` (z = h/2), ``"struck"`` (z = -h/2), or ``"curvature"``.
     """
     lines: dict[str, tuple[Array, Array]] = {}
     for name, result in results.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -42,13 +42,9 @@ SHADES = 256  # of a colour map
 MARKERS = "osD^vP*"
 
 
-@dataclass(frozen=True)
-class MapGrid:
-    """A quantity on a full grid of two parameters."""
-
-    x: Floats  # (nx,), ascending
-    y: Floats  # (ny,), ascending
-    values: Any = field(repr=False)  # (ny, nx), masked where a case has no value
+# A quantity on a full grid of two parameters: x (nx,) and y (ny,), ascending, and the values,
+# (ny, nx), masked where a case has none.
+Grid = tuple[Floats, Floats, Any]
 
 
 def parameter_map(
@@ -66,19 +62,9 @@ def parameter_map(
     lines if the cases form a full grid, else coloured points; if one parameter is a text, one curve
     per text, or rows of cells if there are too many curves.
 
-    Parameters
-    ----------
-    results : mapping of str to SweepResult
-        One sweep.
-    quantity : str
-        A name of the sweep's summary; the peak force, or the velocity found, if empty.
-    over : sequence of str
-        One or two parameters; by default all that vary.
-    where : mapping of str to float or str
-        Show only the cases with these values; numbers select the nearest value.
-    level : sequence of float
-        Values to mark (the deck's unit).
-    width : str
+    `quantity` is a name of the sweep's summary, by default the peak force, or the velocity found;
+    `over` one or two parameters, by default all that vary.  `where` selects the cases with these
+    values, of numbers the nearest; `level` are values to mark (the deck's unit).
     """
     ((name, sweep),) = results.items()
     choice = choose(sweep, name, quantity, over, where or {}, level)
@@ -132,16 +118,16 @@ def _mark_limits(axes: Axes, x: Axis, y: Axis, choice: Choice) -> None:
             axes.plot(x.values[here], limits[here], **style)
     elif x is shown:
         axes.plot(limits, y.values, "|", color="0.2", markersize=11.0)
-    elif (grid := _grid(x, y, above)) is None:
+    elif (found := _grid(x, y, above)) is None:
         reached = above.values >= 0.0
         axes.plot(
             x.values[reached], y.values[reached], "o", markersize=4.2, markerfacecolor="none",
             markeredgecolor=LEVEL_COLOUR,
         )  # fmt: skip
     elif y.ticks:
-        _crossings(axes, grid, 0.0)
-    elif grid.values.min() < 0.0 < grid.values.max():
-        axes.contour(grid.x, grid.y, grid.values, [0.0], **CONTOUR)
+        _crossings(axes, found, 0.0)
+    elif found[2].min() < 0.0 < found[2].max():
+        axes.contour(*found, [0.0], **CONTOUR)
 
 
 # One value ---------------------------------------------------------------------------------------
@@ -265,15 +251,15 @@ def _bar(axes: Axes, drawn: Any, shown: Axis, levels: list[float]) -> None:
             bar.ax.axvline(level, color=LEVEL_COLOUR, linewidth=1.5)
 
 
-def _cells(axes: Axes, grid: MapGrid, shown: Axis, levels: list[float], *, rows: bool) -> None:
+def _cells(axes: Axes, grid: Grid, shown: Axis, levels: list[float], *, rows: bool) -> None:
     """One cell per case, with contour lines unless the rows are texts."""
-    many = grid.values.size > MANY
+    values = grid[2]
     drawn = axes.pcolormesh(
-        grid.x, grid.y, grid.values, shading="nearest", cmap=IN_ORDER, norm=_colours(shown),
-        edgecolor="face", linewidth=0.1, rasterized=many,
+        *grid, shading="nearest", cmap=IN_ORDER, norm=_colours(shown), edgecolor="face",
+        linewidth=0.1, rasterized=values.size > MANY,
     )  # fmt: skip
     _bar(axes, drawn, shown, levels)
-    low, high = grid.values.min(), grid.values.max()
+    low, high = values.min(), values.max()
     if rows:
         for level in levels:
             _crossings(axes, grid, level)
@@ -281,22 +267,23 @@ def _cells(axes: Axes, grid: MapGrid, shown: Axis, levels: list[float], *, rows:
     if not shown.whole and low < high:
         ticks = MaxNLocator(LINES).tick_values(low, high)
         inner = [tick for tick in ticks if low < tick < high and tick not in levels]
-        lines = axes.contour(grid.x, grid.y, grid.values, inner, colors="white", linewidths=0.5)
+        lines = axes.contour(*grid, inner, colors="white", linewidths=0.5)
         axes.clabel(lines, fontsize=6.0, inline_spacing=2, fmt=Multiple(shown.scale.factor))
     if inside := sorted({level for level in levels if low < level < high}):
-        marked = axes.contour(grid.x, grid.y, grid.values, inside, **CONTOUR)
+        marked = axes.contour(*grid, inside, **CONTOUR)
         form = Multiple(shown.scale.factor)
         axes.clabel(marked, fontsize=6.0, inline_spacing=2, colors="white", fmt=form)
 
 
-def _crossings(axes: Axes, grid: MapGrid, level: float) -> None:
+def _crossings(axes: Axes, grid: Grid, level: float) -> None:
     """Mark where a row crosses a level, interpolated linearly between cases."""
-    for row, values in zip(grid.y, grid.values.filled(np.nan) - level, strict=True):
+    x, y, shown = grid
+    for row, values in zip(y, shown.filled(np.nan) - level, strict=True):
         before, after = values[:-1], values[1:]
         passed = np.flatnonzero((before < 0.0) != (after < 0.0))
         passed = passed[np.isfinite(before[passed]) & np.isfinite(after[passed])]
         share = before[passed] / (before[passed] - after[passed])
-        at = grid.x[passed] + share * np.diff(grid.x)[passed]
+        at = x[passed] + share * np.diff(x)[passed]
         axes.vlines(at, row - 0.5, row + 0.5, color=LEVEL_COLOUR, linewidth=1.2)
 
 
@@ -314,16 +301,11 @@ def _points(axes: Axes, first: Axis, second: Axis, shown: Axis, levels: list[flo
     _bar(axes, drawn, shown, levels)
 
 
-def _grid(first: Axis, second: Axis, shown: Axis) -> MapGrid | None:
+def _grid(first: Axis, second: Axis, shown: Axis) -> Grid | None:
     """The cases as a full grid; None if they do not form one."""
     x, column = np.unique(first.values, return_inverse=True)
     y, row = np.unique(second.values, return_inverse=True)
-    if len(x) * len(y) != len(shown.values):
+    places = row * len(x) + column
+    if not np.array_equal(np.sort(places), np.arange(len(x) * len(y))):
         return None
-    filled = np.zeros((len(y), len(x)), dtype=int)
-    np.add.at(filled, (row, column), 1)
-    if (filled != 1).any():
-        return None
-    values = np.empty(filled.shape)
-    values[row, column] = shown.values
-    return MapGrid(x, y, np.ma.masked_invalid(values))
+    return x, y, np.ma.masked_invalid(shown.values[np.argsort(places)].reshape(len(y), len(x)))

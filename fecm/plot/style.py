@@ -30,20 +30,15 @@ from fecm.results.schema import printable
 
 # Width of a column and of a page (in).
 WIDTHS = {"column": 3.5, "full": 7.2}
-
 RATIO = {"column": 0.68, "full": 0.45}  # height over width of a graph
-
 BAR = 0.32  # height of a colour bar with its labels (in)
-
 RESOLUTION, SCREEN = 300, 150  # dots per inch in print and on a screen
 
 # Okabe and Ito's colours, without yellow, which is hard to see on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
 STYLES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))
-
 IN_ORDER = "viridis"  # sequential
-
 SIGNED = "RdBu_r"  # diverging, about zero
 
 # Where pictures are drawn: on axes, on a new figure of pyplot, or on a figure by itself.
@@ -55,26 +50,17 @@ RC: Any = {
     "figure.dpi": SCREEN,
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 8.0,
-    "axes.labelsize": 8.0,
-    "axes.titlesize": 8.0,
-    "xtick.labelsize": 7.0,
-    "ytick.labelsize": 7.0,
-    "legend.fontsize": 7.0,
-    "legend.title_fontsize": 7.0,
-    "axes.linewidth": 0.6,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
+    **dict.fromkeys(("font.size", "axes.labelsize", "axes.titlesize"), 8.0),
+    **dict.fromkeys(("xtick.labelsize", "ytick.labelsize"), 7.0),
+    **dict.fromkeys(("legend.fontsize", "legend.title_fontsize"), 7.0),
+    **dict.fromkeys(("axes.linewidth", "xtick.major.width", "ytick.major.width"), 0.6),
     "lines.linewidth": 0.9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
+    **dict.fromkeys(("axes.spines.top", "axes.spines.right", "legend.frameon"), False),
     "axes.formatter.use_mathtext": True,
-    "legend.frameon": False,
     "legend.handlelength": 1.8,
     "legend.columnspacing": 1.2,
     "legend.borderaxespad": 0.2,
-    "figure.constrained_layout.h_pad": 0.02,
-    "figure.constrained_layout.w_pad": 0.02,
+    **dict.fromkeys(("figure.constrained_layout.h_pad", "figure.constrained_layout.w_pad"), 0.02),
     "savefig.facecolor": "white",
     "pdf.fonttype": 42,
     "svg.hashsalt": "fecm",
@@ -173,10 +159,7 @@ def scale(peak: float, unit: str) -> Scale:
 
 
 def common_unit(results: Mapping[str, Result], dimension: str) -> str:
-    """Common unit of a dimension; empty if a result names none.
-
-    Raises PlotError if the results have different units.
-    """
+    """Common unit of a dimension; empty if a result names none.  Refuse different units."""
     units = {name: result.unit(dimension) for name, result in results.items()}
     named = {unit: name for name, unit in units.items() if unit}
     if len(named) > 1:
@@ -202,10 +185,7 @@ def scale_in(units: Mapping[str, str] | None, dimension: str, *arrays: Any) -> S
 
 
 def limit_count(count: int, what: str, most: int = len(COLOURS)) -> None:
-    """Refuse more lines than there are colours or styles.
-
-    Raises PlotError if `count` exceeds `most`.
-    """
+    """Refuse more lines than there are colours or styles."""
     if count > most:
         raise PlotError(f"{count} {what} can't be told apart in one picture; at most {most} can")
 

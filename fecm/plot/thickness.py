@@ -40,17 +40,9 @@ def thickness(
     In-plane stresses are in the axes of each ply, interlaminar ones in those of the plate; the last
     graph is the resultant of these.  sigma_z is not computed.
 
-    Parameters
-    ----------
-    results : mapping of str to Result
-        One result.
-    at : sequence of (float, float)
-        At most one place (length): the nearest element with ply stresses, and its nearest point; by
-        default those of the largest abs(sigma_1).
-    times : sequence of float
-        At most one time (the deck's unit), for which the nearest stored row is drawn; by default
-        that of the element's largest abs(sigma_1).
-    width : str
+    Of `at` (length) at most one place selects the nearest element with ply stresses, and its
+    nearest point; of `times` (the deck's unit) at most one the nearest stored row.  By default both
+    are those of the largest abs(sigma_1).
     """
     ((name, result),) = results.items()
     plies, point = _chosen(result, name, at, times)

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from fecm.plot.kinds import Picture
@@ -30,7 +29,7 @@ def dispersion_picture(medium: Medium, curves: Sequence[Dispersion]) -> Picture:
 
     Velocities are divided by the transverse shear velocity, frequencies by that velocity over the
     thickness, as in figures 2.4 and 2.5.  The axes end just above the in-plane modes and the
-    cut-off.  Raises PlotError if there are more directions than colours.
+    cut-off.
     """
     limit_count(len(curves), "directions")
     unit = medium.shear_velocity
@@ -86,10 +85,7 @@ def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
 def fronts_picture(
     surfaces: WaveSurfaces, times: Sequence[float], radius: float, units: Mapping[str, str]
 ) -> Picture:
-    """Fronts at several times with rays and cusps, one graph per mode.
-
-    Raises PlotError if there are more times than colours.
-    """
+    """Fronts at several times with rays and cusps, one graph per mode."""
     limit_count(len(times), "times")
     fronts, some = surfaces.fronts(AROUND), surfaces.fronts(np.arange(0.0, 360.0, RAYS))
     places = [fronts.positions(time, radius) for time in times]
@@ -97,9 +93,11 @@ def fronts_picture(
     turns = [surfaces.cusps(time, radius) for time in times]
     length = scale_in(units, "length", *places)
     clock = scale_in(units, "time", np.array(times))
+    around = np.linspace(0.0, 2.0 * np.pi, 181)
+    circle = radius * np.cos(around), radius * np.sin(around)
     figure, axes = panels("full", 2, 3, ratio=0.95)
     for mode, ax in enumerate(axes[:5]):
-        _circle(ax, radius)
+        ax.plot(*circle, color="0.4", ls=DASHES[2])
         for start, end in zip(*(at[:, mode] for at in ends), strict=True):
             ax.plot(*zip(start, end, strict=True), color="0.6", lw=0.5)
         for at, colour in zip(places, COLOURS, strict=False):
@@ -121,8 +119,3 @@ def fronts_picture(
         labels.append("cusps")
     axes[5].legend(handles, labels, loc="center")
     return Picture(figure)
-
-
-def _circle(ax: Axes, radius: float) -> None:
-    angle = np.linspace(0.0, 2.0 * np.pi, 181)
-    ax.plot(radius * np.cos(angle), radius * np.sin(angle), color="0.4", ls=DASHES[2])

@@ -21,13 +21,7 @@ class UnknownCaseError(FecmError, LookupError):
 
 
 def chosen(names: Iterable[str] = ()) -> list[Case]:
-    """Return the named cases in their usual order; all cases if there are no names.
-
-    Raises
-    ------
-    UnknownCaseError
-        If a name is unknown.
-    """
+    """Return the named cases in their usual order; all cases if there are no names."""
     wanted = list(names)
     for name in wanted:
         if name not in CASE_OF:

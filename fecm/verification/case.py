@@ -29,33 +29,15 @@ Compute = Callable[[], Sequence[Value]]
 
 @dataclass(frozen=True)
 class Check:
-    """Expected value of one quantity.
+    """Expected value of one quantity."""
 
-    Attributes
-    ----------
-    quantity : str
-        Name and unit.
-    expected : float
-        Expected value.
-    source : str
-        Source of the expected value.
-    tolerance : float
-        Largest admissible error.
-    why : str
-        Reason for the tolerance.
-    label : str
-        ``independent``, ``consistency`` or ``against change``.
-    scale : float or None
-        Reference of the relative error; None for the expected value.
-    """
-
-    quantity: str
+    quantity: str  # name and unit
     expected: float
-    source: str
-    tolerance: float
-    why: str
-    label: str = "independent"
-    scale: float | None = None
+    source: str  # of the expected value
+    tolerance: float  # largest admissible error
+    why: str  # reason for the tolerance
+    label: str = "independent"  # or "consistency" or "against change"
+    scale: float | None = None  # reference of the relative error; None for the expected value
 
 
 @dataclass(frozen=True)
@@ -70,23 +52,12 @@ class Case:
 
 @dataclass(frozen=True)
 class Row:
-    """Result of a check.
+    """Result of a check."""
 
-    Attributes
-    ----------
-    case : str
-        Name of the case.
-    check : Check
-    got : float
-        Computed value; NaN if the computation failed.
-    failure : str
-        Reason for the failure.
-    """
-
-    case: str
+    case: str  # its name
     check: Check
-    got: float
-    failure: str = ""
+    got: float  # NaN if the computation failed
+    failure: str = ""  # its reason
 
     @property
     def error(self) -> float:

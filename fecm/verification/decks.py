@@ -137,18 +137,8 @@ def quarter_plate(
 
     x = 0 and y = 0 are lines of symmetry, so that node 1 is the middle.
 
-    Parameters
-    ----------
-    elements : int
-        Elements per side.
-    plate : Material
-    macros : iterable of Macro
-    load : float or ndarray
-        Load at the nodes (nodes along y, nodes along x), force/area.
-    codes : str
-        Supports, such as `BENDING`.
-    others : sequence of Segment
-        Further segments, such as impact and gages.
+    `elements` are those of a side, `load` is force/area at the nodes, (nodes along y, nodes along
+    x), `codes` are supports such as `BENDING`, `others` further segments.
     """
     grid = Grid(uniform(0.5, elements), uniform(0.5, elements))
     along = weights(lines(grid.columns))

@@ -10,7 +10,6 @@ import numpy as np
 from fecm.deck.grid import Grid, Section, lines, uniform
 from fecm.deck.model import Boundary, Coordinates, Deck, Impact, Projectile, Shear
 from fecm.deck.records import NodeCodes, NodeValues
-from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import build_plate
 from fecm.problem.generate import generate
@@ -68,12 +67,8 @@ def patch() -> Sequence[Value]:
 def loaded_rectangle(x: Sequence[float], y: Sequence[float], *, shears: bool = False) -> Deck:
     """Build a rectangle of [0/45] under edge tractions, on supports without reactions.
 
-    Parameters
-    ----------
-    x, y : sequence of float
-        Force per length of the five dofs on an edge with normal x or y.
-    shears : bool
-        Only w moves, and a shear correction factor acts.
+    `x` and `y` are the forces per length of the five dofs on an edge with normal x or y.  With
+    `shears` only w moves, and a shear correction factor acts.
     """
     grid = Grid(
         [Section(0.0, 1.2, 1), Section(1.2, 2.0, 1)], [Section(0.0, 0.5, 1), Section(0.5, 1.5, 1)]
@@ -148,5 +143,4 @@ def _critical(made: Deck, dof: int) -> float:
     mesh = generate(made)
     codes, equations = np.ones_like(mesh.codes), np.zeros_like(mesh.equations)
     codes[4, dof], equations[4, dof] = 0, 1
-    held: Mesh = replace(mesh, codes=codes, equations=equations)
-    return critical_time_step(build_plate(made, held))
+    return critical_time_step(build_plate(made, replace(mesh, codes=codes, equations=equations)))

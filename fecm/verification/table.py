@@ -17,27 +17,13 @@ def cells(row: Row) -> tuple[str, ...]:
     """Return the cells of a row in the order of :data:`HEAD`."""
     check = row.check
     return (
-        row.case,
-        check.source,
-        check.quantity,
-        f"{check.expected:.9g}",
-        f"{row.got:.9g}",
-        f"{row.error:.1e}",
-        f"{check.tolerance:g}",
-        check.label,
-        FINE if row.within else NOT_FINE,
-    )
+        row.case, check.source, check.quantity, f"{check.expected:.9g}", f"{row.got:.9g}",
+        f"{row.error:.1e}", f"{check.tolerance:g}", check.label, FINE if row.within else NOT_FINE,
+    )  # fmt: skip
 
 
 def lines(cases: Sequence[Case], rows: Iterable[Row]) -> Iterator[str]:
-    """Yield the lines of a table as rows are computed.
-
-    Parameters
-    ----------
-    cases : sequence of Case
-        Cases of the rows, for the widths of the columns.
-    rows : iterable of Row
-    """
+    """Yield the lines of a table as rows are computed; the cases give the widths of the columns."""
     # Numbers of nine digits are at most 15 wide, errors 8.
     known = [cells(Row(one.name, check, math.nan)) for one in cases for check in one.checks]
     least = (0, 0, 0, 15, 15, 8, 0, 0, 0)
@@ -59,19 +45,13 @@ def lines(cases: Sequence[Case], rows: Iterable[Row]) -> Iterator[str]:
 def values(row: Row) -> dict[str, Any]:
     """Return a row as plain values; None for values that could not be computed."""
     check = row.check
+    got, error = (value if math.isfinite(value) else None for value in (row.got, row.error))
     return {
-        "case": row.case,
-        "source": check.source,
-        "quantity": check.quantity,
-        "expected": check.expected,
-        "got": row.got if math.isfinite(row.got) else None,
-        "error": row.error if math.isfinite(row.error) else None,
-        "tolerance": check.tolerance,
-        "why": check.why,
-        "label": check.label,
-        "verdict": FINE if row.within else NOT_FINE,
+        "case": row.case, "source": check.source, "quantity": check.quantity,
+        "expected": check.expected, "got": got, "error": error, "tolerance": check.tolerance,
+        "why": check.why, "label": check.label, "verdict": FINE if row.within else NOT_FINE,
         "failure": row.failure,
-    }
+    }  # fmt: skip
 
 
 INTRODUCTION = """\
