@@ -16,7 +16,7 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.results.csv import table
+from fecm.results.csv import lines
 from fecm.results.result import Result
 from fecm.results.schema import ExportError
 from fecm.results.vtkhdf import write_vtkhdf
@@ -60,7 +60,7 @@ def rows(text: str) -> list[dict[str, str]]:
 
 def exported(result: Result, name: str) -> list[dict[str, str]]:
     """Rows of an exported dataset."""
-    return rows("".join(table(result, name).lines()))
+    return rows("".join(lines(result, name)))
 
 
 # VTKHDF -----------------------------------------------------------------------------------------
@@ -240,9 +240,9 @@ def test_fields_are_written_in_long_form_with_numbers_from_one(result: Result) -
 def test_any_dataset_has_its_columns_named(
     result: Result, name: str, header: str, last: str | None
 ) -> None:
-    lines = "".join(table(result, name).lines()).splitlines()
-    assert lines[0] == header
-    assert last is None or lines[-1] == last
+    text = "".join(lines(result, name)).splitlines()
+    assert text[0] == header
+    assert last is None or text[-1] == last
 
 
 def test_what_is_the_same_at_every_row_is_written_once() -> None:
@@ -278,7 +278,7 @@ def test_modes_are_numbered() -> None:
 )
 def test_an_unknown_name_is_answered_with_near_ones(result: Result, name: str, hint: str) -> None:
     with pytest.raises(ExportError) as refused:
-        table(result, name)
+        lines(result, name)
     assert hint in str(refused.value)
 
 
@@ -286,7 +286,7 @@ def test_a_group_that_was_never_stored_names_its_macro() -> None:
     idle = PROGRAM.replace("RODP          5\n", "")
     result = run(small(idle, data=DATA_CARDS[DATA_CARDS.index("MATE") :]))
     with pytest.raises(ExportError, match="add RODP"):
-        table(result, "history")
+        lines(result, "history")
 
 
 def test_the_command_writes_beside_the_user_and_keeps_what_is_there(file: Path) -> None:

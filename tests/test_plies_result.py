@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.results.csv import table
+from fecm.results.csv import lines
 from fecm.results.result import Result
 from fecm.results.schema import ExportError, NotStoredError, ResultFileError
 from fecm.results.vtkhdf import write_vtkhdf
@@ -87,10 +87,10 @@ def test_what_is_not_stored_is_answered_with_the_remedy_or_the_range(result: Res
 def test_the_table_of_plies_has_a_line_for_each_face_with_the_shear_of_the_element(
     result: Result,
 ) -> None:
-    header, *lines = "".join(table(result, "plies").lines()).splitlines()
+    header, *rows = "".join(lines(result, "plies")).splitlines()
     assert header == ("step,time,element,point,ply,face,sigma_1,sigma_2,tau_12,tau_xz,tau_yz")
-    assert len(lines) == 2 * 2 * 9 * 2 * 2
-    step, _, element, point, ply, face, *values = lines[-3].split(",")
+    assert len(rows) == 2 * 2 * 9 * 2 * 2
+    step, _, element, point, ply, face, *values = rows[-3].split(",")
     assert (step, point, ply, face) == ("10", "9", "1", "2")
     assert int(element) == result["plies/element"][1]
     stored = [result[f"plies/{name}"] for name in ("sigma_1", "sigma_2", "tau_12")]
@@ -109,7 +109,7 @@ def test_the_table_of_plies_has_a_line_for_each_face_with_the_shear_of_the_eleme
     ],
 )
 def test_axes_of_plies_and_patch_have_their_names(result: Result, name: str, header: str) -> None:
-    assert next(table(result, name).lines()) == header + "\n"
+    assert next(lines(result, name)) == header + "\n"
 
 
 def test_cells_have_the_stress_of_largest_magnitude_and_its_ply(

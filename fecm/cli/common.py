@@ -17,7 +17,7 @@ from fecm._files import beside
 from fecm.problem.slips import MODES, REPORT
 from fecm.results.schema import printable
 
-NO, UNUSABLE, INTERRUPTED, TERMINATED = 1, 2, 130, 143
+NO, UNUSABLE, INTERRUPTED = 1, 2, 130
 
 # Signals that end a run in good order; Windows has no SIGHUP.
 SIGNALS = tuple(
@@ -29,7 +29,6 @@ SIGNALLED = tuple(128 + number for number in SIGNALS)
 
 DECK_PATH = click.Path(exists=True, dir_okay=False, path_type=Path)
 FILE_PATH = click.Path(path_type=Path)
-
 
 MODE_OPTION = click.option(
     "--mode",

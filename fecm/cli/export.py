@@ -75,7 +75,7 @@ def export(
             cases = sweep_of(contents, history=name == sweep_csv.HISTORY)
             write_lines(sweep_csv.lines(cases, name), path, overwrite=overwrite)
         elif target == "csv":
-            write_lines(csv.table(result_of(contents), name).lines(), path, overwrite=overwrite)
+            write_lines(csv.lines(result_of(contents), name), path, overwrite=overwrite)
         elif is_sweep:
             raise ExportError("a sweep has no fields; --to csv writes its cases")
         else:

@@ -136,13 +136,11 @@ def _named(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:
         names = [printable(str(path)) for path in paths]
     if len(set(names)) < len(names):
         raise RefusedError("a result is given twice")
-    return {name: _loaded(path) for name, path in zip(names, paths, strict=True)}
-
-
-def _loaded(path: Path) -> Result | SweepResult:
-
-    contents = read(path, FORMAT, SWEEP)
-    return sweep_of(contents, history=False) if contents.form == SWEEP else result_of(contents)
+    opened = (read(path, FORMAT, SWEEP) for path in paths)
+    return {
+        name: sweep_of(one, history=False) if one.form == SWEEP else result_of(one)
+        for name, one in zip(names, opened, strict=True)
+    }
 
 
 def _draw(

@@ -102,7 +102,13 @@ def choose(
         highest = float(np.nanmax(limits))
         if highest - np.nanmin(limits) <= 1e-9 * highest:
             level, limits = [*level, highest], np.empty(0)
-    _check_levels(level, shown)
+    low, high = np.nanmin(shown.values), np.nanmax(shown.values)
+    for value in level:
+        if not low <= value <= high:
+            warn(
+                f"the level {value:g} is outside the picture's values, which range from {low:g} "
+                f"to {high:g}"
+            )
     return Choice(axes, shown, list(level), title, other, still, limits)
 
 
@@ -227,14 +233,3 @@ def numbers(sweep: SweepResult, name: str, values: Array) -> Axis:
     """Axis of numbers; counts are not scaled."""
     shown = Scale(1.0, "") if name in INTEGERS else scale(peak(values), sweep.unit(name))
     return Axis(name, shown, values)
-
-
-def _check_levels(levels: Sequence[float], shown: Axis) -> None:
-    """Warn of values to mark outside the values shown."""
-    low, high = np.nanmin(shown.values), np.nanmax(shown.values)
-    for level in levels:
-        if not low <= level <= high:
-            warn(
-                f"the level {level:g} is outside the picture's values, which range from {low:g} "
-                f"to {high:g}"
-            )

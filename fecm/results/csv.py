@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -52,25 +51,11 @@ PLIES = tuple(f"plies/{name}" for name in (*IN_PLANE, *INTERLAMINAR))
 BLOCK = 100_000
 
 
-@dataclass(frozen=True)
-class Table:
-    """A table."""
+def lines(result: Result, name: str = "history") -> Iterator[str]:
+    """Lines of one dataset such as ``tape3/w``, or of all datasets of a group such as ``history``.
 
-    header: tuple[str, ...]  # names of the columns
-    rows: Iterator[tuple[float, ...]]  # values of the columns, row by row
-
-    def lines(self) -> Iterator[str]:
-        """All lines with line ends, beginning with the header."""
-        yield ",".join(self.header) + "\n"
-        for row in self.rows:
-            yield ",".join(map(repr, row)) + "\n"
-
-
-def table(result: Result, name: str = "history") -> Table:
-    """Table of one dataset such as ``tape3/w``, or of all datasets of a group such as ``history``.
-
-    Raises ExportError if there is no such dataset or group, or the group's datasets differ in
-    shape.
+    The first is the header.  Raises ExportError if there is no such dataset or group, or the
+    group's datasets differ in shape.
     """
     members = _members(result, name.strip("/"))
     group = members[0].rpartition("/")[0]
@@ -85,7 +70,7 @@ def table(result: Result, name: str = "history") -> Table:
         values = ["tape3/displacement"]  # w is one of its columns
     instants = [result[path] for path in clock]
     if not values:  # only step or time
-        return Table(_names(clock), zip(*(times.tolist() for times in instants), strict=True))
+        return _lines(_names(clock), zip(*(times.tolist() for times in instants), strict=True))
     values = [path for path in values if path not in LABELS.values()] or values
     arrays = [result[path] for path in values]
     if name.strip("/") == "plies" and len(values) > len(PLIES):
@@ -101,7 +86,13 @@ def table(result: Result, name: str = "history") -> Table:
         columns = names[: axes.pop()[1]]
     keys = tuple(KEYS.get(str(size), "row") for size, _ in axes)
     rows = _rows(arrays, instants, [_labels(result, *axis) for axis in axes])
-    return Table((*_names(clock), *keys, *columns), rows)
+    return _lines((*_names(clock), *keys, *columns), rows)
+
+
+def _lines(header: Sequence[str], rows: Iterator[tuple[float, ...]]) -> Iterator[str]:
+    """Lines of a header and of rows of numbers."""
+    texts = (",".join(map(repr, row)) + "\n" for row in rows)
+    return itertools.chain([",".join(header) + "\n"], texts)
 
 
 def _members(result: Result, name: str) -> list[str]:

@@ -79,8 +79,10 @@ class Contents(Mapping[str, Array]):
         if key not in self._read:
             with self._file() as file:
                 values = np.asarray(file[key][()])
-            if key == ELEMENTS:
-                self._check_nodes(values)
+            if key == ELEMENTS and values.size:  # plotting indexes nodes unchecked
+                count = self.shapes.get(COORDINATES, (0,))[0]
+                if not 0 <= values.min() <= values.max() <= count:
+                    raise ResultFileError(f"{self.path}: {key} names nodes outside 1 to {count}")
             self._read[key] = values
         return self._read[key]
 
@@ -101,12 +103,6 @@ class Contents(Mapping[str, Array]):
         """Read the attributes of a dataset or group."""
         with self._file() as file:
             return _attributes(file[path])
-
-    def _check_nodes(self, elements: Array) -> None:
-        """Refuse elements whose nodes are not in the mesh; plotting indexes them unchecked."""
-        count = self.shapes.get(COORDINATES, (0,))[0]
-        if elements.size and not 0 <= elements.min() <= elements.max() <= count:
-            raise ResultFileError(f"{self.path}: {ELEMENTS} names nodes outside 1 to {count}")
 
     def __contains__(self, key: object) -> bool:
         return key in self.shapes  # Mapping's own method would read the dataset

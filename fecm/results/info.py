@@ -17,16 +17,11 @@ from fecm.results.summary import summary
 def describe_groups(contents: Contents) -> list[dict[str, Any]]:
     """Describe the groups and datasets of a result file, of a run or of a sweep.
 
-    Raises ResultFileError if the file can't be read.
-
-    Returns
-    -------
-    list of dict
-        ``name`` (empty for the file itself), ``description``, ``rows`` (stored instants, or None),
-        ``attributes`` and ``datasets``; of each dataset ``name`` (its path), ``shape``, ``dtype``
-        (``"text"`` for texts), ``description``, ``dimension``, ``unit``, ``min`` and ``max`` of the
-        finite numbers (None without any), ``not_finite`` and, for texts, the number of
-        ``different`` ones.
+    Of each group ``name`` (empty for the file itself), ``description``, ``rows`` (stored instants,
+    or None), ``attributes`` and ``datasets``; of each dataset ``name`` (its path), ``shape``,
+    ``dtype`` (``"text"`` for texts), ``description``, ``dimension``, ``unit``, ``min`` and ``max``
+    of the finite numbers (None without any), ``not_finite`` and, for texts, the number of
+    ``different`` ones.
     """
     datasets = [_describe(contents, path) for path in contents]
     members: dict[str, list[dict[str, Any]]] = {name: [] for name in contents.groups}

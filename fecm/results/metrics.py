@@ -95,22 +95,9 @@ def summarise(
     If the last step is in contact, quantities that depend on the rest of the contact are NaN:
     everything except the peaks, and a peak at the last step.
 
-    Parameters
-    ----------
-    force : ndarray (steps, cases)
-        Contact force after every step.
-    times : ndarray (steps,)
-        Times of the steps.
-    indentation : Indentation
-    mass, velocity : float or ndarray (cases,)
-        Mass and impact velocity of the projectile.
-    threshold : float, optional
-        Delamination threshold, force.
-
-    Returns
-    -------
-    dict of ndarray (cases,)
-        By the names of :data:`SUMMARY`; with a threshold also those of :data:`THRESHOLD`.
+    Contact forces are (steps, cases), times of the steps (steps,); mass and impact velocity of the
+    projectile are numbers or (cases,).  Returns the names of :data:`SUMMARY`, with a delamination
+    threshold (force) also those of :data:`THRESHOLD`, (cases,) each.
     """
     dt = np.diff(times, prepend=0.0)
     touching = force > 0.0

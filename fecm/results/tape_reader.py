@@ -76,12 +76,7 @@ class TapeText:
 def read_tapes(folder: Path) -> TapeText:
     """Read tape3, tape8 and tape9 of a folder, with or without ``.txt``; some may be missing.
 
-    Raises
-    ------
-    ResultFileError
-        If the folder has no tape, or a tape is invalid.
-    OSError
-        If a file cannot be opened.
+    Raises ResultFileError if the folder has no tape, or a tape is invalid.
     """
     arrays: dict[str, Array] = {}
     lines = False
