@@ -14,8 +14,7 @@ def _leave(number: int, frame: FrameType | None) -> None:
     os._exit(128 + number)
 
 
-# Address space that NumPy and SciPy need.  With less, OpenBLAS may hang.
-LEAST_SPACE = 600_000_000
+LEAST_SPACE = 600_000_000  # address space of NumPy and SciPy; with less, OpenBLAS may hang
 
 
 def _refuse(message: str) -> NoReturn:

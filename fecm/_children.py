@@ -6,8 +6,7 @@ import os
 import signal
 import sys
 
-# prctl(2): signal of this process when its parent ends.
-PR_SET_PDEATHSIG = 1
+PR_SET_PDEATHSIG = 1  # prctl(2): signal of this process when its parent ends
 
 
 def die_with_parent(parent: int) -> None:

@@ -24,9 +24,7 @@ NO_WAIT = getattr(os, "O_NONBLOCK", 0)
 
 # Errors of os.link on file systems without hard links.
 NO_LINKS = {errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK}
-
-# Attempts to create a partial file while others remove it.
-ATTEMPTS = 10
+ATTEMPTS = 10  # to create a partial file while others remove it
 
 
 class OutputError(FecmError, OSError):

@@ -12,9 +12,7 @@ from fecm._errors import FecmError
 MEMINFO = Path("/proc/meminfo")
 CGROUP = Path("/proc/self/cgroup")
 CGROUPS = Path("/sys/fs/cgroup")
-
-# Bytes that are allocated without a check.
-UNNOTICED = 100_000_000
+UNNOTICED = 100_000_000  # bytes that are allocated without a check
 
 
 class NotEnoughMemoryError(FecmError, MemoryError):

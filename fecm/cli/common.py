@@ -23,9 +23,7 @@ NO, UNUSABLE, INTERRUPTED = 1, 2, 130
 SIGNALS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
-
-# Exit status after each of them.
-SIGNALLED = tuple(128 + number for number in SIGNALS)
+SIGNALLED = tuple(128 + number for number in SIGNALS)  # exit status after each of them
 
 DECK_PATH = click.Path(exists=True, dir_okay=False, path_type=Path)
 FILE_PATH = click.Path(path_type=Path)

@@ -47,9 +47,7 @@ ROOM, ROOM_A_BYTE = 4 * GB, 50
 PATIENCE, SPEED = 30.0, 5_000_000
 TOTAL, TOTAL_SPEED = 600.0, 100_000
 FREE_SHARE = 0.75
-
-# Time between two looks at the child (s).
-WAIT = 0.1
+WAIT = 0.1  # time between two looks at the child (s)
 # Time that a child has to end after a signal, first by itself, then after it gets the signal (s).
 GRACE = 0.3, 2.0
 

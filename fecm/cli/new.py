@@ -27,10 +27,8 @@ from fecm.objects import CUSTOM, FIXTURES, MOST, Laminate, ObjectError, Plate, S
 from fecm.problem.plate_mesh import BOUNDARY
 
 ESTIMATE = "estimate:RADIUS[,ES,NUS]"
-# Options that describe a rectangle.
-RECTANGLE = ("size", "mesh", "grading", "columns", "rows")
-# Options that a fixture sets.
-FIXED = ("size", "columns", "rows", "support", "edges")
+RECTANGLE = ("size", "mesh", "grading", "columns", "rows")  # options that describe one
+FIXED = ("size", "columns", "rows", "support", "edges")  # options that a fixture sets
 
 # Constants of a named ply, as `fecm materials` lists them.
 LINES = (

@@ -95,8 +95,7 @@ class Parsed(click.ParamType):  # type: ignore[type-arg]
             self.fail(str(error), param, ctx)
 
 
-# Most bytes of a file whose contents are the value of an option.
-MOST = 1_000_000
+MOST = 1_000_000  # bytes of a file whose contents are the value of an option
 
 
 def file_of(parse: Callable[[str], Any]) -> Parsed:

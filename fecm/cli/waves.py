@@ -28,8 +28,7 @@ from fecm.problem.build import laminate_of_deck
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces
 from fecm.studies.waves import dispersion as compute
 
-# A table with more rows is certainly a typo.
-MOST = 1_000_000
+MOST = 1_000_000  # rows of a table; more are certainly a typo
 
 
 # Options -----------------------------------------------------------------------------------------

@@ -25,11 +25,8 @@ from fecm.results.schema import NotStoredError, ResultFileError, remedy
 Array = NDArray[Any]
 Ints = NDArray[np.intp]
 
-# Larger numbers are refused: axes fail long before numbers overflow.
-LARGEST = 1e100
-
-# Meshes with more elements are drawn with fewer points per element.
-MANY = 2000
+LARGEST = 1e100  # larger numbers are refused: axes fail long before numbers overflow
+MANY = 2000  # meshes with more elements are drawn with fewer points per element
 
 
 def require(result: Result, name: str, *paths: str) -> list[Array]:

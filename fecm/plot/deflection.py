@@ -40,8 +40,7 @@ AXES = {"x": 0, "y": 1}
 FRAMES = 60
 SAMPLES = 401
 LEVELS = 21
-# Height of the deflected plate over its longer side.
-EXAGGERATION = 0.3
+EXAGGERATION = 0.3  # height of the deflected plate over its longer side
 
 
 # Along a line -----------------------------------------------------------------------------------

@@ -42,12 +42,9 @@ MARKS: tuple[dict[str, Any], ...] = tuple(
     {"marker": marker, "ms": size, "mew": 0.6, "mfc": "none", "ls": "none"}
     for marker, size in (("s", 4.0), ("D", 3.0), ("o", 4.0), ("x", 2.5))
 )
-# Maps of more cells are drawn as pixels in PDF and SVG.
-MANY = 5000
-# Elements under the load that a note names; the others it counts.
-NAMED = 12
-# Numbers on the axis of the plies at most.
-TICKS = 16
+MANY = 5000  # maps of more cells are drawn as pixels in PDF and SVG
+NAMED = 12  # elements under the load that a note names; the others it counts
+TICKS = 16  # numbers on the axis of the plies at most
 
 
 @dataclass(frozen=True)

@@ -47,11 +47,8 @@ from fecm.sweeps.identify import Identification
 
 Results = Mapping[str, Result]
 
-# Measured points drawn one by one at most.
-POINTS = 200
-
-# Letters of small text per inch.
-LETTERS = 16
+POINTS = 200  # measured points drawn one by one at most
+LETTERS = 16  # of small text per inch
 
 # What a loop is drawn against: column of the history, sign, and label.
 AGAINST = {

@@ -23,8 +23,7 @@ Array = NDArray[Any]
 Ints = NDArray[np.intp]
 
 INTEGERS = (*WHOLE_VALUES, *WHOLE_NUMBERS)
-# Most texts with one curve each: the number of colours.
-CURVES = len(COLOURS)
+CURVES = len(COLOURS)  # most texts with one curve each
 LABELS = {
     "velocity": "Impact velocity", "k": "Contact coefficient $k$", "alpha_p": r"$\alpha_p$",
     "s_p": "$s_p$", "q": "$q$", "rod_length": "Length of the rod",

@@ -28,8 +28,7 @@ from fecm.plot.style import (
 )
 from fecm.sweeps.result import SweepResult
 
-# More cells or points are stored as an image in vector formats.
-MANY = 10_000
+MANY = 10_000  # more cells or points are stored as an image in vector formats
 LINES = 8  # contour lines, approximately
 # Heights of a row of texts, of everything around the rows, and of a colour bar (in).
 ROW, HEAD, BAR = 0.17, 0.75, 0.45

@@ -55,10 +55,7 @@ def options_of(kind: str) -> list[str]:
 
 
 def check_options(kinds: Iterable[str], options: Iterable[str]) -> None:
-    """Refuse options that none of these kinds of picture takes.
-
-    Raises PlotError if there is such an option; the message names it and the kinds that take it.
-    """
+    """Refuse options that none of these kinds of picture takes."""
     kinds = list(kinds)
     taken = {option for kind in kinds for option in options_of(kind)}
     for option in options:
@@ -186,10 +183,7 @@ def plot(
 
 
 def check_suffix(kind: str, path: Path) -> None:
-    """Refuse a file name whose suffix is not a format of the kind.
-
-    Raises PlotError if it is not; the message names the formats.
-    """
+    """Refuse a file name whose suffix is not a format of the kind."""
     suffixes = kind_named(kind).suffixes
     if path.suffix.lower() not in suffixes:
         raise PlotError(f"{path}: the kind {kind} is written as {' or '.join(suffixes)}")

@@ -80,7 +80,6 @@ _PREFIXED = {
 }  # fmt: skip
 
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 # Decorates functions to draw in this style.
@@ -212,10 +211,7 @@ def style_on(axes: Axes | None) -> dict[str, Any]:
 def panels(
     width: str, rows: int = 1, columns: int = 1, *, ratio: float, **options: Any
 ) -> tuple[Figure, list[Axes]]:
-    """Figure with equal axes, row by row; `ratio` is height over width of each.
-
-    Raises PlotError if the picture does not fit the axes to draw on.
-    """
+    """Figure with equal axes, row by row; `ratio` is height over width of each."""
     inches, target = WIDTHS[width], TARGET.get()
     solid = "subplot_kw" in options and options["subplot_kw"].get("projection") == "3d"
     if isinstance(target, Axes):

@@ -19,8 +19,7 @@ from fecm.results.result import Result
 from fecm.results.schema import NotStoredError, ResultFileError
 
 STRESS = "force/length^2"
-# Residual over the largest interlaminar stress above which a note says so.
-LARGE_RESIDUAL = 0.1
+LARGE_RESIDUAL = 0.1  # over the largest interlaminar stress: a note says so
 # A parabola through the lower, middle and upper value of a ply, at some parts of its thickness.
 _PARTS = np.linspace(0.0, 1.0, 9)
 _PARABOLA = np.stack(

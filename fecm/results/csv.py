@@ -47,8 +47,7 @@ KEYS = {size: name for size, (name, _) in SCALES.items()} | {
 LABELS = {"gages": "gages/number", "members": "plies/element", "patch_nodes": "patch/node"}
 # Datasets of the table of ply stresses.
 PLIES = tuple(f"plies/{name}" for name in (*IN_PLANE, *INTERLAMINAR))
-# Lines per block.
-BLOCK = 100_000
+BLOCK = 100_000  # lines per block
 
 
 def lines(result: Result, name: str = "history") -> Iterator[str]:

@@ -24,11 +24,8 @@ from fecm.results.schema import FORMAT, FORMAT_VERSION, SWEEP, NotStoredError, R
 Array = NDArray[Any]
 ELEMENTS, COORDINATES = "mesh/elements", "mesh/coordinates"
 
-# Source of each form of file.
-RESULT_OF = {FORMAT: "a run", SWEEP: "a sweep"}
-
-# Upper bound of the compression of HDF5's filters; deflate reaches 1032.
-PACKED = 2000
+RESULT_OF = {FORMAT: "a run", SWEEP: "a sweep"}  # source of each form of file
+PACKED = 2000  # upper bound of the compression of HDF5's filters; deflate reaches 1032
 
 
 class Contents(Mapping[str, Array]):

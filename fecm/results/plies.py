@@ -64,12 +64,7 @@ def plies_of(
     time: float | Sequence[float] | None = None,
     elements: int | Sequence[int] | None = None,
 ) -> Plies:
-    """Stresses and strains of a result's plies; see :meth:`fecm.results.result.PlyGroup.__call__`.
-
-    Raises NotStoredError if the result has no ply stresses, or not at such a time or in such an
-    element.  Raises ResultFileError if the result's deck can't be read or does not fit its ply
-    stresses.
-    """
+    """Stresses and strains of plies: see :meth:`fecm.results.result.PlyGroup.__call__`."""
     if "plies/sigma_1" not in result:
         raise NotStoredError(f"the result has no ply stresses{remedy('plies')}")
     stored = {name: result[f"plies/{name}"] for name in (*IN_PLANE, *INTERLAMINAR, "residual")}

@@ -79,8 +79,7 @@ def jsonable(value: Any) -> Any:
     return str(value)
 
 
-# Bytes of a block of rows.
-BLOCK = 4_000_000
+BLOCK = 4_000_000  # bytes of a block of rows
 
 
 def row_blocks(shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
@@ -92,10 +91,7 @@ def row_blocks(shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
 
 
 FORMAT = "fecm"
-
-# Format of a sweep's result.
-SWEEP = "fecm-sweep"
-
+SWEEP = "fecm-sweep"  # format of a sweep's result
 FORMAT_VERSION = 1
 
 
@@ -311,8 +307,7 @@ DATASETS = {
     )
 }  # fmt: skip
 
-# Sizes of axes that every result has.
-FIXED = {"faces": 2, "levels": 3, "directions": 2}
+FIXED = {"faces": 2, "levels": 3, "directions": 2}  # sizes of axes that every result has
 
 # Dimension scales: name and description by size.
 SCALES = {

@@ -84,8 +84,7 @@ class RowBuffer:
     The shapes are the full shapes of the datasets, rows first; `stored` counts the rows written.
     """
 
-    # Most bytes of a block.
-    BYTES = 1_000_000
+    BYTES = 1_000_000  # of a block at most
 
     def __init__(
         self, sink: Sink, datasets: Sequence[Dataset], shapes: Sequence[tuple[int, ...]]

@@ -11,8 +11,7 @@ import numpy as np
 from fecm.mechanics.failure import CRITERIA
 from fecm.results.result import Result, contact_intervals
 
-# Most contacts and frequencies listed individually.
-LISTED = 6
+LISTED = 6  # most contacts and frequencies listed individually
 
 OPEN_END = (
     "the run ends in contact: the end of the contact, the permanent indentation and the energies "

@@ -26,8 +26,7 @@ from fecm.results.tapes import CONTACT, CURVATURES
 
 Array = NDArray[Any]
 
-# Form of a folder of tapes, as `Contents.form` of a file.
-TAPES = "tapes"
+TAPES = "tapes"  # form of a folder of tapes, as `Contents.form` of a file
 NAMES = ("tape3", "tape8", "tape9")
 WIDTH = 12  # characters per number
 PER_LINE = 6  # numbers per line without labels

@@ -32,8 +32,7 @@ TYPES = {3: 5, 4: 9, 8: 23, 9: 28}
 # Numbers of points that are the first nodes of an element (K = -2: corners, K = -3: nine).
 NODAL_POINTS = (4, 9)
 CONTACT = ("force", "indentation", "transducer")
-# Numbers per block of a field.
-BLOCK = 4_000_000
+BLOCK = 4_000_000  # numbers per block of a field
 
 
 def write_vtkhdf(
