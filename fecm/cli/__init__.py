@@ -7,6 +7,7 @@ imported when the command is called.
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -100,7 +101,7 @@ def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoR
     status = _status(arguments, prog_name)
     if (error := streams.failure()) is not None and status not in SIGNALLED:
         status = UNUSABLE
-        if not streams.is_of_reader(error):
+        if error.errno != errno.EPIPE:  # a reader who has left needs no message
             echo(f"fecm: error: standard output: {error.strerror}", err=True)
     signals.ignore()
     raise SystemExit(status)
@@ -148,7 +149,9 @@ def _message(error: Exception) -> str:
         name = error.filename2 or error.filename  # the target of a rename
         named = name and not isinstance(name, int)
         return printable(f"{name}: {error.strerror}" if named else error.strerror)
-    if isinstance(error, MemoryError) and not isinstance(error, FecmError):
+    if isinstance(error, FecmError):
+        return printable(str(error))
+    if isinstance(error, MemoryError):
         return "there is not enough memory"
     if isinstance(error, ImportError):
         while isinstance(error.__cause__, ImportError):  # NumPy wraps the error in advice

@@ -28,21 +28,12 @@ SIGNALLED = tuple(128 + number for number in SIGNALS)  # exit status after each 
 DECK_PATH = click.Path(exists=True, dir_okay=False, path_type=Path)
 FILE_PATH = click.Path(path_type=Path)
 
-MODE_OPTION = click.option(
-    "--mode",
-    type=click.Choice(MODES),
-    default=REPORT,
-    show_default=True,
-    help="Follow the report's text, or its printed program slip by slip.",
-)
-FORMAT_OPTION = click.option(
-    "--format",
-    "form",
-    type=click.Choice(["text", "json"]),
-    default="text",
-    show_default=True,
-    help="Text for people, or JSON for programs.",
-)
+MODE_OPTION = click.option("--mode", type=click.Choice(MODES), default=REPORT, show_default=True,
+                           help="Follow the report's text, or its printed program slip by "
+                                "slip.")  # fmt: skip
+FORMAT_OPTION = click.option("--format", "form", type=click.Choice(["text", "json"]),
+                             default="text", show_default=True,
+                             help="Text for people, or JSON for programs.")  # fmt: skip
 
 
 class RefusedError(FecmError):

@@ -10,10 +10,10 @@ from typing import Any
 
 import click
 
-from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, RefusedError
+from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO
 from fecm.cli.isolation import reads
 from fecm.cli.types import NOT_NEGATIVE, Parsed, assignment, file_of
-from fecm.results.diff import SCALE_NAMES, Comparison, Difference, IncomparableError, difference
+from fecm.results.diff import SCALE_NAMES, Comparison, Difference, difference
 from fecm.results.schema import jsonable, printable, shown_apart
 
 
@@ -108,10 +108,7 @@ def diff(
     rtol = file["rtol"] if rtol is None else rtol
     atol = file["atol"] if atol is None else atol
     exclude, own = (*file["exclude"], *exclude), (*file["own"], *own)
-    try:
-        found = difference(a, b, rtol, atol, only, exclude, own)
-    except IncomparableError as error:
-        raise RefusedError(printable(str(error))) from None
+    found = difference(a, b, rtol, atol, only, exclude, own)
     if form == "json":
         about = {
             "verdict": "same" if found.same else "different",

@@ -14,8 +14,8 @@ import click
 from fecm._files import check_outputs
 from fecm.cli.common import FILE_PATH, RefusedError, note, writing
 from fecm.cli.types import Decorated, stacked
-from fecm.plot.kinds import MISSING, SUFFIXES
-from fecm.plot.pictures import imported, save
+from fecm.plot.kinds import SUFFIXES
+from fecm.plot.pictures import imported, require_matplotlib, save
 
 STANDARD_OUTPUT = Path("-")
 
@@ -52,7 +52,9 @@ class OutputPaths:
         self, table: Path, picture: Path | None, overwrite: bool, *sources: Path | None
     ) -> None:
         if picture is not None:
-            _check_picture(picture)
+            if picture.suffix.lower() not in SUFFIXES:
+                raise RefusedError(f"{picture}: pictures are written as {', '.join(SUFFIXES)}")
+            require_matplotlib()
         self.table, self.picture, self._overwrite = table, picture, overwrite
         files = [path for path in (table, picture) if path and path != STANDARD_OUTPUT]
         check_outputs(files, overwrite, [source for source in sources if source])
@@ -78,13 +80,3 @@ def write_lines(lines: Iterable[str], path: Path, *, overwrite: bool) -> None:
         return
     with writing(path, overwrite=overwrite) as file:
         file.writelines(lines)
-
-
-def _check_picture(path: Path) -> None:
-    """Refuse a picture that can't be drawn."""
-    if path.suffix.lower() not in SUFFIXES:
-        raise RefusedError(f"{path}: pictures are written as {', '.join(SUFFIXES)}")
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        raise RefusedError(MISSING) from None

@@ -14,7 +14,7 @@ from fecm._files import check_outputs
 from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, note, progress
 from fecm.cli.isolation import reads
 from fecm.cli.types import Finite, ListOf, Parsed, assignment
-from fecm.plot.kinds import KINDS, Picture, PlotError
+from fecm.plot.kinds import KINDS, Picture
 from fecm.plot.pictures import check_options, check_suffix, draw, options_of, save
 from fecm.results.hdf5_reader import read
 from fecm.results.result import Result, result_of
@@ -86,28 +86,21 @@ def plot(
 ) -> None:
     """Draw the report's figures from one or more RESULTs, or the map of a sweep."""
     options = {name: value for name, value in asked.items() if value}
-    try:
-        named = _named(results)
-        chosen = list(dict.fromkeys(kinds)) or [_usual(next(iter(named.values())))]
-        check_options(chosen, options)
-        paths = _paths(results[0], chosen, output)
-        folder = output if output is not None and output not in paths.values() else None
-        if folder is None or folder.is_dir():
-            check_outputs(list(paths.values()), overwrite, results)
-        with progress("fecm", len(chosen)) as advance:
-            pictures = _draw(named, chosen, options, advance)
-        if folder is not None:
-            folder.mkdir(parents=True, exist_ok=True)
-        for kind, path in paths.items():
-            with progress(kind, len(pictures[kind].frames)) as advance:
-                save(pictures[kind], path, overwrite=overwrite, advance=advance)
-            echo(path)
-    except PlotError as error:
-        raise RefusedError(str(error)) from None
-    except ImportError as error:
-        if error.name and not error.name.startswith("matplotlib"):
-            raise
-        raise RefusedError(str(error)) from None
+    named = _named(results)
+    chosen = list(dict.fromkeys(kinds)) or [_usual(next(iter(named.values())))]
+    check_options(chosen, options)
+    paths = _paths(results[0], chosen, output)
+    folder = output if output is not None and output not in paths.values() else None
+    if folder is None or folder.is_dir():
+        check_outputs(list(paths.values()), overwrite, results)
+    with progress("fecm", len(chosen)) as advance:
+        pictures = _draw(named, chosen, options, advance)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+    for kind, path in paths.items():
+        with progress(kind, len(pictures[kind].frames)) as advance:
+            save(pictures[kind], path, overwrite=overwrite, advance=advance)
+        echo(path)
 
 
 def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path]:

@@ -227,7 +227,7 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
         ) from None
     except _StoppedError as stopped:
         echo(
-            f"fecm: stopped after step {stopped.step}; the same command with --resume continues "
+            f"fecm: stopped after step {stopped.args[0]}; the same command with --resume continues "
             f"{path}",
             err=True,
         )
@@ -245,11 +245,7 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
 
 
 class _StoppedError(Exception):
-    """A signal stopped the run; its checkpoint is written."""
-
-    def __init__(self, step: int) -> None:
-        self.step = step
-        super().__init__(step)
+    """A signal stopped the run after the step in `args`; its checkpoint is written."""
 
 
 class _Observer:

@@ -8,7 +8,6 @@ printed.  Characters that an encoding lacks are escaped.
 from __future__ import annotations
 
 import contextlib
-import errno
 import io
 import os
 import sys
@@ -87,8 +86,3 @@ def failure() -> OSError | None:
     with contextlib.suppress(OSError, ValueError):
         sys.stdout.flush()
     return None if _Kept.output is None else _Kept.output.error
-
-
-def is_of_reader(error: OSError) -> bool:
-    """Whether the reader of the output has left, who needs no message."""
-    return error.errno == errno.EPIPE

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import click
 
 from fecm.cli.common import FORMAT_OPTION, CheckFailedError, RefusedError
-from fecm.verification import Case, Row, UnknownCaseError, carry_out, chosen, table
+from fecm.verification import Case, Row, carry_out, chosen, table
 
 
 @click.command()
@@ -23,10 +23,7 @@ def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: str) -> 
     """
     if markdown and (listing or form == "json"):
         raise RefusedError("--markdown goes with neither --list nor --format json")
-    try:
-        wanted = chosen(cases)
-    except UnknownCaseError as error:
-        raise RefusedError(str(error)) from None
+    wanted = chosen(cases)
     if listing:
         _name(wanted, form)
         return

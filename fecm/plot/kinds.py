@@ -23,6 +23,10 @@ class PlotError(FecmError, ValueError):
     """A result lacks what a picture needs, or the options do not fit it."""
 
 
+class MatplotlibError(FecmError, ImportError):
+    """matplotlib is not installed."""
+
+
 @dataclass(frozen=True)
 class Picture:
     """A figure; `frames` draw its frames if it is animated; `notes` say what it shows in words."""

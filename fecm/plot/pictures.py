@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from fecm._errors import FecmError
 from fecm._files import beside
-from fecm.plot.kinds import KINDS, MISSING, Kind, Picture, PlotError
+from fecm.plot.kinds import KINDS, MISSING, Kind, MatplotlibError, Picture, PlotError
 from fecm.results.result import Result
 
 if TYPE_CHECKING:
@@ -38,13 +38,18 @@ def kind_named(name: str) -> Kind:
     return KINDS[name]
 
 
-def imported(place: str) -> Callable[..., Picture]:
-    """Import the function at ``module:name`` of this package."""
-    module, _, name = place.partition(":")
+def require_matplotlib() -> None:
+    """Raise an ImportError that says what to install if there is no matplotlib."""
     try:
         import matplotlib  # noqa: F401
     except ImportError:
-        raise ImportError(MISSING) from None
+        raise MatplotlibError(MISSING) from None
+
+
+def imported(place: str) -> Callable[..., Picture]:
+    """Import the function at ``module:name`` of this package."""
+    module, _, name = place.partition(":")
+    require_matplotlib()
     function: Callable[..., Picture] = getattr(import_module(f"fecm.plot.{module}"), name)
     return function
 

@@ -28,7 +28,10 @@ def to_xarray(result: Result) -> xarray.DataTree:
         values = result[path]
         known = DATASETS.get(path, Dataset(path, values.shape, ""))
         texts = {"long_name": known.description, "units": result.unit(known.dimension)}
-        axes = [_axis(size, f"{known.name}_{n}") for n, size in enumerate(known.shape)]
+        axes = [
+            "time" if size == "rows" else SCALES.get(str(size), (f"{known.name}_{n}",))[0]
+            for n, size in enumerate(known.shape)
+        ]
         attributes = {name: text for name, text in texts.items() if text}
         groups.setdefault(known.group, {})[known.name] = (axes, values, attributes)
     units = {"units": unit} if (unit := result.unit("length")) else {}
@@ -44,11 +47,6 @@ def to_xarray(result: Result) -> xarray.DataTree:
         tree[name] = xarray.Dataset(variables, places if at_nodes else {}, attributes)
     root = xarray.Dataset(coords=unknowns, attrs=result.attributes)
     return xarray.DataTree.from_dict({"/": root, **tree})
-
-
-def _axis(size: str | int, otherwise: str) -> str:
-    """Name of the dimension of an axis, as in the file."""
-    return "time" if size == "rows" else SCALES.get(str(size), (otherwise,))[0]
 
 
 def to_pyvista(result: Result, time: float | None) -> pyvista.UnstructuredGrid:

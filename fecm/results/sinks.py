@@ -24,27 +24,21 @@ class Sink(Protocol):
     @property
     def arrays(self) -> Mapping[str, Array]:
         """Datasets that are stored so far, by path."""
-        ...
 
     def attributes(self, group: str, values: Mapping[str, Any]) -> None:
         """Set attributes of a group; ``""`` is the file itself."""
-        ...
 
     def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
         """Create a dataset."""
-        ...
 
     def write(self, path: str, start: int, rows: Array) -> None:
         """Store rows of a dataset, beginning at row `start`."""
-        ...
 
     def trim(self, path: str, rows: int) -> None:
         """Truncate a dataset to its first rows; delete it if there are none."""
-        ...
 
     def text(self, path: str, value: str, description: str) -> None:
         """Store a text."""
-        ...
 
 
 class MemorySink:

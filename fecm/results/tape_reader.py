@@ -203,9 +203,8 @@ def _displacements(text: _Lines) -> tuple[Array, bool]:
 
 def _require_complete(text: _Lines, complete: bool) -> None:
     """Require that the last line ends a row."""
-    wrong = np.zeros(len(text.lines), dtype=bool)
-    wrong[-1] = not complete
-    text.refuse(wrong, lambda n: "the last row is not complete")
+    if not complete:
+        raise ResultFileError(f"{text.path}:{len(text.lines)}: the last row is not complete")
 
 
 def _contact(text: _Lines) -> dict[str, Array]:
