@@ -21,12 +21,11 @@ def sarif(checked: Mapping[Path, Sequence[Finding]], failures: Sequence[str]) ->
     severities = {f.code: f.severity for findings in checked.values() for f in findings}
     rules = [
         {
-            "id": code,
-            "helpUri": f"{HOME}/page/findings.html#{code.lower()}",
+            "id": code, "helpUri": f"{HOME}/page/findings.html#{code.lower()}",
             "defaultConfiguration": {"level": severities[code]},
         }
         for code in codes
-    ]
+    ]  # fmt: skip
     driver = {"name": "fecm", "version": __version__, "informationUri": HOME, "rules": rules}
     notifications = [{"level": "error", "message": {"text": text}} for text in failures]
     run = {

@@ -214,10 +214,8 @@ def surface(results: Results, *, times: Sequence[float] = (), width: str = "colu
     """The deflected plate; by default at the instant of largest deflection range."""
     ((name, result),) = results.items()
     (w,) = require(result, name, "tape3/w")
-    if times:
-        rows = stored_rows(result, name, times, 1)
-    else:
-        rows = np.array([int(np.ptp(w, axis=1).argmax())])
+    largest = np.array([int(np.ptp(w, axis=1).argmax())])
+    rows = stored_rows(result, name, times, 1) if times else largest
     columns = 1 if width == "column" else min(len(rows), 2)
     figure, plates = _plates(results, width, rows, columns, len(rows))
     clock = scale_of(results, "time", [result["tape3/time"]])

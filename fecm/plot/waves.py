@@ -18,9 +18,7 @@ WORDS = {name: name.replace("_", " ").replace("in plane", "in-plane") for name i
 DASHES: tuple[Any, ...] = (
     "-", (0, (5, 1.5)), (0, (1, 1)), (0, (7, 1.5, 1, 1.5)), (0, (7, 1.5, 1, 1.5, 1, 1.5))
 )  # fmt: skip
-_DOT: dict[str, Any] = {
-    "ls": "", "marker": "o", "ms": 3.0, "mfc": "white", "mec": "black", "mew": 0.6
-}  # fmt: skip
+_DOT: Any = {"ls": "", "marker": "o", "ms": 3.0, "mfc": "white", "mec": "black", "mew": 0.6}
 
 
 @styled

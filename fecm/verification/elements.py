@@ -34,13 +34,11 @@ STRESSES = program("TANG FORM SOLV STRE")
 IN_PLANE = "eps_xx eps_yy gamma_xy kappa_x kappa_y kappa_xy"
 
 # Corners of the four elements of the patch: no side is parallel to another or to an axis.
-CORNERS = np.array(
-    [
-        [(0.0, 0.0), (1.1, -0.1), (2.0, 0.1)],
-        [(-0.1, 0.9), (1.2, 1.1), (2.1, 0.8)],
-        [(0.1, 2.0), (0.9, 2.2), (2.0, 1.9)],
-    ]
-)
+CORNERS = np.array([
+    [(0.0, 0.0), (1.1, -0.1), (2.0, 0.1)],
+    [(-0.1, 0.9), (1.2, 1.1), (2.1, 0.8)],
+    [(0.1, 2.0), (0.9, 2.2), (2.0, 1.9)],
+])  # fmt: skip
 
 
 @case("patch")
