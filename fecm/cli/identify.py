@@ -55,10 +55,7 @@ def identify(
     problem = load_single(deck, "identify")
     units = unit_names(problem.deck)
     found = fit(problem.deck, measurement_of(measured, units), free, sensor)
-    if picture is not None:
-        from fecm.plot.histories import fit_picture
-
-        targets.draw(fit_picture(found, units))
+    targets.draw("histories:fit_picture", found, units)
     if output is not None:
         write_lines([found.deck.to_text()], output, overwrite=overwrite)
         note(f"wrote {output}")
