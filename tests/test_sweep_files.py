@@ -207,3 +207,19 @@ def test_steps_that_there_are_not_end_in_one_line(
         done = call(*command, bad)
         assert_unusable(done)
         assert "history/steps does not match the stored steps" in done.stderr
+
+
+def test_a_history_streamed_from_stored_tasks_is_the_one_in_memory(tmp_path: Path) -> None:
+    # Tasks have cases that are not adjacent, other numbers of steps, or no case that can be run.
+    deck = tmp_path / "plate.inp"
+    deck.write_text(small())
+    vary: dict[str, list[object]] = {
+        "k": [1e6, 2e6], "layup": ["[0/90]", "nonsense", "[0]"], "dt": [5e-7, 1e-6],
+    }  # fmt: skip
+    fecm.sweep(deck, vary, history=True, output=tmp_path / "memory.h5")
+    options = [part for n, v in vary.items() for part in ("--vary", f"{n}={','.join(map(str, v))}")]
+    done = call(
+        "sweep", deck, *options, "--history", "--allow-failed", "-o", tmp_path / "stream.h5"
+    )
+    assert done.exit_code == 0
+    assert (tmp_path / "stream.h5").read_bytes() == (tmp_path / "memory.h5").read_bytes()

@@ -32,8 +32,11 @@ from fecm.sweeps.cases import (
     parse_vary,
     read_cases,
 )
+from fecm.sweeps.convergence import refined_cases
+from fecm.sweeps.convergence import table as table_of
 from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.plan import (
+    DEFLECTION,
     MEASURES,
     Plan,
     Task,
@@ -66,6 +69,10 @@ from fecm.sweeps.store import PartialResults
                    f"{', '.join(NAMES)}.")  # fmt: skip
 @click.option("--cases", "table", type=DECK_PATH, metavar="CASES.csv",
               help="A table instead of --vary: a header of names, one row per case.")  # fmt: skip
+@click.option("--refine", "factors", type=ListOf("FACTOR,...", click.IntRange(1, 8)),
+              metavar="1,2,4",
+              help="Instead: divide the sides of all elements and DT by factors; order "
+                   "and limit of every quantity.")  # fmt: skip
 @click.option("--random", "laws", type=Parsed(parse_random), multiple=True, metavar="NAME=LAW",
               help="Random value: normal:MEAN,SD, lognormal:MEDIAN,SIGMA, uniform:A,B or "
                    "triangular:A,MODE,B; may be repeated, together with --vary.")  # fmt: skip
@@ -108,6 +115,7 @@ def sweep(
     deck: Path,
     varied: tuple[tuple[str, list[Value]], ...],
     table: Path | None,
+    factors: tuple[int, ...] | None,
     laws: tuple[tuple[str, Law], ...],
     samples: int | None,
     seed: int | None,
@@ -133,7 +141,10 @@ def sweep(
     failed, for which the exit status is 1, and those that ended in contact.
     """
     path = output or Path(f"{deck.stem}-sweep.h5")
-    if bool(varied) == (table is not None) and (varied or (until is None and not laws)):
+    if factors and (varied or table or laws or until or extra):
+        raise click.UsageError("--refine varies nothing else and measures no more")
+    other = until is not None or laws or factors
+    if bool(varied) == (table is not None) and (varied or not other):
         raise click.UsageError("give either --vary or --cases")
     if laws and table is not None:
         raise click.UsageError("--random goes with --vary, not with --cases")
@@ -151,7 +162,10 @@ def sweep(
         raise click.UsageError("give only one of --workers, --scheduler and --scheduler-file")
     if full and find:
         raise click.UsageError("--full runs given velocities: --vary velocity=FOUND --full 0")
+    problem = _problem(deck)
     cases = grid(varied) if table is None else read_cases(table)
+    if factors:
+        cases, extra = refined_cases(problem, factors), (DEFLECTION,)
     design = None
     if laws:
         design = design_of(dict(laws), samples, seed or 0, kind or "lhs", sensitivity=sensitivity)
@@ -162,7 +176,6 @@ def sweep(
     fulls = {case: path.with_name(f"{path.stem}-{case}{path.suffix}") for case in chosen}
     check_outputs([path, *fulls.values()], overwrite, [deck] if table is None else [deck, table])
     scheduler = scheduler if scheduler_file is None else address_in(scheduler_file)
-    problem = _problem(deck)
     planned = plan(
         problem, cases, history=history, until=until, extra=extra, design=design, limits=limits
     )
@@ -172,20 +185,22 @@ def sweep(
         for text in (doubt(design), cost(cases, design, shared=shared)):
             if text:
                 note(text)
-    check_memory(problem, planned, 0 if scheduler is not None else workers)
+    check_memory(problem, planned, 0 if scheduler is not None else workers, streamed=True)
     if count := freed(tasks(problem, planned)):
         note(
             f"B is not zero in {count} case{'' if count == 1 else 's'}: u and v, which the deck "
             "restrains at every node, are free there except where w is held"
         )
-    result = _carry_out(problem, planned, path, workers, scheduler, overwrite=overwrite)
-    save(result, path, overwrite=overwrite)
+    parts = PartialResults(path, planned.fingerprint(), restart=overwrite)
+    result = _carry_out(problem, planned, parts, workers, scheduler)
+    forces = parts.forces(tasks(problem, planned)) if history else None
+    save(result, path, overwrite=overwrite, forces=forces)
     if lost := sum(status.startswith(LOST) for status in result["status"].tolist()):
         note(f"{lost} cases were lost with their workers; --overwrite runs them again")
     else:
-        PartialResults(path, planned.fingerprint(), restart=True).clear()
+        parts.clear()
     echo(result.title or "sweep")
-    for line in summary(result):
+    for line in (*summary(result), *table_of(result.cases, result.summary)):
         echo(f"  {line}")
     for line in () if result.random is None else tables(result.random, result.unit):
         echo(f"  {line}".rstrip())
@@ -211,16 +226,13 @@ def _problem(deck: Path) -> Problem:
 def _carry_out(
     problem: Problem,
     planned: Plan,
-    path: Path,
+    parts: PartialResults,
     workers: int,
     scheduler: str | None,
-    *,
-    overwrite: bool,
 ) -> SweepResult:
     """Run the plan with a progress bar; finished cases survive any interruption."""
-    parts = PartialResults(path, planned.fingerprint(), restart=overwrite)
     try:
-        with signals.deferred(), _progress(len(planned.cases)) as done:
+        with signals.deferred(), _progress(len(planned.cases), workers) as done:
             return carry_out(
                 problem, planned, workers=workers, scheduler=scheduler, parts=parts, done=done,
                 idle=signals.heed, note=note,
@@ -234,7 +246,7 @@ def _carry_out(
 
 
 @contextlib.contextmanager
-def _progress(count: int) -> Iterator[Callable[[Task, Outcome], None]]:
+def _progress(count: int, workers: int) -> Iterator[Callable[[Task, Outcome], None]]:
     """Show cases done, their rate and the time left, where standard error is a terminal."""
     if not sys.stderr.isatty():
         yield lambda task, outcome: None
@@ -243,7 +255,8 @@ def _progress(count: int) -> Iterator[Callable[[Task, Outcome], None]]:
 
     def rate(_: object) -> str:
         seconds = time.monotonic() - begin
-        return f"{finished} cases, {finished / seconds:.3g} a second" if seconds else ""
+        per_core = finished / seconds / workers if seconds else 0.0
+        return f"{finished} cases, {per_core:.3g} a second per worker" if finished else ""
 
     with click.progressbar(
         length=count, label="fecm", file=sys.stderr, show_eta=True, item_show_func=rate

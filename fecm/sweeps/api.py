@@ -18,8 +18,9 @@ from fecm.deck.model import Deck
 from fecm.problem.problem import Problem
 from fecm.sweeps.batch import built, deck_of
 from fecm.sweeps.cases import Case, CasesError, Limit, checked, combined, parse_exceed
+from fecm.sweeps.convergence import refined_cases
 from fecm.sweeps.outcome import RUN, Outcome, merge
-from fecm.sweeps.plan import Build, Measure, Plan, Task, check_memory, plan, tasks
+from fecm.sweeps.plan import DEFLECTION, Build, Measure, Plan, Task, check_memory, plan, tasks
 from fecm.sweeps.result import SweepResult, result_of, save
 from fecm.sweeps.sampling import (
     REMEDY,
@@ -125,12 +126,20 @@ def carry_out(
 ) -> SweepResult:
     """Run the tasks of a plan in this process, on an executor, a scheduler or several workers.
 
-    Tasks that `parts` has stored are not run again.  `done` is called with each task and its
-    outcome, including tasks finished earlier, `idle` regularly, `note` with messages for the user.
-    The executor is not shut down.  Raises SchedulerError if the scheduler cannot be used.
+    Tasks that `parts` has stored are not run again; with it, the result has no forces.  `done` is
+    called with each task and its outcome, including tasks finished earlier, `idle` regularly,
+    `note` with messages for the user.  The executor is not shut down.  Raises SchedulerError if the
+    scheduler cannot be used.
     """
     outcomes: list[Outcome] = []
     left: list[Task] = []
+
+    def take(task: Task, outcome: Outcome) -> None:
+        if parts is not None or not made.history:
+            outcome.force = None
+        outcomes.append(outcome)
+        done(task, outcome)
+
     for task in tasks(problem, made):
         before = None
         try:
@@ -140,14 +149,12 @@ def carry_out(
         if before is None:
             left.append(task)
         else:
-            outcomes.append(before)
-            done(task, before)
+            take(task, before)
 
     def keep(task: Task, outcome: Outcome) -> None:
         if parts is not None and not lost(outcome):
             parts.put(task, outcome)
-        outcomes.append(outcome)
-        done(task, outcome)
+        take(task, outcome)
 
     if executor is not None:
         on_executor(left, executor, keep, idle)
@@ -158,7 +165,7 @@ def carry_out(
     else:
         run_serial(left, keep, idle)
     outcome = merge(outcomes)
-    if not made.history:
+    if parts is not None or not made.history:
         outcome.force = None
     return result_of(made, outcome)
 
@@ -168,6 +175,7 @@ def sweep(
     vary: Mapping[str, Sequence[Any]] | None = None,
     cases: Iterable[Mapping[str, Any]] | None = None,
     *,
+    refine: Sequence[int] | None = None,
     random: Mapping[str, str] | None = None,
     samples: int | None = None,
     seed: int = 0,
@@ -197,6 +205,9 @@ def sweep(
         Values by name; all combinations are run.
     cases : iterable of mapping, optional
         Cases instead, one mapping each.
+    refine : sequence of int, optional
+        Factors 1, 2, 4, 8 or a part of them, instead: the sides of all elements and DT are divided
+        by each.  :attr:`SweepResult.convergence` has observed orders and limits.
     random : mapping of str to str, optional
         Laws of random values by name: ``"normal:MEAN,SD"``, ``"lognormal:MEDIAN,SIGMA"``,
         ``"uniform:A,B"`` or ``"triangular:A,MODE,B"``.  With `vary` all combinations get the same
@@ -273,11 +284,16 @@ def sweep(
     >>> found["w"].shape
     (2,)
     """
+    others = (vary, cases, random, until, build, measure)
+    if refine is not None and any(other is not None for other in others):
+        raise CasesError("refine can't be given together with other cases, until, build or measure")
     if random is None and (samples is not None or seed or sensitivity or exceed):
         raise CasesError("samples, seed, sensitivity and exceed need random values")
     if cases is not None and random is not None:
         raise CasesError("give random values together with vary, not with cases")
-    if (vary is None) == (cases is None) and (vary or (until is None and random is None)):
+    if (vary is None) == (cases is None) and (
+        vary or (until is None and random is None and refine is None)
+    ):
         raise CasesError("give either vary or cases")
     if not (random is None or (isinstance(random, Mapping) and random)):
         raise CasesError(
@@ -318,6 +334,8 @@ def sweep(
         if finding.severity == "warning":
             warn(finding.render(prepared.source))
     (problem,) = prepared.problems
+    if refine is not None:
+        made, extra = refined_cases(problem, refine), (DEFLECTION,)
     planned = plan(
         problem, made, history=history, until=until, build=build, measure=own, extra=extra,
         design=drawn, limits=_limits(exceed or {}),

@@ -36,6 +36,8 @@ LAMINATE = (
 )  # fmt: skip
 PLATE = (*LOAD, *LAMINATE, "size", "support", "dt", "duration")
 NAMES = (*CONTACT, *PLATE)
+# Factor of a refinement study, which varies nothing else.
+REFINE = "refine"
 # Of each of these names only one can vary.
 EXCLUDING = (
     ("velocity", "energy"), ("k", "radius"), ("mass", "rod_mass", "rod_density"),

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from fecm._typing import Floats
 from fecm.results.metrics import COLUMNS, SUMMARY
 
+# Numbers of cases, and their contact forces, (cases, steps).
+Forces = tuple[Sequence[int], Floats | None]
+
 FINE = "ok"
 # The run ends during contact.
 STILL = "still in contact"

@@ -24,6 +24,7 @@ from fecm.sweeps.cases import (
     LAMINATE,
     LOAD,
     PLATE,
+    REFINE,
     THRESHOLD,
     Case,
     CasesError,
@@ -34,7 +35,7 @@ from fecm.sweeps.clock import Clock, clock_of
 from fecm.sweeps.find import COUNT
 from fecm.sweeps.random_result import check_limits
 from fecm.sweeps.sampling import Design
-from fecm.sweeps.vary import apply_case
+from fecm.sweeps.vary import apply_case, check_deck
 
 Build = Callable[[dict[str, Any]], Deck]
 Measure = Callable[[Result], Mapping[str, float]]
@@ -165,7 +166,7 @@ def tasks(checked: Problem, made: Plan) -> list[Task]:
     together = max(1, _together(checked, made) // (1 if made.until is None else COUNT))
     groups: dict[tuple[object, ...], list[int]] = {}
     for number, case in enumerate(made.cases):
-        key = tuple(case[name] for name in PLATE if name in case)
+        key = tuple(case[name] for name in (*PLATE, REFINE) if name in case)
         groups.setdefault(key, []).append(number)
     found: list[Task] = []
     for numbers in groups.values():
@@ -210,18 +211,22 @@ def without_output(body: Body, kept_words: Sequence[str] = ()) -> Body:
 KEPT = 24
 
 
-def check_memory(checked: Problem, made: Plan, workers: int) -> None:
+def check_memory(checked: Problem, made: Plan, workers: int, *, streamed: bool = False) -> None:
     """Reject a sweep that needs more memory than is free, by a NotEnoughMemoryError.
 
-    `workers` are those on this machine; 0 if a cluster runs the cases.
+    `workers` are those on this machine; 0 if a cluster runs the cases.  If histories are
+    `streamed` to files, only those of one task are held.
     """
+    if REFINE in made.cases[-1]:
+        checked = check_deck(apply_case(made.deck, made.cases[-1]))
     steps, cases = checked.work.steps, len(made.cases)
     at_once = min(workers, len(tasks(checked, made)))
     plate = checked
     if made.measure is None:
         words = ("FAIL",) if FAILURE in made.extra else ()
         plate = replace(checked, program=without_output(checked.program, words))
-    kept = KEPT * steps * cases if made.history else 0
+    held = min(cases, TOGETHER) if streamed else cases
+    kept = KEPT * steps * held if made.history else 0
 
     def needed(exact: bool) -> int:
         if not at_once:

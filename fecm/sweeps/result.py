@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -19,7 +19,8 @@ from fecm.deck.units import unit_names, unit_of
 from fecm.results.metrics import COLUMNS, FOUND, SUMMARY, THRESHOLD, described
 from fecm.results.schema import FORMAT_VERSION, SWEEP, Dataset, ResultFileError, declared_units
 from fecm.sweeps.cases import pair
-from fecm.sweeps.outcome import RUN, STILL, Outcome
+from fecm.sweeps.convergence import Convergence, convergence
+from fecm.sweeps.outcome import RUN, STILL, Forces, Outcome
 from fecm.sweeps.plan import Plan
 from fecm.sweeps.random_result import RandomResult, attributes, evaluate, random_of, stored
 
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fecm.results.hdf5_reader import Contents
+    from fecm.results.hdf5_writer import FileSink
 
 
 Array = NDArray[Any]
@@ -36,6 +38,7 @@ Array = NDArray[Any]
 WORDS = 18
 # Distance from the place given, relative to its coordinates, that is rounding.
 SAME = 1e-9
+FORCE = "history/force"
 # Reasons of failure that the summary lists.
 LISTED = 5
 
@@ -189,6 +192,11 @@ class SweepResult:
     def still(self) -> NDArray[np.bool_]:
         """Cases that were run and ended in contact."""
         return np.asarray(self.summary["status"] == STILL)
+
+    @property
+    def convergence(self) -> dict[str, Convergence]:
+        """Order and limit of every quantity of a refinement study; empty for other sweeps."""
+        return convergence(self.cases, self.summary)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -346,10 +354,17 @@ def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
     )  # fmt: skip
 
 
-def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
+def save(
+    result: SweepResult,
+    path: Path,
+    *,
+    overwrite: bool = True,
+    forces: Iterable[Forces] | None = None,
+) -> None:
     """Write the result of a sweep.
 
-    Raises ResultWriteError if the file cannot be written; an existing file is then unchanged.
+    `forces` are those that the result does not hold, of some cases after the other.  Raises
+    ResultWriteError if the file cannot be written; an existing file is then unchanged.
     """
     from fecm.results.hdf5_writer import writing
 
@@ -367,9 +382,10 @@ def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
     if (unconverged := result.unconverged_steps) is not None:
         text = "steps whose contact iteration did not converge"
         columns.append(("history/unsettled_steps", unconverged, text, ""))
-    if result.force is not None and len(result):
-        text = "contact force after every step"
-        columns.append(("history/force", result.force, text, "force"))
+    if result.force is not None:
+        forces = [(range(len(result)), result.force)]
+    if forces is not None and len(result):
+        columns.append((FORCE, None, "contact force after every step", "force"))
     with writing(path, overwrite=overwrite) as sink:
         about = {"format": SWEEP, "format_version": FORMAT_VERSION, "fecm_version": __version__}
         sink.attributes("", {**about, "title": result.title, **units})
@@ -380,6 +396,13 @@ def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
             for group, values in attributes(result.random).items():
                 sink.attributes(group, values)
         for name, values, text, dimension, *own in columns:
+            if name == FORCE:
+                longest = int(result.steps.max())
+                made = Dataset(FORCE, ("cases", "steps"), text, dimension)
+                sink.create(made, (len(result), longest))
+                for numbers, force in forces or ():
+                    _write_forces(sink, numbers, force, longest)
+                continue
             axes = own[0] if own else ("cases", "steps")[: values.ndim]
             if values.dtype.kind in "US":
                 sink.text(name, values.tolist(), text, axes)
@@ -389,6 +412,18 @@ def save(result: SweepResult, path: Path, *, overwrite: bool = True) -> None:
             sink.write(name, 0, values)
         for group, text in GROUPS.items():
             sink.attributes(group, {"description": text})
+        for name, one in result.convergence.items():
+            sink.attributes(f"convergence/{name}", vars(one))
+
+
+def _write_forces(sink: FileSink, numbers: Sequence[int], force: Any, longest: int) -> None:
+    """Write the forces of some cases, NaN after the last step of each."""
+    rows = np.full((len(numbers), longest), np.nan)
+    if force is not None:
+        rows[:, : force.shape[1]] = force
+    ends = np.flatnonzero(np.diff(numbers) != 1) + 1
+    for start, some in zip([0, *ends.tolist()], np.split(rows, ends), strict=True):
+        sink.write(FORCE, numbers[start], some)
 
 
 def load(path: Path) -> SweepResult:

@@ -10,13 +10,14 @@ import hashlib
 import io
 import json
 import shutil
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from fecm._errors import FecmError
 from fecm._files import beside, packed
-from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.outcome import Forces, Outcome
 from fecm.sweeps.plan import Task
 
 MARK = "sweep.json"
@@ -86,6 +87,12 @@ class PartialResults:
         with beside(self._path(task)) as partial, partial.open("wb") as file:
             file.write(data)
             file.write(hashlib.sha256(data).digest())
+
+    def forces(self, tasks: Sequence[Task]) -> Iterator[Forces]:
+        """Read the contact forces of one task after the other; None if all its cases failed."""
+        for task in tasks:
+            outcome = self.get(task)
+            yield task.numbers, None if outcome is None else outcome.force
 
     def clear(self) -> None:
         """Delete the folder."""

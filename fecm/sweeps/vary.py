@@ -41,8 +41,9 @@ from fecm.problem.check_program import UNSTABLE
 from fecm.problem.generate import generate, restraint_codes
 from fecm.problem.plate_mesh import BOUNDARY, PlateMesh
 from fecm.problem.problem import Problem, check
+from fecm.problem.refine import RefineError, refined
 from fecm.studies.indentation_test.modulus import effective_stiffness, indentation_modulus
-from fecm.sweeps.cases import Case, CasesError, Value, check_names, pair
+from fecm.sweeps.cases import REFINE, Case, CasesError, Value, check_names, pair
 from fecm.sweeps.clock import with_time_step
 
 MASS = ("mass", "rod_mass")
@@ -315,8 +316,19 @@ def _taken_time_step(deck: Deck) -> float:
     return taken_time_step(check_deck(deck).critical_time_step)
 
 
+def _refined(deck: Deck, name: str, value: Value) -> Deck:
+    """Divide the sides of all elements by a power of two."""
+    try:
+        for _ in range(int(value).bit_length() - 1):
+            deck = refined(deck, generate(deck))
+    except RefineError as error:
+        raise CasesError(f"refine: {error}") from None
+    return deck
+
+
 # In the order in which they are applied.
 _SETTERS: dict[str, Callable[[Deck, str, Value], Deck]] = {
+    REFINE: _refined,
     "layup": _layup,
     "angle": _angle,
     "thickness": _thickness,

@@ -1,0 +1,113 @@
+"""Refinement studies: orders and limits of known sequences, and those of a plate's exact series."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import fecm
+from fecm.deck.model import Deck, Patch
+from fecm.sweeps.cases import CasesError
+from fecm.sweeps.convergence import convergence
+from tests.builders import REPORT_PLY, table
+from tests.calls import assert_unusable, call
+from tests.decks import small
+
+# Peak force of the simply supported cross-ply plate under a disc, from the exact series.
+RADIUS = 0.25
+(PEAK,) = (
+    float(row["peak force"])
+    for row in table("patch_impact_summary.csv")
+    if float(row["c"]) == RADIUS
+)
+
+
+def plate() -> Deck:
+    """The report's plate and rigid mass with a patch, until after its first peak."""
+    with pytest.warns(fecm.FecmWarning, match="18x12 elements"):
+        return fecm.impact(
+            fecm.Plate.rectangle((6.0, 4.0), (12, 8), support="simple"),
+            fecm.Laminate("[0/90/0/90/0/90/0/90/0/90]s", REPORT_PLY, 0.0053),
+            fecm.RigidMass(0.000181),
+            fecm.Contact(1912000.0, 1.0, 0.0, 1.5),
+            velocity=115.0, duration=3e-5, patch=Patch(radius=RADIUS),
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0, 3.5])
+def test_a_power_law_has_its_order_and_its_limit(order: float) -> None:
+    factors = np.array([1, 2, 4, 8])
+    values = 80.0 - 3.0 * (1.0 / factors) ** order
+    found = convergence({"refine": factors}, {"peak_force": values})["peak_force"]
+    assert found.order == pytest.approx(order, rel=1e-9)
+    assert found.limit == pytest.approx(80.0, rel=1e-12)
+    assert not found.remark
+
+
+@pytest.mark.parametrize(
+    ("values", "limit", "remark"),
+    [
+        ([1.0, 2.0, 1.5], np.nan, "not monotone"),
+        ([1.0, 2.0, 3.0], np.nan, "does not converge"),
+        ([1.0, 2.0, 2.0], 2.0, "equal"),
+        ([1.0, np.nan, 2.0], np.nan, "missing"),
+        ([1.0, 4.0], 5.0, "order 2 is assumed"),
+    ],
+)
+def test_no_order_is_stated_where_there_is_none(
+    values: list[float], limit: float, remark: str
+) -> None:
+    factors = np.array([1, 2, 4])[: len(values)]
+    found = convergence({"refine": factors}, {"impulse": np.array(values)})["impulse"]
+    np.testing.assert_equal(found.limit, limit)
+    assert remark in found.remark
+
+
+def test_the_limit_of_two_meshes_is_that_of_the_series() -> None:
+    found = fecm.sweep(plate(), refine=[1, 2])
+    assert found["elements"].tolist() == [216, 864]
+    assert found["dt"][0] == 2.0 * found["dt"][1]
+    assert found.steps[1] == pytest.approx(2 * found.steps[0], abs=1)
+    assert found.convergence["peak_force"].limit == pytest.approx(PEAK, rel=1e-3)
+    assert np.isfinite(found["max_deflection"]).sum() + found.still.sum() == 2
+
+
+@pytest.mark.long
+def test_order_and_limit_of_three_meshes_are_printed_and_stored(tmp_path: Path) -> None:
+    (tmp_path / "plate.inp").write_text(plate().to_text())
+    done = call("sweep", "plate.inp", "--refine", "1,2,4", "-o", "s.h5", cwd=tmp_path)
+    assert done.exit_code == 0
+    (line,) = [line for line in done.stdout.splitlines() if "peak_force" in line]
+    order, limit = map(float, line.split()[-2:])
+    with h5py.File(tmp_path / "s.h5") as file:
+        stored = dict(file["convergence/peak_force"].attrs)
+    assert stored["order"] == pytest.approx(order, abs=5e-3)
+    assert stored["limit"] == pytest.approx(limit, rel=1e-5)
+    assert limit == pytest.approx(PEAK, rel=1e-3)
+    assert order > 1.0
+    assert fecm.load_sweep(tmp_path / "s.h5").convergence["peak_force"].order == stored["order"]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--refine", "1,3"), "1,2,4,8"),
+        (("--refine", "2"), "at least two"),
+        (("--refine", "1,2", "--vary", "k=1e6"), "varies nothing else"),
+    ],
+)
+def test_a_refinement_that_is_none_is_refused(
+    options: tuple[str, ...], said: str, tmp_path: Path
+) -> None:
+    (tmp_path / "plate.inp").write_text(small())
+    done = call("sweep", tmp_path / "plate.inp", *options, "-o", tmp_path / "s.h5")
+    assert_unusable(done)
+    assert said in done.stderr
+
+
+def test_a_refinement_varies_nothing_else() -> None:
+    with pytest.raises(CasesError, match="refine"):
+        fecm.sweep(small(), {"k": [1e6]}, refine=[1, 2])
