@@ -1,11 +1,12 @@
 """A thousand impacts as a whole process, against their full runs and a plain sparse loop.
 
-    python benchmarks/sweep.py [--write]
+    python benchmarks/sweep.py [--many] [--write]
 
 The report's plate over 800 µs (4000 steps) is hit at 40 velocities with 25 contact coefficients:
 ``fecm sweep`` in a process of its own, from its start to its end, and the same with ``--history``.
 Every 50th case is run in full by ``fecm.run``; what is compared is the contact force of every step,
 over the peak force.  The plain loop is that of run.py, once, times 1000.
+`--many` also runs 10^5 cases; the processor time of a case is compared with that of a full run.
 `--write` keeps the figures in benchmarks/results, under the machine's name.
 """
 
@@ -31,11 +32,13 @@ from fecm.sweeps.vary import apply_case
 DECK = HERE.parent / "decks" / "impact-115.inp"
 VARY = ("--vary", "velocity=50:300:40", "--vary", "k=1e6:3e6:25")
 CASES, STEPS, EVERY = 1000, 4000, 50
+MANY = ("--vary", "velocity=50:300:400", "--vary", "k=1e6:3e6:250")
+MANY_CASES = 100_000
 
 
-def process(output: Path, *options: str) -> float:
+def process(output: Path, *options: str, vary: tuple[str, ...] = VARY) -> float:
     """Seconds of a sweep as a process."""
-    command = [sys.executable, "-m", "fecm", "sweep", str(DECK), *VARY, "-o", str(output),
+    command = [sys.executable, "-m", "fecm", "sweep", str(DECK), *vary, "-o", str(output),
                "--overwrite", *options]  # fmt: skip
     begin = time.perf_counter()
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -90,12 +93,36 @@ def measure() -> dict[str, float | int]:
     }
 
 
+def throughput() -> dict[str, float | int]:
+    """Processor time and memory of many cases, beside those of a full run."""
+    with tempfile.TemporaryDirectory() as folder:
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        process(Path(folder) / "sweep.h5", vary=MANY)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    alone = []
+    for _ in range(ROUNDS):
+        begin = time.process_time()
+        full({"velocity": 115.0})
+        alone.append(time.process_time() - begin)
+    return {
+        "many_cases": MANY_CASES,
+        "many_cases_a_cpu_second": round(MANY_CASES / seconds),
+        "many_peak_memory_mb": round(after.ru_maxrss / 1024, 1),
+        "full_run_cpu_seconds": round(statistics.median(alone), 3),
+        "cases_for_a_full_run": round(statistics.median(alone) * MANY_CASES / seconds),
+    }
+
+
 def main() -> None:
     """Measure, print a table, and keep it if asked."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--write", action="store_true", help="keep the figures as JSON")
+    parser.add_argument("--many", action="store_true", help="also run 10^5 cases")
     options = parser.parse_args()
     figures = measure()
+    if options.many:
+        figures |= throughput()
     for name, value in figures.items():
         print(f"{name.replace('_', ' '):24}{value:>10}")
     if options.write:

@@ -20,7 +20,7 @@ from fecm.api import load_deck
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import build_plate
 from fecm.problem.memory import needed_bytes
-from fecm.sweeps.plan import ADVANCED, KEPT
+from fecm.sweeps.plan import ADVANCED, KEPT, TOGETHER
 from tests.calls import assert_unusable, call
 from tests.decks import small
 
@@ -130,14 +130,14 @@ def test_the_estimate_of_a_sweep_bounds_what_is_measured(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )
     measured = int(done.stdout)
-    estimated = steps * (ADVANCED * min(cases, 1024) + (KEPT * cases if history else 0))
+    estimated = steps * (ADVANCED * min(cases, TOGETHER) + (KEPT * cases if history else 0))
     assert measured <= estimated <= 2 * measured
 
 
 @pytest.mark.parametrize(
     ("options", "free", "remedy"),
-    [((), 50, "fewer steps"), (("--workers", "3"), 500, "fewer workers"),
-     (("--history",), 500, "none of their histories")],
+    [((), 50, "fewer steps"), (("--workers", "3"), 400, "fewer workers"),
+     (("--history",), 400, "none of their histories")],
 )  # fmt: skip
 def test_a_sweep_that_needs_more_than_is_free_is_refused_with_both_numbers(
     tmp_path: Path,
@@ -148,7 +148,7 @@ def test_a_sweep_that_needs_more_than_is_free_is_refused_with_both_numbers(
 ) -> None:
     monkeypatch.setattr(fecm._memory, "available", lambda: free * MEGABYTE)
     deck = tmp_path / "small.inp"
-    deck.write_text(small().replace("LOOP         10", "LOOP       9000"))
+    deck.write_text(small().replace("LOOP         10", "LOOP       4500"))
     vary = ("--vary", "velocity=50:100:3000", "-o", tmp_path / "s.h5")
     done = call("sweep", deck, *vary, *options)
     assert (done.exit_code, done.stdout) == (2, "")

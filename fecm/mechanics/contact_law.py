@@ -17,6 +17,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._typing import Floats
+
 # float or Floats, and bool or Bools: one case, or an array of cases.
 Number = Any
 Truth = Any
@@ -237,32 +239,47 @@ class HystereticLaw(MeasuredLaw):
         self, memory: LoadingHistory, last: ContactPoint, indentation: Number
     ) -> tuple[Number, LoadingHistory]:
         """Contact force at a trial indentation; a trial does not change the history."""
-        return self.accept(memory, last, indentation).force(indentation), memory
+        if not isinstance(indentation, np.ndarray):
+            return self.accept(memory, last, indentation).force(indentation), memory
+        cases, new = self._turning(memory, last, indentation)
+        force = memory.force(indentation)
+        if new is not None:
+            force[cases] = new.force(indentation[cases])
+        return force, memory
 
     def accept(
         self, memory: LoadingHistory, last: ContactPoint, indentation: Number
     ) -> LoadingHistory:
         """Loading history after a step that ends at an indentation."""
         m, a = memory, indentation
-        falls = a < last.indentation
-        virgin, unloading = m.branch == VIRGIN, m.branch == UNLOADING
         if isinstance(a, np.ndarray):
-            rises = a > last.indentation
-            turns = np.where(virgin, falls, (a >= m.peak) | np.where(unloading, rises, falls))
-            cases = np.flatnonzero(turns)
-            if not len(cases):
+            cases, new = self._turning(m, last, a)
+            if new is None:
                 return m
-            law = HystereticLaw(self.constants.of_cases(cases))
-            at = ContactPoint(*(x[cases] for x in last))
-            new = law._turned(LoadingHistory(*(x[cases] for x in m)), at, a[cases])
             updated = LoadingHistory(*(x.copy() for x in m))
             for values, changed in zip(updated, new, strict=True):
                 values[cases] = changed
             return updated
+        falls = a < last.indentation
+        virgin, unloading = m.branch == VIRGIN, m.branch == UNLOADING
         # Most steps stay on the same curve.
         if not falls if virgin else a < m.peak and falls == unloading:
             return m
         return self._turned(m, last, a)
+
+    def _turning(
+        self, m: LoadingHistory, last: ContactPoint, a: Floats
+    ) -> tuple[NDArray[np.intp], LoadingHistory | None]:
+        """Cases that may leave their branch, and their loading histories; None without any."""
+        falls, rises = a < last.indentation, a > last.indentation
+        virgin, unloading = m.branch == VIRGIN, m.branch == UNLOADING
+        turns = np.where(virgin, falls, (a >= m.peak) | np.where(unloading, rises, falls))
+        cases = np.flatnonzero(turns)
+        if not len(cases):
+            return cases, None
+        law = HystereticLaw(self.constants.of_cases(cases))
+        at = ContactPoint(*(x[cases] for x in last))
+        return cases, law._turned(LoadingHistory(*(x[cases] for x in m)), at, a[cases])
 
     def _turned(self, m: LoadingHistory, last: ContactPoint, a: Number) -> LoadingHistory:
         """Loading history where the indentation may leave the branch."""

@@ -76,10 +76,19 @@ class Indentation(NamedTuple):
     permanent: Floats
 
 
+# Values of a part of a sum, which stays in the cache.
+PART = 1 << 15
+
+
 def _total(weights: Floats, values: NDArray[Any]) -> Floats:
     """Weighted sums over the steps, in their order whatever the number of cases."""
-    weighted = weights[:, None] * values
-    return np.array(np.add.accumulate(weighted, out=weighted)[-1])
+    total: Floats = np.zeros(values.shape[1])
+    rows = max(1, PART // values.shape[1])
+    for start in range(0, len(values), rows):
+        part = weights[start : start + rows, None] * values[start : start + rows]
+        part[0] += total
+        total = np.add.accumulate(part, out=part)[-1].copy()
+    return total
 
 
 def summarise(

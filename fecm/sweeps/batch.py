@@ -105,7 +105,7 @@ def run(task: Task) -> Outcome:
         except CasesError as error:
             lost |= dict.fromkeys(numbers, str(error))
         else:
-            runs = runs_of(checked, task.extra)
+            runs = runs_of(checked, task.extra, history=task.history)
             outcome = (
                 runs(numbers, decks, True)
                 if task.until is None
@@ -186,10 +186,10 @@ def _told(error: Exception) -> str:
     return f"{type(error).__name__}: {' '.join(str(error).split())}"
 
 
-def runs_of(checked: Problem, extra: Sequence[str] = ()) -> Runs:
+def runs_of(checked: Problem, extra: Sequence[str] = (), *, history: bool = True) -> Runs:
     """Return the function that runs decks which share the plate of a problem."""
     if shares_plate(checked):
-        return partial(_together, checked, _plate(checked, extra), extra)
+        return partial(_together, checked, _plate(checked, extra), extra, history)
     return lambda numbers, decks, judged: merge(
         [_alone(n, replace(checked, deck=deck), extra=extra)
          for n, deck in zip(numbers, decks, strict=True)]
@@ -314,13 +314,15 @@ def _together(
     checked: Problem,
     plate: Plate,
     extra: Sequence[str],
+    history: bool,
     numbers: list[int],
     decks: list[Deck],
     judged: bool,
 ) -> Outcome:
     """Run cases that share a plate by its response to a unit force.
 
-    Those with doubtful energies are run in full if they are judged.
+    The outcome has the contact forces if `history` is set.  Cases with doubtful energies are run in
+    full if they are judged.
     """
     steps, dt = len(plate.response), plate.dt
     projectiles = [build_projectile(deck) for deck in decks]
@@ -349,10 +351,11 @@ def _together(
         peaks[DEFLECTION] = found.deflection
     summary |= {name: _known(*peak, found.force[-1]) for name, peak in peaks.items()}
     back = np.argsort(order)
-    force = np.ascontiguousarray(found.force.T[back])
     unsettled = found.unconverged_steps[back]
     columns = {name: values[back] for name, values in summary.items()}
-    outcome = outcome_of(numbers, columns, force, dt, unsettled)
+    outcome = outcome_of(numbers, columns, found.force[-1, back], steps, dt, unsettled)
+    if history:
+        outcome.force = np.ascontiguousarray(found.force.T[back])
     doubtful = np.flatnonzero(~(error[back] < ENERGY_WARNING) | (unsettled > 0))
     if not (judged and len(doubtful)):
         return outcome
@@ -397,7 +400,7 @@ def impacts(
         TipState(none, -speed, none), law.start(), ContactPoint(none, none), none,
         unconverged_steps=np.zeros(cases, dtype=np.int64),
     )  # fmt: skip
-    deepest = none
+    force, deepest = np.empty((steps, cases)), none
     plate_work, dw, largest_ddw, highest = none, none, none, none
     work: list[Floats] = []
     for step in range(steps):
@@ -405,6 +408,7 @@ def impacts(
         moved, tips.sums = sums.next()
         couple_step(tips, law, state, moved)
         sums.give(state.contact.force)
+        force[step] = state.contact.force
         deepest = np.maximum(deepest, state.contact.indentation)
         highest = np.maximum(highest, state.plate_w)
         # Central differences conserve the work 1/2 (F + F') (w' - w) on the plate.
@@ -415,7 +419,7 @@ def impacts(
             work.append(state.contact_work + plate_work)
     permanent = law.permanent(state.memory, state.contact)
     return Impacts(
-        sums.given,
+        force,
         Indentation(deepest, state.contact.indentation, permanent),
         state.unconverged_steps,
         np.array(work),
@@ -505,7 +509,9 @@ def _alone(
     found = Indentation(largest, indentation[-1:], np.array([permanent]))
     summary = summarise(force[:, None], times, found, mass, np.array([speed]), _threshold(checked))
     unsettled = np.array([values.get("unsettled_steps", 0)])
-    outcome = outcome_of([number], summary, force[None], simulation.state.dt, unsettled)
+    outcome = outcome_of(
+        [number], summary, force[-1:], len(force), simulation.state.dt, unsettled, force[None]
+    )
     if measure is not None or extra:
         result = Result(sink.arrays, sink.texts, sink.groups)
         outcome.columns |= _extra(extra, result)

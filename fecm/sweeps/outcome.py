@@ -85,11 +85,13 @@ def merge(parts: Sequence[Outcome]) -> Outcome:
 
 
 def outcome_of(
-    numbers: list[int], summary: Mapping[str, Floats], force: Floats, dt: float,
-    unsettled: NDArray[np.int64],
+    numbers: list[int], summary: Mapping[str, Floats], last: Floats, steps: int, dt: float,
+    unsettled: NDArray[np.int64], force: Floats | None = None,
 ) -> Outcome:  # fmt: skip
-    """Return the outcome of cases that were run with one time step; `force` is (cases, steps)."""
-    cases, steps = force.shape
-    status = np.where(force[:, -1] > 0.0, STILL, FINE)
+    """Return the outcome of cases that were run with one time step.
+
+    `last` (cases,) are the contact forces after the last step, `force` (cases, steps) all.
+    """
+    cases, status = len(numbers), np.where(last > 0.0, STILL, FINE)
     about = status, np.full(cases, dt), np.full(cases, steps, dtype=np.int64), unsettled
     return Outcome(numbers, {**summary, **dict(zip(ABOUT, about, strict=True))}, force)

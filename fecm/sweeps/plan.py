@@ -43,7 +43,7 @@ Measure = Callable[[Result], Mapping[str, float]]
 # Cases advanced together.
 TOGETHER = 2048
 # Bytes per step and case advanced together: above the measured value.
-ADVANCED = 42
+ADVANCED = 30
 # Names of columns that are measured on request.
 DEFLECTION, GAGES, FAILURE = MEASURES = ("max_deflection", "gages", "failure")
 

@@ -114,7 +114,7 @@ class Convolution:
         parts = [known[:, :, FAR * n : FAR * (n + 2)] for n in range(blocks - 1)]
         self._filters = [rfft(np.roll(part, -FAR, axis=2))[..., None] for part in parts]
         self._spectra = np.empty((last[-1], len(parts), FAR + 1, TILE), dtype=complex)
-        self._given = np.zeros((last[-1], FAR * blocks + 1, TILE))
+        self._given = np.zeros((last[-1], FAR, TILE))  # of the last block
         self._block = np.zeros((last[-1], sums, FAR, TILE))
         self._values = np.zeros(last[-1] * TILE)
         self._step = 0
@@ -133,15 +133,9 @@ class Convolution:
         """Set f_n of the step last returned by :meth:`next`; f_0 before the first step."""
         self._values[self._place] = values
         given = self._values.reshape(-1, 1, 1, TILE)
-        self._given[:, self._step] = given[:, 0, 0]
         row, left = self._step % FAR, NEAR - self._step % NEAR
+        self._given[:, row] = given[:, 0, 0]
         self._block[:, :, row : row + left] += self._near[:, :, :left] * given
-
-    @property
-    def given(self) -> Floats:
-        """f_1, f_2, ... up to the last one set, (steps, cases)."""
-        given = self._given[:, 1 : self._step + 1].swapaxes(0, 1)
-        return given.reshape(self._step, -1).take(self._place, axis=1)
 
     def _add_block(self, known: int, kind: int, tiles: slice) -> None:
         """Add the effect of a complete block, the last one, of forces on the later steps."""
@@ -149,13 +143,13 @@ class Convolution:
             size, end = (NEAR, BLOCK) if known % BLOCK else (BLOCK, FAR)
             row, rows = known % FAR, end - known % end
             factors = self._tables[size][kind, :, :rows]
-            part = self._given[tiles, None, known - size : known]
+            part = self._given[tiles, None, row - size : row]
             self._block[tiles, :, row : row + rows] += factors @ part
             return
         number = known // FAR
         for tile in range(tiles.start, tiles.stop):
             spectra = self._spectra[tile]
-            spectra[number - 1] = rfft(self._given[tile, known - FAR : known], 2 * FAR, axis=0)
+            spectra[number - 1] = rfft(self._given[tile], 2 * FAR, axis=0)
             total = self._filters[0][kind] * spectra[number - 1]
             for distance in range(1, number):
                 total += self._filters[distance][kind] * spectra[number - 1 - distance]
@@ -209,9 +203,7 @@ class TipSteps:
         :class:`~fecm.mechanics.rod_integrators.RodState`.
         """
         step, cases = self._steps[kind], np.flatnonzero(self.kinds == kind)
-        forces = self.theta * force[:, cases]
-        forces[1:] += (1.0 - self.theta) * force[:-1, cases]
-        forces /= self.scale[cases]
+        before = np.zeros((1, len(cases)))
         motion = np.zeros((3 * step.n, len(cases)))
         motion[step.n : 2 * step.n : 2] = -speed[cases]
         # T^1, T^2, T^4, ...; column j of `reach` is the effect of a unit force after j steps.
@@ -219,9 +211,11 @@ class TipSteps:
         while reach.shape[1] < BLOCK:
             reach = np.hstack([reach, _product(powers[-1], reach)])
             powers.append(_product(powers[-1], powers[-1]))
-        for start in range(0, len(forces), BLOCK):
-            part = forces[start : start + BLOCK]
-            count = len(part)
+        for start in range(0, len(force), BLOCK):
+            forces = force[start : start + BLOCK, cases]
+            earlier = np.vstack([before, forces[:-1]])
+            part = (self.theta * forces + (1.0 - self.theta) * earlier) / self.scale[cases]
+            before, count = forces[-1:], len(part)
             for bit, power in enumerate(powers):
                 if count >> bit & 1:
                     motion = _product(power, motion)
