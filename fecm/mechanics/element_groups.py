@@ -97,7 +97,7 @@ def element_blocks(elements: Ints, coordinates: Floats) -> list[ElementBlock]:
     given = nodes > 0
     # Patterns in the order of their bits, first node first.
     codes = given @ (1 << np.arange(given.shape[1])[::-1])
-    for code in np.unique(codes):
+    for code in np.unique(codes, return_index=True)[0]:  # loads no masked arrays
         rows = np.flatnonzero(codes == code)
         present = given[rows[0]]
         shape = shape_of(present)

@@ -10,8 +10,12 @@ from fecm.deck.macros import flat
 from fecm.deck.units import MASS, mass_in_si, unit_names, unit_of
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.stiffness_product import SAFE
+from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import Problem, build_projectile
 from fecm.problem.check_impact import resolution, said_error
+
+# Share of the critical time step below which the step that DT 0 takes is shown.
+ROOM = 0.6
 
 
 class ProblemSummary:
@@ -78,7 +82,11 @@ class ProblemSummary:
         for dt in dict.fromkeys(self.time_steps):
             dt = dt or SAFE * self.critical_time_step
             share = dt / self.critical_time_step
-            lines.append(f"  DT                  {quantity(dt, 'time')} ({share:.0%} of it)")
+            more = ""
+            if share < ROOM:
+                taken = taken_time_step(self.critical_time_step)
+                more = f"; DT 0 takes {taken:.3g}: {taken / dt:.1f} times fewer steps"
+            lines.append(f"  DT                  {quantity(dt, 'time')} ({share:.0%} of it{more})")
         if self.elements_per_wave is not None:
             error = "" if self.mesh_error is None else f" ({said_error(self.mesh_error)})"
             lines.append(f"  elements per wave   {self.elements_per_wave:.1f}{error}")

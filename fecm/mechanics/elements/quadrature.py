@@ -21,6 +21,21 @@ _XI = np.array([-1, 1, 1, -1, 0, 1, 0, -1, 0])
 _ETA = np.array([-1, -1, 1, 1, -1, 0, 1, 0, 0])
 
 
+# Points and weights of the Gauss-Legendre rules of the orders 1 to 4.
+_LEGENDRE = (
+    ((0.0,), (2.0,)),
+    ((-0.5773502691896257, 0.5773502691896257), (1.0, 1.0)),
+    (
+        (-0.7745966692414834, 0.0, 0.7745966692414834),
+        (0.5555555555555557, 0.8888888888888888, 0.5555555555555557),
+    ),
+    (
+        (-0.8611363115940526, -0.33998104358485626, 0.33998104358485626, 0.8611363115940526),
+        (0.34785484513745357, 0.6521451548625464, 0.6521451548625464, 0.34785484513745357),
+    ),
+)
+
+
 @dataclass(frozen=True, eq=False)
 class Quadrature:
     """Points and weights of a quadrature rule."""
@@ -34,7 +49,8 @@ class Quadrature:
 @cache
 def gauss(order: int) -> Quadrature:
     """Gauss rule with `order` points in each direction; a ValueError outside 1 to 4."""
-    return _rule(order, *np.polynomial.legendre.leggauss(_known(order)))
+    points, weights = np.array(_LEGENDRE[_known(order) - 1])
+    return _rule(order, points, weights)
 
 
 @cache
@@ -45,7 +61,7 @@ def nodal(order: int) -> Quadrature:
     be used for integration.  A ValueError outside 1 to 4.
     """
     points = np.linspace(-1.0, 1.0, order) if _known(order) > 1 else np.zeros(1)
-    return _rule(order, points, np.polynomial.legendre.leggauss(order)[1])
+    return _rule(order, points, np.array(_LEGENDRE[order - 1][1]))
 
 
 def _known(order: int) -> int:
