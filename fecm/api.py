@@ -27,7 +27,7 @@ from fecm.simulation.run import simulate
 from fecm.simulation.simulation import Simulation
 
 Mode = Literal["report", "listing"]
-Solver = Literal["auto", "csr"]
+Solver = Literal["auto", "kernels", "numpy", "csr"]
 
 # Called with the number of steps taken and of all steps.
 Progress = Callable[[int, int], object]

@@ -70,4 +70,6 @@ def stop_at_once(problem: Problem, path: Path) -> None:
             checkpointer.write(simulation)
             raise StoppedError
 
-        simulate_run(Simulation(problem, journal, observers=(look,)))
+        options = RunOptions(solver="numpy")  # which looks up in short runs too
+        simulation = Simulation(problem, journal, options, observers=(look,))
+        simulate_run(simulation)

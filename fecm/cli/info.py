@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import json
 import math
+import platform
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 
+from fecm._version import __version__
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION
 from fecm.cli.isolation import reads
+from fecm.mechanics import kernels
+from fecm.mechanics.stiffness_product import available
 from fecm.results.hdf5_reader import Contents, read
 from fecm.results.info import about_run, describe_groups
 from fecm.results.result import result_of
@@ -29,8 +34,30 @@ RUN_KEYS, SWEEP_KEYS = HEADING[:6], ("title", "fecm_version", "format", "format_
 PERMANENT = "permanent_indentation"
 
 
+def _system(context: click.Context, _: object, asked: bool) -> None:
+    if not asked:
+        return
+    import h5py
+    import scipy
+
+    for name, text in (
+        ("fecm", __version__),
+        ("kernels", kernels.description()),
+        ("Python", f"{platform.python_version()}, {platform.system()} {platform.machine()}"),
+        ("NumPy", np.__version__),
+        ("SciPy", scipy.__version__),
+        ("h5py", f"{h5py.__version__}, HDF5 {h5py.version.hdf5_version}"),
+        ("cores", str(available())),
+    ):
+        click.echo(f"{name:9} {text}")
+    context.exit()
+
+
 @click.command(short_help="Describe the contents of RESULT.")
 @click.argument("result", type=FILE_PATH)
+@click.option("--system", is_flag=True, is_eager=True, expose_value=False, callback=_system,
+              help="Show the versions in use instead, and whether the kernels are "
+                   "compiled.")  # fmt: skip
 @FORMAT_OPTION
 @reads("result")
 def info(result: Path, form: str) -> None:

@@ -59,8 +59,8 @@ from fecm.simulation.spool import CheckpointError, Journal
 @click.option("--overwrite", is_flag=True,
               help="Replace existing results and the checkpoints of interrupted runs.")  # fmt: skip
 @click.option("--solver", type=click.Choice(SOLVERS), default=AUTO, show_default=True,
-              help="Computation of K·u: by the method that suits the mesh, or by a sparse "
-                   "matrix.")  # fmt: skip
+              help="Computation of K·u: by compiled kernels where there are any, else by NumPy; by "
+                   "one of them; or by a sparse matrix.")  # fmt: skip
 @click.option("--threads", type=click.IntRange(0, 1024), default=0, metavar="N",
               help="Threads that share the work of a step; 0 uses every core for a large mesh.  "
                    "[default: 0]")  # fmt: skip

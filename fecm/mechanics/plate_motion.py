@@ -26,8 +26,17 @@ from numpy.typing import NDArray
 
 from fecm._errors import FecmError
 from fecm._typing import Floats
+from fecm.mechanics import kernels
 from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.stiffness_product import AUTO, CSR, Workers, pieces, stiffness_operator
+from fecm.mechanics.stiffness_operator import pieces
+from fecm.mechanics.stiffness_product import (
+    AUTO,
+    CSR,
+    KERNELS,
+    NUMPY,
+    Workers,
+    stiffness_operator,
+)
 from fecm.mechanics.symmetry import SymmetryReduction, unreduced
 
 Indices = NDArray[np.intp]
@@ -194,6 +203,9 @@ class PlateMotion:
         damping: float = 0.0,
     ) -> None:
         self.damping = damping
+        if solver == AUTO:
+            solver = NUMPY if kernels.LIBRARY is None else KERNELS
+        self.solver = solver
         kept = unreduced(plate) if reduced is None or solver == CSR else reduced
         self.plate = plate
         self._reduction = kept
@@ -213,6 +225,11 @@ class PlateMotion:
             (self._scale[p], self.mass[p], work[p], None if self._loads is None else loads[p])
             for p in pieces(kept.count)
         ]
+
+    @property
+    def loaded(self) -> bool:
+        """Whether nodal forces act or dofs are prescribed."""
+        return self._loads is not None or self._prescribes
 
     def start(self) -> PlateState:
         """State of the plate at rest."""

@@ -166,6 +166,11 @@ class Transducer:
     node: int  # node of the rod, from 1; 0 for the contact force itself
     sign: float = -1.0  # -1 for a force positive in compression, +1 for one positive in tension
 
+    @property
+    def dof(self) -> int:
+        """Dof du/dx of the node, from 0; that of a rigid mass without a node."""
+        return max(0, 2 * self.node - 1)
+
 
 def report_rod(density: float = REPORT_DENSITY) -> Rod:
     """Build the rod of the report's program (lb, in, s)."""

@@ -12,7 +12,6 @@ number of threads.
 from __future__ import annotations
 
 import os
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -21,24 +20,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
+from fecm.mechanics import kernels
 from fecm.mechanics.element_groups import congruence
+from fecm.mechanics.kernels.plate import CompiledProduct
 from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.stiffness_operator import R, StiffnessOperator, pieces
 from fecm.mechanics.symmetry import SymmetryReduction, unreduced
 
 if TYPE_CHECKING:
     from scipy import sparse
 
-# Chosen by the mesh, or always the sparse matrix.
-AUTO, CSR = "auto", "csr"
+# The kernels where they are compiled, else NumPy; or always one of them, or the sparse matrix.
+AUTO, KERNELS, NUMPY, CSR = "auto", "kernels", "numpy", "csr"
 
-SOLVERS = (AUTO, CSR)
+SOLVERS = (AUTO, KERNELS, NUMPY, CSR)
 
 # Fraction of the critical time step used if the deck has no time step.
 SAFE = 0.9
 
 T = TypeVar("T")
-
-R = TypeVar("R")
 
 
 def available() -> int:
@@ -79,9 +79,6 @@ def _each(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
 
 Indices = NDArray[np.intp]
 
-# Equations per piece: BLAS sums vectors of this length in one thread.
-PIECE = 8192
-
 # Elements per matrix product: it fits the cache, and BLAS uses one thread.
 BLOCK = 256
 
@@ -93,31 +90,6 @@ BATCH = 65536
 
 # The number of domains of a large mesh is a multiple of this, for equal shares of the threads.
 SHARES = 4
-
-
-def pieces(neq: int) -> list[slice]:
-    """Slices of the equations."""
-    return [slice(i, min(i + PIECE, neq)) for i in range(0, neq, PIECE)]
-
-
-class StiffnessOperator(ABC):
-    """The internal forces of a displacement."""
-
-    # Entries of a padded vector.
-    size: int
-
-    @abstractmethod
-    def each(self, padded: Floats, use: Callable[[int, Floats], R]) -> list[R]:
-        """Compute K u and apply a function to the number and forces of each piece, in order.
-
-        The padded vector, (size,), starts with the displacement and ends with a zero.
-        """
-
-    def __call__(self, displacement: Floats) -> Floats:
-        """K u, (neq,)."""
-        padded = np.zeros(self.size)
-        padded[: len(displacement)] = displacement
-        return np.concatenate(self.each(padded, lambda _, forces: forces.copy()))
 
 
 class CsrProduct(StiffnessOperator):
@@ -271,6 +243,8 @@ def stiffness_operator(
     if solver == CSR:
         return CsrProduct(plate.stiffness)
     kept = reduced or unreduced(plate)
+    if solver == KERNELS or (solver == AUTO and kernels.LIBRARY is not None):
+        return CompiledProduct(plate, kept, 1 if workers is None else workers.count)
     domains: list[list[Group]] = []
     for family in plate.families:
         weights = kept.weights[family.rows]

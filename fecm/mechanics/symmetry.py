@@ -146,7 +146,7 @@ def _images(
         return None
     elements = np.full(len(mesh.elements), -1, dtype=np.intp)
     for family in plate.families:
-        opposite = _opposite(family)
+        opposite = opposite_nodes(family)
         if opposite is None:
             return None
         turned = nodes[family.nodes][:, opposite]
@@ -158,7 +158,7 @@ def _images(
     return nodes, elements
 
 
-def _opposite(family: ElementBlock) -> Indices | None:
+def opposite_nodes(family: ElementBlock) -> Indices | None:
     """Position, among the element's nodes, of each node's image under the half turn."""
     xi, eta = family.shape.xi[family.present], family.shape.eta[family.present]
     found = (np.abs(xi + xi[:, None]) < 1e-12) & (np.abs(eta + eta[:, None]) < 1e-12)

@@ -30,6 +30,7 @@ from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss,
 from fecm.mechanics.failure_envelope import FailureMonitor
 from fecm.mechanics.gages import GageArray, gages
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
+from fecm.mechanics.impact_steps import ImpactSteps, supports
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.patch import RADIUS_PER_THICKNESS, patch_weights
@@ -237,6 +238,7 @@ class ImpactModel:
     plate: PlateModel
     motion: PlateMotion  # motion of the plate; its own plate has only the moving dofs
     impact: ImpactSystem | None  # plate and projectile; None without impact
+    steps: ImpactSteps | None  # its steps by the compiled kernels; None where they can't take them
     station: Transducer
     # Points of tape8 and of the stresses.
     strains: StrainField
@@ -407,14 +409,20 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     plies, failure = build_plies(problem, plate), build_failure(problem, plate)
     places = stress_points.places(mesh.coordinates) if plies or failure else None
     cards, transposed = deck.last(model.Gages), plate.rules.transposed_jacobian
+    read = None if cards is None else gages(mesh, cards.records, transposed_jacobian=transposed)
+    station, steps = build_station(deck, rod, slips), None
+    if impact is not None and supports(impact):
+        sums = None if read is None else motion.dof_sums(read.dof_indices, read.weights)
+        steps = ImpactSteps(impact, sums, station.dof, workers.count)
     return ImpactModel(
         plate=plate,
         motion=motion,
         impact=impact,
-        station=build_station(deck, rod, slips),
+        steps=steps,
+        station=station,
         strains=plate.strain_field(plate.rules.strains),
         stress_points=stress_points,
-        gages=None if cards is None else gages(mesh, cards.records, transposed_jacobian=transposed),
+        gages=read,
         patch=problem.patch,
         plies=plies,
         failure=failure,

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from fecm.mechanics.contact_law import Law
+from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.rod_integrators import RodMethod
-from fecm.mechanics.stiffness_product import AUTO, SOLVERS
+from fecm.mechanics.stiffness_product import AUTO, KERNELS, SOLVERS
 
 # Relative error of the energy balance that ends a run.
 ENERGY_LIMIT = 0.1
@@ -21,7 +22,8 @@ class RunOptions:
 
     # Slips of the printed program that are on: see :func:`~fecm.problem.slips.active_slips`.
     slips: frozenset[str] = frozenset()
-    # Computation of K·u, one of ``SOLVERS``: chosen for the mesh, or by a sparse matrix.
+    # Computation of K·u, one of ``SOLVERS``: compiled kernels where there are any, else NumPy; or
+    # one of them; or a sparse matrix.
     solver: str = AUTO
     # Threads that share the work of a step; 0 takes every core for a large mesh.  The result does
     # not depend on it.
@@ -34,6 +36,8 @@ class RunOptions:
     def __post_init__(self) -> None:
         if self.solver not in SOLVERS:
             raise ValueError(f"unknown solver {self.solver!r}; known are {', '.join(SOLVERS)}")
+        if self.solver == KERNELS and LIBRARY is None:
+            raise ValueError("this installation has no compiled kernels; take the solver numpy")
         if self.threads < 0:
             raise ValueError(f"threads is {self.threads}; it must be 0 or more")
         if not self.energy_limit > 0.0:

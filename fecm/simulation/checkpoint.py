@@ -48,7 +48,7 @@ def identity(simulation: Simulation) -> dict[str, Any]:
         "version": __version__,
         "deck": hashlib.sha256(text.encode()).hexdigest(),
         "slips": sorted(options.slips),
-        "solver": options.solver,
+        "solver": simulation.model.motion.solver,
         "rod": [options.rod_method.mass, options.rod_method.integrator],
         "printed": simulation.printer.is_on,
     }

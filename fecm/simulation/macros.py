@@ -5,19 +5,20 @@ A word with a number on its card receives it.  An action returns True to leave t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
 
-from fecm.deck.macros import WORDS, number
+from fecm._typing import Floats
+from fecm.deck.macros import WORDS, Body, number
 from fecm.deck.records import Macro, load_factor
 from fecm.mechanics.natural_modes import modes
 from fecm.mechanics.statics import reactions
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.strains import strains_and_resultants
 from fecm.mechanics.time_step import critical_time_step, taken_time_step
-from fecm.simulation.interpreter import Action, EndedError
+from fecm.simulation.interpreter import Action, EndedError, Passes
 from fecm.simulation.simulation import Simulation
 
 # Time and loads ----------------------------------------------------------------------------------
@@ -75,6 +76,43 @@ def impact_step(run: Simulation, n: int) -> None:
     if stores and "tapes" not in slips:
         recorder.strains(plate.step, plate.time, run.displacement_field())
     run.observe()
+
+
+def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
+    """Carry out passes of a loop with RODP in one call of the kernels.
+
+    Returns False where a single step has to be taken: the first one, one with another DT, and that
+    of the last pass.
+    """
+    state, impact, steps = run.state, run.state.impact, run.model.steps
+    plate = state.plate
+    if impact is None or steps is None or not plate.step:
+        return False
+    count = min(run.interpreter.passes_to_come, run.interval - plate.step % run.interval)
+    if plate.dt != state.dt or plate.dt2 != state.dt**2 or count < 2:
+        return False
+    numbers = {item.word: int(number(item)) for item in macros if item.word != "TIME"}
+    due = {word: np.arange(count) for word in numbers}
+    passes = run.interpreter.current_pass + due["RODP"]
+    due = {word: passes % n == 0 for word, n in numbers.items()}
+    due["RODP"] = (plate.step + 1 + np.arange(count)) % numbers["RODP"] == 0
+    (stored,) = np.nonzero(np.logical_or.reduce(list(due.values())))
+    found = steps.take(impact, state.dt, count, stored)
+    if any(item.word == "TIME" for item in macros):
+        state.clock = float(np.add.accumulate([state.clock, *[state.dt] * count])[-1])
+    run.recorder.steps.add(plate, found.columns, found.strains, np.flatnonzero(due["RODP"]))
+    strained = found.fields[due["RODP"][stored]]
+    strains = iter(run.model.strains.evaluate(strained).swapaxes(0, 1) if len(strained) else ())
+    for field, row in zip(found.fields, stored.tolist(), strict=True):
+        step, time = int(found.columns["step"][row]), float(found.columns["time"][row])
+        if due["RODP"][row]:
+            run.recorder.strain_row(step, time, next(strains))
+        for word, store in STORING.items():
+            if word in due and due[word][row]:
+                store(run, step, time, field)
+    run.interpreter.skip(count)
+    run.observe()
+    return True
 
 
 def _counted(run: Simulation, n: int) -> bool:
@@ -152,14 +190,36 @@ def find_modes(run: Simulation, n: int) -> None:
 # Output ------------------------------------------------------------------------------------------
 
 
-def store_displacements(run: Simulation, n: int) -> None:
-    """DISP."""
-    if run.interpreter.current_pass % n:
-        return
-    plate, field = run.state.plate, run.displacement_field()
-    run.recorder.displacements(plate.step, plate.time, field)
+def _at_passes(word: str, run: Simulation, n: int) -> None:
+    """DISP, PLYS or FAIL at every N-th pass."""
+    if not run.interpreter.current_pass % n:
+        plate = run.state.plate
+        STORING[word](run, plate.step, plate.time, run.displacement_field())
+
+
+def _store_displacements(run: Simulation, step: int, time: float, field: Floats) -> None:
+    run.recorder.displacements(step, time, field)
     if run.state.impact is None:
-        run.printer.displacements(field, plate.time)
+        run.printer.displacements(field, time)
+
+
+def _store_ply_stresses(run: Simulation, step: int, time: float, field: Floats) -> None:
+    if run.model.plies is not None:
+        run.recorder.row("plies", step, time, run.model.plies.evaluate(field))
+
+
+def _evaluate_failure(run: Simulation, step: int, time: float, field: Floats) -> None:
+    envelope, monitor = run.state.failure, run.model.failure
+    if envelope is not None and monitor is not None:
+        monitor.update(envelope, field, time)
+
+
+# What is done with a displacement field at every N-th pass.
+STORING: dict[str, Callable[[Simulation, int, float, Floats], None]] = {
+    "DISP": _store_displacements,
+    "PLYS": _store_ply_stresses,
+    "FAIL": _evaluate_failure,
+}
 
 
 def store_reactions(run: Simulation) -> None:
@@ -179,22 +239,6 @@ def store_stresses(run: Simulation, n: int) -> None:
     run.recorder.row("stresses", plate.step, plate.time, values)
     places = points.places(run.problem.mesh.coordinates)
     run.printer.stresses(values, places, run.state.clock)
-
-
-def store_ply_stresses(run: Simulation, n: int) -> None:
-    """PLYS."""
-    if run.model.plies is None or run.interpreter.current_pass % n:
-        return
-    plate, values = run.state.plate, run.model.plies.evaluate(run.displacement_field())
-    run.recorder.row("plies", plate.step, plate.time, values)
-
-
-def evaluate_failure(run: Simulation, n: int) -> None:
-    """FAIL."""
-    envelope, monitor = run.state.failure, run.model.failure
-    if envelope is None or monitor is None or run.interpreter.current_pass % n:
-        return
-    monitor.update(envelope, run.displacement_field(), run.state.plate.time)
 
 
 def check(run: Simulation) -> None:
@@ -222,12 +266,24 @@ ACTIONS: dict[str, Callable[..., bool | None]] = {
     "EIGE": find_modes,
     "EXCD": central_difference,
     "RODP": impact_step,
-    "DISP": store_displacements,
+    **{word: partial(_at_passes, word) for word in STORING},
     "STRE": store_stresses,
-    "PLYS": store_ply_stresses,
-    "FAIL": evaluate_failure,
     "CHEC": check,
 }
+
+
+def bind_loop(run: Simulation, body: Body) -> Passes | None:
+    """Return what carries out passes of a loop together; None if its macros need single steps."""
+    macros = [item for item in body if isinstance(item, Macro)]
+    words = [macro.word for macro in macros]
+    if len(macros) < len(body) or words.count("RODP") != 1 or len(set(words)) < len(words):
+        return None
+    first = words.index("RODP")
+    if not {"TIME", *STORING}.issuperset(words[:first] + words[first + 1 :]):
+        return None
+    if run.model.steps is None or run.options.slips or set(STORING).intersection(words[:first]):
+        return None
+    return partial(impact_steps, run, macros)
 
 
 def bind(run: Simulation, macro: Macro) -> Action:

@@ -142,8 +142,11 @@ class Recorder:
 
     def strains(self, step: int, time: float, field: Floats) -> None:
         """Store a row of tape8: strains of the displacements at `time`."""
-        values = self._model.strains.evaluate(field)
-        self.row("tape8", step, time, dict(zip(STRAINS, values, strict=True)))
+        self.strain_row(step, time, self._model.strains.evaluate(field))
+
+    def strain_row(self, step: int, time: float, strains: Floats) -> None:
+        """Store a row of tape8, (5, numel, npt)."""
+        self.row("tape8", step, time, dict(zip(STRAINS, strains, strict=True)))
 
     def state(self) -> dict[str, Any]:
         """Rows that are not stored yet, for :meth:`restore`."""

@@ -21,7 +21,7 @@ from fecm.results.schema import FORMAT, FORMAT_VERSION
 from fecm.results.sinks import Sink
 from fecm.results.summary import OPEN_END
 from fecm.simulation.guard import ENERGY_WARNING, likely_cause
-from fecm.simulation.macros import bind
+from fecm.simulation.macros import bind, bind_loop
 from fecm.simulation.simulation import Observer, Simulation
 from fecm.simulation.validity import warnings_of
 
@@ -52,7 +52,10 @@ def run(simulation: Simulation) -> None:
     try:
         with np.errstate(all="ignore"):  # an overflow is reported as a divergence
             simulation.interpreter.run(
-                partial(bind, simulation), state.position, partial(simulation.on_macro, simulation)
+                partial(bind, simulation),
+                state.position,
+                partial(simulation.on_macro, simulation),
+                partial(bind_loop, simulation),
             )
             if state.failure is not None:
                 simulation.recorder.failure(state.failure)
@@ -74,6 +77,7 @@ def _write_header(simulation: Simulation) -> None:
         "title": deck.title,
         "mode": mode_of(options.slips),
         "slips": sorted(options.slips),
+        "solver": simulation.model.motion.solver,
         **options.rod_method.attributes,
         **({} if options.law is None else {"law": type(options.law).__name__}),
         **_units(deck),

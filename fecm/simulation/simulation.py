@@ -51,7 +51,8 @@ class Simulation:
             state.prop_force = 1.0  # PROP's first value in the listing
         self.interpreter = Interpreter(problem.program)
         # Steps between two calls of the observers.
-        self.interval = max(1, min(64, 100_000 // self.model.plate.neq))
+        most, work = (64, 100_000) if self.model.steps is None else (1024, 20_000_000)
+        self.interval = max(1, min(most, work // self.model.plate.neq))
         limit = None if options.slips else options.energy_limit
         self.recorder = Recorder(
             self.sink,

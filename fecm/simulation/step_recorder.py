@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecm._typing import Floats
 from fecm.mechanics.impact import ImpactState
@@ -25,6 +26,8 @@ SCALARS = (
     "step", "time", "plate_kinetic", "plate_strain", "external_work",
     "force", "indentation", "plate_w", "contact_work", "displacement",
 )  # fmt: skip
+# Those that follow from the motion of the projectile.
+PROJECTILE = ("velocity", "acceleration", "projectile_kinetic", "projectile_strain", "station")
 CONTACT = ("force", "indentation", "transducer", "displacement", "velocity", "acceleration")
 
 
@@ -46,7 +49,9 @@ class StepRecorder:
         self._impact = impact = model.impact
         self._on_block = on_block
         self._all_contact = all_contact
-        self._rows: list[tuple[float, ...]] = []
+        self._table = np.zeros((len(SCALARS) + len(PROJECTILE), BLOCK))
+        # Rows of the table, and those whose projectile's columns are known.
+        self._count = self._known = 0
         self._contact_rows: list[int] = []
         self._stored = self._tape9_rows = 0
         self._station = model.station
@@ -89,27 +94,51 @@ class StepRecorder:
         strain = plate.strain_energy
         own = (plate.step, plate.time, kinetic, strain, plate.external_work)
         if self._gages is not None:
-            self._strains[len(self._rows)] = self._gages.evaluate(plate, factor)
+            self._strains[self._count] = self._gages.evaluate(plate, factor)
         if impact is None:
-            self._rows.append((*own, 0.0, 0.0, 0.0, 0.0, 0.0))
+            self._table[: len(own), self._count] = own
         else:
-            self._rod[len(self._rows)] = impact.rod.motion
+            self._rod[self._count] = impact.rod.motion
             if contact_row or self._all_contact:
-                self._contact_rows.append(len(self._rows))
+                self._contact_rows.append(self._count)
             indentation, force = impact.contact
             hit = (force, indentation, impact.plate_w, impact.contact_work, impact.rod.tip)
-            self._rows.append((*own, *hit))
-        if len(self._rows) == BLOCK:
+            self._table[: len(SCALARS), self._count] = (*own, *hit)
+        self._count += 1
+        if self._count == BLOCK:
             self.flush()
+
+    def add(
+        self,
+        plate: PlateState,
+        columns: Mapping[str, Floats],
+        strains: Floats,
+        contact_rows: NDArray[np.intp],
+    ) -> None:
+        """Add rows for many steps, and the contact of some of them to tape9."""
+        given = {**columns, "external_work": np.full(len(strains), plate.external_work)}
+        values = np.array([given[name] for name in (*SCALARS, *PROJECTILE)])
+        done = 0
+        while done < len(strains):
+            self._add_projectile()
+            count = min(BLOCK - self._count, len(strains) - done)
+            rows = slice(self._count, self._count + count)
+            self._table[:, rows] = values[:, done : done + count]
+            self._strains[rows] = strains[done : done + count] if self._gages is not None else 0.0
+            inside = contact_rows[(contact_rows >= done) & (contact_rows < done + count)]
+            self._contact_rows += (inside - done + self._count).tolist()
+            self._count = self._known = rows.stop
+            done += count
+            if self._count == BLOCK:
+                self.flush()
 
     def state(self) -> dict[str, Any]:
         """Rows that are not stored yet, and how many are."""
-        count = len(self._rows)
+        self._add_projectile()
         return {
-            "rows": np.array(self._rows).reshape(count, len(SCALARS)),
+            "rows": self._table[:, : self._count].copy(),
             "contact": list(self._contact_rows),
-            "rod": self._rod[:count].copy(),
-            "strains": self._strains[:count].copy(),
+            "strains": self._strains[: self._count].copy(),
             "stored": self._stored,
             "tape9": self._tape9_rows,
             "initial": self.initial,
@@ -118,20 +147,23 @@ class StepRecorder:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from a :meth:`state`."""
-        self._rows = [tuple(row) for row in state["rows"].tolist()]
+        self._count = self._known = state["rows"].shape[1]
+        self._table[:, : self._count] = state["rows"]
         self._contact_rows = list(state["contact"])
-        self._rod[: len(self._rows)] = state["rod"]
-        self._strains[: len(self._rows)] = state["strains"]
+        self._strains[: self._count] = state["strains"]
         self._stored, self._tape9_rows = state["stored"], state["tape9"]
         self.initial, self._damped = state["initial"], tuple(state["damped"])
 
     def flush(self) -> None:
         """Store the gathered rows and pass them to `on_block`."""
-        count = len(self._rows)
+        count = self._count
         if not count:
             return
-        table = dict(zip(SCALARS, np.array(self._rows).T, strict=True))
-        self._add_projectile(table, count)
+        self._add_projectile()
+        columns = self._table[:, :count].copy()
+        table = dict(zip((*SCALARS, *PROJECTILE), columns, strict=True))
+        if self._impact is not None:
+            table["transducer"] = self._transducer(table["force"], table["station"])
         table["held_energy"] = (
             table["plate_kinetic"] + table["plate_strain"]
             + table["projectile_kinetic"] + table["projectile_strain"] + table["contact_work"]
@@ -151,7 +183,7 @@ class StepRecorder:
                 self._sink.write(f"tape9/{name}", self._tape9_rows, table[name][rows])
             self._tape9_rows += len(rows)
         self._stored += count
-        self._rows.clear()
+        self._count = self._known = 0
         self._contact_rows.clear()
 
     def _add_damping(self, table: dict[str, Floats]) -> None:
@@ -163,18 +195,18 @@ class StepRecorder:
         table["balance_error"] += table["damping_work"]
         self._damped = (float(time[-1]), float(power[-1]), float(table["damping_work"][-1]))
 
-    def _add_projectile(self, table: dict[str, Floats], count: int) -> None:
-        """Add the columns that follow from the motion of the projectile."""
-        if self._impact is None:
-            table["projectile_kinetic"] = table["projectile_strain"] = np.zeros(count)
+    def _add_projectile(self) -> None:
+        """Set the columns that follow from the motion of the projectile."""
+        rows = slice(self._known, self._count)
+        self._known = self._count
+        if self._impact is None or rows.start == rows.stop:
             return
-        u, v, a = self._rod[:count].swapaxes(0, 1)
+        u, v, a = self._rod[rows].swapaxes(0, 1)
         u[:, 0] = 0.0  # displacements are relative to the tip
-        table["transducer"] = self._transducer(table["force"], u)
-        table["velocity"], table["acceleration"] = v[:, 0], a[:, 0]
         rod = self._impact.rod
-        table["projectile_kinetic"] = rod.kinetic_energy(v)
-        table["projectile_strain"] = rod.strain_energy(u)
+        self._table[len(SCALARS) :, rows] = (
+            v[:, 0], a[:, 0], rod.kinetic_energy(v), rod.strain_energy(u), u[:, self._station.dof],
+        )  # fmt: skip
 
     def _transducer(self, force: Floats, deformation: Floats) -> Floats:
         """Force at the transducer: E A du/dx of its node; the contact force on a rigid mass."""
@@ -183,7 +215,7 @@ class StepRecorder:
             return -sign * force
         rod = self._impact.rod
         area = float(rod.areas[min(node, rod.elements) - 1])
-        return sign * rod.modulus * area * deformation[:, 2 * node - 1]
+        return sign * rod.modulus * area * deformation
 
     @property
     def rows(self) -> dict[str, int]:

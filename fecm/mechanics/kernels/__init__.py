@@ -1,0 +1,109 @@
+"""Compiled kernels, where the installation has them; :data:`LIBRARY` is None otherwise."""
+
+from __future__ import annotations
+
+import ctypes
+from ctypes import POINTER, Structure, c_double, c_int32, c_int64
+from typing import Any
+
+Doubles, Integers, Longs = POINTER(c_double), POINTER(c_int32), POINTER(c_int64)
+
+# The structures of kernels.c and impact.h, field by field.
+
+
+def _fields(text: str, **kinds: Any) -> list[tuple[str, Any]]:
+    """Fields of a structure from `kind: name name; ...`."""
+    known = {"int": c_int64, "float": c_double, "floats": Doubles, "ints": Integers} | kinds
+    found: list[tuple[str, Any]] = []
+    for part in text.split(";"):
+        kind, names = part.split(":")
+        found += [(name, known[kind.strip()]) for name in names.split()]
+    return found
+
+
+class Group(Structure):
+    """Elements with the same nodes present, and either one matrix or none."""
+
+    _fields_ = _fields(
+        "int: kind nodes pairs; floats: matrix; int: bending shear tying; floats: rotations"
+        " rotations_t deflection deflection_t in_plane_t tied tied_t"
+    )
+
+
+class Block(Structure):
+    """Eight elements."""
+
+    _fields_ = _fields(
+        "group: group; ints: source target; floats: data; int: done", group=POINTER(Group)
+    )
+
+
+class Chunk(Structure):
+    """Blocks whose elements share nodes with few others."""
+
+    _fields_ = _fields(
+        "int: blocks; blocks: block; int: first nodes shared; ints: shares; floats: signs force",
+        blocks=POINTER(Block),
+    )
+
+
+class Plate(Structure):
+    """A plate and its state."""
+
+    _fields_ = _fields(
+        "int: nd nodes own chunks followers; chunks: chunk; ints: leader; floats: turned stiffness"
+        " shear mass scale u d s shared; float: damping",
+        chunks=POINTER(Chunk),
+    )
+
+
+class Sums(Structure):
+    """Inner products d M d, d K u, u K u, (K u) s."""
+
+    _fields_ = _fields("float: inertia power strain force")
+
+
+class Impact(Structure):
+    """Contact, projectile and records of steps."""
+
+    _fields_ = _fields(
+        "float: k q critical slope branch f b w p peak peak_force permanent indentation force"
+        " plate_w work time; int: unconverged; float: dt theta weight_before weight gain;"
+        " int: modes; floats: T h stiffness tip_shape station motion; float: tip dt2; int: loaded;"
+        " longs: entry; floats: load_weight mobility last; int: gages gage_dofs; longs: gage_entry;"
+        " floats: gage_weight; int: rows; longs: stored; floats: records strains fields",
+        longs=Longs,
+    )
+
+
+COLUMNS = (
+    "time", "inertia", "power", "strain", "internal", "load_d", "load_s", "force", "indentation",
+    "plate_w", "contact_work", "displacement", "velocity", "acceleration", "projectile_kinetic",
+    "projectile_strain", "station",
+)  # fmt: skip
+
+
+def _load() -> Any:
+    try:
+        from fecm.mechanics.kernels import _compiled  # type: ignore[attr-defined]
+    except ImportError:
+        return None
+    library = ctypes.CDLL(_compiled.__file__)
+    library.fecm_impact_steps.restype = c_int64
+    sizes = (c_int64 * 7)()
+    library.fecm_sizes(sizes)
+    mirrored = [*map(ctypes.sizeof, (Group, Block, Chunk, Plate, Impact)), len(COLUMNS)]
+    # Those of another version are not used.
+    return library if list(sizes)[:6] == mirrored else None
+
+
+LIBRARY = _load()
+
+
+def description() -> str:
+    """Which kernels are in use, in words."""
+    if LIBRARY is None:
+        return "not compiled; NumPy is used"
+    sizes = (c_int64 * 7)()
+    LIBRARY.fecm_sizes(sizes)
+    return f"compiled, {'AVX2' if sizes[6] else 'portable'}"

@@ -1,0 +1,308 @@
+/* Compiled kernels: the product K u of a plate, bursts of impact steps.
+ *
+ * Loaded with ctypes by __init__.py, whose structures mirror those below.
+ *
+ * A plate's vectors have `nd` entries for each of its nodes: 4 for w, theta_x, theta_y and 0, or 5.
+ * Restrained dofs are among them; their inverse mass is zero, so that they stay at rest.  Nodes that follow another one by symmetry come last.
+ * Elements are taken eight at a time, one in each lane.  They belong to chunks, which threads share;
+ * cuts and sums do not depend on the number of threads, and so neither do the results.
+ */
+#define Py_LIMITED_API 0x030B0000
+#include <Python.h>
+#include <math.h>
+#include <stdatomic.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#ifndef _WIN32
+#include <pthread.h>
+#include <sched.h>
+#endif
+
+#define LANES 8
+#define PASSES 5 /* of the contact iteration */
+#define TOLERANCE 1.0e-6
+
+typedef double half __attribute__((vector_size(32), aligned(8), may_alias));
+typedef struct {
+    half a, b;
+} lanes; /* a value of each of eight elements */
+
+enum { SHARED, FREE }; /* one matrix for all elements, or none */
+
+/* Elements with the same nodes present, and either one matrix or none. */
+typedef struct {
+    int64_t kind, nodes;
+    /* SHARED: node i < `pairs` is the image of node i + `pairs` under half a turn, and the even and
+     * the odd parts have matrices of their own; without that symmetry `pairs` is 0. */
+    int64_t pairs;
+    const double *matrix;          /* SHARED: (n, n), or (even, even) and (odd, odd) */
+    int64_t bending, shear, tying; /* FREE: points; `tying` of each covariant strain, or 0 */
+    const double *rotations, *rotations_t; /* FREE: (2 bending + values, nodes), transposed */
+    const double *deflection, *deflection_t; /* FREE: (slopes, nodes), transposed */
+    const double *in_plane_t;                /* FREE: (nodes, 2 bending) */
+    const double *tied, *tied_t;             /* FREE: (2, shear, tying), (2, tying, shear) */
+} Group;
+
+/* Eight elements. */
+typedef struct {
+    const Group *group;
+    const int32_t *from, *to; /* (nodes, 8): nodes of the plate, and of the chunk's forces */
+    const double *data;       /* FREE: (points, 5, 8) and (2 tying, 2, 8) */
+    int64_t done;             /* nodes of the chunk that no later block touches */
+} Block;
+
+/* Blocks whose elements share nodes with few others. */
+typedef struct {
+    int64_t blocks;
+    const Block *block;
+    int64_t first, nodes, shared; /* first own node of the plate, own nodes, nodes shared */
+    const int32_t *shares;        /* (shared,): shared nodes of the plate */
+    const double *signs;          /* (shared, nd) */
+    double *force;                /* (nodes + shared + 2, nd) */
+} Chunk;
+
+typedef struct {
+    int64_t nd, nodes, own, chunks, followers; /* entries of a node; nodes, those of one chunk */
+    const Chunk *chunk;
+    const int32_t *leader;  /* (followers,) */
+    const double *turned;   /* (nd,): sign of a follower's dof */
+    const double *stiffness, *shear; /* (6, 6) of strains and negative curvatures; (2, 2) */
+    const double *mass, *scale;      /* (nodes, nd): M, and dt^2 M^-1 */
+    double *u, *d, *s; /* (nodes, nd): displacement, increment, scaled internal force */
+    double *shared;    /* (nodes - own, nd) */
+    double damping;    /* a dt/2 */
+} Plate;
+
+/* Inner products of a state: d M d, d K u, u K u, K u s. */
+typedef struct {
+    double inertia, power, strain, force;
+} Sums;
+
+#define TARGET static
+#include "impact.h"
+#undef TARGET
+
+#if defined(__x86_64__)
+#define NAME(name) name##_avx2
+#define INLINE static inline __attribute__((always_inline, target("avx2,fma")))
+#define TARGET static __attribute__((target("avx2,fma")))
+#include "plate.h"
+#undef NAME
+#undef INLINE
+#undef TARGET
+#define CHOSEN(name) (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? name##_avx2 : name##_any)
+#else
+#define CHOSEN(name) name##_any
+#endif
+#define NAME(name) name##_any
+#define INLINE static inline __attribute__((always_inline))
+#define TARGET static
+#include "plate.h"
+
+/* Work that threads share: products K u, each followed by what one of them does alone. */
+typedef struct {
+    const Plate *plate;
+    Impact *impact;
+    int64_t steps, taken, threads;
+    half *sums; /* (chunks, 4) */
+    Sums result;
+    int stop;
+    atomic_int arrived, round, ready;
+} Job;
+
+/* Wait for the other threads; they give the processor away, as it may be needed by another. */
+static void meet(Job *job) {
+    if (job->threads == 1) return;
+    const int round = atomic_load(&job->round);
+    if (atomic_fetch_add(&job->arrived, 1) + 1 == job->threads) {
+        atomic_store(&job->arrived, 0);
+        atomic_fetch_add(&job->round, 1);
+        return;
+    }
+    for (int spins = 0; atomic_load(&job->round) == round; spins++)
+        if (spins > 1000) {
+#ifndef _WIN32
+            sched_yield();
+#endif
+        }
+}
+
+/* Take the step of the plate without K u: the displacement under the last internal force. */
+static void displace(const Plate *p) {
+    const int64_t count = p->nd * p->nodes;
+    const double keep = 1.0 - p->damping, share = 1.0 / (1.0 + p->damping);
+    for (int64_t i = 0; i < count; i++) {
+        p->d[i] = (keep * p->d[i] - p->s[i]) * share;
+        p->u[i] += p->d[i];
+    }
+}
+
+static void follow(const Plate *p) {
+    for (int64_t node = 0; node < p->followers; node++)
+        for (int64_t dof = 0; dof < p->nd; dof++)
+            p->u[p->nd * (p->nodes + node) + dof] = p->turned[dof] * p->u[p->nd * p->leader[node] + dof];
+}
+
+/* Contact, projectile and records of a step whose displacement is known. */
+static void begin_step(Job *job, int64_t number) {
+    const Plate *p = job->plate;
+    Impact *x = job->impact;
+    double w = 0.0, d = 0.0;
+    for (int64_t i = 0; i < x->loaded; i++) {
+        w += x->weight[i] * p->u[x->entry[i]];
+        d += x->weight[i] * p->d[x->entry[i]];
+        x->last[i] = p->d[x->entry[i]];
+    }
+    x->time += x->rod.dt;
+    move_projectile(x, w);
+    const Rod *rod = &x->rod;
+    const double *q = rod->motion, *v = q + rod->modes, *a = v + rod->modes;
+    double velocity = 0.0, acceleration = 0.0, kinetic = 0.0, strain = 0.0, station = 0.0;
+    for (int64_t i = 0; i < rod->modes; i++) {
+        velocity += rod->tip_shape[i] * v[i];
+        acceleration += rod->tip_shape[i] * a[i];
+        kinetic += v[i] * v[i];
+        strain += rod->stiffness[i] * q[i] * q[i];
+        station += rod->station[i] * q[i];
+    }
+    double *row = x->records + COLUMNS * number;
+    row[TIME] = x->time, row[LOAD_D] = d;
+    row[CONTACT] = x->contact.force, row[INDENTATION] = x->contact.indentation;
+    row[PLATE_W] = x->plate_w, row[WORK] = x->work, row[TIP] = rod->tip;
+    row[VELOCITY] = velocity, row[ACCELERATION] = acceleration;
+    row[ROD_KINETIC] = 0.5 * kinetic, row[ROD_STRAIN] = 0.5 * strain, row[STATION] = station;
+    for (int64_t gage = 0; gage < x->gages; gage++) {
+        double sum = 0.0;
+        for (int64_t i = gage * x->gage_dofs; i < (gage + 1) * x->gage_dofs; i++)
+            sum += x->gage_weight[i] * p->u[x->gage_entry[i]];
+        x->strains[x->gages * number + gage] = sum;
+    }
+    if (x->rows && *x->stored == number) {
+        memcpy(x->fields, p->u, sizeof(double) * p->nd * p->nodes);
+        x->fields += p->nd * p->nodes;
+        x->stored++, x->rows--;
+    }
+    job->stop = !isfinite(x->contact.indentation + x->contact.force);
+}
+
+/* Inner products of a step; the contact force pulls the displacement of the next one. */
+static void end_step(Job *job, int64_t number, int next) {
+    const Plate *p = job->plate;
+    Impact *x = job->impact;
+    const double keep = 1.0 - p->damping, share = 1.0 / (1.0 + p->damping);
+    double s = 0.0;
+    for (int64_t i = 0; i < x->loaded; i++) {
+        const int64_t e = x->entry[i];
+        if (next) {
+            s += x->weight[i] * (keep * x->last[i] - p->d[e] / share);
+            const double pull = x->contact.force * x->mobility[i] * x->dt2 * share;
+            p->d[e] += pull;
+            p->u[e] += pull;
+        } else
+            s += x->weight[i] * p->s[e];
+    }
+    double *row = x->records + COLUMNS * number;
+    row[INERTIA] = job->result.inertia, row[POWER] = job->result.power;
+    row[STRAIN] = job->result.strain, row[FORCE] = job->result.force, row[LOAD_S] = s;
+}
+
+static void take_steps(Job *job, int64_t thread) {
+    const Plate *p = job->plate;
+    const int64_t first = p->chunks * thread / job->threads, end = p->chunks * (thread + 1) / job->threads;
+    for (int64_t step = 0; step < job->steps; step++) {
+        const int next = step + 1 < job->steps;
+        if (!thread && job->impact) begin_step(job, step);
+        meet(job);
+        if (job->stop) return;
+        for (int64_t c = first; c < end; c++) CHOSEN(run_chunk)(p, c, next, job->sums + 4 * c);
+        meet(job);
+        if (thread) continue;
+        job->result = CHOSEN(finish)(p, next, job->sums);
+        if (job->impact) {
+            end_step(job, step, next);
+            if (next) follow(p);
+        }
+        job->taken = step + 1;
+    }
+}
+
+#ifndef _WIN32
+enum { MOST_THREADS = 64 };
+
+typedef struct {
+    Job *job;
+    int64_t thread;
+} Share;
+
+static void *thread_main(void *given) {
+    Share *share = given;
+    while (!atomic_load(&share->job->ready)) sched_yield();
+    take_steps(share->job, share->thread);
+    return NULL;
+}
+#endif
+
+/* Carry out a job on some threads; on fewer if the system has no more. */
+static void carry_out(Job *job) {
+#ifdef _WIN32
+    job->threads = 1;
+    take_steps(job, 0);
+#else
+    pthread_t others[MOST_THREADS];
+    Share shares[MOST_THREADS];
+    int64_t wanted = job->threads < MOST_THREADS ? job->threads : MOST_THREADS;
+    if (wanted > job->plate->chunks) wanted = job->plate->chunks;
+    for (job->threads = 1; job->threads < wanted; job->threads++) {
+        const int64_t i = job->threads;
+        shares[i] = (Share){job, i};
+        if (pthread_create(others + i, NULL, thread_main, shares + i)) break;
+    }
+    atomic_store(&job->ready, 1);
+    take_steps(job, 0);
+    for (int64_t i = 1; i < job->threads; i++) pthread_join(others[i], NULL);
+#endif
+}
+
+#ifdef _WIN32
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+/* s = scale K u and its inner products. */
+EXPORT int fecm_internal_force(const Plate *plate, Sums *sums, int64_t threads) {
+    Job job = {.plate = plate, .steps = 1, .threads = threads};
+    job.sums = malloc(sizeof(half) * 4 * plate->chunks);
+    if (!job.sums) return 0;
+    follow(plate);
+    carry_out(&job);
+    free(job.sums);
+    *sums = job.result;
+    return 1;
+}
+
+/* Take impact steps; returns their number, which is smaller if the motion is no longer finite. */
+EXPORT int64_t fecm_impact_steps(const Plate *plate, Impact *impact, int64_t steps, int64_t threads) {
+    Job job = {.plate = plate, .impact = impact, .steps = steps, .threads = threads};
+    job.sums = malloc(sizeof(half) * 4 * plate->chunks);
+    if (!job.sums) return -1;
+    for (int64_t i = 0; i < impact->loaded; i++)
+        plate->s[impact->entry[i]] -= impact->contact.force * impact->mobility[i] * impact->dt2;
+    displace(plate);
+    follow(plate);
+    carry_out(&job);
+    free(job.sums);
+    return job.taken;
+}
+
+/* Sizes of the structures, which those in Python must have, and whether AVX2 is in use. */
+EXPORT void fecm_sizes(int64_t *sizes) {
+    sizes[0] = sizeof(Group), sizes[1] = sizeof(Block), sizes[2] = sizeof(Chunk);
+    sizes[3] = sizeof(Plate), sizes[4] = sizeof(Impact), sizes[5] = COLUMNS;
+    sizes[6] = CHOSEN(run_chunk) != run_chunk_any;
+}
+
+static PyModuleDef module = {PyModuleDef_HEAD_INIT, "_compiled", NULL, -1, NULL, NULL, NULL, NULL, NULL};
+
+PyMODINIT_FUNC PyInit__compiled(void) { return PyModule_Create(&module); }

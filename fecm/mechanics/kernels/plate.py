@@ -1,0 +1,414 @@
+"""A plate for the compiled kernels: its vectors, and its elements eight at a time."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._typing import Floats
+from fecm.mechanics import assumed_shear
+from fecm.mechanics.element_groups import ElementBlock, congruence
+from fecm.mechanics.interpolation import (
+    NDOF,
+    inverse_jacobian,
+    jacobian_determinants,
+    local_shape_functions,
+)
+from fecm.mechanics.kernels import LIBRARY, Chunk, Doubles, Group, Integers, Plate, Sums
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.stiffness_operator import R, StiffnessOperator, pieces
+from fecm.mechanics.symmetry import TURNED, SymmetryReduction, opposite_nodes
+
+Indices = NDArray[np.intp]
+
+
+LANES = 8
+SHARED, FREE = 0, 1
+# With fewer congruent elements a shared matrix fills too few lanes.
+WORTH_GROUPING = 8
+# Elements of a chunk, approximately, and the largest number of chunks.
+CHUNK, MOST_CHUNKS = 512, 16
+# Largest coupling of even and odd motions of an element, relative to its largest stiffness.
+SYMMETRIC = 1e-14
+# The structure Block of kernels.c.
+BLOCK = np.dtype([(name, np.uint64) for name in ("group", "source", "target", "data", "done")])
+
+
+class _Elements:
+    """Elements of a family that share a matrix, or have none."""
+
+    def __init__(
+        self, plate: PlateModel, family: ElementBlock, columns: Indices, weights: Floats, kind: int
+    ) -> None:
+        self.plate, self.family, self.columns, self.weights = plate, family, columns, weights
+        opposite = opposite_nodes(family)
+        nn = family.nodes.shape[1]
+        self.order, self.pairs = np.arange(nn), 0
+        self.arrays: dict[str, Floats] = {}
+        self.numbers = {"kind": kind, "nodes": nn}
+        if kind == FREE:
+            self._tables()
+            return
+        K = weights[0] * plate.stiffness_of(family.take(np.array([0])))[0]
+        K = K.reshape(nn, NDOF, nn, NDOF).transpose(1, 0, 3, 2)[columns][:, :, columns]
+        if opposite is not None:
+            first = np.flatnonzero(opposite > np.arange(nn))
+            centre = np.flatnonzero(opposite == np.arange(nn))
+            order = np.concatenate([first, opposite[first], centre])
+            if (parts := self._halves(K[:, order][:, :, :, order], len(first))) is not None:
+                self.order, self.numbers["pairs"] = order, len(first)
+                self.arrays["matrix"] = parts
+                return
+        self.arrays["matrix"] = K.reshape(nn * len(columns), -1).copy()
+
+    def _halves(self, K: Floats, pairs: int) -> Floats | None:
+        """Matrices of the even and the odd motions, in a row; None if they are coupled."""
+        nd, nn = K.shape[:2]
+        even: list[Floats] = []
+        odd: list[Floats] = []
+        unit = np.eye(nd * nn).reshape(nd, nn, -1)
+        for dof, column in enumerate(self.columns):
+            keeps = bool(TURNED[column] > 0.0)
+            a, b, rest = unit[dof, :pairs], unit[dof, pairs : 2 * pairs], unit[dof, 2 * pairs :]
+            parts = [a + b, a - b]
+            even += [*parts[1 - keeps], *(rest if keeps else ())]
+            odd += [*parts[keeps], *(() if keeps else rest)]
+        T = np.array(even + odd)
+        scale = 1.0 / (T**2).sum(axis=1)
+        turned = scale[:, None] * (T @ K.reshape(nd * nn, -1) @ T.T) * scale
+        n = len(even)
+        coupled = max(abs(turned[:n, n:]).max(), abs(turned[n:, :n]).max())
+        if coupled > SYMMETRIC * abs(turned).max():
+            return None
+        return np.concatenate([turned[:n, :n].ravel(), turned[n:, n:].ravel()])
+
+    def _tables(self) -> None:
+        """Values and slopes of the shape functions at the points of quadrature."""
+        family, rules = self.family, self.plate.rules
+        nn = family.nodes.shape[1]
+        _, local = local_shape_functions(family, rules.bending)
+        slopes = local.transpose(1, 0, 2).reshape(-1, nn)
+        shear = assumed_shear.quadrature(family) if rules.assumes_shear else rules.shear
+        if rules.assumes_shear:
+            tied = [local_shape_functions(family, assumed_shear.tying_points(nn, axis))
+                    for axis in (0, 1)]  # fmt: skip
+            values = np.concatenate([value for value, _ in tied])
+            deflection = np.concatenate([at[:, axis] for axis, (_, at) in enumerate(tied)])
+            weights = [assumed_shear.tying_weights(nn, axis, shear) for axis in (0, 1)]
+            self.arrays["tied"] = np.stack(weights)
+            self.arrays["tied_t"] = np.stack([table.T for table in weights])
+            self.numbers["tying"] = len(tied[0][0])
+        else:
+            values, local = local_shape_functions(family, shear)
+            deflection = local.transpose(1, 0, 2).reshape(-1, nn)
+        self.rules = rules.bending, shear
+        self.numbers |= {"bending": len(rules.bending.xi), "shear": len(shear.xi)}
+        rotations = np.concatenate([slopes, values])
+        self.arrays |= {
+            "rotations": rotations, "rotations_t": rotations.T, "in_plane_t": slopes.T,
+            "deflection": deflection, "deflection_t": deflection.T,
+        }  # fmt: skip
+
+    def data(self, members: Indices) -> Floats:
+        """Jacobians at the points of the elements without a matrix, (blocks, numbers, 8)."""
+        family, rules = self.family.take(members), self.plate.rules
+        parts = []
+        for rule in self.rules:
+            _, local = local_shape_functions(family, rule)
+            inverse, _ = inverse_jacobian(
+                family, local, transposed_jacobian=rules.transposed_jacobian
+            )
+            jxw = jacobian_determinants(family, rule) * rule.weights * self.weights[members, None]
+            flat = inverse.reshape(*inverse.shape[:2], 4)
+            parts.append(np.concatenate([flat, jxw[:, :, None]], axis=2).reshape(len(members), -1))
+        if rules.assumes_shear:
+            nn = family.nodes.shape[1]
+            for axis in (0, 1):
+                _, local = local_shape_functions(family, assumed_shear.tying_points(nn, axis))
+                slope = np.einsum("tn,eni->eti", local[:, axis], family.coordinates)
+                parts.append(slope.reshape(len(members), -1))
+        values = np.concatenate(parts, axis=1)
+        return np.ascontiguousarray(values.reshape(-1, LANES, values.shape[1]).swapaxes(1, 2))
+
+
+class CompiledPlate:
+    """A plate in the layout of the kernels.
+
+    Vectors are (nodes, entries) over the nodes that move independently; `position` (count,) are the
+    places of the independent dofs in them.
+    """
+
+    def __init__(self, plate: PlateModel, kept: SymmetryReduction) -> None:
+        moves = kept.sign != 0.0
+        self.columns = columns = np.arange(0 if moves[:, :2].any() else 2, NDOF)
+        self._held: list[Any] = []  # arrays that the structures point to
+        leader = _leaders(kept)
+        groups: list[_Elements] = []
+        members: list[Indices] = []  # of the group's family
+        for family in plate.families:
+            weights = kept.weights[family.rows].astype(float)
+            for chosen, kind in _grouped(family, weights):
+                groups.append(_Elements(plate, family.take(chosen), columns, weights[chosen], kind))
+                members.append(np.arange(len(chosen)))
+        sizes = [len(part) for part in members]
+        group = np.repeat(np.arange(len(groups)), sizes)
+        member = np.concatenate(members)
+        centres = np.concatenate([g.family.coordinates.mean(axis=1) for g in groups])
+        along = _morton(centres)
+        chunks = 1 if len(along) < 2 * CHUNK else min(MOST_CHUNKS, len(along) // CHUNK)
+        chunk = np.empty(len(along), dtype=np.intp)
+        chunk[along] = np.arange(len(along)) * chunks // len(along)
+        # In each chunk the elements of a group follow one another, in blocks of eight.
+        order = along[np.lexsort((group[along], chunk[along]))]
+        begins = np.flatnonzero(
+            np.diff(group[order], prepend=-1) | np.diff(chunk[order], prepend=-1)
+        )
+        counts = np.diff(np.append(begins, len(order)))
+        blocks = -(-counts // LANES)
+        last = np.cumsum(blocks)
+        lane = np.arange(last[-1] * LANES)
+        run = np.repeat(np.arange(len(counts)), blocks * LANES)
+        offset = lane - LANES * (last - blocks)[run]
+        real = offset < counts[run]
+        element = order[begins[run] + np.minimum(offset, counts[run] - 1)].reshape(-1, LANES)
+        real = real.reshape(-1, LANES)
+        block_group, block_chunk = group[element[:, 0]], chunk[element[:, 0]]
+        # Nodes of the blocks' elements; numbers of the nodes.
+        nodes_of = [g.family.nodes[:, g.order] for g in groups]
+        block_nodes = [
+            nodes_of[g][member[element[block_group == g]]].swapaxes(1, 2)
+            for g in range(len(groups))
+        ]
+        numnp = len(leader)
+        lowest, highest = np.full(numnp, chunks), np.full(numnp, -1)
+        final = np.zeros(numnp, dtype=np.intp)
+        for g, nodes in enumerate(block_nodes):
+            (rows,) = np.nonzero(block_group == g)
+            touched = leader[nodes]
+            for touching, ufunc, values in (
+                (lowest, np.minimum, block_chunk[rows]),
+                (highest, np.maximum, block_chunk[rows]),
+                (final, np.maximum, rows),
+            ):
+                ufunc.at(touching, touched, values[:, None, None])
+        used = highest >= 0
+        followers = np.unique(
+            np.concatenate([nodes[leader[nodes] != nodes] for nodes in block_nodes])
+        )
+        own = used & (lowest == highest)
+        own[leader[followers]] = False
+        inside, common = np.flatnonzero(own), np.flatnonzero(used & ~own)
+        inside = inside[np.lexsort((inside, final[inside]))]
+        number = np.full(numnp, -1)
+        number[np.concatenate([inside, common])] = np.arange(len(inside) + len(common))
+        total = len(inside) + len(common)
+        place = number.copy()
+        place[followers] = total + np.arange(len(followers))
+        nd = 4 if len(columns) == 3 else NDOF  # entries of a node
+        self.shape = (total, nd)
+        self._number_dofs(kept, number)
+        mass = np.zeros((total + 2, nd))
+        independent = kept.gather(kept.sign * plate.field(plate.mass, 0.0))
+        mass.ravel()[self.position] = independent
+        self.mass = mass
+        self.inverse_mass = np.divide(1.0, mass, out=np.zeros_like(mass), where=mass > 0.0)
+        self.scale = np.zeros_like(mass)
+        self.u = np.zeros((total + len(followers) + 2, nd))
+        self.d, self.s = np.zeros_like(mass), np.zeros_like(mass)
+
+        table = np.zeros(len(element), dtype=BLOCK)
+        starts = np.searchsorted(block_chunk, np.arange(chunks + 1))
+        firsts = np.searchsorted(block_chunk[final[inside]], np.arange(chunks + 1))
+        table["done"] = np.searchsorted(final[inside], np.arange(len(element)), side="right")
+        table["done"] -= firsts[block_chunk].astype(np.uint64)
+        cuts = (Chunk * chunks)()
+        local = np.empty(numnp, dtype=np.intp)
+        targets = [np.empty(nodes.shape, dtype=np.int32) for nodes in block_nodes]
+        turned = np.zeros(nd)
+        turned[: len(columns)] = TURNED[columns]
+        for c in range(chunks):
+            count = int(firsts[c + 1] - firsts[c])
+            parts = [
+                nodes[block_chunk[block_group == g] == c].ravel()
+                for g, nodes in enumerate(block_nodes)
+            ]
+            here = np.unique(np.concatenate(parts))
+            shares = here[~own[leader[here]]]
+            mine = here[own[leader[here]]]
+            local[mine] = number[mine] - firsts[c]
+            local[shares] = count + np.arange(len(shares))
+            for g, nodes in enumerate(block_nodes):
+                at = block_chunk[block_group == g] == c
+                filled = real[block_group == g][at][:, None]
+                targets[g][at] = np.where(filled, local[nodes[at]], count + len(shares))
+            signs = np.where((leader[shares] != shares)[:, None], turned, 1.0)
+            cuts[c] = Chunk(
+                starts[c + 1] - starts[c], None, int(firsts[c]), count, len(shares),
+                self._ints(number[leader[shares]]), self._floats(signs),
+                self._floats(np.zeros((count + len(shares) + 2, nd))),
+            )  # fmt: skip
+        for g, elements in enumerate(groups):
+            (rows,) = np.nonzero(block_group == g)
+            made = Group(
+                **elements.numbers, **{n: self._floats(a) for n, a in elements.arrays.items()}
+            )
+            self._held.append(made)
+            sources = place[block_nodes[g]].astype(np.int32)
+            table["group"][rows] = ctypes.addressof(made)
+            for name, array in (("source", sources), ("target", targets[g])):
+                table[name][rows] = self._addresses(array)
+            if elements.numbers["kind"] == FREE:
+                data = elements.data(member[element[rows]].ravel())
+                table["data"][rows] = self._addresses(data)
+        self._held.append(table)
+        address = table.ctypes.data
+        for c in range(chunks):
+            where = ctypes.c_void_p(address + int(starts[c]) * BLOCK.itemsize)
+            cuts[c].block = ctypes.cast(where, type(cuts[c].block))
+        laminate = plate.laminate
+        stiffness = np.block([[laminate.A, -laminate.B], [-laminate.B, laminate.D]])
+        self.structure = Plate(
+            nd, total, len(inside), chunks, len(followers),
+            cuts, self._ints(number[leader[followers]]), self._floats(turned),
+            self._floats(stiffness), self._floats(laminate.shear), floats(self.mass),
+            floats(self.scale),
+            floats(self.u), floats(self.d), floats(self.s),
+            self._floats(np.zeros((len(common) + 2, nd))), 0.0,
+        )  # fmt: skip
+        self._held.append(cuts)
+
+    def _number_dofs(self, kept: SymmetryReduction, number: Indices) -> None:
+        """Set the places of the independent dofs in the vectors."""
+        self.position = np.empty(kept.count, dtype=np.intp)
+        nodes, dofs = np.nonzero((kept.sign != 0.0) & (number >= 0)[:, None])
+        # A dof that follows another has a node without a number.
+        self.position[kept.index[nodes, dofs]] = (
+            number[nodes] * self.shape[1] + dofs - self.columns[0]
+        )
+
+    def _floats(self, array: Floats) -> Any:
+        held = np.ascontiguousarray(array, dtype=np.float64)
+        self._held.append(held)
+        return floats(held)
+
+    def _ints(self, array: NDArray[Any]) -> Any:
+        held = np.ascontiguousarray(array, dtype=np.int32)
+        self._held.append(held)
+        return held.ctypes.data_as(Integers)
+
+    def _addresses(self, array: NDArray[Any]) -> NDArray[np.uint64]:
+        """Addresses of the parts of an array along its first axis."""
+        held = np.ascontiguousarray(array)
+        self._held.append(held)
+        step = held.strides[0]
+        return np.uint64(held.ctypes.data) + np.arange(len(held), dtype=np.uint64) * np.uint64(step)
+
+    def internal_force(self, threads: int = 1) -> Sums:
+        """Compute `s`, which is K u times `scale`, and inner products of the state."""
+        sums = Sums()
+        done = LIBRARY.fecm_internal_force(
+            ctypes.byref(self.structure), ctypes.byref(sums), ctypes.c_int64(threads)
+        )
+        if not done:
+            raise MemoryError
+        return sums
+
+
+class CompiledProduct(StiffnessOperator):
+    """K u by the compiled kernels; padded vectors are those of the reduction."""
+
+    def __init__(self, plate: PlateModel, kept: SymmetryReduction, threads: int = 1) -> None:
+        self.plate = CompiledPlate(plate, kept)
+        self._count, self._signed, self._threads = kept.count, kept.signed, threads
+        self.size = (2 if kept.signed else 1) * kept.count + 1
+        self._pieces = pieces(kept.count)
+        # Factors of the internal force: 1, or those of a time step and its square.
+        self._scaled_for: float | None = math.nan
+        rests = kept.sign == 0.0
+        self._field = self.plate.position[np.where(rests, 0, kept.index)]
+        self._sign = kept.sign
+
+    def scale(self, dt2: float | None) -> None:
+        """Make the kernels scale K u by dt2 and the inverse mass; by 1 without dt2."""
+        if self._scaled_for != dt2:
+            scale, position = self.plate.scale.ravel(), self.plate.position
+            scale[position] = (
+                1.0 if dt2 is None else dt2 * self.plate.inverse_mass.ravel()[position]
+            )
+            self._scaled_for = dt2
+
+    def each(self, padded: Floats, use: Callable[[int, Floats], R]) -> list[R]:
+        """Compute K u and apply a function to each piece."""
+        if self._signed:
+            np.negative(padded[: self._count], out=padded[self._count : -1])
+        plate = self.plate
+        plate.u.ravel()[plate.position] = padded[: self._count]
+        self.scale(None)
+        plate.internal_force(self._threads)
+        forces = plate.s.ravel()[plate.position]
+        return [use(number, forces[piece]) for number, piece in enumerate(self._pieces)]
+
+    def fields(self, stored: Floats) -> Floats:
+        """Fields (rows, numnp, 5) of stored vectors (rows, nodes, dofs)."""
+        full = stored.reshape(len(stored), stored[0].size if len(stored) else 1)
+        fields = full.take(self._field, axis=1) if len(stored) else np.empty((0, *self._sign.shape))
+        fields *= self._sign
+        fields += 0.0  # no negative zeros
+        return fields
+
+    def entries(self, indices: Indices, weights: Floats) -> tuple[NDArray[np.int64], Floats]:
+        """Places in the vectors, and weights, of sums over padded vectors."""
+        turned = (indices >= self._count) & (indices < self.size - 1)
+        rest = indices == self.size - 1
+        dofs = np.where(rest, 0, np.where(turned, indices - self._count, indices))
+        signed = np.where(rest, 0.0, np.where(turned, -weights, weights))
+        return self.plate.position[dofs].astype(np.int64), np.ascontiguousarray(signed)
+
+
+def floats(array: Floats) -> Any:
+    """Pointer to an array of numbers."""
+    return array.ctypes.data_as(Doubles)
+
+
+def _leaders(kept: SymmetryReduction) -> Indices:
+    """Node that each node follows, (numnp,): itself if it moves independently."""
+    numnp = len(kept.index)
+    nodes, dofs = np.nonzero(kept.sign)
+    first = np.full(kept.count, numnp)
+    np.minimum.at(first, kept.index[nodes, dofs], nodes)
+    leader = np.arange(numnp)
+    leader[nodes] = first[kept.index[nodes, dofs]]
+    return leader
+
+
+def _grouped(family: ElementBlock, weights: Floats) -> list[tuple[Indices, int]]:
+    """Elements of a family with a common matrix, or without."""
+    same = congruence(family)
+    key = 3 * same.group + weights.astype(int)
+    alone = []
+    found: list[tuple[Indices, int]] = []
+    for one in np.unique(key[weights > 0.0]):
+        (chosen,) = np.nonzero(key == one)
+        if len(chosen) >= WORTH_GROUPING:
+            found.append((chosen, SHARED))
+        else:
+            alone.append(chosen)
+    if alone:
+        found.append((np.sort(np.concatenate(alone)), FREE))
+    return found
+
+
+def _morton(places: Floats) -> Indices:
+    """Order of places, (n, 2), along a curve that fills the plane."""
+    low = places.min(axis=0)
+    cells = ((places - low) * (2**15 / max(np.ptp(places, axis=0).max(), 1e-300))).astype(np.uint64)
+    code = np.zeros(len(places), dtype=np.uint64)
+    for bit in range(16):
+        for axis in (0, 1):
+            code |= (cells[:, axis] >> np.uint64(bit) & np.uint64(1)) << np.uint64(2 * bit + axis)
+    return np.argsort(code, kind="stable")

@@ -1,0 +1,56 @@
+"""Build hook: compiles the kernels where there is a C compiler; fecm runs on NumPy without."""
+
+from __future__ import annotations
+
+import shutil
+import sysconfig
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+KERNELS = "fecm/mechanics/kernels"
+
+
+class CustomBuildHook(BuildHookInterface[Any]):
+    """Adds the compiled kernels to a wheel, or to the source tree of an editable installation."""
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Compile; a failure is a warning."""
+        if self.target_name != "wheel":
+            return
+        root = Path(self.root)
+        folder = Path(tempfile.mkdtemp())
+        try:
+            built = _compiled(root, folder)
+        except Exception as error:  # setuptools raises its own, the system's and SystemExit's
+            self.app.display_warning(f"the kernels are not compiled ({error}); fecm uses NumPy")
+            return
+        target = f"{KERNELS}/{built.name}"
+        if version == "editable":
+            shutil.copy(built, root / target)
+            return
+        build_data["force_include"][str(built)] = target
+        build_data["pure_python"] = False
+        platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+        build_data["tag"] = f"cp311-abi3-{platform}"
+
+
+def _compiled(root: Path, folder: Path) -> Path:
+    """Compile the kernels into a folder, for every Python from 3.11 on."""
+    from setuptools import Distribution, Extension
+    from setuptools.command.build_ext import build_ext
+
+    extension = Extension(
+        "_compiled",
+        [str(root / KERNELS / "kernels.c")],
+        extra_compile_args=["-O3", "-std=gnu11", "-Wno-psabi", "-fvisibility=hidden"],
+        libraries=["m", "pthread"],
+        py_limited_api=True,
+    )
+    command = build_ext(Distribution({"ext_modules": [extension]}))
+    command.build_lib, command.build_temp = str(folder), str(folder / "objects")
+    command.ensure_finalized()
+    command.run()
+    return folder / command.get_ext_filename("_compiled")

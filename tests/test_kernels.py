@@ -1,0 +1,192 @@
+"""The compiled kernels give what NumPy gives, whatever the plate and the number of threads."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sysconfig
+from itertools import product
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import fecm
+from fecm.api import load_deck
+from fecm.mechanics import kernels
+from fecm.mechanics.interpolation import NDOF
+from fecm.mechanics.kernels.plate import CompiledProduct
+from fecm.problem.build import build_model
+from fecm.problem.options import RunOptions
+from fecm.problem.problem import Problem
+from fecm.results import hdf5_writer
+from fecm.results.result import Result
+from fecm.simulation.checkpoint import Checkpointer
+from fecm.simulation.run import run
+from fecm.simulation.simulation import Simulation
+from fecm.simulation.spool import Journal
+from tests.builders import distorted_square, square
+from tests.calls import call
+from tests.decks import small
+from tests.test_element_decks import deck as element_deck
+
+compiled = pytest.mark.skipif(kernels.LIBRARY is None, reason="the kernels are not compiled")
+NUMPY = RunOptions(solver="numpy")
+SOURCES = Path(kernels.__file__).parent
+WARNINGS = ("-std=gnu11", "-Wall", "-Wextra", "-Werror", "-Wno-psabi")
+
+
+def problem(text: str) -> Problem:
+    """The checked problem of a deck."""
+    (found,) = load_deck(text).problems
+    return found
+
+
+def assert_same_product(text: str, dofs: int, *, threads: int = 1) -> CompiledProduct:
+    """K u of both agrees to rounding for a random displacement; `dofs` move at a node."""
+    motion = build_model(problem(text), NUMPY).motion
+    u = np.random.default_rng(0).standard_normal(len(motion.mass))
+    product = CompiledProduct(motion.plate, motion._reduction, threads)
+    wanted, found = motion.product(u), product(u)
+    np.testing.assert_allclose(found, wanted, rtol=0.0, atol=5e-15 * np.abs(wanted).max())
+    assert len(product.plate.columns) == dofs
+    return product
+
+
+@compiled
+@pytest.mark.parametrize("kind", [3, 4, 8, 9, 10, 12])
+@pytest.mark.parametrize("coupled", [False, True])
+def test_the_product_is_numpys_for_every_family_and_rule(kind: int, coupled: bool) -> None:
+    meshes = square(8, 8, kind), distorted_square(5, 4, kind)
+    for mesh, orders, mitc in product(meshes, ((3, 2, 3), (4, 4, 3)), (False, True)):
+        if mitc and kind not in (4, 9):
+            continue
+        text = element_deck(mesh, orders)
+        if coupled:
+            text = text.replace("2,90.,.053", "2,30.,.053").replace(",1,1,0,0,0", ",0,0,0,0,0")
+        text = text.replace("EXPE\n", "SHEA MITC\nEXPE\n", 1) if mitc else text
+        assert_same_product(text, NDOF if coupled else 3)
+
+
+@compiled
+def test_the_product_does_not_depend_on_the_number_of_threads() -> None:
+    text = element_deck(distorted_square(40, 40), (3, 2, 3))
+    products = [assert_same_product(text, 3, threads=threads) for threads in (1, 2, 3)]
+    assert products[0].plate.structure.chunks == 3
+    u = np.random.default_rng(1).standard_normal(len(products[0].plate.position))
+    one, *others = (product(u) for product in products)
+    for other in others:
+        np.testing.assert_array_equal(other, one)
+
+
+REPORT = Path("decks/impact-115.inp").read_text()
+DECKS = {
+    "small": small(),
+    "point": REPORT,
+    "patch and gage": REPORT.replace(
+        "EXPE",
+        "PATC\nDISC             0.2\n\nGAGE\n    1       2.5       2.0     0.053        0.\n\nEXPE",
+    ),
+    "rigid mass": REPORT.replace("EXPE", "PROJ\n    0    0  0.000181\n\nEXPE"),
+    "one rigidity": REPORT.replace(
+        "EXPE\n  1912000. 0.0006564     0.094       2.0", "EXPE ACR\n  1912000. 0.0006564"
+    ),
+    "damping": REPORT.replace("EXPE", "DAMP\n     3000.\n\nEXPE"),
+    "distorted": element_deck(distorted_square(6, 6), (3, 2, 3), steps=300),
+    "shorter steps": REPORT.replace("4000", "  37"),
+}
+
+
+def assert_close(found: Result, wanted: Result) -> None:
+    """Every dataset agrees to 1e-10 of its maximum."""
+    assert list(found) == list(wanted)
+    for name in wanted:
+        values = wanted[name]
+        scale = np.abs(values).max(initial=0.0)
+        if name == "energy/balance_error":
+            scale = wanted.attributes_of("energy")["initial"]
+        # NumPy's step of the rod carries the rounding of its rigid velocity, 1e-11 of a step's
+        # acceleration, where the modes of the kernels are exact to 2e-15.
+        atol = (1e-9 if name.endswith("acceleration") else 1e-10) * scale
+        np.testing.assert_allclose(found[name], values, rtol=0.0, atol=atol, err_msg=name)
+
+
+@compiled
+@pytest.mark.parametrize("name", DECKS)
+def test_a_run_is_that_of_numpy(name: str) -> None:
+    found, wanted = (fecm.run_one(DECKS[name], solver=s) for s in ("kernels", "numpy"))
+    assert_close(found, wanted)
+
+
+@compiled
+def test_a_run_does_not_depend_on_the_number_of_threads(tmp_path: Path) -> None:
+    deck = element_deck(square(40, 40), (3, 2, 3), steps=40).replace("2.0E-7", "5.0E-8")
+    for threads in (1, 2, 3):
+        fecm.run_one(deck, output=tmp_path / f"{threads}.h5", threads=threads)
+    one = (tmp_path / "1.h5").read_bytes()
+    assert (tmp_path / "2.h5").read_bytes() == one == (tmp_path / "3.h5").read_bytes()
+
+
+@compiled
+def test_a_run_resumed_between_bursts_gives_the_same_bytes(tmp_path: Path) -> None:
+    """Of a run that ends at an observer, as an interrupted one does."""
+    (problem,) = load_deck(REPORT.replace("4000", " 300")).problems
+
+    def run_to(path: Path, stop: int, *, resume: bool = False) -> None:
+        def look(simulation: Simulation) -> None:
+            if simulation.state.plate.step == stop:
+                checkpointer.write(simulation)
+                raise InterruptedError
+
+        with hdf5_writer.writing(path) as sink:
+            journal = Journal(sink)
+            checkpointer = Checkpointer(path, journal)
+            simulation = Simulation(problem, journal, observers=(look,))
+            simulation.interval = 50
+            if resume:
+                checkpointer.restore(simulation)
+            run(simulation)
+        checkpointer.clear()
+
+    run_to(tmp_path / "whole.h5", 0)
+    with pytest.raises(InterruptedError):
+        run_to(tmp_path / "cut.h5", 150)
+    run_to(tmp_path / "cut.h5", 0, resume=True)
+    assert (tmp_path / "cut.h5").read_bytes() == (tmp_path / "whole.h5").read_bytes()
+
+
+@compiled
+def test_the_result_names_its_solver(tmp_path: Path) -> None:
+    for solver in ("kernels", "numpy", "csr"):
+        fecm.run_one(small(), output=tmp_path / "x.h5", solver=solver)
+        with h5py.File(tmp_path / "x.h5") as file:
+            assert file.attrs["solver"] == solver
+
+
+def test_without_kernels_numpy_runs_and_the_word_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    wanted = fecm.run_one(small(), solver="numpy")
+    monkeypatch.setattr(kernels, "LIBRARY", None)
+    monkeypatch.setattr("fecm.problem.options.LIBRARY", None)
+    np.testing.assert_array_equal(fecm.run_one(small()).force, wanted.force)
+    with pytest.raises(ValueError, match="no compiled kernels; take the solver numpy"):
+        fecm.run_one(small(), solver="kernels")
+
+
+def test_info_shows_whether_the_kernels_are_compiled() -> None:
+    shown = call("info", "--system").stdout
+    assert f"kernels   {kernels.description()}\n" in shown
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
+def test_the_kernels_compile_without_a_warning(tmp_path: Path) -> None:
+    include = sysconfig.get_paths()["include"]
+    if not Path(include, "Python.h").exists():
+        pytest.skip("needs Python's headers")
+    command = ["cc", *WARNINGS, "-O1", "-c", f"-I{include}", str(SOURCES / "kernels.c")]
+    done = subprocess.run(
+        [*command, "-o", str(tmp_path / "kernels.o")], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
