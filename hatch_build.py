@@ -45,7 +45,7 @@ def _compiled(root: Path, folder: Path) -> Path:
     extension = Extension(
         "_compiled",
         [str(root / KERNELS / "kernels.c")],
-        extra_compile_args=["-O3", "-std=gnu11", "-Wno-psabi", "-fvisibility=hidden"],
+        extra_compile_args=["-O3", "-g0", "-std=gnu11", "-Wno-psabi", "-fvisibility=hidden"],
         libraries=["m", "pthread"],
         py_limited_api=True,
     )
