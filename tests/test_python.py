@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import logging
+import os
 import re
 import subprocess
 import sys
@@ -67,6 +68,22 @@ def test_importing_fecm_imports_neither_numpy_nor_scipy() -> None:
     code = "import sys, fecm; print({'numpy', 'scipy', 'h5py'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
+
+
+def test_no_command_imports_scipy_unless_the_deck_needs_it(tmp_path: Path) -> None:
+    (tmp_path / "small.inp").write_text(small())
+    code = (
+        "import sys\nfrom tests.calls import call\n"
+        "for words in ('run small.inp', 'check small.inp', 'info small.h5', 'tapes small.h5',\n"
+        "              'diff small.h5 small.h5', 'export small.h5 --to csv',\n"
+        "              'plot small.h5 --kind force'):\n"
+        "    assert call(*words.split()).exit_code == 0, words\n"
+        "    assert 'scipy' not in sys.modules, words\n"
+    )
+    subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, check=True,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])},
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("name", GROUPS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -43,7 +43,9 @@ from fecm.plot.style import (
 from fecm.results.result import Result
 from fecm.results.schema import declared_units
 from fecm.studies.comparison import Measurement, Source, compare, measurement_of
-from fecm.sweeps.identify import Identification
+
+if TYPE_CHECKING:
+    from fecm.sweeps.identify import Identification
 
 Results = Mapping[str, Result]
 

@@ -39,7 +39,7 @@ def kind_named(name: str) -> Kind:
 
 
 def require_matplotlib() -> None:
-    """Raise an ImportError that says what to install if there is no matplotlib."""
+    """Raise MatplotlibError, which says what to install, if matplotlib is absent."""
     try:
         import matplotlib  # noqa: F401
     except ImportError:

@@ -46,7 +46,8 @@ POINTS, TOP_POINTS = 10, 3
 SINGULAR, NO_EFFECT = 1e-3, 1e-6
 # Share of a parameter in a singular vector above which the vector concerns it.
 SHARE = 0.1
-# Correlation of parameters, and of neighbouring residuals above a share of the peak, that is told.
+# A finding reports a larger correlation: of two parameters, and of neighbouring residuals where the
+# force exceeds a share of its peak.
 CORRELATED, COLOURED, FAINT = 0.99, 0.5, 1e-3
 # The fit ends with a step below this share of a standard error.
 SETTLED = 0.01

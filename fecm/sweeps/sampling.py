@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.special import ndtri
 
 from fecm._typing import Floats
 from fecm.sweeps.cases import INTEGERS, MOST, NAMES, PLATE, TEXTS, Case, CasesError, name_fault
@@ -42,6 +41,8 @@ class Law:
 
     def values(self, unit: Floats) -> Floats:
         """Values at which the distribution function takes these values, between 0 and 1."""
+        from scipy.special import ndtri  # slow to import
+
         first, *_, last = self.parameters
         if self.kind == "normal":
             return np.asarray(first + last * ndtri(unit))
