@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import sysconfig
 import tempfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +17,16 @@ KERNELS = "fecm/mechanics/kernels"
 class CustomBuildHook(BuildHookInterface[Any]):
     """Adds the compiled kernels to a wheel, or to the source tree of an editable installation."""
 
+    folder: Path | None = None
+
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile; a failure is a warning."""
         if self.target_name != "wheel":
             return
-        root = Path(self.root)
-        folder = Path(tempfile.mkdtemp())
+        root, self.folder = Path(self.root), Path(tempfile.mkdtemp())
         try:
-            built = _compiled(root, folder)
-        except Exception as error:  # setuptools raises its own, the system's and SystemExit's
+            built = _compiled(root, self.folder)
+        except (Exception, SystemExit) as error:  # whatever setuptools makes of a lacking compiler
             self.app.display_warning(f"the kernels are not compiled ({error}); fecm uses NumPy")
             return
         target = f"{KERNELS}/{built.name}"
@@ -36,15 +38,24 @@ class CustomBuildHook(BuildHookInterface[Any]):
         platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
         build_data["tag"] = f"cp311-abi3-{platform}"
 
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        """Delete what was compiled."""
+        if self.folder is not None:
+            shutil.rmtree(self.folder, ignore_errors=True)
+
 
 def _compiled(root: Path, folder: Path) -> Path:
     """Compile the kernels into a folder, for every Python from 3.11 on."""
     from setuptools import Distribution, Extension
     from setuptools.command.build_ext import build_ext
 
+    # As fecm.mechanics.kernels.stamp computes it.
+    sources = sorted((root / KERNELS).glob("*.[ch]"))
+    stamp = zlib.crc32(b"".join(path.read_bytes() for path in sources)) >> 1
     extension = Extension(
         "_compiled",
         [str(root / KERNELS / "kernels.c")],
+        define_macros=[("FECM_STAMP", str(stamp))],
         extra_compile_args=["-O3", "-g0", "-std=gnu11", "-Wno-psabi", "-fvisibility=hidden"],
         libraries=["m", "pthread"],
         py_limited_api=True,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import shutil
 import subprocess
 import sysconfig
@@ -15,8 +16,11 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.mechanics import kernels
+from fecm.mechanics.impact_steps import Modes
 from fecm.mechanics.interpolation import NDOF
 from fecm.mechanics.kernels.plate import CompiledProduct
+from fecm.mechanics.projectile import Rod
+from fecm.mechanics.rod_integrators import RodState, WilsonStep
 from fecm.problem.build import build_model
 from fecm.problem.options import RunOptions
 from fecm.problem.problem import Problem
@@ -157,6 +161,47 @@ def test_a_run_resumed_between_bursts_gives_the_same_bytes(tmp_path: Path) -> No
 
 
 @compiled
+def test_rows_are_those_of_one_burst_if_memory_ends_it_earlier(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    deck = REPORT.replace("4000", " 300")
+    wanted = fecm.run_one(deck)
+    monkeypatch.setattr("fecm.simulation.macros.FIELDS", 3000)  # one field
+    assert_close(fecm.run_one(deck), wanted)
+
+
+@pytest.mark.parametrize("elements", [1, 2, 20, 100, 200])
+@pytest.mark.parametrize("tapered", [False, True])
+def test_the_modes_of_a_rod_take_the_step_of_its_matrices(elements: int, tapered: bool) -> None:
+    """To the rounding of the latter, which hold the rigid velocity."""
+    diameters = 0.02 * (1.0 + 0.5 * np.linspace(0.0, 1.0, elements) * tapered)
+    rod = Rod(0.025, tuple(diameters.tolist()), 2.07e11, 7850.0)
+    K, M = rod.stiffness(), rod.mass()
+    integrator, modes = WilsonStep(K, M, 2e-7), Modes.of(K, M)
+    rng = np.random.default_rng(0)
+    state = RodState(np.stack([scale * rng.standard_normal(len(M)) for scale in (1e-9, 30.0, 1e6)]))
+    T, h = modes.step(integrator)
+    moved = np.einsum("abm,bm->am", T.reshape(3, 3, -1), modes.motion(state)) + 5e3 * h
+    after = integrator.advance(state, 5e3)
+    for found, wanted in zip(moved[1:] @ modes.shapes.T, after.motion[1:], strict=True):
+        np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-9 * np.abs(wanted).max())
+
+
+@compiled
+def test_the_structures_of_python_have_the_sizes_of_those_in_c() -> None:
+    sizes = (ctypes.c_int64 * 6)()
+    kernels.LIBRARY.fecm_sizes(sizes)
+    structures = kernels.Group, kernels.Block, kernels.Chunk, kernels.Plate, kernels.Impact
+    assert list(sizes) == [*map(ctypes.sizeof, structures), len(kernels.COLUMNS)]
+
+
+@compiled
+def test_a_library_of_other_sources_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernels, "stamp", lambda _: 1)
+    assert kernels._load() is None
+
+
+@compiled
 def test_the_result_names_its_solver(tmp_path: Path) -> None:
     for solver in ("kernels", "numpy", "csr"):
         fecm.run_one(small(), output=tmp_path / "x.h5", solver=solver)
@@ -185,8 +230,7 @@ def test_the_kernels_compile_without_a_warning(tmp_path: Path) -> None:
     include = sysconfig.get_paths()["include"]
     if not Path(include, "Python.h").exists():
         pytest.skip("needs Python's headers")
-    command = ["cc", *WARNINGS, "-O1", "-c", f"-I{include}", str(SOURCES / "kernels.c")]
-    done = subprocess.run(
-        [*command, "-o", str(tmp_path / "kernels.o")], capture_output=True, text=True, check=False
-    )
+    command = ["cc", *WARNINGS, "-O1", "-DFECM_STAMP=0", "-c", f"-I{include}"]
+    command += [str(SOURCES / "kernels.c"), "-o", str(tmp_path / "kernels.o")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")

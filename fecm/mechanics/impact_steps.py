@@ -7,6 +7,7 @@ after is that of :mod:`fecm.mechanics.impact`.
 from __future__ import annotations
 
 import ctypes
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,6 +33,9 @@ from fecm.mechanics.plate_motion import (
 )
 from fecm.mechanics.rod_integrators import RodIntegrator, RodState
 
+# Difference of squares of frequencies below which modes count as equal, relative to the largest.
+EQUAL = 1e-10
+
 
 @dataclass(frozen=True)
 class Modes:
@@ -39,7 +43,7 @@ class Modes:
 
     shapes: Floats  # (n, modes)
     stiffness: Floats  # (modes,): square of the angular frequency; 0 for the rigid motion
-    mass: Floats  # (n,) or (n, n)
+    weights: Floats  # (n, modes): the mass matrix times the shapes
 
     @classmethod
     def of(cls, K: Floats, m: Floats) -> Modes:
@@ -49,29 +53,26 @@ class Modes:
         values, vectors = np.linalg.eigh(inverse @ K @ inverse.T)
         # One Newton step in extended precision: the errors of a low mode are relative to the
         # largest frequency (T. Ogita and K. Aishima, Iterative refinement for symmetric
-        # eigenvalue decomposition, 2018).
+        # eigenvalue decomposition, 2018).  Modes of equal frequency are only made orthogonal.
         V = (inverse.T @ vectors).astype(np.longdouble)
         overlap, S = np.eye(len(m)) - V.T @ M @ V, V.T @ K @ V
         exact = np.diagonal(S) / (1.0 - np.diagonal(overlap))
         gap = exact - exact[:, None]
-        np.fill_diagonal(gap, 1.0)
-        change = (S + overlap * exact) / gap
-        np.fill_diagonal(change, np.diagonal(overlap) / 2.0)
+        far = abs(gap) > EQUAL * values[-1]
+        change = np.where(far, S + overlap * exact, overlap) / np.where(far, gap, 2.0)
         shapes, values = (V + V @ change).astype(float), exact.astype(float)
         rigid = np.zeros(len(m))
         rigid[::2] = 1.0
         shapes[:, 0] = rigid / np.sqrt(rigid @ M @ rigid)
         values[0] = 0.0
-        return cls(shapes, values, m)
+        return cls(shapes, values, M @ shapes)
 
     def motion(self, state: RodState) -> Floats:
         """Motion of the modes, (3, modes), without the rigid displacement."""
         y = np.stack([state.deformation, state.velocity, state.acceleration])
-        M = np.diag(self.mass) if self.mass.ndim == 1 else self.mass
-        weights = M @ self.shapes
-        rigid = y @ weights[:, 0]
+        rigid = y @ self.weights[:, 0]
         # Without it, its rounding does not reach the other modes.
-        modal = (y - rigid[:, None] * self.shapes[:, 0]) @ weights
+        modal = (y - rigid[:, None] * self.shapes[:, 0]) @ self.weights
         modal[:, 0] = rigid
         modal[0, 0] = 0.0
         return np.ascontiguousarray(modal)
@@ -141,7 +142,7 @@ class ImpactSteps:
         product = system.motion.product
         if not isinstance(product, CompiledProduct):
             raise TypeError("the plate has no compiled product")
-        self._system, self._gages, self._threads = system, gages, threads
+        self._system, self._threads = system, threads
         self._plate: CompiledPlate = product.plate
         self._product = product
         self._modes = Modes.of(system.rod_stiffness, system.rod_mass)
@@ -156,10 +157,7 @@ class ImpactSteps:
         else:
             entry, weights, mobility = position[load.equations], load.weights, load.mobility
         self._entry = np.ascontiguousarray(entry, dtype=np.int64)
-        self._weights, self._mobility = (
-            np.ascontiguousarray(weights),
-            np.ascontiguousarray(mobility),
-        )
+        self._weights, self._mobility = map(np.ascontiguousarray, (weights, mobility))
         self._last = np.empty(len(entry))
         self._gage_entry = np.zeros((0, 0), dtype=np.int64)
         self._gage_weights = np.zeros((0, 0))
@@ -184,7 +182,7 @@ class ImpactSteps:
         fields = np.empty((len(rows), *kernel.shape))
         m: LoadingHistory = state.memory
         impact = Impact(
-            c.k, c.q, c.alpha_p if linear else c.alpha_cr, c.s_p if linear else -1.0, *m,
+            c.k, c.q, c.alpha_p if linear else c.alpha_cr, c.s_p if linear else math.nan, *m,
             *state.contact, state.plate_w, state.contact_work, plate.time,
             int(state.unconverged_steps), integrator.dt, integrator.theta, *integrator.weights,
             integrator.gain, len(self._tip_shape), floats(T), floats(h),

@@ -26,17 +26,9 @@ from numpy.typing import NDArray
 
 from fecm._errors import FecmError
 from fecm._typing import Floats
-from fecm.mechanics import kernels
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.stiffness_operator import pieces
-from fecm.mechanics.stiffness_product import (
-    AUTO,
-    CSR,
-    KERNELS,
-    NUMPY,
-    Workers,
-    stiffness_operator,
-)
+from fecm.mechanics.stiffness_product import AUTO, CSR, Workers, resolved, stiffness_operator
 from fecm.mechanics.symmetry import SymmetryReduction, unreduced
 
 Indices = NDArray[np.intp]
@@ -203,9 +195,7 @@ class PlateMotion:
         damping: float = 0.0,
     ) -> None:
         self.damping = damping
-        if solver == AUTO:
-            solver = NUMPY if kernels.LIBRARY is None else KERNELS
-        self.solver = solver
+        self.solver = resolved(solver)
         kept = unreduced(plate) if reduced is None or solver == CSR else reduced
         self.plate = plate
         self._reduction = kept

@@ -229,6 +229,13 @@ class ElementProduct(StiffnessOperator):
         return self._total
 
 
+def resolved(solver: str) -> str:
+    """The solver itself instead of ``"auto"``."""
+    if solver != AUTO:
+        return solver
+    return NUMPY if kernels.LIBRARY is None else KERNELS
+
+
 def stiffness_operator(
     plate: PlateModel,
     solver: str = AUTO,
@@ -240,10 +247,11 @@ def stiffness_operator(
     The solver is one of `SOLVERS`: ``"csr"`` for the sparse matrix of all dofs; otherwise element
     by element, with one matrix for elements that are congruent to enough others.
     """
+    solver = resolved(solver)
     if solver == CSR:
         return CsrProduct(plate.stiffness)
     kept = reduced or unreduced(plate)
-    if solver == KERNELS or (solver == AUTO and kernels.LIBRARY is not None):
+    if solver == KERNELS:
         return CompiledProduct(plate, kept, 1 if workers is None else workers.count)
     domains: list[list[Group]] = []
     for family in plate.families:

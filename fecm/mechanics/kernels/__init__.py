@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+import zlib
 from ctypes import POINTER, Structure, c_double, c_int32, c_int64
+from pathlib import Path
 from typing import Any
 
 Doubles, Integers, Longs = POINTER(c_double), POINTER(c_int32), POINTER(c_int64)
@@ -90,11 +92,13 @@ def _load() -> Any:
         return None
     library = ctypes.CDLL(_compiled.__file__)
     library.fecm_impact_steps.restype = c_int64
-    sizes = (c_int64 * 7)()
-    library.fecm_sizes(sizes)
-    mirrored = [*map(ctypes.sizeof, (Group, Block, Chunk, Plate, Impact)), len(COLUMNS)]
-    # Those of another version are not used.
-    return library if list(sizes)[:6] == mirrored else None
+    # A library of other sources, left by an earlier installation in place, is not used.
+    return library if library.fecm_stamp() == stamp(Path(__file__).parent) else None
+
+
+def stamp(folder: Path) -> int:
+    """Checksum of the sources in a folder, which the compiled library carries."""
+    return zlib.crc32(b"".join(path.read_bytes() for path in sorted(folder.glob("*.[ch]")))) >> 1
 
 
 LIBRARY = _load()
@@ -104,6 +108,4 @@ def description() -> str:
     """Which kernels are in use, in words."""
     if LIBRARY is None:
         return "not compiled; NumPy is used"
-    sizes = (c_int64 * 7)()
-    LIBRARY.fecm_sizes(sizes)
-    return f"compiled, {'AVX2' if sizes[6] else 'portable'}"
+    return f"compiled, {'AVX2' if LIBRARY.fecm_has_avx2() else 'portable'}"

@@ -2,7 +2,7 @@
 
 enum { VIRGIN, UNLOADING, RELOADING };
 
-/* Constants of the contact law: equation 3-8, or 3-7 where `slope` is negative. */
+/* Constants of the contact law: equation 3-8, or 3-7 where `slope` is not a number. */
 typedef struct {
     double k, q, critical, slope;
 } Law;
@@ -64,7 +64,7 @@ static double force_of(const History *m, double a) {
 /* Permanent indentation after a peak, equation 3-8 or 3-7. */
 static double permanent(const Law *law, double peak) {
     double value;
-    if (law->slope >= 0.0)
+    if (!isnan(law->slope))
         value = law->slope * (peak - law->critical);
     else {
         const double top = peak > 0.0 ? peak : 0.0;

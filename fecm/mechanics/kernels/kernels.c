@@ -3,7 +3,8 @@
  * Loaded with ctypes by __init__.py, whose structures mirror those below.
  *
  * A plate's vectors have `nd` entries for each of its nodes: 4 for w, theta_x, theta_y and 0, or 5.
- * Restrained dofs are among them; their inverse mass is zero, so that they stay at rest.  Nodes that follow another one by symmetry come last.
+ * Restrained dofs are among them; their inverse mass is zero, so that they stay at rest.  Nodes that
+ * follow another one by symmetry come last.
  * Elements are taken eight at a time, one in each lane.  They belong to chunks, which threads share;
  * cuts and sums do not depend on the number of threads, and so neither do the results.
  */
@@ -296,12 +297,16 @@ EXPORT int64_t fecm_impact_steps(const Plate *plate, Impact *impact, int64_t ste
     return job.taken;
 }
 
-/* Sizes of the structures, which those in Python must have, and whether AVX2 is in use. */
+/* Sizes of the structures, which those in Python must have. */
 EXPORT void fecm_sizes(int64_t *sizes) {
     sizes[0] = sizeof(Group), sizes[1] = sizeof(Block), sizes[2] = sizeof(Chunk);
     sizes[3] = sizeof(Plate), sizes[4] = sizeof(Impact), sizes[5] = COLUMNS;
-    sizes[6] = CHOSEN(run_chunk) != run_chunk_any;
 }
+
+/* Checksum of the sources, given by the build. */
+EXPORT int fecm_stamp(void) { return FECM_STAMP; }
+
+EXPORT int fecm_has_avx2(void) { return CHOSEN(run_chunk) != run_chunk_any; }
 
 static PyModuleDef module = {PyModuleDef_HEAD_INIT, "_compiled", NULL, -1, NULL, NULL, NULL, NULL, NULL};
 

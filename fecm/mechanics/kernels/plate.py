@@ -5,12 +5,12 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._typing import Floats
+from fecm._typing import Bools, Floats
 from fecm.mechanics import assumed_shear
 from fecm.mechanics.element_groups import ElementBlock, congruence
 from fecm.mechanics.interpolation import (
@@ -25,7 +25,6 @@ from fecm.mechanics.stiffness_operator import R, StiffnessOperator, pieces
 from fecm.mechanics.symmetry import TURNED, SymmetryReduction, opposite_nodes
 
 Indices = NDArray[np.intp]
-
 
 LANES = 8
 SHARED, FREE = 0, 1
@@ -46,15 +45,20 @@ class _Elements:
         self, plate: PlateModel, family: ElementBlock, columns: Indices, weights: Floats, kind: int
     ) -> None:
         self.plate, self.family, self.columns, self.weights = plate, family, columns, weights
-        opposite = opposite_nodes(family)
         nn = family.nodes.shape[1]
-        self.order, self.pairs = np.arange(nn), 0
+        self.order = np.arange(nn)  # of the nodes, in all arrays
         self.arrays: dict[str, Floats] = {}
         self.numbers = {"kind": kind, "nodes": nn}
         if kind == FREE:
             self._tables()
-            return
-        K = weights[0] * plate.stiffness_of(family.take(np.array([0])))[0]
+        else:
+            self._matrix(weights[0])
+
+    def _matrix(self, weight: float) -> None:
+        """Set the common matrix, or those of the even and odd motions."""
+        plate, family, columns = self.plate, self.family, self.columns
+        nn, opposite = family.nodes.shape[1], opposite_nodes(family)
+        K = weight * plate.stiffness_of(family.take(np.array([0])))[0]
         K = K.reshape(nn, NDOF, nn, NDOF).transpose(1, 0, 3, 2)[columns][:, :, columns]
         if opposite is not None:
             first = np.flatnonzero(opposite > np.arange(nn))
@@ -136,6 +140,26 @@ class _Elements:
         return np.ascontiguousarray(values.reshape(-1, LANES, values.shape[1]).swapaxes(1, 2))
 
 
+class _Layout(NamedTuple):
+    """Blocks of eight elements; lanes without one repeat another element of their block."""
+
+    chunks: int
+    group: Indices  # (blocks,)
+    chunk: Indices  # (blocks,)
+    member: Indices  # (blocks, 8): number of the element in its group
+    filled: Bools  # (blocks, 8): whether the lane has an element of its own
+
+
+class _Nodes(NamedTuple):
+    """Numbers of nodes in the vectors of the kernels."""
+
+    number: Indices  # (numnp,): number; -1 if it has none
+    own: Bools  # (numnp,): whether one chunk alone touches it, and nothing follows it
+    followers: Indices  # nodes that follow others
+    final: Indices  # (own nodes,): last block that touches each, in the order of their numbers
+    total: int  # nodes with a number
+
+
 class CompiledPlate:
     """A plate in the layout of the kernels.
 
@@ -147,140 +171,99 @@ class CompiledPlate:
         moves = kept.sign != 0.0
         self.columns = columns = np.arange(0 if moves[:, :2].any() else 2, NDOF)
         self._held: list[Any] = []  # arrays that the structures point to
-        leader = _leaders(kept)
-        groups: list[_Elements] = []
-        members: list[Indices] = []  # of the group's family
-        for family in plate.families:
-            weights = kept.weights[family.rows].astype(float)
-            for chosen, kind in _grouped(family, weights):
-                groups.append(_Elements(plate, family.take(chosen), columns, weights[chosen], kind))
-                members.append(np.arange(len(chosen)))
-        sizes = [len(part) for part in members]
-        group = np.repeat(np.arange(len(groups)), sizes)
-        member = np.concatenate(members)
-        centres = np.concatenate([g.family.coordinates.mean(axis=1) for g in groups])
-        along = _morton(centres)
-        chunks = 1 if len(along) < 2 * CHUNK else min(MOST_CHUNKS, len(along) // CHUNK)
-        chunk = np.empty(len(along), dtype=np.intp)
-        chunk[along] = np.arange(len(along)) * chunks // len(along)
-        # In each chunk the elements of a group follow one another, in blocks of eight.
-        order = along[np.lexsort((group[along], chunk[along]))]
-        begins = np.flatnonzero(
-            np.diff(group[order], prepend=-1) | np.diff(chunk[order], prepend=-1)
-        )
-        counts = np.diff(np.append(begins, len(order)))
-        blocks = -(-counts // LANES)
-        last = np.cumsum(blocks)
-        lane = np.arange(last[-1] * LANES)
-        run = np.repeat(np.arange(len(counts)), blocks * LANES)
-        offset = lane - LANES * (last - blocks)[run]
-        real = offset < counts[run]
-        element = order[begins[run] + np.minimum(offset, counts[run] - 1)].reshape(-1, LANES)
-        real = real.reshape(-1, LANES)
-        block_group, block_chunk = group[element[:, 0]], chunk[element[:, 0]]
-        # Nodes of the blocks' elements; numbers of the nodes.
-        nodes_of = [g.family.nodes[:, g.order] for g in groups]
-        block_nodes = [
-            nodes_of[g][member[element[block_group == g]]].swapaxes(1, 2)
-            for g in range(len(groups))
+        groups = [
+            _Elements(plate, family.take(chosen), columns, weights[chosen], kind)
+            for family in plate.families
+            for weights in [kept.weights[family.rows].astype(float)]
+            for chosen, kind in _grouped(family, weights)
         ]
-        numnp = len(leader)
-        lowest, highest = np.full(numnp, chunks), np.full(numnp, -1)
-        final = np.zeros(numnp, dtype=np.intp)
-        for g, nodes in enumerate(block_nodes):
-            (rows,) = np.nonzero(block_group == g)
-            touched = leader[nodes]
-            for touching, ufunc, values in (
-                (lowest, np.minimum, block_chunk[rows]),
-                (highest, np.maximum, block_chunk[rows]),
-                (final, np.maximum, rows),
-            ):
-                ufunc.at(touching, touched, values[:, None, None])
-        used = highest >= 0
-        followers = np.unique(
-            np.concatenate([nodes[leader[nodes] != nodes] for nodes in block_nodes])
-        )
-        own = used & (lowest == highest)
-        own[leader[followers]] = False
-        inside, common = np.flatnonzero(own), np.flatnonzero(used & ~own)
-        inside = inside[np.lexsort((inside, final[inside]))]
-        number = np.full(numnp, -1)
-        number[np.concatenate([inside, common])] = np.arange(len(inside) + len(common))
-        total = len(inside) + len(common)
-        place = number.copy()
-        place[followers] = total + np.arange(len(followers))
-        nd = 4 if len(columns) == 3 else NDOF  # entries of a node
-        self.shape = (total, nd)
-        self._number_dofs(kept, number)
-        mass = np.zeros((total + 2, nd))
+        layout, leader = _layout(groups), _leaders(kept)
+        # Nodes of the blocks of each group, (blocks, nodes, 8).
+        touched = [
+            g.family.nodes[:, g.order][layout.member[layout.group == number]].swapaxes(1, 2)
+            for number, g in enumerate(groups)
+        ]
+        nodes = _numbered(layout, touched, leader)
+        entries = 4 if len(columns) == 3 else NDOF
+        self.shape = (nodes.total, entries)
+        self._number_dofs(kept, nodes.number)
+        self.mass = np.zeros((nodes.total + 2, entries))
         independent = kept.gather(kept.sign * plate.field(plate.mass, 0.0))
-        mass.ravel()[self.position] = independent
-        self.mass = mass
-        self.inverse_mass = np.divide(1.0, mass, out=np.zeros_like(mass), where=mass > 0.0)
-        self.scale = np.zeros_like(mass)
-        self.u = np.zeros((total + len(followers) + 2, nd))
-        self.d, self.s = np.zeros_like(mass), np.zeros_like(mass)
-
-        table = np.zeros(len(element), dtype=BLOCK)
-        starts = np.searchsorted(block_chunk, np.arange(chunks + 1))
-        firsts = np.searchsorted(block_chunk[final[inside]], np.arange(chunks + 1))
-        table["done"] = np.searchsorted(final[inside], np.arange(len(element)), side="right")
-        table["done"] -= firsts[block_chunk].astype(np.uint64)
-        cuts = (Chunk * chunks)()
-        local = np.empty(numnp, dtype=np.intp)
-        targets = [np.empty(nodes.shape, dtype=np.int32) for nodes in block_nodes]
-        turned = np.zeros(nd)
+        self.mass.ravel()[self.position] = independent
+        self.inverse_mass = np.zeros_like(self.mass)
+        np.divide(1.0, self.mass, out=self.inverse_mass, where=self.mass > 0.0)
+        self.scale, self.d, self.s = (np.zeros_like(self.mass) for _ in range(3))
+        self.u = np.zeros((nodes.total + len(nodes.followers) + 2, entries))
+        turned = np.zeros(entries)
         turned[: len(columns)] = TURNED[columns]
-        for c in range(chunks):
+        cuts = self._chunks(layout, groups, touched, nodes, leader, turned)
+        laminate = plate.laminate
+        stiffness = np.block([[laminate.A, -laminate.B], [-laminate.B, laminate.D]])
+        common = nodes.total - len(nodes.final)
+        self.structure = Plate(
+            entries, nodes.total, len(nodes.final), layout.chunks, len(nodes.followers),
+            cuts, self._ints(nodes.number[leader[nodes.followers]]), self._floats(turned),
+            self._floats(stiffness), self._floats(laminate.shear), floats(self.mass),
+            floats(self.scale), floats(self.u), floats(self.d), floats(self.s),
+            self._floats(np.zeros((common + 2, entries))), 0.0,
+        )  # fmt: skip
+
+    def _chunks(
+        self,
+        layout: _Layout,
+        groups: list[_Elements],
+        touched: list[Indices],
+        nodes: _Nodes,
+        leader: Indices,
+        turned: Floats,
+    ) -> Any:
+        """The chunks, with their blocks."""
+        place = nodes.number.copy()  # in the displacement, where the followers come last
+        place[nodes.followers] = nodes.total + np.arange(len(nodes.followers))
+        starts = np.searchsorted(layout.chunk, np.arange(layout.chunks + 1))
+        firsts = np.searchsorted(layout.chunk[nodes.final], np.arange(layout.chunks + 1))
+        local = np.empty(len(leader), dtype=np.intp)
+        targets = [np.empty(part.shape, dtype=np.int32) for part in touched]
+        inside = [layout.chunk[layout.group == number] for number in range(len(groups))]
+        filled = [layout.filled[layout.group == number, None] for number in range(len(groups))]
+        cuts = (Chunk * layout.chunks)()
+        self._held.append(cuts)
+        for c in range(layout.chunks):
             count = int(firsts[c + 1] - firsts[c])
-            parts = [
-                nodes[block_chunk[block_group == g] == c].ravel()
-                for g, nodes in enumerate(block_nodes)
-            ]
+            parts = [part[at == c].ravel() for part, at in zip(touched, inside, strict=True)]
             here = np.unique(np.concatenate(parts))
-            shares = here[~own[leader[here]]]
-            mine = here[own[leader[here]]]
-            local[mine] = number[mine] - firsts[c]
+            mine = nodes.own[leader[here]]
+            shares = here[~mine]
+            local[here[mine]] = nodes.number[here[mine]] - firsts[c]
             local[shares] = count + np.arange(len(shares))
-            for g, nodes in enumerate(block_nodes):
-                at = block_chunk[block_group == g] == c
-                filled = real[block_group == g][at][:, None]
-                targets[g][at] = np.where(filled, local[nodes[at]], count + len(shares))
+            for target, part, at, real in zip(targets, touched, inside, filled, strict=True):
+                rows = at == c
+                target[rows] = np.where(real[rows], local[part[rows]], count + len(shares))
             signs = np.where((leader[shares] != shares)[:, None], turned, 1.0)
             cuts[c] = Chunk(
                 starts[c + 1] - starts[c], None, int(firsts[c]), count, len(shares),
-                self._ints(number[leader[shares]]), self._floats(signs),
-                self._floats(np.zeros((count + len(shares) + 2, nd))),
+                self._ints(nodes.number[leader[shares]]), self._floats(signs),
+                self._floats(np.zeros((count + len(shares) + 2, len(turned)))),
             )  # fmt: skip
-        for g, elements in enumerate(groups):
-            (rows,) = np.nonzero(block_group == g)
-            made = Group(
-                **elements.numbers, **{n: self._floats(a) for n, a in elements.arrays.items()}
-            )
-            self._held.append(made)
-            sources = place[block_nodes[g]].astype(np.int32)
-            table["group"][rows] = ctypes.addressof(made)
-            for name, array in (("source", sources), ("target", targets[g])):
-                table[name][rows] = self._addresses(array)
-            if elements.numbers["kind"] == FREE:
-                data = elements.data(member[element[rows]].ravel())
-                table["data"][rows] = self._addresses(data)
+        table = np.zeros(len(layout.group), dtype=BLOCK)
         self._held.append(table)
-        address = table.ctypes.data
-        for c in range(chunks):
-            where = ctypes.c_void_p(address + int(starts[c]) * BLOCK.itemsize)
+        done = np.searchsorted(nodes.final, np.arange(len(table)), side="right")
+        table["done"] = done - firsts[layout.chunk]
+        for number, elements in enumerate(groups):
+            (rows,) = np.nonzero(layout.group == number)
+            arrays = {name: self._floats(array) for name, array in elements.arrays.items()}
+            made = Group(**elements.numbers, **arrays)
+            self._held.append(made)
+            table["group"][rows] = ctypes.addressof(made)
+            table["source"][rows] = self._addresses(place[touched[number]].astype(np.int32))
+            table["target"][rows] = self._addresses(targets[number])
+            if elements.numbers["kind"] == FREE:
+                data = elements.data(layout.member[rows].ravel())
+                table["data"][rows] = self._addresses(data)
+        for c in range(layout.chunks):
+            where = ctypes.c_void_p(table.ctypes.data + int(starts[c]) * BLOCK.itemsize)
             cuts[c].block = ctypes.cast(where, type(cuts[c].block))
-        laminate = plate.laminate
-        stiffness = np.block([[laminate.A, -laminate.B], [-laminate.B, laminate.D]])
-        self.structure = Plate(
-            nd, total, len(inside), chunks, len(followers),
-            cuts, self._ints(number[leader[followers]]), self._floats(turned),
-            self._floats(stiffness), self._floats(laminate.shear), floats(self.mass),
-            floats(self.scale),
-            floats(self.u), floats(self.d), floats(self.s),
-            self._floats(np.zeros((len(common) + 2, nd))), 0.0,
-        )  # fmt: skip
-        self._held.append(cuts)
+        return cuts
 
     def _number_dofs(self, kept: SymmetryReduction, number: Indices) -> None:
         """Set the places of the independent dofs in the vectors."""
@@ -355,8 +338,7 @@ class CompiledProduct(StiffnessOperator):
 
     def fields(self, stored: Floats) -> Floats:
         """Fields (rows, numnp, 5) of stored vectors (rows, nodes, dofs)."""
-        full = stored.reshape(len(stored), stored[0].size if len(stored) else 1)
-        fields = full.take(self._field, axis=1) if len(stored) else np.empty((0, *self._sign.shape))
+        fields = stored.reshape(len(stored), math.prod(stored.shape[1:])).take(self._field, axis=1)
         fields *= self._sign
         fields += 0.0  # no negative zeros
         return fields
@@ -373,6 +355,52 @@ class CompiledProduct(StiffnessOperator):
 def floats(array: Floats) -> Any:
     """Pointer to an array of numbers."""
     return array.ctypes.data_as(Doubles)
+
+
+def _layout(groups: list[_Elements]) -> _Layout:
+    """Put the elements of groups into blocks, and the blocks into chunks of near elements."""
+    sizes = np.array([len(g.family.rows) for g in groups])
+    group = np.repeat(np.arange(len(groups)), sizes)
+    along = _morton(np.concatenate([g.family.coordinates.mean(axis=1) for g in groups]))
+    chunks = 1 if len(along) < 2 * CHUNK else min(MOST_CHUNKS, len(along) // CHUNK)
+    chunk = np.empty(len(along), dtype=np.intp)
+    chunk[along] = np.arange(len(along)) * chunks // len(along)
+    # In each chunk the elements of a group follow one another.
+    order = along[np.lexsort((group[along], chunk[along]))]
+    begins = np.flatnonzero(np.diff(group[order], prepend=-1) | np.diff(chunk[order], prepend=-1))
+    counts = np.diff(np.append(begins, len(order)))
+    blocks = -(-counts // LANES)
+    last = np.cumsum(blocks)
+    run = np.repeat(np.arange(len(counts)), blocks * LANES)
+    offset = np.arange(last[-1] * LANES) - LANES * (last - blocks)[run]
+    element = order[begins[run] + np.minimum(offset, counts[run] - 1)].reshape(-1, LANES)
+    one = element[:, 0]
+    member = element - (np.cumsum(sizes) - sizes)[group[one], None]
+    return _Layout(
+        chunks, group[one], chunk[one], member, (offset < counts[run]).reshape(-1, LANES)
+    )
+
+
+def _numbered(layout: _Layout, touched: list[Indices], leader: Indices) -> _Nodes:
+    """Number the nodes of a chunk alone by the last block that touches them, then the others."""
+    numnp = len(leader)
+    lowest, highest = np.full(numnp, layout.chunks), np.full(numnp, -1)
+    final = np.zeros(numnp, dtype=np.intp)
+    for number, nodes in enumerate(touched):
+        (rows,) = np.nonzero(layout.group == number)
+        chunk, at = layout.chunk[rows, None, None], leader[nodes]
+        np.minimum.at(lowest, at, chunk)
+        np.maximum.at(highest, at, chunk)
+        np.maximum.at(final, at, rows[:, None, None])
+    followers = np.unique(np.concatenate([nodes[leader[nodes] != nodes] for nodes in touched]))
+    own = (highest >= 0) & (lowest == highest)
+    own[leader[followers]] = False
+    inside, common = np.flatnonzero(own), np.flatnonzero((highest >= 0) & ~own)
+    inside = inside[np.argsort(final[inside], kind="stable")]
+    count = len(inside) + len(common)
+    numbers = np.full(numnp, -1)
+    numbers[np.concatenate([inside, common])] = np.arange(count)
+    return _Nodes(numbers, own, followers, final[inside], count)
 
 
 def _leaders(kept: SymmetryReduction) -> Indices:
