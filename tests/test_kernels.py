@@ -30,6 +30,7 @@ from fecm.simulation.checkpoint import Checkpointer
 from fecm.simulation.run import run
 from fecm.simulation.simulation import Simulation
 from fecm.simulation.spool import Journal
+from fecm.sweeps.impacts import FOUND
 from tests.builders import distorted_square, square
 from tests.calls import call
 from tests.decks import small
@@ -189,10 +190,11 @@ def test_the_modes_of_a_rod_take_the_step_of_its_matrices(elements: int, tapered
 
 @compiled
 def test_the_structures_of_python_have_the_sizes_of_those_in_c() -> None:
-    sizes = (ctypes.c_int64 * 6)()
+    sizes = (ctypes.c_int64 * 9)()
     kernels.LIBRARY.fecm_sizes(sizes)
     structures = kernels.Group, kernels.Block, kernels.Chunk, kernels.Plate, kernels.Impact
-    assert list(sizes) == [*map(ctypes.sizeof, structures), len(kernels.COLUMNS)]
+    assert list(sizes[:6]) == [*map(ctypes.sizeof, structures), len(kernels.COLUMNS)]
+    assert list(sizes[6:]) == [ctypes.sizeof(kernels.Sweep), 6, len(FOUND)]
 
 
 @compiled

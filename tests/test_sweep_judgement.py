@@ -5,16 +5,22 @@ from __future__ import annotations
 import csv
 import io
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import fecm
 from fecm.deck import Deck
+from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent, stacked
 from fecm.mechanics.plate_motion import DivergenceError
+from fecm.mechanics.projectile import RigidMass
+from fecm.mechanics.rod_integrators import WilsonStep
 from fecm.results.metrics import PEAKS, SUMMARY
-from fecm.sweeps.batch import impacts
+from fecm.sweeps import batch
+from fecm.sweeps.impacts import Hits, Impacts, balance_errors, by_numpy, impacts
 from fecm.sweeps.outcome import STILL
+from fecm.sweeps.responses import TipSteps
 from fecm.sweeps.vary import apply_case
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, PROGRAM, small
@@ -67,17 +73,14 @@ def test_a_case_that_a_run_rejects_fails_with_the_runs_reason(
 def test_cases_together_keep_the_energy_as_well_as_their_runs_do(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from fecm.sweeps import batch
-
     seen: list[float] = []
-    errors = batch.balance_errors
 
-    def watched(*arguments: object) -> object:
-        made = errors(*arguments)  # type: ignore[arg-type]
-        seen.extend(made.tolist())
+    def watched(*arguments: Any) -> Impacts:
+        made = impacts(*arguments)
+        seen.extend(made.error.tolist())
         return made
 
-    monkeypatch.setattr(batch, "balance_errors", watched)
+    monkeypatch.setattr(batch, "impacts", watched)
     deck = model(small(STEPS))
     stiffnesses = [2e6, 1e8, 1e9]
     assert fecm.sweep(deck, {"k": stiffnesses}).fine.all()
@@ -88,23 +91,16 @@ def test_cases_together_keep_the_energy_as_well_as_their_runs_do(
 
 
 def test_a_force_with_no_projectile_behind_it_is_an_error_of_the_balance() -> None:
-    from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent, stacked
-    from fecm.mechanics.projectile import RigidMass
-    from fecm.mechanics.rod_integrators import WilsonStep
-    from fecm.sweeps.batch import balance_errors
-    from fecm.sweeps.responses import TipSteps
-
     mass, dt, steps = RigidMass(1.8e-4), 5e-7, 400
     kind = np.zeros(1, dtype=np.intp)
     law = HystereticLaw(stacked([LinearPermanent(1.9e6, 1.0, 0.0, 2.0)]))
     tips = TipSteps([WilsonStep(mass.stiffness(), mass.mass(), dt)], kind, steps)
     rigid = np.full(steps, 0.0)
-    speed = np.array([100.0])
-    found = impacts(rigid, tips, law, speed, 1e-6)
-    (error,) = balance_errors(found, tips, [mass], kind, speed)
-    assert error < 1e-4
-    found.work[-1] += 0.05 * 0.5 * 1.8e-4 * 100.0**2
-    (error,) = balance_errors(found, tips, [mass], kind, speed)
+    hits = Hits([mass], kind, np.ones(1), law, np.array([100.0]))
+    found, work = by_numpy(rigid, 1e-6, hits, tips)
+    assert found.error[0] < 1e-4
+    work.done[-1] += 0.05 * 0.5 * 1.8e-4 * 100.0**2
+    (error,) = balance_errors(found.force, work, hits, tips)
     assert error == pytest.approx(0.05, abs=1e-4)
 
 

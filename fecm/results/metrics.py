@@ -76,19 +76,13 @@ class Indentation(NamedTuple):
     permanent: Floats
 
 
-# Values of a part of a sum, which stays in the cache.
-PART = 1 << 15
+# Cases whose forces stay in the cache.
+PART = 16
 
 
 def _total(weights: Floats, values: NDArray[Any]) -> Floats:
-    """Weighted sums over the steps, in their order whatever the number of cases."""
-    total: Floats = np.zeros(values.shape[1])
-    rows = max(1, PART // values.shape[1])
-    for start in range(0, len(values), rows):
-        part = weights[start : start + rows, None] * values[start : start + rows]
-        part[0] += total
-        total = np.add.accumulate(part, out=part)[-1].copy()
-    return total
+    """Weighted sums over the steps, in their order."""
+    return np.asarray(np.add.accumulate(weights * values, axis=1)[:, -1])
 
 
 def summarise(
@@ -108,20 +102,41 @@ def summarise(
     projectile are numbers or (cases,).  Returns the names of :data:`SUMMARY`, with a delamination
     threshold (force) also those of :data:`THRESHOLD`, (cases,) each.
     """
+    cases = force.shape[1]
+    mass, velocity = (np.broadcast_to(v, cases) for v in (mass, velocity))
+    parts = []
+    for start in range(0, cases, PART):
+        some = slice(start, start + PART)
+        depths = Indentation(*(values[some] for values in indentation))
+        rows = np.ascontiguousarray(force[:, some].T)
+        parts.append(_summary(rows, times, depths, mass[some], velocity[some], threshold))
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _summary(
+    force: Floats,
+    times: Floats,
+    indentation: Indentation,
+    mass: Floats,
+    velocity: Floats,
+    threshold: float | None,
+) -> dict[str, Floats]:
+    """Summary of some cases, forces (cases, steps); see :func:`summarise`."""
     dt = np.diff(times, prepend=0.0)
     touching = force > 0.0
-    before = np.vstack([np.zeros_like(touching[:1]), touching[:-1]])
-    last = len(times) - 1 - np.argmax(touching[::-1], axis=0)
-    peak = np.argmax(force, axis=0)
-    met = touching.any(axis=0)
+    begins = touching.copy()
+    begins[:, 1:] &= ~touching[:, :-1]
+    last = len(times) - 1 - np.argmax(touching[:, ::-1], axis=1)
+    peak = np.argmax(force, axis=1)
+    met = touching.any(axis=1)
     # The force is linear between steps, and 0 before the first.
     weights = 0.5 * (dt + np.append(dt[1:], 0.0))
     impulse = _total(weights, force)
     rebound = impulse / mass - velocity
     found = {
-        "peak_force": force.max(axis=0),
+        "peak_force": force.max(axis=1),
         "time_of_peak": np.where(met, times[peak], np.nan),
-        "contacts": (touching & ~before).sum(axis=0).astype(float),
+        "contacts": begins.sum(axis=1).astype(float),
         "contact_time": _total(dt, touching),
         "last_contact": np.where(met, times[last], np.nan),
         "max_indentation": indentation.largest,
@@ -130,14 +145,14 @@ def summarise(
         "rebound_velocity": rebound,
         "energy_absorbed": 0.5 * mass * (velocity**2 - rebound**2),
     }
-    still = touching[-1]
+    still = touching[:, -1]
     unknown = {name: still & (peak == len(times) - 1) for name in PEAKS}
     if threshold is not None:
         above = force >= threshold
-        first = times[np.argmax(above, axis=0)]
-        found["threshold_force"] = np.full(force.shape[1], threshold)
+        first = times[np.argmax(above, axis=1)]
+        found["threshold_force"] = np.full(len(force), threshold)
         found["threshold_margin"] = 1.0 - found["peak_force"] / threshold
-        found["threshold_time"] = np.where(above.any(axis=0), first, np.nan)
+        found["threshold_time"] = np.where(above.any(axis=1), first, np.nan)
         found["time_above"] = _total(dt, above)
         unknown["threshold_margin"] = unknown["peak_force"]
         unknown |= dict.fromkeys(("threshold_force", "threshold_time"), np.zeros_like(still))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -22,18 +22,14 @@ from fecm.deck.macros import compile_program, flat
 from fecm.deck.model import Deck, Impact, Projectile
 from fecm.deck.model import Indentation as LawCards
 from fecm.deck.units import unit_names
-from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, stacked
-from fecm.mechanics.impact import ContactState, couple_step
+from fecm.mechanics.contact_law import HystereticLaw, stacked
 from fecm.mechanics.mesh import Mesh
-from fecm.mechanics.plate_motion import DivergenceError, PlateState
-from fecm.mechanics.projectile import Projectile as ProjectileModel
+from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.projectile import RigidMass
-from fecm.mechanics.rod_integrators import WilsonStep
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import build_law, build_model, build_projectile
 from fecm.problem.check_impact import check_impact, check_law, check_projectile
 from fecm.problem.check_program import check_program
-from fecm.problem.generate import generate
 from fecm.problem.problem import Problem
 from fecm.results.metrics import GAGE, HIT, Indentation, summarise
 from fecm.results.result import Result
@@ -41,9 +37,10 @@ from fecm.results.sinks import MemorySink
 from fecm.results.summary import largest_exposures
 from fecm.simulation.guard import ENERGY_WARNING
 from fecm.simulation.run import simulate
-from fecm.sweeps.cases import PLATE, THRESHOLD, Case, CasesError, name_fault
+from fecm.sweeps.cases import PLATE, REFINE, THRESHOLD, Case, CasesError, Value, name_fault
 from fecm.sweeps.clock import Clock, with_time_step
 from fecm.sweeps.find import search
+from fecm.sweeps.impacts import Hits, impacts
 from fecm.sweeps.outcome import RUN, Outcome, merge, outcome_of
 from fecm.sweeps.plan import (
     ADVANCED,
@@ -57,14 +54,7 @@ from fecm.sweeps.plan import (
     shares_plate,
     without_output,
 )
-from fecm.sweeps.responses import (
-    BLOCK,
-    Convolution,
-    TipState,
-    TipSteps,
-    largest_sums,
-    plate_response,
-)
+from fecm.sweeps.responses import largest_sums, plate_response
 from fecm.sweeps.vary import apply_case, check_deck, raise_first
 
 # Runs decks by their numbers; doubtful ones in full if they are judged.
@@ -79,50 +69,57 @@ def run(task: Task) -> Outcome:
     if task.alone:
         found = merge([_in_full(task, n, c) for n, c in zip(task.numbers, task.cases, strict=True)])
         return found if task.history else replace(found, force=None)
+    first = {n: value for n, value in task.cases[0].items() if n in (*PLATE, REFINE)}
+    try:
+        checked, runs = _prepared(
+            task.deck, tuple(first.items()), task.clock, task.extra, task.history
+        )
+    except CasesError as error:
+        return Outcome.failed(dict.fromkeys(task.numbers, str(error)))
     numbers: list[int] = []
     decks: list[Deck] = []
     lost: dict[int, str] = {}
-    mesh: Mesh | None = None
-    first = task.cases[0]
-    try:
-        plate = apply_case(task.deck, {n: value for n, value in first.items() if n in PLATE})
-    except CasesError as error:
-        return Outcome.failed(dict.fromkeys(task.numbers, str(error)))
     for number, case in zip(task.numbers, task.cases, strict=True):
         try:
-            deck = apply_case(plate, {n: value for n, value in case.items() if n not in PLATE})
-            mesh = mesh or generate(deck)  # of the plate that the cases share
-            _check_contact(deck, mesh)
+            own = {n: value for n, value in case.items() if n not in first}
+            deck = apply_case(checked.deck, own)
+            _check_contact(deck, checked.mesh)
         except CasesError as error:
             lost[number] = str(error)
             continue
         numbers.append(number)
         decks.append(deck)
-    parts: list[Outcome] = []
+    parts = [Outcome.failed(lost)] if lost else []
     if decks:
-        try:
-            checked, decks = _timed(decks, task.clock, first)
-        except CasesError as error:
-            lost |= dict.fromkeys(numbers, str(error))
-        else:
-            runs = runs_of(checked, task.extra, history=task.history)
-            outcome = (
-                runs(numbers, decks, True)
-                if task.until is None
-                else _found(numbers, decks, _force(checked, task.until), runs)
-            )
-            parts.append(_with_hit(outcome, checked, first))
-    if lost:
-        parts.append(Outcome.failed(lost))
+        outcome = (
+            runs(numbers, decks, True)
+            if task.until is None
+            else _found(numbers, decks, _force(checked, task.until), runs)
+        )
+        parts.append(_with_hit(outcome, checked, first))
     outcome = merge(parts)
     return outcome if task.history else replace(outcome, force=None)
+
+
+@lru_cache(maxsize=1)
+def _prepared(
+    deck: Deck,
+    plate: tuple[tuple[str, Value], ...],
+    clock: Clock | None,
+    extra: tuple[str, ...],
+    history: bool,
+) -> tuple[Problem, Runs]:
+    """The problem of a plate, given by values of names, and what runs its cases."""
+    case = dict(plate)
+    checked = _timed(apply_case(deck, case), clock, case)
+    return checked, runs_of(checked, extra, history=history)
 
 
 def _in_full(task: Task, number: int, case: Case) -> Outcome:
     """Run a case whose deck the caller builds, or whose result the caller measures."""
     try:
         if task.build is None:
-            checked, _ = _timed([apply_case(task.deck, case)], task.clock, case)
+            checked = _timed(apply_case(task.deck, case), task.clock, case)
         else:
             (checked,) = built(task.build, case).problems
             if unit_names(checked.deck) != unit_names(task.deck):
@@ -240,24 +237,23 @@ def deck_of(plan: Plan, case: int) -> Deck:
     Raises CasesError if the case cannot be run.
     """
     values = plan.cases[case]
-    _, (deck,) = _timed([apply_case(plan.deck, values)], plan.clock, values)
-    return deck
+    return _timed(apply_case(plan.deck, values), plan.clock, values).deck
 
 
-def _timed(decks: list[Deck], clock: Clock | None, case: Case) -> tuple[Problem, list[Deck]]:
-    """Check the plate and program shared by decks, and set the time step of the plate."""
+def _timed(deck: Deck, clock: Clock | None, case: Case) -> Problem:
+    """Check the deck of a case, with the time step of its plate."""
     if clock is None:
-        return check_deck(decks[0]), decks
+        return check_deck(deck)
     # DT 0 is below the critical time step of any plate.
-    checked = check_deck(with_time_step(decks[0], 0.0))
+    checked = check_deck(with_time_step(deck, 0.0))
     dt = clock.time_step(checked.critical_time_step)
     duration = float(case["duration"]) if "duration" in case else None
-    timed = [with_time_step(deck, dt, clock.dt, duration) for deck in decks]
+    timed = with_time_step(deck, dt, clock.dt, duration)
     findings = Findings()
-    problem = Problem(timed[0], checked.mesh, compile_program(timed[0].macros, findings))
+    problem = Problem(timed, checked.mesh, compile_program(timed.macros, findings))
     check_program(problem, findings)
     raise_first(findings)
-    return problem, timed
+    return problem
 
 
 def _check_contact(deck: Deck, mesh: Mesh) -> None:
@@ -298,15 +294,9 @@ def _plate(checked: Problem, extra: Sequence[str]) -> Plate:
     load, dt, steps = setup.impact.contact.load, _time_step(checked), checked.work.steps
     gages = setup.gages if GAGES in extra else None
     names = [] if gages is None else [f"{GAGE}{number}" for number in gages.numbers]
-    strains = np.empty((len(names), steps))
     sums = None if gages is None else setup.motion.dof_sums(gages.dof_indices, gages.weights)
-
-    def read(step: int, state: PlateState) -> None:
-        if sums is not None:
-            strains[:, step] = sums.evaluate(state, 0.0)
-
     with np.errstate(all="ignore"):
-        response = plate_response(setup.motion, load, dt, steps, read)
+        response, strains = plate_response(setup.motion, load, dt, steps, sums)
     return Plate(response, dt, 1.0 / load.inverse_mass, dict(zip(names, strains, strict=True)))
 
 
@@ -338,14 +328,12 @@ def _together(
     scale = np.where(rigid[order], mass, 1.0)
     require(ADVANCED * steps * len(decks), f"{len(decks)} cases of {steps} steps")
     with np.errstate(all="ignore"):
-        rods = [WilsonStep(rod.stiffness(), rod.mass(), dt) for rod in kinds]
         law = HystereticLaw(stacked([build_law(decks[case]).constants for case in order]))
         speed = np.array([decks[case].require(Impact).velocity for case in order])
-        tips = TipSteps(rods, kind, steps, scale)
-        found = impacts(plate.response, tips, law, speed, plate.node_mass)
+        hits = Hits(list(kinds), kind, scale, law, speed)
+        found = impacts(plate.response, dt, plate.node_mass, hits)
         times = np.add.accumulate(np.full(steps, dt))
         summary = summarise(found.force, times, found.indentation, mass, speed, _threshold(checked))
-        error = balance_errors(found, tips, list(kinds), kind, speed) if judged else 0.0 * speed
         peaks = {n: largest_sums(r, found.force) for n, r in plate.strains.items() if judged}
     if DEFLECTION in extra:
         peaks[DEFLECTION] = found.deflection
@@ -356,7 +344,7 @@ def _together(
     outcome = outcome_of(numbers, columns, found.force[-1, back], steps, dt, unsettled)
     if history:
         outcome.force = np.ascontiguousarray(found.force.T[back])
-    doubtful = np.flatnonzero(~(error[back] < ENERGY_WARNING) | (unsettled > 0))
+    doubtful = np.flatnonzero(~(found.error[back] < ENERGY_WARNING) | (unsettled > 0))
     if not (judged and len(doubtful)):
         return outcome
     rest = np.setdiff1d(np.arange(len(numbers)), doubtful)
@@ -365,101 +353,6 @@ def _together(
         _alone(numbers[case], replace(checked, deck=decks[case]), extra=extra) for case in doubtful
     ]
     return merge([outcome.select(rest), *full])
-
-
-@dataclass(frozen=True)
-class Impacts:
-    """Histories of many impacts on one plate."""
-
-    force: Floats  # (steps, cases): contact force after every step
-    indentation: Indentation
-    unconverged_steps: NDArray[np.int64]  # (cases,): steps whose contact iteration did not converge
-    # (blocks, cases): work of the contact force on plate and indentation, after every block of
-    # steps and after the last step (force*length).
-    work: Floats
-    deflection: tuple[Floats, Floats]  # (cases,): largest and last displacement of the plate
-    # (cases,): largest dt^2/8 m a^2 of the impact node (force*length): its share of the difference
-    # between the plate's energy and the work done on it.
-    excess: Floats
-
-
-def impacts(
-    response: Floats, tips: TipSteps, law: HystereticLaw, speed: Floats, node_mass: float
-) -> Impacts:
-    """Compute many impacts on a plate from its response to a unit force, (steps,).
-
-    The law has arrays of constants, `speed` (cases,) are the approach velocities.  `node_mass` is
-    the mass that the contact force accelerates: the lumped mass of the impact node, or 1/(g M^-1 g)
-    of a patch with the weights g.
-    """
-    steps, cases = len(response), len(speed)
-    none = np.zeros(cases)
-    of_plate = np.broadcast_to(response[:, None], tips.responses.shape)
-    sums = Convolution(np.stack([of_plate, tips.responses]), tips.kinds)
-    state = ContactState(
-        TipState(none, -speed, none), law.start(), ContactPoint(none, none), none,
-        unconverged_steps=np.zeros(cases, dtype=np.int64),
-    )  # fmt: skip
-    force, deepest = np.empty((steps, cases)), none
-    plate_work, dw, largest_ddw, highest = none, none, none, none
-    work: list[Floats] = []
-    for step in range(steps):
-        last, w = state.contact.force, state.plate_w
-        moved, tips.sums = sums.next()
-        couple_step(tips, law, state, moved)
-        sums.give(state.contact.force)
-        force[step] = state.contact.force
-        deepest = np.maximum(deepest, state.contact.indentation)
-        highest = np.maximum(highest, state.plate_w)
-        # Central differences conserve the work 1/2 (F + F') (w' - w) on the plate.
-        before, dw = dw, state.plate_w - w
-        plate_work = plate_work + 0.5 * (last + state.contact.force) * dw
-        largest_ddw = np.maximum(largest_ddw, np.abs(dw - before))
-        if not (step + 1) % BLOCK or step + 1 == steps:
-            work.append(state.contact_work + plate_work)
-    permanent = law.permanent(state.memory, state.contact)
-    return Impacts(
-        force,
-        Indentation(deepest, state.contact.indentation, permanent),
-        state.unconverged_steps,
-        np.array(work),
-        (highest, state.plate_w),
-        node_mass * largest_ddw**2 / (8.0 * tips.dt**2),
-    )
-
-
-def balance_errors(
-    found: Impacts,
-    tips: TipSteps,
-    kinds: Sequence[ProjectileModel],
-    kind: NDArray[np.intp],
-    speed: Floats,
-) -> Floats:
-    """Estimate the error of the energy balance of cases relative to the initial energy, (cases,).
-
-    The energy of the projectile and the work done on plate and indentation must add up to the
-    initial energy, after every block of steps and after the last.  Central differences conserve
-    1/2 v(-)' M v(+) + 1/2 u' K u, with velocities half a step before and after: the work done on
-    the plate.  The energy that a run reports is larger by dt^2/8 a' M a, of which only the part of
-    the impact node is known here.
-
-    Case n has the projectile ``kinds[kind[n]]`` times ``tips.scale[n]``, and the approach velocity
-    ``speed[n]``.  Its error is 0 if the initial energy is 0, and not finite if the motion is not
-    finite.
-    """
-    worst = np.zeros(len(speed))
-    for number, projectile in enumerate(kinds):
-        cases = np.flatnonzero(kind == number)
-        scale = tips.scale[cases]
-        initial = 0.5 * projectile.total_mass * scale * speed[cases] ** 2
-        lost = np.zeros(len(cases))
-        for work, motion in zip(found.work, tips.motions(number, speed, found.force), strict=True):
-            deformation, velocity, _ = motion.reshape(3, -1, len(cases)).swapaxes(1, 2)
-            deformation[:, 0] = 0.0
-            held = projectile.kinetic_energy(velocity) + projectile.strain_energy(deformation)
-            lost = np.maximum(lost, np.abs(scale * held + work[cases] - initial))
-        worst[cases] = (lost + found.excess[cases]) / np.where(initial > 0.0, initial, 1.0)
-    return worst
 
 
 def _known(largest: Floats, last: Floats, force: Floats) -> Floats:

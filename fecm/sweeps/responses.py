@@ -9,16 +9,20 @@ block are added one by one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.fft import irfft, rfft
 from numpy.typing import NDArray
-from scipy.fft import irfft, rfft
 
 from fecm._typing import Floats
-from fecm.mechanics.plate_motion import AppliedForce, Load, PlateMotion, PlateState
+from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
+from fecm.mechanics.impact import ImpactConditions, ImpactSystem
+from fecm.mechanics.impact_steps import ImpactSteps, supports
+from fecm.mechanics.plate_motion import AppliedForce, DofSums, Load, PlateMotion
+from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.rod_integrators import RodIntegrator, RodState
 
 # Steps of a block.
@@ -31,26 +35,32 @@ NEAR, FAR = 8, 256
 TILE = 16
 # Multiplications of a matrix product small enough for BLAS to use one thread.
 SMALL = BLOCK**3
+NO_FORCE = HystereticLaw(LinearPermanent(0.0, 0.0, 0.0, 1.0))
 
 
 def plate_response(
-    motion: PlateMotion,
-    load: Load,
-    dt: float,
-    steps: int,
-    read: Callable[[int, PlateState], None] = lambda step, state: None,
-) -> Floats:
-    """Displacement per force under a load after 1 to `steps` steps, the first with a unit force.
+    motion: PlateMotion, load: Load, dt: float, steps: int, gages: DofSums | None = None
+) -> tuple[Floats, Floats]:
+    """Displacement under a load and strains of gages per force after 1 to `steps` steps.
 
-    The plate has no nodal loads.  `read` is called with each step, from 0, and its state.
+    The first is taken under a unit force.  The plate has no nodal loads.  Returns arrays (steps,)
+    and (gages, steps).
     """
-    state = motion.start()
+    # A projectile that never touches the plate.
+    system = ImpactSystem(motion, RigidMass(1.0), NO_FORCE, ImpactConditions(load, 0.0))
+    state = system.start()
     response = np.empty(steps)
-    for step in range(steps):
-        motion.advance(state, dt, 0.0, AppliedForce(load, 1.0) if step == 0 else None)
-        response[step] = load.dot(state.padded)
-        read(step, state)
-    return response
+    strains = np.empty((0 if gages is None else len(gages.weights), steps))
+    burst = supports(system)
+    for step in range(1 if burst else steps):
+        motion.advance(state.plate, dt, 0.0, AppliedForce(load, 1.0) if step == 0 else None)
+        response[step] = load.dot(state.plate.padded)
+        if gages is not None:
+            strains[:, step] = gages.evaluate(state.plate, 0.0)
+    if burst and steps > 1:
+        rest = ImpactSteps(system, gages, 0, 1).take(state, dt, steps - 1, np.array([], np.intp))
+        response[1:], strains[:, 1:] = rest.columns["plate_w"], rest.strains.T
+    return response, strains
 
 
 def tip_response(step: RodIntegrator, steps: int) -> Floats:

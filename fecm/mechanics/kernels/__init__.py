@@ -78,6 +78,15 @@ class Impact(Structure):
     )
 
 
+class Sweep(Structure):
+    """Impacts of many cases by one kind of projectile."""
+
+    _fields_ = _fields(
+        "int: cases stride steps modes; float: dt theta weight_before weight; floats: T h stiffness"
+        " tip_shape plate given force found"
+    )
+
+
 COLUMNS = (
     "time", "inertia", "power", "strain", "internal", "load_d", "load_s", "force", "indentation",
     "plate_w", "contact_work", "displacement", "velocity", "acceleration", "projectile_kinetic",

@@ -19,6 +19,9 @@
 #include <pthread.h>
 #include <sched.h>
 #endif
+#ifdef __x86_64__
+#include <immintrin.h>
+#endif
 
 #define LANES 8
 #define PASSES 5 /* of the contact iteration */
@@ -80,6 +83,34 @@ typedef struct {
     double inertia, power, strain, force;
 } Sums;
 
+/* Impacts on one plate by one kind of projectile, whose mass and stiffness have a factor in each case. */
+typedef struct {
+    int64_t cases, stride, steps, modes; /* `stride`: columns of the arrays of cases */
+    double dt, theta, weight_before, weight; /* as in RodIntegrator */
+    const double *T, *h, *stiffness, *tip_shape; /* modes: see Rod */
+    const double *plate; /* (steps,): displacement per force after 1, 2, ... steps */
+    const double *given; /* (GIVEN, cases): k, q, critical, slope, velocity, factor */
+    double *force, *found; /* (cases, steps), (FOUND, cases) */
+} Sweep;
+
+enum { GIVEN = 6, FOUND = 9 }; /* rows; those found are in sweep.h */
+enum {
+    CASES = 4,
+    CHECKED = 64, /* steps from one check of the energies to the next */
+    FAR = 128     /* steps whose forces act on later blocks of steps by Fourier transforms */
+};
+typedef int64_t mask __attribute__((vector_size(32)));
+
+/* Responses of plate and tip to a unit force, and memory for their sums over forces. */
+typedef struct {
+    double *response, unit, gain; /* (steps, 2), the tip's over `unit`; its acceleration at once */
+    double *power, *reach; /* (modes, 3, 3), (modes, CHECKED, 3): a block of steps, a force in each */
+    double *turn, *filter; /* (FAR, 2): cos and sin; (blocks - 1, 2 FAR, 2) */
+    half *work, *spectra;  /* (2 FAR, 2), (blocks - 1, 2 FAR, 2) */
+    half *force, *motion;  /* (FAR,), (modes, 3) */
+    char *loaded;          /* (blocks,): whether any force in a block is not 0 */
+} Response;
+
 #define TARGET static
 #include "impact.h"
 #undef TARGET
@@ -88,7 +119,10 @@ typedef struct {
 #define NAME(name) name##_avx2
 #define INLINE static inline __attribute__((always_inline, target("avx2,fma")))
 #define TARGET static __attribute__((target("avx2,fma")))
+#define ROOT(x) ((half)_mm256_sqrt_pd((__m256d)(x)))
 #include "plate.h"
+#include "sweep.h"
+#undef ROOT
 #undef NAME
 #undef INLINE
 #undef TARGET
@@ -99,7 +133,9 @@ typedef struct {
 #define NAME(name) name##_any
 #define INLINE static inline __attribute__((always_inline))
 #define TARGET static
+#define ROOT(x) ((half){sqrt((x)[0]), sqrt((x)[1]), sqrt((x)[2]), sqrt((x)[3])})
 #include "plate.h"
+#include "sweep.h"
 
 /* Work that threads share: products K u, each followed by what one of them does alone. */
 typedef struct {
@@ -297,10 +333,75 @@ EXPORT int64_t fecm_impact_steps(const Plate *plate, Impact *impact, int64_t ste
     return job.taken;
 }
 
+/* Fill in the responses of the tip, and tables of sines. */
+static void respond(const Sweep *x, Response *r) {
+    const int64_t n = x->modes;
+    double largest[2] = {0.0, 0.0}, now = 0.0;
+    memset(r->response, 0, sizeof(double) * 2 * x->steps);
+    for (int64_t i = 0; i < n; i++) {
+        /* Column 3 of y: motion after a unit force; others: after a unit of each motion. */
+        double y[4][3] = {{1.0}, {0.0, 1.0}, {0.0, 0.0, 1.0}, {x->h[i], x->h[n + i], x->h[2 * n + i]}};
+        for (int64_t step = 0; step < x->steps || step < CHECKED; step++) {
+            if (step < CHECKED) memcpy(r->reach + 3 * (CHECKED * i + CHECKED - 1 - step), y[3], sizeof y[3]);
+            for (int column = step < CHECKED ? 0 : 3; column < 4; column++) {
+                const double q = y[column][0], v = y[column][1], a = y[column][2];
+                for (int row = 0; row < 3; row++) {
+                    const double *T = x->T + 3 * row * n + i;
+                    y[column][row] = T[0] * q + T[n] * v + T[2 * n] * a;
+                }
+            }
+            if (step < x->steps) r->response[2 * step + 1] += x->tip_shape[i] * y[3][2];
+            if (step == CHECKED - 1)
+                for (int row = 0; row < 3; row++)
+                    for (int column = 0; column < 3; column++) r->power[9 * i + 3 * row + column] = y[column][row];
+        }
+        r->gain += x->tip_shape[i] * x->h[2 * n + i];
+    }
+    for (int64_t step = 0; step < x->steps; step++) {
+        double *at = r->response + 2 * step;
+        const double before = step ? now : 0.0; /* the force of a step is that at t + theta dt */
+        now = at[1];
+        at[0] = x->plate[step], at[1] = x->theta * now + (1.0 - x->theta) * before;
+        for (int part = 0; part < 2; part++) largest[part] = fmax(largest[part], fabs(at[part]));
+    }
+    /* Of the order of the plate's, so that neither loses digits in their common transforms. */
+    const double ratio = largest[1] / largest[0];
+    r->unit = ratio > 0.0 && isfinite(ratio) ? ldexp(1.0, ilogb(ratio)) : 1.0;
+    for (int64_t step = 0; step < x->steps; step++) r->response[2 * step + 1] /= r->unit;
+    for (int64_t i = 0; i < FAR; i++)
+        r->turn[2 * i] = cos(M_PI * i / FAR), r->turn[2 * i + 1] = sin(M_PI * i / FAR);
+}
+
+/* Compute impacts; returns 0 without memory for it. */
+EXPORT int fecm_sweep(const Sweep *x) {
+    const int64_t blocks = (x->steps + FAR - 1) / FAR, n = x->modes;
+    const int64_t numbers[] = {2 * x->steps, 9 * n, 3 * CHECKED * n, 2 * FAR, 4 * FAR * blocks};
+    const int64_t halves[] = {4 * FAR, 4 * FAR * blocks, FAR, 3 * n};
+    int64_t size = blocks;
+    for (int i = 0; i < 5; i++) size += sizeof(double) * numbers[i];
+    for (int i = 0; i < 4; i++) size += sizeof(half) * halves[i];
+    half *memory = malloc(size);
+    if (!memory) return 0;
+    Response r = {.gain = 0.0};
+    half **of_halves[] = {&r.work, &r.spectra, &r.force, &r.motion};
+    double **of_numbers[] = {&r.response, &r.power, &r.reach, &r.turn, &r.filter};
+    half *at = memory;
+    for (int i = 0; i < 4; at += halves[i++]) *of_halves[i] = at;
+    double *next = (double *)at;
+    for (int i = 0; i < 5; next += numbers[i++]) *of_numbers[i] = next;
+    r.loaded = (char *)next;
+    respond(x, &r);
+    CHOSEN(filters)(x, &r);
+    for (int64_t first = 0; first < x->cases; first += CASES) CHOSEN(run_cases)(x, &r, first);
+    free(memory);
+    return 1;
+}
+
 /* Sizes of the structures, which those in Python must have. */
 EXPORT void fecm_sizes(int64_t *sizes) {
     sizes[0] = sizeof(Group), sizes[1] = sizeof(Block), sizes[2] = sizeof(Chunk);
     sizes[3] = sizeof(Plate), sizes[4] = sizeof(Impact), sizes[5] = COLUMNS;
+    sizes[6] = sizeof(Sweep), sizes[7] = GIVEN, sizes[8] = FOUND;
 }
 
 /* Checksum of the sources, given by the build. */

@@ -1,0 +1,147 @@
+"""Sweeps by the compiled kernels give what NumPy gives, and no case depends on the others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm.api import load_deck
+from fecm.mechanics import kernels
+from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
+from fecm.mechanics.projectile import RigidMass
+from fecm.problem.build import build_model
+from fecm.problem.options import RunOptions
+from fecm.sweeps import batch, impacts
+from fecm.sweeps.cases import Case
+from fecm.sweeps.responses import plate_response
+from fecm.sweeps.result import SweepResult
+from tests.test_kernels import compiled
+
+DECK = Path("decks/impact-115.inp").read_text().replace("LOOP       4000", "LOOP       1500")
+RIGID = DECK.replace("EXPE", "PROJ\n    0    0  0.000181\n\nEXPE")
+GAGE = "PATC\nDISC             0.2\n\nGAGE\n    1       2.5       2.0     0.053        0.\n\nEXPE"
+LAW = "EXPE\n  1912000. 0.0006564     0.094       2.0"
+COUNT = 20
+
+
+def drawn(**ranges: tuple[float, float]) -> list[Case]:
+    """Cases with random values; some powers of the law have no root."""
+    rng = np.random.default_rng(7)
+    values = {name: rng.uniform(*limits, COUNT).tolist() for name, limits in ranges.items()}
+    if "q" in values:
+        values["q"][:12] = [1.5, 2.0, 2.5, 2.0] * 3
+    return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
+
+
+ANY = drawn(
+    velocity=(20.0, 300.0), k=(1e6, 3e6), alpha_p=(0.0, 1e-3), s_p=(0.0, 0.2), q=(1.5, 2.5),
+    mass=(1e-4, 4e-4),
+)  # fmt: skip
+FIRM = drawn(velocity=(20.0, 300.0), k=(1e6, 3e6), alpha_p=(1e-4, 1e-3))
+RODS = drawn(velocity=(20.0, 300.0), rod_length=(0.5, 2.0), k=(1e6, 3e6))
+
+
+def without_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernels, "LIBRARY", None)
+    batch._prepared.cache_clear()
+
+
+@compiled
+@pytest.mark.parametrize(
+    ("deck", "cases", "measured"),
+    [(DECK, ANY, ()), (RIGID, ANY, ()), (DECK, RODS, ()),
+     (DECK.replace("EXPE", GAGE), ANY, ("gages", "max_deflection")),
+     (DECK.replace(LAW, "EXPE ACR\n  1912000. 0.0006564"), FIRM, ("max_deflection",))],
+)  # fmt: skip
+def test_cases_are_those_of_numpy(
+    deck: str, cases: list[Case], measured: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def swept() -> SweepResult:
+        return fecm.sweep(deck, cases=cases, history=True, measure=measured)
+
+    found = swept()
+    without_kernels(monkeypatch)
+    wanted = swept()
+    assert found.force is not None
+    assert wanted.force is not None
+    assert found["status"].tolist() == wanted["status"].tolist()
+    peaks = wanted.force.max(axis=1, keepdims=True)
+    assert (peaks > 1.0).all()
+    assert (np.abs(found.force - wanted.force) <= 1e-10 * peaks).all()
+    for name, values in wanted.summary.items():
+        if values.dtype.kind == "f":
+            atol = 1e-10 * np.nanmax(np.abs(values), initial=0.0)
+            np.testing.assert_allclose(found[name], values, rtol=0.0, atol=atol, err_msg=name)
+
+
+@compiled
+def test_a_case_has_the_same_bytes_with_any_others() -> None:
+    whole = fecm.sweep(DECK, cases=ANY, history=True)
+    assert whole.force is not None
+    for some in ([3], [0, 7, 19], list(range(4, 17))):
+        part = fecm.sweep(DECK, cases=[ANY[n] for n in some], history=True)
+        np.testing.assert_array_equal(part.force, whole.force[some])
+        for name, values in part.summary.items():
+            np.testing.assert_array_equal(values, whole[name][some])
+
+
+@compiled
+def test_errors_of_the_energy_balance_are_those_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of cases that lose energy, some whose motion is not finite."""
+    seen: list[impacts.Impacts] = []
+
+    def watched(*given: Any) -> impacts.Impacts:
+        seen.append(impacts.impacts(*given))
+        return seen[-1]
+
+    monkeypatch.setattr(batch, "impacts", watched)
+    cases: list[Case] = [{"k": k} for k in (2e6, 1e9, 1e10, 1e300)]
+    deck = DECK.replace("LOOP       1500", "LOOP        200")
+    fecm.sweep(deck, cases=cases)
+    without_kernels(monkeypatch)
+    fecm.sweep(deck, cases=cases)
+    found, wanted = seen
+    assert wanted.error[2] > 0.01
+    np.testing.assert_array_equal(found.unconverged_steps, wanted.unconverged_steps)
+    finite = np.isfinite(wanted.error)
+    assert finite.tolist() == [True, True, True, False]
+    np.testing.assert_allclose(found.error[finite], wanted.error[finite], rtol=1e-6, atol=1e-9)
+    assert not found.error[3] < 1.0
+
+
+@compiled
+@pytest.mark.parametrize("steps", [1, 2, 150])
+def test_the_response_of_a_plate_is_that_of_numpy(steps: int) -> None:
+    (problem,) = load_deck(DECK.replace("EXPE", GAGE)).problems
+    found = []
+    for solver in ("kernels", "numpy"):
+        model = build_model(problem, RunOptions(solver=solver))
+        assert model.impact is not None
+        assert model.gages is not None
+        gages = model.motion.dof_sums(model.gages.dof_indices, model.gages.weights)
+        load = model.impact.contact.load
+        found.append(plate_response(model.motion, load, 2e-7, steps, gages))
+    for one, other in zip(found[0], found[1], strict=True):
+        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-12 * np.abs(other).max())
+
+
+@compiled
+def test_a_law_that_the_kernels_do_not_know_is_numpys() -> None:
+    class Other(LinearPermanent):
+        """The same law by another name."""
+
+    one, kind = np.ones(3), np.zeros(3, dtype=np.intp)
+    response = 1e-7 * np.arange(1.0, 301.0)
+    forces = []
+    for law in (LinearPermanent, Other):
+        constants = law(2e6 * one, 1e-4 * one, 0.1 * one, 2.0 * one)
+        speed = np.array([50.0, 100.0, 150.0])
+        hits = impacts.Hits([RigidMass(1.8e-4)], kind, one, HystereticLaw(constants), speed)
+        forces.append(impacts.impacts(response, 2e-7, 1e-6, hits).force)
+    found, wanted = forces
+    assert not np.array_equal(found, wanted)
+    np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-10 * wanted.max())
