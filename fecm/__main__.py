@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import signal
 from types import FrameType
@@ -45,6 +46,7 @@ def main() -> NoReturn:
             f"the process may have {space / 1e6:.0f} MB of address space (ulimit -v), and "
             f"{LEAST_SPACE / 1e6:.0f} MB are needed"
         )
+    gc.set_threshold(100_000)  # modules and arrays make little garbage in cycles
     try:
         from fecm.cli import main as run
     except (ImportError, MemoryError) as error:

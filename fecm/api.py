@@ -5,11 +5,11 @@ from __future__ import annotations
 import logging
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, Literal
 
 from fecm._errors import FecmWarning
+from fecm._frozen import frozen
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, load_text, read_deck
@@ -35,7 +35,7 @@ Progress = Callable[[int, int], object]
 LOGGER = logging.getLogger("fecm")
 
 
-@dataclass(frozen=True)
+@frozen
 class LoadedDeck:
     """A file that was read and checked."""
 

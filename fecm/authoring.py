@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Literal
 
 from fecm._errors import FecmWarning
+from fecm._frozen import frozen
 from fecm.api import load_deck
 from fecm.deck.catalogue import (
     CONTACTS,
@@ -69,7 +70,7 @@ AUTO = "auto"
 MITC, FULL = "mitc", "full"
 
 
-@dataclass(frozen=True)
+@frozen
 class Authored:
     """A new deck, not yet checked."""
 

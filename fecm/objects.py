@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from numbers import Real
 from pathlib import Path
 from typing import Literal, Self
@@ -13,6 +13,7 @@ from typing import Literal, Self
 from numpy.typing import ArrayLike
 
 from fecm._errors import FecmError
+from fecm._frozen import frozen
 from fecm.deck.catalogue import CONTACTS, NamedContact, NamedPly, convert
 from fecm.deck.grid import (
     EDGES,
@@ -62,7 +63,7 @@ class ObjectError(FecmError, ValueError):
     """Objects that make no deck; messages quote the names of parameters in backquotes."""
 
 
-@dataclass(frozen=True)
+@frozen
 class DropWeight:
     """What a test standard prescribes besides its fixture, in mm, N, s and t."""
 
@@ -75,7 +76,7 @@ class DropWeight:
     thickest: float
 
 
-@dataclass(frozen=True)
+@frozen
 class Fixture:
     """A plate on the edges of a window in its middle."""
 
@@ -124,7 +125,7 @@ def parse_fixture(text: str) -> Fixture:
     return Fixture("window", (lx, ly), (wx, wy))
 
 
-@dataclass(frozen=True)
+@frozen
 class Plate:
     """Mesh and supports of a plate.
 
@@ -298,7 +299,7 @@ class Plate:
         return cls(found.supports(wanted), imported=found)
 
 
-@dataclass(frozen=True)
+@frozen
 class Laminate:
     """Layup of a plate.
 
@@ -340,7 +341,7 @@ class Laminate:
         return float(f"{len(self.angles) * self.ply_thickness:.9g}")
 
 
-@dataclass(frozen=True)
+@frozen
 class Sphere:
     """Elastic contact of a sphere, its k estimated from the ply's constants."""
 

@@ -9,21 +9,23 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib import import_module
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import click
-from click.shell_completion import CompletionItem
 
 from fecm._errors import FecmError
+from fecm._frozen import frozen
 from fecm._version import __version__
 from fecm.cli import isolation, streams
 from fecm.cli.common import INTERRUPTED, SIGNALLED, UNUSABLE, echo, signals
 from fecm.results.schema import printable
 
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
-@dataclass(frozen=True)
+
+@frozen
 class LazyCommand:
     """A command that is imported when it is called."""
 
@@ -77,6 +79,8 @@ class LazyGroup(click.Group):
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Complete the name of a command or an option."""
+        from click.shell_completion import CompletionItem
+
         names = [name for name in sorted(COMMANDS) if name.startswith(incomplete)]
         return [
             *(CompletionItem(name, help=COMMANDS[name].summary) for name in names),

@@ -8,14 +8,14 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
-from typing import TextIO
+from typing import Any, TextIO
 
 import click
 
 from fecm._errors import FecmError
 from fecm._files import beside
 from fecm.problem.slips import MODES, REPORT
-from fecm.results.schema import printable
+from fecm.results.schema import jsonable, printable
 
 NO, UNUSABLE, INTERRUPTED = 1, 2, 130
 
@@ -53,6 +53,13 @@ def echo(text: object = "", *, err: bool = False) -> None:
     """
     with contextlib.suppress(OSError):
         click.echo("\n".join(map(printable, str(text).split("\n"))), err=err)
+
+
+def echo_json(value: Any) -> None:
+    """Print a value as one line of JSON."""
+    import json
+
+    click.echo(json.dumps(jsonable(value)))
 
 
 def note(text: object) -> None:

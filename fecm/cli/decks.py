@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -21,6 +20,7 @@ from fecm.cli.common import (
     RefusedError,
     echo,
     echo_file,
+    echo_json,
     progress,
     write_text,
 )
@@ -33,7 +33,6 @@ from fecm.problem.options import RunOptions
 from fecm.problem.problem import Problem
 from fecm.problem.slips import REPORT, active_slips
 from fecm.problem.summary import ProblemSummary
-from fecm.results.schema import jsonable
 
 
 def count_findings(findings: Sequence[Finding]) -> str:
@@ -142,7 +141,7 @@ def check(decks: tuple[Path, ...], mode: str, form: str, strict: bool, mesh_erro
     failed = _failures(decks, one)
     if form == "sarif":
         unread = [str(error) for error in failed if not isinstance(error, CheckFailedError)]
-        click.echo(json.dumps(sarif(checked, unread)))
+        echo_json(sarif(checked, unread))
     _end(failed)
 
 
@@ -153,7 +152,7 @@ def _print(prepared: LoadedDeck, form: str, *, brief: bool, passes: bool) -> Non
         lines = [finding.to_dict(prepared.source) for finding in prepared.findings]
         about = {"kind": "summary", "file": prepared.source}
         for line in (*lines, *({**about, **view.to_dict()} for view in views)):
-            click.echo(json.dumps(jsonable(line)))
+            echo_json(line)
     elif form == "text":
         for finding in prepared.findings:
             echo(finding.render(prepared.source))
@@ -178,7 +177,7 @@ def _compare_meshes(prepared: LoadedDeck, mode: str, form: str) -> None:
         if form == "json":
             changes = {"change": found.change, "relative_change": found.relative_change}
             head = {"kind": "mesh_error", "file": prepared.source}
-            click.echo(json.dumps({**head, **found.__dict__, **changes, "units": units}))
+            echo_json({**head, **found.__dict__, **changes, "units": units})
             continue
         share = found.relative_change
         about = "no contact" if share is None else f"{share:+.2%}"

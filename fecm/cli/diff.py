@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import tomllib
 from pathlib import Path
@@ -10,11 +9,11 @@ from typing import Any
 
 import click
 
-from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO
+from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, echo_json
 from fecm.cli.isolation import reads
 from fecm.cli.types import NOT_NEGATIVE, Parsed, assignment, file_of
 from fecm.results.diff import SCALE_NAMES, Comparison, Difference, difference
-from fecm.results.schema import jsonable, printable, shown_apart
+from fecm.results.schema import printable, shown_apart
 
 
 def _tolerance(name: str, values: object) -> tuple[float, ...]:
@@ -118,7 +117,7 @@ def diff(
             "only_in_a": found.only[0], "only_in_b": found.only[1],
             "excluded": found.excluded, "listed": found.listed,
         }  # fmt: skip
-        click.echo(json.dumps(jsonable(about)))
+        echo_json(about)
     else:
         lines = list(map(printable, sorted(_different(found)))) if brief else _lines(found)
         within = f"rtol {rtol:g}, atol {atol:g}" + ", --tol" * bool(own)

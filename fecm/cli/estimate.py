@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
 
 import click
 
-from fecm.cli.common import DECK_PATH, FORMAT_OPTION, echo, note
+from fecm.cli.common import DECK_PATH, FORMAT_OPTION, echo, echo_json, note
 from fecm.cli.decks import load_single
 from fecm.deck.units import unit_names, unit_of
 from fecm.problem.problem import Problem
-from fecm.results.schema import jsonable
 from fecm.studies.estimate import estimate as estimate_problem
 from fecm.sweeps.api import carry_out
 from fecm.sweeps.plan import plan
@@ -50,7 +48,7 @@ def estimate(deck: Path, form: str) -> None:
         "stiffness": found.stiffness, "models": rows,
     }  # fmt: skip
     if form == "json":
-        click.echo(json.dumps(jsonable(values)))
+        echo_json(values)
         return
     _print(problem, values)
 

@@ -16,8 +16,6 @@ from fecm.results.result import load, result_of
 from fecm.results.schema import FORMAT, SWEEP, ExportError
 from fecm.results.tapes import tape_texts, write_tapes
 from fecm.results.vtkhdf import write_vtkhdf
-from fecm.sweeps import csv as sweep_csv
-from fecm.sweeps.result import sweep_of
 
 
 @click.command()
@@ -72,6 +70,9 @@ def export(
         check_outputs([path], overwrite, [result])
     try:
         if target == "csv" and is_sweep:
+            from fecm.sweeps import csv as sweep_csv
+            from fecm.sweeps.result import sweep_of
+
             cases = sweep_of(contents, history=name == sweep_csv.HISTORY)
             write_lines(sweep_csv.lines(cases, name), path, overwrite=overwrite)
         elif target == "csv":

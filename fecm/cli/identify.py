@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
-from fecm.cli.common import DECK_PATH, FILE_PATH, FORMAT_OPTION, NO, echo, note
+from fecm.cli.common import DECK_PATH, FILE_PATH, FORMAT_OPTION, NO, echo, echo_json, note
 from fecm.cli.decks import load_single
 from fecm.cli.outputs import STANDARD_OUTPUT, OutputPaths, write_lines
 from fecm.cli.rod import FILTER_HELP
 from fecm.cli.types import ListOf, Parsed
 from fecm.deck.units import unit_names, unit_of
-from fecm.results.schema import jsonable
 from fecm.studies.comparison import measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of
 from fecm.sweeps.identify import FREE, Identification, fit
@@ -62,7 +60,7 @@ def identify(
     for text in found.notes:
         note(text)
     if form == "json":
-        click.echo(json.dumps(jsonable(_plain(found))))
+        echo_json(_plain(found))
     else:
         echo("\n".join(_lines(found, units)))
         echo(found.cards())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import platform
 from collections.abc import Mapping
@@ -13,16 +12,12 @@ import click
 import numpy as np
 
 from fecm._version import __version__
-from fecm.cli.common import FILE_PATH, FORMAT_OPTION
+from fecm.cli.common import FILE_PATH, FORMAT_OPTION, echo_json
 from fecm.cli.isolation import reads
-from fecm.mechanics import kernels
-from fecm.mechanics.stiffness_product import available
 from fecm.results.hdf5_reader import Contents, read
 from fecm.results.info import about_run, describe_groups
 from fecm.results.result import result_of
-from fecm.results.schema import FORMAT, SWEEP, declared_units, jsonable, printable, shown
-from fecm.sweeps.random_result import tables
-from fecm.sweeps.result import summary, sweep_of
+from fecm.results.schema import FORMAT, SWEEP, declared_units, printable, shown
 
 # Attributes of the file with lines of their own.
 HEADING = ("title", "mode", "slips", "fecm_version", "format", "format_version",
@@ -39,6 +34,9 @@ def _system(context: click.Context, _: object, asked: bool) -> None:
         return
     import h5py
     import scipy
+
+    from fecm.mechanics import kernels
+    from fecm.mechanics.stiffness_product import available
 
     for name, text in (
         ("fecm", __version__),
@@ -63,12 +61,22 @@ def _system(context: click.Context, _: object, asked: bool) -> None:
 def info(result: Path, form: str) -> None:
     """Describe units, summary and every dataset of RESULT, of a run or of a sweep."""
     contents = read(result, FORMAT, SWEEP)
+    with contents.held():
+        about = _about(contents)
+    if form == "json":
+        echo_json(about)
+    else:
+        click.echo("\n".join(_page(about)))
+
+
+def _about(contents: Contents) -> dict[str, Any]:
+    """What is shown, under the keys of the JSON output."""
     is_sweep = contents.form == SWEEP
     extent = _of_sweep(contents) if is_sweep else about_run(result_of(contents))
     if extent.get("still_in_contact") and PERMANENT in contents.groups["history"]:
         contents.groups["history"][PERMANENT] = math.nan  # unknown before the end of the contact
     attributes, lines = contents.attributes, extent.pop("summary")
-    about = {
+    return {
         "file": printable(str(contents.path)),
         "size": contents.path.stat().st_size,
         **{name: attributes.get(name) for name in (SWEEP_KEYS if is_sweep else RUN_KEYS)},
@@ -79,14 +87,13 @@ def info(result: Path, form: str) -> None:
         "groups": describe_groups(contents),
         "texts": {n: {"lines": len(text.splitlines())} for n, text in contents.texts.items()},
     }
-    if form == "json":
-        click.echo(json.dumps(jsonable(about)))
-    else:
-        click.echo("\n".join(_page(about)))
 
 
 def _of_sweep(contents: Contents) -> dict[str, Any]:
     """Cases, failed cases and summary of a sweep."""
+    from fecm.sweeps.random_result import tables
+    from fecm.sweeps.result import summary, sweep_of
+
     result = sweep_of(contents, history=False)
     failed = len(result) - int(result.fine.sum())
     lines = [] if result.random is None else tables(result.random, result.unit)

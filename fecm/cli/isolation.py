@@ -22,7 +22,6 @@ from __future__ import annotations
 import atexit
 import contextlib
 import functools
-import json
 import math
 import os
 import select
@@ -30,13 +29,14 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn, TypeVar
 
 from fecm._children import die_with_parent
 from fecm._files import clear_partials
+from fecm._frozen import frozen
 from fecm._memory import available, format_bytes
 from fecm.cli import streams
 from fecm.cli.common import SIGNALLED, SIGNALS, RefusedError, echo
@@ -64,7 +64,7 @@ class _State:
 switch = _State()
 
 
-@dataclass(frozen=True)
+@frozen
 class Limits:
     """Limits of a child."""
 
@@ -127,6 +127,8 @@ def reads(*names: str) -> Callable[[Command], Command]:
             limits = limits_for(sum(map(_size, files)), available())
             label = printable(" or ".join(map(str, dict.fromkeys(files))))
             job = {"files": label, "folders": _folders(values), **asdict(limits)}
+            import json
+
             os.write(switch.pipe, json.dumps(job).encode() + b"\n")
             _confine(limits, switch.pipe)
             try:
@@ -231,6 +233,8 @@ def _watch(child: int, pipe: int, received: Sequence[int]) -> tuple[dict[str, An
     Silence is counted in waits instead of seconds: a stop of both processes (Ctrl-Z) is one wait.
     The result is what the child said about its job, and whether it was killed because it hung.
     """
+    import json
+
     job: dict[str, Any] | None = None
     start, silent, hangs = b"", 0, False
     orders: list[tuple[float, int]] = []  # when the child gets which signal

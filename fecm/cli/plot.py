@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -16,10 +16,12 @@ from fecm.cli.isolation import reads
 from fecm.cli.types import Finite, ListOf, Parsed, assignment
 from fecm.plot.kinds import KINDS, Picture
 from fecm.plot.pictures import check_options, check_suffix, draw, options_of, save
-from fecm.results.hdf5_reader import read
+from fecm.results.hdf5_reader import Contents, read
 from fecm.results.result import Result, result_of
 from fecm.results.schema import FORMAT, SWEEP, printable
-from fecm.sweeps.result import SweepResult, sweep_of
+
+if TYPE_CHECKING:
+    from fecm.sweeps.result import SweepResult
 
 _KIND_HELP = "; ".join(f"{name}: {kind.summary}" for name, kind in KINDS.items())
 
@@ -130,10 +132,16 @@ def _named(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:
     if len(set(names)) < len(names):
         raise RefusedError("a result is given twice")
     opened = (read(path, FORMAT, SWEEP) for path in paths)
-    return {
-        name: sweep_of(one, history=False) if one.form == SWEEP else result_of(one)
-        for name, one in zip(names, opened, strict=True)
-    }
+    return {name: _result(contents) for name, contents in zip(names, opened, strict=True)}
+
+
+def _result(contents: Contents) -> Result | SweepResult:
+    """Result of a run or of a sweep."""
+    if contents.form != SWEEP:
+        return result_of(contents)
+    from fecm.sweeps.result import sweep_of
+
+    return sweep_of(contents, history=False)
 
 
 def _draw(

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
-import shutil
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -21,6 +19,7 @@ from fecm.cli.common import (
     CheckFailedError,
     RefusedError,
     echo,
+    echo_json,
     note,
     progress,
     signals,
@@ -37,10 +36,11 @@ from fecm.problem.options import ENERGY_LIMIT, RunOptions
 from fecm.problem.problem import Problem
 from fecm.problem.slips import NAMES, active_slips
 from fecm.results import hdf5_writer
+from fecm.results.hdf5_reader import read
 from fecm.results.info import about_run
-from fecm.results.result import Result, load
-from fecm.results.schema import declared_units, jsonable
-from fecm.results.summary import largest_exposures, summary
+from fecm.results.result import Result, result_of
+from fecm.results.schema import declared_units
+from fecm.results.summary import largest_exposures
 from fecm.simulation.checkpoint import Checkpointer, checkpoint_of, spool_of
 from fecm.simulation.printout import Printer
 from fecm.simulation.run import run as simulate_run
@@ -184,16 +184,18 @@ def _run_one(
             note(f"{path} resumes after step {simulation.state.plate.step}")
         simulate_run(simulation)
     checkpointer.clear()
-    result = load(path)
+    contents = read(path)
+    result = result_of(contents)
+    with contents.held():
+        about = about_run(result)
     for text in (*simulation.state.notes, *result.notes):
         note(text)
     if form == "json":
-        about = {"title": problem.deck.title, "result": str(path), "printed": printed}
-        units = declared_units(result.attributes)
-        click.echo(json.dumps(jsonable({**about, "units": units, **about_run(result)})))
+        named = {"title": problem.deck.title, "result": str(path), "printed": printed}
+        echo_json({**named, "units": declared_units(result.attributes), **about})
         return result
     echo(problem.deck.title or "(no title)")
-    for line in summary(result):
+    for line in about["summary"]:
         echo(f"  {line}")
     echo(f"  result            {path}")
     if printed is not None:
@@ -280,6 +282,8 @@ class _Observer:
 
 def _check_room(path: Path, size: int) -> None:
     """Refuse a result that does not fit on the disk."""
+    import shutil
+
     free = shutil.disk_usage(path.parent).free
     if size > free:
         raise RefusedError(

@@ -12,10 +12,10 @@ import re
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from decimal import Decimal
 from functools import cache, lru_cache
 from itertools import pairwise
 
+from fecm._frozen import frozen
 from fecm.deck.findings import Findings, Place
 
 JUSTIFY = "right-justify each number in its own columns"
@@ -77,6 +77,8 @@ def _formatted(numeral: str, width: int) -> str | None:
 
 def _forms(numeral: str, letter: str) -> Iterator[str]:
     """Forms of a number, the most readable first, with `letter` before an exponent."""
+    from decimal import Decimal
+
     number = Decimal(numeral).normalize()
     sign, numerals, exponent = number.as_tuple()
     if not isinstance(exponent, int):  # infinite or no number
@@ -107,7 +109,7 @@ Value = int | float | str
 LARGEST_INTEGER = 2**31 - 1
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Field:
     """A field of a card: name, Fortran letter (I, F or A), columns, and a label for rulers.
 

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 import tomllib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import resources
 from typing import Any
 
+from fecm._frozen import frozen
 from fecm.deck.model import Allowables, Delamination, Indentation, Units
 from fecm.deck.records import Ply
 from fecm.deck.units import DENSITY, MODULUS, TOUGHNESS, in_si
@@ -45,7 +46,7 @@ SYSTEM_OF_FILES = "mm-N-s"
 NU23 = 0.4
 
 
-@dataclass(frozen=True)
+@frozen
 class NamedPly:
     """A ply with a name."""
 
@@ -148,7 +149,7 @@ SYSTEM = "in-lbf-s"
 COEFFICIENT = "force/length^1.5"
 
 
-@dataclass(frozen=True)
+@frozen
 class NamedContact:
     """A contact with a name."""
 

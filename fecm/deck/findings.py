@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from fecm._errors import FecmError
+from fecm._frozen import frozen
 
 # Severities by the first letter of a code.
 SEVERITIES = {"E": "error", "W": "warning", "N": "note"}
@@ -23,7 +23,7 @@ WIDEST = 200
 LONGEST = 600
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Place:
     """Place of a value: line, first and last column, and the card's text."""
 
@@ -34,7 +34,7 @@ class Place:
     field: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Finding:
     """One error, warning or note.
 

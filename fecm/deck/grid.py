@@ -6,12 +6,12 @@ import math
 import re
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._frozen import frozen
 from fecm.deck.model import Boundary, Coordinates, Elements
 from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
 
@@ -25,7 +25,7 @@ HELD, SIMPLE, CLAMPED = (1, 1, 1, 0, 0), ((1, 1, 1, 1, 0), (1, 1, 1, 0, 1)), (1,
 EDGES = ("left", "right", "bottom", "top")
 
 
-@dataclass(frozen=True)
+@frozen
 class Section:
     """A run of equally long elements in one direction."""
 
@@ -155,7 +155,7 @@ def _edges(sections: Sequence[Section], side: float) -> tuple[int, int]:
     return first, last
 
 
-@dataclass(frozen=True)
+@frozen
 class Grid:
     """A grid of 9-node elements; node numbers run along x first."""
 

@@ -6,11 +6,10 @@ any loop it is 1.  LOOP 0 runs once.
 
 from __future__ import annotations
 
-import difflib
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
 
+from fecm._frozen import frozen
 from fecm.deck.card import parse_real
 from fecm.deck.findings import Findings
 from fecm.deck.records import Macro
@@ -21,7 +20,7 @@ NESTING = 64
 MOST_MACROS = 10**9
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Word:
     """A word of the macro language."""
 
@@ -82,7 +81,7 @@ WORDS = {
 }
 
 
-@dataclass(frozen=True)
+@frozen
 class Loop:
     """A loop: its LOOP card, number of passes and body."""
 
@@ -157,6 +156,8 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
 
 def _unknown(macro: Macro, findings: Findings) -> Word | None:
     """Report an unknown word; return the closest known one, so that loops stay complete."""
+    import difflib
+
     near = difflib.get_close_matches(macro.word, WORDS, 1, 0.5)
     findings.add(
         "E501",
@@ -263,7 +264,7 @@ def moves_only(body: Body) -> bool:
 STEPS = {"RODP", "EXCD"}
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WorkEstimate:
     """Work and output of a program; an upper bound where CONV may leave loops early."""
 

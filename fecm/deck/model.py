@@ -8,10 +8,11 @@ and elements between them.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from textwrap import shorten
 from typing import ClassVar, Self, TypeVar
 
+from fecm._frozen import frozen
 from fecm._html import html_table
 from fecm.deck.card import Fields, Source, Value, layout, write_card
 from fecm.deck.records import (
@@ -39,7 +40,7 @@ NODE = ("I5 node", "I5 increment|incr")
 _S = TypeVar("_S", bound="Segment")
 
 
-@dataclass(frozen=True)
+@frozen
 class Segment(Record):
     """A keyword card and the data that follow it."""
 
@@ -51,7 +52,7 @@ class Segment(Record):
         yield self.to_card()
 
 
-@dataclass(frozen=True)
+@frozen
 class NumberedSegment(Segment):
     """A segment of any number of cards, ended by a blank one."""
 
@@ -72,7 +73,7 @@ class NumberedSegment(Segment):
         yield ""
 
 
-@dataclass(frozen=True)
+@frozen
 class Coordinates(NumberedSegment):
     """COOR: (2I5,7F10.0); coordinates of the nodes (length), of which NDM are used."""
 
@@ -86,7 +87,7 @@ class Coordinates(NumberedSegment):
         return layout(*NODE, *(f"F10 {axis}-coordinate|{axis}" for axis in AXES[: control.ndm]))
 
 
-@dataclass(frozen=True)
+@frozen
 class Elements(NumberedSegment):
     """ELEM: (16I5); nodes of the elements; the increment follows the last of the NEN nodes."""
 
@@ -101,7 +102,7 @@ class Elements(NumberedSegment):
         return layout("I5 element|elm", *nodes, "I5 increment|incr")
 
 
-@dataclass(frozen=True)
+@frozen
 class Boundary(NumberedSegment):
     """BOUN: (16I5); restraint codes of the nodes; a dof with a code other than 0 is restrained."""
 
@@ -115,7 +116,7 @@ class Boundary(NumberedSegment):
         return layout(*NODE, *(f"I5 code {i + 1}|c{i + 1}" for i in range(control.ndf)))
 
 
-@dataclass(frozen=True)
+@frozen
 class Forces(NumberedSegment):
     """FORC: (2I5,7F10.0); nodal forces, or displacements where the dof is restrained."""
 
@@ -129,7 +130,7 @@ class Forces(NumberedSegment):
         return layout(*NODE, *(f"F10 value {i + 1}" for i in range(control.ndf)))
 
 
-@dataclass(frozen=True)
+@frozen
 class Material(Segment):
     """MATE: integration orders, ply constants and layers, the first layer at z = -h/2."""
 
@@ -145,7 +146,7 @@ class Material(Segment):
             yield record.to_card()
 
 
-@dataclass(frozen=True)
+@frozen
 class Impact(Segment):
     """ROD: (2I5,F10.0); impact point and velocity."""
 
@@ -159,7 +160,7 @@ class Impact(Segment):
     )
 
 
-@dataclass(frozen=True)
+@frozen
 class Indentation(Segment):
     """EXPE: (4F10.0); the measured indentation law, equations 3-1, 3-3 and 3-8.
 
@@ -201,7 +202,7 @@ class Indentation(Segment):
         yield from self.text().splitlines()
 
 
-@dataclass(frozen=True)
+@frozen
 class Projectile(Segment):
     """PROJ: (2I5,3F10.0) and, for a rod, its diameters; the projectile (not in the report)."""
 
@@ -231,7 +232,7 @@ class Projectile(Segment):
             yield ""
 
 
-@dataclass(frozen=True)
+@frozen
 class Patch(Segment):
     """PATC: (A4,6X,4F10.0); the contact force acts on a circle (not in the report's program)."""
 
@@ -260,7 +261,7 @@ class Patch(Segment):
         return ["" if value is None else value for value in super().row()]
 
 
-@dataclass(frozen=True)
+@frozen
 class Shear(Segment):
     """SHEA: (F10.0); treatment of transverse shear (not in the report's program)."""
 
@@ -286,7 +287,7 @@ class Shear(Segment):
             yield write_card(self.fields, [self.factor])
 
 
-@dataclass(frozen=True)
+@frozen
 class Allowables(Segment):
     """ALLO: (7F10.0) and (3F10.0); strengths of the ply (not in the report's program)."""
 
@@ -333,7 +334,7 @@ class Allowables(Segment):
         yield write_card(self.constants, row[7:])
 
 
-@dataclass(frozen=True)
+@frozen
 class Delamination(Segment):
     """DELA: (2F10.0); toughness for the delamination threshold (not in the report's program)."""
 
@@ -344,7 +345,7 @@ class Delamination(Segment):
     fields: ClassVar[Fields] = layout("F10 G_IIc", "F10? number of delaminations|number")
 
 
-@dataclass(frozen=True)
+@frozen
 class Damping(Segment):
     """DAMP: (F10.0); mass-proportional damping of the plate (not in the report's program)."""
 
@@ -354,7 +355,7 @@ class Damping(Segment):
     fields: ClassVar[Fields] = layout("F10 a")
 
 
-@dataclass(frozen=True)
+@frozen
 class Gages(NumberedSegment):
     """GAGE: strain gages, read at every step (not in the report's program)."""
 
@@ -363,7 +364,7 @@ class Gages(NumberedSegment):
     keyword: ClassVar[str] = "GAGE"
 
 
-@dataclass(frozen=True)
+@frozen
 class Units(Segment):
     """UNIT: names of the deck's units, for output; nothing is converted."""
 
@@ -380,7 +381,7 @@ class Units(Segment):
         yield f"{self.length} {self.force} {self.time}"
 
 
-@dataclass(frozen=True)
+@frozen
 class PrintOption(Segment):
     """PRIN or NOPR: whether the data that follow are printed."""
 
@@ -392,7 +393,7 @@ class PrintOption(Segment):
         yield "PRIN" if self.on else "NOPR"
 
 
-@dataclass(frozen=True)
+@frozen
 class Page(Segment):
     """PAGE: the printer's carriage control at the head of each page, on a separate card."""
 
@@ -402,7 +403,7 @@ class Page(Segment):
     fields: ClassVar[Fields] = layout("A4 carriage control")
 
 
-@dataclass(frozen=True)
+@frozen
 class Deck(Record):
     """One problem: everything from its FECM card to the END of its macro program.
 

@@ -6,7 +6,6 @@ from unreadable cards.
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections import Counter
 from dataclasses import dataclass, field
@@ -335,6 +334,8 @@ class Reader:
 
 def _close(word: str, known: list[str]) -> list[str]:
     """The closest known word, if any."""
+    import difflib
+
     return difflib.get_close_matches(word, known, 1, 0.6)
 
 

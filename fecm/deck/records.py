@@ -8,9 +8,10 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, ClassVar, Self
 
+from fecm._frozen import frozen
 from fecm.deck.card import Fields, Source, Value, layout, write_card
 from fecm.deck.findings import Place
 
@@ -35,12 +36,12 @@ AXES = ("x", "y", "z")
 DOF_NAMES = ("u", "v", "w", "theta_x", "theta_y")
 
 
-@dataclass(frozen=True, kw_only=True)
+@frozen
 class Record:
     """Values of one card, as attributes in the card's order."""
 
     # The card; None for a record built in Python.
-    source: Source | None = field(default=None, compare=False, repr=False)
+    source: Source | None = field(default=None, compare=False, repr=False, kw_only=True)
     fields: ClassVar[Fields]
     # Values of the card that one attribute holds as a tuple.
     packed: ClassVar[slice | None] = None
@@ -81,7 +82,7 @@ class Record:
         return self.source.place(name) if self.source else None
 
 
-@dataclass(frozen=True)
+@frozen
 class Control(Record):
     """Control card: 6I5."""
 
@@ -99,7 +100,7 @@ class Control(Record):
     )
 
 
-@dataclass(frozen=True)
+@frozen
 class NodeValues(Record):
     """COOR or FORC card: values at a node, and the step to the next node generated from it."""
 
@@ -110,7 +111,7 @@ class NodeValues(Record):
     packed: ClassVar[slice] = slice(2, None)
 
 
-@dataclass(frozen=True)
+@frozen
 class RodDiameter(Record):
     """PROJ card: (2I5,F10.0); an element's diameter (length), and the step to generated ones."""
 
@@ -121,7 +122,7 @@ class RodDiameter(Record):
     fields: ClassVar[Fields] = layout("I5 element|elm", "I5 increment|incr", "F10 diameter")
 
 
-@dataclass(frozen=True)
+@frozen
 class Gage(Record):
     """GAGE card: (I5,5X,4F10.0); a strain gage."""
 
@@ -138,7 +139,7 @@ class Gage(Record):
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
+@frozen
 class NodeCodes(Record):
     """BOUN card: restraint codes of a node; a negative code carries on to generated nodes."""
 
@@ -149,7 +150,7 @@ class NodeCodes(Record):
     packed: ClassVar[slice] = slice(2, None)
 
 
-@dataclass(frozen=True)
+@frozen
 class ElementNodes(Record):
     """ELEM card: the nodes of an element (0 where absent) and the step for generated ones."""
 
@@ -160,7 +161,7 @@ class ElementNodes(Record):
     packed: ClassVar[slice] = slice(1, -1)
 
 
-@dataclass(frozen=True)
+@frozen
 class Layer(Record):
     """Layer card of MATE: (I5,F5.0,F10.0); the number is not used for placing."""
 
@@ -173,7 +174,7 @@ class Layer(Record):
     )
 
 
-@dataclass(frozen=True)
+@frozen
 class Integration(Record):
     """First card of MATE: (3I5,2F10.0)."""
 
@@ -193,7 +194,7 @@ class Integration(Record):
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
+@frozen
 class Ply(Record):
     """Second card of MATE: (7F10.0); mass density and elastic constants of every layer."""
 
@@ -213,7 +214,7 @@ class Ply(Record):
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
+@frozen
 class Macro(Record):
     """A macro card: (A4,1X,A4,1X,2F5.0)."""
 
@@ -246,7 +247,7 @@ class Macro(Record):
         return write_card(cls.fields[: len(plain)], plain)
 
 
-@dataclass(frozen=True)
+@frozen
 class LoadTable(Record):
     """Card of PROP: (2I5,7F10.0), after the macro program's END."""
 

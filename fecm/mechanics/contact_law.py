@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 
 # float or Floats, and bool or Bools: one case, or an array of cases.
@@ -87,7 +88,7 @@ class ContactParameters(ABC):
         return self.loading(peak) / (peak - self.permanent(peak)) ** self.q
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class LinearPermanent(ContactParameters):
     """Parameters with a linear permanent indentation (the card of EXPE)."""
 
@@ -103,7 +104,7 @@ class LinearPermanent(ContactParameters):
         return _select(value > 0.0, value, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class YangSunPermanent(ContactParameters):
     """Parameters with one unloading rigidity k/alpha_cr for every peak (the card of EXPE ACR)."""
 
@@ -205,7 +206,7 @@ class Law(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MeasuredLaw:
     """A law of the report, with measured parameters; subclasses add `trial` and `accept`."""
 
@@ -225,7 +226,7 @@ class MeasuredLaw:
         return self.constants.permanent(_select(peak > memory.peak, peak, memory.peak))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class HystereticLaw(MeasuredLaw):
     """The report's law with any sequence of unloadings and reloadings.
 
@@ -319,7 +320,7 @@ class HystereticLaw(MeasuredLaw):
         )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ListingLaw(MeasuredLaw):
     """The printed program's law (the slip ``reload``), which never returns to an earlier branch.
 

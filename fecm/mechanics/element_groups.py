@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.mechanics.elements.shape import CUBIC, QUADRILATERAL, TRIANGLE, ElementShape
 
@@ -15,12 +17,17 @@ from fecm.mechanics.elements.shape import CUBIC, QUADRILATERAL, TRIANGLE, Elemen
 TOLERANCE = 1.0e-9
 
 
-@dataclass(frozen=True)
+@frozen
 class Congruence:
     """Groups of elements of a block that are translations of one another."""
 
     representatives: NDArray[np.intp]  # (ng,): position in the block of one element per group
     group: NDArray[np.intp]  # (ne,): group of every element
+
+
+def distinct(values: ArrayLike) -> NDArray[Any]:
+    """Sorted distinct values; without an index np.unique would import numpy.ma."""
+    return np.unique(values, return_index=True)[0]
 
 
 def congruence(family: ElementBlock) -> Congruence:
@@ -61,7 +68,7 @@ def shape_of(present: Bools) -> ElementShape:
 Ints = NDArray[np.int32]
 
 
-@dataclass(frozen=True)
+@frozen
 class ElementBlock:
     """Elements that have the same nodes present."""
 
@@ -97,7 +104,7 @@ def element_blocks(elements: Ints, coordinates: Floats) -> list[ElementBlock]:
     given = nodes > 0
     # Patterns in the order of their bits, first node first.
     codes = given @ (1 << np.arange(given.shape[1])[::-1])
-    for code in np.unique(codes, return_index=True)[0]:  # loads no masked arrays
+    for code in distinct(codes):
         rows = np.flatnonzero(codes == code)
         present = given[rows[0]]
         shape = shape_of(present)

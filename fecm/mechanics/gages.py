@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._errors import FecmError
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics import element_groups, interpolation
 from fecm.mechanics.element_groups import ElementBlock
@@ -42,7 +43,7 @@ class GagePlace(Protocol):
     direction: float
 
 
-@dataclass(frozen=True)
+@frozen
 class GageArray:
     """Strains of gages as weighted sums of dofs."""
 

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm.mechanics.contact_law import ContactPoint, Law, Number, Truth
 from fecm.mechanics.plate_motion import AppliedForce, DivergenceError, Load, PlateMotion, PlateState
 from fecm.mechanics.projectile import Projectile, rigid_approach
@@ -47,7 +48,7 @@ class ImpactState(ContactState):
     plate: PlateState = field(kw_only=True)  # the plate, with the number of steps and the time
 
 
-@dataclass(frozen=True)
+@frozen
 class ImpactConditions:
     """Conditions of the impact, with the slips that affect it as parameters."""
 

@@ -5,11 +5,11 @@ Arrays over elements have the element first, then the quadrature point.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics.element_groups import ElementBlock
 from fecm.mechanics.elements.quadrature import Quadrature
@@ -19,7 +19,7 @@ from fecm.mechanics.elements.shape import ElementShape
 NDOF = 5
 
 
-@dataclass(frozen=True)
+@frozen
 class Interpolation:
     """Shape functions of an element block at the points of a rule."""
 

@@ -13,6 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 
 # The slip ``small-stiffness`` sets entries of A, B and D below the first limit to 0, except
@@ -35,7 +36,7 @@ class PlyConstants(Protocol):
     g23: float
 
 
-@dataclass(frozen=True)
+@frozen
 class Plies:
     """Plies of a laminate, from z = -h/2 on."""
 
@@ -52,7 +53,7 @@ class Plies:
         return np.stack([lower, (lower + upper) / 2.0, upper], axis=1)
 
 
-@dataclass(frozen=True)
+@frozen
 class Laminate:
     """Stiffness and inertia of a laminate, per area."""
 

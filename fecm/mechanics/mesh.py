@@ -6,17 +6,16 @@ node or element n.  An absent node of an element and the equation of a restraine
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 
 Ints = NDArray[np.int32]
 
 
-@dataclass(frozen=True)
+@frozen
 class Mesh:
     """Nodes, elements, restraints and nodal forces of a problem."""
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics.plate import PlateModel
 
@@ -16,7 +15,7 @@ DENSE = 60
 SHIFT = 1.0e-9
 
 
-@dataclass(frozen=True)
+@frozen
 class Modes:
     """The lowest modes of a plate."""
 

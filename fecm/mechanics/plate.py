@@ -7,7 +7,6 @@ contains all dofs of all nodes, (numnp, 5).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._errors import FecmError
+from fecm._frozen import frozen
 from fecm._memory import require
 from fecm._typing import Floats
 from fecm.mechanics import element_groups, element_matrices, interpolation
@@ -39,7 +39,7 @@ class UnsoundPlateError(FecmError, ArithmeticError):
     """The plate's stiffness is not finite or has no largest frequency."""
 
 
-@dataclass(frozen=True)
+@frozen
 class IntegrationRules:
     """Quadrature rules of a plate."""
 
@@ -52,7 +52,7 @@ class IntegrationRules:
     assumes_shear: bool = False
 
 
-@dataclass(frozen=True)
+@frozen
 class PlateModel:
     """The discrete plate: M a + K u = P."""
 

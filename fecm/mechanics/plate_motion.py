@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._errors import FecmError
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.stiffness_operator import pieces
@@ -112,7 +113,7 @@ class Sums(NamedTuple):
     load_force: float  # P s
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PointLoad:
     """A unit force on one equation."""
 
@@ -129,7 +130,7 @@ class PointLoad:
         internal[self.equation] -= force * (self.inverse_mass * dt2)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DistributedLoad:
     """A unit force distributed over equations."""
 
@@ -165,7 +166,7 @@ class AppliedForce(NamedTuple):
     force: float
 
 
-@dataclass(frozen=True)
+@frozen
 class DofSums:
     """Weighted sums of dofs, such as the strains of gages."""
 

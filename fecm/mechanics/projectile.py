@@ -8,10 +8,11 @@ state arrays is over dofs; another axis, one column per case, may follow.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics.rod_integrators import CONSISTENT, RodState
 
@@ -25,7 +26,7 @@ REPORT_DENSITY = 0.0006875
 LISTING_DENSITY = 0.0003225
 
 
-@dataclass(frozen=True)
+@frozen
 class Rod:
     """A straight elastic rod of equal elements."""
 
@@ -129,7 +130,7 @@ def _energy(matrix: Floats, x: Floats) -> Floats:
     return np.asarray(energy)
 
 
-@dataclass(frozen=True)
+@frozen
 class RigidMass:
     """A projectile that does not deform, with one dof."""
 
@@ -159,7 +160,7 @@ class RigidMass:
 Projectile = Rod | RigidMass
 
 
-@dataclass(frozen=True)
+@frozen
 class Transducer:
     """Node and sign of the force that the transducer measures."""
 

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal, Protocol
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 
 # The report's program uses the lumped mass, its text the consistent one (equation 4-24).
@@ -21,7 +22,7 @@ AVERAGE: Integrator = "average-acceleration"
 INTEGRATORS = (WILSON, AVERAGE)
 
 
-@dataclass(frozen=True)
+@frozen
 class RodMethod:
     """Mass matrix and integration method of a rod; the defaults are the report program's.
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 
 from fecm._typing import Floats
 from fecm.mechanics import kernels
-from fecm.mechanics.element_groups import congruence
+from fecm.mechanics.element_groups import congruence, distinct
 from fecm.mechanics.kernels.plate import CompiledProduct
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.stiffness_operator import R, StiffnessOperator, pieces
@@ -53,7 +52,11 @@ class Workers:
 
     def __init__(self, count: int = 1) -> None:
         self.count = count
-        self._pool = ThreadPoolExecutor(self.count - 1) if self.count > 1 else None
+        self._pool = None
+        if count > 1:
+            from concurrent.futures import ThreadPoolExecutor
+
+            self._pool = ThreadPoolExecutor(count - 1)
 
     def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
         """Results of a function that releases the GIL, in the order of the items.
@@ -271,7 +274,7 @@ def stiffness_operator(
         for share in np.array_split(members, shares):
             groups: list[Group] = []
             grouped = common[share] & shared[same.group[share]]
-            for number in np.unique(same.group[share[grouped]]):
+            for number in distinct(same.group[share[grouped]]):
                 inside = share[grouped & (same.group[share] == number)]
                 groups.append((matrices[int(number)], dof_indices[inside]))
             alone = share[~grouped]

@@ -8,11 +8,12 @@ opposite sign, and half of the elements suffice.  Every laminate is invariant un
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics.element_groups import ElementBlock
 from fecm.mechanics.mesh import equation_numbers
@@ -26,7 +27,7 @@ TURNED = np.array([-1.0, -1.0, 1.0, -1.0, -1.0])
 TOLERANCE = 1.0e-9
 
 
-@dataclass(frozen=True)
+@frozen
 class SymmetryReduction:
     """Independent dofs, and the dependence of the others on them."""
 

@@ -6,12 +6,12 @@ What a result lacks, or can't be drawn, is a :class:`~fecm.plot.kinds.PlotError`
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Deck, Impact
 from fecm.mechanics.element_groups import ElementBlock, element_blocks
@@ -114,7 +114,7 @@ def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -
         raise PlotError(f"{name} has {error}") from None
 
 
-@dataclass(frozen=True)
+@frozen
 class Patches:
     """The plate divided into small quadrilaterals, equally many per element."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from fecm._errors import warn
+from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Material
 from fecm.mechanics.elements.quadrature import Quadrature
@@ -47,7 +47,7 @@ NAMED = 12  # elements under the load that a note names; the others it counts
 TICKS = 16  # numbers on the axis of the plies at most
 
 
-@dataclass(frozen=True)
+@frozen
 class Exposures:
     """What is drawn of a result."""
 

@@ -6,10 +6,10 @@ Imports no matplotlib: the command line lists the kinds without it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from fecm._errors import FecmError
+from fecm._frozen import frozen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,7 +27,7 @@ class MatplotlibError(FecmError, ImportError):
     """matplotlib is not installed."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Picture:
     """A figure; `frames` draw its frames if it is animated; `notes` say what it shows in words."""
 
@@ -36,7 +36,7 @@ class Picture:
     notes: Sequence[str] = ()
 
 
-@dataclass(frozen=True)
+@frozen
 class Kind:
     """A kind of picture."""
 

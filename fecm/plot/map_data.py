@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecm._errors import warn
+from fecm._frozen import frozen
 from fecm.plot.kinds import PlotError
 from fecm.plot.style import COLOURS, Scale, peak, scale
 from fecm.results.metrics import COLUMNS
@@ -37,7 +37,7 @@ LABELS = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
+@frozen
 class Axis:
     """A parameter or quantity, shown by an axis or by colours."""
 
@@ -59,7 +59,7 @@ class Axis:
         return self.name in INTEGERS
 
 
-@dataclass(frozen=True)
+@frozen
 class Choice:
     """Contents of a map."""
 

@@ -11,7 +11,6 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ContextDecorator
 from contextvars import ContextVar
-from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 import matplotlib
@@ -23,6 +22,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import Formatter, Locator
 
+from fecm._frozen import frozen
 from fecm.deck.units import unit_of
 from fecm.plot.kinds import PlotError
 from fecm.results.result import Result
@@ -116,7 +116,7 @@ class Multiple(Formatter):
         return f"{self._factor * value:.4g}"
 
 
-@dataclass(frozen=True)
+@frozen
 class Scale:
     """Scale of an axis: factor of the numbers at its ticks, and text of the unit."""
 

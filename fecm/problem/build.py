@@ -5,13 +5,14 @@ The active slips become parameters of plate, projectile, contact law and transdu
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.deck import model
 from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, moves_only
@@ -69,7 +70,7 @@ class Threshold(NamedTuple):
     rigidity: float
 
 
-@dataclass(frozen=True)
+@frozen
 class ContactPatch:
     """Circle on which the contact force acts, and its nodal weights."""
 
@@ -81,7 +82,7 @@ class ContactPatch:
     weights: Floats  # (numnp,): shares of the nodes in a unit force; 0 where w is restrained
 
 
-@dataclass(frozen=True)
+@frozen
 class Problem:
     """A checked problem; each part is built once, when it is first needed."""
 
@@ -231,7 +232,7 @@ class Problem:
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class ImpactModel:
     """Model of a problem, ready to run."""
 

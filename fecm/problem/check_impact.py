@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._frozen import frozen
 from fecm.deck.findings import Findings
 from fecm.deck.model import Deck, Gages, Impact, Indentation, Material, Patch, Projectile, Shear
 from fecm.deck.units import KNOWN, in_si, unit_names
@@ -254,7 +253,7 @@ def check_law(law: Indentation, findings: Findings) -> None:
             findings.add("E412", f"The {name} is {value:g}; it must be {rule}.", law.place(name))
 
 
-@dataclass(frozen=True)
+@frozen
 class Resolution:
     """Resolution of an impact by the mesh."""
 

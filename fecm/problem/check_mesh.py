@@ -24,6 +24,7 @@ from fecm.deck.model import (
 )
 from fecm.deck.records import Integration
 from fecm.mechanics import assumed_shear, element_groups, interpolation
+from fecm.mechanics.element_groups import distinct
 from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature
 from fecm.mechanics.elements.shape import CUBIC, TRIANGLE
 from fecm.mechanics.mesh import Mesh, holds_the_plane
@@ -163,7 +164,7 @@ def _check_coincidence(deck: Deck, mesh: Mesh, findings: Findings) -> None:
     sorted_places = mesh.coordinates[order]
     same = (sorted_places[1:] == sorted_places[:-1]).all(axis=1)
     if same.any():
-        rows = np.unique(np.concatenate([order[1:][same], order[:-1][same]]))
+        rows = distinct(np.concatenate([order[1:][same], order[:-1][same]]))
         findings.add(
             "W314",
             f"{describe_nodes(rows)} in the place of another node: the plate is cut there.",
@@ -204,7 +205,7 @@ def check_side_nodes(deck: Deck, mesh: Mesh, findings: Findings) -> None:
                 along = ((node - corners[:, 0]) * side).sum(axis=1) / np.square(side).sum(axis=1)
             wrong += family.rows[np.abs(along - share) > OFF_PLACE].tolist()
     if wrong:
-        rows = np.unique(wrong).astype(np.intp)
+        rows = distinct(wrong).astype(np.intp)
         findings.add(
             "W323",
             f"Side nodes of {describe_elements(rows)} are away from their places by more than "
@@ -284,7 +285,7 @@ def _check_jacobians(
                 folded.setdefault(family.shape.numbering, []).extend(rows.tolist())
     for numbering, wrong in folded.items():
         what = "has a Jacobian that is zero or negative"
-        report_elements(findings, "E313", np.unique(wrong).astype(np.intp), deck, what, numbering)
+        report_elements(findings, "E313", distinct(wrong).astype(np.intp), deck, what, numbering)
 
 
 def _check_masses(material: Material, families: Blocks, findings: Findings) -> None:

@@ -13,6 +13,7 @@ from fecm.deck.findings import Findings, Place
 from fecm.deck.model import Deck, Impact, Indentation, Material, Projectile, Segment
 from fecm.deck.records import Layer, Ply, Record
 from fecm.deck.units import in_si, unit_names
+from fecm.mechanics.element_groups import distinct
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.projectile import Rod
@@ -156,7 +157,7 @@ def _check_law(deck: Deck, findings: Findings) -> None:
 def _check_neighbours(impact: Impact, mesh: Mesh, findings: Findings) -> None:
     """Warn if all neighbours of the impact node, inside the plate too, are restrained."""
     touching = mesh.elements[(mesh.elements == impact.node).any(axis=1)]
-    around = np.setdiff1d(touching, [0, impact.node]) - 1
+    around = distinct(touching[(touching > 0) & (touching != impact.node)]) - 1
     places = mesh.coordinates
     inner = ((places > places.min(axis=0)) & (places < places.max(axis=0))).all(axis=1)
     if inner[around].any() and (mesh.equations[around, impact.dof - 1] == 0).all():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import sys
-from decimal import Context, Decimal
 
 import numpy as np
 
@@ -27,6 +26,8 @@ def check_program(problem: Problem, findings: Findings) -> None:
     """Check the length of a program, and that its loops reach the steps to be stored."""
     deck, sizes = problem.deck, problem.work
     if sizes.macros > MOST_MACROS:
+        from decimal import Context, Decimal
+
         count = Decimal(sizes.macros).normalize(Context(prec=3))  # may be beyond all floats
         findings.add(
             "E509",

@@ -7,10 +7,10 @@ as a spring with the tangent stiffness of the indentation law.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm.deck.model import Deck, Impact, Indentation
 from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError
@@ -65,7 +65,7 @@ def contact_stiffness(deck: Deck, plate: PlateModel) -> float:
     return float(force * max(1.5 / peak, law.q / (peak - law.permanent(peak))))
 
 
-@dataclass(frozen=True)
+@frozen
 class ContactStep:
     """Limit of the time step from the contact."""
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from fecm._frozen import frozen
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.rod_integrators import RodMethod
@@ -13,7 +14,7 @@ from fecm.mechanics.stiffness_product import AUTO, KERNELS, SOLVERS
 ENERGY_LIMIT = 0.1
 
 
-@dataclass(frozen=True)
+@frozen
 class RunOptions:
     """Options of a run; the defaults are the report's.
 

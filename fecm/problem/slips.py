@@ -7,14 +7,15 @@ Modes, single slips of a run and the errata page all come from this table;
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+
+from fecm._frozen import frozen
 
 REPORT = "report"
 LISTING = "listing"
 MODES = (REPORT, LISTING)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Slip:
     """One difference between the printed program and the report."""
 

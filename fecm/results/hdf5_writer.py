@@ -26,6 +26,8 @@ from fecm.results.schema import (
 
 Array = NDArray[Any]
 TIME = "time"
+TEXT = h5py.string_dtype()
+TEXT_TYPE, SCALAR = h5py.h5t.py_create(TEXT, logical=True), h5py.h5s.create(h5py.h5s.SCALAR)
 
 
 class FileSink:
@@ -37,16 +39,17 @@ class FileSink:
         self._units: dict[str, str] = {}
         self._datasets: dict[str, h5py.Dataset] = {}
         self._made: list[Dataset] = []
+        self._groups: dict[str, h5py.Group] = {"": file}
+        self._scales: dict[str, h5py.Dataset] = {}
         self.axis_names = dict(AXIS_NAMES)
 
     def _group(self, name: str) -> h5py.Group:
-        if not name:
-            return self._file
-        new = name not in self._file
-        group = self._file.require_group(name)
-        if new and name in GROUP_DESCRIPTIONS:
-            group.attrs["description"] = GROUP_DESCRIPTIONS[name]
-        return group
+        if name not in self._groups:
+            new = name not in self._file
+            group = self._groups[name] = self._file.require_group(name)
+            if new and name in GROUP_DESCRIPTIONS:
+                _set_text(group, GROUP_DESCRIPTIONS[name], "description")
+        return self._groups[name]
 
     def attributes(self, group: str, values: Mapping[str, Any]) -> None:
         """Set attributes of a group; a list of strings becomes an array of strings."""
@@ -55,19 +58,18 @@ class FileSink:
             self._units = declared_units(values)
         for name, value in values.items():
             if isinstance(value, list | tuple):
-                target.attrs.create(name, value, (len(value),), h5py.string_dtype())
+                target.attrs.create(name, value, (len(value),), TEXT)
             else:
                 target.attrs[name] = value
 
     def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
         """Create a contiguous dataset of its full shape."""
         made = self._group(dataset.group).create_dataset(dataset.name, shape, dataset.dtype)
-        made.attrs["description"] = dataset.description
-        made.attrs["long_name"] = dataset.description
+        _set_text(made, dataset.description, "description", "long_name")
         if dataset.dimension:
-            made.attrs["dimension"] = dataset.dimension
+            _set_text(made, dataset.dimension, "dimension")
             if unit := unit_of(dataset.dimension, self._units):
-                made.attrs["unit"] = made.attrs["units"] = unit  # xarray and pint read units
+                _set_text(made, unit, "unit", "units")  # xarray and pint read units
         self._datasets[dataset.path] = made
         self._made.append(dataset)
 
@@ -94,16 +96,18 @@ class FileSink:
     def _scale(self, size: str, length: int) -> h5py.Dataset:
         """Scale of an axis, created on first use."""
         name, description = SCALES[size]
-        if name not in self._file:
+        if name not in self._scales and name not in self._file:
             if size in self.axis_names:
                 texts = self.axis_names[size][:length]
-                made = self._file.create_dataset(name, data=texts, dtype=h5py.string_dtype())
+                made = self._file.create_dataset(name, data=texts, dtype=TEXT)
             else:
                 numbers = np.arange(length, dtype="i4") + (size not in FROM_0)
                 made = self._file.create_dataset(name, data=numbers)
             made.make_scale(name)
-            made.attrs["description"] = made.attrs["long_name"] = description
-        return self._file[name]
+            _set_text(made, description, "description", "long_name")
+        if name not in self._scales:
+            self._scales[name] = self._file[name]
+        return self._scales[name]
 
     def write(self, path: str, start: int, rows: Array) -> None:
         """Store rows of a dataset.  Raises OSError if this or an earlier write failed."""
@@ -141,7 +145,9 @@ class FileSink:
             made.attrs.update(attributes)
             self._datasets[path] = made
         elif not len(group):
-            del self._file[path.rpartition("/")[0]]
+            empty = path.rpartition("/")[0]
+            del self._file[empty]
+            self._groups.pop(empty, None)
 
     def text(
         self,
@@ -151,11 +157,18 @@ class FileSink:
         axes: tuple[str, ...] = ("cases",),
     ) -> None:
         """Store a text, or texts along an axis."""
-        made = self._file.create_dataset(path, data=value, dtype=h5py.string_dtype())
+        made = self._file.create_dataset(path, data=value, dtype=TEXT)
         if not isinstance(value, str):
             self._datasets[path] = made
             self._made.append(Dataset(path, axes, description))
         made.attrs["description"] = description
+
+
+def _set_text(item: h5py.HLObject, text: str, *names: str) -> None:
+    """Set new attributes to a text, as ``item.attrs`` does at three times the cost."""
+    value = np.array(text, dtype=TEXT)
+    for name in names:
+        h5py.h5a.create(item.id, name.encode(), TEXT_TYPE, SCALAR).write(value)
 
 
 class _Stored(Mapping[str, Array]):

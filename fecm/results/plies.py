@@ -5,12 +5,12 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Deck, Material
 from fecm.deck.reader import Reader
@@ -29,7 +29,7 @@ IN_PLANE = ("sigma_1", "sigma_2", "tau_12")
 INTERLAMINAR = ("tau_xz", "tau_yz")
 
 
-@dataclass(frozen=True)
+@frozen
 class Plies:
     """Stresses and strains of plies, in the deck's units.
 

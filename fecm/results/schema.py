@@ -7,14 +7,13 @@ of ply stresses ``members`` (elements), ``npp`` (points per element), ``layers``
 
 from __future__ import annotations
 
-import difflib
 import math
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from fecm._errors import FecmError
+from fecm._frozen import frozen
 from fecm.deck.records import AXES, DOF_NAMES
 from fecm.mechanics.failure import CRITERIA
 
@@ -54,6 +53,8 @@ def shown_apart(one: Any, other: Any, width: int = 60) -> tuple[str, str]:
 
 def suggestion(asked: str, paths: Iterable[str]) -> str:
     """End of a message about a missing dataset or group: similar names, or the groups."""
+    import difflib
+
     known = sorted({name for path in paths for name in (path, path.rpartition("/")[0])} - {""})
     last_parts = [name.rpartition("/")[2] for name in known]
     close = difflib.get_close_matches(asked, last_parts, n=3) if "/" not in asked else []
@@ -110,7 +111,7 @@ class ResultWriteError(FecmError, OSError):
     """A result can't be written."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Dataset:
     """One dataset of a result."""
 

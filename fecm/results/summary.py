@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm.mechanics.failure import CRITERIA
 from fecm.results.result import Result, contact_intervals
 
@@ -55,7 +55,7 @@ def _threshold(result: Result) -> list[str]:
     return [f"delamination      {force} reached at time {_quantity(result, time, 'time')}"]
 
 
-@dataclass(frozen=True)
+@frozen
 class LargestExposure:
     """Largest exposure of a criterion outside the elements under the load."""
 

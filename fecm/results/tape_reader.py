@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.results.schema import ResultFileError
 from fecm.results.tapes import CONTACT, CURVATURES
@@ -40,7 +40,7 @@ _NUMBER = re.compile(rb"([+-]?(?:\d+\.?\d*|\.\d+))(?:[ED]([+-]?\d+)|([+-]\d+))?"
 _SPECIAL = re.compile(rb"[+-]?(?:inf(?:inity)?|nan)", re.IGNORECASE)
 
 
-@dataclass(frozen=True)
+@frozen
 class TapeText:
     """Contents of a folder of tapes."""
 

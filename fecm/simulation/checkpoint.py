@@ -9,11 +9,8 @@ resumed run gives the same bytes as an uninterrupted one.
 from __future__ import annotations
 
 import contextlib
-import hashlib
-import json
 import os
 import time
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -41,6 +38,8 @@ def spool_of(result: Path) -> Path:
 
 def identity(simulation: Simulation) -> dict[str, Any]:
     """Properties that a run and its checkpoint must have in common."""
+    import hashlib
+
     deck, options = simulation.problem.deck, simulation.options
     text = deck.text or deck.to_text()
     return {
@@ -84,6 +83,8 @@ class Checkpointer:
 
         Raises OSError if it can't be written; the previous checkpoint then remains valid.
         """
+        import json
+
         flags = os.O_RDWR
         if not self._journal.spooled.length:
             self._spool.unlink(missing_ok=True)
@@ -120,6 +121,9 @@ class Checkpointer:
 
     def _read(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         """JSON values and arrays of the checkpoint."""
+        import json
+        import zipfile
+
         if not self._checkpoint.exists():
             raise CheckpointError(f"there is no checkpoint {self._checkpoint}")
         with (

@@ -6,10 +6,8 @@ rows if it has any.  Replaying the spool produces a file of the same bytes.
 
 from __future__ import annotations
 
-import json
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -18,6 +16,7 @@ from numpy.typing import NDArray
 
 from fecm._errors import FecmError
 from fecm._files import naming, open_ordinary, sync
+from fecm._frozen import frozen
 from fecm.results.hdf5_writer import FileSink
 from fecm.results.schema import DATASETS, Dataset
 
@@ -31,7 +30,7 @@ class CheckpointError(FecmError, ValueError):
     """The checkpoint, or its spool, can't be used."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Part:
     """The part of a spool that belongs to a checkpoint: number of bytes and their CRC."""
 
@@ -120,6 +119,8 @@ class Journal:
         with naming(path), open_ordinary(path) as file:
             if _checksum(file, part.length) != part.checksum:
                 raise CheckpointError(f"{path} is damaged, or was written by another run")
+            import json
+
             file.seek(0)
             while file.tell() < part.length:
                 try:
@@ -157,4 +158,6 @@ def _checksum(file: BinaryIO, length: int) -> int:
 
 def _line(entry: Mapping[str, Any]) -> bytes:
     """An operation in JSON, with NumPy's numbers and arrays as Python's."""
+    import json
+
     return json.dumps(entry, default=lambda value: value.tolist()).encode() + b"\n"

@@ -121,7 +121,7 @@ def _restored(value: Any, path: str, stored: Mapping[str, Any], seen: set[int]) 
         return value
     seen.add(id(value))
     new = {name: _restored(getattr(value, name), f"{path}/{name}", stored, seen) for name in names}
-    if isinstance(value, tuple) or value.__dataclass_params__.frozen:
+    if isinstance(value, tuple) or "__setattr__" in vars(type(value)):  # frozen
         return type(value)(**new)
     for name, one in new.items():
         setattr(value, name, one)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.deck.units import KNOWN
 from fecm.results.result import Result
@@ -21,7 +21,7 @@ from fecm.studies.tables import read_table, same_name
 Source = str | Path | tuple[Any, Any]
 
 
-@dataclass(frozen=True)
+@frozen
 class Measurement:
     """A measured force in the deck's units."""
 
@@ -36,7 +36,7 @@ class Measurement:
         return "contact force" if self.column == "force" else self.column
 
 
-@dataclass(frozen=True)
+@frozen
 class Comparison:
     """A result's force, interpolated at measured times, against the measured force.
 

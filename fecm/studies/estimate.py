@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from scipy.optimize import brentq
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.deck.model import Impact, Indentation
 from fecm.mechanics.delamination import SMALL_MASS, effective_rigidity
@@ -26,7 +26,7 @@ from fecm.studies.quick_models import (
 )
 
 
-@dataclass(frozen=True)
+@frozen
 class Model:
     """One quick model of an impact."""
 
@@ -36,7 +36,7 @@ class Model:
     velocity: float  # at which the model reaches it; NaN without DELA
 
 
-@dataclass(frozen=True)
+@frozen
 class Estimate:
     """Quick estimates of an impact."""
 

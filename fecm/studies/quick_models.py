@@ -8,19 +8,19 @@ stored in the bending of the plate and in the indentation.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 
 # Mass over the plate's below which waves control the impact, and above which it is quasi-static.
 SMALL, LARGE = 0.1, 50.0
 
 
-@dataclass(frozen=True)
+@frozen
 class QuickImpact:
     """Result of a quick model."""
 

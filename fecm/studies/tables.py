@@ -11,12 +11,12 @@ import csv
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import chain, repeat
 from pathlib import Path
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.studies import StudyError
 
@@ -28,7 +28,7 @@ _COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 _UNIT = re.compile(r"[^(\[]*[(\[]([^)\]]*)[)\]]")
 
 
-@dataclass(frozen=True)
+@frozen
 class Table:
     """Rows of a file below the names and units of its columns; both are empty if it has none."""
 

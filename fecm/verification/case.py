@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 
 TABLES: dict[str, dict[str, Any]] = tomllib.loads(
@@ -27,7 +27,7 @@ Value = float | Floats | tuple[Floats, Floats]
 Compute = Callable[[], Sequence[Value]]
 
 
-@dataclass(frozen=True)
+@frozen
 class Check:
     """Expected value of one quantity."""
 
@@ -40,7 +40,7 @@ class Check:
     scale: float | None = None  # reference of the relative error; None for the expected value
 
 
-@dataclass(frozen=True)
+@frozen
 class Case:
     """Quantities computed together: `compute` returns one value per check, in order."""
 
@@ -50,7 +50,7 @@ class Case:
     compute: Compute
 
 
-@dataclass(frozen=True)
+@frozen
 class Row:
     """Result of a check."""
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fecm._typing import Bools, Floats
 from fecm.mechanics import assumed_shear
-from fecm.mechanics.element_groups import ElementBlock, congruence
+from fecm.mechanics.element_groups import ElementBlock, congruence, distinct
 from fecm.mechanics.interpolation import (
     NDOF,
     inverse_jacobian,
@@ -231,7 +231,7 @@ class CompiledPlate:
         for c in range(layout.chunks):
             count = int(firsts[c + 1] - firsts[c])
             parts = [part[at == c].ravel() for part, at in zip(touched, inside, strict=True)]
-            here = np.unique(np.concatenate(parts))
+            here = distinct(np.concatenate(parts))
             mine = nodes.own[leader[here]]
             shares = here[~mine]
             local[here[mine]] = nodes.number[here[mine]] - firsts[c]
@@ -392,7 +392,7 @@ def _numbered(layout: _Layout, touched: list[Indices], leader: Indices) -> _Node
         np.minimum.at(lowest, at, chunk)
         np.maximum.at(highest, at, chunk)
         np.maximum.at(final, at, rows[:, None, None])
-    followers = np.unique(np.concatenate([nodes[leader[nodes] != nodes] for nodes in touched]))
+    followers = distinct(np.concatenate([nodes[leader[nodes] != nodes] for nodes in touched]))
     own = (highest >= 0) & (lowest == highest)
     own[leader[followers]] = False
     inside, common = np.flatnonzero(own), np.flatnonzero((highest >= 0) & ~own)
@@ -420,7 +420,7 @@ def _grouped(family: ElementBlock, weights: Floats) -> list[tuple[Indices, int]]
     key = 3 * same.group + weights.astype(int)
     alone = []
     found: list[tuple[Indices, int]] = []
-    for one in np.unique(key[weights > 0.0]):
+    for one in distinct(key[weights > 0.0]):
         (chosen,) = np.nonzero(key == one)
         if len(chosen) >= WORTH_GROUPING:
             found.append((chosen, SHARED))

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics.contact_law import (
     ACR_POWER,
@@ -29,7 +28,7 @@ from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING, divid
 from fecm.studies.indentation_test.permanent import Critical, Line, critical, line
 
 
-@dataclass(frozen=True)
+@frozen
 class FreePower:
     """First loading with a free power, F = k a^n (equation 3-1)."""
 
@@ -71,7 +70,7 @@ def free_power(curves: Curves) -> FreePower:
 LARGEST = 1e60
 
 
-@dataclass(frozen=True)
+@frozen
 class Cycle:
     """Unloading and reloading from a point of the first loading curve."""
 
@@ -84,7 +83,7 @@ class Cycle:
     k_1_measured: Estimate | None
 
 
-@dataclass(frozen=True)
+@frozen
 class Fit:
     """Result of a fit."""
 

@@ -14,11 +14,12 @@ k.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.mechanics.contact_law import LOADING_POWER, power_curve
 from fecm.studies import StudyError
@@ -26,7 +27,7 @@ from fecm.studies.indentation_test import LIMITS_Q
 from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING, Division
 
 
-@dataclass(frozen=True)
+@frozen
 class Estimate:
     """A value and its standard error, which is 0 for a prescribed value."""
 
@@ -71,7 +72,7 @@ SURE = 3.0
 STEP = 1e-6
 
 
-@dataclass(frozen=True)
+@frozen
 class ParameterLayout:
     """Index of each parameter in the vector of parameters.
 
@@ -102,7 +103,7 @@ def layout_of(division: Division, tied: frozenset[int] = frozenset()) -> Paramet
     )
 
 
-@dataclass(frozen=True)
+@frozen
 class Curves:
     """Curves of a test, scaled by its largest indentation and force."""
 
@@ -180,7 +181,7 @@ def scaled(division: Division, indentation: Floats, force: Floats) -> Curves:
     return curves
 
 
-@dataclass(frozen=True)
+@frozen
 class Solution:
     """Fitted parameters in the units of the test, numbered by :class:`ParameterLayout`.
 

@@ -7,12 +7,12 @@ more than a threshold above its noise.  Points within the noise of a turn belong
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.studies import StudyError
 
@@ -27,7 +27,7 @@ GUARD = 2.0
 NEGLIGIBLE = 0.1
 
 
-@dataclass(frozen=True)
+@frozen
 class Path:
     """Moving mean of measured indentations, and their noise."""
 
@@ -94,7 +94,7 @@ def turns(path: Path, retreat: float) -> list[int]:
 LOADING, FALLING, RISING = "loading", "unloading", "reloading"
 
 
-@dataclass(frozen=True)
+@frozen
 class Stretch:
     """Points on one curve."""
 
@@ -106,7 +106,7 @@ class Stretch:
     turn: float = 0.0  # of RISING, the recorded indentation at its beginning
 
 
-@dataclass(frozen=True)
+@frozen
 class Corner:
     """An upper turn."""
 
@@ -116,7 +116,7 @@ class Corner:
     rise: int = -1  # otherwise, the number of the RISING stretch that ends there
 
 
-@dataclass(frozen=True)
+@frozen
 class Division:
     """A test divided into stretches."""
 

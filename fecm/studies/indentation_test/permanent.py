@@ -6,11 +6,10 @@ other cycles; the fit is by generalised least squares with the complete covarian
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics.contact_law import ACR_POWER, LOADING_POWER
 from fecm.studies.indentation_test.curves import Estimate
@@ -23,7 +22,7 @@ UNLIKELY = 0.01
 ROUNDING = 1e-9
 
 
-@dataclass(frozen=True)
+@frozen
 class Line:
     """Equation 3-8."""
 
@@ -96,7 +95,7 @@ def _scatter(chi: float, freedom: int) -> float:
     return (chi / freedom) ** 0.5 if freedom > 0 and chi2.sf(chi, freedom) < UNLIKELY else 1.0
 
 
-@dataclass(frozen=True)
+@frozen
 class Critical:
     """Equation 3-7."""
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.studies import StudyError
 from fecm.studies.tables import Table, read_table, same_name
@@ -29,7 +29,7 @@ FORCES = {
 IMPERIAL = {"in", "inch", "inches", "mil", "mils", "lbf", "lb", "lbs", "kip", "kips"}
 
 
-@dataclass(frozen=True)
+@frozen
 class Test:
     """An indentation test."""
 

@@ -7,15 +7,14 @@ c_F = (c_a / m) V_F / V_a (equation 4-4).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.studies import StudyError
 
 
-@dataclass(frozen=True)
+@frozen
 class Calibration:
     """Straight line through V_F against V_a, and the sensitivity, with standard errors."""
 

@@ -12,10 +12,11 @@ first and after the last sample.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.deck.units import KNOWN
 from fecm.studies import StudyError
@@ -30,7 +31,7 @@ CUT_OFF, SAMPLES = 2.0775, 10
 UNEQUAL = 0.05
 
 
-@dataclass(frozen=True)
+@frozen
 class Filter:
     """A filter of unit static gain.
 

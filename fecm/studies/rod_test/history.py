@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.deck.reader import HDF5
 from fecm.results.result import Result, load
@@ -18,7 +19,7 @@ from fecm.studies.tables import read_table, same_name
 TRANSDUCER = "transducer"
 
 
-@dataclass(frozen=True)
+@frozen
 class TimeHistory:
     """A quantity in time."""
 

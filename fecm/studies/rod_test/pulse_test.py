@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics.projectile import Rod
 from fecm.mechanics.rod_integrators import STEPS, WILSON, RodState
@@ -27,7 +27,7 @@ COUNTS = 0.01
 POINTS = ("struck_end", "middle", "far_end")
 
 
-@dataclass(frozen=True)
+@frozen
 class RodHistory:
     """History of a rod under a pulse."""
 

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.studies import StudyError
 from fecm.studies.tables import read_table
@@ -20,7 +20,7 @@ FORMS = {"gauss": ("F0", "TAU", "B"), "sine": ("F0", "B")}
 USAGE = "gauss:F0,TAU,B, sine:F0,B or a CSV file of time and force"
 
 
-@dataclass(frozen=True)
+@frozen
 class Pulse:
     """A force as a function of times of any shape, and the default duration of a test."""
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg.lapack import dgejsv
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.studies import StudyError
 from fecm.studies.waves.medium import BEYOND, Medium, best, gradients, in_normal_axes, shares
@@ -17,7 +17,7 @@ from fecm.studies.waves.medium import BEYOND, Medium, best, gradients, in_normal
 MODES = ("flexural_1", "flexural_2", "flexural_3", "extension", "in_plane_shear")
 
 
-@dataclass(frozen=True)
+@frozen
 class Dispersion:
     """Harmonic waves in one direction.
 

@@ -9,12 +9,11 @@ angle, computed by perturbation of the eigenvalue problem: with the slowness p =
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.studies.waves.medium import Medium, trigonometry
 from fecm.studies.waves.sheets import SURE, assigned, match_modes, sheets, track_branch
@@ -26,7 +25,7 @@ FRONTS = ("extension", "in_plane_shear", "bending", "twisting", "transverse_shea
 STEPS = 10
 
 
-@dataclass(frozen=True)
+@frozen
 class Fronts:
     """The five fronts for a series of normals, in the order of :data:`FRONTS`.
 
@@ -85,7 +84,7 @@ class Fronts:
         return radius + time * (self.velocity + self.curvature)
 
 
-@dataclass(frozen=True)
+@frozen
 class Cusp:
     """A cusp of a front.
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics.laminate import Laminate
 from fecm.studies import StudyError
@@ -15,7 +15,7 @@ from fecm.studies import StudyError
 BEYOND = "the laminate's constants are too large or too far apart to compute with"
 
 
-@dataclass(frozen=True)
+@frozen
 class Medium:
     """An infinite laminate that carries waves.
 

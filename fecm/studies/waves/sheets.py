@@ -7,12 +7,12 @@ normal they form sheets; sheets that cross are identified by their modes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.studies import StudyError
 from fecm.studies.waves.medium import BEYOND, Medium, best, gradients, in_normal_axes, shares
@@ -26,7 +26,7 @@ SURE, FINEST = 0.8, 1e-9
 _ORDERS = np.array(list(permutations(range(5))))
 
 
-@dataclass(frozen=True)
+@frozen
 class Sheets:
     """Solutions for a series of normals, in descending order of velocity."""
 
