@@ -124,7 +124,7 @@ def test_what_only_the_time_step_had_caught_is_named_where_the_deck_lets_fecm_ch
 
 
 @pytest.mark.parametrize(
-    ("k", "stable"), [("      6E6", True), ("      1E7", False)], ids=["6e6", "1e7"]
+    ("k", "stable"), [("      6E6", True), ("    1.2E7", False)], ids=["6e6", "1.2e7"]
 )
 def test_the_stable_step_with_the_contact_tells_which_run_diverges(k: str, stable: bool) -> None:
     text = BASE.replace("  100000.0     0.017", f" {k}     0.017")

@@ -221,9 +221,11 @@ class PlateModel:
         full.reshape(-1)[self._free_indices] = displacement
         return full
 
-    def strain_field(self, points: Quadrature) -> StrainField:
+    def strain_field(
+        self, points: Quadrature, kind: type[StrainField] = StrainField
+    ) -> StrainField:
         """Strains at points of every element."""
-        return StrainField(
+        return kind(
             self.mesh.elements,
             self.mesh.coordinates,
             points,

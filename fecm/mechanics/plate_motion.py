@@ -267,11 +267,15 @@ class PlateMotion:
 
     def _update_forces(self, state: PlateState) -> None:
         """Compute internal force and inner products from the displacement."""
-        if self._scaled_for != state.dt2:
-            np.multiply(self._inverse_mass, state.dt2, out=self._scale)
-            self._scaled_for = state.dt2
+        self._scale_for(state.dt2)
         sums = self.product.each(state.padded, partial(self._piece_sums, state))
         state.sums = sums[0] if len(sums) == 1 else Sums(*map(sum, zip(*sums, strict=True)))
+
+    def _scale_for(self, dt2: float) -> None:
+        """Set the factors of the internal force."""
+        if self._scaled_for != dt2:
+            np.multiply(self._inverse_mass, dt2, out=self._scale)
+            self._scaled_for = dt2
 
     def _piece_sums(self, state: PlateState, number: int, internal: Floats) -> Sums:
         """Scaled internal force and inner products of one piece, from K u."""
@@ -311,9 +315,10 @@ class PlateMotion:
         """
         dt_v = dt if velocity_dt is None else velocity_dt
         dt2, b = dt * dt_v, 0.5 * self.damping * dt_v
-        if state.dt2 != dt2 or self._scaled_for != dt2:
+        if state.dt2 != dt2:
             state.dt2 = dt2
             self._update_forces(state)
+        self._scale_for(dt2)
         if state.dt != dt:
             state.increment *= dt / state.dt if state.dt else 1.0
             state.dt = dt

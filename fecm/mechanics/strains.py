@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
 from fecm.mechanics.assumed_shear import TiedStrains
-from fecm.mechanics.element_groups import ElementBlock, Ints, element_blocks
+from fecm.mechanics.element_groups import Ints, element_blocks
 from fecm.mechanics.elements.quadrature import Quadrature
 from fecm.mechanics.interpolation import NDOF, inverse_jacobian, local_shape_functions
 from fecm.mechanics.laminate import Laminate
@@ -61,30 +62,38 @@ class StrainField:
         assumes_shear: bool = False,
     ) -> None:
         self.shape = (len(elements), len(rule.xi))
-        self._families: list[tuple[ElementBlock, Floats]] = []
-        self._blocks: list[
-            tuple[NDArray[np.intp], NDArray[np.intp], Floats, Floats, TiedStrains | None]
-        ] = []
-        for family in element_blocks(elements, coordinates):
-            values, local = local_shape_functions(family, rule)
-            self._families.append((family, values))
+        self.rule, self.assumes_shear = rule, assumes_shear
+        self.transposed_jacobian = transposed_jacobian
+        self.families = element_blocks(elements, coordinates)
+
+    @cached_property
+    def _blocks(
+        self,
+    ) -> list[tuple[NDArray[np.intp], NDArray[np.intp], Floats, Floats, TiedStrains | None]]:
+        blocks = []
+        for family in self.families:
+            values, local = local_shape_functions(family, self.rule)
             # Rows: d/dxi, d/deta and value at every point, for one matrix product.
             table = np.concatenate([local[:, 0], local[:, 1], values])
-            inverse = inverse_jacobian(family, local, transposed_jacobian=transposed_jacobian)[0]
+            inverse, _ = inverse_jacobian(
+                family, local, transposed_jacobian=self.transposed_jacobian
+            )
             for start in range(0, len(family.rows), STRAIN_BLOCK):
                 cut = slice(start, start + STRAIN_BLOCK)
                 places = family.nodes[cut].T[:, None] * NDOF + np.array([2, 3, 4])[:, None]
                 metric = inverse[cut].transpose(2, 3, 1, 0)[:, :, :, None].copy()
                 tied = None
-                if assumes_shear:
+                if self.assumes_shear:
                     block = family.take(np.arange(len(family.rows))[cut])
-                    tied = TiedStrains(block, rule)
-                self._blocks.append((family.rows[cut], places, table, metric, tied))
+                    tied = TiedStrains(block, self.rule)
+                blocks.append((family.rows[cut], places, table, metric, tied))
+        return blocks
 
     def places(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """Coordinates x and y of the points, (numel, npt)."""
         x, y = np.empty((2, *self.shape))
-        for family, values in self._families:
+        for family in self.families:
+            values, _ = local_shape_functions(family, self.rule)
             place = np.einsum("eni,pn->iep", coordinates[family.nodes], values)
             x[family.rows], y[family.rows] = place
         return x, y

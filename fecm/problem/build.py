@@ -32,6 +32,7 @@ from fecm.mechanics.failure_envelope import FailureMonitor
 from fecm.mechanics.gages import GageArray, gages
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.impact_steps import ImpactSteps, supports
+from fecm.mechanics.kernels.strains import CompiledStrains
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.patch import RADIUS_PER_THICKNESS, patch_weights
@@ -48,7 +49,7 @@ from fecm.mechanics.projectile import (
     report_rod,
 )
 from fecm.mechanics.rod_integrators import STEPS
-from fecm.mechanics.stiffness_product import CSR, Workers, available
+from fecm.mechanics.stiffness_product import CSR, KERNELS, Workers, available
 from fecm.mechanics.strains import StrainField
 from fecm.mechanics.symmetry import half_turn_images, restrain_resting_dofs, symmetry_reduction
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
@@ -406,6 +407,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         )
         law = chosen.law or build_law(deck, slips)
         impact = ImpactSystem(motion, rod, law, conditions, STEPS[method.integrator])
+    kind = CompiledStrains if motion.solver == KERNELS else StrainField
     stress_points = plate.strain_field(problem.rules[2])
     plies, failure = build_plies(problem, plate), build_failure(problem, plate)
     places = stress_points.places(mesh.coordinates) if plies or failure else None
@@ -421,7 +423,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         impact=impact,
         steps=steps,
         station=station,
-        strains=plate.strain_field(plate.rules.strains),
+        strains=plate.strain_field(plate.rules.strains, kind),
         stress_points=stress_points,
         gages=read,
         patch=problem.patch,

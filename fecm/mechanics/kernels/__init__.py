@@ -28,7 +28,7 @@ class Group(Structure):
 
     _fields_ = _fields(
         "int: kind nodes pairs; floats: matrix; int: bending shear tying; floats: rotations"
-        " rotations_t deflection deflection_t in_plane_t tied tied_t"
+        " deflection rotations_t deflection_t in_plane_t tied tied_t"
     )
 
 
@@ -53,16 +53,19 @@ class Plate(Structure):
     """A plate and its state."""
 
     _fields_ = _fields(
-        "int: nd nodes own chunks followers; chunks: chunk; ints: leader; floats: turned stiffness"
-        " shear mass scale u d s shared; float: damping",
+        "int: nd nodes own chunks followers most; chunks: chunk; ints: leader; floats: turned"
+        " stiffness shear; ints: kind; floats: mass scale factor u d s shared; float: damping",
         chunks=POINTER(Chunk),
     )
 
 
-class Sums(Structure):
-    """Inner products d M d, d K u, u K u, (K u) s."""
+class Strains(Structure):
+    """Strains of elements with the same nodes present."""
 
-    _fields_ = _fields("float: inertia power strain force")
+    _fields_ = _fields(
+        "int: elements nodes points width; longs: row node shape; floats: table metric",
+        longs=Longs,
+    )
 
 
 class Impact(Structure):

@@ -26,33 +26,41 @@
 #define LANES 8
 #define PASSES 5 /* of the contact iteration */
 #define TOLERANCE 1.0e-6
+#define MOST_THREADS 64
 
 typedef double half __attribute__((vector_size(32), aligned(8), may_alias));
 typedef struct {
     half a, b;
 } lanes; /* a value of each of eight elements */
+#define ALIGNED __attribute__((aligned(64)))
+#define HALF(value) (*((half *)&(value) + side))
 
-enum { SHARED, FREE }; /* one matrix for all elements, or none */
+/* One matrix for all elements, or one for even and one for odd motions; or none: sums over points of
+ * quadrature, factorized or by tables. */
+enum { ONE, TWO, FACTORIZED, POINTS };
 
 /* Elements with the same nodes present, and either one matrix or none. */
 typedef struct {
     int64_t kind, nodes;
-    /* SHARED: node i < `pairs` is the image of node i + `pairs` under half a turn, and the even and
-     * the odd parts have matrices of their own; without that symmetry `pairs` is 0. */
-    int64_t pairs;
-    const double *matrix;          /* SHARED: (n, n), or (even, even) and (odd, odd) */
-    int64_t bending, shear, tying; /* FREE: points; `tying` of each covariant strain, or 0 */
-    const double *rotations, *rotations_t; /* FREE: (2 bending + values, nodes), transposed */
-    const double *deflection, *deflection_t; /* FREE: (slopes, nodes), transposed */
-    const double *in_plane_t;                /* FREE: (nodes, 2 bending) */
-    const double *tied, *tied_t;             /* FREE: (2, shear, tying), (2, tying, shear) */
+    int64_t pairs;        /* TWO: node i < `pairs` is the image of i + `pairs` under half a turn */
+    const double *matrix; /* ONE: (n, n); TWO: (even, even) and (odd, odd) */
+    /* POINTS: number of points; `tying` of each covariant strain, or 0.  FACTORIZED: in a direction. */
+    int64_t bending, shear, tying;
+    /* POINTS: (2 bending + values, nodes), (slopes, nodes).  FACTORIZED: points in a direction. */
+    const double *rotations, *deflection;
+    const double *rotations_t, *deflection_t; /* POINTS: transposed */
+    const double *in_plane_t;                 /* POINTS: (nodes, 2 bending) */
+    const double *tied, *tied_t;              /* POINTS: (2, shear, tying), (2, tying, shear) */
 } Group;
 
 /* Eight elements. */
 typedef struct {
     const Group *group;
     const int32_t *from, *to; /* (nodes, 8): nodes of the plate, and of the chunk's forces */
-    const double *data;       /* FREE: (points, 5, 8) and (2 tying, 2, 8) */
+    /* Inverse Jacobian.  POINTS: with its determinant times the weight, (points, 5, 8), and slopes of
+     * the mapping (2 tying, 2, 8).  FACTORIZED: times the root of that, (bending, 4, 8), followed by
+     * the root, (shear, 5, 8). */
+    const double *data;
     int64_t done;             /* nodes of the chunk that no later block touches */
 } Block;
 
@@ -63,16 +71,19 @@ typedef struct {
     int64_t first, nodes, shared; /* first own node of the plate, own nodes, nodes shared */
     const int32_t *shares;        /* (shared,): shared nodes of the plate */
     const double *signs;          /* (shared, nd) */
-    double *force;                /* (nodes + shared + 2, nd) */
+    double *force;                /* (shared, nd) */
 } Chunk;
 
 typedef struct {
     int64_t nd, nodes, own, chunks, followers; /* entries of a node; nodes, those of one chunk */
+    int64_t most;                              /* nodes of the largest chunk, and one more */
     const Chunk *chunk;
     const int32_t *leader;  /* (followers,) */
     const double *turned;   /* (nd,): sign of a follower's dof */
     const double *stiffness, *shear; /* (6, 6) of strains and negative curvatures; (2, 2) */
-    const double *mass, *scale;      /* (nodes, nd): M, and dt^2 M^-1 */
+    const int32_t *kind;             /* (nodes,): row of the next two */
+    const double *mass, *scale;      /* (kinds, nd): M, and dt^2 M^-1 */
+    const double *factor;            /* (nodes, 2): of these two; or NULL, for 1 */
     double *u, *d, *s; /* (nodes, nd): displacement, increment, scaled internal force */
     double *shared;    /* (nodes - own, nd) */
     double damping;    /* a dt/2 */
@@ -111,6 +122,14 @@ typedef struct {
     char *loaded;          /* (blocks,): whether any force in a block is not 0 */
 } Response;
 
+/* Strains of elements with the same nodes present; `width` is that of `points` in fours. */
+typedef struct {
+    int64_t elements, nodes, points, width;
+    const int64_t *row, *node, *shape; /* (elements,), (elements, nodes), (elements,): row of `metric` */
+    const double *table;  /* (nodes, 3, width): slopes in xi and eta, values */
+    const double *metric; /* (shapes, 4, width): inverse Jacobian */
+} Strains;
+
 #define TARGET static
 #include "impact.h"
 #undef TARGET
@@ -142,7 +161,8 @@ typedef struct {
     const Plate *plate;
     Impact *impact;
     int64_t steps, taken, threads;
-    half *sums; /* (chunks, 4) */
+    half *sums;     /* (chunks, 4) */
+    double *forces; /* (threads, most, nd): of the chunk in work, zero between chunks */
     Sums result;
     int stop;
     atomic_int arrived, round, ready;
@@ -252,7 +272,8 @@ static void take_steps(Job *job, int64_t thread) {
         if (!thread && job->impact) begin_step(job, step);
         meet(job);
         if (job->stop) return;
-        for (int64_t c = first; c < end; c++) CHOSEN(run_chunk)(p, c, next, job->sums + 4 * c);
+        double *forces = job->forces + thread * p->nd * p->most;
+        for (int64_t c = first; c < end; c++) CHOSEN(run_chunk)(p, c, next, forces, job->sums + 4 * c);
         meet(job);
         if (thread) continue;
         job->result = CHOSEN(finish)(p, next, job->sums);
@@ -265,8 +286,6 @@ static void take_steps(Job *job, int64_t thread) {
 }
 
 #ifndef _WIN32
-enum { MOST_THREADS = 64 };
-
 typedef struct {
     Job *job;
     int64_t thread;
@@ -280,7 +299,7 @@ static void *thread_main(void *given) {
 }
 #endif
 
-/* Carry out a job on some threads; on fewer if the system has no more. */
+/* Carry out a job on its threads, on fewer if the system has no more. */
 static void carry_out(Job *job) {
 #ifdef _WIN32
     job->threads = 1;
@@ -288,8 +307,7 @@ static void carry_out(Job *job) {
 #else
     pthread_t others[MOST_THREADS];
     Share shares[MOST_THREADS];
-    int64_t wanted = job->threads < MOST_THREADS ? job->threads : MOST_THREADS;
-    if (wanted > job->plate->chunks) wanted = job->plate->chunks;
+    const int64_t wanted = job->threads;
     for (job->threads = 1; job->threads < wanted; job->threads++) {
         const int64_t i = job->threads;
         shares[i] = (Share){job, i};
@@ -301,36 +319,41 @@ static void carry_out(Job *job) {
 #endif
 }
 
+/* Carry out a job; false if there is no memory. */
+static int with_memory(Job *job) {
+    const Plate *p = job->plate;
+    if (job->threads > MOST_THREADS) job->threads = MOST_THREADS;
+    if (job->threads > p->chunks) job->threads = p->chunks;
+    job->sums = malloc(sizeof(half) * 4 * p->chunks);
+    job->forces = calloc(job->threads * p->nd * p->most, sizeof(double));
+    const int found = job->sums && job->forces;
+    if (found) carry_out(job);
+    free(job->sums);
+    free(job->forces);
+    return found;
+}
+
 #ifdef _WIN32
 #define EXPORT __declspec(dllexport)
 #else
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-/* s = scale K u and its inner products. */
-EXPORT int fecm_internal_force(const Plate *plate, Sums *sums, int64_t threads) {
+/* s = scale K u. */
+EXPORT int fecm_internal_force(const Plate *plate, int64_t threads) {
     Job job = {.plate = plate, .steps = 1, .threads = threads};
-    job.sums = malloc(sizeof(half) * 4 * plate->chunks);
-    if (!job.sums) return 0;
     follow(plate);
-    carry_out(&job);
-    free(job.sums);
-    *sums = job.result;
-    return 1;
+    return with_memory(&job);
 }
 
 /* Take impact steps; returns their number, which is smaller if the motion is no longer finite. */
 EXPORT int64_t fecm_impact_steps(const Plate *plate, Impact *impact, int64_t steps, int64_t threads) {
     Job job = {.plate = plate, .impact = impact, .steps = steps, .threads = threads};
-    job.sums = malloc(sizeof(half) * 4 * plate->chunks);
-    if (!job.sums) return -1;
     for (int64_t i = 0; i < impact->loaded; i++)
         plate->s[impact->entry[i]] -= impact->contact.force * impact->mobility[i] * impact->dt2;
     displace(plate);
     follow(plate);
-    carry_out(&job);
-    free(job.sums);
-    return job.taken;
+    return with_memory(&job) ? job.taken : -1;
 }
 
 /* Fill in the responses of the tip, and tables of sines. */
@@ -397,11 +420,16 @@ EXPORT int fecm_sweep(const Sweep *x) {
     return 1;
 }
 
+/* Strains (5, fields, numel, points) of displacement fields (fields, numnp, 5). */
+EXPORT void fecm_strains(const Strains *family, int64_t fields, int64_t numnp, int64_t numel, const double *u, double *strains) {
+    CHOSEN(strains)(family, fields, numnp, numel, u, strains);
+}
+
 /* Sizes of the structures, which those in Python must have. */
 EXPORT void fecm_sizes(int64_t *sizes) {
     sizes[0] = sizeof(Group), sizes[1] = sizeof(Block), sizes[2] = sizeof(Chunk);
-    sizes[3] = sizeof(Plate), sizes[4] = sizeof(Impact), sizes[5] = COLUMNS;
-    sizes[6] = sizeof(Sweep), sizes[7] = GIVEN, sizes[8] = FOUND;
+    sizes[3] = sizeof(Plate), sizes[4] = sizeof(Impact), sizes[5] = sizeof(Strains), sizes[6] = sizeof(Sweep);
+    sizes[7] = COLUMNS, sizes[8] = GIVEN, sizes[9] = FOUND;
 }
 
 /* Checksum of the sources, given by the build. */

@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 from fecm._typing import Bools, Floats
 from fecm.mechanics import assumed_shear
 from fecm.mechanics.element_groups import ElementBlock, congruence, distinct
+from fecm.mechanics.elements.quadrature import Quadrature
 from fecm.mechanics.interpolation import (
     NDOF,
-    inverse_jacobian,
-    jacobian_determinants,
     local_shape_functions,
 )
-from fecm.mechanics.kernels import LIBRARY, Chunk, Doubles, Group, Integers, Plate, Sums
+from fecm.mechanics.kernels import LIBRARY, Chunk, Doubles, Group, Integers, Plate
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.stiffness_operator import R, StiffnessOperator, pieces
 from fecm.mechanics.symmetry import TURNED, SymmetryReduction, opposite_nodes
@@ -27,11 +26,14 @@ from fecm.mechanics.symmetry import TURNED, SymmetryReduction, opposite_nodes
 Indices = NDArray[np.intp]
 
 LANES = 8
-SHARED, FREE = 0, 1
+# The kinds of kernels.c.
+ONE, TWO, FACTORIZED, POINTS = range(4)
 # With fewer congruent elements a shared matrix fills too few lanes.
 WORTH_GROUPING = 8
-# Elements of a chunk, approximately, and the largest number of chunks.
-CHUNK, MOST_CHUNKS = 512, 16
+# Elements of a chunk, approximately: the forces on their nodes stay in the cache.
+CHUNK = 512
+# Relative difference below which masses of nodes count as equal.
+EQUAL = 1e-12
 # Largest coupling of even and odd motions of an element, relative to its largest stiffness.
 SYMMETRIC = 1e-14
 # The structure Block of kernels.c.
@@ -49,10 +51,20 @@ class _Elements:
         self.order = np.arange(nn)  # of the nodes, in all arrays
         self.arrays: dict[str, Floats] = {}
         self.numbers = {"kind": kind, "nodes": nn}
-        if kind == FREE:
-            self._tables()
-        else:
+        if kind == ONE:
             self._matrix(weights[0])
+            return
+        rules = plate.rules
+        shear = assumed_shear.quadrature(family) if rules.assumes_shear else rules.shear
+        self.rules = rules.bending, shear
+        self.points = [self._at_points(rule) for rule in self.rules]
+        if self._factorizes():
+            lines = [distinct(rule.xi) for rule in self.rules]
+            self.numbers |= {"kind": FACTORIZED, "bending": len(lines[0]), "shear": len(lines[1])}
+            self.arrays = {"rotations": lines[0], "deflection": lines[1]}
+            self.order = np.lexsort((family.shape.xi, family.shape.eta))
+        else:
+            self._tables(shear)
 
     def _matrix(self, weight: float) -> None:
         """Set the common matrix, or those of the even and odd motions."""
@@ -65,7 +77,8 @@ class _Elements:
             centre = np.flatnonzero(opposite == np.arange(nn))
             order = np.concatenate([first, opposite[first], centre])
             if (parts := self._halves(K[:, order][:, :, :, order], len(first))) is not None:
-                self.order, self.numbers["pairs"] = order, len(first)
+                self.order = order
+                self.numbers |= {"kind": TWO, "pairs": len(first)}
                 self.arrays["matrix"] = parts
                 return
         self.arrays["matrix"] = K.reshape(nn * len(columns), -1).copy()
@@ -91,13 +104,28 @@ class _Elements:
             return None
         return np.concatenate([turned[:n, :n].ravel(), turned[n:, n:].ravel()])
 
-    def _tables(self) -> None:
+    def _at_points(self, rule: Quadrature) -> Floats:
+        """Inverse Jacobian, and its determinant times the weight, (ne, npt, 5)."""
+        _, local = local_shape_functions(self.family, rule)
+        inverse, determinant = jacobians(self.family, local, self.plate.rules.transposed_jacobian)
+        jxw = determinant * rule.weights * self.weights[:, None]
+        return np.concatenate([inverse, jxw[:, :, None]], axis=2)
+
+    def _factorizes(self) -> bool:
+        """Whether sums over the points are products of sums along xi and eta."""
+        grid = self.family.shape.nodes == 9 and self.family.present.all()
+        return bool(
+            grid
+            and not self.plate.rules.assumes_shear
+            and all((values[:, :, 4] > 0.0).all() for values in self.points)
+        )
+
+    def _tables(self, shear: Quadrature) -> None:
         """Values and slopes of the shape functions at the points of quadrature."""
         family, rules = self.family, self.plate.rules
         nn = family.nodes.shape[1]
         _, local = local_shape_functions(family, rules.bending)
         slopes = local.transpose(1, 0, 2).reshape(-1, nn)
-        shear = assumed_shear.quadrature(family) if rules.assumes_shear else rules.shear
         if rules.assumes_shear:
             tied = [local_shape_functions(family, assumed_shear.tying_points(nn, axis))
                     for axis in (0, 1)]  # fmt: skip
@@ -110,7 +138,6 @@ class _Elements:
         else:
             values, local = local_shape_functions(family, shear)
             deflection = local.transpose(1, 0, 2).reshape(-1, nn)
-        self.rules = rules.bending, shear
         self.numbers |= {"bending": len(rules.bending.xi), "shear": len(shear.xi)}
         rotations = np.concatenate([slopes, values])
         self.arrays |= {
@@ -120,24 +147,34 @@ class _Elements:
 
     def data(self, members: Indices) -> Floats:
         """Jacobians at the points of the elements without a matrix, (blocks, numbers, 8)."""
-        family, rules = self.family.take(members), self.plate.rules
-        parts = []
-        for rule in self.rules:
-            _, local = local_shape_functions(family, rule)
-            inverse, _ = inverse_jacobian(
-                family, local, transposed_jacobian=rules.transposed_jacobian
-            )
-            jxw = jacobian_determinants(family, rule) * rule.weights * self.weights[members, None]
-            flat = inverse.reshape(*inverse.shape[:2], 4)
-            parts.append(np.concatenate([flat, jxw[:, :, None]], axis=2).reshape(len(members), -1))
-        if rules.assumes_shear:
-            nn = family.nodes.shape[1]
+        rules, parts = self.plate.rules, [values[members] for values in self.points]
+        if self.numbers["kind"] == FACTORIZED:
+            for part in parts:
+                part[:, :, 4] = np.sqrt(part[:, :, 4])
+                part[:, :, :4] *= 0.5 * part[:, :, 4:]
+            along = [np.lexsort((rule.eta, rule.xi)) for rule in self.rules]
+            parts = [parts[0][:, along[0], :4], parts[1][:, along[1]]]
+        elif rules.assumes_shear:
+            family = self.family.take(members)
             for axis in (0, 1):
-                _, local = local_shape_functions(family, assumed_shear.tying_points(nn, axis))
-                slope = np.einsum("tn,eni->eti", local[:, axis], family.coordinates)
-                parts.append(slope.reshape(len(members), -1))
-        values = np.concatenate(parts, axis=1)
+                points = assumed_shear.tying_points(family.nodes.shape[1], axis)
+                _, local = local_shape_functions(family, points)
+                parts.append(np.einsum("tn,eni->eti", local[:, axis], family.coordinates))
+        values = np.concatenate([part.reshape(len(members), -1) for part in parts], axis=1)
         return np.ascontiguousarray(values.reshape(-1, LANES, values.shape[1]).swapaxes(1, 2))
+
+
+def jacobians(family: ElementBlock, local: Floats, transposed: bool) -> tuple[Floats, Floats]:
+    """Inverse Jacobian (ne, npt, 4) and its determinant (ne, npt), in closed form.
+
+    See :func:`fecm.mechanics.interpolation.inverse_jacobian`.
+    """
+    # Rounded as there: coordinates are large beside an element.
+    J = np.einsum("pan,eni->epai", local, family.coordinates)
+    (a, b), (c, d) = J.transpose(2, 3, 0, 1)  # x and y by xi, x and y by eta
+    determinant = a * d - b * c
+    rows = (d, -c, -b, a) if transposed else (d, -b, -c, a)
+    return np.stack(rows, axis=2) / determinant[:, :, None], determinant
 
 
 class _Layout(NamedTuple):
@@ -187,13 +224,15 @@ class CompiledPlate:
         entries = 4 if len(columns) == 3 else NDOF
         self.shape = (nodes.total, entries)
         self._number_dofs(kept, nodes.number)
-        self.mass = np.zeros((nodes.total + 2, entries))
-        independent = kept.gather(kept.sign * plate.field(plate.mass, 0.0))
-        self.mass.ravel()[self.position] = independent
-        self.inverse_mass = np.zeros_like(self.mass)
-        np.divide(1.0, self.mass, out=self.inverse_mass, where=self.mass > 0.0)
-        self.scale, self.d, self.s = (np.zeros_like(self.mass) for _ in range(3))
-        self.u = np.zeros((nodes.total + len(nodes.followers) + 2, entries))
+        mass = np.zeros(self.shape)
+        mass.ravel()[self.position] = kept.gather(kept.sign * plate.field(plate.mass, 0.0))
+        kinds, rows, factor = _kinds(mass)
+        self.inverse_mass, self.scale = np.zeros((2, *rows.shape))
+        np.divide(1.0, rows, out=self.inverse_mass, where=rows > 0.0)
+        both = None if factor is None else np.stack([factor, 1.0 / factor], axis=1)
+        self.factor = None if both is None else self._floats(both)
+        self.d, self.s = np.zeros((2, *self.shape))
+        self.u = np.zeros((nodes.total + len(nodes.followers), entries))
         turned = np.zeros(entries)
         turned[: len(columns)] = TURNED[columns]
         cuts = self._chunks(layout, groups, touched, nodes, leader, turned)
@@ -202,10 +241,13 @@ class CompiledPlate:
         common = nodes.total - len(nodes.final)
         self.structure = Plate(
             entries, nodes.total, len(nodes.final), layout.chunks, len(nodes.followers),
+            max(cut.nodes + cut.shared for cut in cuts) + 1,
             cuts, self._ints(nodes.number[leader[nodes.followers]]), self._floats(turned),
-            self._floats(stiffness), self._floats(laminate.shear), floats(self.mass),
-            floats(self.scale), floats(self.u), floats(self.d), floats(self.s),
-            self._floats(np.zeros((common + 2, entries))), 0.0,
+            self._floats(stiffness), self._floats(laminate.shear), self._ints(kinds),
+            self._floats(rows), floats(self.scale),
+            self.factor,
+            floats(self.u), floats(self.d), floats(self.s),
+            self._floats(np.zeros((common, entries))), 0.0,
         )  # fmt: skip
 
     def _chunks(
@@ -243,7 +285,7 @@ class CompiledPlate:
             cuts[c] = Chunk(
                 starts[c + 1] - starts[c], None, int(firsts[c]), count, len(shares),
                 self._ints(nodes.number[leader[shares]]), self._floats(signs),
-                self._floats(np.zeros((count + len(shares) + 2, len(turned)))),
+                self._floats(np.zeros((len(shares), len(turned)))),
             )  # fmt: skip
         table = np.zeros(len(layout.group), dtype=BLOCK)
         self._held.append(table)
@@ -257,7 +299,7 @@ class CompiledPlate:
             table["group"][rows] = ctypes.addressof(made)
             table["source"][rows] = self._addresses(place[touched[number]].astype(np.int32))
             table["target"][rows] = self._addresses(targets[number])
-            if elements.numbers["kind"] == FREE:
+            if "matrix" not in elements.arrays:
                 data = elements.data(layout.member[rows].ravel())
                 table["data"][rows] = self._addresses(data)
         for c in range(layout.chunks):
@@ -291,15 +333,10 @@ class CompiledPlate:
         step = held.strides[0]
         return np.uint64(held.ctypes.data) + np.arange(len(held), dtype=np.uint64) * np.uint64(step)
 
-    def internal_force(self, threads: int = 1) -> Sums:
-        """Compute `s`, which is K u times `scale`, and inner products of the state."""
-        sums = Sums()
-        done = LIBRARY.fecm_internal_force(
-            ctypes.byref(self.structure), ctypes.byref(sums), ctypes.c_int64(threads)
-        )
-        if not done:
+    def internal_force(self, threads: int = 1) -> None:
+        """Compute `s`, which is K u times `scale`."""
+        if not LIBRARY.fecm_internal_force(ctypes.byref(self.structure), ctypes.c_int64(threads)):
             raise MemoryError
-        return sums
 
 
 class CompiledProduct(StiffnessOperator):
@@ -319,10 +356,9 @@ class CompiledProduct(StiffnessOperator):
     def scale(self, dt2: float | None) -> None:
         """Make the kernels scale K u by dt2 and the inverse mass; by 1 without dt2."""
         if self._scaled_for != dt2:
-            scale, position = self.plate.scale.ravel(), self.plate.position
-            scale[position] = (
-                1.0 if dt2 is None else dt2 * self.plate.inverse_mass.ravel()[position]
-            )
+            inverse = self.plate.inverse_mass
+            self.plate.scale[...] = inverse > 0.0 if dt2 is None else dt2 * inverse
+            self.plate.structure.factor = None if dt2 is None else self.plate.factor
             self._scaled_for = dt2
 
     def each(self, padded: Floats, use: Callable[[int, Floats], R]) -> list[R]:
@@ -362,7 +398,7 @@ def _layout(groups: list[_Elements]) -> _Layout:
     sizes = np.array([len(g.family.rows) for g in groups])
     group = np.repeat(np.arange(len(groups)), sizes)
     along = _morton(np.concatenate([g.family.coordinates.mean(axis=1) for g in groups]))
-    chunks = 1 if len(along) < 2 * CHUNK else min(MOST_CHUNKS, len(along) // CHUNK)
+    chunks = 1 if len(along) < 2 * CHUNK else len(along) // CHUNK
     chunk = np.empty(len(along), dtype=np.intp)
     chunk[along] = np.arange(len(along)) * chunks // len(along)
     # In each chunk the elements of a group follow one another.
@@ -414,21 +450,40 @@ def _leaders(kept: SymmetryReduction) -> Indices:
     return leader
 
 
+def _kinds(mass: Floats) -> tuple[Indices, Floats, Floats | None]:
+    """Rows of a table of masses, one for each node, and the factors of nodes if not 1.
+
+    The ratio of the masses of a node's dofs is that of the laminate, but for supports.
+    """
+    row, table = _distinct(mass)
+    if 2 * len(table) < len(mass):
+        return row, table, None
+    largest = mass.max(axis=1)
+    factor = np.where(largest > 0.0, largest, 1.0)
+    return *_distinct(mass / factor[:, None]), factor
+
+
+def _distinct(rows: Floats) -> tuple[Indices, Floats]:
+    """Index of each row, (n,), in a table of those that differ."""
+    scale = rows.max(axis=0, initial=0.0)
+    relative = rows / np.where(scale > 0.0, scale, 1.0)
+    mixed = relative @ np.sqrt(np.arange(2.0, 2.0 + rows.shape[1]))
+    _, first, index = np.unique(np.round(mixed / EQUAL), return_index=True, return_inverse=True)
+    if np.abs(relative[first[index]] - relative).max() > EQUAL:  # in spite of equal sums
+        return np.arange(len(rows)), rows
+    return index, rows[first]
+
+
 def _grouped(family: ElementBlock, weights: Floats) -> list[tuple[Indices, int]]:
     """Elements of a family with a common matrix, or without."""
     same = congruence(family)
-    key = 3 * same.group + weights.astype(int)
-    alone = []
-    found: list[tuple[Indices, int]] = []
-    for one in distinct(key[weights > 0.0]):
-        (chosen,) = np.nonzero(key == one)
-        if len(chosen) >= WORTH_GROUPING:
-            found.append((chosen, SHARED))
-        else:
-            alone.append(chosen)
-    if alone:
-        found.append((np.sort(np.concatenate(alone)), FREE))
-    return found
+    (stepped,) = np.nonzero(weights)
+    key = 3 * same.group[stepped] + weights[stepped].astype(int)
+    _, group, counts = np.unique(key, return_inverse=True, return_counts=True)
+    many = np.flatnonzero(counts >= WORTH_GROUPING)
+    found = [(stepped[group == one], ONE) for one in many.tolist()]
+    alone = stepped[counts[group] < WORTH_GROUPING]
+    return [*found, (alone, POINTS)] if len(alone) else found
 
 
 def _morton(places: Floats) -> Indices:
