@@ -362,3 +362,18 @@ def test_the_page_of_findings_has_exactly_the_codes_of_the_program() -> None:
     page = (ROOT / "docs" / "findings.md").read_text()
     listed = re.findall(r"^\| \[([EWN]\d{3})\]\{#", page, re.MULTILINE)
     assert sorted(listed) == sorted(set(re.findall(r'"([EWN]\d{3})"', written)))
+
+
+def test_a_run_says_how_many_fewer_steps_the_time_step_of_dt_0_takes(tmp_path: Path) -> None:
+    (tmp_path / "small.inp").write_text(small())
+    shown = call("run", "small.inp", "--overwrite", cwd=tmp_path).stdout
+    assert "time step" not in shown  # above half of the critical one
+    (tmp_path / "small.inp").write_text(small(PROGRAM.replace(".5E-6", ".5E-7")))
+    shown = call("run", "small.inp", "--overwrite", cwd=tmp_path).stdout
+    found = re.search(r"at most (\S+) of the .* DT 0 takes at least (\S+): (\S+) times", shown)
+    assert found is not None
+    share, taken, fewer = map(float, found.groups())
+    critical = load_deck(tmp_path / "small.inp").problems[0].critical_time_step
+    assert 0.9 * share < 0.5e-7 / critical < share
+    assert 0.8 * critical < taken < 0.9 * critical
+    assert fewer == pytest.approx(taken / 0.5e-7, rel=0.02)

@@ -35,6 +35,7 @@ from fecm.problem.memory import check_memory
 from fecm.problem.options import ENERGY_LIMIT, RunOptions
 from fecm.problem.problem import Problem
 from fecm.problem.slips import NAMES, active_slips
+from fecm.problem.summary import larger_steps
 from fecm.results import hdf5_writer
 from fecm.results.hdf5_reader import read
 from fecm.results.info import about_run
@@ -195,7 +196,7 @@ def _run_one(
         echo_json({**named, "units": declared_units(result.attributes), **about})
         return result
     echo(problem.deck.title or "(no title)")
-    for line in about["summary"]:
+    for line in (*about["summary"], *larger_steps(problem)):
         echo(f"  {line}")
     echo(f"  result            {path}")
     if printed is not None:
