@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -152,6 +153,11 @@ _CRITICAL: dict[type, Any] = {
 }
 
 
+@lru_cache(maxsize=8)
+def _modes(rod: Projectile) -> Modes:
+    return Modes.of(rod.stiffness(), rod.mass())
+
+
 def _by_kernels(response: Floats, dt: float, node_mass: float, hits: Hits) -> Impacts:
     """Compute impacts by the compiled kernels, and projectiles by their modes."""
     steps, cases, c = len(response), len(hits.speed), hits.law.constants
@@ -162,7 +168,7 @@ def _by_kernels(response: Floats, dt: float, node_mass: float, hits: Hits) -> Im
     starts = np.searchsorted(hits.kind, np.arange(len(hits.rods) + 1)).tolist()
     for rod, first, last in zip(hits.rods, starts[:-1], starts[1:], strict=True):
         step = WilsonStep(rod.stiffness(), rod.mass(), dt)
-        modes = Modes.of(rod.stiffness(), rod.mass())
+        modes = _modes(rod)
         (T, h), shape = modes.step(step), modes.shapes[0].copy()
         own = kernels.Sweep(
             last - first, cases, steps, len(shape), dt, step.theta, *step.weights,

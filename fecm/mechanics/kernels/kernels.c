@@ -108,7 +108,8 @@ enum { GIVEN = 6, FOUND = 9 }; /* rows; those found are in sweep.h */
 enum {
     CASES = 4,
     CHECKED = 64, /* steps from one check of the energies to the next */
-    FAR = 128     /* steps whose forces act on later blocks of steps by Fourier transforms */
+    FAR = 128,    /* steps whose forces act on later blocks of steps by Fourier transforms */
+    SPACED = 4 * FAR + 8 /* from one spectrum to the next; a power of two would share few sets of the cache */
 };
 typedef int64_t mask __attribute__((vector_size(32)));
 
@@ -116,10 +117,10 @@ typedef int64_t mask __attribute__((vector_size(32)));
 typedef struct {
     double *response, unit, gain; /* (steps, 2), the tip's over `unit`; its acceleration at once */
     double *power, *reach; /* (modes, 3, 3), (modes, CHECKED, 3): a block of steps, a force in each */
-    double *turn, *filter; /* (FAR, 2): cos and sin; (blocks - 1, 2 FAR, 2) */
-    half *work, *spectra;  /* (2 FAR, 2), (blocks - 1, 2 FAR, 2) */
+    double *turn, *filter; /* (FAR, 2): cos and sin; spectra (blocks, 2 FAR, 2) */
+    half *work, *spectra;  /* (2 FAR, 2); spectra (blocks, 2 FAR, 2) */
     half *force, *motion;  /* (FAR,), (modes, 3) */
-    char *loaded;          /* (blocks,): whether any force in a block is not 0 */
+    int64_t *used;         /* (blocks,): those whose forces are not all 0 */
 } Response;
 
 /* Strains of elements with the same nodes present; `width` is that of `points` in fours. */
@@ -398,9 +399,9 @@ static void respond(const Sweep *x, Response *r) {
 /* Compute impacts; returns 0 without memory for it. */
 EXPORT int fecm_sweep(const Sweep *x) {
     const int64_t blocks = (x->steps + FAR - 1) / FAR, n = x->modes;
-    const int64_t numbers[] = {2 * x->steps, 9 * n, 3 * CHECKED * n, 2 * FAR, 4 * FAR * blocks};
-    const int64_t halves[] = {4 * FAR, 4 * FAR * blocks, FAR, 3 * n};
-    int64_t size = blocks;
+    const int64_t numbers[] = {2 * x->steps, 9 * n, 3 * CHECKED * n, 2 * FAR, SPACED * blocks};
+    const int64_t halves[] = {4 * FAR, SPACED * blocks, FAR, 3 * n};
+    int64_t size = sizeof(int64_t) * blocks;
     for (int i = 0; i < 5; i++) size += sizeof(double) * numbers[i];
     for (int i = 0; i < 4; i++) size += sizeof(half) * halves[i];
     half *memory = malloc(size);
@@ -412,7 +413,7 @@ EXPORT int fecm_sweep(const Sweep *x) {
     for (int i = 0; i < 4; at += halves[i++]) *of_halves[i] = at;
     double *next = (double *)at;
     for (int i = 0; i < 5; next += numbers[i++]) *of_numbers[i] = next;
-    r.loaded = (char *)next;
+    r.used = (int64_t *)next;
     respond(x, &r);
     CHOSEN(filters)(x, &r);
     for (int64_t first = 0; first < x->cases; first += CASES) CHOSEN(run_cases)(x, &r, first);

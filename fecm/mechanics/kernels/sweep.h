@@ -45,34 +45,62 @@ TARGET void NAME(filters)(const Sweep *x, const Response *r) {
             }
         NAME(transform)(z, r->turn);
         for (int64_t lane = 0; lane < CASES && first + lane < count; lane++)
-            for (int64_t i = 0; i < 4 * FAR; i++) r->filter[(first + lane) * 4 * FAR + i] = z[i][lane];
+            for (int64_t i = 0; i < 4 * FAR; i++) r->filter[(first + lane) * SPACED + i] = z[i][lane];
     }
 }
 
-/* Sums over the forces of complete blocks, (FAR, 2), in `work`; `fresh` if those of the last are not all 0. */
-INLINE void NAME(far_sums)(const Response *r, int64_t block, int fresh) {
+/* sum += g f, and at the opposite frequency opposite += h f*; f is the spectrum of real numbers. */
+INLINE void NAME(add_product)(const double *g, const double *h, const half *f, half *sum, half *opposite) {
+    const half re = f[0], im = f[1];
+    sum[0] += g[0] * re, sum[1] += g[1] * re, opposite[0] += h[0] * re, opposite[1] += h[1] * re;
+    sum[0] -= g[1] * im, sum[1] += g[0] * im, opposite[0] += h[1] * im, opposite[1] -= h[0] * im;
+}
+
+/* Sums over the forces of earlier blocks, (FAR, 2), in `work`; `used` of them have forces other than 0. */
+INLINE void NAME(far_sums)(const Response *r, int64_t block, int64_t used) {
     half *z = r->work;
-    r->loaded[block - 1] = fresh;
-    if (fresh) {
-        half *spectrum = r->spectra + (block - 1) * 4 * FAR;
-        for (int i = 0; i < FAR; i++) spectrum[2 * i] = r->force[i], spectrum[2 * i + 1] = (half){0};
-        memset(spectrum + 2 * FAR, 0, sizeof(half) * 2 * FAR);
-        NAME(transform)(spectrum, r->turn);
+    if (used && r->used[used - 1] == block - 1) {
+        half *spectrum = r->spectra + (block - 1) * SPACED;
+        memset(z, 0, sizeof(half) * 4 * FAR);
+        for (int i = 0; i < FAR; i++) z[2 * i] = r->force[i];
+        NAME(transform)(z, r->turn);
+        /* Places i and 3 n - 1 - i, n the largest power of two in i, have opposite frequencies. */
+        memcpy(spectrum, z, sizeof(half) * 4);
+        for (int n = 2; n < 2 * FAR; n *= 2) memcpy(spectrum + 2 * n, z + 2 * n, sizeof(half) * n);
     }
-    for (int first = 0; first < 4 * FAR; first += 8) {
-        half sum[8] = {{0}};
-        for (int64_t past = 0; past < block; past++) {
-            if (!r->loaded[past]) continue;
-            const double *g = r->filter + (block - 1 - past) * 4 * FAR + first;
-            const half *f = r->spectra + past * 4 * FAR + first;
-            for (int i = 0; i < 8; i += 2) {
-                sum[i] += g[i] * f[i] - g[i + 1] * f[i + 1];
-                sum[i + 1] += g[i] * f[i + 1] + g[i + 1] * f[i];
-            }
+    for (int place = 0; place < 2; place++) { /* their own opposites */
+        half sum[2] = {{0}}, opposite[2] = {{0}};
+        for (int64_t k = 0; k < used; k++) {
+            const double *g = r->filter + (block - 1 - r->used[k]) * SPACED + 2 * place;
+            NAME(add_product)(g, g, r->spectra + r->used[k] * SPACED + 2 * place, sum, opposite);
         }
-        memcpy(z + first, sum, sizeof sum);
+        z[2 * place] = sum[0], z[2 * place + 1] = sum[1];
     }
+    for (int n = 2; n < 2 * FAR; n *= 2)
+        for (int first = n, last = 2 * n - 1; first < last; first++, last--) {
+            half sum[2] = {{0}}, opposite[2] = {{0}};
+            for (int64_t k = 0; k < used; k++) {
+                const double *g = r->filter + (block - 1 - r->used[k]) * SPACED;
+                const half *f = r->spectra + r->used[k] * SPACED;
+                NAME(add_product)(g + 2 * first, g + 2 * last, f + 2 * first, sum, opposite);
+            }
+            z[2 * first] = sum[0], z[2 * first + 1] = sum[1];
+            z[2 * last] = opposite[0], z[2 * last + 1] = opposite[1];
+        }
     NAME(restore)(z, r->turn);
+}
+
+/* Sums over the forces of this block before an even row, for it and for the next one. */
+INLINE void NAME(near_sums)(const Response *r, int row, half near[2][2]) {
+    const double *g = r->response + 2 * row;
+    half sum[2][4]; /* of even and odd forces */
+    for (int i = 0; i < 8; i++) sum[i / 4][i % 4] = (half){0};
+    for (int past = 0; past < row; past += 2)
+        for (int odd = 0; odd < 2; odd++, g -= 2) {
+            const half f = r->force[past + odd];
+            sum[odd][0] += g[-2] * f, sum[odd][1] += g[-1] * f, sum[odd][2] += g[0] * f, sum[odd][3] += g[1] * f;
+        }
+    for (int i = 0; i < 4; i++) near[i / 2][i % 2] = sum[0][i] + sum[1][i];
 }
 
 /* Cases whose indentation may leave the branch. */
@@ -117,16 +145,14 @@ INLINE void NAME(move_modes)(const Sweep *x, const Response *r, const half *appl
             continue;
         }
         const double *P = r->power + 9 * i, *g = r->reach + 3 * CHECKED * i;
-        half q = {0}, v = {0}, a = {0}, q1 = {0}, v1 = {0}, a1 = {0};
-        for (int step = 0; step < CHECKED; step += 2, g += 6) {
-            const half f = applied[step], f1 = applied[step + 1];
-            q += g[0] * f, v += g[1] * f, a += g[2] * f;
-            q1 += g[3] * f1, v1 += g[4] * f1, a1 += g[5] * f1;
-        }
-        q += q1 + P[0] * y[0] + P[1] * y[1] + P[2] * y[2];
-        v += v1 + P[3] * y[0] + P[4] * y[1] + P[5] * y[2];
-        a += a1 + P[6] * y[0] + P[7] * y[1] + P[8] * y[2];
-        y[0] = q, y[1] = v, y[2] = a;
+        half sum[4][3] = {{{0}}};
+        for (int step = 0; step < CHECKED; step += 4, g += 12)
+            for (int part = 0; part < 4; part++)
+                for (int row = 0; row < 3; row++) sum[part][row] += g[3 * part + row] * applied[step + part];
+        const half q = y[0], v = y[1], a = y[2];
+        for (int row = 0; row < 3; row++)
+            y[row] = ((sum[0][row] + sum[1][row]) + (sum[2][row] + sum[3][row])) +
+                     (P[3 * row] * q + P[3 * row + 1] * v + P[3 * row + 2] * a);
     }
 }
 
@@ -146,32 +172,24 @@ TARGET void NAME(run_cases)(const Sweep *x, const Response *r, int64_t first) {
     half m[8] = {none, given[0], none, none + 1.0, none + 1.5, none, none, none};
     half tip = none, velocity = -given[4], acceleration = none, indentation = none, force = none, w = none;
     half deepest = none, highest = none, sharpest = none, lost = none, unconverged = none;
-    half plate_work = none, contact_work = none, dw = none, applied[CHECKED];
+    half plate_work = none, contact_work = none, dw = none, applied[CHECKED], near[2][2] = {{none}};
     for (int64_t i = 0; i < 3 * x->modes; i++) r->motion[i] = none;
     r->motion[1] = velocity / x->tip_shape[0]; /* the rigid motion */
     const half initial = 0.5 * scale * r->motion[1] * r->motion[1];
-    int fresh = 0; /* whether forces of the last block are not all 0 */
+    int64_t used = 0;
+    int fresh = 0; /* whether forces of this block are not all 0 */
     for (int64_t step = 0; step < x->steps; step++) {
         const int row = step % FAR;
         if (!row) {
-            if (step) NAME(far_sums)(r, step / FAR, fresh);
-            else memset(r->work, 0, sizeof(half) * 2 * FAR);
+            if (fresh) r->used[used++] = step / FAR - 1;
+            NAME(far_sums)(r, step / FAR, used);
             fresh = 0;
         }
-        half sum[2][4] = {{none}};
-        if (fresh) {
-            const double *g = r->response + 2 * (row - 1);
-            int past = 0;
-            for (; past + 4 <= row; past += 4, g -= 8)
-                for (int i = 0; i < 4; i++) {
-                    sum[0][i] += g[-2 * i] * r->force[past + i];
-                    sum[1][i] += g[1 - 2 * i] * r->force[past + i];
-                }
-            for (; past < row; past++, g -= 2)
-                sum[0][0] += g[0] * r->force[past], sum[1][0] += g[1] * r->force[past];
-        }
-        const half moved = r->work[2 * row] + ((sum[0][0] + sum[0][1]) + (sum[0][2] + sum[0][3]));
-        const half pushed = r->work[2 * row + 1] + ((sum[1][0] + sum[1][1]) + (sum[1][2] + sum[1][3]));
+        if (row & 1)
+            for (int part = 0; part < 2; part++) near[0][part] = near[1][part] + r->response[part] * r->force[row - 1];
+        else
+            NAME(near_sums)(r, fresh ? row : 0, near);
+        const half moved = r->work[2 * row] + near[0][0], pushed = r->work[2 * row + 1] + near[0][1];
         const half base = pushed * r->unit / scale;
         /* The contact iteration; see couple_step. */
         const half drift = tip + x->dt * velocity + x->weight_before * acceleration;
