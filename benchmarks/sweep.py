@@ -6,7 +6,8 @@ The report's plate over 800 µs (4000 steps) is hit at 40 velocities with 25 con
 ``fecm sweep`` in a process of its own, from its start to its end, and the same with ``--history``.
 Every 50th case is run in full by ``fecm.run``; what is compared is the contact force of every step,
 over the peak force.  The plain loop is that of run.py, once, times 1000.
-`--many` also runs 10^5 cases; the processor time of a case is compared with that of a full run.
+`--many` also runs 10^5 cases, and 100 layups at 100 velocities; their processor times are compared
+with those of a full run by NumPy and of a sweep by NumPy, measured in turns.
 `--write` keeps the figures in benchmarks/results, under the machine's name.
 """
 
@@ -19,14 +20,18 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from figures import keep
 from run import HERE, ROUNDS, checked, plain, report
 
 import fecm
-from fecm.sweeps.cases import Case
+from fecm.mechanics import kernels
+from fecm.sweeps.batch import _prepared
+from fecm.sweeps.cases import Case, parse_vary
 from fecm.sweeps.vary import apply_case
 
 DECK = HERE.parent / "decks" / "impact-115.inp"
@@ -34,6 +39,8 @@ VARY = ("--vary", "velocity=50:300:40", "--vary", "k=1e6:3e6:25")
 CASES, STEPS, EVERY = 1000, 4000, 50
 MANY = ("--vary", "velocity=50:300:400", "--vary", "k=1e6:3e6:250")
 MANY_CASES = 100_000
+LAYUPS = ",".join(f"[{angle}/{angle + 45}]5s" for angle in range(100))
+LAYERS = ("--vary", f"layup={LAYUPS}", "--vary", "velocity=50:300:100")
 
 
 def process(output: Path, *options: str, vary: tuple[str, ...] = VARY) -> float:
@@ -93,24 +100,57 @@ def measure() -> dict[str, float | int]:
     }
 
 
+def processor(path: Path, vary: tuple[str, ...]) -> float:
+    """Processor seconds of a sweep as a process."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    process(path, vary=vary)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def here(compute: Callable[[], object]) -> float:
+    """Processor seconds of a call."""
+    begin = time.process_time()
+    compute()
+    return time.process_time() - begin
+
+
+def by_numpy() -> None:
+    """Run a thousand cases without the kernels."""
+    library, kernels.LIBRARY = kernels.LIBRARY, None
+    try:
+        _prepared.cache_clear()
+        fecm.sweep(report(), vary_of(VARY))
+    finally:
+        kernels.LIBRARY = library
+
+
+def vary_of(options: tuple[str, ...]) -> dict[str, list[Any]]:
+    """Values by name of the options --vary."""
+    return dict(parse_vary(text) for text in options[1::2])
+
+
 def throughput() -> dict[str, float | int]:
-    """Processor time and memory of many cases, beside those of a full run."""
+    """Processor time and memory of many cases, beside those of NumPy."""
+    runs: list[float] = []
     with tempfile.TemporaryDirectory() as folder:
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        process(Path(folder) / "sweep.h5", vary=MANY)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    alone = []
-    for _ in range(ROUNDS):
-        begin = time.process_time()
-        full({"velocity": 115.0})
-        alone.append(time.process_time() - begin)
+        path = Path(folder) / "sweep.h5"
+        runs += [here(lambda: fecm.run(report(), solver="numpy")) for _ in range(ROUNDS)]
+        many = processor(path, MANY)
+        peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+        runs += [here(lambda: fecm.run(report(), solver="numpy")) for _ in range(ROUNDS)]
+        layers = processor(path, LAYERS)
+        runs += [here(lambda: fecm.run(report(), solver="numpy")) for _ in range(ROUNDS)]
+    alone = statistics.median(runs)
     return {
         "many_cases": MANY_CASES,
-        "many_cases_a_cpu_second": round(MANY_CASES / seconds),
-        "many_peak_memory_mb": round(after.ru_maxrss / 1024, 1),
-        "full_run_cpu_seconds": round(statistics.median(alone), 3),
-        "cases_for_a_full_run": round(statistics.median(alone) * MANY_CASES / seconds),
+        "many_cases_a_cpu_second": round(MANY_CASES / many),
+        "many_peak_memory_mb": round(peak, 1),
+        "layups_cpu_seconds": round(layers, 2),
+        "numpy_run_cpu_seconds": round(alone, 3),
+        "cases_for_a_numpy_run": round(alone * MANY_CASES / many),
+        "numpy_runs_for_layups": round(layers / alone, 1),
+        "numpy_cases_a_cpu_second": round(CASES / here(by_numpy)),
     }
 
 
