@@ -46,6 +46,8 @@ def main() -> NoReturn:
             f"the process may have {space / 1e6:.0f} MB of address space (ulimit -v), and "
             f"{LEAST_SPACE / 1e6:.0f} MB are needed"
         )
+    # Matrix products are small; the threads of OpenBLAS would only wait for work, and busily.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     gc.set_threshold(100_000)  # modules and arrays make little garbage in cycles
     try:
         from fecm.cli import main as run

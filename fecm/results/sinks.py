@@ -118,6 +118,11 @@ class RowBuffer:
         if self._filled == self._room:
             self.flush()
 
+    def extend(self, columns: Mapping[str, Array]) -> None:
+        """Write many rows at once, after those collected; rows are the first axis."""
+        self.flush()
+        self._write(columns, len(next(iter(columns.values()))))
+
     def flush(self) -> None:
         """Write the collected rows."""
         if self._filled:

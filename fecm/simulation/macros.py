@@ -16,7 +16,7 @@ from fecm.deck.records import Macro, load_factor
 from fecm.mechanics.natural_modes import modes
 from fecm.mechanics.statics import reactions
 from fecm.mechanics.stiffness_product import SAFE
-from fecm.mechanics.strains import strains_and_resultants
+from fecm.mechanics.strains import STRAINS, strains_and_resultants
 from fecm.mechanics.time_step import critical_time_step, taken_time_step
 from fecm.simulation.interpreter import Action, EndedError, Passes
 from fecm.simulation.simulation import Simulation
@@ -110,17 +110,21 @@ def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
     found = steps.take(impact, state.dt, count, stored)
     if any(item.word == "TIME" for item in macros):
         state.clock = float(np.add.accumulate([state.clock, *[state.dt] * count])[-1])
-    contact_rows = stored[due["RODP"][stored]]
-    run.recorder.steps.add(plate, found.columns, found.strains, contact_rows)
-    strained = found.fields[due["RODP"][stored]]
-    strains = iter(run.model.strains.evaluate(strained).swapaxes(0, 1) if len(strained) else ())
-    for field, row in zip(found.fields, stored.tolist(), strict=True):
-        step, time = int(found.columns["step"][row]), float(found.columns["time"][row])
-        if due["RODP"][row]:
-            run.recorder.strain_row(step, time, next(strains))
-        for word, store in STORING.items():
-            if word in due and due[word][row]:
-                store(run, step, time, field)
+    recorder = run.recorder
+    recorder.steps.add(plate, found.columns, found.strains, stored[due["RODP"][stored]])
+    for word, at in due.items():
+        chosen = at[stored]
+        steps_at, times = (found.columns[name][stored[chosen]] for name in ("step", "time"))
+        fields = found.fields if chosen.all() else found.fields[chosen]
+        if word == "RODP":
+            strains = dict(zip(STRAINS, run.model.strains.evaluate(fields), strict=True))
+            recorder.rows("tape8", steps_at, times, strains)
+        elif word == "DISP":
+            columns = {"w": fields[:, :, 2], "displacement": fields}
+            recorder.rows("tape3", steps_at, times, columns)
+        else:
+            for step, time, field in zip(steps_at, times, fields, strict=True):
+                STORING[word](run, int(step), float(time), field)
     run.interpreter.skip(count)
     run.observe()
     return True

@@ -136,16 +136,18 @@ class Recorder:
         """Store a row of one of the groups :data:`BUFFERED`: a value or an array per dataset."""
         self._buffers[group].put({"step": step, "time": time, **columns})
 
+    def rows(self, group: str, steps: Floats, times: Floats, columns: Mapping[str, Floats]) -> None:
+        """Store many rows of a group; the first axis of every array."""
+        if len(steps):
+            self._buffers[group].extend({"step": steps, "time": times, **columns})
+
     def displacements(self, step: int, time: float, field: Floats) -> None:
         """Store a row of tape3: every dof of every node, (numnp, 5)."""
         self.row("tape3", step, time, {"w": field[:, 2], "displacement": field})
 
     def strains(self, step: int, time: float, field: Floats) -> None:
         """Store a row of tape8: strains of the displacements at `time`."""
-        self.strain_row(step, time, self._model.strains.evaluate(field))
-
-    def strain_row(self, step: int, time: float, strains: Floats) -> None:
-        """Store a row of tape8, (5, numel, npt)."""
+        strains = self._model.strains.evaluate(field)
         self.row("tape8", step, time, dict(zip(STRAINS, strains, strict=True)))
 
     def state(self) -> dict[str, Any]:
