@@ -190,11 +190,11 @@ def test_the_modes_of_a_rod_take_the_step_of_its_matrices(elements: int, tapered
 
 @compiled
 def test_the_structures_of_python_have_the_sizes_of_those_in_c() -> None:
-    sizes = (ctypes.c_int64 * 10)()
+    sizes = (ctypes.c_int64 * 11)()
     kernels.LIBRARY.fecm_sizes(sizes)
     structures = (
         kernels.Group, kernels.Block, kernels.Chunk, kernels.Plate, kernels.Impact,
-        kernels.Strains, kernels.Sweep,
+        kernels.Strains, kernels.Sweep, kernels.Failure,
     )  # fmt: skip
     counts = [len(kernels.COLUMNS), 6, len(FOUND)]
     assert list(sizes) == [*map(ctypes.sizeof, structures), *counts]

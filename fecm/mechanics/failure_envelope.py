@@ -73,19 +73,7 @@ class FailureMonitor:
     def update(self, envelope: FailureEnvelope, field: Floats, time: float) -> None:
         """Raise the exposures to those of a displacement field, (numnp, 5)."""
         strains, gradients = self.stresses.strains(field)
-        flat, plies = strains.reshape(-1, 6), envelope.plies
-        for start in range(0, len(flat), BLOCK):
-            stresses = np.split(flat[start : start + BLOCK] @ self._in_plane, 3, axis=1)
-            s1, s2, tau = (np.ascontiguousarray(part).ravel() for part in stresses)
-            first = start * self._in_plane.shape[1] // 3
-            for number, criterion in enumerate(CRITERIA.values()):
-                candidates = criterion(self._strengths, s1, s2, tau)
-                exposure = exposure_of(candidates)
-                own = plies.exposure[number, first : first + len(s1)]
-                (larger,) = np.nonzero(exposure > own)
-                own[larger] = exposure[larger]
-                plies.mode[number, first + larger] = modes_of(candidates, larger)
-                plies.time[number, first + larger] = time
+        self._raise_plies(envelope.plies, strains.reshape(-1, 6), time)
         shear = (gradients.reshape(-1, 12) @ self._shear).reshape(
             len(gradients), self.stresses.shape[2] - 1, 2, 2
         )
@@ -96,3 +84,18 @@ class FailureMonitor:
         envelope.interfaces.exposure[higher] = worst[higher]
         envelope.interfaces.time[higher] = time
         envelope.interfaces.mode[higher] = MODES.index("interlaminar shear")
+
+    def _raise_plies(self, plies: Maxima, strains: Floats, time: float) -> None:
+        """Raise the exposures of all plies to those of strains, (elements * points, 6)."""
+        for start in range(0, len(strains), BLOCK):
+            stresses = np.split(strains[start : start + BLOCK] @ self._in_plane, 3, axis=1)
+            s1, s2, tau = (np.ascontiguousarray(part).ravel() for part in stresses)
+            first = start * self._in_plane.shape[1] // 3
+            for number, criterion in enumerate(CRITERIA.values()):
+                candidates = criterion(self._strengths, s1, s2, tau)
+                exposure = exposure_of(candidates)
+                own = plies.exposure[number, first : first + len(s1)]
+                (larger,) = np.nonzero(exposure > own)
+                own[larger] = exposure[larger]
+                plies.mode[number, first + larger] = modes_of(candidates, larger)
+                plies.time[number, first + larger] = time

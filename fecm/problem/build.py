@@ -32,6 +32,7 @@ from fecm.mechanics.failure_envelope import FailureMonitor
 from fecm.mechanics.gages import GageArray, gages
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.impact_steps import ImpactSteps, supports
+from fecm.mechanics.kernels.failure import CompiledMonitor
 from fecm.mechanics.kernels.strains import CompiledStrains
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.mesh import Mesh
@@ -362,12 +363,14 @@ def build_plies(problem: Problem, plate: PlateModel) -> PlyStresses | None:
     return PlyStresses(problem.mesh, plate.laminate, problem.rules[2], nearest)
 
 
-def build_failure(problem: Problem, plate: PlateModel) -> FailureMonitor | None:
+def build_failure(
+    problem: Problem, plate: PlateModel, kind: type[FailureMonitor] = FailureMonitor
+) -> FailureMonitor | None:
     """Build the failure criteria of FAIL, of all elements."""
     if all(macro.word != "FAIL" for macro in flat(problem.program)):
         return None
     stresses = PlyStresses(problem.mesh, plate.laminate, problem.rules[2])
-    return FailureMonitor(stresses, plate.laminate, problem.deck.require(Allowables))
+    return kind(stresses, plate.laminate, problem.deck.require(Allowables))
 
 
 def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactModel:
@@ -407,9 +410,10 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         )
         law = chosen.law or build_law(deck, slips)
         impact = ImpactSystem(motion, rod, law, conditions, STEPS[method.integrator])
-    kind = CompiledStrains if motion.solver == KERNELS else StrainField
+    compiled = motion.solver == KERNELS
     stress_points = plate.strain_field(problem.rules[2])
-    plies, failure = build_plies(problem, plate), build_failure(problem, plate)
+    plies = build_plies(problem, plate)
+    failure = build_failure(problem, plate, CompiledMonitor if compiled else FailureMonitor)
     places = stress_points.places(mesh.coordinates) if plies or failure else None
     cards, transposed = deck.last(model.Gages), plate.rules.transposed_jacobian
     read = None if cards is None else gages(mesh, cards.records, transposed_jacobian=transposed)
@@ -423,7 +427,9 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         impact=impact,
         steps=steps,
         station=station,
-        strains=plate.strain_field(plate.rules.strains, kind),
+        strains=plate.strain_field(
+            plate.rules.strains, CompiledStrains if compiled else StrainField
+        ),
         stress_points=stress_points,
         gages=read,
         patch=problem.patch,

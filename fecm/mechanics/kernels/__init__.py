@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import ctypes
 import zlib
-from ctypes import POINTER, Structure, c_double, c_int32, c_int64
+from ctypes import POINTER, Structure, c_double, c_int8, c_int32, c_int64
 from pathlib import Path
 from typing import Any
 
 Doubles, Integers, Longs = POINTER(c_double), POINTER(c_int32), POINTER(c_int64)
+Codes = POINTER(c_int8)
 
 # The structures of kernels.c and impact.h, field by field.
 
@@ -65,6 +66,16 @@ class Strains(Structure):
     _fields_ = _fields(
         "int: elements nodes points width; longs: row node shape; floats: table metric",
         longs=Longs,
+    )
+
+
+class Failure(Structure):
+    """Largest exposures of plies."""
+
+    _fields_ = _fields(
+        "int: points states width; floats: in_plane; float: xt xc yt yc s12 f12 p_plus p_minus"
+        " resistance critical; floats: exposure time; codes: mode",
+        codes=Codes,
     )
 
 

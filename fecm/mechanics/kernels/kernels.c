@@ -131,6 +131,22 @@ typedef struct {
     const double *metric; /* (shapes, 4, width): inverse Jacobian */
 } Strains;
 
+enum { CRITERIA = 4 };
+
+/* Strengths, in the order of failure.py, and Puck's limits. */
+typedef struct {
+    double xt, xc, yt, yc, s12, f12, p_plus, p_minus, resistance, critical;
+} Ply;
+
+/* Largest exposures of the states of stress (plies, faces) at points; `width` is `states` in fours. */
+typedef struct {
+    int64_t points, states, width;
+    const double *in_plane; /* (6, 3, width): stresses per strain */
+    Ply ply;
+    double *exposure, *time; /* (CRITERIA, points, states) */
+    int8_t *mode;
+} Failure;
+
 #define TARGET static
 #include "impact.h"
 #undef TARGET
@@ -142,6 +158,7 @@ typedef struct {
 #define ROOT(x) ((half)_mm256_sqrt_pd((__m256d)(x)))
 #include "plate.h"
 #include "sweep.h"
+#include "failure.h"
 #undef ROOT
 #undef NAME
 #undef INLINE
@@ -156,6 +173,7 @@ typedef struct {
 #define ROOT(x) ((half){sqrt((x)[0]), sqrt((x)[1]), sqrt((x)[2]), sqrt((x)[3])})
 #include "plate.h"
 #include "sweep.h"
+#include "failure.h"
 
 /* Work that threads share: products K u, each followed by what one of them does alone. */
 typedef struct {
@@ -426,11 +444,16 @@ EXPORT void fecm_strains(const Strains *family, int64_t fields, int64_t numnp, i
     CHOSEN(strains)(family, fields, numnp, numel, u, strains);
 }
 
+/* Raise exposures to those of strains (points, 6). */
+EXPORT void fecm_failure(const Failure *failure, const double *strains, double time) {
+    CHOSEN(failure)(failure, strains, time);
+}
+
 /* Sizes of the structures, which those in Python must have. */
 EXPORT void fecm_sizes(int64_t *sizes) {
     sizes[0] = sizeof(Group), sizes[1] = sizeof(Block), sizes[2] = sizeof(Chunk);
     sizes[3] = sizeof(Plate), sizes[4] = sizeof(Impact), sizes[5] = sizeof(Strains), sizes[6] = sizeof(Sweep);
-    sizes[7] = COLUMNS, sizes[8] = GIVEN, sizes[9] = FOUND;
+    sizes[7] = sizeof(Failure), sizes[8] = COLUMNS, sizes[9] = GIVEN, sizes[10] = FOUND;
 }
 
 /* Checksum of the sources, given by the build. */
