@@ -54,7 +54,10 @@ def main() -> NoReturn:
     except (ImportError, MemoryError) as error:
         line = str(error).partition("\n")[0] or "there is not enough memory"
         _refuse(f"a part of the program can't be loaded: {line}")
-    run()
+    try:
+        run()
+    finally:
+        gc.freeze()  # the interpreter ends without a search for cycles
 
 
 if __name__ == "__main__":

@@ -186,7 +186,7 @@ def _run_one(
         simulate_run(simulation)
     checkpointer.clear()
     contents = read(path)
-    result = result_of(contents)
+    result = result_of(contents, problem.deck)
     with contents.held():
         about = about_run(result)
     for text in (*simulation.state.notes, *result.notes):

@@ -95,7 +95,7 @@ def plies_of(
 
 def model_of(result: Result) -> Deck:
     """Model of a result's deck.  Raises ResultFileError if the result holds no readable deck."""
-    deck = _parsed(result.deck, result.mode == "listing")
+    deck = result._model or _parsed(result.deck, result.mode == "listing")
     if deck is None:
         raise ResultFileError("the result holds no deck that can be read")
     return deck

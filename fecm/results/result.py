@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fecm._html import html_table
 from fecm._typing import Floats
-from fecm.deck.model import Impact
+from fecm.deck.model import Deck, Impact
 from fecm.deck.units import unit_of
 from fecm.results import groups
 from fecm.results.groups import Ints
@@ -129,11 +129,13 @@ class Result(groups.Contact):
         arrays: Mapping[str, Array],
         texts: Mapping[str, str],
         groups: Mapping[str, Mapping[str, Any]],
+        model: Deck | None = None,
     ) -> None:
         self._arrays = arrays
         self._groups = groups
         self.attributes: dict[str, Any] = dict(groups.get("", {}))
         self.deck: str = texts.get("deck", "")
+        self._model = model
         self.findings: tuple[Finding, ...] = ()
 
     @property
@@ -444,15 +446,16 @@ def load(path: str | Path) -> Result:
     return result_of(read(Path(path)))
 
 
-def result_of(contents: Contents) -> Result:
-    """Build a run's result from the contents of its file.
+def result_of(contents: Contents, model: Deck | None = None) -> Result:
+    """Build a run's result from the contents of its file, and the deck's model where it is known.
 
     Raises ResultFileError if a dataset has the wrong shape or type.
     """
     kinds = {name: dtype.kind for name, dtype in contents.dtypes.items()}
     if found := shape_error(contents.shapes, kinds):
         raise ResultFileError(f"{contents.path}: {found}")
-    return Result(contents, contents.texts, {"": contents.attributes, **contents.groups})
+    attributes = {"": contents.attributes, **contents.groups}
+    return Result(contents, contents.texts, attributes, model)
 
 
 def _number(value: Any) -> float:
