@@ -1,19 +1,20 @@
-"""Cost of a time step against a plain sparse loop, both measured in one process.
+"""Cost of a time step beside a plain sparse loop, both measured in one process and in turns.
 
-    python benchmarks/run.py [--write] [CASE ...]
+    python benchmarks/run.py [--write] [--rounds N] [CASE ...]
 
-Cases are the report's deck (`report`), its mesh refined 3, 10 and 20 times in each direction (`x3`,
-`x10`, `x20`), the mesh refined 10 times and hit beside its middle (`off-centre`), so that all of it
-has to be stepped, the report's mesh with its inner nodes moved at random (`distorted`), and the
-report's deck with a contact patch (`patch`), compared with the deck without, run in turns.  The
-plain loop is the product with scipy's CSR matrix, the update of the plate and the same contact
-code; the other one is what ``fecm run`` does: energies, history and stored rows included, written
-to a file, on one thread and on every core.
-Each case has a process of its own, and its peak memory is read before the plain loop needs more.
+The plain loop is the product with scipy's CSR matrix, the update of the plate and the same contact
+code.  A step is everything that ``fecm run`` does in it: energies, history, a row of strains and of
+displacements at every twentieth step, the file written.  Its cost is the difference of a long and a
+short run over the difference of their steps; what is left is the set-up.  `memory` takes steps
+without rows and without a file.  Each case has a process of its own, and one thread unless said otherwise.
 `--write` keeps the figures in benchmarks/results, under the machine's name.
 """
 
 from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
 
 import argparse
 import multiprocessing
@@ -21,9 +22,11 @@ import resource
 import statistics
 import tempfile
 import time
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from figures import keep
@@ -32,9 +35,10 @@ import fecm
 from fecm.deck import Deck
 from fecm.deck.grid import Grid, Section
 from fecm.deck.macros import compile_program
-from fecm.deck.model import Boundary, Coordinates, Elements, Impact, Patch
+from fecm.deck.model import Boundary, Coordinates, Elements, Impact, Material, Patch
 from fecm.deck.records import Control, NodeValues
-from fecm.mechanics.stiffness_product import CSR, available
+from fecm.mechanics.kernels import LIBRARY
+from fecm.mechanics.stiffness_product import CSR, KERNELS, NUMPY
 from fecm.problem.build import build_model
 from fecm.problem.generate import generate
 from fecm.problem.options import RunOptions
@@ -44,9 +48,8 @@ from fecm.simulation.run import run
 from fecm.simulation.simulation import Simulation
 
 HERE = Path(__file__).parent
-ROUNDS = 5
-# Seconds that one loop of a round may take about.
-BUDGET = 1.0
+# Seconds that one loop of a round may take about, and bytes of its file.
+BUDGET, FILE = 0.4, 2e8
 DT = 2.0e-7
 
 
@@ -58,8 +61,11 @@ def report() -> Deck:
     return deck
 
 
-def refined(times: int) -> Deck:
-    """The report's plate with every element cut `times` times in each direction."""
+def refined(times: int, aside: int = 0) -> Deck:
+    """The report's plate with every element cut `times` times in each direction.
+
+    The impact is `aside` nodes beside the middle.
+    """
     deck = report()
     columns = [
         Section(0.0, 1.5, 3 * times), Section(1.5, 4.5, 8 * times), Section(4.5, 6.0, 3 * times)
@@ -67,33 +73,56 @@ def refined(times: int) -> Deck:
     rows = [Section(0.0, 0.5, times), Section(0.5, 3.5, 8 * times), Section(3.5, 4.0, times)]
     grid = Grid(columns, rows)
     boundary = grid.boundary((1, 1, 0, 0, 0), {})
+    hit = Impact(grid.nearest(3.0, 2.0)[0] + aside, 3, 115.0)
+    mesh = [grid.coordinates(), grid.element_cards(), *([boundary] if boundary else [])]
     kept = [
         s for s in deck.segments if not isinstance(s, Coordinates | Elements | Boundary | Impact)
     ]
-    hit = Impact(grid.nearest(3.0, 2.0)[0], 3, 115.0)
-    mesh = [grid.coordinates(), grid.element_cards(), *([boundary] if boundary else [])]
     control = Control(grid.nodes, grid.elements, deck.control.layers, 2, 5, 9)
     return replace(deck, control=control, segments=(*mesh, *kept, hit), text="")
 
 
-def off_centre() -> Deck:
-    """The mesh refined 10 times, hit where no symmetry halves it."""
-    deck = refined(10)
-    hit = deck.require(Impact)
-    aside = replace(hit, node=hit.node + 20)
-    segments = tuple(aside if segment is hit else segment for segment in deck.segments)
-    return replace(deck, segments=segments, text="")
-
-
-def distorted() -> Deck:
-    """The report's mesh with the nodes inside moved by up to a tenth of an element."""
-    deck = report()
-    places = generate(deck).coordinates.copy()
-    inside = ((places > 0.0) & (places < [6.0, 4.0])).all(axis=1)
-    places[inside] += np.random.default_rng(0).uniform(-0.02, 0.02, (inside.sum(), 2))
-    records = [NodeValues(n, 0, (x, y)) for n, (x, y) in enumerate(places.tolist(), start=1)]
+def moved(deck: Deck, move: Callable[[np.ndarray], np.ndarray]) -> Deck:
+    """The deck of a grid with its corners moved, (rows, columns, 2), and straight sides."""
+    flat = generate(deck).coordinates
+    places = flat.reshape(-1, int(np.argmax(np.diff(flat[:, 1]) > 0.0)) + 1, 2).copy()
+    places[::2, ::2] = move(places[::2, ::2])
+    places[::2, 1::2] = (places[::2, :-1:2] + places[::2, 2::2]) / 2.0
+    places[1::2] = (places[:-1:2] + places[2::2]) / 2.0
+    found = places.reshape(-1, 2).tolist()
+    records = [NodeValues(n, 0, (x, y)) for n, (x, y) in enumerate(found, start=1)]
     segments = [Coordinates(tuple(records)) if isinstance(s, Coordinates) else s
                 for s in deck.segments]  # fmt: skip
+    return replace(deck, segments=tuple(segments), text="")
+
+
+def distorted(times: int) -> Deck:
+    """The mesh with its inner corners moved by up to a tenth of an element."""
+
+    def shift(corners: np.ndarray) -> np.ndarray:
+        shifts = np.random.default_rng(0).uniform(-0.04 / times, 0.04 / times, corners.shape)
+        shifts[[0, -1]] = shifts[:, [0, -1]] = 0.0
+        return corners + shifts
+
+    return moved(refined(times), shift)
+
+
+def graded(times: int) -> Deck:
+    """The mesh with sides that fall towards the middle, each row and column of another width."""
+    middle = np.array([3.0, 2.0])
+    return moved(
+        refined(times), lambda at: at + 0.08 * np.sin(np.pi * (at - middle) / middle) * middle
+    )
+
+
+def coupled(deck: Deck) -> Deck:
+    """The deck with half of the plies turned by a right angle: B is not 0, and u and v move."""
+    material = deck.require(Material)
+    half = len(material.layers) // 2
+    turned = [replace(layer, angle=90.0) for layer in material.layers[half:]]
+    layers = (*material.layers[:half], *turned)
+    segments = [replace(material, layers=layers) if s is material else s
+                for s in deck.segments if not isinstance(s, Boundary)]  # fmt: skip
     return replace(deck, segments=tuple(segments), text="")
 
 
@@ -105,18 +134,21 @@ def patched() -> Deck:
 
 CASES: dict[str, Callable[[], Deck]] = {
     "report": report,
+    "patch": patched,
+    "distorted": lambda: distorted(1),
     "x3": lambda: refined(3),
     "x10": lambda: refined(10),
-    "x20": lambda: refined(20),
-    "off-centre": off_centre,
-    "distorted": distorted,
-    "patch": patched,
+    "x10 off-centre": lambda: refined(10, 20),
+    "x10 graded": lambda: graded(10),
+    "x10 distorted": lambda: distorted(10),
+    "x10 distorted, B": lambda: coupled(distorted(10)),
+    "x32": lambda: refined(32),
 }
 
 
 def time_step(deck: Deck) -> float:
     """The report's time step, finer on finer meshes."""
-    return float(DT / np.sqrt(deck.control.numel / 140))
+    return float(DT / np.sqrt(deck.control.numel / 140)) / 2.0
 
 
 def checked(deck: Deck, steps: int) -> Problem:
@@ -127,104 +159,153 @@ def checked(deck: Deck, steps: int) -> Problem:
     return Problem(cut, generate(cut), compile_program(macros, fecm.deck.Findings()))
 
 
-def full(problem: Problem, folder: str, threads: int = 1) -> float:
-    """Seconds of a run's own loop, from its first macro to its closed file."""
-    begin = 0.0
-    path = Path(folder) / "run.h5"
-    path.unlink(missing_ok=True)
-    with hdf5_writer.writing(path) as sink:
-        simulation = Simulation(problem, sink, RunOptions(threads=threads))
-        begin = time.perf_counter()
-        run(simulation)
-    return time.perf_counter() - begin
+class Plain:
+    """The plain loop."""
+
+    def __init__(self, problem: Problem) -> None:
+        setup = build_model(problem, RunOptions(solver=CSR))
+        if setup.impact is None:
+            raise ValueError("nothing hits in this deck")
+        self.impact, plate = setup.impact, setup.motion.plate
+        self.K, self.m, self.dt = plate.stiffness, plate.mass, time_step(problem.deck)
+        self.state, self.velocity = setup.impact.start(), np.zeros(plate.neq)
+
+    def take(self, steps: int) -> None:
+        """Take steps."""
+        state, load, dt = self.state, self.impact.contact.load, self.dt
+        displacement = state.plate.displacement
+        for _ in range(steps):
+            force = -(self.K @ displacement)
+            self.velocity += dt * (force / self.m)
+            load.subtract(-state.contact.force, dt, self.velocity)
+            displacement += dt * self.velocity
+            self.impact.move_projectile(state, dt)
 
 
-def plain(problem: Problem, steps: int) -> float:
-    """Seconds of the plain loop."""
-    setup = build_model(problem, RunOptions(solver=CSR))
-    impact, plate = setup.impact, setup.motion.plate
-    K, m = plate.stiffness, plate.mass
-    if impact is None:
-        raise ValueError("nothing hits in this deck")
-    state, load = impact.start(), impact.contact.load
-    displacement, velocity = state.plate.displacement, np.zeros(plate.neq)
-    dt = time_step(problem.deck)
+class Memory:
+    """Steps of the kernels, with their records in memory."""
+
+    def __init__(self, problem: Problem, threads: int = 1) -> None:
+        setup = build_model(problem, RunOptions(solver=KERNELS, threads=threads))
+        if setup.impact is None or setup.steps is None:
+            raise ValueError("the kernels don't take these steps")
+        self.steps, self.state, self.dt = setup.steps, setup.impact.start(), time_step(problem.deck)
+        setup.impact.advance(self.state, self.dt)
+
+    def take(self, steps: int) -> None:
+        """Take steps."""
+        self.steps.take(self.state, self.dt, steps, np.array([], dtype=np.intp))
+
+
+class Run:
+    """Runs of ``fecm run`` without its process, to a closed file."""
+
+    def __init__(self, deck: Deck, folder: str, solver: str) -> None:
+        self.deck, self.path = deck, Path(folder) / "run.h5"
+        self.options = RunOptions(solver=solver)
+
+    def take(self, steps: int) -> None:
+        """Run a deck of so many steps."""
+        self.path.unlink(missing_ok=True)
+        with hdf5_writer.writing(self.path) as sink:
+            run(Simulation(checked(self.deck, steps), sink, self.options))
+
+
+def seconds(loop: Any, steps: int) -> float:
+    """Processor time of some steps."""
+    begin = time.process_time()
+    loop.take(steps)
+    return time.process_time() - begin
+
+
+def wall(loop: Any, steps: int) -> float:
+    """Time on the clock of some steps."""
     begin = time.perf_counter()
-    for _ in range(steps):
-        force = -(K @ displacement)
-        velocity += dt * (force / m)
-        load.subtract(-state.contact.force, dt, velocity)
-        displacement += dt * velocity
-        impact.move_projectile(state, dt)
+    loop.take(steps)
     return time.perf_counter() - begin
 
 
-def patch_over_point(folder: str) -> float:
-    """Cost of a step with a patch over one without; the best of many short runs in turns."""
-    problems = [checked(deck, 1000) for deck in (patched(), report())]
-    times = [[full(problem, folder) for problem in problems] for _ in range(12 * ROUNDS)]
-    patch, point = np.min(times, axis=0)
-    return float(patch / point)
+def memory_per_equation(problem: Problem, solver: str) -> float:
+    """Bytes that the model of a solver keeps for each equation."""
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+    setup = build_model(problem, RunOptions(solver=solver))
+    after = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    return (after - before) / setup.motion.plate.neq
 
 
-def measure(name: str) -> dict[str, float | str | int]:
+def measure(name: str, rounds: int) -> dict[str, Any]:
     """Figures of one case."""
     deck = CASES[name]()
-    with tempfile.TemporaryDirectory() as folder:
-        few, more = (full(checked(deck, steps), folder) for steps in (20, 60))
-        steps = max(60, min(4000, int(BUDGET * 40 / max(more - few, 1e-6))))
-        problem = checked(deck, steps)
-        first = full(problem, folder)
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        pairs = [(plain(problem, steps), first)]
-        pairs += [(plain(problem, steps), full(problem, folder)) for _ in range(ROUNDS - 1)]
-        shared = [full(problem, folder, available()) for _ in range(ROUNDS)]
-        over_point = patch_over_point(folder) if name == "patch" else None
+    problem = checked(deck, 10)
     neq = problem.mesh.number_of_equations
-    ours = statistics.median(b for _, b in pairs) / steps
-    together = statistics.median(shared) / steps
-    return {
-        "case": name,
-        "elements": deck.control.numel,
-        "unknowns": neq,
-        "steps": steps,
-        "us_a_step": round(ours * 1e6, 1),
-        "us_a_step_on_every_core": round(together * 1e6, 1),
-        "csr_us_a_step": round(statistics.median(a for a, _ in pairs) / steps * 1e6, 1),
-        "ratio": round(statistics.median(b / a for a, b in pairs), 3),
-        "million_unknown_steps_a_second": round(neq / ours / 1e6, 1),
-        "million_unknown_steps_a_second_on_every_core": round(neq / together / 1e6, 1),
-        "us_an_element": round(ours * 1e6 / deck.control.numel, 4),
-        "peak_memory_mb": round(peak, 1),
-        **({} if over_point is None else {"over_point_force": round(over_point, 3)}),
+    solvers = [NUMPY] if LIBRARY is None else [KERNELS, NUMPY]
+    build_model(checked(report(), 10), RunOptions())  # imports
+    begin = time.process_time()
+    build_model(checked(deck, 10), RunOptions())
+    setup = time.process_time() - begin
+    figures = {"case": name, "elements": deck.control.numel, "unknowns": neq}
+    kept = memory_per_equation(checked(deck, 10), solvers[0])
+    with tempfile.TemporaryDirectory() as folder:
+        loops = {s: Run(deck, folder, s) for s in solvers}
+        short, counts = 20, {}
+        largest = 20.0 * FILE / (8.0 * (5.0 * 9.0 * deck.control.numel + 6.0 * deck.control.numnp))
+        for solver, loop in loops.items():
+            few, more = seconds(loop, short), seconds(loop, 3 * short)
+            wanted = BUDGET * 2 * short / max(more - few, 1e-3)
+            counts[solver] = short + max(2 * short, int(min(8000, largest, wanted)))
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        plain = Plain(problem)
+        plain_steps = max(3, int(BUDGET / max(seconds(plain, 3) / 3, 1e-9)))
+        memory = Memory(problem) if LIBRARY is not None else None
+        own = 0 if memory is None else max(20, int(BUDGET * 20 / max(seconds(memory, 20), 1e-6)))
+        found: dict[str, list[float]] = {}
+        for _ in range(rounds):
+            found.setdefault("plain", []).append(seconds(plain, plain_steps) / plain_steps)
+            for solver, loop in loops.items():
+                times = [seconds(loop, n) for n in (short, counts[solver])]
+                cost = (times[1] - times[0]) / (counts[solver] - short)
+                found.setdefault(solver, []).append(cost)
+            if memory is not None:
+                found.setdefault("memory", []).append(seconds(memory, own) / own)
+        if LIBRARY is not None and multiprocessing.cpu_count() > 1:
+            pair = [Memory(problem, threads) for threads in (1, 2)]
+            ratios = []
+            for _ in range(rounds):
+                one, two = (wall(loop, own) for loop in pair)
+                ratios.append(one / two)
+            figures["two_threads"] = round(statistics.median(ratios), 2)
+    middle = {key: statistics.median(values) for key, values in found.items()}
+    figures["us_a_step"] = {key: round(value * 1e6, 2) for key, value in middle.items()}
+    figures["plain_over"] = {
+        key: round(statistics.median(p / v for p, v in zip(found["plain"], values, strict=True)), 1)
+        for key, values in found.items() if key != "plain"
+    }  # fmt: skip
+    best = middle.get("memory", middle[NUMPY])
+    return figures | {
+        "ns_an_element": round(best * 1e9 / deck.control.numel, 1),
+        "setup_in_steps": round(setup / best),
+        "bytes_an_equation": round(kept),
+        "peak_memory_mb": round(peak),
     }
 
 
 def main() -> None:
     """Measure the cases, print a table, and keep it if asked."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("cases", nargs="*", metavar="CASE", help=", ".join(CASES))
+    parser.add_argument("cases", nargs="*", metavar="CASE", help="; ".join(CASES))
+    parser.add_argument("--rounds", type=int, default=5, help="of measurements in turns")
     parser.add_argument("--write", action="store_true", help="keep the figures as JSON")
     options = parser.parse_args()
     if unknown := [name for name in options.cases if name not in CASES]:
         parser.error(f"no case {unknown[0]}; there are {', '.join(CASES)}")
     figures = []
-    print(
-        f"{'case':12}{'elements':>9}{'us/step':>10}{'all cores':>10}{'CSR':>10}{'ratio':>8}"
-        f"{'M u-s/s':>9}{'all cores':>10}{'MB':>8}"
-    )
     for name in options.cases or CASES:
         with multiprocessing.get_context("spawn").Pool(1) as pool:
-            row = pool.apply(measure, (name,))
+            row = pool.apply(measure, (name, options.rounds))
         figures.append(row)
-        print(
-            f"{name:12}{row['elements']:9}{row['us_a_step']:10}{row['us_a_step_on_every_core']:10}"
-            f"{row['csr_us_a_step']:10}{row['ratio']:8}{row['million_unknown_steps_a_second']:9}"
-            f"{row['million_unknown_steps_a_second_on_every_core']:10}{row['peak_memory_mb']:8}",
-            flush=True,
-        )
-        if "over_point_force" in row:
-            print(f"{'':12}a step with a patch costs {row['over_point_force']} of one without")
+        print(" ".join(f"{key}={value}" for key, value in row.items()), flush=True)
     if options.write:
         print(keep({"cases": figures}))
 
