@@ -6,7 +6,8 @@ The plain loop is the product with scipy's CSR matrix, the update of the plate a
 code.  A step is everything that ``fecm run`` does in it: energies, history, a row of strains and of
 displacements at every twentieth step, the file written.  Its cost is the difference of a long and a
 short run over the difference of their steps; what is left is the set-up.  `memory` takes steps
-without rows and without a file.  Each case has a process of its own, and one thread unless said otherwise.
+without rows and without a file.  All are processor times, the best of some rounds in turns; each
+case has a process of its own, and one thread unless said otherwise.
 `--write` keeps the figures in benchmarks/results, under the machine's name.
 """
 
@@ -19,7 +20,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
 import argparse
 import multiprocessing
 import resource
-import statistics
 import tempfile
 import time
 import tracemalloc
@@ -260,32 +260,39 @@ def measure(name: str, rounds: int) -> dict[str, Any]:
         plain_steps = max(3, int(BUDGET / max(seconds(plain, 3) / 3, 1e-9)))
         memory = Memory(problem) if LIBRARY is not None else None
         own = 0 if memory is None else max(20, int(BUDGET * 20 / max(seconds(memory, 20), 1e-6)))
-        found: dict[str, list[float]] = {}
+        best: dict[tuple[str, int], float] = {}
+
+        def take(key: str, loop: Any, steps: int, clock: Callable[..., float] = seconds) -> None:
+            best[key, steps] = min(clock(loop, steps), best.get((key, steps), np.inf))
+
+        pair = []
+        if memory is not None and multiprocessing.cpu_count() > 1:
+            pair = [(f"{n}", Memory(problem, n)) for n in (1, 2)]
         for _ in range(rounds):
-            found.setdefault("plain", []).append(seconds(plain, plain_steps) / plain_steps)
+            take("plain", plain, plain_steps)
             for solver, loop in loops.items():
-                times = [seconds(loop, n) for n in (short, counts[solver])]
-                cost = (times[1] - times[0]) / (counts[solver] - short)
-                found.setdefault(solver, []).append(cost)
+                take(solver, loop, short)
+                take(solver, loop, counts[solver])
             if memory is not None:
-                found.setdefault("memory", []).append(seconds(memory, own) / own)
-        if LIBRARY is not None and multiprocessing.cpu_count() > 1:
-            pair = [Memory(problem, threads) for threads in (1, 2)]
-            ratios = []
-            for _ in range(rounds):
-                one, two = (wall(loop, own) for loop in pair)
-                ratios.append(one / two)
-            figures["two_threads"] = round(statistics.median(ratios), 2)
-    middle = {key: statistics.median(values) for key, values in found.items()}
-    figures["us_a_step"] = {key: round(value * 1e6, 2) for key, value in middle.items()}
+                take("memory", memory, own)
+            for key, both in pair:
+                take(key, both, own, wall)
+    cost = {"plain": best["plain", plain_steps] / plain_steps}
+    for solver in solvers:
+        long = counts[solver]
+        cost[solver] = (best[solver, long] - best[solver, short]) / (long - short)
+    if memory is not None:
+        cost["memory"] = best["memory", own] / own
+    if pair:
+        figures["two_threads"] = round(best["1", own] / best["2", own], 2)
+    figures["us_a_step"] = {key: round(value * 1e6, 2) for key, value in cost.items()}
     figures["plain_over"] = {
-        key: round(statistics.median(p / v for p, v in zip(found["plain"], values, strict=True)), 1)
-        for key, values in found.items() if key != "plain"
-    }  # fmt: skip
-    best = middle.get("memory", middle[NUMPY])
+        key: round(cost["plain"] / value, 1) for key, value in cost.items() if key != "plain"
+    }
+    least = cost.get("memory", cost[NUMPY])
     return figures | {
-        "ns_an_element": round(best * 1e9 / deck.control.numel, 1),
-        "setup_in_steps": round(setup / best),
+        "ns_an_element": round(least * 1e9 / deck.control.numel, 1),
+        "setup_in_steps": round(setup / least),
         "bytes_an_equation": round(kept),
         "peak_memory_mb": round(peak),
     }
