@@ -147,8 +147,9 @@ CASES: dict[str, Callable[[], Deck]] = {
 
 
 def time_step(deck: Deck) -> float:
-    """The report's time step, finer on finer meshes."""
-    return float(DT / np.sqrt(deck.control.numel / 140)) / 2.0
+    """The report's time step, finer on finer meshes, where u and v may move too."""
+    elements = deck.control.numel
+    return DT if elements == 140 else float(DT / 2.0 / np.sqrt(elements / 140))
 
 
 def checked(deck: Deck, steps: int) -> Problem:
@@ -241,6 +242,8 @@ def measure(name: str, rounds: int) -> dict[str, Any]:
     problem = checked(deck, 10)
     neq = problem.mesh.number_of_equations
     solvers = [NUMPY] if LIBRARY is None else [KERNELS, NUMPY]
+    if deck.control.numel > 50_000:
+        del solvers[1:]  # NumPy would take minutes
     build_model(checked(report(), 10), RunOptions())  # imports
     begin = time.process_time()
     build_model(checked(deck, 10), RunOptions())
@@ -289,7 +292,7 @@ def measure(name: str, rounds: int) -> dict[str, Any]:
     figures["plain_over"] = {
         key: round(cost["plain"] / value, 1) for key, value in cost.items() if key != "plain"
     }
-    least = cost.get("memory", cost[NUMPY])
+    least = cost.get("memory", cost[solvers[0]])
     return figures | {
         "ns_an_element": round(least * 1e9 / deck.control.numel, 1),
         "setup_in_steps": round(setup / least),

@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 from figures import keep
-from run import HERE, ROUNDS, checked, plain, report
+from run import HERE, Plain, checked, report, seconds
 
 import fecm
 from fecm.mechanics import kernels
@@ -83,7 +83,7 @@ def measure() -> dict[str, float | int]:
         stored = [process(path, "--history") for _ in range(ROUNDS)]
         worst, seconds = compare(fecm.load_sweep(path))
     problem = checked(report(), STEPS)
-    csr = statistics.median(plain(problem, STEPS) for _ in range(ROUNDS))
+    csr = statistics.median(seconds(Plain(problem), STEPS) for _ in range(ROUNDS))
     return {
         "cases": CASES,
         "steps": STEPS,
