@@ -99,6 +99,9 @@ DECKS = {
     ),
     "damping": REPORT.replace("EXPE", "DAMP\n     3000.\n\nEXPE"),
     "distorted": element_deck(distorted_square(6, 6), (3, 2, 3), steps=300),
+    "rows far apart": REPORT.replace("EXPE\n", "SHEA MITC\nEXPE\n", 1).replace(
+        "        20", "      3000"
+    ),
     "shorter steps": REPORT.replace("4000", "  37"),
 }
 

@@ -114,6 +114,8 @@ def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
     recorder.steps.add(plate, found.columns, found.strains, stored[due["RODP"][stored]])
     for word, at in due.items():
         chosen = at[stored]
+        if not chosen.any():
+            continue
         steps_at, times = (found.columns[name][stored[chosen]] for name in ("step", "time"))
         fields = found.fields if chosen.all() else found.fields[chosen]
         if word == "RODP":
