@@ -12,7 +12,7 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 KERNELS = "fecm/mechanics/kernels"
-FLAGS = ["-O3", "-g0", "-std=gnu11", "-Wno-psabi", "-fno-math-errno", "-fvisibility=hidden"]
+FLAGS = ["-O3", "-g0", "-std=gnu11", "-Wno-psabi", "-fvisibility=hidden"]
 
 
 class CustomBuildHook(BuildHookInterface[Any]):
@@ -57,14 +57,7 @@ def _compiled(root: Path, folder: Path) -> Path:
         "_compiled",
         [str(root / KERNELS / "kernels.c")],
         define_macros=[("FECM_STAMP", str(stamp))],
-        extra_compile_args=[
-            "-O3",
-            "-g0",
-            "-std=gnu11",
-            "-Wno-psabi",
-            "-fno-math-errno",
-            "-fvisibility=hidden",
-        ],
+        extra_compile_args=FLAGS,
         libraries=["m", "pthread"],
         py_limited_api=True,
     )

@@ -22,8 +22,8 @@ from fecm.mechanics.contact_law import (
     YangSunPermanent,
 )
 from fecm.mechanics.impact import ImpactState, ImpactSystem
-from fecm.mechanics.kernels import COLUMNS, LIBRARY, Impact, Longs
-from fecm.mechanics.kernels.plate import CompiledPlate, CompiledProduct, Indices, floats
+from fecm.mechanics.kernels import COLUMNS, LIBRARY, Impact, Longs, floats
+from fecm.mechanics.kernels.plate import CompiledPlate, CompiledProduct, Indices
 from fecm.mechanics.plate_motion import (
     DivergenceError,
     DofSums,
@@ -35,6 +35,11 @@ from fecm.mechanics.rod_integrators import RodIntegrator, RodState
 
 # Difference of squares of frequencies below which modes count as equal, relative to the largest.
 EQUAL = 1e-10
+# Critical indentation and slope of the laws that the kernels know: equations 3-8 and 3-7.
+CRITICAL: dict[type, Any] = {
+    LinearPermanent: lambda law: (law.alpha_p, law.s_p),
+    YangSunPermanent: lambda law: (law.alpha_cr, math.nan),
+}
 
 
 @dataclass(frozen=True)
@@ -122,7 +127,7 @@ def supports(system: ImpactSystem) -> bool:
     return (
         isinstance(motion.product, CompiledProduct)
         and isinstance(law, HystereticLaw)
-        and isinstance(law.constants, LinearPermanent | YangSunPermanent)
+        and type(law.constants) in CRITICAL
         and contact.plate_moves
         and not contact.keeps_first_step
         and contact.share == 1.0
@@ -175,14 +180,13 @@ class ImpactSteps:
         motion = self._modes.motion(state.rod)
         law: Any = system.law
         c = law.constants
-        linear = isinstance(c, LinearPermanent)
         rows = np.ascontiguousarray(stored, dtype=np.int64)
         records = np.empty((steps, len(COLUMNS)))
         strains = np.empty((steps, len(self._gage_entry)))
         fields = np.empty((len(rows), *kernel.shape))
         m: LoadingHistory = state.memory
         impact = Impact(
-            c.k, c.q, c.alpha_p if linear else c.alpha_cr, c.s_p if linear else math.nan, *m,
+            c.k, c.q, *CRITICAL[type(c)](c), *m,
             *state.contact, state.plate_w, state.contact_work, plate.time,
             int(state.unconverged_steps), integrator.dt, integrator.theta, *integrator.weights,
             integrator.gain, len(self._tip_shape), floats(T), floats(h),

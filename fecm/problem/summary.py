@@ -23,9 +23,7 @@ def larger_steps(problem: Problem) -> list[str]:
     largest = max((m.value for m in flat(problem.program) if m.word == "DT"), default=0.0)
     if not problem.work.steps or not 0.0 < largest < ROOM * problem.safe_time_step:
         return []
-    least = (
-        problem.safe_time_step
-    )  # known from the check, and a few per cent below the critical one
+    least = problem.safe_time_step  # known, and a few per cent below the critical one
     taken = f"{taken_time_step(least):.3g} {unit_of('time', unit_names(problem.deck))}".rstrip()
     return [
         f"time step         DT is at most {largest / least:.2f} of the critical one; DT 0 takes at "

@@ -107,21 +107,19 @@ class RowBuffer:
             self._filled = len(state[name])
             block[: self._filled] = state[name]
 
-    def put(self, columns: Mapping[str, Any]) -> None:
-        """Add one row: a value or an array for every dataset."""
-        if self._room == 1:
-            self._write({name: np.asarray(columns[name])[None] for name in self._paths}, 1)
+    def put(self, columns: Mapping[str, Array]) -> None:
+        """Add rows, the first axis of an array for every dataset."""
+        count = len(next(iter(columns.values())))
+        if self._filled + count > self._room:
+            self.flush()
+        if count >= self._room:
+            self._write(columns, count)
             return
         for name, block in self._blocks.items():
-            block[self._filled] = columns[name]
-        self._filled += 1
+            block[self._filled : self._filled + count] = columns[name]
+        self._filled += count
         if self._filled == self._room:
             self.flush()
-
-    def extend(self, columns: Mapping[str, Array]) -> None:
-        """Write many rows at once, after those collected; rows are the first axis."""
-        self.flush()
-        self._write(columns, len(next(iter(columns.values()))))
 
     def flush(self) -> None:
         """Write the collected rows."""

@@ -16,9 +16,10 @@ from fecm.deck.records import Macro, load_factor
 from fecm.mechanics.natural_modes import modes
 from fecm.mechanics.statics import reactions
 from fecm.mechanics.stiffness_product import SAFE
-from fecm.mechanics.strains import STRAINS, strains_and_resultants
+from fecm.mechanics.strains import strains_and_resultants
 from fecm.mechanics.time_step import critical_time_step, taken_time_step
 from fecm.simulation.interpreter import Action, EndedError, Passes
+from fecm.simulation.recorder import Steps, Times
 from fecm.simulation.simulation import Simulation
 
 # Time and loads ----------------------------------------------------------------------------------
@@ -72,12 +73,12 @@ def impact_step(run: Simulation, n: int) -> None:
         state.prop_force = None  # the listing's first impact step begins with PROP = 0
     stores = _counted(run, n) if "counter" in slips else not (plate.step + 1) % n
     if stores and "tapes" in slips:  # strains one step late
-        recorder.strains(plate.step + 1, plate.time, run.displacement_field())
+        recorder.strains([plate.step + 1], [plate.time], run.displacement_field()[None])
     system.advance(impact, state.dt, run.force_factor(), state.prop_force)
     state.prop_force = None
     recorder.steps.step(plate, impact, run.force_factor(), contact_row=stores)
     if stores and "tapes" not in slips:
-        recorder.strains(plate.step, plate.time, run.displacement_field())
+        recorder.strains([plate.step], [plate.time], run.displacement_field()[None])
     run.observe()
 
 
@@ -114,19 +115,11 @@ def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
     recorder.steps.add(plate, found.columns, found.strains, stored[due["RODP"][stored]])
     for word, at in due.items():
         chosen = at[stored]
-        if not chosen.any():
-            continue
-        steps_at, times = (found.columns[name][stored[chosen]] for name in ("step", "time"))
-        fields = found.fields if chosen.all() else found.fields[chosen]
-        if word == "RODP":
-            strains = dict(zip(STRAINS, run.model.strains.evaluate(fields), strict=True))
-            recorder.rows("tape8", steps_at, times, strains)
-        elif word == "DISP":
-            columns = {"w": fields[:, :, 2], "displacement": fields}
-            recorder.rows("tape3", steps_at, times, columns)
-        else:
-            for step, time, field in zip(steps_at, times, fields, strict=True):
-                STORING[word](run, int(step), float(time), field)
+        if chosen.any():
+            fields = found.fields if chosen.all() else found.fields[chosen]
+            at_steps = found.columns["step"][stored[chosen]].astype(int).tolist()
+            times = found.columns["time"][stored[chosen]].tolist()
+            STORING[word](run, at_steps, times, fields)
     run.interpreter.skip(count)
     run.observe()
     return True
@@ -211,32 +204,42 @@ def _at_passes(word: str, run: Simulation, n: int) -> None:
     """DISP, PLYS or FAIL at every N-th pass."""
     if not run.interpreter.current_pass % n:
         plate = run.state.plate
-        STORING[word](run, plate.step, plate.time, run.displacement_field())
+        STORING[word](run, [plate.step], [plate.time], run.displacement_field()[None])
 
 
-def _store_displacements(run: Simulation, step: int, time: float, field: Floats) -> None:
-    run.recorder.displacements(step, time, field)
+def _store_strains(run: Simulation, steps: Steps, times: Times, fields: Floats) -> None:
+    run.recorder.strains(steps, times, fields)
+
+
+def _store_displacements(run: Simulation, steps: Steps, times: Times, fields: Floats) -> None:
+    run.recorder.displacements(steps, times, fields)
     if run.state.impact is None:
-        run.printer.displacements(field, time)
+        for time, field in zip(times, fields, strict=True):
+            run.printer.displacements(field, time)
 
 
-def _store_ply_stresses(run: Simulation, step: int, time: float, field: Floats) -> None:
+def _store_ply_stresses(run: Simulation, steps: Steps, times: Times, fields: Floats) -> None:
     if run.model.plies is not None:
-        run.recorder.row("plies", step, time, run.model.plies.evaluate(field))
+        for step, time, field in zip(steps, times, fields, strict=True):
+            run.recorder.row("plies", step, time, run.model.plies.evaluate(field))
 
 
-def _evaluate_failure(run: Simulation, step: int, time: float, field: Floats) -> None:
+def _evaluate_failure(run: Simulation, _: Steps, times: Times, fields: Floats) -> None:
     envelope, monitor = run.state.failure, run.model.failure
     if envelope is not None and monitor is not None:
-        monitor.update(envelope, field, time)
+        for time, field in zip(times, fields, strict=True):
+            monitor.update(envelope, field, time)
 
 
-# What is done with a displacement field at every N-th pass.
-STORING: dict[str, Callable[[Simulation, int, float, Floats], None]] = {
+# What is done with displacement fields, (rows, numnp, 5), at every N-th step of RODP or pass.
+STORING: dict[str, Callable[[Simulation, Steps, Times, Floats], None]] = {
+    "RODP": _store_strains,
     "DISP": _store_displacements,
     "PLYS": _store_ply_stresses,
     "FAIL": _evaluate_failure,
 }
+# Those that are macros of their own.
+AT_PASSES = ("DISP", "PLYS", "FAIL")
 
 
 def store_reactions(run: Simulation) -> None:
@@ -283,7 +286,7 @@ ACTIONS: dict[str, Callable[..., bool | None]] = {
     "EIGE": find_modes,
     "EXCD": central_difference,
     "RODP": impact_step,
-    **{word: partial(_at_passes, word) for word in STORING},
+    **{word: partial(_at_passes, word) for word in AT_PASSES},
     "STRE": store_stresses,
     "CHEC": check,
 }
@@ -296,9 +299,9 @@ def bind_loop(run: Simulation, body: Body) -> Passes | None:
     if len(macros) < len(body) or words.count("RODP") != 1 or len(set(words)) < len(words):
         return None
     first = words.index("RODP")
-    if not {"TIME", *STORING}.issuperset(words[:first] + words[first + 1 :]):
+    if not {"TIME", *AT_PASSES}.issuperset(words[:first] + words[first + 1 :]):
         return None
-    if run.model.steps is None or run.options.slips or set(STORING).intersection(words[:first]):
+    if run.model.steps is None or run.options.slips or set(AT_PASSES).intersection(words[:first]):
         return None
     return partial(impact_steps, run, macros)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,10 @@ from fecm.results.schema import DATASETS, FIXED, INTERLAMINAR, Dataset
 from fecm.results.sinks import RowBuffer, Sink
 from fecm.simulation.state import subset
 from fecm.simulation.step_recorder import OnBlock, StepRecorder
+
+# Of rows.
+Steps = Sequence[int]
+Times = Sequence[float]
 
 FAILURE = ("failure", INTERLAMINAR, *(f"failure/{name}" for name in CRITERIA))
 DAMPING_WORK = "energy/damping_work"
@@ -134,21 +138,28 @@ class Recorder:
 
     def row(self, group: str, step: int, time: float, columns: Mapping[str, Any]) -> None:
         """Store a row of one of the groups :data:`BUFFERED`: a value or an array per dataset."""
-        self._buffers[group].put({"step": step, "time": time, **columns})
+        rows = {name: np.asarray(value)[None] for name, value in columns.items()}
+        self.rows(group, [step], [time], rows)
 
-    def rows(self, group: str, steps: Floats, times: Floats, columns: Mapping[str, Floats]) -> None:
-        """Store many rows of a group; the first axis of every array."""
-        if len(steps):
-            self._buffers[group].extend({"step": steps, "time": times, **columns})
+    def rows(
+        self,
+        group: str,
+        steps: Steps,
+        times: Times,
+        columns: Mapping[str, NDArray[Any]],
+    ) -> None:
+        """Store rows of a group, the first axis of every array."""
+        own = {"step": np.array(steps), "time": np.array(times)}
+        self._buffers[group].put({**own, **columns})
 
-    def displacements(self, step: int, time: float, field: Floats) -> None:
-        """Store a row of tape3: every dof of every node, (numnp, 5)."""
-        self.row("tape3", step, time, {"w": field[:, 2], "displacement": field})
+    def displacements(self, steps: Steps, times: Times, fields: Floats) -> None:
+        """Store rows of tape3: every dof of every node, (rows, numnp, 5)."""
+        self.rows("tape3", steps, times, {"w": fields[:, :, 2], "displacement": fields})
 
-    def strains(self, step: int, time: float, field: Floats) -> None:
-        """Store a row of tape8: strains of the displacements at `time`."""
-        strains = self._model.strains.evaluate(field)
-        self.row("tape8", step, time, dict(zip(STRAINS, strains, strict=True)))
+    def strains(self, steps: Steps, times: Times, fields: Floats) -> None:
+        """Store rows of tape8: strains of the displacements at `times`, (rows, numnp, 5)."""
+        strains = self._model.strains.evaluate(fields)
+        self.rows("tape8", steps, times, dict(zip(STRAINS, strains, strict=True)))
 
     def state(self) -> dict[str, Any]:
         """Rows that are not stored yet, for :meth:`restore`."""

@@ -6,7 +6,7 @@ import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,10 @@ from fecm.mechanics import kernels
 from fecm.mechanics.contact_law import (
     ContactPoint,
     HystereticLaw,
-    LinearPermanent,
-    YangSunPermanent,
 )
 from fecm.mechanics.impact import ContactState, couple_step
-from fecm.mechanics.impact_steps import Modes
-from fecm.mechanics.kernels.plate import floats
+from fecm.mechanics.impact_steps import CRITICAL, Modes
+from fecm.mechanics.kernels import floats
 from fecm.mechanics.projectile import Projectile
 from fecm.mechanics.rod_integrators import WilsonStep
 from fecm.results.metrics import Indentation
@@ -71,7 +69,7 @@ def impacts(response: Floats, dt: float, node_mass: float, hits: Hits) -> Impact
     `node_mass` is the mass that the contact force accelerates: the lumped mass of the impact node,
     or 1/(g M^-1 g) of a patch with the weights g.
     """
-    if kernels.LIBRARY is not None and type(hits.law.constants) in _CRITICAL:
+    if kernels.LIBRARY is not None and type(hits.law.constants) in CRITICAL:
         return _by_kernels(response, dt, node_mass, hits)
     rods = [WilsonStep(rod.stiffness(), rod.mass(), dt) for rod in hits.rods]
     tips = TipSteps(rods, hits.kind, len(response), hits.scale)
@@ -146,13 +144,6 @@ def balance_errors(force: Floats, work: Work, hits: Hits, tips: TipSteps) -> Flo
     return worst
 
 
-# Critical indentation and slope of the laws that the kernel knows: equations 3-8 and 3-7.
-_CRITICAL: dict[type, Any] = {
-    LinearPermanent: lambda law: (law.alpha_p, law.s_p),
-    YangSunPermanent: lambda law: (law.alpha_cr, np.nan),
-}
-
-
 @lru_cache(maxsize=8)
 def _modes(rod: Projectile) -> Modes:
     return Modes.of(rod.stiffness(), rod.mass())
@@ -163,7 +154,7 @@ def _by_kernels(response: Floats, dt: float, node_mass: float, hits: Hits) -> Im
     steps, cases, c = len(response), len(hits.speed), hits.law.constants
     given = np.empty((6, cases))
     given[0], given[1], given[4], given[5] = c.k, c.q, hits.speed, hits.scale
-    given[2], given[3] = _CRITICAL[type(c)](c)
+    given[2], given[3] = CRITICAL[type(c)](c)
     force, found = np.empty((cases, steps)), np.empty((len(FOUND), cases))
     starts = np.searchsorted(hits.kind, np.arange(len(hits.rods) + 1)).tolist()
     for rod, first, last in zip(hits.rods, starts[:-1], starts[1:], strict=True):

@@ -8,6 +8,8 @@ from ctypes import POINTER, Structure, c_double, c_int8, c_int32, c_int64
 from pathlib import Path
 from typing import Any
 
+from fecm._typing import Floats
+
 Doubles, Integers, Longs = POINTER(c_double), POINTER(c_int32), POINTER(c_int64)
 Codes = POINTER(c_int8)
 
@@ -132,3 +134,8 @@ def description() -> str:
     if LIBRARY is None:
         return "not compiled; NumPy is used"
     return f"compiled, {'AVX2' if LIBRARY.fecm_has_avx2() else 'portable'}"
+
+
+def floats(array: Floats) -> Any:
+    """Pointer to an array of numbers."""
+    return array.ctypes.data_as(Doubles)

@@ -1,7 +1,5 @@
 /* Largest exposures of plies, with FailureMonitor's arithmetic; included once for each instruction set. */
 
-INLINE half NAME(root)(half x) { return (half){sqrt(x[0]), sqrt(x[1]), sqrt(x[2]), sqrt(x[3])}; }
-
 /* Largest of some candidates, the first of equals, and the codes of their modes. */
 typedef struct {
     half exposure, mode;
@@ -27,18 +25,18 @@ INLINE void NAME(criteria)(const Ply *p, half s1, half s2, half tau, NAME(Worst)
     const double x = p->xt * p->xc, y = p->yt * p->yc;
     const half q = s1 * (s1 * (1.0 / x) + 2.0 * p->f12 / sqrt(x * y) * s2) + s2 * s2 * (1.0 / y) + ratio * ratio;
     const half linear = s1 * (1.0 / p->xt - 1.0 / p->xc) + s2 * (1.0 / p->yt - 1.0 / p->yc);
-    NAME(admit)(w + 1, 0.5 * (linear + NAME(root)(linear * linear + 4.0 * q)), 6);
+    NAME(admit)(w + 1, 0.5 * (linear + ROOT(linear * linear + 4.0 * q)), 6);
     /* Hashin. */
     const half matrix = s2 * NAME(choose)(open, one * (1.0 / p->yt), one * (1.0 / p->yc));
-    const half both = NAME(root)(matrix * matrix + ratio * ratio);
-    NAME(admit)(w + 2, NAME(choose)(pulled, NAME(root)(fibre * fibre + ratio * ratio), zero), 1);
+    const half both = ROOT(matrix * matrix + ratio * ratio);
+    NAME(admit)(w + 2, NAME(choose)(pulled, ROOT(fibre * fibre + ratio * ratio), zero), 1);
     NAME(admit)(w + 2, crushed, 2);
     NAME(admit)(w + 2, NAME(choose)(open, both, zero), 3), NAME(admit)(w + 2, NAME(choose)(pressed, both, zero), 4);
     /* Puck. */
     const double s = p->s12, slope = p->p_minus * p->resistance / s, wide = 2.0 * (1.0 + slope) * s;
     const half press = one * (p->p_minus / s);
     const half factor = NAME(choose)(pressed, press, one * (1.0 / p->yt - p->p_plus / s)) * s2;
-    const half ab = NAME(root)(ratio * ratio + factor * factor) + NAME(choose)(pressed, press, one * (p->p_plus / s)) * s2;
+    const half ab = ROOT(ratio * ratio + factor * factor) + NAME(choose)(pressed, press, one * (p->p_plus / s)) * s2;
     const mask steep = pressed & (-s2 * p->critical > t * p->resistance);
     const half c = (t * t * (p->yc / (wide * wide)) + s2 * s2 * (1.0 / p->yc)) / -NAME(choose)(steep, s2, -one);
     NAME(admit)(w + 3, fibre, 1), NAME(admit)(w + 3, crushed, 2);

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import ctypes
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from fecm._typing import Floats
 from fecm.mechanics.failure import puck_limits
 from fecm.mechanics.failure_envelope import FailureMonitor, Maxima
-from fecm.mechanics.kernels import LIBRARY, Codes, Doubles, Failure
+from fecm.mechanics.kernels import LIBRARY, Codes, Failure, floats
 
 
 class CompiledMonitor(FailureMonitor):
@@ -27,11 +26,7 @@ class CompiledMonitor(FailureMonitor):
         p, table = self._strengths, self._table
         ply = p.xt, p.xc, p.yt, p.yc, p.s12, p.f12, p.p_plus, p.p_minus, *puck_limits(p)
         structure = Failure(
-            len(strains), self._in_plane.shape[1] // 3, table.shape[2], _doubles(table), *ply,
-            _doubles(plies.exposure), _doubles(plies.time), plies.mode.ctypes.data_as(Codes),
+            len(strains), self._in_plane.shape[1] // 3, table.shape[2], floats(table), *ply,
+            floats(plies.exposure), floats(plies.time), plies.mode.ctypes.data_as(Codes),
         )  # fmt: skip
-        LIBRARY.fecm_failure(ctypes.byref(structure), _doubles(strains), ctypes.c_double(time))
-
-
-def _doubles(array: Floats) -> Any:
-    return array.ctypes.data_as(Doubles)
+        LIBRARY.fecm_failure(ctypes.byref(structure), floats(strains), ctypes.c_double(time))

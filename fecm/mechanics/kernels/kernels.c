@@ -338,7 +338,7 @@ static void carry_out(Job *job) {
 #endif
 }
 
-/* Carry out a job; false if there is no memory. */
+/* Allocate the memory of a job and carry it out; returns 0 if there is not enough memory. */
 static int with_memory(Job *job) {
     const Plate *p = job->plate;
     if (job->threads > MOST_THREADS) job->threads = MOST_THREADS;
@@ -414,7 +414,7 @@ static void respond(const Sweep *x, Response *r) {
         r->turn[2 * i] = cos(M_PI * i / FAR), r->turn[2 * i + 1] = sin(M_PI * i / FAR);
 }
 
-/* Compute impacts; returns 0 without memory for it. */
+/* Compute impacts; returns 0 if there is not enough memory. */
 EXPORT int fecm_sweep(const Sweep *x) {
     const int64_t blocks = (x->steps + FAR - 1) / FAR, n = x->modes;
     const int64_t numbers[] = {2 * x->steps, 9 * n, 3 * CHECKED * n, 2 * FAR, SPACED * blocks};

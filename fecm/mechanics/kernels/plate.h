@@ -67,21 +67,31 @@ INLINE void NAME(add_columns)(int nd, const int32_t *to, const half *y, double *
     }
 }
 
-/* Elements with one matrix. */
-INLINE void NAME(one_matrix)(int nd, int nodes, const Block *b, const double *u, double *f) {
-    lanes x[60] ALIGNED, y[60] ALIGNED;
+/* Displacements (nd, nodes) of eight elements, and their forces y added to those of the nodes. */
+INLINE void NAME(gather)(int nd, int nodes, const Block *b, const double *u, lanes *x) {
     half r[5];
     for (int node = 0; node < nodes; node++)
         for (int side = 0; side < 2; side++) {
             NAME(columns)(nd, b->from + LANES * node + 4 * side, u, r);
             for (int dof = 0; dof < nd; dof++) HALF(x[dof * nodes + node]) = r[dof];
         }
-    NAME(product)(b->group->matrix, nd * nodes, nd * nodes, x, y);
+}
+
+INLINE void NAME(scatter)(int nd, int nodes, const Block *b, const lanes *y, double *f) {
+    half r[5];
     for (int node = 0; node < nodes; node++)
         for (int side = 0; side < 2; side++) {
             for (int dof = 0; dof < nd; dof++) r[dof] = HALF(y[dof * nodes + node]);
             NAME(add_columns)(nd, b->to + LANES * node + 4 * side, r, f);
         }
+}
+
+/* Elements with one matrix. */
+INLINE void NAME(one_matrix)(int nd, int nodes, const Block *b, const double *u, double *f) {
+    lanes x[60] ALIGNED, y[60] ALIGNED;
+    NAME(gather)(nd, nodes, b, u, x);
+    NAME(product)(b->group->matrix, nd * nodes, nd * nodes, x, y);
+    NAME(scatter)(nd, nodes, b, y, f);
 }
 
 /* Elements with one matrix for even motions and one for odd ones: under half a turn w keeps its sign,
@@ -130,12 +140,7 @@ INLINE void NAME(no_matrix)(int nd, int nodes, const Plate *p, const Block *b, d
     const Group *g = b->group;
     const double *data = b->data;
     lanes x[60] ALIGNED, y[60] ALIGNED;
-    half r[5];
-    for (int node = 0; node < nodes; node++)
-        for (int side = 0; side < 2; side++) {
-            NAME(columns)(nd, b->from + LANES * node + 4 * side, p->u, r);
-            for (int dof = 0; dof < nd; dof++) HALF(x[dof * nodes + node]) = r[dof];
-        }
+    NAME(gather)(nd, nodes, b, p->u, x);
     const int nb = (int)g->bending, ns = (int)g->shear, nt = (int)g->tying;
     const int values = nt ? 2 * nt : ns, slopes = nt ? 2 * nt : 2 * ns, first = nd == 5 ? 2 : 0;
     lanes at_w[32], at_r[2][48], at_u[2][32], e[2][16], part[12];
@@ -229,11 +234,7 @@ INLINE void NAME(no_matrix)(int nd, int nodes, const Plate *p, const Block *b, d
         NAME(product)(g->rotations_t, nodes, 2 * nb + values, at_r[i], yw + (1 + i) * nodes);
         if (nd == 5) NAME(product)(g->in_plane_t, nodes, 2 * nb, at_u[i], y + i * nodes);
     }
-    for (int node = 0; node < nodes; node++)
-        for (int side = 0; side < 2; side++) {
-            for (int dof = 0; dof < nd; dof++) r[dof] = HALF(y[dof * nodes + node]);
-            NAME(add_columns)(nd, b->to + LANES * node + 4 * side, r, f);
-        }
+    NAME(scatter)(nd, nodes, b, y, f);
 }
 
 /* Biquadratic elements with the points of a tensor product, by sum factorization.

@@ -14,11 +14,8 @@ from fecm._typing import Bools, Floats
 from fecm.mechanics import assumed_shear
 from fecm.mechanics.element_groups import ElementBlock, congruence, distinct
 from fecm.mechanics.elements.quadrature import Quadrature
-from fecm.mechanics.interpolation import (
-    NDOF,
-    local_shape_functions,
-)
-from fecm.mechanics.kernels import LIBRARY, Chunk, Doubles, Group, Integers, Plate
+from fecm.mechanics.interpolation import NDOF, local_shape_functions
+from fecm.mechanics.kernels import LIBRARY, Chunk, Group, Integers, Plate, floats
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.stiffness_operator import R, StiffnessOperator, pieces
 from fecm.mechanics.symmetry import TURNED, SymmetryReduction, opposite_nodes
@@ -386,11 +383,6 @@ class CompiledProduct(StiffnessOperator):
         dofs = np.where(rest, 0, np.where(turned, indices - self._count, indices))
         signed = np.where(rest, 0.0, np.where(turned, -weights, weights))
         return self.plate.position[dofs].astype(np.int64), np.ascontiguousarray(signed)
-
-
-def floats(array: Floats) -> Any:
-    """Pointer to an array of numbers."""
-    return array.ctypes.data_as(Doubles)
 
 
 def _layout(groups: list[_Elements]) -> _Layout:

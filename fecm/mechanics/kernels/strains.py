@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fecm._typing import Floats
 from fecm.mechanics.element_groups import congruence
 from fecm.mechanics.interpolation import local_shape_functions
-from fecm.mechanics.kernels import LIBRARY, Doubles, Longs, Strains
+from fecm.mechanics.kernels import LIBRARY, Longs, Strains, floats
 from fecm.mechanics.kernels.plate import jacobians
 from fecm.mechanics.strains import STRAINS, StrainField
 
@@ -41,7 +41,7 @@ class CompiledStrains(StrainField):
             longs = [np.ascontiguousarray(a, dtype=np.int64)
                      for a in (family.rows, family.nodes, same.group)]  # fmt: skip
             pointers: list[Any] = [array.ctypes.data_as(Longs) for array in longs]
-            pointers += [array.ctypes.data_as(Doubles) for array in (table, metric)]
+            pointers += [floats(array) for array in (table, metric)]
             numbers = len(family.rows), nodes, points, width
             made.append((Strains(*numbers, *pointers), [*longs, table, metric]))
         return made
@@ -56,6 +56,6 @@ class CompiledStrains(StrainField):
         for structure, _ in self._structures:
             LIBRARY.fecm_strains(
                 ctypes.byref(structure), *map(ctypes.c_int64, (count, numnp, self.shape[0])),
-                fields.ctypes.data_as(Doubles), strains.ctypes.data_as(Doubles),
+                floats(fields), floats(strains),
             )  # fmt: skip
         return strains
