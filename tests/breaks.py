@@ -195,12 +195,12 @@ def partly_given(right: Any, convolution: Any, values: Any) -> None:
 
 
 def exchanged_on_tape8(
-    right: Any, recorder: Any, group: str, step: Any, time: Any, columns: Any
+    right: Any, recorder: Any, group: str, steps: Any, times: Any, columns: Any
 ) -> None:
     if group == "tape8":
         other = ("kappa_y", "kappa_x", "kappa_xy", "gamma_xz", "gamma_yz")
         columns = dict(zip(other, columns.values(), strict=True))
-    right(recorder, group, step, time, columns)
+    right(recorder, group, steps, times, columns)
 
 
 def other_power(right: Any, constants: Any, *args: Any) -> None:

@@ -205,7 +205,7 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
         in_strains(2, 4), {"patch": ("γ_xy", "κ_xy"), "tape8": ("κ_xy",)},
     ),
     "strains of x and y exchanged on tape8": (
-        instead(Recorder, "row", exchanged_on_tape8),
+        instead(Recorder, "rows", exchanged_on_tape8),
         {"tape8": ("κ_x ", "κ_y ", "γ_yz", "γ_xz")},
     ),
     "Jacobian transposed": (
