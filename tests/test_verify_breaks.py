@@ -36,8 +36,7 @@ from fecm.problem import build
 from fecm.simulation.recorder import Recorder
 from fecm.studies import quick_models
 from fecm.studies.rod_test import pulse_test
-from fecm.studies.waves.fronts import Fronts
-from fecm.studies.waves.medium import Medium
+from fecm.studies.waves import Fronts, Medium
 from fecm.sweeps.responses import Convolution
 from fecm.verification import CASES, carry_out, chosen
 from tests.breaks import (
