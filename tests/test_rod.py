@@ -16,12 +16,16 @@ from fecm.mechanics.projectile import Rod, report_rod
 from fecm.mechanics.rod_integrators import AVERAGE, CONSISTENT
 from fecm.studies.rod_test.filters import Filter
 from fecm.studies.rod_test.pulse_test import (
+    Pulse,
     RodHistory,
     default_time_step,
     force_row,
+    gauss_pulse,
+    pulse_of,
     simulate_pulse,
+    sine_pulse,
+    table_pulse,
 )
-from fecm.studies.rod_test.pulses import Pulse, gauss_pulse, pulse_of, sine_pulse, table_pulse
 from tests.builders import table
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, small

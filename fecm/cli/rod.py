@@ -22,10 +22,15 @@ from fecm.problem.build import build_projectile, build_station
 from fecm.studies import StudyError
 from fecm.studies.rod_test.calibration import Calibration
 from fecm.studies.rod_test.calibration import calibrate as fit_sensitivity
-from fecm.studies.rod_test.filters import Filter, filter_of
-from fecm.studies.rod_test.history import recorded
-from fecm.studies.rod_test.pulse_test import RodHistory, default_time_step, simulate_pulse, table
-from fecm.studies.rod_test.pulses import Pulse, pulse_of
+from fecm.studies.rod_test.filters import Filter, filter_of, recorded
+from fecm.studies.rod_test.pulse_test import (
+    Pulse,
+    RodHistory,
+    default_time_step,
+    pulse_of,
+    simulate_pulse,
+    table,
+)
 from fecm.studies.tables import read_table
 
 FILTER_HELP = ("first-order:RISE or moving-average:RISE, with the time RISE from 10 to 90 % of the "

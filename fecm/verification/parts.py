@@ -24,8 +24,7 @@ from fecm.mechanics.delamination import effective_rigidity, threshold_force
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.projectile import Rod, report_rod
 from fecm.mechanics.rod_integrators import CONSISTENT
-from fecm.studies.rod_test.pulse_test import simulate_pulse
-from fecm.studies.rod_test.pulses import gauss_pulse, sine_pulse
+from fecm.studies.rod_test.pulse_test import gauss_pulse, simulate_pulse, sine_pulse
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from fecm.verification.case import Value, case
 from fecm.verification.decks import REPORT_ANGLES, REPORT_PLY, REPORT_THICKNESS, isotropic
