@@ -19,8 +19,7 @@ from fecm.api import load_deck
 from fecm.plot import style
 from fecm.plot.kinds import Picture
 from fecm.plot.pictures import save
-from fecm.studies.estimate import estimate
-from fecm.studies.quick_models import LARGE, SMALL
+from fecm.studies.estimate import LARGE, SMALL, estimate
 from fecm.sweeps.api import carry_out
 from fecm.sweeps.plan import plan
 from fecm.verification.decks import result_of

@@ -14,8 +14,12 @@ from fecm.deck.records import Ply
 from fecm.mechanics.delamination import SMALL_MASS, effective_rigidity, threshold_force
 from fecm.mechanics.laminate import laminate
 from fecm.results.result import Result
-from fecm.studies.estimate import static_stiffness
-from fecm.studies.quick_models import inelasticity, infinite_plate, static_plate
+from fecm.studies.estimate import (
+    inelasticity,
+    infinite_plate,
+    static_plate,
+    static_stiffness,
+)
 from fecm.verification.decks import result_of
 from fecm.verification.impacts import struck_square
 from tests.builders import report_plate, table

@@ -34,7 +34,7 @@ from fecm.mechanics.impact import ImpactSystem
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.problem import build
 from fecm.simulation.recorder import Recorder
-from fecm.studies import quick_models
+from fecm.studies import estimate
 from fecm.studies.rod_test import pulse_test
 from fecm.studies.waves import Fronts, Medium
 from fecm.sweeps.responses import Convolution
@@ -357,11 +357,11 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
         {"threshold": ("",)},
     ),
     "a tenth of the plate's inertia missing in Zener's parameter": (
-        instead(quick_models, "infinite_plate", lambda right, *a: right(*a[:-1], a[-1] / 0.9**0.5)),
+        instead(estimate, "infinite_plate", lambda right, *a: right(*a[:-1], a[-1] / 0.9**0.5)),
         {"small-mass": ("F T", "t_peak")},
     ),
     "nine tenths of the plate's stiffness": (
-        instead(quick_models, "static_plate", lambda right, *a: right(*a[:-1], 0.9 * a[-1])),
+        instead(estimate, "static_plate", lambda right, *a: right(*a[:-1], 0.9 * a[-1])),
         {"large-mass": ("largest",)},
     ),
     "EQUI ignored": (

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from fecm._tables import aligned
 from fecm.cli.common import DECK_PATH, FORMAT_OPTION, echo, echo_json, note
 from fecm.cli.decks import load_single
 from fecm.deck.units import unit_names, unit_of
@@ -16,7 +17,11 @@ from fecm.studies.estimate import estimate as estimate_problem
 from fecm.sweeps.api import carry_out
 from fecm.sweeps.plan import plan
 
-COLUMNS = ("model", "peak force", "duration", "threshold", "velocity", "energy")
+# Columns of the table, and their dimensions.
+COLUMNS = {
+    "peak force": "force", "duration": "time", "threshold": "force", "velocity": "length/time",
+    "energy": "force*length",
+}  # fmt: skip
 
 
 @click.command()
@@ -77,19 +82,13 @@ def _print(problem: Problem, values: dict[str, Any]) -> None:
     echo(problem.deck.title or "(no title)")
     echo(f"  class       M/M_plate = {values['mass_ratio']:.4g}, {values['class']}")
     echo(f"  lambda      {values['lambda']:.4g}")
-    stiffness = values["stiffness"]
-    held = text(stiffness, "force/length")
-    free = "- (the plate is free: no static model)"
-    echo(f"  stiffness   {free if math.isnan(stiffness) else held}")
+    free = " (the plate is free: no static model)" if math.isnan(values["stiffness"]) else ""
+    echo(f"  stiffness   {text(values['stiffness'], 'force/length')}{free}")
     if problem.damping:
         echo("  damping     in the run only: the models without a mesh neglect DAMP")
-    dimensions = ("force", "time", "force", "length/time", "force*length")
-    table = [list(COLUMNS)]
+    table = [["model", *COLUMNS]]
     for row in values["models"]:
         model, *numbers = row.values()
-        cells = zip(numbers, dimensions, strict=True)
-        table.append([model, *(text(value, dimension) for value, dimension in cells)])
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    for cells_ in table:
-        line = "  ".join(cell.ljust(width) for cell, width in zip(cells_, widths, strict=True))
-        echo(f"  {line}".rstrip())
+        table.append([model, *map(text, numbers, COLUMNS.values())])
+    for line in aligned(table):
+        echo(f"  {line}")

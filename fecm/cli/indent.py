@@ -19,8 +19,8 @@ from fecm.deck.catalogue import CONTACTS, NU23, SYSTEM, SYSTEMS, NamedPly
 from fecm.deck.model import Indentation
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.studies import StudyError
-from fecm.studies.indentation_test import LIMITS_Q
 from fecm.studies.indentation_test.constants import fit as fitted
+from fecm.studies.indentation_test.curves import LIMITS_Q
 from fecm.studies.indentation_test.modulus import effective_stiffness, indentation_modulus
 from fecm.studies.indentation_test.report import card, lines, notes, plain
 from fecm.studies.indentation_test.table import Test, read_test

@@ -11,6 +11,7 @@ from typing import Any
 import click
 import numpy as np
 
+from fecm._tables import aligned
 from fecm._version import __version__
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION, echo_json
 from fecm.cli.isolation import reads
@@ -150,13 +151,8 @@ def _group(group: Mapping[str, Any]) -> list[str]:
     if group["rows"] is not None:
         head += f"; {group['rows']} row{'s' * (group['rows'] != 1)}"
     attributes = [f"{printable(name)} = {shown(v)}" for name, v in group["attributes"].items()]
-    lines = [head, *(f"  {text}" for text in attributes)]
-    cells = [_cells(dataset) for dataset in group["datasets"]]
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    for row in cells:
-        text = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        lines.append(f"  {text}".rstrip())
-    return lines
+    datasets = aligned([_cells(dataset) for dataset in group["datasets"]])
+    return [head, *(f"  {text}" for text in (*attributes, *datasets))]
 
 
 def _cells(dataset: Mapping[str, Any]) -> tuple[str, ...]:

@@ -34,7 +34,6 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn, TypeVar
 
-from fecm._children import die_with_parent
 from fecm._files import clear_partials
 from fecm._frozen import frozen
 from fecm._memory import available, format_bytes
@@ -47,6 +46,7 @@ ROOM, ROOM_A_BYTE = 4 * GB, 50
 PATIENCE, SPEED = 30.0, 5_000_000
 TOTAL, TOTAL_SPEED = 600.0, 100_000
 FREE_SHARE = 0.75
+PR_SET_PDEATHSIG = 1  # prctl(2): signal of this process when its parent ends
 WAIT = 0.1  # time between two looks at the child (s)
 # Time that a child has to end after a signal, first by itself, then after it gets the signal (s).
 GRACE = 0.3, 2.0
@@ -104,7 +104,7 @@ def fork() -> None:
         os.close(writing)
         _wait(child, reading)
     os.close(reading)
-    die_with_parent(parent)
+    _die_with_parent(parent)
     switch.pipe = writing
 
 
@@ -161,6 +161,17 @@ def _folders(values: dict[str, Any]) -> list[str]:
 
 
 # The child --------------------------------------------------------------------------------------
+
+
+def _die_with_parent(parent: int) -> None:
+    """Have Linux kill this process when its parent ends, which may have happened since the fork."""
+    if sys.platform != "linux":
+        return
+    import ctypes
+
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), signal.SIGKILL)
 
 
 def _confine(limits: Limits, pipe: int) -> None:

@@ -13,7 +13,7 @@ from textwrap import shorten
 from typing import ClassVar, Self, TypeVar
 
 from fecm._frozen import frozen
-from fecm._html import html_table
+from fecm._tables import html_table
 from fecm.deck.card import Fields, Source, Value, layout, write_card
 from fecm.deck.records import (
     AXES,

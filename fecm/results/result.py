@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._html import html_table
+from fecm._tables import html_table
 from fecm._typing import Floats
 from fecm.deck.model import Deck, Impact
 from fecm.deck.units import unit_of

@@ -1,10 +1,17 @@
-"""Quick estimates of an impact, and the velocities at which they reach the threshold of DELA."""
+"""Quick estimates of an impact: models without a mesh, and when they reach the threshold of DELA.
+
+Small mass (Zener 1941, Olsson 1992): the plate under the contact is a dashpot,
+a'' + 3/2 lambda sqrt(a) a' + a^1.5 = 0 in units of the contact.  Large mass: the kinetic energy is
+stored in the bending of the plate and in the indentation.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 
+import numpy as np
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from fecm._frozen import frozen
@@ -16,14 +23,72 @@ from fecm.mechanics.statics import SingularStiffnessError, Tangent
 from fecm.problem.build import build_projectile
 from fecm.problem.problem import Problem
 from fecm.studies import StudyError
-from fecm.studies.quick_models import (
-    LARGE,
-    SMALL,
-    QuickImpact,
-    inelasticity,
-    infinite_plate,
-    static_plate,
-)
+
+# Mass over the plate's below which waves control the impact, and above which it is quasi-static.
+SMALL, LARGE = 0.1, 50.0
+
+
+@frozen
+class QuickImpact:
+    """Result of a quick model."""
+
+    peak: float  # contact force
+    time: float  # of the peak
+    duration: float  # of the contact
+
+
+def inelasticity(
+    mass: float, velocity: float, k: float, plate_mass: float, rigidity: float
+) -> float:
+    """Zener's parameter lambda = k^0.4 V^0.2 M^0.6/(8 sqrt(m D*)).
+
+    M and V are of the projectile, m is the plate's mass per area, k the contact coefficient in
+    force/length^1.5, and D* the effective bending stiffness in force*length.
+    """
+    return float(k**0.4 * velocity**0.2 * mass**0.6) / (8.0 * math.sqrt(plate_mass * rigidity))
+
+
+def infinite_plate(mass: float, velocity: float, k: float, parameter: float) -> QuickImpact:
+    """Impact on an infinite plate with the parameter lambda.
+
+    F = a^1.5 M V/T with the time scale T = (M/(k sqrt(V)))^0.4.
+    """
+
+    def rate(_: float, state: Floats) -> Floats:
+        root = np.sqrt(max(state[0], 0.0))
+        return np.array([state[1], -1.5 * parameter * root * state[1] - root**3])
+
+    def leaves(_: float, state: Floats) -> float:
+        return float(state[0])
+
+    def turns(_: float, state: Floats) -> float:
+        return float(state[1])
+
+    leaves.terminal, leaves.direction, turns.direction = True, -1.0, -1.0  # type: ignore[attr-defined]
+    found = solve_ivp(
+        rate, (0.0, 1e6), [0.0, 1.0], "DOP853", events=(leaves, turns), rtol=1e-11, atol=1e-13
+    )
+    scale = (mass / (k * velocity**0.5)) ** 0.4
+    peak = float(found.y_events[1][0][0]) ** 1.5 * mass * velocity / scale
+    ends = found.t_events[0]
+    duration = float(ends[0]) * scale if len(ends) else float("inf")
+    return QuickImpact(peak, float(found.t_events[1][0]) * scale, duration)
+
+
+def static_plate(mass: float, velocity: float, k: float, stiffness: float) -> QuickImpact:
+    """Impact whose energy M V^2/2 is F^2/(2 k_b) in bending and (2/5) F^(5/3)/k^(2/3) in contact.
+
+    k_b is the static stiffness of the plate under its patch, force/length.
+    """
+    energy = 0.5 * mass * velocity**2
+    most = velocity * math.sqrt(stiffness * mass)  # without indentation
+
+    def missing(force: float) -> float:
+        return force**2 / (2.0 * stiffness) + 0.4 * math.cbrt(force**5 / k**2) - energy
+
+    duration = math.pi * math.sqrt(mass / stiffness)
+    peak = float(brentq(missing, 0.0, most, xtol=1e-12 * most))
+    return QuickImpact(peak, duration / 2.0, duration)
 
 
 @frozen
@@ -70,13 +135,12 @@ def estimate(problem: Problem) -> Estimate:
     def small(v: float) -> QuickImpact:
         return infinite_plate(mass, v, k, inelasticity(mass, v, k, laminate.mass, rigidity))
 
+    def large(v: float) -> QuickImpact:
+        return static_plate(mass, v, k, stiffness)
+
     models = [_model("infinite plate", small, velocity, SMALL_MASS * force)]
     stiffness = static_stiffness(problem.moving_plate, contact)
     if math.isfinite(stiffness):
-
-        def large(v: float) -> QuickImpact:
-            return static_plate(mass, v, k, stiffness)
-
         models.append(_model("static plate", large, velocity, force))
     parameter = inelasticity(mass, velocity, k, laminate.mass, rigidity)
     return Estimate(mass, ratio, parameter, stiffness, tuple(models))

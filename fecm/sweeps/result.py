@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._html import html_table
+from fecm._tables import html_table
 from fecm._version import __version__
 from fecm.deck.model import Delamination
 from fecm.deck.units import unit_names, unit_of

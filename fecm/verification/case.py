@@ -21,6 +21,7 @@ from fecm._typing import Floats
 TABLES: dict[str, dict[str, Any]] = tomllib.loads(
     (resources.files("fecm.verification") / "checks.toml").read_text("utf-8")
 )
+INTRODUCTION: Any = TABLES.pop("introduction")
 # A number; a field, of which the value farthest from the expected one counts; or a field and its
 # expected shape, of which the amplitude at the point farthest from the expected field counts.
 Value = float | Floats | tuple[Floats, Floats]

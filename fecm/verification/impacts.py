@@ -16,8 +16,7 @@ from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.build import build_plate
 from fecm.problem.generate import generate
 from fecm.results.result import Result
-from fecm.studies import quick_models
-from fecm.studies.estimate import static_stiffness
+from fecm.studies.estimate import infinite_plate, static_plate, static_stiffness
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.plan import plan
 from fecm.verification.case import Value, case
@@ -147,7 +146,7 @@ def struck_square(mass: float, end: float) -> Deck:
 @case("small-mass")
 def small_mass() -> Sequence[Value]:
     """Peak and time of the dashpot model, peak of a run."""
-    model = quick_models.infinite_plate(1.0, 1.0, 1.0, 1.0)
+    model = infinite_plate(1.0, 1.0, 1.0, 1.0)
     return [model.peak, model.time, result_of(struck_square(0.0128, 3e-5)).force.max()]
 
 
@@ -157,4 +156,4 @@ def large_mass() -> Sequence[Value]:
     (problem,) = load_deck(struck_square(1.0, 1e-6).to_text()).problems
     assert problem.contact is not None
     stiffness = static_stiffness(problem.moving_plate, problem.contact)
-    return [stiffness, quick_models.static_plate(5.5, 2.0, 1e9, 2.5e6).peak]
+    return [stiffness, static_plate(5.5, 2.0, 1e9, 2.5e6).peak]

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from typing import Any
 
-from fecm.verification.case import CASE_OF, Case, Row
+from fecm.verification.case import CASE_OF, INTRODUCTION, Case, Row
 
 HEAD = ("case", "source", "quantity", "expected", "got", "error", "allowed", "label", "verdict")
 FINE, NOT_FINE = "ok", "FAILED"
@@ -53,37 +53,6 @@ def values(row: Row) -> dict[str, Any]:
         "failure": row.failure,
     }  # fmt: skip
 
-
-INTRODUCTION = """\
-# Verification
-
-`fecm verify` computes the cases below in a few seconds and compares the results with known values.
-It needs no files, so that it tests the installed program. The exit status is 0 if every row is
-within its tolerance, and 1 otherwise.
-
-```sh
-fecm verify                        # all cases
-fecm verify patch rod-pulse        # some cases
-fecm verify --list                 # names of the cases
-fecm verify --format json          # JSON
-fecm verify --markdown             # this page
-```
-
-- **independent**: the expected value is a closed form or an external reference.
-- **consistency**: two computations by this program must agree, or its results must satisfy a law
-  such as the energy balance. Such a row cannot detect an error that both sides share.
-- **against change**: the expected value was computed by the original program, recompiled, or by
-  this program. Such a row does not show that either is correct, only that nothing has changed.
-
-The error is relative to the expected value; if that is zero, to a scale stated in the row or a
-natural scale of the quantity. The tolerance follows from the theory of the discretisation, for the
-reason stated. Each row of the first two kinds fails if the physics that it tests is broken on
-purpose: `tests/test_verify_breaks.py` does so, and requires that every such row is covered.
-
-Units are lb, in and s, except for the square plates of `static-bending`, `frequencies`,
-`assumed-shear`, `equilibrium-shear`, `ply-stresses` and `ply-shear`, whose sides and least moduli
-are of the order of 1. Plates have L2 = 2 unless stated otherwise; `patch`, `resultants`,
-`time-step` and the impacts have L2 = 3, as the deck of the report. MITC is the word of `SHEA`."""
 
 COLUMNS = ("quantity", "source", "expected", "got", "error", "allowed", "because", "label")
 

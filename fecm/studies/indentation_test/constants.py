@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from fecm._frozen import frozen
 from fecm._typing import Floats
@@ -25,7 +25,6 @@ from fecm.studies.indentation_test.curves import (
     solve,
 )
 from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING, divide
-from fecm.studies.indentation_test.permanent import Critical, Line, critical, line
 
 
 @frozen
@@ -65,6 +64,123 @@ def free_power(curves: Curves) -> FreePower:
         r_squared(c * everywhere[0] ** n, everywhere[1]),
     )
 
+
+# Relation of permanent to largest indentation, equations 3-8 and 3-7 ------------------------------
+
+# Both coordinates of a cycle have errors, which are correlated with each other and with those of
+# other cycles; the fit is by generalised least squares with the complete covariance.
+
+# Iterations of the weights, which depend on the slope.
+ROUNDS = 20
+# Probability below which the scatter about the line exceeds the noise of the points.
+UNLIKELY = 0.01
+# Smallest error of a coordinate relative to the largest indentation, for tests without noise.
+ROUNDING = 1e-9
+
+
+@frozen
+class Line:
+    """Equation 3-8."""
+
+    s_p: Estimate
+    alpha_p: Estimate
+    elastic: tuple[int, ...]  # cycles below alpha_p, without permanent indentation
+    scatter: float  # of :func:`_scatter`; it multiplies the errors
+
+
+def line(peaks: Floats, permanents: Floats, covariance: Floats) -> Line | None:
+    """Fit alpha_0 = max(0, s_p (alpha_m - alpha_p)); None if fewer than two cycles exceed alpha_p.
+
+    The covariance is that of all peaks alpha_m, then all permanent indentations alpha_0.
+    """
+    covariance = covariance + np.eye(len(covariance)) * (ROUNDING * peaks.max()) ** 2
+    order = np.argsort(peaks)
+    best: tuple[float, Line] | None = None
+    for count in range(len(peaks) - 1):
+        elastic, beyond = order[:count], order[count:]
+        found = _split(peaks, permanents, covariance, elastic)
+        if found is None:
+            continue
+        chi, candidate = found
+        between = not count or peaks[elastic[-1]] <= candidate.alpha_p.value < peaks[beyond[0]]
+        if between and (best is None or chi < best[0]):
+            best = chi, candidate
+    return None if best is None else best[1]
+
+
+def _split(
+    peaks: Floats, permanents: Floats, covariance: Floats, elastic: NDArray[np.intp]
+) -> tuple[float, Line] | None:
+    """Return chi² and the line for a set of elastic cycles."""
+    n = len(peaks)
+    beyond = np.full(n, 1.0)
+    beyond[elastic] = 0.0
+    design = np.stack([beyond * peaks, beyond], axis=1)
+    slope, level = np.polyfit(peaks[beyond > 0.0], permanents[beyond > 0.0], 1)
+    normal, weight = np.eye(2), np.eye(n)
+    for _ in range(ROUNDS):
+        across = np.concatenate([np.diag(-slope * beyond), np.eye(n)], axis=1)
+        variance = across @ covariance @ across.T
+        weight = np.linalg.pinv(variance, rcond=1e-14, hermitian=True)
+        normal = design.T @ weight @ design
+        if not np.all(np.isfinite(normal)) or np.linalg.matrix_rank(normal) < 2:
+            return None
+        slope, level = np.linalg.solve(normal, design.T @ weight @ permanents)
+    errors = np.linalg.inv(normal)
+    left = permanents - design @ [slope, level]
+    chi = float(left @ weight @ left)
+    scatter = _scatter(chi, n - 2)
+    if slope == 0.0:
+        return None
+    by = np.array([level / slope**2, -1.0 / slope])
+    return chi, Line(
+        Estimate(float(slope), scatter * float(errors[0, 0] ** 0.5)),
+        Estimate(float(-level / slope), scatter * float((by @ errors @ by) ** 0.5)),
+        tuple(int(i) for i in elastic),
+        scatter,
+    )
+
+
+def _scatter(chi: float, freedom: int) -> float:
+    """Return the root of chi² per degree of freedom if it exceeds the noise, else 1."""
+    from scipy.stats import chi2
+
+    return (chi / freedom) ** 0.5 if freedom > 0 and chi2.sf(chi, freedom) < UNLIKELY else 1.0
+
+
+@frozen
+class Critical:
+    """Equation 3-7."""
+
+    alpha_cr: Estimate
+    scatter: float  # as that of a line
+
+
+def critical(peaks: Floats, permanents: Floats, covariance: Floats) -> Critical:
+    """Fit alpha_cr = (alpha_m - alpha_0)^(5/2)/alpha_m^(3/2), equal for all cycles.
+
+    Parameters are those of :func:`line`.  A cycle below alpha_cr has no permanent indentation and
+    only bounds alpha_cr: such cycles are excluded if there are others.
+    """
+    covariance = covariance + np.eye(len(covariance)) * (ROUNDING * peaks.max()) ** 2
+    own = (peaks - permanents) ** ACR_POWER / peaks**LOADING_POWER
+    by_peak = own * (ACR_POWER / (peaks - permanents) - LOADING_POWER / peaks)
+    by_permanent = -own * ACR_POWER / (peaks - permanents)
+    across = np.concatenate([np.diag(by_peak), np.diag(by_permanent)], axis=1)
+    variance = across @ covariance @ across.T
+    deep = peaks > own + np.sqrt(np.diag(variance))
+    if not deep.any():
+        deep[:] = True
+    weight = np.linalg.pinv(variance[np.ix_(deep, deep)], hermitian=True)
+    total = float(weight.sum())
+    mean = float((weight @ own[deep]).sum()) / total if total > 0.0 else float(own[deep].mean())
+    left = own[deep] - mean
+    scatter = _scatter(float(left @ weight @ left), int(deep.sum()) - 1)
+    error = scatter * total**-0.5 if total > 0.0 else 0.0
+    return Critical(Estimate(mean, error), scatter)
+
+
+# The whole test ---------------------------------------------------------------------------------
 
 # Largest number whose powers are finite.
 LARGEST = 1e60
@@ -143,7 +259,9 @@ def fit(
     found = p[peaks], p[at.permanents], covariance
     cycles = tuple(_cycle(solution, n) for n in range(len(peaks)))
     straight = line(*found) if not acr and len(cycles) > 1 else None
-    fitted, measured = solution.curves.of(solution.scaled, LOADING, FALLING, RISING)
+    kinds = (LOADING, FALLING, RISING)
+    of_curves = {kind: r_squared(*solution.curves.of(solution.scaled, kind)) for kind in kinds}
+    fitted, measured = solution.curves.of(solution.scaled, *kinds)
     return Fit(
         k=_parameter(solution, at.K),
         free=free_power(curves),
@@ -151,13 +269,7 @@ def fit(
         cycles=cycles,
         line=straight,
         critical=critical(*found) if acr and cycles else None,
-        r_squared={
-            **{
-                kind: r_squared(*solution.curves.of(solution.scaled, kind))
-                for kind in (LOADING, FALLING, RISING)
-            },
-            "permanent": _explained(straight, found[0], found[1]),
-        },
+        r_squared={**of_curves, "permanent": _explained(straight, found[0], found[1])},
         scatter=float(np.sqrt(np.mean((fitted - measured) ** 2))),
         solution=solution,
     )

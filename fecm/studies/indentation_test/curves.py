@@ -23,7 +23,6 @@ from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.mechanics.contact_law import LOADING_POWER, power_curve
 from fecm.studies import StudyError
-from fecm.studies.indentation_test import LIMITS_Q
 from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING, Division
 
 
@@ -55,6 +54,8 @@ def influence(jacobian: Floats, residual: Floats) -> tuple[Floats, Floats]:
 
 Ints = NDArray[np.int64]
 
+# Bounds of the unloading power.
+LIMITS_Q = (0.3, 12.0)
 # Fewest points of a curve.
 FEWEST = 5
 # Initial guess of the unloading power.
@@ -92,15 +93,12 @@ def layout_of(division: Division, tied: frozenset[int] = frozenset()) -> Paramet
     """Number the parameters: k, q, corners, permanent indentations, and origins not in `tied`."""
     corners = list(range(2, 2 + len(division.corners)))
     permanents = [2 + len(corners) + n for n in range(len(division.peaks))]
+    origins: dict[int, int] = {}
     size = 2 + len(corners) + len(permanents)
-    rises = [
-        n
-        for n, s in enumerate(division.stretches)
-        if s.kind == RISING and len(s.rows) >= FEWEST and n not in tied
-    ]
-    return ParameterLayout(
-        corners, permanents, {n: size + i for i, n in enumerate(rises)}, size + len(rises)
-    )
+    for n, s in enumerate(division.stretches):
+        if s.kind == RISING and len(s.rows) >= FEWEST and n not in tied:
+            origins[n], size = size, size + 1
+    return ParameterLayout(corners, permanents, origins, size)
 
 
 @frozen

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+from fecm._tables import aligned
 from fecm.deck.model import Indentation
 from fecm.mechanics.contact_law import LinearPermanent, YangSunPermanent
-from fecm.studies.indentation_test.constants import Cycle, Fit
+from fecm.studies.indentation_test.constants import Cycle, Fit, Line
 from fecm.studies.indentation_test.curves import Estimate
 from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING
-from fecm.studies.indentation_test.permanent import Line
 
 # Digits on the card.
 DIGITS = 5
@@ -24,13 +24,12 @@ def card(fit: Fit) -> str:
     """Return the EXPE segment; empty if the test does not determine all parameters."""
     relation = fit.relation()
     if isinstance(relation, YangSunPermanent):
-        alpha, s_p, word = relation.alpha_cr, 0.0, Indentation.ACR
+        values, word = (relation.k, relation.alpha_cr, 0.0, relation.q), Indentation.ACR
     elif isinstance(relation, LinearPermanent):
-        alpha, s_p, word = relation.alpha_p, relation.s_p, ""
+        values, word = (relation.k, relation.alpha_p, relation.s_p, relation.q), ""
     else:
         return ""
-    values = (float(f"{value:.{DIGITS}g}") for value in (relation.k, alpha, s_p, relation.q))
-    k, alpha, s_p, q = values
+    k, alpha, s_p, q = (float(f"{value:.{DIGITS}g}") for value in values)
     return Indentation(k, alpha, s_p, q, word).text()
 
 
@@ -105,30 +104,27 @@ def _share(value: float | None) -> str:
 def lines(fit: Fit) -> list[str]:
     """Return the fit as lines of text."""
     division = fit.solution.curves.division
-    count = len(division.rows(LOADING))
+    loading, falling, rising = (len(division.rows(kind)) for kind in (LOADING, FALLING, RISING))
+    shares = {kind: _share(value) for kind, value in fit.r_squared.items()}
     found = [
-        f"first loading   {count} points",
-        f"  k             {_format(fit.k)} (n = 3/2){_share(fit.r_squared[LOADING])}",
+        f"first loading   {loading} points",
+        f"  k             {_format(fit.k)} (n = 3/2){shares[LOADING]}",
         f"  n             {_format(fit.free.n)}, with k {_format(fit.free.k)}"
         f"{_share(fit.free.r_squared)}",
     ]
     if fit.q is not None:
-        found.append(f"unloading       {len(division.rows(FALLING))} points")
-        found.append(f"  q             {_format(fit.q)}{_share(fit.r_squared[FALLING])}")
-    if len(division.rows(RISING)):
-        found.append(
-            f"reloading       {len(division.rows(RISING))} points{_share(fit.r_squared[RISING])}"
-        )
+        found.append(f"unloading       {falling} points")
+        found.append(f"  q             {_format(fit.q)}{shares[FALLING]}")
+    if rising:
+        found.append(f"reloading       {rising} points{shares[RISING]}")
     if fit.line is not None:
-        found.append(f"permanent       {_share(fit.r_squared['permanent']).strip()}".rstrip())
+        found.append(f"permanent       {shares['permanent'].strip()}".rstrip())
         found.append(f"  s_p           {_format(fit.line.s_p)}")
         found.append(f"  alpha_p       {_format(fit.line.alpha_p)}")
     if fit.critical is not None:
         found.append(f"alpha_cr        {_format(fit.critical.alpha_cr)}")
     found.append(f"scatter         {100.0 * fit.scatter:.2g} % of the largest force")
-    if fit.cycles:
-        found += ["", *_table(fit.cycles), ""]
-    return found
+    return [*found, "", *_table(fit.cycles), ""] if fit.cycles else found
 
 
 def _table(cycles: tuple[Cycle, ...]) -> list[str]:
@@ -139,11 +135,7 @@ def _table(cycles: tuple[Cycle, ...]) -> list[str]:
     ]
     if all(c.k_1_measured is None for c in cycles):
         rows = [row[:-1] for row in rows]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
+    return aligned(rows)
 
 
 def plain(fit: Fit) -> dict[str, Any]:
