@@ -60,36 +60,29 @@ __all__ = [
 ]
 
 if not TYPE_CHECKING:  # type checkers know the names from the imports above
-    _HOMES = {
-        "run": "fecm.api",
-        "run_one": "fecm.api",
-        "read_one": "fecm.api",
-        "Deck": "fecm.deck.model",
-        "DeckError": "fecm.deck.findings",
-        "read_deck": "fecm.deck.reader",
-        "impact": "fecm.authoring",
-        "Contact": "fecm.objects",
-        "Laminate": "fecm.objects",
-        "Plate": "fecm.objects",
-        "Ply": "fecm.deck.records",
-        "RigidMass": "fecm.mechanics.projectile",
-        "Rod": "fecm.mechanics.projectile",
-        "DivergenceError": "fecm.mechanics.plate_motion",
-        "Result": "fecm.results.result",
-        "load": "fecm.results.result",
-        "sweep": "fecm.sweeps.api",
-        "Identification": "fecm.sweeps.identify",
-        "identify": "fecm.sweeps.identify",
-        "SweepResult": "fecm.sweeps.result",
-        "load_sweep": "fecm.sweeps.result:load",
+    _NAMES = {
+        "fecm.api": "read_one run run_one",
+        "fecm.authoring": "impact",
+        "fecm.deck.findings": "DeckError",
+        "fecm.deck.model": "Deck",
+        "fecm.deck.reader": "read_deck",
+        "fecm.deck.records": "Ply",
+        "fecm.mechanics.plate_motion": "DivergenceError",
+        "fecm.mechanics.projectile": "RigidMass Rod",
+        "fecm.objects": "Contact Laminate Plate",
+        "fecm.results.result": "Result load",
+        "fecm.sweeps.api": "sweep",
+        "fecm.sweeps.identify": "Identification identify",
+        "fecm.sweeps.result": "SweepResult load_sweep",
     }
+    _HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
     def __getattr__(name):
         """Import a public name on first access, so that `import fecm` is fast."""
         if name not in _HOMES:
             raise AttributeError(f"module 'fecm' has no attribute {name!r}")
-        module, _, own = _HOMES[name].partition(":")
-        return getattr(_import_module(module), own or name)
+        own = "load" if name == "load_sweep" else name
+        return getattr(_import_module(_HOMES[name]), own)
 
 
 def __dir__() -> list[str]:

@@ -45,11 +45,8 @@ class LoadedDeck:
 
     def errors(self, force: bool = False) -> list[Finding]:
         """Findings that make the deck unusable; with `force`, without unstable motions."""
-        return [
-            finding
-            for finding in self.findings
-            if finding.severity == "error" and not (force and finding.code in (UNSTABLE, HOURGLASS))
-        ]
+        allowed = (UNSTABLE, HOURGLASS) if force else ()
+        return [f for f in self.findings if f.severity == "error" and f.code not in allowed]
 
 
 def load_deck(path_or_text: str | Path | BinaryIO | Deck, mode: str = REPORT) -> LoadedDeck:
@@ -120,9 +117,7 @@ def run_one(
     86.20 lb
     """
     choices = _options(mode, slips, solver, threads, rod_mass, rod_integrator, energy_limit, law)
-    prepared = _load_valid(deck, mode, force)
-    _check_one(prepared.problems)
-    return _run(prepared, choices, output, progress)[0]
+    return _run(deck, mode, force, choices, output, progress, one=True)[0]
 
 
 def run(
@@ -200,7 +195,7 @@ def run(
     6.19 lb
     """
     choices = _options(mode, slips, solver, threads, rod_mass, rod_integrator, energy_limit, law)
-    results = _run(_load_valid(deck, mode, force), choices, output, progress)
+    results = _run(deck, mode, force, choices, output, progress, one=False)
     return results[0] if len(results) == 1 else results
 
 
@@ -212,14 +207,6 @@ def _options(
     return RunOptions(active_slips(mode, slips), solver, threads, rod, energy_limit, law)
 
 
-def _load_valid(deck: str | Path | Deck, mode: str, force: bool) -> LoadedDeck:
-    """Read a deck, or raise a DeckError."""
-    prepared = load_deck(deck, mode)
-    if prepared.errors(force):
-        raise DeckError(prepared.findings, prepared.source)
-    return prepared
-
-
 def _check_one(found: Sequence[object]) -> None:
     """Refuse a deck that does not have exactly one problem."""
     if len(found) != 1:
@@ -227,9 +214,15 @@ def _check_one(found: Sequence[object]) -> None:
 
 
 def _run(
-    prepared: LoadedDeck, choices: RunOptions, output: str | Path | None, progress: Progress | None
-) -> list[Result]:
+    deck: str | Path | Deck, mode: str, force: bool, choices: RunOptions,
+    output: str | Path | None, progress: Progress | None, *, one: bool,
+) -> list[Result]:  # fmt: skip
     """Run the problems of a deck; warn as the caller's caller."""
+    prepared = load_deck(deck, mode)
+    if prepared.errors(force):
+        raise DeckError(prepared.findings, prepared.source)
+    if one:
+        _check_one(prepared.problems)
     found = tuple(finding for finding in prepared.findings if finding.severity != "error")
     for finding in found:
         if finding.severity == "warning":

@@ -59,14 +59,11 @@ from fecm.problem.generate import generate
 from fecm.problem.plate_mesh import PlateMesh
 from fecm.studies.estimate import static_stiffness
 
-# Integration order of stiffness and mass, and stress points.
-ORDER, NODAL_POINTS = 3, -3
-# Default number of stored rows of strains and displacements.
-ROWS = 200
+ORDER, NODAL_POINTS = 3, -3  # integration order of stiffness and mass, stress points
+ROWS = 200  # default number of stored rows of strains and displacements
 # Simulated time over half a period of the projectile on the plate's static stiffness.
 CONTACT_TIMES = 1.25
-# The default patch: a disc, or what a standard has.
-AUTO = "auto"
+AUTO = "auto"  # the default patch: a disc, or what a standard has
 MITC, FULL = "mitc", "full"
 
 
@@ -242,7 +239,12 @@ def author(
         patch = Patch() if test is None else Patch(HERTZ)
     elif isinstance(patch, str):
         patch = parse_patch(patch)
-    named = _named(laminate.ply)
+    given = laminate.ply
+    if isinstance(given, str):
+        if given not in MATERIALS:
+            raise ObjectError(f"{given!r} is not a named ply: {', '.join(MATERIALS)}")
+        given = MATERIALS[given]
+    named = given if isinstance(given, NamedPly) else None
     system = units or (named.system if named else None)
     shown = system if units or system != SYSTEM else None  # the report's decks have no UNIT
     ply = named.converted(system or named.system) if named else laminate.ply
@@ -273,11 +275,8 @@ def author(
     layers = tuple(Layer(n, a, laminate.ply_thickness) for n, a in enumerate(angles, start=1))
     coupled = stiffness_of(ply, angles, [laminate.ply_thickness] * len(angles)).is_coupled
     everywhere = (0, 0, 0, 0, 0) if coupled else (1, 1, 0, 0, 0)
-    if isinstance(mesh, Grid):
-        window = plate.fixture.window if plate.fixture else None
-        supported = mesh.supported(everywhere, plate.supports, window)
-    else:
-        supported = mesh.supported(everywhere, plate.supports)
+    window = (plate.fixture.window,) if plate.fixture else ()
+    supported = mesh.supported(everywhere, plate.supports, *window)
     try:
         records = tuple(Gage(n, *map(float, gage)) for n, gage in enumerate(gages, start=1))
     except (TypeError, ValueError):
@@ -319,15 +318,6 @@ def _program(duration: float, dt: float, every: int | None, fails: bool) -> tupl
         *([Macro("FAIL", value=rows)] if fails else []),
         Macro("NEXT"),
     )
-
-
-def _named(ply: str | Ply | NamedPly) -> NamedPly | None:
-    """The named ply; None for constants."""
-    if isinstance(ply, str):
-        if ply not in MATERIALS:
-            raise ObjectError(f"{ply!r} is not a named ply: {', '.join(MATERIALS)}")
-        return MATERIALS[ply]
-    return ply if isinstance(ply, NamedPly) else None
 
 
 def _law(

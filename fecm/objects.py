@@ -67,12 +67,10 @@ class ObjectError(FecmError, ValueError):
 class DropWeight:
     """What a test standard prescribes besides its fixture, in mm, N, s and t."""
 
-    # Mass and radius of the rigid projectile.
-    mass: float
+    mass: float  # of the rigid projectile
     radius: float
     energy: float  # impact energy per thickness, force
-    thinnest: float
-    # Limits of the laminate's thickness, length.
+    thinnest: float  # limits of the laminate's thickness, length
     thickest: float
 
 
@@ -98,26 +96,19 @@ class Fixture:
 
 
 # ASTM D7136/D7136M: 5.5 kg, hemisphere of 16 mm diameter, 6.7 J per mm of thickness.
-FIXTURES = {
-    fixture.name: fixture
-    for fixture in (
-        Fixture("D7136", (150.0, 100.0), (125.0, 75.0), DropWeight(5.5e-3, 8.0, 6700.0, 4.0, 6.0)),
-    )
-}
+D7136 = DropWeight(5.5e-3, 8.0, 6700.0, 4.0, 6.0)
+FIXTURES = {"D7136": Fixture("D7136", (150.0, 100.0), (125.0, 75.0), D7136)}
 
 
 def parse_fixture(text: str) -> Fixture:
-    """Fixture of a name, or of ``window:LXxLY,WXxWY``.
-
-    Raises ObjectError if it is neither, or the window is not smaller than the plate.
-    """
+    """Fixture of a name, or of ``window:LXxLY,WXxWY``, smaller than the plate."""
     if text in FIXTURES:
         return FIXTURES[text]
     number = r"\s*(\d+\.?\d*|\.\d+)\s*"
     match = re.fullmatch(f"window:{number}[xX×]{number},{number}[xX×]{number}", text)
     if match is None:
         raise ObjectError(f"{text!r} is not a fixture: {', '.join(FIXTURES)} or {CUSTOM}")
-    lx, ly, wx, wy = (float(value) for value in match.groups())
+    lx, ly, wx, wy = map(float, match.groups())
     if not (0.0 < wx < lx < 1e30 and 0.0 < wy < ly < 1e30):
         raise ObjectError(
             f"the window of {wx:g} x {wy:g} is not smaller than the plate of {lx:g} x {ly:g}"
@@ -216,7 +207,9 @@ class Plate:
                 raise ObjectError(f"`columns` and `rows`: {error}") from None
         if columns or rows or size is None or mesh is None:
             raise ObjectError("give `size` and `mesh`, or `columns` and `rows`")
-        return cls(supports, _sides(size), _counts(mesh), float(grading))
+        x, y = pair("size", size)
+        check_positive(size=min(x, y))
+        return cls(supports, (x, y), _counts(mesh), float(grading))
 
     @classmethod
     def on_fixture(
@@ -460,13 +453,6 @@ def pair(name: str, value: Sequence[float]) -> tuple[float, float]:
         x, y = map(float, value)
     except (TypeError, ValueError):
         raise ObjectError(f"`{name}` is {value!r}, not two numbers") from None
-    return x, y
-
-
-def _sides(size: Sequence[float]) -> tuple[float, float]:
-    """Two positive lengths."""
-    x, y = pair("size", size)
-    check_positive(size=min(x, y))
     return x, y
 
 
