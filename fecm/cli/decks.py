@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import io
+import os
 import sys
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
+from urllib.parse import quote
 
 import click
 
 from fecm._errors import FecmError
 from fecm._files import check_outputs
+from fecm._version import __version__
 from fecm.api import LoadedDeck, load_deck
 from fecm.cli.common import (
     MODE_OPTION,
@@ -24,7 +27,6 @@ from fecm.cli.common import (
     progress,
     write_text,
 )
-from fecm.cli.sarif import sarif
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.format import format_deck
 from fecm.deck.reader import load_text
@@ -86,19 +88,19 @@ def _input(deck: Path) -> Path | BinaryIO:
     return buffer
 
 
-def _failures(decks: Sequence[Path], work: Callable[[Path], None]) -> list[Exception]:
-    """Do the work on every deck; its errors."""
+def _each(
+    decks: Sequence[Path],
+    work: Callable[[Path], None],
+    report: Callable[[list[Exception]], None] = lambda failed: None,
+) -> None:
+    """Do the work on every deck, report what failed, and end with the worst exit status."""
     failed: list[Exception] = []
     for deck in dict.fromkeys(decks):
         try:
             work(deck)
         except (FecmError, OSError) as error:
             failed.append(error)
-    return failed
-
-
-def _end(failed: Sequence[Exception]) -> None:
-    """End with the worst exit status."""
+    report(failed)
     if len(failed) == 1:
         raise failed[0]
     if failed:
@@ -138,11 +140,12 @@ def check(decks: tuple[Path, ...], mode: str, form: str, strict: bool, mesh_erro
         if mesh_error:
             _compare_meshes(prepared, mode, form)
 
-    failed = _failures(decks, one)
-    if form == "sarif":
-        unread = [str(error) for error in failed if not isinstance(error, CheckFailedError)]
-        echo_json(sarif(checked, unread))
-    _end(failed)
+    def report(failed: list[Exception]) -> None:
+        if form == "sarif":
+            unread = [str(error) for error in failed if not isinstance(error, CheckFailedError)]
+            echo_json(_sarif(checked, unread))
+
+    _each(decks, one, report)
 
 
 def _print(prepared: LoadedDeck, form: str, *, brief: bool, passes: bool) -> None:
@@ -181,15 +184,66 @@ def _compare_meshes(prepared: LoadedDeck, mode: str, form: str) -> None:
             continue
         share = found.relative_change
         about = "no contact" if share is None else f"{share:+.2%}"
-        for line in (
-            f"peak force          {found.peak_force:.5g} {force}".rstrip()
-            + f" on {found.elements} elements",
-            f"  bisected          {found.refined_peak_force:.5g} {force}".rstrip()
-            + f" on {found.refined_elements}, within {found.distance:.3g} {length}".rstrip()
-            + " of the load",
-            f"  change            {found.change:+.3g} {force}".rstrip() + f" ({about})",
-        ):
-            echo(f"  {line}")
+        coarse, refined = (
+            f"{peak:.5g} {force}".rstrip() for peak in (found.peak_force, found.refined_peak_force)
+        )
+        near = f"within {found.distance:.3g} {length}".rstrip()
+        change = f"{found.change:+.3g} {force}".rstrip()
+        echo(f"  peak force          {coarse} on {found.elements} elements")
+        echo(f"    bisected          {refined} on {found.refined_elements}, {near} of the load")
+        echo(f"    change            {change} ({about})")
+
+
+SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
+HOME = "https://fecm.readthedocs.io"
+
+
+def _sarif(checked: Mapping[Path, Sequence[Finding]], failures: Sequence[str]) -> dict[str, Any]:
+    """SARIF 2.1.0: findings by deck, and messages about decks that could not be read."""
+    severities = {f.code: f.severity for findings in checked.values() for f in findings}
+    codes = sorted(severities)
+    rules = [
+        {
+            "id": code, "helpUri": f"{HOME}/page/findings.html#{code.lower()}",
+            "defaultConfiguration": {"level": severities[code]},
+        }
+        for code in codes
+    ]  # fmt: skip
+    driver = {"name": "fecm", "version": __version__, "informationUri": HOME, "rules": rules}
+    notifications = [{"level": "error", "message": {"text": text}} for text in failures]
+    run = {
+        "tool": {"driver": driver},
+        "columnKind": "unicodeCodePoints",
+        "invocations": [
+            {"executionSuccessful": not failures, "toolExecutionNotifications": notifications}
+        ],
+        "results": [
+            {
+                "ruleId": finding.code,
+                "ruleIndex": codes.index(finding.code),
+                "level": finding.severity,
+                "message": {"text": finding.message + (finding.hint and f" Hint: {finding.hint}.")},
+                "locations": [{"physicalLocation": _location(deck, finding)}],
+            }
+            for deck, findings in checked.items()
+            for finding in findings
+        ],
+    }
+    return {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
+
+
+def _location(deck: Path, finding: Finding) -> dict[str, Any]:
+    """File and region; without a place the region is the first line."""
+    uri = deck.as_uri() if deck.is_absolute() else quote(os.fsencode(deck.as_posix()))
+    region: dict[str, Any] = {"startLine": 1}
+    if place := finding.place:
+        region = {
+            "startLine": place.line,
+            "startColumn": place.first,
+            "endColumn": max(place.first, place.last) + 1,
+            "snippet": {"text": place.text},
+        }
+    return {"artifactLocation": {"uri": uri}, "region": region}
 
 
 @click.command(short_help="Align the columns of decks.")
@@ -228,7 +282,7 @@ def fmt(decks: tuple[Path, ...], output: Path | None, only_check: bool, overwrit
         elif after != before or not in_place:
             write_text(target, after, overwrite=overwrite or in_place)
 
-    _end(_failures(decks, one))
+    _each(decks, one)
 
 
 def _same(one: Path, other: Path) -> bool:

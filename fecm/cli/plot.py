@@ -89,7 +89,9 @@ def plot(
     """Draw the report's figures from one or more RESULTs, or the map of a sweep."""
     options = {name: value for name, value in asked.items() if value}
     named = _named(results)
-    chosen = list(dict.fromkeys(kinds)) or [_usual(next(iter(named.values())))]
+    first = next(iter(named.values()))
+    usual = "force" if isinstance(first, Result) else "exceedance" if first.random else "map"
+    chosen = list(dict.fromkeys(kinds)) or [usual]
     check_options(chosen, options)
     paths = _paths(results[0], chosen, output)
     folder = output if output is not None and output not in paths.values() else None
@@ -115,13 +117,6 @@ def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path
         return {kinds[0]: output}
     folder = output or Path()
     return {kind: folder / f"{first.stem}-{kind}{KINDS[kind].suffixes[0]}" for kind in kinds}
-
-
-def _usual(result: Result | SweepResult) -> str:
-    """Kind of picture to draw by default."""
-    if isinstance(result, Result):
-        return "force"
-    return "map" if result.random is None else "exceedance"
 
 
 def _named(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:

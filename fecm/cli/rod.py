@@ -112,14 +112,9 @@ def pulse(
     else:
         struck, station, deck_dt, units = _of_deck(deck)
     struck = struck.with_mass(mass_matrix)
-    history = simulate_pulse(
-        struck,
-        applied,
-        dt or deck_dt or default_time_step(struck),
-        duration or applied.duration,
-        tuple(dict.fromkeys(stations)) or (station,),
-        integrator,
-    )
+    step, end = dt or deck_dt or default_time_step(struck), duration or applied.duration
+    places = tuple(dict.fromkeys(stations)) or (station,)
+    history = simulate_pulse(struck, applied, step, end, places, integrator)
     filtered = None
     if transducer is not None:
         filtered = transducer.in_unit(units.get("time", ""))(history.time, history.forces)
@@ -163,9 +158,8 @@ def _summary(struck: Rod, history: RodHistory) -> list[str]:
         f"steps             {len(history.time) - 1} of {dt:g}",
         f"applied           peak {history.applied[peak]:.6g} at time {history.time[peak]:.6g}",
     ]
-    for x, force, ratio in zip(
-        history.stations, history.forces.T, history.mean_ratios, strict=True
-    ):
+    columns = history.stations, history.forces.T, history.mean_ratios
+    for x, force, ratio in zip(*columns, strict=True):
         row = abs(force).argmax()
         lines.append(
             f"force at {x:<8.4g} peak {force[row]:.6g} at time {history.time[row]:.6g}; "

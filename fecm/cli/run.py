@@ -135,7 +135,12 @@ def run(
             continue
         result = _run_one(problem, path, print_to, choices, every, resumes=number == own - 1,
                           overwrite=overwrite or number < own, form=form)  # fmt: skip
-        exceeded += [] if fail_limit is None else _exceeded(result, fail_limit)
+        if fail_limit is not None:
+            exceeded += [
+                f"exposure {e.exposure:.4g} of {e.criterion}"
+                for e in largest_exposures(result)
+                if e.exposure > fail_limit
+            ]
     if exceeded:
         raise CheckFailedError(f"{'; '.join(exceeded)}: more than the limit of {fail_limit:g}")
 
@@ -176,10 +181,8 @@ def _run_one(
         if printed is not None:
             printer = Printer(stack.enter_context(writing(printed, overwrite=overwrite)))
         advance = stack.enter_context(progress("fecm", problem.work.steps))
-        observer = _Observer(checkpointer, every, advance)
-        simulation = Simulation(
-            problem, journal, choices, printer, (observer.on_step,), observer.on_macro
-        )
+        on_step, on_macro = _observers(checkpointer, every, advance)
+        simulation = Simulation(problem, journal, choices, printer, (on_step,), on_macro)
         if resumes:
             checkpointer.restore(simulation)
             note(f"{path} resumes after step {simulation.state.plate.step}")
@@ -202,12 +205,6 @@ def _run_one(
     if printed is not None:
         echo(f"  printed           {printed}")
     return result
-
-
-def _exceeded(result: Result, limit: float) -> list[str]:
-    """Criteria whose largest exposure exceeds a limit."""
-    found = largest_exposures(result)
-    return [f"exposure {e.exposure:.4g} of {e.criterion}" for e in found if e.exposure > limit]
 
 
 @contextlib.contextmanager
@@ -251,34 +248,31 @@ class _StoppedError(Exception):
     """A signal stopped the run after the step in `args`; its checkpoint is written."""
 
 
-class _Observer:
-    """Shows the progress of a run, writes its checkpoints, and stops it after a signal.
+def _observers(
+    checkpointer: Checkpointer, every: float | None, advance: Callable[[int], object]
+) -> tuple[Callable[[Simulation], None], Callable[[Simulation], None]]:
+    """Functions that are called after a step and after a macro.
 
-    `every` are the seconds between two checkpoints; without them only a signal writes one.
+    They show the progress, write a checkpoint when `every` seconds have passed since the last one,
+    and stop the run after a signal.
     """
+    shown = 0
 
-    def __init__(
-        self, checkpointer: Checkpointer, every: float | None, advance: Callable[[int], object]
-    ) -> None:
-        self._checkpointer = checkpointer
-        self._every = every
-        self._advance = advance
-        self._shown = 0
-
-    def on_macro(self, simulation: Simulation) -> None:
-        """Stop the run if a signal came."""
+    def on_macro(simulation: Simulation) -> None:
         if signals.came():
-            self._checkpointer.write(simulation)
+            checkpointer.write(simulation)
             raise _StoppedError(simulation.state.plate.step)
 
-    def on_step(self, simulation: Simulation) -> None:
-        """Advance the progress bar, and write a checkpoint if one is due."""
+    def on_step(simulation: Simulation) -> None:
+        nonlocal shown
         step = simulation.state.plate.step
-        self._advance(step - self._shown)
-        self._shown = step
-        self.on_macro(simulation)
-        if self._every is not None and self._checkpointer.age >= self._every:
-            self._checkpointer.write(simulation)
+        advance(step - shown)
+        shown = step
+        on_macro(simulation)
+        if every is not None and checkpointer.age >= every:
+            checkpointer.write(simulation)
+
+    return on_step, on_macro
 
 
 def _check_room(path: Path, size: int) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 
 from fecm.cli.common import DECK_PATH, RefusedError, note
 from fecm.cli.decks import load_valid
@@ -119,16 +120,14 @@ def dispersion(
     medium, _ = _medium(**shared)
     curves = [compute(medium, angle, wavelengths) for angle in angles]
     rows = (
-        (curve.angle, wavelength, mode, velocity, frequency)
-        for curve in curves
-        for wavelength, velocities, frequencies in zip(
-            curve.wavelength.tolist(),
-            curve.phase_velocity.tolist(),
-            curve.angular_frequency.tolist(),
-            strict=True,
+        (
+            curve.angle, wavelength, mode,
+            curve.phase_velocity.item(row, place), curve.angular_frequency.item(row, place),
         )
-        for mode, velocity, frequency in zip(MODES, velocities, frequencies, strict=True)
-    )
+        for curve in curves
+        for row, wavelength in enumerate(curve.wavelength.tolist())
+        for place, mode in enumerate(MODES)
+    )  # fmt: skip
     targets.draw("waves:dispersion_picture", medium, curves)
     targets.write("angle_deg,wavelength_over_h,mode,phase_velocity,angular_frequency", rows)
 
@@ -142,10 +141,7 @@ def speeds(step: float, targets: OutputPaths, **shared: Any) -> None:
     medium, units = _medium(**shared)
     surfaces = WaveSurfaces(medium)
     fronts = surfaces.fronts(_normals(step))
-    rows = (
-        (normal, *velocities)
-        for normal, velocities in zip(fronts.normal.tolist(), fronts.velocity.tolist(), strict=True)
-    )
+    rows = np.column_stack([fronts.normal, fronts.velocity]).tolist()
     targets.draw("waves:speeds_picture", surfaces, units)
     _note_names(surfaces)
     targets.write(",".join(("angle_deg", *FRONTS)), rows)

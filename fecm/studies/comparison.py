@@ -38,36 +38,18 @@ class Measurement:
 
 @frozen
 class Comparison:
-    """A result's force, interpolated at measured times, against the measured force.
+    """A result's force, interpolated at measured times, against the measured force."""
 
-    Attributes
-    ----------
-    points : int
-        Measured times within the times of the result.
-    begin, end : float
-        First and last of them.
-    peak, measured_peak : float
-        Largest forces.
-    impulse, measured_impulse : float
-        Time integrals of the forces, linear between the points.
-    rms : float
-        Root of the mean square of the difference, force.
-    correlation : float
-        Pearson's coefficient; NaN if one of the forces is constant.
-    units : mapping of str to str
-        Names of the units; empty if the deck names none.
-    """
-
-    points: int
-    begin: float
+    points: int  # measured times within the times of the result
+    begin: float  # the first of them
     end: float
     peak: float
     measured_peak: float
-    impulse: float
+    impulse: float  # time integral of the force, linear between the points
     measured_impulse: float
-    rms: float
-    correlation: float
-    units: Mapping[str, str]
+    rms: float  # root of the mean square of the difference, force
+    correlation: float  # Pearson's coefficient; NaN if one of the forces is constant
+    units: Mapping[str, str]  # names; empty if the deck names none
 
     def __str__(self) -> str:
         clock, pound = (self.units.get(name, "") for name in ("time", "force"))
