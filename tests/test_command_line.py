@@ -209,8 +209,9 @@ def test_help_names_every_slip(tmp_path: Path) -> None:
         assert name in text
 
 
-def test_the_errata_page_is_made_from_the_table_of_slips() -> None:
-    assert (ROOT / "docs" / "errata.md").read_text() == slips.errata()
+def test_the_errata_page_has_a_row_for_every_slip() -> None:
+    rows = re.findall(r"^\| `(.+?)` \|", (ROOT / "docs" / "errata.md").read_text(), re.MULTILINE)
+    assert rows == list(slips.NAMES)
 
 
 def test_listing_mode_is_all_slips_and_report_mode_none() -> None:
