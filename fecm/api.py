@@ -16,10 +16,9 @@ from fecm.deck.reader import Reader, load_text, read_deck
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.rod_integrators import Integrator, MassMatrix, RodMethod
 from fecm.problem.check_mesh import HOURGLASS, check_listing
-from fecm.problem.check_program import UNSTABLE
 from fecm.problem.memory import check_memory
 from fecm.problem.options import ENERGY_LIMIT, RunOptions
-from fecm.problem.problem import Problem, check
+from fecm.problem.problem import UNSTABLE, Problem, check
 from fecm.problem.slips import LISTING, REPORT, active_slips
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink

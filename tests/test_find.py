@@ -11,7 +11,7 @@ import pytest
 import fecm
 from fecm.results.metrics import FOUND
 from fecm.results.result import Result
-from fecm.sweeps.find import search
+from fecm.sweeps.batch import search
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM, small
 

@@ -30,7 +30,7 @@ from fecm.simulation.checkpoint import Checkpointer
 from fecm.simulation.run import run
 from fecm.simulation.simulation import Simulation
 from fecm.simulation.spool import Journal
-from fecm.sweeps.impacts import FOUND
+from fecm.sweeps.responses import FOUND
 from tests.builders import distorted_square, square
 from tests.calls import call
 from tests.decks import small

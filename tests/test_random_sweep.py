@@ -14,6 +14,7 @@ import fecm
 from fecm.results.schema import ResultFileError
 from fecm.sweeps.cases import CasesError
 from fecm.sweeps.plan import plan
+from fecm.sweeps.random_result import QUANTILES, Indices, indices, wilson
 from fecm.sweeps.sampling import (
     DESIGNS,
     Design,
@@ -23,7 +24,6 @@ from fecm.sweeps.sampling import (
     random_cases,
     unit_samples,
 )
-from fecm.sweeps.sensitivity import QUANTILES, Indices, indices, wilson
 from tests.calls import Done, assert_unusable, call
 from tests.decks import DATA, DATA_CARDS, small
 

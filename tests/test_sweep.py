@@ -31,8 +31,7 @@ from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.plan import Task, plan, shares_plate, tasks
 from fecm.sweeps.responses import Convolution, plate_response
 from fecm.sweeps.result import SweepResult
-from fecm.sweeps.schedule import LOST, on_workers
-from fecm.sweeps.store import OtherSweepError, PartialResults
+from fecm.sweeps.schedule import LOST, OtherSweepError, PartialResults, on_workers
 from fecm.sweeps.vary import apply_case
 from tests.calls import Done, call
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, model, small
@@ -448,7 +447,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
 SIGNALLED = """
 import os, signal
 from fecm.__main__ import main
-from fecm.sweeps.store import PartialResults
+from fecm.sweeps.schedule import PartialResults
 
 plain, stored = PartialResults.put, []
 

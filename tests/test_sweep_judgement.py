@@ -18,9 +18,8 @@ from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.rod_integrators import WilsonStep
 from fecm.results.metrics import PEAKS, SUMMARY
 from fecm.sweeps import batch
-from fecm.sweeps.impacts import Hits, Impacts, balance_errors, by_numpy, impacts
 from fecm.sweeps.outcome import STILL
-from fecm.sweeps.responses import TipSteps
+from fecm.sweeps.responses import Hits, Impacts, TipSteps, balance_errors, by_numpy, impacts
 from fecm.sweeps.vary import apply_case
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, PROGRAM, small

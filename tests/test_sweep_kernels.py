@@ -15,7 +15,7 @@ from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
 from fecm.mechanics.projectile import RigidMass
 from fecm.problem.build import build_model
 from fecm.problem.options import RunOptions
-from fecm.sweeps import batch, impacts
+from fecm.sweeps import batch, responses
 from fecm.sweeps.cases import Case
 from fecm.sweeps.responses import plate_response
 from fecm.sweeps.result import SweepResult
@@ -92,10 +92,10 @@ def test_a_case_has_the_same_bytes_with_any_others() -> None:
 @compiled
 def test_errors_of_the_energy_balance_are_those_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of cases that lose energy, some whose motion is not finite."""
-    seen: list[impacts.Impacts] = []
+    seen: list[responses.Impacts] = []
 
-    def watched(*given: Any) -> impacts.Impacts:
-        seen.append(impacts.impacts(*given))
+    def watched(*given: Any) -> responses.Impacts:
+        seen.append(responses.impacts(*given))
         return seen[-1]
 
     monkeypatch.setattr(batch, "impacts", watched)
@@ -140,8 +140,8 @@ def test_a_law_that_the_kernels_do_not_know_is_numpys() -> None:
     for law in (LinearPermanent, Other):
         constants = law(2e6 * one, 1e-4 * one, 0.1 * one, 2.0 * one)
         speed = np.array([50.0, 100.0, 150.0])
-        hits = impacts.Hits([RigidMass(1.8e-4)], kind, one, HystereticLaw(constants), speed)
-        forces.append(impacts.impacts(response, 2e-7, 1e-6, hits).force)
+        hits = responses.Hits([RigidMass(1.8e-4)], kind, one, HystereticLaw(constants), speed)
+        forces.append(responses.impacts(response, 2e-7, 1e-6, hits).force)
     found, wanted = forces
     assert not np.array_equal(found, wanted)
     np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-10 * wanted.max())

@@ -16,11 +16,10 @@ from fecm.sweeps import schedule
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.batch import run
 from fecm.sweeps.cases import grid
-from fecm.sweeps.clock import with_time_step
 from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.plan import Plan, Task, plan, tasks
-from fecm.sweeps.schedule import LOST
-from fecm.sweeps.store import DamagedPartError, PartialResults
+from fecm.sweeps.schedule import LOST, DamagedPartError, PartialResults
+from fecm.sweeps.vary import with_time_step
 from tests.calls import call
 from tests.decks import model, small
 from tests.kill_runs import SWEEP, SWEPT

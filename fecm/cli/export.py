@@ -70,11 +70,10 @@ def export(
         check_outputs([path], overwrite, [result])
     try:
         if target == "csv" and is_sweep:
-            from fecm.sweeps import csv as sweep_csv
-            from fecm.sweeps.result import sweep_of
+            from fecm.sweeps.result import csv_lines, sweep_of
 
-            cases = sweep_of(contents, history=name == sweep_csv.HISTORY)
-            write_lines(sweep_csv.lines(cases, name), path, overwrite=overwrite)
+            cases = sweep_of(contents, history=name == "history")
+            write_lines(csv_lines(cases, name), path, overwrite=overwrite)
         elif target == "csv":
             write_lines(csv.lines(result_of(contents), name), path, overwrite=overwrite)
         elif is_sweep:

@@ -38,7 +38,7 @@ from fecm.mechanics.contact_law import (
     hertz_coefficient,
 )
 from fecm.problem.build import build_constants
-from fecm.problem.check_impact import check_law
+from fecm.problem.check_segments import check_law
 from fecm.studies import StudyError
 from fecm.studies.indentation_test.constants import fit as fitted
 from fecm.studies.indentation_test.curves import LIMITS_Q

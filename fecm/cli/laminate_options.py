@@ -15,7 +15,7 @@ from fecm.deck.model import Material
 from fecm.deck.records import Integration, Layer, Ply
 from fecm.mechanics.laminate import Laminate
 from fecm.problem.build import laminate_of
-from fecm.problem.check_material import check_material
+from fecm.problem.check_segments import check_material
 
 # Key of the plies of --materials among the values of a context.
 _META = "fecm.plies"

@@ -58,8 +58,7 @@ from fecm.sweeps.sampling import (
     parse_random,
     random_cases,
 )
-from fecm.sweeps.schedule import LOST, SchedulerError, address_in
-from fecm.sweeps.store import PartialResults
+from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_in
 
 
 @click.command()

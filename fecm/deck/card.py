@@ -231,12 +231,9 @@ def read_values(
     fixed = "," not in card.data
     if "\t" in card.data:
         column = card.data.index("\t") + 1
-        findings.add(
-            "E103",
-            "The card has a tab, so its columns are ambiguous.",
-            Place(card.line, column, column, card.text),
-            "write blanks instead of tabs",
-        )
+        message = "The card has a tab, so its columns are ambiguous."
+        hint = "write blanks instead of tabs"
+        findings.add("E103", message, Place(card.line, column, column, card.text), hint)
         return None
     if fixed and not _is_aligned(card, fields, findings, cut_is_meant=blanks_are_zeros):
         return None
@@ -355,12 +352,8 @@ def _word(field: Field, text: str, source: Source, findings: Findings) -> str | 
     word = text.rstrip()
     if len(word) <= field.width:
         return word
-    findings.add(
-        "E109",
-        f"`{word}` has {len(word)} characters; the field takes {field.width}.",
-        source.place(field.name),
-        "values are separated by commas",
-    )
+    message = f"`{word}` has {len(word)} characters; the field takes {field.width}."
+    findings.add("E109", message, source.place(field.name), "values are separated by commas")
     return None
 
 
@@ -373,11 +366,8 @@ def _number(
     if not written:
         return "" if field.has_default else 0 if field.kind == "I" else 0.0
     if len(written) > LONGEST:
-        findings.add(
-            "E109",
-            f"The number has {len(written)} characters; at most {LONGEST} are read.",
-            source.place(field.name),
-        )
+        message = f"The number has {len(written)} characters; at most {LONGEST} are read."
+        findings.add("E109", message, source.place(field.name))
         return None
     squeezed = text.replace(" ", "")
     plain = parse(squeezed)
@@ -393,11 +383,8 @@ def _number(
         if not zeros or value is None:
             _refuse_blank(field, text, padded, source, findings)
             return None
-        findings.add(
-            "W104",
-            f"A blank inside `{text}` was read as a zero: the value is {value:g}.",
-            source.place(field.name),
-        )
+        message = f"A blank inside `{text}` was read as a zero: the value is {value:g}."
+        findings.add("W104", message, source.place(field.name))
     if value is None or abs(value) > (LARGEST_INTEGER if field.kind == "I" else sys.float_info.max):
         findings.add("E107", f"`{written}` is too large a number.", source.place(field.name))
         return None
@@ -422,13 +409,10 @@ def _refuse_blank(
     line = source.card.data.ljust(field.last)
     justified = text.replace(" ", "").rjust(field.width)
     meant = (line[: field.first - 1] + justified + line[field.last :]).rstrip()
-    findings.add(
-        "E104",
-        f"There is a blank {where} the number `{text.strip()}`; the report's machine read it as a "
-        f"zero and the value as {was}.",
-        source.place(field.name),
-        "remove the blank" if "," in line else f"right-justified, the card is `{meant}`",
-    )
+    read = f"read it as a zero and the value as {was}"
+    message = f"There is a blank {where} the number `{text.strip()}`; the report's machine {read}."
+    hint = "remove the blank" if "," in line else f"right-justified, the card is `{meant}`"
+    findings.add("E104", message, source.place(field.name), hint)
 
 
 def write_card(fields: Fields, values: Sequence[Value]) -> str:

@@ -106,9 +106,8 @@ def read_plies(text: str) -> dict[str, NamedPly]:
     units = tables.pop("units", SYSTEM_OF_FILES)
     for name, table in tables.items():
         if not isinstance(table, dict):
-            raise ValueError(
-                f'{name} is outside the table of a ply; begin each ply with ["its name"]'
-            )
+            message = f'{name} is outside the table of a ply; begin each ply with ["its name"]'
+            raise ValueError(message)
     if not tables:
         raise ValueError('no plies; begin each with ["its name"]')
     return {name: _ply(name, {"units": units, **table}) for name, table in tables.items()}
@@ -121,9 +120,8 @@ def _ply(name: str, table: dict[str, Any]) -> NamedPly:
             if not isinstance(value, str):
                 raise ValueError(f"[{name}] {key}: {value!r} is not a text in quotes")
         elif key not in KEYS:
-            raise ValueError(
-                f"[{name}] {key} is unknown; the keys are {', '.join((*KEYS, *TEXTS))}"
-            )
+            message = f"[{name}] {key} is unknown; the keys are {', '.join((*KEYS, *TEXTS))}"
+            raise ValueError(message)
         elif isinstance(value, bool) or not isinstance(value, int | float):
             raise ValueError(f"[{name}] {key}: {value!r} is not a number")
         elif not math.isfinite(value) or (KEYS[key] and value <= 0.0):
@@ -139,11 +137,15 @@ def _ply(name: str, table: dict[str, Any]) -> NamedPly:
     return NamedPly(name, values, system, table.get("source", ""), table.get("assumed", ""))
 
 
-MATERIALS = read_plies((resources.files("fecm.deck") / "materials.toml").read_text("utf-8"))
+def _text(file: str) -> str:
+    """Text of a file of this package."""
+    return (resources.files("fecm.deck") / file).read_text("utf-8")
+
+
+MATERIALS = read_plies(_text("materials.toml"))
 
 # Constants of the report that are not the indenter's: alpha_p, s_p and reference 14's alpha_cr.
 ALPHA_P, S_P, ALPHA_CR = 6.564e-4, 0.094, 3.16e-3
-
 # System of units of the report.
 SYSTEM = "in-lbf-s"
 COEFFICIENT = "force/length^1.5"
@@ -166,33 +168,7 @@ class NamedContact:
         )
 
 
-_GROUPS = {"": "mean of both groups", "a": "[0/45/0/-45/0]2s", "b": "[90/45/90/-45/90]2s"}
-
-
-def _table(size: str, group: str, k: float, q: float) -> NamedContact:
-    """A column of Table 3.1."""
-    return NamedContact(
-        f"report-{size}{group}",
-        Indentation(k, ALPHA_P, S_P, q),
-        f"{size} in steel sphere on graphite/epoxy, {_GROUPS[group]}; T. M. Tan and C. T. Sun, "
-        "NASA CR-168057, 1982, Table 3.1",
-    )
-
-
 CONTACTS = {
-    contact.name: contact
-    for contact in (
-        _table("0.5", "", 1.330e6, 2.5),
-        _table("0.5", "a", 1.284e6, 2.5),
-        _table("0.5", "b", 1.376e6, 2.5),
-        _table("0.75", "", 1.912e6, 2.0),
-        _table("0.75", "a", 1.833e6, 2.0),
-        _table("0.75", "b", 1.990e6, 2.0),
-        NamedContact(
-            "yang-0.5",
-            Indentation(9.694e5, ALPHA_CR, 0.0, 2.5, Indentation.ACR),
-            "0.5 in steel sphere on graphite/epoxy, by dial gage; S. H. Yang and C. T. Sun, "
-            "NASA CR-165460, 1981, as in Table 3.1 of NASA CR-168057; the law of equation 3-7",
-        ),
-    )
+    name: NamedContact(name, Indentation(**table["law"]), table["source"])
+    for name, table in tomllib.loads(_text("contacts.toml")).items()
 }

@@ -17,10 +17,7 @@ RULER = "!:"
 
 
 def format_deck(text: str, source: str = "<text>") -> str:
-    """Align a deck's columns; `source` is its name in messages.
-
-    Raises DeckError if the deck can't be read.
-    """
+    """Align a deck's columns; `source` is its name in messages.  Raises DeckError."""
     reader = Reader(text, keeps_values=True)
     reader.problems()
     if reader.findings.errors:

@@ -120,17 +120,14 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
         _check_value(word, macro, findings)
         _check_order(word, macro, done, findings)
         if word.inside and not open_loops:
-            findings.add(
-                "E513", f"{word.name} is outside any loop.", macro.place("macro"),
-                "put it between LOOP and NEXT",
-            )  # fmt: skip
+            message = f"{word.name} is outside any loop."
+            findings.add("E513", message, macro.place("macro"), "put it between LOOP and NEXT")
         if word.name == "LOOP":
             open_loops.append((macro, body))
             body = []
             if len(open_loops) > NESTING:
-                findings.add(
-                    "E506", f"Loops are nested deeper than {NESTING}.", macro.place("macro")
-                )
+                message = f"Loops are nested deeper than {NESTING}."
+                findings.add("E506", message, macro.place("macro"))
                 return ()
         elif word.name == "NEXT":
             if not open_loops:
@@ -143,10 +140,9 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
         else:
             body.append(macro)
     for head, _ in open_loops:
-        findings.add(
-            "E502", "The LOOP is not closed by a NEXT.", head.place("macro"),
-            "put a NEXT card after the loop's last macro",
-        )  # fmt: skip
+        message = "The LOOP is not closed by a NEXT."
+        hint = "put a NEXT card after the loop's last macro"
+        findings.add("E502", message, head.place("macro"), hint)
     if open_loops:
         return ()
     program = tuple(body)
@@ -159,12 +155,9 @@ def _unknown(macro: Macro, findings: Findings) -> Word | None:
     import difflib
 
     near = difflib.get_close_matches(macro.word, WORDS, 1, 0.5)
-    findings.add(
-        "E501",
-        f"`{macro.word}` is not a macro.",
-        macro.place("macro"),
-        f"did you mean {near[0]}?" if near else f"known are {', '.join(WORDS)}, END",
-    )
+    message = f"`{macro.word}` is not a macro."
+    hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(WORDS)}, END"
+    findings.add("E501", message, macro.place("macro"), hint)
     return WORDS[near[0]] if near else None
 
 
@@ -194,19 +187,12 @@ def _check_unused(word: Word, macro: Macro, findings: Findings) -> None:
             else "remove it",
         )
     elif macro.value and not word.value:
-        findings.add(
-            "E514",
-            f"{word.name} takes no number; the card has {macro.value:g}.",
-            macro.place("value"),
-            "remove it",
-        )
+        message = f"{word.name} takes no number; the card has {macro.value:g}."
+        findings.add("E514", message, macro.place("value"), "remove it")
     elif macro.second and not word.second:
-        findings.add(
-            "E514",
-            f"{word.name} takes no second number; the card has {macro.second:g}.",
-            macro.place("second value"),
-            f"a number of more than five digits goes after a comma: {word.name},123456",
-        )
+        message = f"{word.name} takes no second number; the card has {macro.second:g}."
+        hint = f"a number of more than five digits goes after a comma: {word.name},123456"
+        findings.add("E514", message, macro.place("second value"), hint)
 
 
 def _check_value(word: Word, macro: Macro, findings: Findings) -> None:
@@ -230,13 +216,9 @@ def _warn_of_stopped_clock(body: Body, findings: Findings) -> None:
         if isinstance(item, Loop):
             words = {m.word for m in flat(item.body)}
             if words & STEPS and "TIME" not in words:
-                findings.add(
-                    "W507",
-                    "The loop steps without TIME, so the clock of time-dependent loads does not "
-                    "advance.",
-                    item.macro.place("macro"),
-                    "put TIME before the step",
-                )
+                why = "the clock of time-dependent loads does not advance"
+                message = f"The loop steps without TIME, so {why}."
+                findings.add("W507", message, item.macro.place("macro"), "put TIME before the step")
             else:
                 _warn_of_stopped_clock(item.body, findings)
 

@@ -435,11 +435,9 @@ class Deck(Record):
 
     def _repr_html_(self) -> str:
         """Table of segments and macros, for notebooks."""
-        words = {
-            "segments": [segment.keyword for segment in self.segments],
-            "macros": [macro.word for macro in self.macros],
-        }
-        rows = ((name, shorten(" ".join(found), 200)) for name, found in words.items())
+        segments = " ".join(segment.keyword for segment in self.segments)
+        macros = " ".join(macro.word for macro in self.macros)
+        rows = (("segments", shorten(segments, 200)), ("macros", shorten(macros, 200)))
         return html_table(repr(self)[1:-1], rows)
 
     def has(self, kind: type[Segment]) -> bool:
@@ -496,10 +494,7 @@ class Deck(Record):
         ValueError
             If a number is not finite.
         """
-        lines = [
-            f"{TITLE} {self.title}".rstrip(),
-            self.control.to_card(),
-        ]
+        lines = [f"{TITLE} {self.title}".rstrip(), self.control.to_card()]
         for segment in self.segments:
             lines.extend(segment.cards(self.control))
         lines += ["END", "MACR", *(macro.to_card() for macro in self.macros), "END"]

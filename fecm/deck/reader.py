@@ -21,6 +21,7 @@ from fecm.deck.segments import READERS, SegmentReader, Stream
 
 MACROS = "MACR"
 END = "END"
+CONTROL_CARD = "(6I5): NUMNP, NUMEL, LAYER, NDM, NDF, NEN"
 
 # Largest number of nodes or elements, and of layers; anything beyond is certainly a typo.
 MOST = 1_000_000
@@ -81,10 +82,9 @@ class Reader:
         while (card := self.stream.take_filled()) is not None:
             first = not (problems or stopped or self.findings)
             if first and (other := _program_of(card.data)):
-                self.findings.add(
-                    "E013", f"This is {other}, not a deck.", card.place,
-                    "`fecm new DECK --mesh FILE`, or fecm.Plate.from_mesh, takes a mesh from it",
-                )  # fmt: skip
+                message = f"This is {other}, not a deck."
+                hint = "`fecm new DECK --mesh FILE`, or fecm.Plate.from_mesh, takes a mesh from it"
+                self.findings.add("E013", message, card.place, hint)
                 self.findings.closed = True
                 break
             if card.keyword == STOP:
@@ -99,9 +99,8 @@ class Reader:
                 self._stray(card, [TITLE, STOP])
         last = self.stream.last
         if not problems and not self.findings.errors:
-            self.findings.add(
-                "E001", "The file contains no problem.", None, "a problem begins with a FECM card"
-            )
+            message = "The file contains no problem."
+            self.findings.add("E001", message, None, "a problem begins with a FECM card")
         elif last is not None and not stopped and not self.findings.counts["E004"]:
             self.findings.add("W002", "The deck does not end with a STOP card.", last.place)
         return problems
@@ -120,15 +119,9 @@ class Reader:
         macros = [] if self.stream.at_end else self._program(title)
         if control is None:
             return ParsedProblem(None, self._unsound)
-        deck = Deck(
-            title.data[4:].strip(),
-            control,
-            tuple(segments),
-            tuple(macros),
-            tuple(self._tables(macros)),
-            f"{self.stream.text_since(first)}\n{STOP}\n",
-            source=Source(title, ()),
-        )
+        parts = tuple(segments), tuple(macros), tuple(self._tables(macros))
+        text, source = f"{self.stream.text_since(first)}\n{STOP}\n", Source(title, ())
+        deck = Deck(title.data[4:].strip(), control, *parts, text, source=source)
         return ParsedProblem(deck, self._unsound)
 
     # Control card --------------------------------------------------------------------------------
@@ -137,18 +130,11 @@ class Reader:
         """Read the control card; None if it is missing or invalid."""
         card = self.stream.take_data()
         if card is None:
-            self.findings.add(
-                "E003",
-                "The control card is missing.",
-                (self.stream.peek() or title).place,
-                "(6I5): NUMNP, NUMEL, LAYER, NDM, NDF, NEN",
-            )
+            place = (self.stream.peek() or title).place
+            self.findings.add("E003", "The control card is missing.", place, CONTROL_CARD)
             return None
-        row = self.stream.row(card, Control.fields)
-        if row is None:
-            return None
-        control = Control.from_row(*row)
-        return control if self._is_sound(control) else None
+        control = self.stream.record(card, Control)
+        return control if control and self._is_sound(control) else None
 
     def _is_sound(self, control: Control) -> bool:
         """Whether counts and dimensions are valid; report those that are not."""
@@ -156,13 +142,9 @@ class Reader:
         if control.nen == 0:
             named = zip(Control.fields, control.row(), strict=True)
             missing = [field.name for field, value in named if not value]
-            self.findings.add(
-                "E201",
-                f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing on the "
-                "control card.",
-                control.place(missing[0]),
-                "(6I5): NUMNP, NUMEL, LAYER, NDM, NDF, NEN",
-            )
+            verb = "is" if len(missing) == 1 else "are"
+            message = f"{', '.join(missing)} {verb} missing on the control card."
+            self.findings.add("E201", message, control.place(missing[0]), CONTROL_CARD)
             return False
         low, high = NODES_AN_ELEMENT
         for name, value, least, most, hint in (
@@ -175,20 +157,17 @@ class Reader:
         ):
             if not least <= value <= most:
                 must = f"{least}" if least == most else f"{least} to {most}"
-                self.findings.add(
-                    "E201", f"{name} is {value}; it must be {must}.", control.place(name), hint
-                )
+                message = f"{name} is {value}; it must be {must}."
+                self.findings.add("E201", message, control.place(name), hint)
         if len(self.findings) > before:
             return False
         self._counted.update(NUMNP=control.numnp, NUMEL=control.numel)
         for name, count in self._counted.items():
             if count > MOST:
-                self.findings.add(
-                    "E201",
-                    f"The file's problems have together {name} {count}; at most {MOST} is allowed.",
-                    control.place(name),
-                    "put each problem in a separate file",
-                )
+                where = "The file's problems have together"
+                message = f"{where} {name} {count}; at most {MOST} is allowed."
+                hint = "put each problem in a separate file"
+                self.findings.add("E201", message, control.place(name), hint)
         return len(self.findings) == before
 
     # Mesh and data -------------------------------------------------------------------------------
@@ -205,9 +184,8 @@ class Reader:
                 return segments
             if keyword in (MACROS, STOP, TITLE):
                 self.stream.give_back()
-                self.findings.add(
-                    "E004", f"The mesh data are not ended by END before {keyword}.", card.place
-                )
+                message = f"The mesh data are not ended by END before {keyword}."
+                self.findings.add("E004", message, card.place)
                 return segments
             if keyword not in READERS or not card.is_keyword:
                 self._stray(card, [*READERS, END])
@@ -229,27 +207,20 @@ class Reader:
         if card.is_keyword:
             near = _close(card.keyword, known)
             self._unsound.update(near)
-            self.findings.add(
-                "E005",
-                f"`{card.data.split()[0]}` is not a keyword here.",
-                Place(card.line, 1, min(4, len(card.data)), card.text),
-                f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}",
-            )
+            message = f"`{card.data.split()[0]}` is not a keyword here."
+            hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
+            place = Place(card.line, 1, min(4, len(card.data)), card.text)
+            self.findings.add("E005", message, place, hint)
         elif card.data.lstrip()[:1].isalpha():
             self._unsound.update(_close(card.data.split()[0][:4].upper(), known))
-            self.findings.add(
-                "E005",
-                f"The keyword `{card.data.split()[0]}` does not begin in column 1.",
-                card.place,
-                "move it to the left",
-            )
+            message = f"The keyword `{card.data.split()[0]}` does not begin in column 1."
+            self.findings.add("E005", message, card.place, "move it to the left")
         else:
-            self.findings.add(
-                "E006",
-                "A keyword is expected, not a card of data.",
-                card.place,
-                "a segment has more cards than its counts say, or a blank card ended it too early",
+            message = "A keyword is expected, not a card of data."
+            hint = (
+                "a segment has more cards than its counts say, or a blank card ended it too early"
             )
+            self.findings.add("E006", message, card.place, hint)
         if known != [MACROS]:
             self.stream.skip_data()
 
@@ -265,16 +236,14 @@ class Reader:
                 break
             if card.is_keyword and not _close(card.keyword, [MACROS]):
                 self.stream.give_back()
-                self.findings.add(
-                    "E009", "The MACR card before the macro program is missing.", card.place
-                )
+                message = "The MACR card before the macro program is missing."
+                self.findings.add("E009", message, card.place)
                 return self._macros(card)
             self._stray(card, [MACROS])
             if card.is_keyword:  # misspelt MACR: the program follows nevertheless
                 return self._macros(card)
-        self.findings.add(
-            "E009", "The problem has no macro program.", title.place, "it begins with a MACR card"
-        )
+        message = "The problem has no macro program."
+        self.findings.add("E009", message, title.place, "it begins with a MACR card")
         self._unsound.add(MACROS)
         return []
 
@@ -296,15 +265,8 @@ class Reader:
                 self._unsound.add(MACROS)
             else:
                 (word, *option, value, second), source = row
-                macros.append(
-                    Macro(
-                        str(word).strip().upper(),
-                        "".join(map(str, option)).strip().upper(),
-                        float(value),
-                        float(second),
-                        source=source,
-                    )
-                )
+                name, text = str(word).strip().upper(), "".join(map(str, option)).strip().upper()
+                macros.append(Macro(name, text, float(value), float(second), source=source))
         self.findings.add("E004", "The macro program is not ended by END.", (card or head).place)
         self._unsound.add(MACROS)
         return macros
@@ -317,18 +279,14 @@ class Reader:
                 continue
             card = self.stream.take_data()
             if card is None or card.is_blank:
-                self.findings.add(
-                    "E011",
-                    "The card of PROP's load table is missing after the macro program's END.",
-                    macro.place("macro"),
-                    "(2I5,7F10.0): type, exponent, t_min, t_max, A1 to A5",
-                )
+                message = "The card of PROP's load table is missing after the macro program's END."
+                hint = "(2I5,7F10.0): type, exponent, t_min, t_max, A1 to A5"
+                self.findings.add("E011", message, macro.place("macro"), hint)
                 break
-            row = self.stream.row(card, LoadTable.fields)
-            if row is None:
+            if (table := self.stream.record(card, LoadTable)) is None:
                 self._unsound.add(MACROS)
-                continue
-            tables.append(LoadTable.from_row(*row))
+            else:
+                tables.append(table)
         return tables
 
 
@@ -356,8 +314,7 @@ def decode(data: bytes) -> str:
 
 def _program_of(line: str) -> str:
     """The kind of file that begins with a line, if it is another program's."""
-    found = (kind for head, kind in OTHERS.items() if re.match(head, line, re.IGNORECASE))
-    return next(found, "")
+    return next((kind for head, kind in OTHERS.items() if re.match(head, line, re.I)), "")
 
 
 def load_text(path_or_text: str | Path | BinaryIO) -> tuple[str, str]:
@@ -420,8 +377,7 @@ def read_deck(path_or_text: str | Path) -> Deck | list[Deck]:
     """
     text, name = load_text(path_or_text)
     reader = Reader(text)
-    decks = [problem.deck for problem in reader.problems()]
+    decks = [problem.deck for problem in reader.problems() if problem.deck is not None]
     if reader.findings.errors:
         raise DeckError(list(reader.findings), name)
-    complete = [deck for deck in decks if deck is not None]
-    return complete[0] if len(complete) == 1 else complete
+    return decks[0] if len(decks) == 1 else decks

@@ -11,6 +11,8 @@ from fecm.deck.card import Card, Fields, Source, Value, read_values
 from fecm.deck.findings import Findings
 from fecm.deck.records import Control, ElementNodes, Integration, Layer, Ply, Record, RodDiameter
 
+_R = TypeVar("_R", bound=Record)
+
 
 class Stream:
     """Cards in the order of the file, without the lines that are comments.
@@ -23,38 +25,34 @@ class Stream:
         self, text: str, *, blanks_are_zeros: bool = False, keeps_values: bool = False
     ) -> None:
         self.lines = text.removeprefix("\ufeff").splitlines()
+        numbered = enumerate(self.lines, start=1)
+        self._cards = [(n, line) for n, line in numbered if not line.startswith("!")]
         self._blanks_are_zeros = blanks_are_zeros
         self._keeps_values = keeps_values
-        self.position = 0  # number of lines taken
+        self.position = 0  # number of cards taken
         self.findings = Findings()
         self.read: dict[int, tuple[Fields, list[Value]]] = {}  # by line number
 
     @property
     def at_end(self) -> bool:
         """Whether every card was taken."""
-        rest = range(self.position, len(self.lines))
-        return all(_is_comment(self.lines[number]) for number in rest)
+        return self.position == len(self._cards)
 
     @property
     def last(self) -> Card | None:
         """The last card of the file; None if it is empty."""
-        for number in range(len(self.lines), 0, -1):
-            if not _is_comment(self.lines[number - 1]):
-                return Card(number, self.lines[number - 1])
-        return None
+        return Card(*self._cards[-1]) if self._cards else None
 
     def take(self) -> Card | None:
         """The next card; None at the end of the file or when findings are closed."""
-        while self.position < len(self.lines) and not self.findings.closed:
-            self.position += 1
-            line = self.lines[self.position - 1]
-            if not _is_comment(line):
-                return Card(self.position, line)
-        return None
+        if self.at_end or self.findings.closed:
+            return None
+        self.position += 1
+        return Card(*self._cards[self.position - 1])
 
     def take_filled(self) -> Card | None:
         """The next card that is not blank, or None as in :meth:`take`."""
-        while self.position < len(self.lines) and not self.lines[self.position].strip():
+        while not self.at_end and not self._cards[self.position][1].strip():
             self.position += 1
         while (card := self.take()) is not None and card.is_blank:
             pass
@@ -66,8 +64,8 @@ class Stream:
 
     def peek(self) -> Card | None:
         """The next card as :meth:`take` gives it, which stays in the stream."""
-        position, card = self.position, self.take()
-        self.position = position
+        if (card := self.take()) is not None:
+            self.give_back()
         return card
 
     def take_data(self) -> Card | None:
@@ -80,8 +78,7 @@ class Stream:
 
     def text_since(self, position: int) -> str:
         """Text of the cards taken since a position."""
-        taken = self.lines[position : self.position]
-        return "\n".join(line.rstrip() for line in taken if not _is_comment(line))
+        return "\n".join(line.rstrip() for _, line in self._cards[position : self.position])
 
     def skip_data(self) -> None:
         """Skip cards up to the next keyword."""
@@ -97,13 +94,10 @@ class Stream:
             self.read[card.line] = (fields, values)
         return values, Source(card, fields)
 
-
-def _is_comment(line: str) -> bool:
-    """Whether a line is a comment."""
-    return line.startswith("!")
-
-
-_R = TypeVar("_R", bound=Record)
+    def record(self, card: Card, kind: type[_R], fields: Fields | None = None) -> _R | None:
+        """Record of a card; None after an error, which is reported."""
+        row = self.row(card, fields or kind.fields)
+        return None if row is None else kind.from_row(*row)
 
 
 class SegmentReader:
@@ -127,21 +121,17 @@ class SegmentReader:
         """Records of numbered cards up to a blank card, or up to the last element's card."""
         records: list[_R] = []
         while (card := self._stream.take_data()) is not None and not card.is_blank:
-            row = self._stream.row(card, fields)
-            if row is None:
+            if (record := self._stream.record(card, kind, fields)) is None:
                 self.unsound.add(head.keyword)
             else:
-                records.append(kind.from_row(*row))
+                records.append(record)
         last = records[-1] if records else None
         complete = isinstance(last, ElementNodes) and last.element >= self._control.numel
         if card is None and not complete:
             following = self._stream.peek()
-            self._stream.findings.add(
-                "E007",
-                f"The {head.keyword} cards are not ended by a blank card.",
-                (following or head).place,
-                "put a blank card before this one" if following else "put a blank card at the end",
-            )
+            message = f"The {head.keyword} cards are not ended by a blank card."
+            hint = f"put a blank card {'before this one' if following else 'at the end'}"
+            self._stream.findings.add("E007", message, (following or head).place, hint)
         return tuple(records)
 
     def _numbered(self, head: Card) -> model.Segment:
@@ -153,34 +143,25 @@ class SegmentReader:
 
     def _single(self, head: Card, kind: type[_R], fields: Fields | None = None) -> _R | None:
         """Record of a mandatory card; None if it is missing or unreadable."""
-        fields = fields or kind.fields
         card = self._stream.take_data()
         if card is None and head.keyword not in self.unsound:
-            self._stream.findings.add(
-                "E008",
-                f"A card of {head.keyword} is missing.",
-                (self._stream.peek() or head).place,
-                f"its fields are {', '.join(field.name for field in fields)}",
-            )
-        row = None if card is None else self._stream.row(card, fields)
-        if row is None:
+            message = f"A card of {head.keyword} is missing."
+            hint = f"its fields are {', '.join(field.name for field in fields or kind.fields)}"
+            self._stream.findings.add("E008", message, (self._stream.peek() or head).place, hint)
+        record = None if card is None else self._stream.record(card, kind, fields)
+        if record is None:
             self.unsound.add(head.keyword)
-            return None
-        return kind.from_row(*row)
+        return record
 
     def _patch(self, head: Card) -> model.Segment | None:
         # The card begins with a word, but not with that of another segment.
         card = self._stream.peek()
         if card is not None and card.keyword not in (*READERS, "END"):
             self._stream.take()
-            row = self._stream.row(card, model.Patch.fields)
-            return None if row is None else model.Patch.from_row(*row)
-        self._stream.findings.add(
-            "E008",
-            "A card of PATC is missing.",
-            (card or head).place,
-            "a blank card takes a disc of 0.327 times the thickness at the node of ROD",
-        )
+            return self._stream.record(card, model.Patch)
+        message = "A card of PATC is missing."
+        hint = "a blank card takes a disc of 0.327 times the thickness at the node of ROD"
+        self._stream.findings.add("E008", message, (card or head).place, hint)
         return None
 
     def _allowables(self, head: Card) -> model.Segment | None:
@@ -195,10 +176,9 @@ class SegmentReader:
         words = head.data.replace(",", " ").upper().split()[1:]
         for word in words:
             if word not in model.Shear.WORDS:
-                self._stream.findings.add(
-                    "E446", f"`{word}` after SHEA is unknown.", head.place,
-                    "SHEA takes MITC (assumed strains) and EQUI (stiffness from equilibrium)",
-                )  # fmt: skip
+                message = f"`{word}` after SHEA is unknown."
+                hint = "SHEA takes MITC (assumed strains) and EQUI (stiffness from equilibrium)"
+                self._stream.findings.add("E446", message, head.place, hint)
         assumed, equilibrium = (word in words for word in model.Shear.WORDS)
         following = self._stream.peek()
         if words and (following is None or following.is_keyword or following.is_blank):
@@ -209,12 +189,9 @@ class SegmentReader:
     def _indentation(self, head: Card) -> model.Segment | None:
         word = " ".join(head.data.replace(",", " ").split()[1:]).upper()
         if word and word != model.Indentation.ACR:
-            self._stream.findings.add(
-                "W416",
-                f"`{word}` after EXPE is not read: the law is that of equation 3-8.",
-                head.place,
-                "EXPE ACR takes the law of equation 3-7",
-            )
+            message = f"`{word}` after EXPE is not read: the law is that of equation 3-8."
+            hint = "EXPE ACR takes the law of equation 3-7"
+            self._stream.findings.add("W416", message, head.place, hint)
             word = ""
         law = self._single(head, model.Indentation, model.Indentation.acr_fields if word else None)
         return law and replace(law, word=word)
@@ -233,12 +210,8 @@ class SegmentReader:
             return model.Units(*names, source=Source(card, ()))
         if card is not None and card.keyword in (*READERS, "END"):
             self._stream.give_back()
-        self._stream.findings.add(
-            "E010",
-            "UNIT takes one card with three names: the units of length, force and time.",
-            (card or head).place,
-            "for example: in lbf s",
-        )
+        message = "UNIT takes one card with three names: the units of length, force and time."
+        self._stream.findings.add("E010", message, (card or head).place, "for example: in lbf s")
         return None
 
     def _print_option(self, head: Card) -> model.Segment:
@@ -249,8 +222,7 @@ class SegmentReader:
         return model.Page("" if card is None else card.data[:4].rstrip(), source=Source(head, ()))
 
     def _material(self, head: Card) -> model.Segment | None:
-        integration = self._single(head, Integration)
-        ply = self._single(head, Ply)
+        integration, ply = self._single(head, Integration), self._single(head, Ply)
         layers = self._layers(head) if integration or ply else None
         if integration is None or ply is None or layers is None:
             return None
@@ -263,15 +235,12 @@ class SegmentReader:
         for number in range(count):
             card = self._stream.take_data()
             if card is None or card.is_blank:
-                self._stream.findings.add(
-                    "E202",
-                    f"MATE has {number} layer cards where the control card says {count}.",
-                    (card or self._stream.peek() or head).place,
-                )
+                message = f"MATE has {number} layer cards where the control card says {count}."
+                place = (card or self._stream.peek() or head).place
+                self._stream.findings.add("E202", message, place)
                 return None
-            row = self._stream.row(card, Layer.fields)
-            if row is not None:
-                layers.append(Layer.from_row(*row))
+            if (layer := self._stream.record(card, Layer)) is not None:
+                layers.append(layer)
         return tuple(layers) if len(layers) == count else None
 
 

@@ -12,9 +12,8 @@ from fecm.plot.map_data import Axis, Ints, case_rows, quantity_of
 from fecm.plot.map_data import numbers as axis_of
 from fecm.plot.maps import LEVEL
 from fecm.plot.style import RATIO, WIDTHS, colours, legend, limit_count, lines_legend, panels
-from fecm.sweeps.random_result import RandomResult
+from fecm.sweeps.random_result import Indices, RandomResult, wilson
 from fecm.sweeps.result import SweepResult
-from fecm.sweeps.sensitivity import Indices, wilson
 
 Sweeps = Mapping[str, SweepResult]
 # Scatter plots side by side.

@@ -16,7 +16,7 @@ from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.deck import model
 from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, moves_only
-from fecm.deck.model import Allowables, Damping, Deck, Delamination, Indentation, Material, Shear
+from fecm.deck.model import Deck
 from fecm.deck.records import RodDiameter
 from fecm.mechanics.contact_law import (
     ContactParameters,
@@ -99,7 +99,7 @@ class Problem:
     @cached_property
     def rules(self) -> tuple[Quadrature, Quadrature, Quadrature]:
         """Quadrature of bending, transverse shear and stored strains."""
-        return rules(self.deck.require(Material))
+        return rules(self.deck.require(model.Material))
 
     @cached_property
     def plate(self) -> PlateModel:
@@ -184,7 +184,7 @@ class Problem:
     @cached_property
     def threshold(self) -> Threshold | None:
         """Delamination threshold; None without a DELA segment."""
-        card = self.deck.last(Delamination)
+        card = self.deck.last(model.Delamination)
         if card is None:
             return None
         rigidity = effective_rigidity(self.laminate)
@@ -193,7 +193,7 @@ class Problem:
     @property
     def damping(self) -> float:
         """Mass-proportional damping a of the plate, 1/time; 0 without a DAMP segment."""
-        card = self.deck.last(Damping)
+        card = self.deck.last(model.Damping)
         return 0.0 if card is None else card.coefficient
 
     @cached_property
@@ -206,13 +206,13 @@ class Problem:
         """Number of values that PLYS stores at a time."""
         cards = [macro for macro in flat(self.program) if macro.word == "PLYS"]
         count = (int(cards[0].second) if cards else 0) or self.deck.control.numel
-        layers = len(self.deck.require(Material).layers)
+        layers = len(self.deck.require(model.Material).layers)
         return count * (layers * (6 * len(self.rules[2].xi) + 6) + 2)
 
     @property
     def _failure_states(self) -> int:
         """Number of points, plies and faces at which FAIL keeps exposures."""
-        layers = len(self.deck.require(Material).layers)
+        layers = len(self.deck.require(model.Material).layers)
         return self.deck.control.numel * len(self.rules[2].xi) * layers * 2
 
     @cached_property
@@ -254,7 +254,7 @@ class ImpactModel:
     under_load: Bools | None
 
 
-def rules(material: Material) -> tuple[Quadrature, Quadrature, Quadrature]:
+def rules(material: model.Material) -> tuple[Quadrature, Quadrature, Quadrature]:
     """Quadrature of a MATE card: bending (L1), transverse shear (L2), stored strains (K).
 
     L1 and L2 outside 1 to 4 count as the nearest of these, as in the listing.  Raises ValueError if
@@ -276,7 +276,8 @@ def contact_patch(deck: Deck, mesh: Mesh) -> ContactPatch | None:
         return None
     radius = card.radius
     if radius is None:
-        radius = RADIUS_PER_THICKNESS[card.shape] * deck.require(Material).integration.thickness
+        thickness = deck.require(model.Material).integration.thickness
+        radius = RADIUS_PER_THICKNESS[card.shape] * thickness
     if card.x is None or card.y is None:
         x, y = mesh.coordinates[deck.require(model.Impact).node - 1].tolist()
     else:
@@ -290,22 +291,19 @@ def contact_patch(deck: Deck, mesh: Mesh) -> ContactPatch | None:
 
 def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> PlateModel:
     """Build the plate of a deck with the active slips."""
-    material = deck.require(Material)
+    material = deck.require(model.Material)
     bending, shear, points = rules(material)
     laminate = laminate_of_deck(deck, isotropic_g12="g12" in slips)
     if "small-stiffness" in slips:
         laminate = laminate.without_small_entries()
-    return PlateModel(
-        mesh,
-        laminate,
-        IntegrationRules(
-            bending=bending,
-            shear=bending if "shear-order" in slips else shear,
-            strains=bending if "tapes" in slips else points,
-            transposed_jacobian="jacobian" in slips,
-            assumes_shear=has_assumed_shear(deck),
-        ),
+    used = IntegrationRules(
+        bending=bending,
+        shear=bending if "shear-order" in slips else shear,
+        strains=bending if "tapes" in slips else points,
+        transposed_jacobian="jacobian" in slips,
+        assumes_shear=has_assumed_shear(deck),
     )
+    return PlateModel(mesh, laminate, used)
 
 
 def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> Projectile:
@@ -331,9 +329,9 @@ def projectile_segment(rod: Projectile, transducer: int = 0) -> model.Projectile
     )
 
 
-def build_constants(measured: Indentation) -> ContactParameters:
+def build_constants(measured: model.Indentation) -> ContactParameters:
     """Build the contact parameters of an EXPE segment."""
-    if measured.word == Indentation.ACR:
+    if measured.word == model.Indentation.ACR:
         return YangSunPermanent(measured.k, measured.alpha_p)
     return LinearPermanent(*measured.values())
 
@@ -350,7 +348,7 @@ def build_station(deck: Deck, projectile: Projectile, slips: frozenset[str]) -> 
 
 def build_law(deck: Deck, slips: frozenset[str] = frozenset()) -> HystereticLaw | ListingLaw:
     """Build the contact law of a deck with the active slips."""
-    constants = build_constants(deck.require(Indentation))
+    constants = build_constants(deck.require(model.Indentation))
     return ListingLaw(constants) if "reload" in slips else HystereticLaw(constants)
 
 
@@ -370,7 +368,7 @@ def build_failure(
     if all(macro.word != "FAIL" for macro in flat(problem.program)):
         return None
     stresses = PlyStresses(problem.mesh, plate.laminate, problem.rules[2])
-    return kind(stresses, plate.laminate, problem.deck.require(Allowables))
+    return kind(stresses, plate.laminate, problem.deck.require(model.Allowables))
 
 
 def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactModel:
@@ -439,7 +437,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     )
 
 
-def laminate_of(material: Material, *, isotropic_g12: bool = False) -> Laminate:
+def laminate_of(material: model.Material, *, isotropic_g12: bool = False) -> Laminate:
     """Laminate of a deck's MATE segment; its inertia uses the card's total thickness.
 
     With `isotropic_g12` E1/2(1+nu12) replaces G12 where E1 = E2 (the slip ``g12``).
@@ -453,24 +451,21 @@ def laminate_of(material: Material, *, isotropic_g12: bool = False) -> Laminate:
 
 
 def laminate_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> Laminate:
-    """Laminate of a deck, with the shear correction factor of its SHEA segment.
-
-    Raises LookupError if the deck has no MATE segment.
-    """
-    shear = deck.last(Shear) or Shear()
-    plain = laminate_of(deck.require(Material), isotropic_g12=isotropic_g12)
+    """Laminate of a deck, with its shear correction factor; LookupError without a MATE segment."""
+    shear = deck.last(model.Shear) or model.Shear()
+    plain = laminate_of(deck.require(model.Material), isotropic_g12=isotropic_g12)
     stiffness = equilibrium_shear_stiffness(plain) if shear.equilibrium else plain.shear
     return replace(plain, shear=shear.factor * stiffness)
 
 
 def has_assumed_shear(deck: Deck) -> bool:
     """Whether the transverse shear strains of a deck are assumed (``SHEA MITC``)."""
-    shear = deck.last(Shear)
+    shear = deck.last(model.Shear)
     return shear is not None and shear.assumed
 
 
 @lru_cache(maxsize=256)
-def is_coupled(material: Material) -> bool:
+def is_coupled(material: model.Material) -> bool:
     """Whether B of a deck's laminate is not 0; False where the MATE segment is invalid."""
     try:
         with np.errstate(all="ignore"):

@@ -9,23 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm.deck import model
 from fecm.deck.findings import Findings, Place
-from fecm.deck.model import (
-    Allowables,
-    Boundary,
-    Coordinates,
-    Damping,
-    Deck,
-    Delamination,
-    Elements,
-    Material,
-    Patch,
-    Shear,
-)
 from fecm.deck.records import Integration
 from fecm.mechanics import assumed_shear, element_groups, interpolation
 from fecm.mechanics.element_groups import distinct
-from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature
+from fecm.mechanics.elements.quadrature import HIGHEST_ORDER
 from fecm.mechanics.elements.shape import CUBIC, TRIANGLE
 from fecm.mechanics.mesh import Mesh, holds_the_plane
 from fecm.problem.build import Problem, has_assumed_shear, rules
@@ -33,13 +22,20 @@ from fecm.problem.generate import place_of_element
 
 # Findings of one kind about elements are grouped beyond this number of cards.
 SHOWN = 4
-
 # Largest number of runs of numbers in a message.
 RUNS = 8
-
 # Layers that the listing's arrays hold (CNPD: QBR(3,3,25), TH(25)).
 LISTING_LAYERS = 25
 ANOTHER_MODE = "run the deck in report mode"
+CORNERS = TRIANGLE.corners
+Blocks = list[element_groups.ElementBlock]
+W, THETA_X = 2, 3
+# Loaded nodes up to this number are single forces, more are a pressure.
+FEW_LOADED = 4
+# Distance of a mid-side node from its place along the side, over the side's length.
+OFF_PLACE = 0.05
+FOUR_NODES, NINE_NODES = "4-node elements", "9-node elements"
+HOURGLASS = "E321"
 
 
 def ranges(numbers: Sequence[int] | NDArray[np.int_]) -> str:
@@ -62,7 +58,7 @@ def describe_elements(rows: NDArray[np.intp]) -> str:
 
 
 def report_elements(
-    findings: Findings, code: str, rows: NDArray[np.intp], deck: Deck, what: str, hint: str = ""
+    findings: Findings, code: str, rows: NDArray[Any], deck: model.Deck, what: str, hint: str = ""
 ) -> None:
     """Report an error of the elements in some rows, one finding per card that generates them.
 
@@ -76,37 +72,20 @@ def report_elements(
         findings.add(code, f"{len(rows)} elements ({ranges(rows + 1)}): each {what}.", place, hint)
         return
     for place, numbers in by_card.items():
-        if len(numbers) == 1:
-            findings.add(code, f"Element {numbers[0]} {what}.", place, hint)
-        else:
-            findings.add(code, f"Elements {ranges(numbers)}: each {what}.", place, hint)
+        one = len(numbers) == 1
+        which = f"Element {numbers[0]}" if one else f"Elements {ranges(numbers)}: each"
+        findings.add(code, f"{which} {what}.", place, hint)
 
 
-CORNERS = TRIANGLE.corners
-
-Blocks = list[element_groups.ElementBlock]
-
-W, THETA_X = 2, 3
-
-# Loaded nodes up to this number are single forces, more are a pressure.
-FEW_LOADED = 4
-
-# Distance of a mid-side node from its place along the side, over the side's length.
-OFF_PLACE = 0.05
-
-
-def check_mesh(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool = False) -> None:
-    """Check nodes, and the shapes of elements with valid node numbers.
-
-    Listing mode takes L1 instead of L2.
-    """
+def check_mesh(deck: model.Deck, mesh: Mesh, findings: Findings, *, listing: bool = False) -> None:
+    """Check nodes, and the shapes of elements with valid nodes; listing mode takes L1 for L2."""
     missing = np.flatnonzero(~mesh.given)
     if len(missing):
-        place = deck.require(Coordinates).place()
+        place = deck.require(model.Coordinates).place()
         findings.add("E306", f"{describe_nodes(missing)} without coordinates.", place)
     unused = np.flatnonzero(mesh.given & ~mesh.used)
     if len(unused):
-        place = deck.require(Elements).place()
+        place = deck.require(model.Elements).place()
         findings.add("E307", f"{describe_nodes(unused)} in no element.", place)
     if not mesh.number_of_equations:
         findings.add("E311", "Every dof of the plate is restrained.", deck.place())
@@ -115,7 +94,7 @@ def check_mesh(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool = Fa
         _check_shapes(deck, mesh, findings, listing=listing)
 
 
-def check_elements(deck: Deck, mesh: Mesh, findings: Findings) -> bool:
+def check_elements(deck: model.Deck, mesh: Mesh, findings: Findings) -> bool:
     """Whether the node numbers of all elements are valid, whatever the coordinates are."""
     elements, numnp = mesh.elements, len(mesh.coordinates)
     before = findings.error_count
@@ -145,9 +124,9 @@ def check_elements(deck: Deck, mesh: Mesh, findings: Findings) -> bool:
     return findings.error_count == before
 
 
-def check_assumed_shear(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+def check_assumed_shear(deck: model.Deck, mesh: Mesh, findings: Findings) -> None:
     """Refuse elements of a sound mesh that have no assumed shear strains."""
-    if not deck.require(Shear).assumed:
+    if not deck.require(model.Shear).assumed:
         return
     wrong = np.zeros(len(mesh.elements), dtype=bool)
     for family in element_groups.element_blocks(mesh.elements, mesh.coordinates):
@@ -158,34 +137,28 @@ def check_assumed_shear(deck: Deck, mesh: Mesh, findings: Findings) -> None:
     )  # fmt: skip
 
 
-def _check_coincidence(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+def _check_coincidence(deck: model.Deck, mesh: Mesh, findings: Findings) -> None:
     """Warn of nodes in the same place: the plate is cut there."""
     order = np.lexsort(mesh.coordinates.T)
     sorted_places = mesh.coordinates[order]
     same = (sorted_places[1:] == sorted_places[:-1]).all(axis=1)
     if same.any():
         rows = distinct(np.concatenate([order[1:][same], order[:-1][same]]))
-        findings.add(
-            "W314",
-            f"{describe_nodes(rows)} in the place of another node: the plate is cut there.",
-            deck.require(Coordinates).place(),
-        )
+        message = f"{describe_nodes(rows)} in the place of another node: the plate is cut there."
+        findings.add("W314", message, deck.require(model.Coordinates).place())
 
 
 def check_in_plane_supports(problem: Problem, findings: Findings) -> None:
     """Warn of in-plane restraints at every node of a laminate whose B is not zero."""
     if holds_the_plane(problem.mesh.codes) and problem.laminate.is_coupled:
-        boundary = problem.deck.last(Boundary)
-        findings.add(
-            "W318",
-            "B is not zero, and u and v are restrained at every node: the plate is stiffer than "
-            "its laminate.",
-            boundary.place() if boundary else None,
-            "restrain u and v only where a support holds them",
-        )
+        boundary = problem.deck.last(model.Boundary)
+        why = "the plate is stiffer than its laminate"
+        message = f"B is not zero, and u and v are restrained at every node: {why}."
+        hint = "restrain u and v only where a support holds them"
+        findings.add("W318", message, boundary.place() if boundary else None, hint)
 
 
-def check_side_nodes(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+def check_side_nodes(deck: model.Deck, mesh: Mesh, findings: Findings) -> None:
     """Warn of nodes on sides that are off the middle or the third points, seen along the side."""
     wrong: list[int] = []
     for family in element_groups.element_blocks(mesh.elements, mesh.coordinates):
@@ -206,30 +179,24 @@ def check_side_nodes(deck: Deck, mesh: Mesh, findings: Findings) -> None:
             wrong += family.rows[np.abs(along - share) > OFF_PLACE].tolist()
     if wrong:
         rows = distinct(wrong).astype(np.intp)
-        findings.add(
-            "W323",
-            f"Side nodes of {describe_elements(rows)} are away from their places by more than "
-            f"{OFF_PLACE:.0%} of the side.",
-            place_of_element(deck, int(rows[0]) + 1),
-            "put them at the middle of the side, in cubic elements at its third points",
-        )
+        off = f"away from their places by more than {OFF_PLACE:.0%} of the side"
+        message = f"Side nodes of {describe_elements(rows)} are {off}."
+        hint = "put them at the middle of the side, in cubic elements at its third points"
+        findings.add("W323", message, place_of_element(deck, int(rows[0]) + 1), hint)
 
 
-def check_support(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+def check_support(deck: model.Deck, mesh: Mesh, findings: Findings) -> None:
     """Warn of a plate that one or two nodes support, unless symmetry holds its rotations."""
     held = mesh.equations == 0
     count = int(held[:, W].sum())
     if 0 < count <= 2 and held[:, THETA_X:].any(axis=1).sum() <= 2:
-        segment = deck.last(Boundary)
-        findings.add(
-            "W319",
-            f"w is restrained at {count} node{'s' if count > 1 else ''} only.",
-            None if segment is None else segment.place(),
-            "restrain w at every node of a supported edge; a free plate needs no support",
-        )
+        segment = deck.last(model.Boundary)
+        message = f"w is restrained at {count} node{'s' if count > 1 else ''} only."
+        hint = "restrain w at every node of a supported edge; a free plate needs no support"
+        findings.add("W319", message, None if segment is None else segment.place(), hint)
 
 
-def _loads_a_node(deck: Deck, mesh: Mesh, *, supported: bool) -> bool:
+def _loads_a_node(deck: model.Deck, mesh: Mesh, *, supported: bool) -> bool:
     """Whether a force on single nodes excites their checkerboard: an impact's, or FORC's.
 
     A supported plate is excited by the short waves of an impact only.
@@ -239,74 +206,49 @@ def _loads_a_node(deck: Deck, mesh: Mesh, *, supported: bool) -> bool:
     return "RODP" in words or (not supported and "EXCD" in words and 0 < loaded <= FEW_LOADED)
 
 
-def _check_shapes(deck: Deck, mesh: Mesh, findings: Findings, *, listing: bool) -> None:
+def _check_shapes(deck: model.Deck, mesh: Mesh, findings: Findings, *, listing: bool) -> None:
     """Check Jacobians at every quadrature point, lumped masses and zero-energy modes."""
-    material = deck.last(Material)
+    material = deck.last(model.Material)
     if material is None or not 1 <= abs(material.integration.points) <= HIGHEST_ORDER:
         return
     families = element_groups.element_blocks(mesh.elements, mesh.coordinates)
-    _check_triangles(material.integration, families, findings)
-    with np.errstate(all="ignore"):
-        _check_jacobians(deck, families, rules(material), findings)
-        _check_masses(material, families, findings)
+    card, used = material.integration, rules(material)
+    folded: dict[str, list[int]] = {}
+    massless: list[NDArray[np.intp]] = []
+    for family in families:
+        # Strains are stored where a triangle's Jacobian is zero: on the side eta = 1.
+        at_third_node = family.shape is TRIANGLE and card.points < -1
+        if at_third_node:
+            what = f"Strains at nodal points (K = {card.points}) do not exist in triangles"
+            where = f"at the third node: {describe_elements(family.rows)}"
+            message = f"{what}, whose Jacobian is zero {where}."
+            hint = f"take Gauss points: K = {-card.points}"
+            findings.add("E317", message, card.place("stress-point order K"), hint)
+        with np.errstate(all="ignore"):
+            for block in family.blocks(4096):
+                for rule in used[:2] if at_third_node else used:
+                    found = interpolation.jacobian_determinants(block, rule)
+                    rows = block.rows[~(found > 0.0).all(axis=1)]
+                    folded.setdefault(family.shape.numbering, []).extend(rows.tolist())
+            values, _ = interpolation.local_shape_functions(family, used[0])
+            if (np.square(values).sum(axis=0) < 1e-12).any():
+                massless.append(family.rows)
+    for numbering, wrong in folded.items():
+        what = "has a Jacobian that is zero or negative"
+        report_elements(findings, "E313", distinct(wrong).astype(np.intp), deck, what, numbering)
+    if massless:
+        nodes = describe_elements(np.sort(np.concatenate(massless)))
+        message = f"Under the bending order L1 = {card.bending} nodes of {nodes} have no mass."
+        hint = "elements with mid-side nodes take L1 = 2 or more"
+        findings.add("E315", message, card.place("bending order L1"), hint)
     supported = bool((mesh.equations[:, W] == 0).any())
     if not listing:
         nodal = _loads_a_node(deck, mesh, supported=supported)
         _check_shear(material, families, supported, nodal, has_assumed_shear(deck), findings)
 
 
-def _at_third_node(card: Integration, family: element_groups.ElementBlock) -> bool:
-    """Whether strains are stored where a triangle's Jacobian is zero: on the side eta = 1."""
-    return family.shape is TRIANGLE and card.points < -1
-
-
-def _check_triangles(card: Integration, families: Blocks, findings: Findings) -> None:
-    for family in families:
-        if _at_third_node(card, family):
-            findings.add(
-                "E317",
-                f"Strains at nodal points (K = {card.points}) do not exist in triangles, whose "
-                f"Jacobian is zero at the third node: {describe_elements(family.rows)}.",
-                card.place("stress-point order K"),
-                f"take Gauss points: K = {-card.points}",
-            )
-
-
-def _check_jacobians(
-    deck: Deck, families: Blocks, used: tuple[Quadrature, ...], findings: Findings
-) -> None:
-    card = deck.require(Material).integration
-    folded: dict[str, list[int]] = {}
-    for family in families:
-        for block in family.blocks(4096):
-            for rule in used[:2] if _at_third_node(card, family) else used:
-                found = interpolation.jacobian_determinants(block, rule)
-                rows = block.rows[~(found > 0.0).all(axis=1)]
-                folded.setdefault(family.shape.numbering, []).extend(rows.tolist())
-    for numbering, wrong in folded.items():
-        what = "has a Jacobian that is zero or negative"
-        report_elements(findings, "E313", distinct(wrong).astype(np.intp), deck, what, numbering)
-
-
-def _check_masses(material: Material, families: Blocks, findings: Findings) -> None:
-    card, bending = material.integration, rules(material)[0]
-    massless = []
-    for family in families:
-        values, _ = interpolation.local_shape_functions(family, bending)
-        if (np.square(values).sum(axis=0) < 1e-12).any():
-            massless.append(family.rows)
-    if massless:
-        findings.add(
-            "E315",
-            f"Under the bending order L1 = {card.bending} nodes of "
-            f"{describe_elements(np.sort(np.concatenate(massless)))} have no mass.",
-            card.place("bending order L1"),
-            "elements with mid-side nodes take L1 = 2 or more",
-        )
-
-
 def _check_shear(
-    material: Material,
+    material: model.Material,
     families: Blocks,
     supported: bool,
     nodal: bool,
@@ -319,26 +261,20 @@ def _check_shear(
     for family in families:
         name, free, held = _orders_without_motions(family)
         if name == FOUR_NODES and order >= free and not assumed:
-            findings.add(
-                "W320",
-                f"4-node elements lock under the shear order L2 = {card.shear}: they are much too "
-                "stiff in a thin plate.",
-                card.place("shear order L2"),
-                "use L2 = 1 and support the plate, or elements with mid-side nodes",
-            )
+            why = "they are much too stiff in a thin plate"
+            message = f"4-node elements lock under the shear order L2 = {card.shear}: {why}."
+            hint = "use L2 = 1 and support the plate, or elements with mid-side nodes"
+            findings.add("W320", message, card.place("shear order L2"), hint)
         if name == NINE_NODES and held <= order < free and nodal:
             _report_hourglass(card, supported, findings)
         elif order < (held if supported else free):
             weak.setdefault(free, []).append(name)
     if weak:
         names = dict.fromkeys(name for kind in weak.values() for name in kind)
-        findings.add(
-            "W316",
-            f"The shear order L2 = {card.shear} leaves {' and '.join(names)} motions without "
-            "energy" + ("." if supported else ", and nothing supports the plate's w."),
-            card.place("shear order L2"),
-            f"take L2 = {max(weak)}",
-        )
+        rest = "." if supported else ", and nothing supports the plate's w."
+        named = " and ".join(names)
+        message = f"The shear order L2 = {card.shear} leaves {named} motions without energy{rest}"
+        findings.add("W316", message, card.place("shear order L2"), f"take L2 = {max(weak)}")
 
 
 def _report_hourglass(card: Integration, supported: bool, findings: Findings) -> None:
@@ -353,11 +289,6 @@ def _report_hourglass(card: Integration, supported: bool, findings: Findings) ->
         message += "nothing resists in a plate without supports."
         hint = "take L2 = 3; --force runs the deck nevertheless"
         findings.add(HOURGLASS, message, place, hint)
-
-
-FOUR_NODES, NINE_NODES = "4-node elements", "9-node elements"
-
-HOURGLASS = "E321"
 
 
 def _orders_without_motions(family: element_groups.ElementBlock) -> tuple[str, int, int]:
@@ -377,7 +308,7 @@ def _orders_without_motions(family: element_groups.ElementBlock) -> tuple[str, i
     return FOUR_NODES, 2, 1
 
 
-def check_listing(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+def check_listing(deck: model.Deck, mesh: Mesh, findings: Findings) -> None:
     """Refuse what the printed program cannot compute: mixed meshes, many layers, later words.
 
     The listing's LMAS takes element 1's node list for all elements (MASS01 hands IX, not IX(1,N),
@@ -387,31 +318,25 @@ def check_listing(deck: Deck, mesh: Mesh, findings: Findings) -> None:
     other = np.flatnonzero((present != present[:1]).any(axis=1))
     if len(other):
         number = int(other[0]) + 1
-        findings.add(
-            "E601",
+        message = (
             f"Element {number} has other nodes than element 1 ({present[number - 1].sum()} against "
             f"{present[0].sum()}): the printed program takes element 1's node list for the mass of "
-            "every element.",
-            place_of_element(deck, number),
-            ANOTHER_MODE,
+            "every element."
         )
-    material = deck.require(Material)
+        findings.add("E601", message, place_of_element(deck, number), ANOTHER_MODE)
+    material = deck.require(model.Material)
     if len(material.layers) > LISTING_LAYERS:
-        findings.add(
-            "E602",
-            f"{len(material.layers)} layers are more than the {LISTING_LAYERS} that the printed "
-            "program has room for.",
-            material.layers[LISTING_LAYERS].place("layer"),
-            ANOTHER_MODE,
-        )
+        room = f"the {LISTING_LAYERS} that the printed program has room for"
+        message = f"{len(material.layers)} layers are more than {room}."
+        findings.add("E602", message, material.layers[LISTING_LAYERS].place("layer"), ANOTHER_MODE)
     later = {macro.word: macro for macro in deck.macros if macro.word in ("PLYS", "FAIL")}
     words = [(word, macro.place("macro")) for word, macro in later.items()]
-    for kind in (Allowables, Delamination, Damping, Patch):
+    for kind in (model.Allowables, model.Delamination, model.Damping, model.Patch):
         if (segment := deck.last(kind)) is not None:
             words.append((kind.keyword, segment.place()))
-    if (shear := deck.last(Shear)) is not None:
+    if (shear := deck.last(model.Shear)) is not None:
         given = (shear.assumed, shear.equilibrium)
-        used = [word for word, is_given in zip(Shear.WORDS, given, strict=True) if is_given]
+        used = [word for word, is_given in zip(model.Shear.WORDS, given, strict=True) if is_given]
         words += [(f"SHEA {word}", shear.place()) for word in used]
     for word, place in words:
         findings.add("E603", f"The printed program has no {word}.", place, ANOTHER_MODE)

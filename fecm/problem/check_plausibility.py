@@ -1,6 +1,7 @@
 """Findings about valid values that no real impact has: wrong units, typing errors, wrong macros.
 
-All are warnings, except that a program which cannot move the plate is an error.
+All are warnings, except that a program which cannot move the plate is an error.  The largest stable
+time step of plate and contact is found here.
 """
 
 from __future__ import annotations
@@ -9,17 +10,19 @@ import math
 
 import numpy as np
 
+from fecm._frozen import frozen
+from fecm.deck import model
 from fecm.deck.findings import Findings, Place
-from fecm.deck.model import Deck, Impact, Indentation, Material, Projectile, Segment
 from fecm.deck.records import Layer, Ply, Record
 from fecm.deck.units import in_si, unit_names
 from fecm.mechanics.element_groups import distinct
+from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.mesh import Mesh
-from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.projectile import Rod
+from fecm.mechanics.plate import PlateModel, UnsoundPlateError
+from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.mechanics.stiffness_product import SAFE
-from fecm.problem.build import Problem, build_projectile
-from fecm.problem.contact_step import contact_step
+from fecm.mechanics.time_step import critical_time_step
+from fecm.problem.build import Problem, build_constants, build_projectile
 
 # Thickness over the longer side of the plate.
 THINNEST, THICKEST = 1.0e-4, 0.25
@@ -54,65 +57,48 @@ Value = tuple[str, Record, str, float]
 def check_plausibility(problem: Problem, findings: Findings) -> None:
     """Warn of values that no real plate or impact has."""
     deck, mesh, hits = problem.deck, problem.mesh, problem.has_impact
-    material = deck.require(Material)
+    material = deck.require(model.Material)
     _check_ply(material.ply, findings)
     _check_angles(material.layers, findings)
     _check_thickness(material, mesh, findings)
     _check_units(deck, findings, hits=hits)
     if hits:
         _check_law(deck, findings)
-        _check_neighbours(deck.require(Impact), mesh, findings)
+        _check_neighbours(deck.require(model.Impact), mesh, findings)
         _check_projectile(deck, problem.plate, findings)
 
 
 def _check_ply(ply: Ply, findings: Findings) -> None:
     ratio = ply.e1 / ply.e2
     if ratio < 0.5:
-        findings.add(
-            "W433",
-            f"E1 = {ply.e1:g} is less than half of E2 = {ply.e2:g}: E1 is the modulus along the "
-            "fibres.",
-            ply.place("Young's modulus E1"),
-        )
+        why = "E1 is the modulus along the fibres"
+        message = f"E1 = {ply.e1:g} is less than half of E2 = {ply.e2:g}: {why}."
+        findings.add("W433", message, ply.place("Young's modulus E1"))
     nu, place = ply.nu12, ply.place("Poisson's ratio NU12")
     if abs(nu) > 1.0:
-        findings.add(
-            "W434",
-            f"Poisson's ratio NU12 = {nu:g} is beyond 1: no ply has such a value.",
-            place,
-            "NU12 of fibre composites is 0.2 to 0.4",
-        )
+        message = f"Poisson's ratio NU12 = {nu:g} is beyond 1: no ply has such a value."
+        findings.add("W434", message, place, "NU12 of fibre composites is 0.2 to 0.4")
     elif 0.0 < nu < 0.1 and ratio > 3.0 and 0.2 <= nu * ratio <= 0.45:
-        findings.add(
-            "W434",
-            f"Poisson's ratio NU12 = {nu:g} looks like NU21: NU12 would be NU21 E1/E2 = "
-            f"{nu * ratio:.3g}.",
-            place,
-            "NU12 is the contraction across the fibres under a stress along them",
-        )
+        why = f"NU12 would be NU21 E1/E2 = {nu * ratio:.3g}"
+        message = f"Poisson's ratio NU12 = {nu:g} looks like NU21: {why}."
+        hint = "NU12 is the contraction across the fibres under a stress along them"
+        findings.add("W434", message, place, hint)
 
 
 def _check_angles(layers: tuple[Layer, ...], findings: Findings) -> None:
     for layer in layers:
         if abs(layer.angle) > 180.0:
-            findings.add(
-                "W431",
-                f"The fibre angle {layer.angle:g} is beyond 180 degrees.",
-                layer.place("fibre angle"),
-                "angles are in degrees, counter-clockwise from the x-axis",
-            )
+            message = f"The fibre angle {layer.angle:g} is beyond 180 degrees."
+            hint = "angles are in degrees, counter-clockwise from the x-axis"
+            findings.add("W431", message, layer.place("fibre angle"), hint)
     turned = [layer for layer in layers if layer.angle]
     if turned and all(_is_radian(layer.angle) for layer in turned):
         shown = ", ".join(
             f"{angle:g} is {math.degrees(angle):.0f} degrees"
             for angle in dict.fromkeys(layer.angle for layer in turned[:8])
         )
-        findings.add(
-            "W432",
-            f"The fibre angles look like radians: {shown}.",
-            turned[0].place("fibre angle"),
-            "angles are in degrees",
-        )
+        message = f"The fibre angles look like radians: {shown}."
+        findings.add("W432", message, turned[0].place("fibre angle"), "angles are in degrees")
 
 
 def _is_radian(angle: float) -> bool:
@@ -121,92 +107,72 @@ def _is_radian(angle: float) -> bool:
     return 0.08 < abs(angle) <= 1.6 and abs(multiple - round(multiple)) < 0.08
 
 
-def _check_thickness(material: Material, mesh: Mesh, findings: Findings) -> None:
+def _check_thickness(material: model.Material, mesh: Mesh, findings: Findings) -> None:
     thickness = material.integration.thickness
     side = float(np.ptp(mesh.coordinates, axis=0).max())
     if not THINNEST * side <= thickness <= THICKEST * side:
-        findings.add(
-            "W430",
-            f"The thickness {thickness:g} is {thickness / side:.2g} of the plate's longer side "
-            f"{side:g}, outside {THINNEST:g} to {THICKEST:g}.",
-            material.integration.place("total thickness"),
-            "thickness and coordinates must be in the same unit of length",
-        )
+        share = f"{thickness / side:.2g} of the plate's longer side {side:g}"
+        message = f"The thickness {thickness:g} is {share}, outside {THINNEST:g} to {THICKEST:g}."
+        hint = "thickness and coordinates must be in the same unit of length"
+        findings.add("W430", message, material.integration.place("total thickness"), hint)
 
 
-def _check_law(deck: Deck, findings: Findings) -> None:
-    law, thickness = deck.require(Indentation), deck.require(Material).integration.thickness
+def _check_law(deck: model.Deck, findings: Findings) -> None:
+    law = deck.require(model.Indentation)
+    thickness = deck.require(model.Material).integration.thickness
     name = law.names()[1]
     if law.alpha_p > thickness:
-        findings.add(
-            "W436",
-            f"The {name} = {law.alpha_p:g} is more than the plate's thickness {thickness:g}: "
-            "no permanent indentation would occur.",
-            law.place(name),
-            "it is a length in the deck's unit",
-        )
-    if law.word != Indentation.ACR and not LEAST_POWER <= law.q <= GREATEST_POWER:
-        findings.add(
-            "W437",
-            f"The unloading power q = {law.q:g} is outside {LEAST_POWER:g} to {GREATEST_POWER:g}.",
-            law.place(law.names()[3]),
-            "measured powers are 1.5 to 2.5",
-        )
+        what = f"The {name} = {law.alpha_p:g} is more than the plate's thickness {thickness:g}"
+        message = f"{what}: no permanent indentation would occur."
+        findings.add("W436", message, law.place(name), "it is a length in the deck's unit")
+    if law.word != model.Indentation.ACR and not LEAST_POWER <= law.q <= GREATEST_POWER:
+        limits = f"{LEAST_POWER:g} to {GREATEST_POWER:g}"
+        message = f"The unloading power q = {law.q:g} is outside {limits}."
+        findings.add("W437", message, law.place(law.names()[3]), "measured powers are 1.5 to 2.5")
 
 
-def _check_neighbours(impact: Impact, mesh: Mesh, findings: Findings) -> None:
+def _check_neighbours(impact: model.Impact, mesh: Mesh, findings: Findings) -> None:
     """Warn if all neighbours of the impact node, inside the plate too, are restrained."""
     touching = mesh.elements[(mesh.elements == impact.node).any(axis=1)]
     around = distinct(touching[(touching > 0) & (touching != impact.node)]) - 1
     places = mesh.coordinates
     inner = ((places > places.min(axis=0)) & (places < places.max(axis=0))).all(axis=1)
     if inner[around].any() and (mesh.equations[around, impact.dof - 1] == 0).all():
-        findings.add(
-            "W441",
-            f"Every other node of the elements at the impact node {impact.node} is restrained in "
-            f"dof {impact.dof}.",
-            impact.place("impact node"),
-            "restrain the supports only",
-        )
+        where = f"the impact node {impact.node} is restrained in dof {impact.dof}"
+        message = f"Every other node of the elements at {where}."
+        findings.add("W441", message, impact.place("impact node"), "restrain the supports only")
 
 
-def _check_projectile(deck: Deck, plate: PlateModel, findings: Findings) -> None:
-    impact, card, ply = deck.require(Impact), deck.last(Projectile), deck.require(Material).ply
+def _check_projectile(deck: model.Deck, plate: PlateModel, findings: Findings) -> None:
+    impact, card = deck.require(model.Impact), deck.last(model.Projectile)
+    ply = deck.require(model.Material).ply
     projectile = build_projectile(deck)
     ratio = projectile.total_mass / (plate.area() * plate.laminate.mass)
     place = impact.place("impact node") if card is None else card.place("length or mass")
     if not LIGHTEST <= ratio <= HEAVIEST:
-        findings.add(
-            "W438",
-            f"The projectile's mass {projectile.total_mass:.4g} is {ratio:.3g} times the plate's.",
-            place,
-            "mass is force time^2/length in the deck's units: t in mm, N and s",
-        )
+        mass = projectile.total_mass
+        message = f"The projectile's mass {mass:.4g} is {ratio:.3g} times the plate's."
+        hint = "mass is force time^2/length in the deck's units: t in mm, N and s"
+        findings.add("W438", message, place, hint)
     along_fibres = math.sqrt(ply.e1 / ply.density)
     if isinstance(projectile, Rod) and card is not None:
         speed = math.sqrt(projectile.modulus / projectile.density)
         if not SLOWEST <= speed / along_fibres <= FASTEST:
-            findings.add(
-                "W439",
-                f"The wave speed in the rod, (E/density)^(1/2) = {speed:.3g}, is "
-                f"{speed / along_fibres:.2g} times that along the plate's fibres.",
-                card.place("rod's Young's modulus"),
-                "modulus and density must be in the units of the ply's",
-            )
+            what = f"The wave speed in the rod, (E/density)^(1/2) = {speed:.3g}"
+            message = f"{what}, is {speed / along_fibres:.2g} times that along the plate's fibres."
+            hint = "modulus and density must be in the units of the ply's"
+            findings.add("W439", message, card.place("rod's Young's modulus"), hint)
     share = abs(impact.velocity) / along_fibres
     if share and not CREEPING <= share <= HYPERSONIC:
-        findings.add(
-            "W440",
-            f"The impact velocity {impact.velocity:g} is {share:.2g} of the wave speed along the "
-            f"fibres, (E1/density)^(1/2) = {along_fibres:.3g}.",
-            impact.place("impact velocity"),
-            "velocity is in the deck's units of length and time",
-        )
+        wave = f"the wave speed along the fibres, (E1/density)^(1/2) = {along_fibres:.3g}"
+        message = f"The impact velocity {impact.velocity:g} is {share:.2g} of {wave}."
+        hint = "velocity is in the deck's units of length and time"
+        findings.add("W440", message, impact.place("impact velocity"), hint)
 
 
-def _values(deck: Deck, *, hits: bool) -> list[Value]:
+def _values(deck: model.Deck, *, hits: bool) -> list[Value]:
     """Values that :data:`REAL` has a range for."""
-    material = deck.require(Material)
+    material = deck.require(model.Material)
     ply, layer = material.ply, max(material.layers, key=lambda layer: layer.thickness)
     values: list[Value] = [
         ("density", ply, "mass density", ply.density),
@@ -219,7 +185,8 @@ def _values(deck: Deck, *, hits: bool) -> list[Value]:
     ]
     if not hits:
         return values
-    impact, law, card = deck.require(Impact), deck.require(Indentation), deck.last(Projectile)
+    impact, law = deck.require(model.Impact), deck.require(model.Indentation)
+    card = deck.last(model.Projectile)
     if impact.velocity > 0.0:
         values.append(("velocity", impact, "impact velocity", impact.velocity))
     values.append(("contact coefficient", law, law.names()[0], law.k))
@@ -229,7 +196,7 @@ def _values(deck: Deck, *, hits: bool) -> list[Value]:
     return values
 
 
-def _check_units(deck: Deck, findings: Findings, *, hits: bool) -> None:
+def _check_units(deck: model.Deck, findings: Findings, *, hits: bool) -> None:
     """Warn in one finding of values that no real material has in the units of UNIT."""
     names = unit_names(deck)
     wrong: list[tuple[Place | None, str]] = []
@@ -240,17 +207,18 @@ def _check_units(deck: Deck, findings: Findings, *, hits: bool) -> None:
             what = f"{name} {value:g} is {value * factor:.3g} {unit}"
             wrong.append((record.place(name), f"{what}, outside {least:g} to {greatest:g}"))
     if wrong:
-        findings.add(
-            "W435",
-            f"In the units of UNIT ({' '.join(names.values())}) the "
-            f"{'; the '.join(what for _, what in wrong)}.",
-            wrong[0][0],
-            "either the values or the names on UNIT are wrong; nothing is converted",
-        )
+        listed = "; the ".join(what for _, what in wrong)
+        message = f"In the units of UNIT ({' '.join(names.values())}) the {listed}."
+        hint = "either the values or the names on UNIT are wrong; nothing is converted"
+        findings.add("W435", message, wrong[0][0], hint)
 
 
 def check_time_step_of_contact(problem: Problem, findings: Findings) -> None:
-    """Warn of a DT that the contact makes unstable, and of one far below the stable step."""
+    """Warn of a DT that the contact makes unstable, and of one far below the stable step.
+
+    The plate moves explicitly under the contact force of the last step, so the contact acts on it
+    as a spring with the tangent stiffness of the indentation law.
+    """
     steps = [macro for macro in problem.deck.macros if macro.word == "DT"]
     if not steps:
         return
@@ -261,30 +229,25 @@ def check_time_step_of_contact(problem: Problem, findings: Findings) -> None:
     for macro in steps:
         dt = macro.value
         if contact is not None and (dt or SAFE * bound) >= contact.limit:
-            findings.add(
-                "W517",
+            message = (
                 f"DT = {dt or SAFE * bound:.3g} is not below {contact.limit:.3g}, the stable "
                 f"step with the contact's stiffness of about {contact.stiffness:.3g} on a mass "
-                f"of {contact.mass:.3g}: the contact may diverge.",
-                macro.place("value"),
-                f"check k and the masses, or take a DT of {0.9 * contact.limit:.2g}",
+                f"of {contact.mass:.3g}: the contact may diverge."
             )
+            hint = f"check k and the masses, or take a DT of {0.9 * contact.limit:.2g}"
+            findings.add("W517", message, macro.place("value"), hint)
         if 0.0 < dt < WASTEFUL * stable:
-            findings.add(
-                "W516",
-                f"DT = {dt:.3g} is only {dt / stable:.2g} of the stable step {stable:.3g}.",
-                macro.place("value"),
-                "DT is in the deck's unit of time",
-            )
+            message = f"DT = {dt:.3g} is only {dt / stable:.2g} of the stable step {stable:.3g}."
+            findings.add("W516", message, macro.place("value"), "DT is in the deck's unit of time")
 
 
 # Macros that move the plate or find its modes, and those that store its displacements.
 MOVE = {"RODP", "EXCD", "SOLV", "EIGE"}
 STORE = {"DISP", "STRE", "REAC"}
-OF_AN_IMPACT: tuple[type[Segment], ...] = (Impact, Indentation, Projectile)
+OF_AN_IMPACT: tuple[type[model.Segment], ...] = (model.Impact, model.Indentation, model.Projectile)
 
 
-def check_purpose(deck: Deck, mesh: Mesh, findings: Findings) -> None:
+def check_purpose(deck: model.Deck, mesh: Mesh, findings: Findings) -> None:
     """Compare the segments of an impact with the program."""
     words = {macro.word: macro for macro in deck.macros}
     movers = MOVE & words.keys()
@@ -294,16 +257,94 @@ def check_purpose(deck: Deck, mesh: Mesh, findings: Findings) -> None:
         hint = "RODP takes an impact step; use it instead of EXCD"
         stored = next((macro for macro in deck.macros if macro.word in STORE | movers), None)
         if stored is not None and movers <= {"EXCD"} and not mesh.forces.any():
-            findings.add(
-                "E519", f"{what}: the plate never moves, and all results would be 0.",
-                stored.place("macro"), hint,
-            )  # fmt: skip
+            message = f"{what}: the plate never moves, and all results would be 0."
+            findings.add("E519", message, stored.place("macro"), hint)
         elif movers:
             findings.add("W520", f"{what}: nothing hits the plate.", segment.place(), hint)
     if {"RODP", "EXCD"} <= movers:
-        findings.add(
-            "W518",
-            "EXCD moves the plate but not the projectile, which is at rest during the step.",
-            words["EXCD"].place("macro"),
-            "RODP applies the loads of FORC too",
-        )
+        message = "EXCD moves the plate but not the projectile, which is at rest during the step."
+        hint = "RODP applies the loads of FORC too"
+        findings.add("W518", message, words["EXCD"].place("macro"), hint)
+
+
+# A clamped square plate under a central force has the stiffness D/(0.0056 a^2): Timoshenko and
+# Woinowsky-Krieger, Theory of Plates and Shells, Table 35.  In terms of the force 8 v (m D)^(1/2)
+# of a wave, that is this factor on the ratio of the masses.
+CLAMPED = 1.0 / (64.0 * 0.0056)
+
+
+def wave_impedance(laminate: Laminate) -> float:
+    """Force over velocity of a point of an infinite plate, 8 (m D*)^(1/2) (force*time/length).
+
+    D* is the effective bending stiffness of an orthotropic plate: R. Olsson, Impact response of
+    orthotropic composite plates predicted from a one-parameter differential equation, AIAA Journal
+    30 (1992) 1587-1596.
+    """
+    D = laminate.D
+    mean = math.sqrt(D[0, 0] * D[1, 1])
+    return 8.0 * math.sqrt(laminate.mass * (mean + D[0, 1] + 2.0 * D[2, 2]) / 2.0)
+
+
+def expected_peak(deck: model.Deck, plate: PlateModel) -> float:
+    """Estimate the peak force, high rather than low.
+
+    The minimum of the Hertz contact on a rigid target, k^(2/5) (5 m v^2/4)^(3/5), and of the
+    response of the plate: the bending wave for a light projectile, the stiffness of a clamped plate
+    for a heavy one.
+    """
+    impact, law = deck.require(model.Impact), deck.require(model.Indentation)
+    mass, v = build_projectile(deck).total_mass, np.abs(np.float64(impact.velocity))
+    ratio = mass / (plate.area() * plate.laminate.mass)
+    rigid = law.k**0.4 * (1.25 * mass) ** 0.6 * v**1.2
+    return float(min(rigid, wave_impedance(plate.laminate) * v * np.sqrt(1.0 + CLAMPED * ratio)))
+
+
+def contact_stiffness(deck: model.Deck, plate: PlateModel) -> float:
+    """Larger tangent stiffness of loading (3-1) and unloading (3-3) at the expected peak."""
+    law = build_constants(deck.require(model.Indentation))
+    with np.errstate(all="ignore"):
+        force = expected_peak(deck, plate)
+    peak = (force / law.k) ** (2.0 / 3.0)
+    if not peak > 0.0:
+        return 0.0
+    return float(force * max(1.5 / peak, law.q / (peak - law.permanent(peak))))
+
+
+@frozen
+class ContactStep:
+    """Limit of the time step from the contact."""
+
+    stiffness: float  # tangent stiffness of the contact, force/length
+    mass: float  # the smaller of the plate's mass at the impact dof and the projectile's at its tip
+    limit: float  # largest stable time step; infinite where the time step is certainly stable
+
+
+def contact_step(
+    problem: Problem, plate: PlateModel, dt: float, bound: float
+) -> ContactStep | None:
+    """Largest time step at which plate and contact are stable together; None without impact.
+
+    `bound` is a lower bound of the plate's critical time step, `dt` the deck's, 0 for 0.9 of the
+    critical one.  The limit is computed only where the bound does not show that this is stable.
+    """
+    if problem.contact is None:
+        return None
+    weights = problem.contact[plate.mesh.equations > 0]
+    stiffness = contact_stiffness(problem.deck, plate)
+    projectile = build_projectile(problem.deck)
+    rigid = isinstance(projectile, RigidMass)
+    tip = projectile.total_mass if rigid else float(projectile.mass()[0])
+    at_node = 1.0 / float((weights**2 / plate.mass).sum())
+    mass = min(tip, at_node)
+    if not stiffness > 0.0:
+        return ContactStep(stiffness, mass, math.inf)
+    # The projectile's implicit step is iterated: a fixed point only below this (beta is 1/6).
+    iterated = math.sqrt(6.0 * tip / stiffness)
+    step = dt or SAFE * bound
+    if step < iterated and (step / bound) ** 2 + step**2 * stiffness / (4.0 * at_node) < 1.0:
+        return ContactStep(stiffness, mass, math.inf)
+    try:
+        critical = critical_time_step(plate, (weights, stiffness))
+    except UnsoundPlateError:  # the contact's stiffness is out of range
+        critical = iterated
+    return ContactStep(stiffness, mass, min(iterated, critical))

@@ -34,13 +34,9 @@ class _Budget:
         exceeded = self._left < 0
         self._left -= count
         if self._left < 0 and not exceeded:
-            self._findings.add(
-                "E012",
-                f"The cards up to this one generate more than {self._limit} nodes, counted with "
-                "repetitions.",
-                place,
-                "generate each node once",
-            )
+            nodes = f"more than {self._limit} nodes, counted with repetitions"
+            message = f"The cards up to this one generate {nodes}."
+            self._findings.add("E012", message, place, "generate each node once")
         return self._left >= 0
 
 
@@ -87,28 +83,19 @@ def restraint_codes(
 
 
 def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floats:
-    """Diameter of every element of a rod, generated from PROJ's cards like coordinates.
-
-    It is NaN for elements without a card.
-    """
+    """Diameters of a rod's elements, generated like coordinates; NaN for those without a card."""
     noted = Findings() if findings is None else findings
     values = np.full((segment.elements, 1), np.nan)
     known: list[NodeValues] = []
     for record in segment.diameters:
         if not 1 <= record.element <= segment.elements:
-            noted.add(
-                "E420",
-                f"Rod element {record.element} does not exist; PROJ defines the rod elements 1 to "
-                f"{segment.elements}.",
-                record.place("element"),
-            )
+            what = f"Rod element {record.element} does not exist"
+            message = f"{what}; PROJ defines the rod elements 1 to {segment.elements}."
+            noted.add("E420", message, record.place("element"))
         elif known and record.element <= known[-1].node:
-            noted.add(
-                "E421",
-                f"Rod element {record.element} follows element {known[-1].node}; elements "
-                "must ascend.",
-                record.place("element"),
-            )
+            what = f"Rod element {record.element} follows element {known[-1].node}"
+            message = f"{what}; elements must ascend."
+            noted.add("E421", message, record.place("element"))
         else:
             known.append(NodeValues(record.element, record.increment, (record.diameter,)))
     _interpolate(values, known, noted, _Budget(segment.elements, noted))
@@ -126,12 +113,9 @@ def _existing(
     outside = [record for record in records if not 1 <= number(record) <= count]
     if outside:
         more = f" (and {len(outside) - 1} more)" if len(outside) > 1 else ""
-        findings.add(
-            code,
-            f"{what.capitalize()} {number(outside[0])}{more} does not exist; the control card "
-            f"defines the {what}s 1 to {count}.",
-            outside[0].place(what),
-        )
+        first = f"{what.capitalize()} {number(outside[0])}{more}"
+        message = f"{first} does not exist; the control card defines the {what}s 1 to {count}."
+        findings.add(code, message, outside[0].place(what))
     return [record for record in records if 1 <= number(record) <= count]
 
 
@@ -150,12 +134,9 @@ def _interpolate(
         values[record.node - 1] = record.values
         if last is not None and last.increment != 0:
             if record.node == last.node:
-                findings.add(
-                    "E302",
-                    f"Node {record.node} follows itself, so nothing can be generated.",
-                    record.place("node"),
-                    "the card before has a generation increment",
-                )
+                message = f"Node {record.node} follows itself, so nothing can be generated."
+                hint = "the card before has a generation increment"
+                findings.add("E302", message, record.place("node"), hint)
             run = _rows(last, record)
             if not budget.covers(len(run), record.place("node")):
                 return
@@ -192,21 +173,14 @@ def _step(elements: Ints, records: Sequence[ElementNodes], findings: Findings) -
     numel = len(elements)
     last: ElementNodes | None = None
     for record in _existing(records, "element", numel, "E303", findings):
-        number = record.element
-        previous = 0 if last is None else last.element
+        number, previous = record.element, 0 if last is None else last.element
         if number <= previous:
-            findings.add(
-                "E304",
-                f"Element {number} follows element {previous}; elements must ascend.",
-                record.place("element"),
-            )
+            message = f"Element {number} follows element {previous}; elements must ascend."
+            findings.add("E304", message, record.place("element"))
             continue
         if last is None and number > 1:
-            findings.add(
-                "E305",
-                f"Element {number} is the first; the elements before it are missing.",
-                record.place("element"),
-            )
+            message = f"Element {number} is the first; the elements before it are missing."
+            findings.add("E305", message, record.place("element"))
         if last is not None:
             _fill(elements, last, number)
         elements[number - 1] = record.nodes

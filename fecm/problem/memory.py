@@ -69,10 +69,7 @@ def needed_bytes(
 
 
 def check_memory(checked: Problem, *, solver: str = AUTO, in_memory: bool = False) -> None:
-    """Refuse a run that needs more memory than is free.
-
-    Raises NotEnoughMemoryError with both numbers.
-    """
+    """Raise NotEnoughMemoryError for a run that needs more memory than is free."""
     remedy = "write it to a file, or store fewer rows" if in_memory else "take a coarser mesh"
     _memory.check(
         "the run",

@@ -16,10 +16,7 @@ ENERGY_LIMIT = 0.1
 
 @frozen
 class RunOptions:
-    """Options of a run; the defaults are the report's.
-
-    Raises ValueError if a value is not valid.
-    """
+    """Options of a run, by default the report's.  Raises ValueError if a value is not valid."""
 
     # Slips of the printed program that are on: see :func:`~fecm.problem.slips.active_slips`.
     slips: frozenset[str] = frozenset()

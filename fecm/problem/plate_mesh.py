@@ -120,10 +120,7 @@ class PlateMesh:
         return np.unique(sides[counts == 1])
 
     def supports(self, wanted: Mapping[str, str]) -> dict[str, str]:
-        """Supports of groups; those named after a support have it.
-
-        Raises MeshError if a group or a support is unknown.
-        """
+        """Supports of groups; those named after a support have it.  Raises MeshError."""
         for name, support in wanted.items():
             if name not in self.groups and name != BOUNDARY:
                 known = ", ".join(sorted({*self.groups, BOUNDARY}))
@@ -175,15 +172,10 @@ def from_meshio(read: MeshLike, where: str = "") -> PlateMesh:
     blocks = {n: block for n, block in enumerate(read.cells) if block.type not in LINES}
     kinds = sorted({block.type for block in blocks.values()})
     if len(kinds) != 1 or kinds[0] not in KINDS.values():
-        what = (
-            f"has {' and '.join(kinds)} elements"
-            if kinds
-            else ("has no elements with an area (in Gmsh, give the surface a physical group too)")
-        )
-        raise MeshError(
-            f"{where}the mesh {what}; all must be triangles of 3 or 6 nodes, or all quadrilaterals "
-            "of 4, 8 or 9"
-        )
+        what = "no elements with an area (in Gmsh, give the surface a physical group too)"
+        what = f"{' and '.join(kinds)} elements" if kinds else what
+        must = "all must be triangles of 3 or 6 nodes, or all quadrilaterals of 4, 8 or 9"
+        raise MeshError(f"{where}the mesh has {what}; {must}")
     groups: dict[str, list[Any]] = {}
     names = {(int(tag), int(dim)): name for name, (tag, dim) in read.field_data.items()}
     for number, block in enumerate(read.cells):
@@ -258,12 +250,10 @@ def _turned(places: Floats, nodes: Integers, size: float, where: str) -> Integer
     twice = ~np.isin(np.arange(len(nodes)), first)
     for wrong, what in ((collapsed, "without an area"), (twice, "given twice")):
         if wrong.any():
-            some = (np.flatnonzero(wrong)[:NAMED] + 1).tolist()
-            more = ", ..." if wrong.sum() > NAMED else ""
-            raise MeshError(
-                f"{where}{wrong.sum()} elements {what}: number {', '.join(map(str, some))}{more} "
-                "of the plane elements"
-            )
+            some = ", ".join(map(str, (np.flatnonzero(wrong)[:NAMED] + 1).tolist()))
+            some += ", ..." if wrong.sum() > NAMED else ""
+            text = f"{wrong.sum()} elements {what}: number {some} of the plane elements"
+            raise MeshError(f"{where}{text}")
     back = [0, *range(count - 1, 0, -1)]
     if nodes.shape[1] > count:  # mid-sides follow their corners
         back += [2 * count - 1 - n for n in range(count)]

@@ -40,10 +40,8 @@ def refined(deck: Deck, mesh: Mesh, marked: Bools | None = None) -> Deck:
     for block in element_blocks(mesh.elements, mesh.coordinates):
         count = block.nodes.shape[1]
         if count not in (4, 9) or block.shape.nodes != 9:
-            raise RefineError(
-                f"element {block.rows[0] + 1} cannot be bisected: it does not have four or nine "
-                "nodes"
-            )
+            why = "it does not have four or nine nodes"
+            raise RefineError(f"element {block.rows[0] + 1} cannot be bisected: {why}")
         local = np.stack([block.shape.xi, block.shape.eta], axis=1)[:count]
         for row in block.rows.tolist():
             cuts = [2 if split[row, axis] else 1 for axis in (0, 1)]
@@ -53,11 +51,8 @@ def refined(deck: Deck, mesh: Mesh, marked: Bools | None = None) -> Deck:
                 at = low + (local + 1.0) / cuts
                 values = block.shape.shape_functions(at[:, 0], at[:, 1], block.present)[0]
                 shares = values[:, block.present]
-                child = [
-                    nodes.number(row, own, tuple(place), share)
-                    for place, share in zip(at.tolist(), shares, strict=True)
-                ]
-                elements.append((row, child))
+                spots = zip(at.tolist(), shares, strict=True)
+                elements.append((row, [nodes.number(row, own, tuple(p), n) for p, n in spots]))
     return _rebuilt(deck, mesh, nodes, sorted(elements))
 
 
@@ -92,9 +87,8 @@ class _Nodes:
         old = np.flatnonzero(np.abs(shares - 1.0) < 1e-9)
         if len(old):
             return int(own[old[0]])
-        on = [
-            n for n, a in enumerate(_ALONG) if abs(place[1 - a] - (-1.0, 1.0, 1.0, -1.0)[n]) < 1e-9
-        ]
+        across = zip((1, 0, 1, 0), (-1.0, 1.0, 1.0, -1.0), strict=True)
+        on = [n for n, (axis, at) in enumerate(across) if abs(place[axis] - at) < 1e-9]
         key: Hashable = (row, place)
         around = own
         if on:
@@ -114,22 +108,15 @@ class _Nodes:
 
 def _rebuilt(deck: Deck, mesh: Mesh, nodes: _Nodes, elements: list[tuple[int, list[int]]]) -> Deck:
     """The deck with other nodes and elements, each on a card of its own."""
+    width = mesh.elements.shape[1]
+    places = (NodeValues(n, 0, tuple(p.tolist())) for n, p in enumerate(nodes.coordinates, 1))
+    children = ((*child, *[0] * (width - len(child))) for _, child in elements)
+    cards = (ElementNodes(n, child, 0) for n, child in enumerate(children, 1))
+    restrained = ((n, (codes != 0).astype(int)) for n, codes in enumerate(nodes.codes, 1))
+    codes = (NodeCodes(n, 0, tuple(held.tolist())) for n, held in restrained if held.any())
     written: list[Segment] = [
-        Coordinates(
-            tuple(
-                NodeValues(n, 0, tuple(place.tolist()))
-                for n, place in enumerate(nodes.coordinates, 1)
-            )
-        ),
-        Elements(tuple(_element(n, child, mesh) for n, (_, child) in enumerate(elements, 1))),
-        Boundary(
-            tuple(
-                NodeCodes(n, 0, tuple(int(c != 0) for c in codes))
-                for n, codes in enumerate(nodes.codes, 1)
-                if codes.any()
-            )
-        ),
-    ]
+        Coordinates(tuple(places)), Elements(tuple(cards)), Boundary(tuple(codes))
+    ]  # fmt: skip
     loaded = [(n, force) for n, force in enumerate(nodes.forces, 1) if force.any()]
     if loaded:
         written.append(Forces(tuple(NodeValues(n, 0, tuple(f.tolist())) for n, f in loaded)))
@@ -137,8 +124,3 @@ def _rebuilt(deck: Deck, mesh: Mesh, nodes: _Nodes, elements: list[tuple[int, li
     rest = [segment for segment in deck.segments if not isinstance(segment, replaced)]
     control = replace(deck.control, numnp=len(nodes.coordinates), numel=len(elements))
     return replace(deck, control=control, segments=(*written, *rest), text="")
-
-
-def _element(number: int, nodes: list[int], mesh: Mesh) -> ElementNodes:
-    absent = [0] * (mesh.elements.shape[1] - len(nodes))
-    return ElementNodes(number, (*nodes, *absent), 0)

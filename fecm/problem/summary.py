@@ -12,7 +12,7 @@ from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import Problem, build_projectile
-from fecm.problem.check_impact import resolution, said_error
+from fecm.problem.check_segments import resolution, said_error
 
 # Share of the critical time step below which the step that DT 0 takes is shown.
 ROOM = 0.6
@@ -61,10 +61,8 @@ class ProblemSummary:
 
     def to_dict(self) -> dict[str, object]:
         """Plain values, for JSON."""
-        return {
-            name: value.tolist() if isinstance(value, np.ndarray) else value
-            for name, value in vars(self).items()
-        }
+        arrays = {n: v.tolist() for n, v in vars(self).items() if isinstance(v, np.ndarray)}
+        return vars(self) | arrays
 
     def lines(self) -> list[str]:
         """Lines of text."""

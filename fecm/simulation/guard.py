@@ -12,7 +12,7 @@ from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import ImpactModel
-from fecm.problem.contact_step import contact_step
+from fecm.problem.check_plausibility import contact_step
 from fecm.problem.problem import Problem
 
 # Error of the energy balance, relative to the supplied energy, that triggers a warning.

@@ -16,30 +16,18 @@ from fecm.api import LoadedDeck, Progress, load_deck
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
 from fecm.problem.problem import Problem
+from fecm.sweeps import sampling, schedule
 from fecm.sweeps.batch import built, deck_of
 from fecm.sweeps.cases import Case, CasesError, Limit, checked, combined, parse_exceed
 from fecm.sweeps.convergence import refined_cases
 from fecm.sweeps.outcome import RUN, Outcome, merge
 from fecm.sweeps.plan import DEFLECTION, Build, Measure, Plan, Task, check_memory, plan, tasks
 from fecm.sweeps.result import SweepResult, result_of, save
-from fecm.sweeps.sampling import (
-    REMEDY,
-    Design,
-    DesignKind,
-    design_of,
-    doubt,
-    parse_law,
-    random_cases,
-)
-from fecm.sweeps.schedule import Done, Idle, lost, on_dask, on_executor, on_workers, run_serial
-from fecm.sweeps.store import DamagedPartError, PartialResults
+from fecm.sweeps.sampling import DesignKind
 
 
 def problem_of(deck: str | Path | Deck) -> Problem:
-    """Return the checked problem of a deck with a single problem.
-
-    Raises DeckError if the deck has errors.  Raises CasesError if the deck has several problems.
-    """
+    """Checked problem of a deck; DeckError if it has errors, CasesError if several problems."""
     return _loaded(deck).problems[0]
 
 
@@ -64,10 +52,7 @@ def _limits(exceed: Mapping[str, Any]) -> list[Limit]:
 
 
 def check_draws(planned: Plan) -> None:
-    """Raise CasesError if a draw of a sensitivity study is impossible.
-
-    The smallest and the largest value of every random name are tried.
-    """
+    """Raise CasesError if the least or largest draw of a sensitivity study is impossible."""
     design = planned.design
     if design is None or not design.sensitivity or planned.build is not None:
         return
@@ -77,10 +62,8 @@ def check_draws(planned: Plan) -> None:
             try:
                 deck_of(planned, values.index(value))
             except CasesError as error:
-                raise CasesError(
-                    f"{name} {value:.6g}: {str(error).rstrip('.')}; sensitivity needs "
-                    f"all draws; {REMEDY}"
-                ) from None
+                text = f"{name} {value:.6g}: {str(error).rstrip('.')}; sensitivity needs all draws"
+                raise CasesError(f"{text}; {sampling.REMEDY}") from None
 
 
 def _first_built(build: Build, cases: Sequence[Case]) -> LoadedDeck:
@@ -100,16 +83,13 @@ def _check_sendable(spawned: bool, **functions: object) -> None:
         try:
             pickle.dumps(function)
         except Exception:  # pickle raises several types
-            raise CasesError(
-                f"{name} can't be sent to worker processes; define it with def at the top level of "
-                "a module"
-            ) from None
+            hint = "define it with def at the top level of a module"
+            raise CasesError(f"{name} can't be sent to worker processes; {hint}") from None
         own = getattr(function, "__module__", "") == "__main__"
         if spawned and own and not hasattr(sys.modules["__main__"], "__file__"):
-            raise CasesError(
-                f"{name} is defined in an interactive session, where worker processes can't import "
-                "it; define it in a module, or use an executor of threads"
-            )
+            where = "in an interactive session, where worker processes can't import it"
+            hint = "define it in a module, or use an executor of threads"
+            raise CasesError(f"{name} is defined {where}; {hint}")
 
 
 def carry_out(
@@ -119,9 +99,9 @@ def carry_out(
     workers: int = 1,
     scheduler: object = None,
     executor: Executor | None = None,
-    parts: PartialResults | None = None,
-    done: Done = lambda task, outcome: None,
-    idle: Idle = lambda: None,
+    parts: schedule.PartialResults | None = None,
+    done: schedule.Done = lambda task, outcome: None,
+    idle: schedule.Idle = lambda: None,
     note: Callable[[str], None] = warn,
 ) -> SweepResult:
     """Run the tasks of a plan in this process, on an executor, a scheduler or several workers.
@@ -141,29 +121,29 @@ def carry_out(
         done(task, outcome)
 
     for task in tasks(problem, made):
-        before = None
         try:
             before = None if parts is None else parts.get(task)
-        except DamagedPartError as error:
+        except schedule.DamagedPartError as error:
             note(f"{error}; its cases are run again")
+            before = None
         if before is None:
             left.append(task)
         else:
             take(task, before)
 
     def keep(task: Task, outcome: Outcome) -> None:
-        if parts is not None and not lost(outcome):
+        if parts is not None and not schedule.lost(outcome):
             parts.put(task, outcome)
         take(task, outcome)
 
     if executor is not None:
-        on_executor(left, executor, keep, idle)
+        schedule.on_executor(left, executor, keep, idle)
     elif scheduler is not None:
-        on_dask(left, scheduler, keep, idle)
+        schedule.on_dask(left, scheduler, keep, idle)
     elif workers > 1 and len(left) > 1:
-        on_workers(left, workers, keep, idle)
+        schedule.on_workers(left, workers, keep, idle)
     else:
-        run_serial(left, keep, idle)
+        schedule.run_serial(left, keep, idle)
     outcome = merge(outcomes)
     if parts is not None or not made.history:
         outcome.force = None
@@ -291,14 +271,12 @@ def sweep(
         raise CasesError("samples, seed, sensitivity and exceed need random values")
     if cases is not None and random is not None:
         raise CasesError("give random values together with vary, not with cases")
-    if (vary is None) == (cases is None) and (
-        vary or (until is None and random is None and refine is None)
-    ):
+    alone = until is not None or random is not None or refine is not None
+    if (vary is None) == (cases is None) and (vary or not alone):
         raise CasesError("give either vary or cases")
     if not (random is None or (isinstance(random, Mapping) and random)):
-        raise CasesError(
-            f'random is {random!r}; write a mapping such as {{"k": "uniform:1e6,2e6"}}'
-        )
+        example = '{"k": "uniform:1e6,2e6"}'
+        raise CasesError(f"random is {random!r}; write a mapping such as {example}")
     if executor is not None and not isinstance(executor, Executor):
         raise CasesError(f"executor is {executor!r}, not a concurrent.futures.Executor")
     if (workers > 1) + (scheduler is not None) + (executor is not None) > 1:
@@ -315,12 +293,12 @@ def sweep(
         made = combined({} if vary is None else vary, free=free)
     else:
         made = checked(cases, free=free)
-    drawn: Design | None = None
+    drawn: sampling.Design | None = None
     if random is not None:
-        laws = {name: parse_law(name, law, free=free) for name, law in random.items()}
-        drawn = design_of(laws, samples, seed, design, sensitivity=sensitivity)
-        made = random_cases(drawn, made)
-        if text := doubt(drawn):
+        laws = {name: sampling.parse_law(name, law, free=free) for name, law in random.items()}
+        drawn = sampling.design_of(laws, samples, seed, design, sensitivity=sensitivity)
+        made = sampling.random_cases(drawn, made)
+        if text := sampling.doubt(drawn):
             warn(text)
     if workers > 1 or isinstance(executor, ProcessPoolExecutor):
         _check_sendable(workers > 1, build=build, measure=own)
@@ -352,11 +330,9 @@ def sweep(
             case, names = task.numbers[0], sorted(outcome.measured)
             first = first or (case, names)
             if names != first[1]:
-                raise CasesError(
-                    f"measure returns {', '.join(names)} for case {case}, and "
-                    f"{', '.join(first[1])} for case {first[0]}; return the same names, NaN where "
-                    "there is no value"
-                )
+                found = f"{', '.join(names)} for case {case}, and {', '.join(first[1])}"
+                hint = "return the same names, NaN where there is no value"
+                raise CasesError(f"measure returns {found} for case {first[0]}; {hint}")
         finished += len(task.numbers)
         if progress is not None:
             progress(finished, len(made))

@@ -28,34 +28,19 @@ from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import build_law, build_model, build_projectile
-from fecm.problem.check_impact import check_impact, check_law, check_projectile
-from fecm.problem.check_program import check_program
-from fecm.problem.problem import Problem
+from fecm.problem.check_segments import check_impact, check_law, check_projectile
+from fecm.problem.problem import Problem, check_program
 from fecm.results.metrics import GAGE, HIT, Indentation, summarise
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.results.summary import largest_exposures
 from fecm.simulation.guard import ENERGY_WARNING
 from fecm.simulation.run import simulate
+from fecm.sweeps import plan
 from fecm.sweeps.cases import PLATE, REFINE, THRESHOLD, Case, CasesError, Value, name_fault
-from fecm.sweeps.clock import Clock, with_time_step
-from fecm.sweeps.find import search
-from fecm.sweeps.impacts import Hits, impacts
 from fecm.sweeps.outcome import RUN, Outcome, merge, outcome_of
-from fecm.sweeps.plan import (
-    ADVANCED,
-    DEFLECTION,
-    FAILURE,
-    GAGES,
-    Build,
-    Measure,
-    Plan,
-    Task,
-    shares_plate,
-    without_output,
-)
-from fecm.sweeps.responses import largest_sums, plate_response
-from fecm.sweeps.vary import apply_case, check_deck, raise_first
+from fecm.sweeps.responses import Hits, impacts, largest_sums, plate_response
+from fecm.sweeps.vary import Clock, apply_case, check_deck, raise_first, with_time_step
 
 # Runs decks by their numbers; doubtful ones in full if they are judged.
 Runs = Callable[[list[int], list[Deck], bool], Outcome]
@@ -64,7 +49,7 @@ UNIT = RigidMass(1.0)
 ROUGH = 1e-4
 
 
-def run(task: Task) -> Outcome:
+def run(task: plan.Task) -> Outcome:
     """Run the cases of a task; a case that cannot be run becomes a row with the reason."""
     if task.alone:
         found = merge([_in_full(task, n, c) for n, c in zip(task.numbers, task.cases, strict=True)])
@@ -91,11 +76,12 @@ def run(task: Task) -> Outcome:
         decks.append(deck)
     parts = [Outcome.failed(lost)] if lost else []
     if decks:
-        outcome = (
-            runs(numbers, decks, True)
-            if task.until is None
-            else _found(numbers, decks, _force(checked, task.until), runs)
-        )
+        if task.until is None:
+            outcome = runs(numbers, decks, True)
+        else:
+            force = _threshold(checked) if task.until == THRESHOLD else None
+            force = float(task.until) if force is None else force
+            outcome = _found(numbers, decks, force, runs)
         parts.append(_with_hit(outcome, checked, first))
     outcome = merge(parts)
     return outcome if task.history else replace(outcome, force=None)
@@ -115,7 +101,7 @@ def _prepared(
     return checked, runs_of(checked, extra, history=history)
 
 
-def _in_full(task: Task, number: int, case: Case) -> Outcome:
+def _in_full(task: plan.Task, number: int, case: Case) -> Outcome:
     """Run a case whose deck the caller builds, or whose result the caller measures."""
     try:
         if task.build is None:
@@ -139,11 +125,8 @@ def _with_hit(outcome: Outcome, checked: Problem, case: Case) -> Outcome:
     return outcome
 
 
-def built(build: Build, case: Case) -> LoadedDeck:
-    """Build and check the deck of a case.
-
-    Raises CasesError if it cannot be built, or has an error.
-    """
+def built(build: plan.Build, case: Case) -> LoadedDeck:
+    """Build and check the deck of a case; CasesError if it cannot be built, or has an error."""
     try:
         deck = build(dict(case))
         if not isinstance(deck, Deck):
@@ -158,7 +141,7 @@ def built(build: Build, case: Case) -> LoadedDeck:
     return prepared
 
 
-def _measured(measure: Measure, result: Result, case: Case) -> dict[str, NDArray[Any]]:
+def _measured(measure: plan.Measure, result: Result, case: Case) -> dict[str, NDArray[Any]]:
     """Columns that the caller computes from the result of a case."""
     try:
         found = measure(result)
@@ -185,18 +168,12 @@ def _told(error: Exception) -> str:
 
 def runs_of(checked: Problem, extra: Sequence[str] = (), *, history: bool = True) -> Runs:
     """Return the function that runs decks which share the plate of a problem."""
-    if shares_plate(checked):
+    if plan.shares_plate(checked):
         return partial(_together, checked, _plate(checked, extra), extra, history)
     return lambda numbers, decks, judged: merge(
         [_alone(n, replace(checked, deck=deck), extra=extra)
          for n, deck in zip(numbers, decks, strict=True)]
     )  # fmt: skip
-
-
-def _force(checked: Problem, until: float | str) -> float:
-    """Peak force to reach."""
-    threshold = _threshold(checked)
-    return float(until) if threshold is None or until != THRESHOLD else threshold
 
 
 def _found(numbers: list[int], decks: list[Deck], force: float, runs: Runs) -> Outcome:
@@ -231,13 +208,10 @@ def _found(numbers: list[int], decks: list[Deck], force: float, runs: Runs) -> O
     return merge(parts)
 
 
-def deck_of(plan: Plan, case: int) -> Deck:
-    """Return the deck of a case with its time step.
-
-    Raises CasesError if the case cannot be run.
-    """
-    values = plan.cases[case]
-    return _timed(apply_case(plan.deck, values), plan.clock, values).deck
+def deck_of(planned: plan.Plan, case: int) -> Deck:
+    """Return the deck of a case with its time step; CasesError if the case cannot be run."""
+    values = planned.cases[case]
+    return _timed(apply_case(planned.deck, values), planned.clock, values).deck
 
 
 def _timed(deck: Deck, clock: Clock | None, case: Case) -> Problem:
@@ -266,12 +240,6 @@ def _check_contact(deck: Deck, mesh: Mesh) -> None:
     raise_first(findings)
 
 
-def _time_step(checked: Problem) -> float:
-    """Time step of the program; 0 means 0.9 of the critical time step, as in a run."""
-    dt = next(macro.value for macro in flat(checked.program) if macro.word == "DT")
-    return dt or taken_time_step(checked.critical_time_step)
-
-
 def _threshold(checked: Problem) -> float | None:
     """Delamination threshold of a plate, force; None without a DELA segment."""
     return None if checked.threshold is None else checked.threshold.force
@@ -291,8 +259,10 @@ def _plate(checked: Problem, extra: Sequence[str]) -> Plate:
     setup = build_model(checked)
     if setup.impact is None:
         raise ValueError("the deck has no impact")
-    load, dt, steps = setup.impact.contact.load, _time_step(checked), checked.work.steps
-    gages = setup.gages if GAGES in extra else None
+    load, steps = setup.impact.contact.load, checked.work.steps
+    dt = next(macro.value for macro in flat(checked.program) if macro.word == "DT")
+    dt = dt or taken_time_step(checked.critical_time_step)
+    gages = setup.gages if plan.GAGES in extra else None
     names = [] if gages is None else [f"{GAGE}{number}" for number in gages.numbers]
     sums = None if gages is None else setup.motion.dof_sums(gages.dof_indices, gages.weights)
     with np.errstate(all="ignore"):
@@ -315,18 +285,16 @@ def _together(
     full if they are judged.
     """
     steps, dt = len(plate.response), plate.dt
-    projectiles = [build_projectile(deck) for deck in decks]
-    mass = np.array([projectile.total_mass for projectile in projectiles])
+    rods = [build_projectile(deck) for deck in decks]
     # All rigid masses are one kind: a unit mass under the force over the mass.
-    rigid = np.array([isinstance(projectile, RigidMass) for projectile in projectiles])
-    projectiles = [UNIT if one else rod for one, rod in zip(rigid, projectiles, strict=True)]
-    kinds = {projectile: number for number, projectile in enumerate(dict.fromkeys(projectiles))}
+    units = [UNIT if isinstance(rod, RigidMass) else rod for rod in rods]
+    kinds = {unit: number for number, unit in enumerate(dict.fromkeys(units))}
     # Cases with the same projectile are adjacent.
-    order = sorted(range(len(decks)), key=lambda case: kinds[projectiles[case]])
-    kind = np.array([kinds[projectiles[case]] for case in order], dtype=np.intp)
-    mass = mass[order]
-    scale = np.where(rigid[order], mass, 1.0)
-    require(ADVANCED * steps * len(decks), f"{len(decks)} cases of {steps} steps")
+    order = sorted(range(len(decks)), key=lambda case: kinds[units[case]])
+    kind = np.array([kinds[units[case]] for case in order], dtype=np.intp)
+    mass = np.array([rods[case].total_mass for case in order])
+    scale = np.where([isinstance(rods[case], RigidMass) for case in order], mass, 1.0)
+    require(plan.ADVANCED * steps * len(decks), f"{len(decks)} cases of {steps} steps")
     with np.errstate(all="ignore"):
         law = HystereticLaw(stacked([build_law(decks[case]).constants for case in order]))
         speed = np.array([decks[case].require(Impact).velocity for case in order])
@@ -335,8 +303,8 @@ def _together(
         times = np.add.accumulate(np.full(steps, dt))
         summary = summarise(found.force, times, found.indentation, mass, speed, _threshold(checked))
         peaks = {n: largest_sums(r, found.force) for n, r in plate.strains.items() if judged}
-    if DEFLECTION in extra:
-        peaks[DEFLECTION] = found.deflection
+    if plan.DEFLECTION in extra:
+        peaks[plan.DEFLECTION] = found.deflection
     summary |= {name: _known(*peak, found.force[-1]) for name, peak in peaks.items()}
     back = np.argsort(order)
     unsettled = found.unconverged_steps[back]
@@ -363,14 +331,14 @@ def _known(largest: Floats, last: Floats, force: Floats) -> Floats:
 def _extra(extra: Sequence[str], result: Result) -> dict[str, NDArray[Any]]:
     """Columns measured of a full run."""
     peaks: dict[str, Floats] = {}
-    if DEFLECTION in extra:
-        peaks[DEFLECTION] = result["history/plate_w"]
-    if GAGES in extra and "gages/number" in result:
+    if plan.DEFLECTION in extra:
+        peaks[plan.DEFLECTION] = result["history/plate_w"]
+    if plan.GAGES in extra and "gages/number" in result:
         strains = np.abs(result["gages/strain"]).T
         peaks |= {f"{GAGE}{n}": s for n, s in zip(result["gages/number"], strains, strict=True)}
     force = result["history/force"][-1:]
     found = {name: _known(v.max(keepdims=True), v[-1:], force) for name, v in peaks.items()}
-    for one in largest_exposures(result) if FAILURE in extra else ():
+    for one in largest_exposures(result) if plan.FAILURE in extra else ():
         last = np.array([one.exposure if one.time >= result["history/time"][-1] else 0.0])
         found[f"exposure_{one.criterion}"] = _known(np.array([one.exposure]), last, force)
     return found
@@ -379,15 +347,14 @@ def _extra(extra: Sequence[str], result: Result) -> dict[str, NDArray[Any]]:
 def _alone(
     number: int,
     checked: Problem,
-    measure: Measure | None = None,
+    measure: plan.Measure | None = None,
     case: Case | None = None,
     extra: Sequence[str] = (),
 ) -> Outcome:
     """Run one case in full, without storing fields unless it is measured."""
     sink = MemorySink()
     if measure is None:
-        words = ("FAIL",) if FAILURE in extra else ()
-        checked = replace(checked, program=without_output(checked.program, words))
+        checked = plan.without_output(checked, extra)
     try:
         simulation = simulate(checked, sink)
     except (DivergenceError, ArithmeticError) as error:
@@ -410,3 +377,50 @@ def _alone(
         outcome.columns |= _extra(extra, result)
         outcome.columns |= {} if measure is None else _measured(measure, result, case or {})
     return outcome
+
+
+# Range of velocities relative to the deck's, and the last relative error.
+RANGE, ERROR = 100.0, 1e-6
+
+
+def search(
+    starts: Sequence[float], force: float, peaks: Callable[[list[tuple[int, float]]], Floats]
+) -> list[float | str]:
+    """Find the lowest velocity of each case at which the contact force reaches a value.
+
+    The range from 1/100 to 100 times the start is searched, by rounds of velocities.  Later rounds
+    gather around the interpolated velocity of the bracket, whose upper end is the result.  `peaks`
+    returns peak forces of pairs of case and velocity; NaN where unknown.  A text is the reason why
+    a case has no velocity.
+    """
+    found: list[float | str] = [""] * len(starts)
+    trials = {n: np.geomspace(v / RANGE, v * RANGE, plan.COUNT) for n, v in enumerate(starts)}
+    first = True
+    while trials:
+        given = peaks([(n, float(v)) for n, values in trials.items() for v in values])
+        ends = np.cumsum([len(values) for values in trials.values()])[:-1]
+        left: dict[int, Floats] = {}
+        for (n, values), own in zip(trials.items(), np.split(given, ends), strict=True):
+            if not first:  # the ends of a bracket, whatever rounding makes of them
+                own[0], own[-1] = min(own[0], np.nextafter(force, 0.0)), np.fmax(own[-1], force)
+            (above,) = np.nonzero(own >= force)
+            if not len(above):
+                found[n] = f"the peak force is below {force:.6g} up to velocity {values[-1]:.6g}"
+                continue
+            after = above[0]
+            if not after:
+                found[n] = f"the peak force is above {force:.6g} from velocity {values[0]:.6g} on"
+                continue
+            low, high = values[after - 1 : after + 1]
+            if high - low <= ERROR * high:
+                found[n] = float(high)
+                continue
+            with np.errstate(all="ignore"):  # a power law; without a finite one the middle alone
+                share = np.log(force / own[after - 1]) / np.log(own[after] / own[after - 1])
+                guess = low * (high / low) ** share
+            offsets = (high - low) * 10.0 ** -np.arange(1.0, 9.0)
+            around = np.concatenate([guess - offsets, guess + offsets])
+            inside = around[(around > low) & (around < high)]
+            left[n] = np.unique(np.concatenate([[low, (low + high) / 2.0, high], inside]))
+        trials, first = left, False
+    return found

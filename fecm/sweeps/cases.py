@@ -84,10 +84,7 @@ def parse_vary(text: str) -> tuple[str, list[Value]]:
 
 
 def parse_until(text: str) -> float | str:
-    """Read ``peak_force=NUMBER`` or ``peak_force=threshold``.
-
-    Raises CasesError if the text has neither form.
-    """
+    """Read ``peak_force=NUMBER`` or ``peak_force=threshold``; CasesError if it is neither."""
     name, _, value = (part.strip() for part in text.partition("="))
     if name != "peak_force" or not value:
         raise CasesError(f"`{text}`: write peak_force=NUMBER or peak_force=threshold")
@@ -95,10 +92,7 @@ def parse_until(text: str) -> float | str:
 
 
 def parse_exceed(text: str) -> Limit:
-    """Read ``QUANTITY=NUMBER`` or ``peak_force=threshold``.
-
-    Raises CasesError if the text has neither form.
-    """
+    """Read ``QUANTITY=NUMBER`` or ``peak_force=threshold``; CasesError if it is neither."""
     name, _, value = (part.strip() for part in text.partition("="))
     if not name or not value or (value == THRESHOLD and name != "peak_force"):
         raise CasesError(f"`{text}`: write QUANTITY=NUMBER or peak_force={THRESHOLD}")
@@ -133,10 +127,8 @@ def grid(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
     count = math.prod(len(values) for _, values in varied)
     if count > MOST:
         raise CasesError(f"{count} cases; at most {MOST} are allowed")
-    return [
-        dict(zip(names, values, strict=True))
-        for values in itertools.product(*(values for _, values in varied))
-    ]
+    combinations = itertools.product(*(values for _, values in varied))
+    return [dict(zip(names, values, strict=True)) for values in combinations]
 
 
 def read_cases(path: Path) -> list[Case]:

@@ -18,8 +18,7 @@ from fecm.deck.macros import flat
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.problem import Problem
 from fecm.sweeps.cases import REFINE, Case, CasesError
-from fecm.sweeps.clock import with_time_step
-from fecm.sweeps.vary import apply_case, check_deck
+from fecm.sweeps.vary import apply_case, check_deck, with_time_step
 
 FACTORS = "1,2,4,8"
 # Order that two factors assume, and the lowest that gives a limit.

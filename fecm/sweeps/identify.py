@@ -337,9 +337,8 @@ def _check(
     name, force, peak = measured.name, measured.force, float(own.max())
     begin, width = _top(clock, own)
     if measured.column != "force":
-        raise StudyError(
-            f"{name} has a column transducer and no force; the contact force is fitted"
-        )
+        message = f"{name} has a column transducer and no force; the contact force is fitted"
+        raise StudyError(message)
     if not (peak > 0.0 and width > 0.0):
         raise StudyError("the deck's own run has no contact force to compare with; check its ROD")
     if -force.min() > force.max():
@@ -370,10 +369,7 @@ def _cause(dimension: str, ratio: float, units: Mapping[str, str]) -> str:
 
 
 def _covariance(jac: Floats, variance: float, names: Sequence[str]) -> Floats:
-    """Covariance of the scaled parameters.
-
-    Raises IdentifyError if the residual does not depend on some of them, or only on combinations.
-    """
+    """Covariance of the scaled parameters; IdentifyError if the residual doesn't determine them."""
     columns = np.sqrt(np.sum(jac**2, axis=0))
     if idle := [n for n, c in zip(names, columns, strict=True) if c < NO_EFFECT * len(jac) ** 0.5]:
         raise IdentifyError(

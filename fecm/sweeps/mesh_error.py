@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from fecm.deck.macros import flat
 from fecm.deck.model import Deck
 from fecm.mechanics.time_step import taken_time_step
-from fecm.problem.check_impact import resolution
+from fecm.problem.check_segments import resolution
 from fecm.problem.memory import check_memory
 from fecm.problem.options import RunOptions
 from fecm.problem.problem import Problem
@@ -19,9 +19,8 @@ from fecm.results.sinks import MemorySink
 from fecm.simulation.run import run
 from fecm.simulation.simulation import Simulation
 from fecm.sweeps.cases import CasesError
-from fecm.sweeps.clock import with_time_step
 from fecm.sweeps.plan import without_output
-from fecm.sweeps.vary import check_deck
+from fecm.sweeps.vary import check_deck, with_time_step
 
 
 @dataclass(frozen=True)
@@ -95,7 +94,7 @@ def mesh_error(
 
 def _peak_force(problem: Problem, options: RunOptions, advance: Callable[[int], object]) -> float:
     """Peak force of a run without stored fields."""
-    plain = replace(problem, program=without_output(problem.program))
+    plain = without_output(problem)
     check_memory(plain, solver=options.solver, in_memory=True)
     sink = MemorySink()
     observers = (lambda simulation: advance(simulation.interval),)

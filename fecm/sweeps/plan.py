@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -14,6 +14,7 @@ from fecm import _memory
 from fecm._version import __version__
 from fecm.deck.macros import Body, Loop, flat
 from fecm.deck.model import Boundary, Deck, Delamination, Gages, Impact
+from fecm.deck.records import Macro
 from fecm.mechanics.kernels import LIBRARY
 from fecm.problem.memory import needed_bytes
 from fecm.problem.problem import Problem
@@ -32,11 +33,9 @@ from fecm.sweeps.cases import (
     Limit,
     check_names,
 )
-from fecm.sweeps.clock import Clock, clock_of
-from fecm.sweeps.find import COUNT
 from fecm.sweeps.random_result import check_limits
 from fecm.sweeps.sampling import Design
-from fecm.sweeps.vary import apply_case, check_deck
+from fecm.sweeps.vary import Clock, apply_case, check_deck, clock_of
 
 Build = Callable[[dict[str, Any]], Deck]
 Measure = Callable[[Result], Mapping[str, float]]
@@ -45,6 +44,8 @@ Measure = Callable[[Result], Mapping[str, float]]
 TOGETHER = 2048
 # Bytes per step and case advanced together: above the measured value.
 ADVANCED = 34 if LIBRARY is None else 12
+# Velocities of the first round of a search.
+COUNT = 25
 # Names of columns that are measured on request.
 DEFLECTION, GAGES, FAILURE = MEASURES = ("max_deflection", "gages", "failure")
 
@@ -195,17 +196,18 @@ def freed(some: Sequence[Task]) -> int:
 FIELDS = ("DISP", "STRE", "PLYS", "FAIL", "REAC", "EIGE")
 
 
-def without_output(body: Body, kept_words: Sequence[str] = ()) -> Body:
-    """Return a program that stores no fields, but those of some words."""
-    kept: list[Any] = []
-    for item in body:
-        if isinstance(item, Loop):
-            kept.append(replace(item, body=without_output(item.body, kept_words)))
-        elif item.word == "RODP":
-            kept.append(replace(item, value=1e9))
-        elif item.word in kept_words or item.word not in FIELDS:
-            kept.append(item)
-    return tuple(kept)
+def without_output(checked: Problem, extra: Sequence[str] = ()) -> Problem:
+    """Return a problem whose program stores no fields, but those of more columns."""
+    dropped = {*FIELDS} - ({"FAIL"} if FAILURE in extra else set())
+
+    def kept(body: Body) -> Iterator[Macro | Loop]:
+        for item in body:
+            if isinstance(item, Loop):
+                yield replace(item, body=tuple(kept(item.body)))
+            elif item.word not in dropped:
+                yield replace(item, value=1e9) if item.word == "RODP" else item
+
+    return replace(checked, program=tuple(kept(checked.program)))
 
 
 # Bytes per step and case whose history is stored: above the measured value.
@@ -222,10 +224,7 @@ def check_memory(checked: Problem, made: Plan, workers: int, *, streamed: bool =
         checked = check_deck(apply_case(made.deck, made.cases[-1]))
     steps, cases = checked.work.steps, len(made.cases)
     at_once = min(workers, len(tasks(checked, made)))
-    plate = checked
-    if made.measure is None:
-        words = ("FAIL",) if FAILURE in made.extra else ()
-        plate = replace(checked, program=without_output(checked.program, words))
+    plate = checked if made.measure else without_output(checked, made.extra)
     held = min(cases, TOGETHER) if streamed else cases
     kept = KEPT * steps * held if made.history else 0
 

@@ -15,18 +15,10 @@ from fecm.results.schema import ResultFileError
 from fecm.sweeps.cases import THRESHOLD, CasesError, Limit
 from fecm.sweeps.outcome import RUN
 from fecm.sweeps.sampling import DESIGNS, REMEDY, Design, Law
-from fecm.sweeps.sensitivity import (
-    ENDS,
-    QUANTILES,
-    Indices,
-    Statistics,
-    indices,
-    statistics,
-    wilson,
-)
 
 if TYPE_CHECKING:
     from fecm.results.hdf5_reader import Contents
+
 
 Array = NDArray[Any]
 # Share of failed draws above which the results are doubtful.
@@ -128,20 +120,15 @@ def evaluate(
     fine = np.isin(summary["status"], RUN)
     made = combinations(design, cases)
     shape = (-1, design.rows) if made else (design.rows,)
-    columns = {
-        name: np.where(fine, values, np.nan).reshape(shape)
-        for name, values in summary.items()
-        if name != "status"
-    }
+    numbers = {name: values for name, values in summary.items() if name != "status"}
+    columns = {n: np.where(fine, values, np.nan).reshape(shape) for n, values in numbers.items()}
     draws = {name: values[..., : design.draws] for name, values in columns.items()}
     check_limits(limits, list(columns), threshold=FORCE in columns)
     found: dict[str, Indices] = {}
     notes: list[str] = []
     if (lost := int((~fine).sum())) > FEW * len(fine):
-        notes.append(
-            f"{lost / len(fine):.3%} of the draws failed, and the statistics are those of the "
-            f"others; {REMEDY}"
-        )
+        text = "of the draws failed, and the statistics are those of the others"
+        notes.append(f"{lost / len(fine):.3%} {text}; {REMEDY}")
     if design.sensitivity:
         table = np.array(list(columns.values()))
         flat = table.reshape(-1, len(design.laws) + 2, design.samples)
@@ -149,10 +136,8 @@ def evaluate(
         found = {n: Indices(*(part[row] for part in split)) for row, n in enumerate(columns)}
         lacking = {n: int(np.isnan(v).sum()) for n, v in columns.items()}
         if names := [name for name, count in lacking.items() if 0 < count < len(fine)]:
-            notes.append(
-                f"no indices where a case has no value: {', '.join(names)} "
-                f"({max(lacking.values())} of {len(fine)} cases)"
-            )
+            text = f"{', '.join(names)} ({max(lacking.values())} of {len(fine)} cases)"
+            notes.append(f"no indices where a case has no value: {text}")
     return RandomResult(
         design, {name: statistics(values) for name, values in draws.items()}, found,
         _exceedance(draws, limits), made, tuple(notes),
@@ -242,13 +227,8 @@ def stored(random: RandomResult) -> Iterator[tuple[str, Array, str, str, tuple[s
         yield f"statistics/{name}", values, text, dimension, (*first, "statistics")
     for name, found in random.sensitivity.items():
         for part, values in found._asdict().items():
-            yield (
-                f"sensitivity/{name}/{part}",
-                values,
-                PARTS[part][0],
-                "",
-                (*first, *PARTS[part][1]),
-            )
+            text, axes = PARTS[part]
+            yield f"sensitivity/{name}/{part}", values, text, "", (*first, *axes)
     if len(random.exceedance.quantity):
         for part, values in random.exceedance._asdict().items():
             axes = ("limits",) if part in ("quantity", "limit") else (*first, "limits")
@@ -275,19 +255,13 @@ def attributes(random: RandomResult) -> dict[str, dict[str, Any]]:
 def random_of(
     contents: Contents, cases: Mapping[str, Array], quantities: Iterable[str], count: int
 ) -> RandomResult | None:
-    """Read the results of a random sweep; None if it is none.
-
-    Raises ResultFileError if they are incomplete.
-    """
+    """Results of a random sweep, None if it is none; ResultFileError if they are incomplete."""
     if "design" not in contents.groups:
         return None
     try:
         about, groups = contents.groups["design"], contents.groups
-        laws = {
-            name: Law(str(own["law"]), tuple(map(float, own["parameters"])))
-            for name in about["names"]
-            for own in [groups[f"random/{name}"]]
-        }
+        owns = {name: groups[f"random/{name}"] for name in about["names"]}
+        laws = {n: Law(str(o["law"]), tuple(map(float, o["parameters"]))) for n, o in owns.items()}
         kind = DESIGNS[DESIGNS.index(about["kind"])]
         samples, seed = int(about["samples"]), int(about["seed"])
         design = Design(laws, samples, seed, kind, bool(about["sensitivity"]))
@@ -313,11 +287,8 @@ def random_of(
             shape = (*first, len(exceedance.quantity))
             if exceedance.limit.shape != shape[-1:] or {v.shape for v in exceedance[2:]} != {shape}:
                 raise ValueError("exceedance")
-        if (
-            count % design.rows
-            or not laws.keys() <= cases.keys()
-            or (not made and count != design.rows)
-        ):
+        whole = count % design.rows == 0 if made else count == design.rows
+        if not (whole and laws.keys() <= cases.keys()):
             raise ValueError("cases")
         return RandomResult(
             design,
@@ -327,6 +298,101 @@ def random_of(
             exceedance, made, tuple(map(str, about["notes"])),
         )  # fmt: skip
     except (KeyError, ValueError, TypeError, AttributeError, ZeroDivisionError) as error:
-        raise ResultFileError(
-            f"{contents.path}: the results of this random sweep are incomplete ({error})"
-        ) from None
+        message = f"{contents.path}: the results of this random sweep are incomplete ({error})"
+        raise ResultFileError(message) from None
+
+
+QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
+# Resamples of the bootstrap, and counts of them in memory at once.
+RESAMPLES = 1000
+COUNTS = 2_000_000
+# Ends of a 95 % interval.
+ENDS = (0.025, 0.975)
+Z = 1.959963984540054  # the standard normal distribution is 0.975 there
+# Variation relative to the largest value below which a quantity is constant.
+ROUNDING = 1e-12
+
+
+class Indices(NamedTuple):
+    """Sobol' indices of a quantity; with varied values, the combinations come first."""
+
+    first: Floats  # (d,): first-order index of each random value
+    total: Floats  # (d,): total index
+    first_interval: Floats  # (d, 2): 95 % interval
+    total_interval: Floats  # (d, 2)
+
+
+class Statistics(NamedTuple):
+    """Statistics of a quantity over the draws that have a value."""
+
+    draws: NDArray[np.int64]  # number of them
+    mean: Floats
+    standard_deviation: Floats
+    quantiles: Floats  # (5,): at the probabilities `QUANTILES`
+
+
+def indices(values: Floats, seed: int) -> Indices:
+    """Estimate the first-order and total Sobol' indices of quantities.
+
+    `values` (m, d + 2, n) are those of the rows of A, B, and A with column i of B.  The indices are
+    those of Saltelli et al., Computer Physics Communications 181 (2010) 259, table 2 (b) and (f);
+    NaN of a quantity that is constant or lacks values.  The variance is that over A and B together.
+    The values are taken relative to their mean there, which does not change the expected values.
+    The intervals are percentiles of bootstraps over the rows of the matrices.
+    """
+    m, rows, n = values.shape
+    d = rows - 2
+    flat = values.reshape(m, -1)
+    with np.errstate(invalid="ignore"):
+        size = np.abs(flat).max(axis=1)
+        varies = np.ptp(flat[:, : 2 * n], axis=1) > ROUNDING * size
+    centred = values - values[:, :2].mean(axis=(1, 2), keepdims=True)
+    f_a, f_b, f_ab = centred[:, :1], centred[:, 1:2], centred[:, 2:]
+    # Means of these columns make the indices: those of f, f^2, and the products, (m, 2 + 2 d, n).
+    columns = np.concatenate(
+        [(f_a + f_b) / 2.0, (f_a**2 + f_b**2) / 2.0, f_b * (f_ab - f_a), (f_a - f_ab) ** 2 / 2.0],
+        axis=1,
+    )
+    columns[~varies] = np.nan
+
+    def ratios(means: Floats) -> Floats:
+        """First-order and total indices (..., m, 2 d) from means (..., m, 2 + 2 d)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(means[..., 2:] / (means[..., 1] - means[..., 0] ** 2)[..., None])
+
+    generator = np.random.default_rng([seed, 1])
+    step = max(1, COUNTS // n)
+    table = columns.reshape(-1, n).T
+    resampled = np.concatenate([
+        # einsum, because the last digits of a product by BLAS may depend on its threads
+        np.einsum("rn,nm->rm", generator.multinomial(n, np.full(n, 1.0 / n), count) / n, table)
+        for start in range(0, RESAMPLES, step)
+        for count in [min(step, RESAMPLES - start)]
+    ])  # fmt: skip
+    found = ratios(columns.mean(axis=2))
+    ends = np.moveaxis(np.quantile(ratios(resampled.reshape(-1, m, rows + d)), ENDS, axis=0), 0, 2)
+    return Indices(found[:, :d], found[:, d:], ends[:, :d], ends[:, d:])
+
+
+def statistics(values: Floats) -> Statistics:
+    """Return the statistics of draws (..., n); NaN are left out."""
+    kept = [row[np.isfinite(row)] for row in values.reshape(-1, values.shape[-1])]
+    none = np.full(len(QUANTILES), np.nan)
+    columns: tuple[list[Any], ...] = (
+        [len(row) for row in kept],
+        [row.mean() if len(row) else np.nan for row in kept],
+        [row.std(ddof=1) if len(row) > 1 else np.nan for row in kept],
+        [np.quantile(row, QUANTILES) if len(row) else none for row in kept],
+    )
+    arrays = map(np.array, columns)
+    return Statistics(*(a.reshape((*values.shape[:-1], *a.shape[1:])) for a in arrays))
+
+
+def wilson(hits: NDArray[np.int64], count: NDArray[np.int64]) -> tuple[Floats, Floats]:
+    """Ends of Wilson's 95 % interval of a probability (E. B. Wilson, JASA 22, 1927, 209)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = hits / count
+        middle = share + Z**2 / (2.0 * count)
+        half = Z * np.sqrt(share * (1.0 - share) / count + (Z / (2.0 * count)) ** 2)
+        scale = 1.0 + Z**2 / count
+        return np.maximum(0.0, (middle - half) / scale), np.minimum(1.0, (middle + half) / scale)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -17,7 +19,14 @@ from fecm._version import __version__
 from fecm.deck.model import Delamination
 from fecm.deck.units import unit_names, unit_of
 from fecm.results.metrics import COLUMNS, FOUND, SUMMARY, THRESHOLD, described
-from fecm.results.schema import FORMAT_VERSION, SWEEP, Dataset, ResultFileError, declared_units
+from fecm.results.schema import (
+    FORMAT_VERSION,
+    SWEEP,
+    Dataset,
+    ExportError,
+    ResultFileError,
+    declared_units,
+)
 from fecm.sweeps.cases import pair
 from fecm.sweeps.convergence import Convergence, convergence
 from fecm.sweeps.outcome import RUN, STILL, Forces, Outcome
@@ -470,9 +479,8 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
         or (shape is not None and (len(shape), shape[:1]) != (2, count))
         or not set(kinds.values()) <= set("fiu")
     ):
-        raise ResultFileError(
-            f"{path}: the data of this sweep do not match in type or number of cases"
-        )
+        message = f"{path}: the data of this sweep do not match in type or number of cases"
+        raise ResultFileError(message)
     steps = contents["history/steps"]
     most = np.inf if shape is None else shape[1]
     if steps.dtype.kind not in "iu" or not ((steps >= 0) & (steps <= most)).all():
@@ -485,3 +493,52 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
         declared_units(contents.attributes),
         random_of(contents, cases, summary, count[0]),
     )  # fmt: skip
+
+
+# First characters of a formula.
+FORMULA = ("=", "+", "-", "@")
+# Tables of the CSV export.
+CASES, HISTORY = "cases", "history"
+
+
+def csv_lines(sweep: SweepResult, name: str = CASES) -> Iterator[str]:
+    """Return the lines of a CSV table, with line ends.
+
+    ``"cases"`` has the values and results of every case, ``"history"`` the contact force after
+    every step of every case that was run.  Cases count from 0, steps from 1.  Numbers are written
+    as Python's repr, which preserves every bit.  An apostrophe precedes texts that a spreadsheet
+    would read as formulas.  Raises ExportError if the table is unknown, or the sweep has no stored
+    forces.
+    """
+    if name not in (CASES, HISTORY):
+        raise ExportError(f"unknown table {name}; a sweep has {CASES} and {HISTORY}")
+    if name == HISTORY and sweep.force is None:
+        raise ExportError("the sweep has no stored forces; run it again with --history")
+    rows = _case_rows(sweep) if name == CASES else _step_rows(sweep)
+    echo: Any = SimpleNamespace(write=str)  # writerow returns what write returns
+    writer = csv.writer(echo, lineterminator="\n")
+    return (writer.writerow(map(_cell, row)) for row in rows)
+
+
+def _case_rows(sweep: SweepResult) -> Iterator[Iterable[Any]]:
+    columns = {**sweep.cases, **sweep.summary}
+    columns |= {"dt": sweep.dt, "steps": sweep.steps, "status": columns.pop("status")}
+    yield ("case", *columns)
+    values = [column.tolist() for column in columns.values()]
+    yield from zip(range(len(sweep)), *values, strict=True)
+
+
+def _step_rows(sweep: SweepResult) -> Iterator[Iterable[Any]]:
+    assert sweep.force is not None
+    yield ("case", "step", "time", "force")
+    for case in np.flatnonzero(sweep.fine).tolist():
+        count = int(sweep.steps[case])
+        times = np.add.accumulate(np.full(count, sweep.dt[case])).tolist()
+        forces = sweep.force[case, :count].tolist()
+        for step, (time, force) in enumerate(zip(times, forces, strict=True), start=1):
+            yield case, step, time, force
+
+
+def _cell(value: Any) -> Any:
+    is_formula = isinstance(value, str) and value and (value[0] in FORMULA or value[0] < " ")
+    return f"'{value}" if is_formula else value

@@ -57,10 +57,7 @@ class Law:
 
 
 def parse_law(name: str, text: str, *, free: bool = False) -> Law:
-    """Read ``LAW:PARAMETERS`` of a value; with `free`, its name is any.
-
-    Raises CasesError if the name cannot be random, or the law or a parameter is invalid.
-    """
+    """Read ``LAW:PARAMETERS`` of a name (any with `free`); CasesError if one of them is invalid."""
     numbers = [known for known in NAMES if known not in (*TEXTS, *INTEGERS)]
     if fault := name_fault(name) if free else "":
         raise CasesError(f"random: {fault}")
@@ -89,10 +86,7 @@ def parse_law(name: str, text: str, *, free: bool = False) -> Law:
 
 
 def parse_random(text: str) -> tuple[str, Law]:
-    """Read ``NAME=LAW:PARAMETERS``.
-
-    Raises CasesError if the text has another form, or is invalid.
-    """
+    """Read ``NAME=LAW:PARAMETERS``; CasesError if the text has another form, or is invalid."""
     name, equals, law = (part.strip() for part in text.partition("="))
     if not equals:
         raise CasesError(f"`{text}`: write NAME=LAW, such as k=lognormal:1.9e6,0.15")

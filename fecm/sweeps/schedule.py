@@ -2,34 +2,37 @@
 
 Tasks are independent, and their outcomes do not depend on where they run.  Each outcome is reported
 as soon as it is available, so that an interrupted sweep loses only the tasks in progress.
+
+Partial results are in a folder beside the result, one file per task.  It is written under a
+temporary name, synchronised and renamed, so that an interrupted sweep leaves only complete files.
+A checksum at its end reveals damage.
 """
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
 import multiprocessing
 import os
+import shutil
 import socket
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    wait,
-)
+from concurrent import futures
 from contextlib import contextmanager
 from pathlib import Path
 from pickle import PicklingError
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
+
 from fecm._errors import FecmError
+from fecm._files import beside, packed
 from fecm.sweeps.batch import run
-from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.outcome import Forces, Outcome
 from fecm.sweeps.plan import Task
 
 Done = Callable[[Task, Outcome], None]
@@ -81,13 +84,10 @@ def _end_with(parent: int) -> None:
 
 
 def _run_on(
-    executor: Executor, tasks: Iterable[Task], idle: Idle
-) -> Iterator[tuple[Task, Future[Outcome]]]:
-    """Run tasks on an executor; yield them with their futures as they finish.
-
-    Raises SchedulerError if the executor takes no tasks.
-    """
-    running: dict[Future[Outcome], Task] = {}
+    executor: futures.Executor, tasks: Iterable[Task], idle: Idle
+) -> Iterator[tuple[Task, futures.Future[Outcome]]]:
+    """Yield tasks and futures as an executor finishes them; SchedulerError if it takes no tasks."""
+    running: dict[futures.Future[Outcome], Task] = {}
     try:
         for task in tasks:
             try:
@@ -96,7 +96,7 @@ def _run_on(
                 raise SchedulerError(f"the executor takes no tasks: {error}") from None
         while running:
             idle()
-            for future in wait(running, timeout=LOOK, return_when=FIRST_COMPLETED).done:
+            for future in futures.wait(running, LOOK, futures.FIRST_COMPLETED).done:
                 yield running.pop(future), future
     finally:
         for future in running:
@@ -110,12 +110,12 @@ def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> Non
     while left and deaths < DEATHS:
         before = len(left)
         context = multiprocessing.get_context("spawn")
-        pool = ProcessPoolExecutor(count, context, _end_with, (os.getpid(),))
+        pool = futures.ProcessPoolExecutor(count, context, _end_with, (os.getpid(),))
         try:
             for task, future in _run_on(pool, list(left.values()), idle):
                 done(task, future.result())
                 del left[task.number]
-        except (BrokenExecutor, SchedulerError):
+        except (futures.BrokenExecutor, SchedulerError):
             deaths = 0 if len(left) < before else deaths + 1
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
@@ -148,9 +148,8 @@ def _client(scheduler: Any) -> Iterator[Any]:
         return
     address = getattr(scheduler, "scheduler_address", scheduler)
     if not isinstance(address, str):
-        raise SchedulerError(
-            f"scheduler is {scheduler!r}, not an address, a Dask client or a cluster"
-        )
+        message = f"scheduler is {scheduler!r}, not an address, a Dask client or a cluster"
+        raise SchedulerError(message)
     try:
         import distributed
     except ImportError:
@@ -180,7 +179,7 @@ def on_dask(tasks: Sequence[Task], scheduler: Any, done: Done, idle: Idle) -> No
         on_executor(tasks, client.get_executor(pure=False), done, idle)
 
 
-def on_executor(tasks: Sequence[Task], executor: Executor, done: Done, idle: Idle) -> None:
+def on_executor(tasks: Sequence[Task], executor: futures.Executor, done: Done, idle: Idle) -> None:
     """Run tasks on any executor; those that it loses become failed cases.
 
     Raises SchedulerError if the executor takes no tasks.
@@ -195,13 +194,92 @@ def on_executor(tasks: Sequence[Task], executor: Executor, done: Done, idle: Idl
 
 
 def address_in(file: Path) -> str:
-    """Address in the file that ``dask scheduler --scheduler-file`` writes.
-
-    Raises SchedulerError if the file has none.  Raises OSError if it cannot be read.
-    """
+    """Address in a file of ``dask scheduler --scheduler-file``; SchedulerError if it has none."""
     try:
         return str(json.loads(file.read_bytes())["address"])
     except (ValueError, KeyError, TypeError):
-        raise SchedulerError(
-            f"{file} has no address; dask scheduler --scheduler-file writes such a file"
-        ) from None
+        message = f"{file} has no address; dask scheduler --scheduler-file writes such a file"
+        raise SchedulerError(message) from None
+
+
+MARK = "sweep.json"
+# Bytes of the checksum after the arrays of a file.
+CHECKSUM = hashlib.sha256().digest_size
+
+
+class OtherSweepError(FecmError, ValueError):
+    """The folder holds the outcomes of another sweep."""
+
+
+class DamagedPartError(FecmError, ValueError):
+    """A file of the folder is damaged."""
+
+
+class PartialResults:
+    """Outcomes of finished tasks of the sweep with a fingerprint, for its result file.
+
+    `restart` deletes the outcomes of another sweep.  Raises OtherSweepError if the folder holds
+    another sweep's outcomes.  Raises OSError if the folder cannot be created.
+    """
+
+    def __init__(self, result: Path, fingerprint: str, *, restart: bool = False) -> None:
+        self.folder = result.with_name(f".{result.name}.parts")
+        mark = self.folder / MARK
+        if self.folder.exists() and _mark(mark) != fingerprint:
+            if not restart:
+                raise OtherSweepError(
+                    f"{self.folder} holds the outcomes of another sweep; --overwrite deletes them"
+                )
+            shutil.rmtree(self.folder)
+        self.folder.mkdir(exist_ok=True)
+        with beside(mark) as partial:
+            partial.write_text(json.dumps({"fingerprint": fingerprint}))
+
+    def _path(self, task: Task) -> Path:
+        return self.folder / f"task-{task.number:06d}.npz"
+
+    def get(self, task: Task) -> Outcome | None:
+        """Outcome of a finished task, None if there is none; DamagedPartError if it is damaged."""
+        path = self._path(task)
+        try:
+            data = path.read_bytes()
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            raise DamagedPartError(f"{path}: {error.strerror}") from None
+        packed_arrays, checksum = data[:-CHECKSUM], data[-CHECKSUM:]
+        if hashlib.sha256(packed_arrays).digest() != checksum:
+            raise DamagedPartError(f"{path} is damaged")
+        with np.load(io.BytesIO(packed_arrays), allow_pickle=False) as arrays:
+            if arrays["numbers"].tolist() != list(task.numbers):
+                raise DamagedPartError(f"{path} holds other cases")
+            columns = dict(arrays)
+            force = columns.pop("force", None)
+            return Outcome(columns.pop("numbers").tolist(), columns, force)
+
+    def put(self, task: Task, outcome: Outcome) -> None:
+        """Store the outcome of a task."""
+        arrays = {**outcome.columns, "numbers": np.array(outcome.numbers)}
+        if outcome.force is not None:
+            arrays["force"] = outcome.force
+        data = packed(arrays)
+        with beside(self._path(task)) as partial, partial.open("wb") as file:
+            file.write(data)
+            file.write(hashlib.sha256(data).digest())
+
+    def forces(self, tasks: Sequence[Task]) -> Iterator[Forces]:
+        """Read the contact forces of one task after the other; None if all its cases failed."""
+        for task in tasks:
+            outcome = self.get(task)
+            yield task.numbers, None if outcome is None else outcome.force
+
+    def clear(self) -> None:
+        """Delete the folder."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def _mark(path: Path) -> str:
+    try:
+        return str(json.loads(path.read_text())["fingerprint"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return ""

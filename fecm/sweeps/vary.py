@@ -3,55 +3,42 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from fecm.deck import model
 from fecm.deck.catalogue import NU23, SYSTEMS
 from fecm.deck.findings import Findings
 from fecm.deck.layup import LayupError, parse_layup
-from fecm.deck.model import (
-    Boundary,
-    Coordinates,
-    Deck,
-    Forces,
-    Gages,
-    Impact,
-    Indentation,
-    Material,
-    Patch,
-    Projectile,
-    Segment,
-)
+from fecm.deck.macros import STEPS, every, flat
 from fecm.deck.reader import ParsedProblem
-from fecm.deck.records import Layer, NodeCodes, NodeValues, Ply
+from fecm.deck.records import Layer, Macro, NodeCodes, NodeValues
 from fecm.deck.units import MODULUS, in_si, unit_names
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.mechanics.element_groups import element_blocks
 from fecm.mechanics.locate import locate
 from fecm.mechanics.mesh import holds_the_plane
 from fecm.mechanics.projectile import RigidMass
-from fecm.mechanics.time_step import taken_time_step
+from fecm.mechanics.time_step import rounded_time_step, taken_time_step
 from fecm.objects import E_S, NU_S, STANDARD
 from fecm.problem.build import build_projectile, is_coupled, projectile_segment
-from fecm.problem.check_program import UNSTABLE
 from fecm.problem.generate import generate, restraint_codes
 from fecm.problem.plate_mesh import BOUNDARY, PlateMesh
-from fecm.problem.problem import Problem, check
+from fecm.problem.problem import UNSTABLE, Problem, check
 from fecm.problem.refine import RefineError, refined
 from fecm.studies.indentation_test.modulus import effective_stiffness, indentation_modulus
 from fecm.sweeps.cases import REFINE, Case, CasesError, Value, check_names, pair
-from fecm.sweeps.clock import with_time_step
 
 MASS = ("mass", "rod_mass")
 # Fields of a ply card.
 PLY = ("density", "nu12", "e1", "e2", "g12", "g13", "g23")
 
 
-def apply_case(deck: Deck, case: Case) -> Deck:
+def apply_case(deck: model.Deck, case: Case) -> model.Deck:
     """Return a deck with the values of a case.
 
     A layup uses the ply thickness of the deck, so that more plies give a thicker plate; a thickness
@@ -68,15 +55,15 @@ def apply_case(deck: Deck, case: Case) -> Deck:
     for name, setter in _SETTERS.items():
         if name in case:
             made = setter(made, name, case[name])
-    material = deck.last(Material)
-    if material is not None and not is_coupled(material) and is_coupled(made.require(Material)):
+    before = deck.last(model.Material)
+    if before and not is_coupled(before) and is_coupled(made.require(model.Material)):
         made = _free_in_plane(made)
     if "dt" in case or "duration" in case:
         made = _timed(made, case, _taken_time_step(deck))
     return replace(made, text="")
 
 
-def check_deck(deck: Deck) -> Problem:
+def check_deck(deck: model.Deck) -> Problem:
     """Check a complete deck.  Raises CasesError if it has an error; the first is the message."""
     findings = Findings()
     checked = check(ParsedProblem(deck), findings)
@@ -94,7 +81,7 @@ def raise_first(findings: Findings) -> None:
         raise CasesError(f"{first.message}{remedy}")
 
 
-def _timed(deck: Deck, case: Case, taken: float) -> Deck:
+def _timed(deck: model.Deck, case: Case, taken: float) -> model.Deck:
     """The deck with the time step and the duration of a case."""
     dt, duration = (None if n not in case else float(case[n]) for n in ("dt", "duration"))
     if duration is not None and not duration > 0.0:
@@ -105,13 +92,13 @@ def _timed(deck: Deck, case: Case, taken: float) -> Deck:
 
 
 @lru_cache(maxsize=8)
-def _holds_the_plane(boundaries: tuple[Boundary, ...], nodes: int, dofs: int) -> bool:
+def _holds_the_plane(boundaries: tuple[model.Boundary, ...], nodes: int, dofs: int) -> bool:
     return holds_the_plane(restraint_codes(boundaries, nodes, dofs))
 
 
-def _free_in_plane(deck: Deck) -> Deck:
+def _free_in_plane(deck: model.Deck) -> model.Deck:
     """Restrain u and v only where w is, if the deck restrains them at every node."""
-    boundaries = tuple(deck.all(Boundary))
+    boundaries = tuple(deck.all(model.Boundary))
     if not _holds_the_plane(boundaries, deck.control.numnp, deck.control.ndf):
         return deck
 
@@ -122,14 +109,14 @@ def _free_in_plane(deck: Deck) -> Deck:
 
     segments = tuple(
         replace(s, records=tuple(map(freed, s.records)), source=None)
-        if isinstance(s, Boundary)
+        if isinstance(s, model.Boundary)
         else s
         for s in deck.segments
     )
     return replace(deck, segments=segments)
 
 
-def _swap(deck: Deck, old: Segment | None, new: Segment) -> Deck:
+def _swap(deck: model.Deck, old: model.Segment | None, new: model.Segment) -> model.Deck:
     """Replace a segment, or add one."""
     if old is None:
         return replace(deck, segments=(*deck.segments, new))
@@ -138,27 +125,27 @@ def _swap(deck: Deck, old: Segment | None, new: Segment) -> Deck:
 
 
 # Segment and field of the values that are fields of a segment.
-_FIELDS: dict[str, tuple[type[Impact | Indentation], str]] = {
-    "velocity": (Impact, "velocity"),
-    "impact_node": (Impact, "node"),
-    **{name: (Indentation, name) for name in ("k", "alpha_p", "s_p", "q")},
+_FIELDS: dict[str, tuple[type[model.Impact | model.Indentation | model.Patch], str]] = {
+    "velocity": (model.Impact, "velocity"),
+    "impact_node": (model.Impact, "node"),
+    **{name: (model.Indentation, name) for name in ("k", "alpha_p", "s_p", "q")},
+    "patch": (model.Patch, "radius"),
+    "x0": (model.Patch, "x"),
+    "y0": (model.Patch, "y"),
 }
 
 
-# Fields of the contact patch.
-_PATCH = {"patch": "radius", "x0": "x", "y0": "y"}
-
-
-def _field(deck: Deck, name: str, value: Value) -> Deck:
+def _field(deck: model.Deck, name: str, value: Value) -> model.Deck:
+    """Change a field of a segment; add a patch if the deck has none."""
     kind, field = _FIELDS[name]
-    old = deck.require(kind)
+    old = deck.last(kind) if kind is model.Patch else deck.require(kind)
     changed: dict[str, Any] = {field: value, "source": None}
-    return _swap(deck, old, replace(old, **changed))
+    return _swap(deck, old, replace(old or model.Patch(), **changed))
 
 
-def _rod(deck: Deck, name: str, value: Value) -> Deck:
+def _rod(deck: model.Deck, name: str, value: Value) -> model.Deck:
     """Change the projectile; add the segment if the deck has none."""
-    rod, old = build_projectile(deck), deck.last(Projectile)
+    rod, old = build_projectile(deck), deck.last(model.Projectile)
     number = float(value)
     if isinstance(rod, RigidMass):
         if name not in MASS:
@@ -166,25 +153,22 @@ def _rod(deck: Deck, name: str, value: Value) -> Deck:
         new = projectile_segment(RigidMass(number))
     else:
         new = projectile_segment(rod, 0 if old is None else old.transducer)
-        if name == "rod_length":
-            new = replace(new, size=number)
-        elif name == "rod_modulus":
-            new = replace(new, modulus=number)
-        elif name == "rod_density":
-            new = replace(new, density=number)
-        else:
-            new = replace(new, density=rod.density * number / rod.total_mass)
+        field = {"rod_length": "size", "rod_modulus": "modulus"}.get(name, "density")
+        changed: dict[str, Any] = {
+            field: rod.density * number / rod.total_mass if name in MASS else number
+        }
+        new = replace(new, **changed)
     return _swap(deck, old, new)
 
 
-def _energy(deck: Deck, name: str, value: Value) -> Deck:
+def _energy(deck: model.Deck, name: str, value: Value) -> model.Deck:
     mass, energy = build_projectile(deck).total_mass, float(value)
     if not (mass > 0.0 and energy >= 0.0):
         raise CasesError(f"no velocity gives the energy {energy:g} to the mass {mass:g}")
     return _field(deck, "velocity", math.sqrt(2.0 * energy / mass))
 
 
-def _radius(deck: Deck, name: str, value: Value) -> Deck:
+def _radius(deck: model.Deck, name: str, value: Value) -> model.Deck:
     """Change k to that of a steel sphere on the laminate of the deck."""
     unit = in_si(MODULUS, unit_names(deck))
     if unit is None:
@@ -194,7 +178,7 @@ def _radius(deck: Deck, name: str, value: Value) -> Deck:
         )
     steel = E_S * (in_si(MODULUS, SYSTEMS[STANDARD]) or 1.0) / unit
     try:
-        modulus = _indentation_modulus(deck.require(Material))
+        modulus = _indentation_modulus(deck.require(model.Material))
         k = hertz_coefficient(float(value), steel, NU_S, modulus)
     except ValueError as error:
         raise CasesError(f"k cannot be estimated: {error}") from None
@@ -202,16 +186,16 @@ def _radius(deck: Deck, name: str, value: Value) -> Deck:
 
 
 @lru_cache(maxsize=256)
-def _indentation_modulus(material: Material) -> float:
+def _indentation_modulus(material: model.Material) -> float:
     angles = [layer.angle for layer in material.layers]
     thicknesses = [layer.thickness for layer in material.layers]
     return indentation_modulus(effective_stiffness(material.ply, angles, thicknesses, NU23))
 
 
-def _at(deck: Deck, name: str, value: Value) -> Deck:
+def _at(deck: model.Deck, name: str, value: Value) -> model.Deck:
     """Move the centre of the patch; without one, hit the nearest node."""
     x, y = pair(name, str(value))
-    patch = deck.last(Patch)
+    patch = deck.last(model.Patch)
     if patch is not None:
         return _swap(deck, patch, replace(patch, x=x, y=y, source=None))
     mesh = generate(deck)
@@ -222,7 +206,7 @@ def _at(deck: Deck, name: str, value: Value) -> Deck:
     return _field(deck, "impact_node", int(np.where(mesh.used, distances, np.inf).argmin()) + 1)
 
 
-def _size(deck: Deck, name: str, value: Value) -> Deck:
+def _size(deck: model.Deck, name: str, value: Value) -> model.Deck:
     """Scale coordinates, the centre of the patch and the gages."""
     a, b = pair(name, str(value))
     if not min(a, b) > 0.0:
@@ -232,7 +216,7 @@ def _size(deck: Deck, name: str, value: Value) -> Deck:
 
     def moved(part: Any) -> Any:
         """A node, gage or patch, or all that a segment has."""
-        if type(part) in (Coordinates, Gages):
+        if type(part) in (model.Coordinates, model.Gages):
             return replace(part, records=tuple(map(moved, part.records)), source=None)
         if isinstance(part, NodeValues):
             x, y = part.values[:2]
@@ -244,15 +228,15 @@ def _size(deck: Deck, name: str, value: Value) -> Deck:
     return replace(deck, segments=tuple(map(moved, deck.segments)))
 
 
-def _support(deck: Deck, name: str, value: Value) -> Deck:
+def _support(deck: model.Deck, name: str, value: Value) -> model.Deck:
     """Replace all restraints by a support of the outline, as ``fecm new`` writes it."""
     mesh, support = generate(deck), str(value)
-    if deck.has(Forces) or mesh.elements.shape[1] not in (4, 9) or not mesh.elements.all():
+    if deck.has(model.Forces) or mesh.elements.shape[1] not in (4, 9) or not mesh.elements.all():
         raise CasesError("support: the deck must have no FORC, and all elements four or nine nodes")
     plate = PlateMesh(mesh.coordinates, mesh.elements.astype(int) - 1, {}, np.array([], int))
-    everywhere = (0, 0, 0, 0, 0) if is_coupled(deck.require(Material)) else (1, 1, 0, 0, 0)
+    everywhere = (0, 0, 0, 0, 0) if is_coupled(deck.require(model.Material)) else (1, 1, 0, 0, 0)
     made = plate.supported(everywhere, {BOUNDARY: support})
-    others = tuple(s for s in deck.segments if not isinstance(s, Boundary))
+    others = tuple(s for s in deck.segments if not isinstance(s, model.Boundary))
     if made is not None and support == "simple" and mesh.elements.shape[1] == 4:
         codes = restraint_codes([made], deck.control.numnp, deck.control.ndf) != 0
         if (codes[:, 2] & ~codes[:, 3:].any(axis=1)).any():
@@ -260,39 +244,34 @@ def _support(deck: Deck, name: str, value: Value) -> Deck:
     return replace(deck, segments=others if made is None else (*others, made))
 
 
-def _patch(deck: Deck, name: str, value: Value) -> Deck:
-    """Change the contact patch; add the segment if the deck has none."""
-    old = deck.last(Patch)
-    field: dict[str, Any] = {_PATCH[name]: float(value), "source": None}
-    return _swap(deck, old, replace(old or Patch(), **field))
+def _with_material(deck: model.Deck, **values: Any) -> model.Deck:
+    """The deck with other values of its MATE segment."""
+    old = deck.require(model.Material)
+    return _swap(deck, old, replace(old, **values))
 
 
-def _ply(deck: Deck, name: str, value: Value) -> Deck:
-    old = deck.require(Material)
-    ply: Ply = replace(old.ply, **{name: float(value)}, source=None)
-    return _swap(deck, old, replace(old, ply=ply))
+def _ply(deck: model.Deck, name: str, value: Value) -> model.Deck:
+    changed: dict[str, Any] = {name: float(value), "source": None}
+    return _with_material(deck, ply=replace(deck.require(model.Material).ply, **changed))
 
 
-def _thickness(deck: Deck, name: str, value: Value) -> Deck:
-    old = deck.require(Material)
-    total = float(value)
+def _thickness(deck: model.Deck, name: str, value: Value) -> model.Deck:
+    old, total = deck.require(model.Material), float(value)
     factor = total / sum(layer.thickness for layer in old.layers)
-    layers = tuple(
-        replace(layer, thickness=layer.thickness * factor, source=None) for layer in old.layers
-    )
+    layers = (replace(y, thickness=y.thickness * factor, source=None) for y in old.layers)
     integration = replace(old.integration, thickness=total, source=None)
-    return _swap(deck, old, replace(old, integration=integration, layers=layers))
+    return _with_material(deck, integration=integration, layers=tuple(layers))
 
 
-def _angle(deck: Deck, name: str, value: Value) -> Deck:
+def _angle(deck: model.Deck, name: str, value: Value) -> model.Deck:
     """Turn all plies."""
-    old = deck.require(Material)
-    layers = (replace(y, angle=y.angle + float(value), source=None) for y in old.layers)
-    return _swap(deck, old, replace(old, layers=tuple(layers)))
+    layers = deck.require(model.Material).layers
+    turned = (replace(y, angle=y.angle + float(value), source=None) for y in layers)
+    return _with_material(deck, layers=tuple(turned))
 
 
-def _layup(deck: Deck, name: str, value: Value) -> Deck:
-    old = deck.require(Material)
+def _layup(deck: model.Deck, name: str, value: Value) -> model.Deck:
+    old = deck.require(model.Material)
     thicknesses = {layer.thickness for layer in old.layers}
     if len(thicknesses) > 1:
         raise CasesError("layup: the plies of the deck differ in thickness")
@@ -304,19 +283,18 @@ def _layup(deck: Deck, name: str, value: Value) -> Deck:
     layers = tuple(Layer(n, angle, ply) for n, angle in enumerate(angles, start=1))
     integration = replace(old.integration, thickness=len(angles) * ply, source=None)
     control = replace(deck.control, layers=len(layers), source=None)
-    made = _swap(deck, old, replace(old, integration=integration, layers=layers))
-    return replace(made, control=control)
+    return replace(_with_material(deck, integration=integration, layers=layers), control=control)
 
 
 @lru_cache(maxsize=8)
-def _taken_time_step(deck: Deck) -> float:
+def _taken_time_step(deck: model.Deck) -> float:
     """Time step that DT 0 means in a deck; 0 if no DT is 0."""
     if all(macro.value for macro in deck.macros if macro.word == "DT"):
         return 0.0
     return taken_time_step(check_deck(deck).critical_time_step)
 
 
-def _refined(deck: Deck, name: str, value: Value) -> Deck:
+def _refined(deck: model.Deck, name: str, value: Value) -> model.Deck:
     """Divide the sides of all elements by a power of two."""
     try:
         for _ in range(int(value).bit_length() - 1):
@@ -327,7 +305,7 @@ def _refined(deck: Deck, name: str, value: Value) -> Deck:
 
 
 # In the order in which they are applied.
-_SETTERS: dict[str, Callable[[Deck, str, Value], Deck]] = {
+_SETTERS: dict[str, Callable[[model.Deck, str, Value], model.Deck]] = {
     REFINE: _refined,
     "layup": _layup,
     "angle": _angle,
@@ -336,9 +314,110 @@ _SETTERS: dict[str, Callable[[Deck, str, Value], Deck]] = {
     "size": _size,
     "support": _support,
     **dict.fromkeys(_FIELDS, _field),
-    **dict.fromkeys(_PATCH, _patch),
     "at": _at,
     "radius": _radius,
     **dict.fromkeys(("rod_length", "rod_modulus", "rod_density", *MASS), _rod),
     "energy": _energy,
 }
+
+
+# Longest loop; the checks reject much shorter programs.
+LONGEST = 1e15
+# Macros that store every N-th step or pass.
+STORING = ("RODP", "DISP", "STRE", "PLYS")
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Rule for the time step of each plate."""
+
+    dt: float  # time step of the deck (time)
+    rounded: bool  # whether the rule is that of ``fecm new`` instead of that of DT 0
+
+    def time_step(self, critical: float) -> float:
+        """Return the time step for a critical time step."""
+        return rounded_time_step(critical) if self.rounded else taken_time_step(critical)
+
+
+def clock_of(checked: Problem) -> Clock | None:
+    """Find the rule of a deck; None if its DT applies to every case."""
+    sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
+    if len(sizes) != 1:
+        return None
+    (dt,) = sizes
+    critical = checked.critical_time_step
+    if not dt:
+        return Clock(taken_time_step(critical), rounded=False)
+    return Clock(dt, rounded=True) if dt == rounded_time_step(critical) else None
+
+
+def with_time_step(
+    deck: model.Deck, dt: float | None, taken: float = 0.0, duration: float | None = None
+) -> model.Deck:
+    """Change every DT of a deck, and the loops so that the duration is kept, or is another.
+
+    `taken` is the time step that DT 0 means in the deck; 0 if no DT is 0.  If the new one is None,
+    every DT is kept; if it is not positive, only the DT cards change.  Macros that store rows keep
+    approximately their number of rows.
+
+    Raises CasesError if whole numbers of passes miss the duration by a step and by 1 %.
+    """
+    loops = _innermost_loops(deck.macros)
+    before, _ = _duration(deck.macros, taken)
+    share = 1.0 if duration is None or not before else duration / before
+    ratios: dict[int, float] = {}
+    now = 0.0
+    for macro, loop in zip(deck.macros, loops, strict=True):
+        if macro.word == "DT":
+            now = macro.value or taken
+        elif macro.word in STEPS and loop is not None and now > 0.0 and (dt is None or dt > 0.0):
+            ratios[loop] = share * (1.0 if dt is None else now / dt)
+
+    def changed(place: int, macro: Macro) -> Macro:
+        loop = loops[place]
+        if macro.word == "DT" and dt is not None:
+            return replace(macro, value=dt, source=None)
+        if macro.word == "LOOP" and place in ratios:
+            count = min(max(1.0, macro.value) * ratios[place], LONGEST)
+            return replace(macro, value=float(max(1, math.ceil(count - 1e-9))), source=None)
+        if macro.word in STORING and loop in ratios:
+            count = min(every(macro) * ratios[loop], LONGEST)
+            return replace(macro, value=float(max(1, round(count))), source=None)
+        return macro
+
+    macros = tuple(changed(place, macro) for place, macro in enumerate(deck.macros))
+    wanted, (made, step) = share * before, _duration(macros, taken)
+    if ratios and abs(made - wanted) > max(0.01 * wanted, step):
+        raise CasesError(
+            f"the loops of the deck give the duration {made:.6g} instead of {wanted:.6g}; take all "
+            "steps in one loop"
+        )
+    return replace(deck, macros=macros)
+
+
+def _duration(macros: Sequence[Macro], taken: float) -> tuple[float, float]:
+    """Time of all steps of a program, and its largest time step."""
+    passes, total, now, largest = [1.0], 0.0, 0.0, 0.0
+    for macro in macros:
+        if macro.word == "LOOP":
+            passes.append(passes[-1] * max(1.0, macro.value))
+        elif macro.word == "NEXT" and len(passes) > 1:
+            passes.pop()
+        elif macro.word == "DT":
+            now = macro.value or taken
+        elif macro.word in STEPS:
+            total, largest = total + passes[-1] * now, max(largest, now)
+    return total, largest
+
+
+def _innermost_loops(macros: Sequence[Macro]) -> list[int | None]:
+    """Place of the innermost LOOP around each macro."""
+    open_loops: list[int] = []
+    found: list[int | None] = []
+    for place, macro in enumerate(macros):
+        if macro.word == "NEXT" and open_loops:
+            open_loops.pop()
+        found.append(open_loops[-1] if open_loops else None)
+        if macro.word == "LOOP":
+            open_loops.append(place)
+    return found
