@@ -48,15 +48,14 @@ def problem(text: str) -> Problem:
     return found
 
 
-def assert_same_product(text: str, dofs: int, *, threads: int = 1) -> CompiledProduct:
+def assert_same_product(text: str, dofs: int) -> None:
     """K u of both agrees to rounding for a random displacement; `dofs` move at a node."""
     motion = build_model(problem(text), NUMPY).motion
     u = np.random.default_rng(0).standard_normal(len(motion.mass))
-    product = CompiledProduct(motion.plate, motion._reduction, threads)
+    product = CompiledProduct(motion.plate, motion._reduction, 1)
     wanted, found = motion.product(u), product(u)
     np.testing.assert_allclose(found, wanted, rtol=0.0, atol=5e-15 * np.abs(wanted).max())
     assert len(product.plate.columns) == dofs
-    return product
 
 
 @compiled
@@ -76,28 +75,29 @@ def test_the_product_is_numpys_for_every_family_and_rule(kind: int, coupled: boo
 
 @compiled
 def test_the_product_does_not_depend_on_the_number_of_threads() -> None:
-    text = element_deck(distorted_square(40, 40), (3, 2, 3))
-    products = [assert_same_product(text, 3, threads=threads) for threads in (1, 2, 3)]
+    motion = build_model(problem(element_deck(distorted_square(40, 40), (3, 2, 3)))).motion
+    u = np.random.default_rng(1).standard_normal(len(motion.mass))
+    products = [CompiledProduct(motion.plate, motion._reduction, threads) for threads in (1, 2, 3)]
     assert products[0].plate.structure.chunks == 3
-    u = np.random.default_rng(1).standard_normal(len(products[0].plate.position))
     one, *others = (product(u) for product in products)
     for other in others:
         np.testing.assert_array_equal(other, one)
 
 
 REPORT = Path("decks/impact-115.inp").read_text()
+FIRST = REPORT.replace("LOOP       4000", "LOOP       1500")  # of two contacts
 DECKS = {
     "small": small(),
     "point": REPORT,
-    "patch and gage": REPORT.replace(
+    "patch and gage": FIRST.replace(
         "EXPE",
         "PATC\nDISC             0.2\n\nGAGE\n    1       2.5       2.0     0.053        0.\n\nEXPE",
     ),
-    "rigid mass": REPORT.replace("EXPE", "PROJ\n    0    0  0.000181\n\nEXPE"),
-    "one rigidity": REPORT.replace(
+    "rigid mass": FIRST.replace("EXPE", "PROJ\n    0    0  0.000181\n\nEXPE"),
+    "one rigidity": FIRST.replace(
         "EXPE\n  1912000. 0.0006564     0.094       2.0", "EXPE ACR\n  1912000. 0.0006564"
     ),
-    "damping": REPORT.replace("EXPE", "DAMP\n     3000.\n\nEXPE"),
+    "damping": FIRST.replace("EXPE", "DAMP\n     3000.\n\nEXPE"),
     "distorted": element_deck(distorted_square(6, 6), (3, 2, 3), steps=300),
     "rows far apart": REPORT.replace("EXPE\n", "SHEA MITC\nEXPE\n", 1).replace(
         "        20", "      3000"
@@ -130,10 +130,9 @@ def test_a_run_is_that_of_numpy(name: str) -> None:
 @compiled
 def test_a_run_does_not_depend_on_the_number_of_threads(tmp_path: Path) -> None:
     deck = element_deck(square(40, 40), (3, 2, 3), steps=40).replace("2.0E-7", "5.0E-8")
-    for threads in (1, 2, 3):
+    for threads in (1, 3):
         fecm.run_one(deck, output=tmp_path / f"{threads}.h5", threads=threads)
-    one = (tmp_path / "1.h5").read_bytes()
-    assert (tmp_path / "2.h5").read_bytes() == one == (tmp_path / "3.h5").read_bytes()
+    assert (tmp_path / "1.h5").read_bytes() == (tmp_path / "3.h5").read_bytes()
 
 
 @compiled
@@ -174,7 +173,7 @@ def test_rows_are_those_of_one_burst_if_memory_ends_it_earlier(
     assert_close(fecm.run_one(deck), wanted)
 
 
-@pytest.mark.parametrize("elements", [1, 2, 20, 100, 200])
+@pytest.mark.parametrize("elements", [1, 2, 20, 100])
 @pytest.mark.parametrize("tapered", [False, True])
 def test_the_modes_of_a_rod_take_the_step_of_its_matrices(elements: int, tapered: bool) -> None:
     """To the rounding of the latter, which hold the rigid velocity."""
@@ -234,11 +233,14 @@ def test_info_shows_whether_the_kernels_are_compiled() -> None:
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
-def test_the_kernels_compile_without_a_warning(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "options", [["-fsyntax-only"], pytest.param(["-O1"], marks=pytest.mark.long)], ids=" ".join
+)
+def test_the_kernels_compile_without_a_warning(options: list[str], tmp_path: Path) -> None:
     include = sysconfig.get_paths()["include"]
     if not Path(include, "Python.h").exists():
         pytest.skip("needs Python's headers")
-    command = ["cc", *WARNINGS, "-O1", "-DFECM_STAMP=0", "-c", f"-I{include}"]
+    command = ["cc", *WARNINGS, *options, "-DFECM_STAMP=0", "-c", f"-I{include}"]
     command += [str(SOURCES / "kernels.c"), "-o", str(tmp_path / "kernels.o")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")

@@ -21,11 +21,11 @@ from fecm.sweeps.responses import plate_response
 from fecm.sweeps.result import SweepResult
 from tests.test_kernels import compiled
 
-DECK = Path("decks/impact-115.inp").read_text().replace("LOOP       4000", "LOOP       1500")
+DECK = Path("decks/impact-115.inp").read_text().replace("LOOP       4000", "LOOP        800")
 RIGID = DECK.replace("EXPE", "PROJ\n    0    0  0.000181\n\nEXPE")
 GAGE = "PATC\nDISC             0.2\n\nGAGE\n    1       2.5       2.0     0.053        0.\n\nEXPE"
 LAW = "EXPE\n  1912000. 0.0006564     0.094       2.0"
-COUNT = 20
+COUNT = 16
 
 
 def drawn(**ranges: tuple[float, float]) -> list[Case]:
@@ -82,7 +82,7 @@ def test_cases_are_those_of_numpy(
 def test_a_case_has_the_same_bytes_with_any_others() -> None:
     whole = fecm.sweep(DECK, cases=ANY, history=True)
     assert whole.force is not None
-    for some in ([3], [0, 7, 19], list(range(4, 17))):
+    for some in ([3], [0, 7, 15], list(range(4, 14))):
         part = fecm.sweep(DECK, cases=[ANY[n] for n in some], history=True)
         np.testing.assert_array_equal(part.force, whole.force[some])
         for name, values in part.summary.items():
@@ -100,7 +100,7 @@ def test_errors_of_the_energy_balance_are_those_of_numpy(monkeypatch: pytest.Mon
 
     monkeypatch.setattr(batch, "impacts", watched)
     cases: list[Case] = [{"k": k} for k in (2e6, 1e9, 1e10, 1e300)]
-    deck = DECK.replace("LOOP       1500", "LOOP        200")
+    deck = DECK.replace("        800", "        200")
     fecm.sweep(deck, cases=cases)
     without_kernels(monkeypatch)
     fecm.sweep(deck, cases=cases)

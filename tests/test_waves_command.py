@@ -80,7 +80,9 @@ def test_fronts_of_the_reports_deck_are_the_reference_files() -> None:
             assert float(mine["ray_deg"]) == pytest.approx(float(row["ray_dir_deg"]), abs=1e-6)
 
 
-@pytest.mark.parametrize("command", [("dispersion",), ("speeds",), ("fronts", "--time", "1e-6")])
+@pytest.mark.parametrize(
+    "command", [("dispersion",), ("speeds",), ("fronts", "--step", "45", "--time", "1e-6")]
+)
 def test_a_layup_gives_what_the_same_laminate_in_a_deck_gives(command: tuple[str, ...]) -> None:
     deck, layup = (rows(call("waves", *command, *source)) for source in ((LONG,), LAMINATE))
     assert len(deck) == len(layup)
@@ -101,16 +103,15 @@ def test_constants_of_a_ply_stand_for_a_named_one() -> None:
     "times",
     [
         ("--time", "1e-6", "--time", "2e-6", LONG),
-        ("--time", "1e-6", "2e-6", LONG),
         (LONG, "--time=1e-6", "2e-6"),
         ("--time", "1e-6,2e-6", LONG),
-        ("--step", "5", "--time", "1e-6", "2e-6", "--", LONG),
+        ("--time", "1e-6", "2e-6", "--", LONG),
     ],
 )
 def test_several_times_may_be_given_in_several_ways(times: tuple[object, ...]) -> None:
-    found = rows(call("waves", "fronts", *times))
+    found = rows(call("waves", "fronts", "--step", "45", *times))
     assert {float(row["time"]) for row in found} == {1e-6, 2e-6}
-    assert len(found) == 5 * 73 * 2
+    assert len(found) == 5 * 9 * 2
 
 
 def test_negative_angles_are_no_options() -> None:
@@ -134,7 +135,7 @@ def test_the_shear_factor_multiplies_the_transverse_shear_stiffness() -> None:
 
 def test_fronts_start_from_a_circle_of_the_given_radius() -> None:
     for option, radius in (((), 0.106), (("--radius", "2"), 2.0), (("--radius", "0"), 0.0)):
-        for row in rows(call("waves", "fronts", LONG, "--time", "0", *option)):
+        for row in rows(call("waves", "fronts", LONG, "--step", "45", "--time", "0", *option)):
             assert np.hypot(float(row["x"]), float(row["y"])) == pytest.approx(radius, abs=1e-15)
 
 
@@ -144,8 +145,8 @@ def test_normals_run_from_0_to_360_as_far_as_the_step_goes() -> None:
             float(row["angle_deg"]) for row in rows(call("waves", "speeds", LONG, "--step", step))
         ]
         assert found == expected
-    tenths = rows(call("waves", "speeds", LONG, "--step", ".1"))
-    assert len(tenths) == 3601
+    tenths = rows(call("waves", "speeds", LONG, "--step", ".3"))
+    assert len(tenths) == 1201
     assert float(tenths[-1]["angle_deg"]) == 360.0
 
 
@@ -185,8 +186,10 @@ def test_a_table_goes_to_a_file_whole(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "command", [("dispersion",), ("speeds",), ("fronts", "--time", "2e-6", "1e-5")]
-)
+    "command",
+    [("dispersion", "--wavelengths", "1:10:5"), ("speeds", "--step", "45"),
+     ("fronts", "--step", "45", "--time", "2e-6")],
+)  # fmt: skip
 def test_a_picture_is_drawn_beside_the_table(command: tuple[str, ...], tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     path = tmp_path / "waves.png"
