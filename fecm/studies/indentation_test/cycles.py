@@ -152,70 +152,47 @@ def divide(indentation: Floats, retreat: float | None = None) -> Division:
     s = path.smooth
     if s[found[1]] <= s[0]:
         raise StudyError("the test begins with unloading; it must begin with the first loading")
-    return _Divider(path, retreat).divide(found)
-
-
-class _Divider:
-    """State while following a test from turn to turn."""
-
-    def __init__(self, path: Path, retreat: float) -> None:
-        self.path = path
-        # Peaks within this distance are one.
-        self.near = max(retreat / 2.0, 4.0 * path.noise)
-        self.stretches: list[Stretch] = []
-        self.corners: list[Corner] = []
-        self.cycle = self.begin = -1
-        self.peak = -math.inf
-
-    def divide(self, found: list[int]) -> Division:
-        """Return the division at the turns."""
-        last = len(found) - 2
-        for n, (first, end) in enumerate(pairwise(found)):
-            rows = self._between(first, end, n < last)
-            if self.path.smooth[end] > self.path.smooth[first]:
-                self._rise(rows, first, end, ends_in_turn=n < last)
-            else:
-                self.stretches.append(Stretch(FALLING, self.cycle, rows, self.begin))
-        return Division(self.path, tuple(self.stretches), tuple(self.corners))
-
-    def _between(self, first: int, end: int, turns: bool) -> Ints:
-        """Return the points between two turns, without the turns and points too close to them.
-
-        The point at a turn may have been recorded before or after it.
-        """
-        begin = first + 1 if first else 0
-        rows: Ints = np.arange(begin, end if turns else end + 1, dtype=np.int64)
-        if not self.path.noise:
-            return rows
-        s, guard = self.path.smooth, GUARD * self.path.noise
-        keep = np.abs(s[rows] - s[first]) > guard if first else np.full(len(rows), True)
-        if turns:
-            keep &= (np.abs(s[rows] - s[end]) > guard) & (rows < end - self.path.reach)
-        if first:
-            keep &= rows > first + self.path.reach
-        return np.asarray(rows[keep])
-
-    def _rise(self, rows: Ints, first: int, end: int, *, ends_in_turn: bool) -> None:
-        """Add a rise, which continues on the first loading curve beyond the peak."""
-        s = self.path.smooth
-        top = float(s[end])
-        if self.cycle >= 0:
-            below = rows[s[rows] <= self.peak]
-            self.stretches.append(Stretch(RISING, self.cycle, below, turn=float(s[first])))
-        rise = len(self.stretches) - 1
-        beyond = rows[s[rows] > self.peak]
-        if top > self.peak + self.near:
-            self.stretches.append(Stretch(LOADING, self.cycle + 1, beyond))
+    near = max(retreat / 2.0, 4.0 * path.noise)  # peaks within this distance are one
+    stretches: list[Stretch] = []
+    corners: list[Corner] = []
+    cycle = begin = -1
+    peak = -math.inf
+    for first, end in pairwise(found):
+        ends_in_turn = end != found[-1]
+        rows, top = _between(path, first, end, ends_in_turn), float(s[end])
+        if top <= s[first]:
+            stretches.append(Stretch(FALLING, cycle, rows, begin))
+            continue
+        if cycle >= 0:
+            below = rows[s[rows] <= peak]
+            stretches.append(Stretch(RISING, cycle, below, turn=float(s[first])))
+        rise = len(stretches) - 1
+        if top > peak + near:  # a rise continues on the first loading curve beyond the peak
+            stretches.append(Stretch(LOADING, cycle + 1, rows[s[rows] > peak]))
             if ends_in_turn:
-                self.cycle += 1
-                self.peak = top
-                self._corner(Corner(top, self.cycle, True))
-        elif ends_in_turn and top < self.peak - self.near:
-            self._corner(Corner(top, self.cycle, False, rise))
+                cycle, peak, begin = cycle + 1, top, len(corners)
+                corners.append(Corner(top, cycle, True))
+        elif ends_in_turn and top < peak - near:
+            begin = len(corners)
+            corners.append(Corner(top, cycle, False, rise))
         elif ends_in_turn:
-            peaks = [n for n, corner in enumerate(self.corners) if corner.is_peak]
-            self.begin = peaks[-1]
+            begin = max(n for n, corner in enumerate(corners) if corner.is_peak)
+    return Division(path, tuple(stretches), tuple(corners))
 
-    def _corner(self, corner: Corner) -> None:
-        self.begin = len(self.corners)
-        self.corners.append(corner)
+
+def _between(path: Path, first: int, end: int, ends_in_turn: bool) -> Ints:
+    """Return the points between two turns, without the turns and points too close to them.
+
+    The point at a turn may have been recorded before or after it.
+    """
+    begin = first + 1 if first else 0
+    rows: Ints = np.arange(begin, end if ends_in_turn else end + 1, dtype=np.int64)
+    if not path.noise:
+        return rows
+    s, guard = path.smooth, GUARD * path.noise
+    keep = np.full(len(rows), True)
+    if first:
+        keep &= (np.abs(s[rows] - s[first]) > guard) & (rows > first + path.reach)
+    if ends_in_turn:
+        keep &= (np.abs(s[rows] - s[end]) > guard) & (rows < end - path.reach)
+    return np.asarray(rows[keep])
