@@ -109,10 +109,8 @@ class Signals:
     once.
     """
 
-    def __init__(self) -> None:
-        self._received = 0
-        self._deferred = False
-        self._installed = False
+    _received = 0
+    _deferred = _installed = False
 
     def install(self) -> None:
         """Handle the signals from now on; a SIGHUP that nohup has switched off stays so."""

@@ -101,32 +101,25 @@ def _of_sweep(contents: Contents) -> dict[str, Any]:
     return {"cases": len(result), "failed": failed, "summary": [*summary(result), *lines]}
 
 
-def _extent(about: Mapping[str, Any]) -> tuple[str, str]:
-    """Number of cases of a sweep, or of steps of a run."""
-    if "cases" in about:
-        return "cases", f"{about['cases']}, {about['failed'] or 'none'} failed"
-    span = about["time"]
-    times = f", time {span[0]:.6g} to {span[1]:.6g}" if span else ""
-    return "steps", f"{about['steps']}{times}"
-
-
 def _page(about: Mapping[str, Any]) -> list[str]:
     """Lines of the text output."""
     rows = [("file", f"{about['file']}, {about['size']} bytes")]
-    if "cases" not in about:
+    if "cases" in about:
+        extent = ("cases", f"{about['cases']}, {about['failed'] or 'none'} failed")
+    else:
         slips = about["slips"] if isinstance(about["slips"], list) else []
-        mode = about["mode"]
-        rows += [
-            ("mode", "unknown" if mode is None else mode),
-            ("slips", ", ".join(map(str, slips)) or "none"),
-        ]
+        mode, span = about["mode"], about["time"]
+        rows.append(("mode", "unknown" if mode is None else mode))
+        rows.append(("slips", ", ".join(map(str, slips)) or "none"))
+        times = f", time {span[0]:.6g} to {span[1]:.6g}" if span else ""
+        extent = ("steps", f"{about['steps']}{times}")
     version = about["fecm_version"]
     units = ", ".join(f"{name} {unit}" for name, unit in about["units"].items())
     rows += [
         ("written by", f"fecm {'of unknown version' if version is None else version}, "
                        f"format version {about['format_version']}"),
         ("units", units or "the deck names none"),
-        _extent(about),
+        extent,
         *(("note", text) for text in about.get("notes", ())),
         *((name, shown(value)) for name, value in about["attributes"].items()),
     ]  # fmt: skip
@@ -135,11 +128,9 @@ def _page(about: Mapping[str, Any]) -> list[str]:
     lines += ["", "summary", *(f"  {printable(line)}".rstrip() for line in about["summary"])]
     for group in about["groups"]:
         lines += ["", *_group(group)]
-    if about["texts"]:
-        lines += ["", "texts"]
-        lines += [
-            f"  {printable(name):17} {text['lines']} lines" for name, text in about["texts"].items()
-        ]
+    lines += ["", "texts"] if about["texts"] else []
+    for name, text in about["texts"].items():
+        lines.append(f"  {printable(name):17} {text['lines']} lines")
     return lines
 
 

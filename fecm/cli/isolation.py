@@ -31,7 +31,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from types import FrameType
+from types import FrameType, SimpleNamespace
 from typing import Any, NoReturn, TypeVar
 
 from fecm._files import clear_partials
@@ -54,14 +54,8 @@ GRACE = 0.3, 2.0
 Command = TypeVar("Command", bound=Callable[..., None])
 
 
-class _State:
-    """Whether commands are isolated, which `main` turns on, and the pipe of a child."""
-
-    on = False
-    pipe: int | None = None
-
-
-switch = _State()
+# Whether commands are isolated, which `main` turns on, and the pipe of a child.
+switch = SimpleNamespace(on=False, pipe=None)
 
 
 @frozen
@@ -120,10 +114,8 @@ def reads(*names: str) -> Callable[[Command], Command]:
             if switch.pipe is None:
                 function(**values)
                 return
-            files: list[Path] = []
-            for name in names:
-                value = values[name]
-                files += value if isinstance(value, tuple) else [value]
+            given = (values[name] for name in names)
+            files = [f for value in given for f in (value if isinstance(value, tuple) else [value])]
             limits = limits_for(sum(map(_size, files)), available())
             label = printable(" or ".join(map(str, dict.fromkeys(files))))
             job = {"files": label, "folders": _folders(values), **asdict(limits)}

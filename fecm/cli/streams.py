@@ -35,10 +35,7 @@ class _Guarded(io.FileIO):
         return view.nbytes
 
 
-class _Kept:
-    """The guarded standard output, once there is one."""
-
-    output: _Guarded | None = None
+_guarded: list[_Guarded] = []  # the standard output, once it is guarded
 
 
 def prepare() -> None:
@@ -51,8 +48,8 @@ def prepare() -> None:
         except OSError:
             os.open(os.devnull, flags)
     if _is_own(sys.stdout, 1):
-        raw = _Kept.output = _Guarded(1, raises=True)
-        sys.stdout = _text(raw, sys.stdout)
+        _guarded[:] = [_Guarded(1, raises=True)]
+        sys.stdout = _text(_guarded[0], sys.stdout)
     if _is_own(sys.stderr, 2):
         sys.stderr = standard_error(2, sys.stderr)
 
@@ -85,4 +82,4 @@ def failure() -> OSError | None:
     """Print what is still buffered; the first error of standard output, if there was one."""
     with contextlib.suppress(OSError, ValueError):
         sys.stdout.flush()
-    return None if _Kept.output is None else _Kept.output.error
+    return _guarded[0].error if _guarded else None
