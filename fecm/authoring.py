@@ -12,6 +12,7 @@ from typing import Literal
 from fecm._errors import FecmWarning
 from fecm._frozen import frozen
 from fecm.api import load_deck
+from fecm.deck import model
 from fecm.deck.catalogue import (
     CONTACTS,
     MATERIALS,
@@ -24,19 +25,6 @@ from fecm.deck.catalogue import (
 )
 from fecm.deck.findings import DeckError
 from fecm.deck.grid import Grid
-from fecm.deck.model import (
-    Allowables,
-    Deck,
-    Gages,
-    Impact,
-    Indentation,
-    Material,
-    Patch,
-    Projectile,
-    Segment,
-    Shear,
-    Units,
-)
 from fecm.deck.records import Control, Gage, Integration, Layer, Macro, Ply
 from fecm.mechanics.laminate import laminate as stiffness_of
 from fecm.mechanics.patch import HERTZ
@@ -71,7 +59,7 @@ MITC, FULL = "mitc", "full"
 class Authored:
     """A new deck, not yet checked."""
 
-    deck: Deck
+    deck: model.Deck
     comments: str  # comment lines for the deck's head
     # What was filled in, and what differs from what was asked.
     notes: list[str]
@@ -81,8 +69,8 @@ class Authored:
 def impact(
     plate: Plate,
     laminate: Laminate,
-    projectile: Rod | RigidMass | Projectile | None = None,
-    contact: Indentation | NamedContact | Sphere | str | None = None,
+    projectile: Rod | RigidMass | model.Projectile | None = None,
+    contact: model.Indentation | NamedContact | Sphere | str | None = None,
     *,
     velocity: float | None = None,
     energy: float | None = None,
@@ -91,12 +79,12 @@ def impact(
     dt: float | None = None,
     every: int | None = None,
     units: str | None = None,
-    patch: str | Patch | None = AUTO,
+    patch: str | model.Patch | None = AUTO,
     shear: Literal["mitc", "full"] = "mitc",
     gages: Iterable[tuple[float, float, float, float]] = (),
     damage: bool = False,
     title: str = "",
-) -> Deck:
+) -> model.Deck:
     """Deck of an impact, as `fecm new` writes it.
 
     A laminate without coupling has its in-plane dofs restrained, as the report's does; any other
@@ -180,8 +168,8 @@ def impact(
 def author(
     plate: Plate,
     laminate: Laminate,
-    projectile: Rod | RigidMass | Projectile | None,
-    contact: Indentation | NamedContact | Sphere | str | None,
+    projectile: Rod | RigidMass | model.Projectile | None,
+    contact: model.Indentation | NamedContact | Sphere | str | None,
     *,
     velocity: float | None,
     energy: float | None,
@@ -190,7 +178,7 @@ def author(
     dt: float | None,
     every: int | None,
     units: str | None,
-    patch: str | Patch | None,
+    patch: str | model.Patch | None,
     shear: str,
     gages: Iterable[tuple[float, float, float, float]],
     damage: bool,
@@ -198,9 +186,10 @@ def author(
 ) -> Authored:
     """Make the deck of :func:`impact` without checking it."""
     for name, value, kinds in (
-        ("plate", plate, Plate), ("laminate", laminate, Laminate), ("patch", patch, str | Patch),
-        ("projectile", projectile, Rod | RigidMass | Projectile),
-        ("contact", contact, str | Indentation | NamedContact | Sphere),
+        ("plate", plate, Plate), ("laminate", laminate, Laminate),
+        ("patch", patch, str | model.Patch),
+        ("projectile", projectile, Rod | RigidMass | model.Projectile),
+        ("contact", contact, str | model.Indentation | NamedContact | Sphere),
     ):  # fmt: skip
         if not isinstance(value, kinds) and (value is not None or name in ("plate", "laminate")):
             raise ObjectError(f"`{name}` is {value!r}, not a {name} of fecm")
@@ -236,7 +225,7 @@ def author(
         if contact in (None, Sphere()):
             contact = Sphere(test.radius)
     if patch == AUTO:
-        patch = Patch() if test is None else Patch(HERTZ)
+        patch = model.Patch() if test is None else model.Patch(HERTZ)
     elif isinstance(patch, str):
         patch = parse_patch(patch)
     given = laminate.ply
@@ -265,7 +254,7 @@ def author(
             f"k = {law.k:g} is estimated from the ply's constants (fecm indent estimate) for an "
             "elastic law; a measured one is better"
         )
-    damages: tuple[Segment, ...] = ()
+    damages: tuple[model.Segment, ...] = ()
     if damage:
         damages, more = _damage(named, system)
         notes += more
@@ -284,20 +273,20 @@ def author(
     if isinstance(projectile, Rod | RigidMass):
         projectile = projectile_segment(projectile)
     segments = (
-        None if shown is None else Units(*SYSTEMS[shown].values()),
+        None if shown is None else model.Units(*SYSTEMS[shown].values()),
         mesh.coordinates(), mesh.element_cards(), supported, projectile,
-        Impact(node, 3, 1.0 if velocity is None else velocity), patch,
-        Gages(records) if records else None, *damages, law,
-        Shear(assumed=True) if shear == MITC else None,
-        Material(Integration(ORDER, ORDER, NODAL_POINTS, laminate.thickness), ply, layers),
+        model.Impact(node, 3, 1.0 if velocity is None else velocity), patch,
+        model.Gages(records) if records else None, *damages, law,
+        model.Shear(assumed=True) if shear == MITC else None,
+        model.Material(Integration(ORDER, ORDER, NODAL_POINTS, laminate.thickness), ply, layers),
     )  # fmt: skip
     control = Control(mesh.nodes, mesh.elements, len(layers), 2, 5, mesh.most_nodes)
-    deck = Deck(title, control, tuple(s for s in segments if s is not None), ())
+    deck = model.Deck(title, control, tuple(s for s in segments if s is not None), ())
     if dt is None:
         dt = rounded_time_step(critical_time_step(build_plate(deck, generate(deck))))
     if energy is not None:
         deck = _with_energy(deck, energy)
-    program = partial(_program, dt=dt, every=every, fails=deck.has(Allowables))
+    program = partial(_program, dt=dt, every=every, fails=deck.has(model.Allowables))
     if duration is None:
         duration = _duration(replace(deck, macros=program(dt)))
     comments = (plate.fixture.comment if plate.fixture else "") + comment
@@ -321,14 +310,14 @@ def _program(duration: float, dt: float, every: int | None, fails: bool) -> tupl
 
 
 def _law(
-    contact: Indentation | NamedContact | Sphere | str | None, laminate: Laminate, ply: Ply,
+    contact: model.Indentation | NamedContact | Sphere | str | None, laminate: Laminate, ply: Ply,
     named: NamedPly | None, system: str | None,
-) -> tuple[Indentation, str]:  # fmt: skip
+) -> tuple[model.Indentation, str]:  # fmt: skip
     """Indentation law, a named one in the units of the ply, and comment lines about it."""
     if isinstance(contact, str):
         contact = Contact.named(contact)
-    if isinstance(contact, Indentation):
-        return Indentation(*contact.values(), contact.word), ""
+    if isinstance(contact, model.Indentation):
+        return model.Indentation(*contact.values(), contact.word), ""
     if isinstance(contact, Sphere):
         return contact.law(laminate, ply, named.nu23 if named else NU23, system)
     if contact is None:
@@ -338,7 +327,9 @@ def _law(
     return contact.converted(system), ""
 
 
-def _damage(named: NamedPly | None, system: str | None) -> tuple[tuple[Segment, ...], list[str]]:
+def _damage(
+    named: NamedPly | None, system: str | None
+) -> tuple[tuple[model.Segment, ...], list[str]]:
     """Strengths and toughness of a named ply, and notes about what it does not have."""
     if named is None or system is None:
         raise ObjectError("`damage` needs a named ply with strengths or toughness")
@@ -356,8 +347,8 @@ def _damage(named: NamedPly | None, system: str | None) -> tuple[tuple[Segment, 
 
 
 def _placed(
-    plate: Plate, at: Sequence[float] | None, patch: Patch | None
-) -> tuple[Grid | PlateMesh, int, Patch | None, list[str]]:
+    plate: Plate, at: Sequence[float] | None, patch: model.Patch | None
+) -> tuple[Grid | PlateMesh, int, model.Patch | None, list[str]]:
     """Mesh, node that is hit, patch, and how they differ from what was asked."""
     doubts: list[str] = []
     place = None if at is None else pair("at", at)
@@ -392,18 +383,18 @@ def _placed(
     return mesh, node, patch, doubts
 
 
-def _with_energy(deck: Deck, energy: float) -> Deck:
+def _with_energy(deck: model.Deck, energy: float) -> model.Deck:
     """The deck with a velocity for an energy, in as many digits as its card has."""
     mass = build_projectile(deck).total_mass
     velocity = math.sqrt(2.0 * energy / mass) if mass > 0.0 else math.inf
     if not 0.0 < velocity < math.inf:
         raise ObjectError(f"no velocity gives the energy {energy:g} to the mass {mass:g}")
-    old = deck.require(Impact)
+    old = deck.require(model.Impact)
     new = replace(old, velocity=float(f"{velocity:.6g}"))
     return replace(deck, segments=tuple(new if s is old else s for s in deck.segments))
 
 
-def _duration(deck: Deck) -> float:
+def _duration(deck: model.Deck) -> float:
     """Simulated time: longer than half a period of projectile and static plate.
 
     That of a deck with errors, which is refused later, is 1.

@@ -19,6 +19,8 @@ from fecm.deck.findings import DeckError
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
 from fecm.simulation.run import simulate
+from fecm.sweeps import plan as plans
+from fecm.sweeps import sampling
 from fecm.sweeps.api import carry_out, check_draws, problem_of
 from fecm.sweeps.batch import deck_of
 from fecm.sweeps.cases import (
@@ -35,29 +37,8 @@ from fecm.sweeps.cases import (
 from fecm.sweeps.convergence import refined_cases
 from fecm.sweeps.convergence import table as table_of
 from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.plan import (
-    DEFLECTION,
-    MEASURES,
-    Plan,
-    Task,
-    check_memory,
-    freed,
-    plan,
-    shares_plate,
-    tasks,
-)
 from fecm.sweeps.random_result import tables
 from fecm.sweeps.result import SweepResult, save, summary, verdict
-from fecm.sweeps.sampling import (
-    DESIGNS,
-    DesignKind,
-    Law,
-    cost,
-    design_of,
-    doubt,
-    parse_random,
-    random_cases,
-)
 from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_in
 
 
@@ -72,12 +53,13 @@ from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_i
               metavar="1,2,4",
               help="Instead: divide the sides of all elements and DT by factors; order "
                    "and limit of every quantity.")  # fmt: skip
-@click.option("--random", "laws", type=Parsed(parse_random), multiple=True, metavar="NAME=LAW",
+@click.option("--random", "laws", type=Parsed(sampling.parse_random), multiple=True,
+              metavar="NAME=LAW",
               help="Random value: normal:MEAN,SD, lognormal:MEDIAN,SIGMA, uniform:A,B or "
                    "triangular:A,MODE,B; may be repeated, together with --vary.")  # fmt: skip
 @click.option("--samples", type=int, metavar="N", help="Number of samples of --random.")
 @click.option("--seed", type=int, metavar="S", help="Seed of --random.  [default: 0]")
-@click.option("--design", "kind", type=click.Choice(DESIGNS),
+@click.option("--design", "kind", type=click.Choice(sampling.DESIGNS),
               help="Design of --random: Latin hypercube, Sobol' sequence, or independent draws "
                    "(Monte Carlo).  [default: lhs]")  # fmt: skip
 @click.option("--sensitivity", is_flag=True,
@@ -95,10 +77,10 @@ from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_i
               help="Result file.  [default: the deck's name with -sweep.h5, in this "
                    "folder]")  # fmt: skip
 @click.option("--history", is_flag=True, help="Also store the contact force of every step.")
-@click.option("--measure", "extra", type=ListOf("NAME,...", click.Choice(MEASURES)), default=(),
-              metavar="NAME,...",
-              help=f"Also store {', '.join(MEASURES)}: the largest deflection, strains of gages "
-                   "(GAGE), exposures (FAIL).")  # fmt: skip
+@click.option("--measure", "extra", type=ListOf("NAME,...", click.Choice(plans.MEASURES)),
+              default=(), metavar="NAME,...",
+              help=f"Also store {', '.join(plans.MEASURES)}: the largest deflection, strains of "
+                   "gages (GAGE), exposures (FAIL).")  # fmt: skip
 @click.option("--full", type=ListOf("CASE,...", click.IntRange(min=0)), metavar="CASE,...",
               help="Also run these cases in full, into SWEEP-CASE.h5; cases count from "
                    "0.")  # fmt: skip
@@ -115,10 +97,10 @@ def sweep(
     varied: tuple[tuple[str, list[Value]], ...],
     table: Path | None,
     factors: tuple[int, ...] | None,
-    laws: tuple[tuple[str, Law], ...],
+    laws: tuple[tuple[str, sampling.Law], ...],
     samples: int | None,
     seed: int | None,
-    kind: DesignKind | None,
+    kind: sampling.DesignKind | None,
     sensitivity: bool,
     limits: tuple[Limit, ...],
     find: str | None,
@@ -164,35 +146,37 @@ def sweep(
     problem = _problem(deck)
     cases = grid(varied) if table is None else read_cases(table)
     if factors:
-        cases, extra = refined_cases(problem, factors), (DEFLECTION,)
+        cases, extra = refined_cases(problem, factors), (plans.DEFLECTION,)
     design = None
     if laws:
-        design = design_of(dict(laws), samples, seed or 0, kind or "lhs", sensitivity=sensitivity)
-        cases = random_cases(design, cases)
+        design = sampling.design_of(
+            dict(laws), samples, seed or 0, kind or "lhs", sensitivity=sensitivity
+        )
+        cases = sampling.random_cases(design, cases)
     chosen = tuple(dict.fromkeys(full or ()))
     if chosen and max(chosen) >= len(cases):
         raise click.UsageError(f"--full {max(chosen)}: the cases are 0 to {len(cases) - 1}")
     fulls = {case: path.with_name(f"{path.stem}-{case}{path.suffix}") for case in chosen}
     check_outputs([path, *fulls.values()], overwrite, [deck] if table is None else [deck, table])
     scheduler = scheduler if scheduler_file is None else address_in(scheduler_file)
-    planned = plan(
+    planned = plans.plan(
         problem, cases, history=history, until=until, extra=extra, design=design, limits=limits
     )
     check_draws(planned)
     if design is not None:
-        shared = shares_plate(problem) and not planned.alone
-        for text in (doubt(design), cost(cases, design, shared=shared)):
+        shared = plans.shares_plate(problem) and not planned.alone
+        for text in (sampling.doubt(design), sampling.cost(cases, design, shared=shared)):
             if text:
                 note(text)
-    check_memory(problem, planned, 0 if scheduler is not None else workers, streamed=True)
-    if count := freed(tasks(problem, planned)):
+    plans.check_memory(problem, planned, 0 if scheduler is not None else workers, streamed=True)
+    if count := plans.freed(plans.tasks(problem, planned)):
         note(
             f"B is not zero in {count} case{'' if count == 1 else 's'}: u and v, which the deck "
             "restrains at every node, are free there except where w is held"
         )
     parts = PartialResults(path, planned.fingerprint(), restart=overwrite)
     result = _carry_out(problem, planned, parts, workers, scheduler)
-    forces = parts.forces(tasks(problem, planned)) if history else None
+    forces = parts.forces(plans.tasks(problem, planned)) if history else None
     save(result, path, overwrite=overwrite, forces=forces)
     if lost := sum(status.startswith(LOST) for status in result["status"].tolist()):
         note(f"{lost} cases were lost with their workers; --overwrite runs them again")
@@ -224,7 +208,7 @@ def _problem(deck: Path) -> Problem:
 
 def _carry_out(
     problem: Problem,
-    planned: Plan,
+    planned: plans.Plan,
     parts: PartialResults,
     workers: int,
     scheduler: str | None,
@@ -245,7 +229,7 @@ def _carry_out(
 
 
 @contextlib.contextmanager
-def _progress(count: int, workers: int) -> Iterator[Callable[[Task, Outcome], None]]:
+def _progress(count: int, workers: int) -> Iterator[Callable[[plans.Task, Outcome], None]]:
     """Show cases done, their rate and the time left, where standard error is a terminal."""
     if not sys.stderr.isatty():
         yield lambda task, outcome: None
@@ -261,7 +245,7 @@ def _progress(count: int, workers: int) -> Iterator[Callable[[Task, Outcome], No
         length=count, label="fecm", file=sys.stderr, show_eta=True, item_show_func=rate
     ) as bar:
 
-        def done(task: Task, outcome: Outcome) -> None:
+        def done(task: plans.Task, outcome: Outcome) -> None:
             nonlocal finished
             finished += len(task.numbers)
             bar.update(len(task.numbers), finished)
@@ -269,7 +253,7 @@ def _progress(count: int, workers: int) -> Iterator[Callable[[Task, Outcome], No
         yield done
 
 
-def _run_in_full(planned: Plan, fulls: dict[int, Path], *, overwrite: bool) -> None:
+def _run_in_full(planned: plans.Plan, fulls: dict[int, Path], *, overwrite: bool) -> None:
     """Run chosen cases with all rows that their deck stores."""
     for case, path in fulls.items():
         try:

@@ -10,23 +10,12 @@ import numpy as np
 from fecm._errors import FecmWarning
 from fecm._typing import Floats
 from fecm.api import Mode, run_one
+from fecm.deck import model
 from fecm.deck.grid import Grid, Section, lines, uniform
-from fecm.deck.model import (
-    Boundary,
-    Coordinates,
-    Deck,
-    Forces,
-    Impact,
-    Indentation,
-    Material,
-    Projectile,
-    Segment,
-    Shear,
-)
 from fecm.deck.records import Control, Integration, Layer, Macro, NodeValues, Ply
 from fecm.results.result import Result
 
-MITC = Shear(assumed=True)
+MITC = model.Shear(assumed=True)
 # The report's laminate (lb, in, s).
 REPORT_PLY = Ply(0.000148, 0.3, 17.5e6, 1.15e6, 0.8e6, 0.8e6, 0.8e6)
 REPORT_HALF = (0.0, 45.0, 0.0, -45.0, 0.0) * 2
@@ -51,16 +40,16 @@ def isotropic(e: float, nu: float, rho: float, shear_factor: float = 1.0) -> Ply
 
 def material(
     ply: Ply, angles: Sequence[float], thickness: float, shear_order: int = 3, points: int = -3
-) -> Material:
+) -> model.Material:
     """Build a MATE segment of layers of equal thickness; -3 takes the strains at the nodes."""
     layers = tuple(Layer(n, angle, thickness) for n, angle in enumerate(angles, start=1))
     total = float(f"{len(layers) * thickness:.9g}")
-    return Material(Integration(3, shear_order, points, total), ply, layers)
+    return model.Material(Integration(3, shear_order, points, total), ply, layers)
 
 
-def elastic(k: float) -> Indentation:
+def elastic(k: float) -> model.Indentation:
     """Build Hertz' law, without permanent indentation."""
-    return Indentation(k, 1.0, 0.0, 1.5)
+    return model.Indentation(k, 1.0, 0.0, 1.5)
 
 
 def program(text: str) -> tuple[Macro, ...]:
@@ -74,25 +63,25 @@ def impact_program(dt: float, steps: int) -> tuple[Macro, ...]:
     return program(f"LMAS DT={dt!r} LOOP={steps} TIME RODP={steps} NEXT")
 
 
-def supports(grid: Grid, codes: str) -> Boundary | None:
+def supports(grid: Grid, codes: str) -> model.Boundary | None:
     """Restraints of codes such as `SUPPORTED`."""
     every, *edges = ([int(code) for code in word] for word in codes.split())
     return grid.boundary(every, dict(zip(("left", "bottom", "right", "top"), edges, strict=True)))
 
 
 def deck(
-    grid: Grid, segments: Iterable[Segment | None], macros: Iterable[Macro],
-    coordinates: Coordinates | None = None,
-) -> Deck:  # fmt: skip
+    grid: Grid, segments: Iterable[model.Segment | None], macros: Iterable[Macro],
+    coordinates: model.Coordinates | None = None,
+) -> model.Deck:  # fmt: skip
     """Build a deck of 9-node elements on a grid's numbering."""
     made = (grid.element_cards(), coordinates or grid.coordinates(), *segments)
     given = tuple(segment for segment in made if segment is not None)
-    layers = next(len(s.layers) for s in given if isinstance(s, Material))
+    layers = next(len(s.layers) for s in given if isinstance(s, model.Material))
     control = Control(grid.nodes, grid.elements, layers, 2, 5, 9)
-    return Deck("verification", control, given, tuple(macros))
+    return model.Deck("verification", control, given, tuple(macros))
 
 
-def result_of(one: Deck, mode: Mode = "report") -> Result:
+def result_of(one: model.Deck, mode: Mode = "report") -> Result:
     """Run a deck of one problem."""
     with warnings.catch_warnings(action="ignore", category=FecmWarning):
         return run_one(one, mode=mode)
@@ -114,10 +103,10 @@ def constant_strains(
     return np.stack([u, v, w, -kx * x - kxy / 2.0 * y, -ky * y - kxy / 2.0 * x], axis=1)
 
 
-def forces(field: Floats) -> Forces:
+def forces(field: Floats) -> model.Forces:
     """Build a FORC segment of a field: forces, or displacements where a dof is restrained."""
     rows = field.reshape(-1, 5).tolist()
-    return Forces(tuple(NodeValues(n, 0, tuple(row)) for n, row in enumerate(rows, start=1)))
+    return model.Forces(tuple(NodeValues(n, 0, tuple(row)) for n, row in enumerate(rows, start=1)))
 
 
 def weights(coordinates: Sequence[float]) -> Floats:
@@ -130,9 +119,9 @@ def weights(coordinates: Sequence[float]) -> Floats:
 
 
 def quarter_plate(
-    elements: int, plate: Material, macros: Iterable[Macro], load: float | Floats = 0.0,
-    codes: str = BENDING, others: Sequence[Segment] = (),
-) -> Deck:  # fmt: skip
+    elements: int, plate: model.Material, macros: Iterable[Macro], load: float | Floats = 0.0,
+    codes: str = BENDING, others: Sequence[model.Segment] = (),
+) -> model.Deck:  # fmt: skip
     """Build a quarter of a simply supported square plate of side 1.
 
     x = 0 and y = 0 are lines of symmetry, so that node 1 is the middle.
@@ -150,21 +139,21 @@ def quarter_plate(
 
 
 def struck_plate(
-    grid: Grid, plate: Material, projectile: Projectile | None, velocity: float,
-    law: Indentation, dt: float, steps: int,
-) -> Deck:  # fmt: skip
+    grid: Grid, plate: model.Material, projectile: model.Projectile | None, velocity: float,
+    law: model.Indentation, dt: float, steps: int,
+) -> model.Deck:  # fmt: skip
     """Build a plate without supports that is hit in the middle."""
     middle = grid.nearest(grid.columns[-1].end / 2.0, grid.rows[-1].end / 2.0)[0]
-    segments = (supports(grid, FREE), projectile, Impact(middle, 3, velocity), law, plate)
+    segments = (supports(grid, FREE), projectile, model.Impact(middle, 3, velocity), law, plate)
     return deck(grid, segments, impact_program(dt, steps))
 
 
-def report_impact(steps: int = 4000) -> Deck:
+def report_impact(steps: int = 4000) -> model.Deck:
     """Build the report's experiment: 115 in/s on a plate of 20 layers (lb, in, s)."""
     grid = Grid(
         [Section(0.0, 1.5, 3), Section(1.5, 4.5, 8), Section(4.5, 6.0, 3)],
         [Section(0.0, 0.5, 1), Section(0.5, 3.5, 8), Section(3.5, 4.0, 1)],
     )
     plate = material(REPORT_PLY, REPORT_ANGLES, REPORT_THICKNESS)
-    law = Indentation(1.912e6, 6.564e-4, 0.094, 2.0)
+    law = model.Indentation(1.912e6, 6.564e-4, 0.094, 2.0)
     return struck_plate(grid, plate, None, 115.0, law, 2e-7, steps)

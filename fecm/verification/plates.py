@@ -27,32 +27,13 @@ from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import build_plate
 from fecm.problem.generate import generate
 from fecm.results.result import Result
+from fecm.verification import decks
 from fecm.verification.case import Value, case
-from fecm.verification.decks import (
-    ANGLE_PLY,
-    CROSS_PLY,
-    MITC,
-    REPORT_PLY,
-    SUPPORTED,
-    constant_strains,
-    deck,
-    elastic,
-    fields,
-    forces,
-    impact_program,
-    isotropic,
-    material,
-    program,
-    quarter_plate,
-    result_of,
-    supports,
-    weights,
-)
 from fecm.verification.parts import FIBRES, THICK
 
 # Constant strains and resultants; the mode of one dof --------------------------------------------
 
-STRESSES = program("TANG FORM SOLV STRE")
+STRESSES = decks.program("TANG FORM SOLV STRE")
 IN_PLANE = "eps_xx eps_yy gamma_xy kappa_x kappa_y kappa_xy"
 
 # Corners of the four elements of the patch: no side is parallel to another or to an axis.
@@ -71,17 +52,17 @@ def patch() -> Sequence[Value]:
     fine[::2, 1::2] = (CORNERS[:, 1:] + CORNERS[:, :-1]) / 2.0
     fine[1::2] = (fine[2::2] + fine[:-2:2]) / 2.0
     x, y = fine.reshape(-1, 2).T
-    field = constant_strains(x, y, (0.4, -0.5, 0.6), strain=(1e-3, 2e-3, 3e-3))
+    field = decks.constant_strains(x, y, (0.4, -0.5, 0.6), strain=(1e-3, 2e-3, 3e-3))
     field = field.reshape(5, 5, 5)
     field[1:-1, 1:-1] = 0.0  # the inner nodes are free
     grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
     places = enumerate(fine.reshape(-1, 2).tolist(), start=1)
-    plate = material(FIBRES, (0.0, 90.0), THICK / 2.0)
-    segments = (supports(grid, "00000" + 4 * " 11111"), forces(field), plate)
+    plate = decks.material(FIBRES, (0.0, 90.0), THICK / 2.0)
+    segments = (decks.supports(grid, "00000" + 4 * " 11111"), decks.forces(field), plate)
     coordinates = Coordinates(tuple(NodeValues(n, 0, tuple(place)) for n, place in places))
-    found = result_of(deck(grid, segments, STRESSES, coordinates))
-    shears = np.array(fields(found, "stresses", "gamma_xz gamma_yz"))
-    return [*fields(found, "stresses", IN_PLANE), shears, found["stresses/M_x"]]
+    found = decks.result_of(decks.deck(grid, segments, STRESSES, coordinates))
+    shears = np.array(decks.fields(found, "stresses", "gamma_xz gamma_yz"))
+    return [*decks.fields(found, "stresses", IN_PLANE), shears, found["stresses/M_x"]]
 
 
 def loaded_rectangle(x: Sequence[float], y: Sequence[float], *, shears: bool = False) -> Deck:
@@ -99,16 +80,16 @@ def loaded_rectangle(x: Sequence[float], y: Sequence[float], *, shears: bool = F
         codes[0, -1, 1:3] = codes[-1, 0, 2] = 1
     loads = np.zeros(codes.shape)
     for place, sign in ((-1, 1.0), (0, -1.0)):
-        loads[:, place] += sign * np.outer(weights(lines(grid.rows)), x)
-        loads[place] += sign * np.outer(weights(lines(grid.columns)), y)
+        loads[:, place] += sign * np.outer(decks.weights(lines(grid.rows)), x)
+        loads[place] += sign * np.outer(decks.weights(lines(grid.columns)), y)
     rows = enumerate(codes.reshape(-1, 5).tolist(), start=1)
     segments = (
         Boundary(tuple(NodeCodes(n, 0, tuple(code)) for n, code in rows if any(code))),
-        forces(np.where(codes == 0, loads, 0.0)),
-        material(FIBRES, (0.0, 45.0), THICK / 2.0),
+        decks.forces(np.where(codes == 0, loads, 0.0)),
+        decks.material(FIBRES, (0.0, 45.0), THICK / 2.0),
         Shear(0.8) if shears else None,
     )
-    return deck(grid, segments, STRESSES)
+    return decks.deck(grid, segments, STRESSES)
 
 
 @case("resultants")
@@ -116,15 +97,15 @@ def resultants() -> Sequence[Value]:
     """Uniform strains and resultants."""
     n_x, n_y, n_xy, m_x, m_y, m_xy = 100.0, -40.0, 30.0, 0.5, 0.3, -0.2
     # A couple M does work on -theta.
-    found = result_of(
+    found = decks.result_of(
         loaded_rectangle((n_x, n_xy, 0.0, -m_x, -m_xy), (n_xy, n_y, 0.0, -m_xy, -m_y))
     )
-    sheared = result_of(
+    sheared = decks.result_of(
         loaded_rectangle((0.0, 0.0, 20.0, 0.0, 0.0), (0.0, 0.0, -8.0, 0.0, 0.0), shears=True)
     )
     return [
-        *fields(found, "stresses", f"{IN_PLANE} N_x N_y N_xy M_x M_y M_xy"),
-        *fields(sheared, "stresses", "gamma_xz gamma_yz Q_x Q_y"),
+        *decks.fields(found, "stresses", f"{IN_PLANE} N_x N_y N_xy M_x M_y M_xy"),
+        *decks.fields(sheared, "stresses", "gamma_xz gamma_yz Q_x Q_y"),
     ]
 
 
@@ -138,23 +119,23 @@ def tape8() -> Sequence[Value]:
     grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
     struck = 2 + grid.across
     x, y = (v.ravel() for v in np.meshgrid(lines(grid.columns), lines(grid.rows)))
-    field = constant_strains(x, y, (0.4, -0.5, 0.6), shear=(0.02, -0.03))
+    field = decks.constant_strains(x, y, (0.4, -0.5, 0.6), shear=(0.02, -0.03))
     field[struck - 1, 2] = 0.0
     codes = [NodeCodes(n, 0, (1, 1, int(n != struck), 1, 1)) for n in range(1, grid.nodes + 1)]
     segments = (
-        Boundary(tuple(codes)), forces(field), Projectile(0, 0, 1e-6), Impact(struck, 3, 1e-12),
-        elastic(1.0), material(FIBRES, (0.0, 90.0), 0.01),
+        Boundary(tuple(codes)), decks.forces(field), Projectile(0, 0, 1e-6),
+        Impact(struck, 3, 1e-12), decks.elastic(1.0), decks.material(FIBRES, (0.0, 90.0), 0.01),
     )  # fmt: skip
-    found = result_of(deck(grid, segments, impact_program(1e-7, 1)))
+    found = decks.result_of(decks.deck(grid, segments, decks.impact_program(1e-7, 1)))
     names = "kappa_x kappa_y kappa_xy gamma_yz gamma_xz"
-    return [field[:, 1:] for field in fields(found, "tape8", names)]
+    return [field[:, 1:] for field in decks.fields(found, "tape8", names)]
 
 
 @case("time-step")
 def time_step() -> Sequence[Value]:
     """Time step 2/ω of the only mode."""
     grid = Grid(uniform(0.3, 1), uniform(0.3, 1))
-    made = deck(grid, [material(isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.1)], ())
+    made = decks.deck(grid, [decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.1)], ())
     return [_critical(made, dof) for dof in (2, 3)]
 
 
@@ -168,9 +149,9 @@ def _critical(made: Deck, dof: int) -> float:
 
 # Statics, frequencies, motion --------------------------------------------------------------------
 
-DEFLECTION = program("TANG FORM SOLV DISP")
+DEFLECTION = decks.program("TANG FORM SOLV DISP")
 ELEMENTS = 8  # of 16 a side
-ONE = isotropic(1.0, 0.3, 1.0)
+ONE = decks.isotropic(1.0, 0.3, 1.0)
 
 
 @case("static-bending")
@@ -178,8 +159,12 @@ def static_bending() -> Sequence[Value]:
     """Deflections, with transverse shear integrated by order 2, which does not lock, and 3."""
 
     def w(thickness: float, factor: float = 1.0, shear_order: int = 2) -> Floats:
-        plate = material(isotropic(1.0, 0.3, 1.0, factor), [0.0], thickness, shear_order)
-        row: Floats = result_of(quarter_plate(ELEMENTS, plate, DEFLECTION, 1.0)).tape3.w[0]
+        plate = decks.material(
+            decks.isotropic(1.0, 0.3, 1.0, factor), [0.0], thickness, shear_order
+        )
+        row: Floats = decks.result_of(
+            decks.quarter_plate(ELEMENTS, plate, DEFLECTION, 1.0)
+        ).tape3.w[0]
         return row
 
     across = 2 * ELEMENTS + 1
@@ -194,9 +179,9 @@ def static_bending() -> Sequence[Value]:
 @case("frequencies")
 def frequencies() -> Sequence[Value]:
     """Frequencies of the symmetric modes, on a quarter of the plate, and of uniform shear."""
-    plate = material(ONE, [0.0], 0.1, 2)
-    macros = program("LMAS EIGE=4 CMAS EIGE=4")
-    found = result_of(quarter_plate(ELEMENTS, plate, macros)).modes.angular_frequency
+    plate = decks.material(ONE, [0.0], 0.1, 2)
+    macros = decks.program("LMAS EIGE=4 CMAS EIGE=4")
+    found = decks.result_of(decks.quarter_plate(ELEMENTS, plate, macros)).modes.angular_frequency
     scaled = found * math.sqrt(0.1 / (0.1**3 / (12.0 * (1.0 - 0.3**2))))
     # Modes 11, 13 and 31, 33 with the lumped mass, then with the consistent mass.
     return [scaled[0], scaled[1], scaled[4], scaled[7], _shear_frequency()]
@@ -206,7 +191,7 @@ def _shear_frequency() -> float:
     """Rayleigh quotient of a free plate in uniform transverse shear."""
     grid = Grid(uniform(0.7, 2), uniform(1.3, 2))
     held = grid.boundary((1, 1, 1, 0, 1), {})
-    made = deck(grid, (held, material(ONE, [0.0], 0.1)), ())
+    made = decks.deck(grid, (held, decks.material(ONE, [0.0], 0.1)), ())
     model = build_plate(made, generate(made))
     ones = np.ones(model.neq)
     return math.sqrt(float(ones @ (model.stiffness @ ones)) / float(model.mass @ ones))
@@ -222,10 +207,10 @@ def two_layers(angles: Sequence[float], codes: str, mode: int, node: int) -> Seq
     """Frequencies of the first and another mode; w in the middle and u at a node under a load."""
 
     def made(shear_order: int, load: float, macros: Sequence[Macro]) -> Result:
-        card = material(FIBRES, angles, H / 2.0, shear_order)
-        return result_of(quarter_plate(FEWER, card, macros, load, codes))
+        card = decks.material(FIBRES, angles, H / 2.0, shear_order)
+        return decks.result_of(decks.quarter_plate(FEWER, card, macros, load, codes))
 
-    modes = [made(n, 0.0, program("LMAS EIGE=3")).modes.angular_frequency for n in (2, 3)]
+    modes = [made(n, 0.0, decks.program("LMAS EIGE=3")).modes.angular_frequency for n in (2, 3)]
     first, second = (made(n, 1.0, DEFLECTION).tape3.displacement[0] for n in (2, 3))
     return [modes[0][0], modes[0][mode], modes[1][0], first[0, 2], first[node, 0], second[0, 2]]
 
@@ -233,13 +218,13 @@ def two_layers(angles: Sequence[float], codes: str, mode: int, node: int) -> Seq
 @case("cross-ply-plate")
 def cross_ply_plate() -> Sequence[Value]:
     """Frequencies and deflections of [0/90]."""
-    return two_layers((0.0, 90.0), CROSS_PLY, 1, 2 * FEWER)
+    return two_layers((0.0, 90.0), decks.CROSS_PLY, 1, 2 * FEWER)
 
 
 @case("angle-ply-plate")
 def angle_ply_plate() -> Sequence[Value]:
     """Frequencies and deflections of [45/-45]."""
-    return two_layers((45.0, -45.0), ANGLE_PLY, 2, (2 * FEWER + 1) * 2 * FEWER)
+    return two_layers((45.0, -45.0), decks.ANGLE_PLY, 2, (2 * FEWER + 1) * 2 * FEWER)
 
 
 @case("forced-plate")
@@ -249,11 +234,11 @@ def forced_plate() -> Sequence[Value]:
     # from the load.
     root = (1.0 - 1.0 / np.sqrt(3.0)) / 2.0 * 0.5 / FEWER
     gage = Gage(1, float(f"{1 / 12 + root:.9g}"), float(f"{0.25 + root:.9g}"), H / 2.0, 30.0)
-    steps = program("LMAS DT=1.08e-7 PROP=1 LOOP=600 TIME EXCD DISP=600 NEXT")
-    card = material(FIBRES, (0.0, 90.0), H / 2.0, 2)
-    made = quarter_plate(FEWER, card, steps, 1.0, CROSS_PLY, [Gages((gage,))])
+    steps = decks.program("LMAS DT=1.08e-7 PROP=1 LOOP=600 TIME EXCD DISP=600 NEXT")
+    card = decks.material(FIBRES, (0.0, 90.0), H / 2.0, 2)
+    made = decks.quarter_plate(FEWER, card, steps, 1.0, decks.CROSS_PLY, [Gages((gage,))])
     table = LoadTable(1, 2, 0.0, 1.0, (0.0, 0.0, 1.0, 5.0e4, 0.0))
-    found = result_of(replace(made, tables=(table,)))
+    found = decks.result_of(replace(made, tables=(table,)))
     return [found.tape3.w[-1, 0], found.gages.strain[-1, 0]]
 
 
@@ -268,8 +253,10 @@ CROSS = (0.0, 90.0, 0.0)
 def rectangle(along: int, patch: Patch, macros: Sequence[Macro], *others: Segment) -> Deck:
     """Build a simply supported [0/90]5s of the report's ply with MITC, pressed on a patch."""
     grid = Grid(uniform(SIDES[0], along), uniform(SIDES[1], along * 2 // 3))
-    plate = material(REPORT_PLY, 5 * (0.0, 90.0) + 5 * (90.0, 0.0), 0.106 / 20)
-    return deck(grid, (supports(grid, SUPPORTED), patch, *others, MITC, plate), macros)
+    plate = decks.material(decks.REPORT_PLY, 5 * (0.0, 90.0) + 5 * (90.0, 0.0), 0.106 / 20)
+    return decks.deck(
+        grid, (decks.supports(grid, decks.SUPPORTED), patch, *others, decks.MITC, plate), macros
+    )
 
 
 @case("patch-compliance")
@@ -278,7 +265,7 @@ def compliance() -> Sequence[Value]:
     found = []
     for shape in ("DISC", "HERT"):
         patch = Patch(shape, 0.5, SIDES[0] / 2.0, SIDES[1] / 2.0, 1.0)
-        result = result_of(rectangle(12, patch, DEFLECTION))
+        result = decks.result_of(rectangle(12, patch, DEFLECTION))
         found.append(result.tape3.w[0, result["patch/node"] - 1] @ result["patch/weight"])
     return found
 
@@ -286,9 +273,9 @@ def compliance() -> Sequence[Value]:
 @case("assumed-shear")
 def assumed_shear() -> Sequence[Value]:
     """Deflections of a plate of four times four elements a quarter."""
-    plates = (quarter_plate(4, material(ONE, [0.0], h), DEFLECTION, 1.0, others=[MITC])
-              for h in (0.1, 0.001))  # fmt: skip
-    return [result_of(made).tape3.w[0, 0] for made in plates]
+    cards = (decks.material(ONE, [0.0], h) for h in (0.1, 0.001))
+    made = [decks.quarter_plate(4, card, DEFLECTION, 1.0, others=[decks.MITC]) for card in cards]
+    return [decks.result_of(one).tape3.w[0, 0] for one in made]
 
 
 @case("equilibrium-shear")
@@ -296,8 +283,8 @@ def equilibrium_shear() -> Sequence[Value]:
     """Transverse shear stiffness of the plates of two decks."""
 
     def shear(ply: Ply, angles: Sequence[float]) -> Floats:
-        plate = material(ply, angles, 1.0 / len(angles))
-        made = quarter_plate(1, plate, (), others=[Shear(equilibrium=True)])
+        plate = decks.material(ply, angles, 1.0 / len(angles))
+        made = decks.quarter_plate(1, plate, (), others=[Shear(equilibrium=True)])
         return build_plate(made, generate(made)).laminate.shear.diagonal()
 
     return [shear(ONE, [0.0])[0] / ONE.g13, *shear(STIFF, CROSS)]
@@ -311,20 +298,22 @@ def bent(
 ) -> Result:
     """Run a simply supported square under q = cos(pi x) cos(pi y), its origin in the middle."""
     along = np.cos(np.pi * np.array(lines(uniform(0.5, ELEMENTS))))
-    plate = material(ply, angles, thickness / len(angles), points=2)
-    macros, load = program(f"TANG FORM SOLV STRE {word}"), np.outer(along, along)
-    return result_of(quarter_plate(ELEMENTS, plate, macros, load, others=[MITC, *others]))
+    plate = decks.material(ply, angles, thickness / len(angles), points=2)
+    macros, load = decks.program(f"TANG FORM SOLV STRE {word}"), np.outer(along, along)
+    return decks.result_of(
+        decks.quarter_plate(ELEMENTS, plate, macros, load, others=[decks.MITC, *others])
+    )
 
 
 @case("ply-stresses")
 def sinusoidal() -> Sequence[Value]:
     """Stresses and their shapes."""
     found = bent(STIFF, CROSS)
-    x, y = fields(found, "stresses", "x y")
+    x, y = decks.fields(found, "stresses", "x y")
     even, odd = np.cos(np.pi * x) * np.cos(np.pi * y), np.sin(np.pi * x) * np.sin(np.pi * y)
     x, y = x.mean(axis=1), y.mean(axis=1)
     one, two, shear, xz, yz = (
-        field[0] for field in fields(found, "plies", "sigma_1 sigma_2 tau_12 tau_xz tau_yz")
+        field[0] for field in decks.fields(found, "plies", "sigma_1 sigma_2 tau_12 tau_xz tau_yz")
     )
     return [
         (one[:, :, 2, 1], even), (two[:, :, 2, 1], even), (shear[:, :, 2, 1], odd),
@@ -337,7 +326,7 @@ def sinusoidal() -> Sequence[Value]:
 def homogeneous() -> Sequence[Value]:
     """Stresses at heights of the third ply, and at the faces, and their shape."""
     found = bent(ONE, (0.0,) * 4)
-    x, y = (place.mean(axis=1) for place in fields(found, "stresses", "x y"))
+    x, y = (place.mean(axis=1) for place in decks.fields(found, "stresses", "x y"))
     shape = np.sin(np.pi * x) * np.cos(np.pi * y)
     tau = found["plies/tau_xz"][0]
     at_faces = (tau[:, [0, 3], [0, 2]], shape[:, None])
