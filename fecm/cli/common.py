@@ -76,12 +76,19 @@ def echo_file(text: str) -> None:
 
 
 @contextlib.contextmanager
-def progress(label: str, length: int) -> Iterator[Callable[[int], object]]:
-    """Show a progress bar if standard error is a terminal; yield the function that advances it."""
-    if length < 2 or not sys.stderr.isatty():
+def progress(
+    label: str, length: int, remark: Callable[[object], str] | None = None
+) -> Iterator[Callable[[int], object]]:
+    """Show a progress bar if standard error is a terminal; yield the function that advances it.
+
+    The bar ends with a remark, and is left out for a single step without one.
+    """
+    if (length < 2 and remark is None) or not sys.stderr.isatty():
         yield lambda steps: None
         return
-    with click.progressbar(length=length, label=label, file=sys.stderr) as bar:
+    with click.progressbar(
+        length=length, label=label, file=sys.stderr, item_show_func=remark
+    ) as bar:
         yield bar.update
 
 

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
-import sys
 import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import click
 
 from fecm._files import check_outputs
 from fecm.api import load_deck
-from fecm.cli.common import DECK_PATH, FILE_PATH, NO, RefusedError, echo, note, signals
+from fecm.cli.common import DECK_PATH, FILE_PATH, NO, RefusedError, echo, note, progress, signals
 from fecm.cli.decks import count_findings
 from fecm.cli.types import ListOf, Parsed
 from fecm.deck.findings import DeckError
@@ -214,8 +211,20 @@ def _carry_out(
     scheduler: str | None,
 ) -> SweepResult:
     """Run the plan with a progress bar; finished cases survive any interruption."""
+    begin, finished = time.monotonic(), 0
+
+    def rate(_: object) -> str:
+        seconds = time.monotonic() - begin
+        per_core = finished / seconds / workers if seconds else 0.0
+        return f"{finished} cases, {per_core:.3g} a second per worker" if finished else ""
+
+    def done(task: plans.Task, outcome: Outcome) -> None:
+        nonlocal finished
+        finished += len(task.numbers)
+        advance(len(task.numbers))
+
     try:
-        with signals.deferred(), _progress(len(planned.cases), workers) as done:
+        with signals.deferred(), progress("fecm", len(planned.cases), rate) as advance:
             return carry_out(
                 problem, planned, workers=workers, scheduler=scheduler, parts=parts, done=done,
                 idle=signals.heed, note=note,
@@ -226,31 +235,6 @@ def _carry_out(
     except (KeyboardInterrupt, SystemExit):
         echo("fecm: the same command resumes this sweep", err=True)
         raise
-
-
-@contextlib.contextmanager
-def _progress(count: int, workers: int) -> Iterator[Callable[[plans.Task, Outcome], None]]:
-    """Show cases done, their rate and the time left, where standard error is a terminal."""
-    if not sys.stderr.isatty():
-        yield lambda task, outcome: None
-        return
-    begin, finished = time.monotonic(), 0
-
-    def rate(_: object) -> str:
-        seconds = time.monotonic() - begin
-        per_core = finished / seconds / workers if seconds else 0.0
-        return f"{finished} cases, {per_core:.3g} a second per worker" if finished else ""
-
-    with click.progressbar(
-        length=count, label="fecm", file=sys.stderr, show_eta=True, item_show_func=rate
-    ) as bar:
-
-        def done(task: plans.Task, outcome: Outcome) -> None:
-            nonlocal finished
-            finished += len(task.numbers)
-            bar.update(len(task.numbers), finished)
-
-        yield done
 
 
 def _run_in_full(planned: plans.Plan, fulls: dict[int, Path], *, overwrite: bool) -> None:
