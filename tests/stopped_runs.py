@@ -11,7 +11,6 @@ from fecm.results import hdf5_writer
 from fecm.simulation.checkpoint import Checkpointer
 from fecm.simulation.run import run as simulate_run
 from fecm.simulation.simulation import Simulation
-from fecm.simulation.spool import Journal
 
 
 class StoppedError(Exception):
@@ -46,9 +45,8 @@ def run(
     problem = load_deck(text).problems[0]
     names = frozenset(slips.split())
     with hdf5_writer.writing(path) as sink:
-        journal = Journal(sink)
-        checkpointer = Checkpointer(path, journal)
-        simulation = Simulation(problem, journal, RunOptions(names))
+        checkpointer = Checkpointer(path, sink)
+        simulation = Simulation(problem, sink, RunOptions(names))
         if macros:
             simulation.on_macro = look
         else:
@@ -63,13 +61,12 @@ def run(
 def stop_at_once(problem: Problem, path: Path) -> None:
     """Stop a run with a checkpoint, as soon as it looks up."""
     with hdf5_writer.writing(path) as sink:
-        journal = Journal(sink)
-        checkpointer = Checkpointer(path, journal)
+        checkpointer = Checkpointer(path, sink)
 
         def look(simulation: Simulation) -> None:
             checkpointer.write(simulation)
             raise StoppedError
 
         options = RunOptions(solver="numpy")  # which looks up in short runs too
-        simulation = Simulation(problem, journal, options, observers=(look,))
+        simulation = Simulation(problem, sink, options, observers=(look,))
         simulate_run(simulation)

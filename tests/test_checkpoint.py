@@ -15,10 +15,14 @@ import pytest
 from fecm.api import load_deck
 from fecm.results import hdf5_writer
 from fecm.results.sinks import RowBuffer
-from fecm.simulation.checkpoint import Checkpointer, checkpoint_of, spool_of
+from fecm.simulation.checkpoint import (
+    Checkpointer,
+    CheckpointError,
+    checkpoint_of,
+    spool_of,
+)
 from fecm.simulation.run import run as simulate_run
 from fecm.simulation.simulation import Simulation
-from fecm.simulation.spool import CheckpointError, Journal
 from tests.calls import call
 from tests.decks import DATA_CARDS, MESH, small
 from tests.stopped_runs import StoppedError, run, stop_at_once
@@ -302,9 +306,8 @@ def test_a_checkpoint_that_can_not_be_written_leaves_the_one_before_in_force(
             raise StoppedError
 
     with contextlib.suppress(StoppedError), hdf5_writer.writing(path) as sink:
-        journal = Journal(sink)
-        checkpointer = Checkpointer(path, journal)
-        simulation = Simulation(load_deck(deck()).problems[0], journal, observers=(look,))
+        checkpointer = Checkpointer(path, sink)
+        simulation = Simulation(load_deck(deck()).problems[0], sink, observers=(look,))
         simulation.interval = 1
         simulate_run(simulation)
     assert len(looks) == 70

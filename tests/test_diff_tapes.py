@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from fecm.results.result import load
-from fecm.results.tape_reader import fortran_number, read_tapes
-from fecm.results.tapes import write_tapes
+from fecm.results.tapes import fortran_number, read_tapes, write_tapes
 from tests.calls import assert_unusable, diff, told
 from tests.decks import DATA
 

@@ -29,7 +29,6 @@ from fecm.results.result import Result
 from fecm.simulation.checkpoint import Checkpointer
 from fecm.simulation.run import run
 from fecm.simulation.simulation import Simulation
-from fecm.simulation.spool import Journal
 from fecm.sweeps.responses import FOUND
 from tests.builders import distorted_square, square
 from tests.calls import call
@@ -147,9 +146,8 @@ def test_a_run_resumed_between_bursts_gives_the_same_bytes(tmp_path: Path) -> No
                 raise InterruptedError
 
         with hdf5_writer.writing(path) as sink:
-            journal = Journal(sink)
-            checkpointer = Checkpointer(path, journal)
-            simulation = Simulation(problem, journal, observers=(look,))
+            checkpointer = Checkpointer(path, sink)
+            simulation = Simulation(problem, sink, observers=(look,))
             simulation.interval = 50
             if resume:
                 checkpointer.restore(simulation)

@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 import fecm
 from fecm._errors import FecmWarning
 from fecm.plot.data import patches, strain_points
-from fecm.plot.deflection import profile
-from fecm.plot.failure import outline
 from fecm.plot.kinds import KINDS, MISSING, Picture, PlotError
-from fecm.plot.meshes import supports
 from fecm.plot.pictures import draw, save
+from fecm.plot.plate import profile, supports
+from fecm.plot.plies import outline
 from fecm.plot.style import COLOURS, scale
 from fecm.results.result import Result
 from fecm.results.summary import summary

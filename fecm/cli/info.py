@@ -16,9 +16,9 @@ from fecm._version import __version__
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION, echo_json
 from fecm.cli.isolation import reads
 from fecm.results.hdf5_reader import Contents, read
-from fecm.results.info import about_run, describe_groups
 from fecm.results.result import result_of
 from fecm.results.schema import FORMAT, SWEEP, declared_units, printable, shown
+from fecm.results.summary import about_run, describe_groups
 
 # Attributes of the file with lines of their own.
 HEADING = ("title", "mode", "slips", "fecm_version", "format", "format_version",

@@ -38,15 +38,18 @@ from fecm.problem.slips import NAMES, active_slips
 from fecm.problem.summary import larger_steps
 from fecm.results import hdf5_writer
 from fecm.results.hdf5_reader import read
-from fecm.results.info import about_run
 from fecm.results.result import Result, result_of
 from fecm.results.schema import declared_units
-from fecm.results.summary import largest_exposures
-from fecm.simulation.checkpoint import Checkpointer, checkpoint_of, spool_of
+from fecm.results.summary import about_run, largest_exposures
+from fecm.simulation.checkpoint import (
+    Checkpointer,
+    CheckpointError,
+    checkpoint_of,
+    spool_of,
+)
 from fecm.simulation.printout import Printer
 from fecm.simulation.run import run as simulate_run
 from fecm.simulation.simulation import Simulation
-from fecm.simulation.spool import CheckpointError, Journal
 
 
 @click.command()
@@ -175,14 +178,14 @@ def _run_one(
     with contextlib.ExitStack() as stack:
         stack.enter_context(signals.deferred())
         stack.enter_context(_ends(path, resumes=resumes))
-        journal = Journal(stack.enter_context(hdf5_writer.writing(path, overwrite=overwrite)))
-        checkpointer = Checkpointer(path, journal)
+        sink = stack.enter_context(hdf5_writer.writing(path, overwrite=overwrite))
+        checkpointer = Checkpointer(path, sink)
         printer = Printer()
         if printed is not None:
             printer = Printer(stack.enter_context(writing(printed, overwrite=overwrite)))
         advance = stack.enter_context(progress("fecm", problem.work.steps))
         on_step, on_macro = _observers(checkpointer, every, advance)
-        simulation = Simulation(problem, journal, choices, printer, (on_step,), on_macro)
+        simulation = Simulation(problem, sink, choices, printer, (on_step,), on_macro)
         if resumes:
             checkpointer.restore(simulation)
             note(f"{path} resumes after step {simulation.state.plate.step}")

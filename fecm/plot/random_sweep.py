@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from fecm.plot.kinds import Picture, PlotError
-from fecm.plot.map_data import Axis, Ints, case_rows, quantity_of
-from fecm.plot.map_data import numbers as axis_of
-from fecm.plot.maps import LEVEL
+from fecm.plot.maps import LEVEL, Axis, Ints, case_rows, quantity_of
+from fecm.plot.maps import numbers as axis_of
 from fecm.plot.style import RATIO, WIDTHS, colours, legend, limit_count, lines_legend, panels
 from fecm.sweeps.random_result import Indices, RandomResult, wilson
 from fecm.sweeps.result import SweepResult
@@ -69,17 +68,9 @@ def exceedance(
 ) -> Picture:
     """Draw the probability that a quantity is larger than a value, with 95 % intervals at limits.
 
-    Parameters
-    ----------
-    results : mapping of str to SweepResult
-        One random sweep; each combination of its varied values has a curve.
-    quantity : str
-        A name of the sweep's summary; the peak force, or the velocity found, if empty.
-    where : mapping of str to float or str
-        Show only these varied values.
-    level : sequence of float
-        Limits (the deck's unit); by default those of the sweep.
-    width : str
+    Each combination of varied values has a curve; `where` selects some.  `quantity` is a name of
+    the sweep's summary, by default the peak force, or the velocity found; `level` are limits (the
+    deck's unit), by default those of the sweep.
     """
     name, sweep, random, chosen = _random(results, where)
     limit_count(len(chosen), "curves")
@@ -123,15 +114,7 @@ def sensitivity(
 ) -> Picture:
     """Draw the Sobol' indices of a quantity as bars, with their 95 % intervals.
 
-    Parameters
-    ----------
-    results : mapping of str to SweepResult
-        One random sweep with sensitivity indices.
-    quantity : str
-        A name of the sweep's summary; the peak force, or the velocity found, if empty.
-    where : mapping of str to float or str
-        Varied values, if the sweep has several combinations of them.
-    width : str
+    `where` selects one of several combinations of varied values; `quantity` as of `exceedance`.
     """
     name, sweep, random, chosen = _random(results, where)
     if not random.sensitivity:
@@ -172,17 +155,8 @@ def scatter(
 ) -> Picture:
     """Draw a quantity over every random value.
 
-    Parameters
-    ----------
-    results : mapping of str to SweepResult
-        One random sweep.
-    quantity : str
-        A name of the sweep's summary; the peak force, or the velocity found, if empty.
-    where : mapping of str to float or str
-        Varied values, if the sweep has several combinations of them.
-    level : sequence of float
-        Limits (the deck's unit); by default those of the sweep.
-    width : str
+    `where` selects one of several combinations of varied values; `quantity` and `level` as of
+    `exceedance`.
     """
     name, sweep, random, chosen = _random(results, where)
     rows = _draws(random, _one(random, name, chosen))

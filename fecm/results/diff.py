@@ -26,19 +26,15 @@ from numpy.typing import NDArray
 from fecm._errors import FecmError
 from fecm.deck.records import DOF_NAMES
 from fecm.results.hdf5_reader import Contents, read
-from fecm.results.schema import DATASETS, FORMAT, SCALES, SWEEP, row_blocks, suggestion
-from fecm.results.tape_reader import SHEARS, TAPES, TapeText, W, read_tapes
-from fecm.results.tapes import CONTACT, CURVATURES
+from fecm.results.schema import CONTACT, DATASETS, FORMAT, SCALES, SWEEP, row_blocks, suggestion
+from fecm.results.tapes import CURVATURES, SHEARS, TAPES, TapeText, W, read_tapes
 
 Array = NDArray[Any]
 
-ON_TAPE = frozenset(
-    (
-        W,
-        *(f"tape8/{name}" for name in (*CURVATURES, *SHEARS["tape8"])),
-        *(f"tape9/{name}" for name in CONTACT),
-    )
-)
+ON_TAPE = {
+    W, *(f"tape8/{name}" for name in (*CURVATURES, *SHEARS["tape8"])),
+    *(f"tape9/{name}" for name in CONTACT),
+}  # fmt: skip
 
 # Names and first numbers of the axes of a sweep's datasets: cases count from 0, as in commands.
 CASES = (("case", 0), ("step", 1))
@@ -62,11 +58,8 @@ SCALE_NAMES = {
     "energy/balance_error": "the energy put in",
     "laminate/B": "sqrt(max A * max D)",
     "plies/residual": "the largest interlaminar stress",
-    **{f"stresses/{name}": "the largest N or M * sqrt(A/D)" for name in MEMBRANE["N"]},
-    **{
-        f"stresses/{name}": "the largest strain or curvature * sqrt(D/A)"
-        for name in MEMBRANE["eps"]
-    },
+    **{f"stresses/{n}": "the largest N or M * sqrt(A/D)" for n in MEMBRANE["N"]},
+    **{f"stresses/{n}": "the largest strain or curvature * sqrt(D/A)" for n in MEMBRANE["eps"]},
     "history/indentation": "the largest indentation in contact",
     "tape9/indentation": "the largest indentation in contact",
 }

@@ -48,15 +48,13 @@ class Group:
             raise NotStoredError(f"there is no {self._name}/{name} in this result")
 
     def __dir__(self) -> list[str]:
-        head = f"{self._name}/"
-        own = {p.removeprefix(head).partition("/")[0] for p in self._arrays if p.startswith(head)}
-        return [*super().__dir__(), *own]
+        return [*super().__dir__(), *{name.partition("/")[0] for name in self._shapes()}]
 
     def _shapes(self) -> dict[str, str]:
         """Shapes of the datasets by their names."""
         head = f"{self._name}/"
-        paths = [path for path in self._arrays if path.startswith(head)]
-        return {path.removeprefix(head): str(self._arrays[path].shape) for path in paths}
+        own = [path for path in self._arrays if path.startswith(head)]
+        return {path.removeprefix(head): str(self._arrays[path].shape) for path in own}
 
     def __repr__(self) -> str:
         shapes = ", ".join(f"{name} {shape}" for name, shape in self._shapes().items())
@@ -149,19 +147,14 @@ class GageGroup(Rows):
     strain: Floats
 
 
-class Stresses(Rows):
-    """Strains and stress resultants, stored by STRE."""
+class Stresses(Tape8):
+    """Strains, those of `Tape8` among them, and stress resultants, stored by STRE."""
 
     x: Floats
     y: Floats
     eps_xx: Floats
     eps_yy: Floats
     gamma_xy: Floats
-    kappa_x: Floats
-    kappa_y: Floats
-    kappa_xy: Floats
-    gamma_xz: Floats
-    gamma_yz: Floats
     N_x: Floats
     N_y: Floats
     N_xy: Floats

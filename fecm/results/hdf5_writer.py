@@ -37,11 +37,16 @@ class FileSink:
         self._file = file
         self._guarded = guarded
         self._units: dict[str, str] = {}
-        self._datasets: dict[str, h5py.Dataset] = {}
+        self.arrays: dict[str, Any] = {}  # datasets that are stored so far, by path
         self._made: list[Dataset] = []
         self._groups: dict[str, h5py.Group] = {"": file}
-        self._scales: dict[str, h5py.Dataset] = {}
         self.axis_names = dict(AXIS_NAMES)
+        # Operations so far, rows without their values, if a checkpoint needs them.
+        self.operations: list[dict[str, Any]] | None = None
+
+    def _note(self, operation: str, **about: Any) -> None:
+        if self.operations is not None:
+            self.operations.append({"do": operation, **about})
 
     def _group(self, name: str) -> h5py.Group:
         if name not in self._groups:
@@ -53,6 +58,7 @@ class FileSink:
 
     def attributes(self, group: str, values: Mapping[str, Any]) -> None:
         """Set attributes of a group; a list of strings becomes an array of strings."""
+        self._note("attributes", group=group, values=dict(values))
         target = self._group(group)
         if not group:
             self._units = declared_units(values)
@@ -64,13 +70,14 @@ class FileSink:
 
     def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
         """Create a contiguous dataset of its full shape."""
+        self._note("create", path=dataset.path, shape=shape)
         made = self._group(dataset.group).create_dataset(dataset.name, shape, dataset.dtype)
         _set_text(made, dataset.description, "description", "long_name")
         if dataset.dimension:
             _set_text(made, dataset.dimension, "dimension")
             if unit := unit_of(dataset.dimension, self._units):
                 _set_text(made, unit, "unit", "units")  # xarray and pint read units
-        self._datasets[dataset.path] = made
+        self.arrays[dataset.path] = made
         self._made.append(dataset)
 
     def label_axes(self) -> None:
@@ -80,7 +87,7 @@ class FileSink:
         elements, points and dofs belong to the file, because a netCDF reader looks for dimensions
         in a group and its parents.  It needs all axes of a dataset labelled, or none.
         """
-        made_of = [(d, self._datasets[d.path]) for d in self._made if d.path in self._datasets]
+        made_of = [(d, self.arrays[d.path]) for d in self._made if d.path in self.arrays]
         clocks = {d.group: made for d, made in made_of if d.name == TIME and d.shape[0] == "rows"}
         for clock in clocks.values():
             clock.make_scale(TIME)
@@ -96,7 +103,7 @@ class FileSink:
     def _scale(self, size: str, length: int) -> h5py.Dataset:
         """Scale of an axis, created on first use."""
         name, description = SCALES[size]
-        if name not in self._scales and name not in self._file:
+        if name not in self._file:
             if size in self.axis_names:
                 texts = self.axis_names[size][:length]
                 made = self._file.create_dataset(name, data=texts, dtype=TEXT)
@@ -105,15 +112,14 @@ class FileSink:
                 made = self._file.create_dataset(name, data=numbers)
             made.make_scale(name)
             _set_text(made, description, "description", "long_name")
-        if name not in self._scales:
-            self._scales[name] = self._file[name]
-        return self._scales[name]
+        return self._file[name]
 
     def write(self, path: str, start: int, rows: Array) -> None:
         """Store rows of a dataset.  Raises OSError if this or an earlier write failed."""
+        self._note("write", path=path, start=start, rows=len(rows))
         self.check()
         # Low-level interface: slices of h5py take four times as long for a short block.
-        dataset = self._datasets[path]
+        dataset = self.arrays[path]
         values = np.ascontiguousarray(rows, dataset.dtype)
         place = dataset.id.get_space()
         place.select_hyperslab((start, *[0] * (values.ndim - 1)), values.shape)
@@ -124,18 +130,9 @@ class FileSink:
         if self._guarded.error is not None:
             raise self._guarded.error
 
-    def stored(self, path: str, start: int, stop: int) -> Array:
-        """Rows of a dataset, read from the file."""
-        return np.asarray(self._datasets[path][start:stop])
-
-    @property
-    def arrays(self) -> Mapping[str, Array]:
-        """Datasets that are stored so far, by path."""
-        return _Stored(self._datasets)
-
     def trim(self, path: str, rows: int) -> None:
         """Truncate a dataset to its first rows; delete it, or an empty group, without any."""
-        old = self._datasets.pop(path)
+        old = self.arrays.pop(path)
         group, name = old.parent, path.rpartition("/")[2]
         attributes = dict(old.attrs)
         kept = old[:rows]
@@ -143,7 +140,7 @@ class FileSink:
         if rows:
             made = group.create_dataset(name, data=kept)
             made.attrs.update(attributes)
-            self._datasets[path] = made
+            self.arrays[path] = made
         elif not len(group):
             empty = path.rpartition("/")[0]
             del self._file[empty]
@@ -157,9 +154,10 @@ class FileSink:
         axes: tuple[str, ...] = ("cases",),
     ) -> None:
         """Store a text, or texts along an axis."""
+        self._note("text", path=path, value=value, description=description)
         made = self._file.create_dataset(path, data=value, dtype=TEXT)
         if not isinstance(value, str):
-            self._datasets[path] = made
+            self.arrays[path] = made
             self._made.append(Dataset(path, axes, description))
         made.attrs["description"] = description
 
@@ -169,26 +167,6 @@ def _set_text(item: h5py.HLObject, text: str, *names: str) -> None:
     value = np.array(text, dtype=TEXT)
     for name in names:
         h5py.h5a.create(item.id, name.encode(), TEXT_TYPE, SCALAR).write(value)
-
-
-class _Stored(Mapping[str, Array]):
-    """Datasets of an open file as arrays."""
-
-    def __init__(self, datasets: Mapping[str, h5py.Dataset]) -> None:
-        self._datasets = datasets
-
-    def __getitem__(self, path: str) -> Array:
-        return np.asarray(self._datasets[path])
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._datasets)
-
-    def __len__(self) -> int:
-        return len(self._datasets)
-
-    def rows(self, path: str, start: int, stop: int) -> Array:
-        """Rows of a dataset."""
-        return np.asarray(self._datasets[path][start:stop])
 
 
 @contextlib.contextmanager
@@ -206,52 +184,32 @@ def writing(path: Path, *, overwrite: bool = True) -> Iterator[FileSink]:
 @contextlib.contextmanager
 def new_hdf5(path: Path, *, overwrite: bool = True) -> Iterator[tuple[h5py.File, _Guarded]]:
     """Open an HDF5 file for writing; see :func:`writing`."""
-    with beside(path, overwrite=overwrite) as partial, partial.open("w+b", buffering=0) as raw:
-        guarded = _Guarded(raw)
+    with beside(path, overwrite=overwrite) as partial, _Guarded(partial, "w+") as guarded:
         with h5py.File(guarded, "w") as file:
             try:
                 yield file, guarded
             except OSError as error:
-                if error is guarded.error:
-                    raise _unwritten(path, error) from None
-                raise
-        if guarded.error is not None:
-            raise _unwritten(path, guarded.error)
+                if error is not guarded.error:
+                    raise
+        if (failed := guarded.error) is not None:
+            raise ResultWriteError(f"{path} can't be written: {failed.strerror or failed}")
 
 
-def _unwritten(path: Path, error: OSError) -> ResultWriteError:
-    return ResultWriteError(f"{path} can't be written: {error.strerror or error}")
-
-
-class _Guarded:
+class _Guarded(io.FileIO):
     """A file that stores the first write error instead of raising it.
 
     After a failed write HDF5 can neither continue nor close the file, and crashes at exit.  It
     therefore sees no error; the sink checks for one.
     """
 
-    def __init__(self, raw: io.FileIO) -> None:
-        self._raw = raw
-        self.error: OSError | None = None
+    error: OSError | None = None
 
-    def seek(self, offset: int, whence: int = 0) -> int:
-        return self._raw.seek(offset, whence)
-
-    def tell(self) -> int:
-        return self._raw.tell()
-
-    def read(self, size: int = -1) -> bytes:
-        return self._raw.read(size) or b""
-
-    def readinto(self, buffer: memoryview) -> int:
-        return self._raw.readinto(buffer) or 0
-
-    def write(self, data: memoryview) -> int:
+    def write(self, data: Any) -> int:
         view = memoryview(data).cast("B")
         done = 0
         while self.error is None and done < len(view):
             try:
-                done += self._raw.write(view[done:]) or 0
+                done += super().write(view[done:]) or 0
             except OSError as error:
                 self.error = error
         return len(view)
@@ -259,10 +217,7 @@ class _Guarded:
     def truncate(self, size: int | None = None) -> int:
         if self.error is None:
             try:
-                self._raw.truncate(size)
+                super().truncate(size)
             except OSError as error:
                 self.error = error
         return size or 0
-
-    def flush(self) -> None:
-        """Nothing is buffered."""

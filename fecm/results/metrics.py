@@ -104,24 +104,15 @@ def summarise(
     """
     cases = force.shape[1]
     mass, velocity = (np.broadcast_to(v, cases) for v in (mass, velocity))
-    parts = []
-    for start in range(0, cases, PART):
-        some = slice(start, start + PART)
-        depths = Indentation(*(values[some] for values in indentation))
-        rows = np.ascontiguousarray(force[:, some].T)
-        parts.append(_summary(rows, times, depths, mass[some], velocity[some], threshold))
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-
-
-def _summary(
-    force: Floats,
-    times: Floats,
-    indentation: Indentation,
-    mass: Floats,
-    velocity: Floats,
-    threshold: float | None,
-) -> dict[str, Floats]:
-    """Summary of some cases, forces (cases, steps); see :func:`summarise`."""
+    if cases > PART:
+        parts = []
+        for start in range(0, cases, PART):
+            some = slice(start, start + PART)
+            depths = Indentation(*(values[some] for values in indentation))
+            given = force[:, some], times, depths, mass[some], velocity[some], threshold
+            parts.append(summarise(*given))
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    force = np.ascontiguousarray(force.T)
     dt = np.diff(times, prepend=0.0)
     touching = force > 0.0
     begins = touching.copy()

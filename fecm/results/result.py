@@ -19,7 +19,9 @@ from fecm.results import groups
 from fecm.results.groups import Ints
 from fecm.results.metrics import INTEGERS, METRICS, Indentation, summarise
 from fecm.results.schema import (
+    AXIS_NAMES,
     DATASETS,
+    SCALES,
     Dataset,
     NotStoredError,
     ResultFileError,
@@ -222,7 +224,9 @@ class Result(groups.Contact):
     def rows(self, path: str, start: int, stop: int) -> Array:
         """Rows of a dataset; those of a file are not kept in memory."""
         read = getattr(self._arrays, "rows", None)
-        return np.asarray(self[path][start:stop] if read is None else read(path, start, stop))
+        return np.asarray(
+            self._arrays[path][start:stop] if read is None else read(path, start, stop)
+        )
 
     def to_dataframe(self) -> pandas.DataFrame:
         """The history as a pandas DataFrame: one row per step, indexed by time.
@@ -257,9 +261,33 @@ class Result(groups.Contact):
         >>> tree = result.to_xarray()  # doctest: +SKIP
         >>> tree["tape3"].w.sel(time=1e-4, method="nearest").max()  # doctest: +SKIP
         """
-        from fecm.results.convert import to_xarray
-
-        return to_xarray(self)
+        try:
+            import xarray
+        except ImportError:
+            raise ImportError("a DataTree needs xarray: pip install 'fecm[xarray]'") from None
+        groups: dict[str, dict[str, Any]] = {}
+        for path in self:
+            values = self[path]
+            known = DATASETS.get(path, Dataset(path, values.shape, ""))
+            texts = {"long_name": known.description, "units": self.unit(known.dimension)}
+            axes = [
+                "time" if size == "rows" else SCALES.get(str(size), (f"{known.name}_{n}",))[0]
+                for n, size in enumerate(known.shape)
+            ]
+            attributes = {name: text for name, text in texts.items() if text}
+            groups.setdefault(known.group, {})[known.name] = (axes, values, attributes)
+        units = {"units": unit} if (unit := self.unit("length")) else {}
+        places = {
+            axis: ("node", values, units)
+            for axis, values in zip(AXIS_NAMES["ndm"], self["mesh/coordinates"].T, strict=False)
+        }
+        unknowns = {"unknown": list(AXIS_NAMES["ndf"][: self["mesh/equations"].shape[1]])}
+        tree = {"/": xarray.Dataset(coords=unknowns, attrs=self.attributes)}
+        for name, variables in groups.items():
+            at_nodes = any("node" in axes for axes, _, _ in variables.values())
+            coordinates = places if at_nodes else {}
+            tree[name] = xarray.Dataset(variables, coordinates, self.attributes_of(name))
+        return xarray.DataTree.from_dict(tree)
 
     def to_pyvista(self, time: float | None = None) -> pyvista.UnstructuredGrid:
         """The plate with its displacements, w and rotations as point data; needs PyVista.
@@ -274,9 +302,26 @@ class Result(groups.Contact):
         NotStoredError
             If the result has no displacements, or none at this time.
         """
-        from fecm.results.convert import to_pyvista
+        try:
+            import pyvista
+        except ImportError:
+            raise ImportError("a grid needs PyVista: pip install 'fecm[pyvista]'") from None
+        from fecm.results.plies import rows_at
+        from fecm.results.vtkhdf import vtk_cells
 
-        return to_pyvista(self, time)
+        if "tape3/w" not in self:
+            raise NotStoredError("there are no displacements (tape3) in this result; add DISP")
+        (row,) = [-1] if time is None else rows_at(self["tape3/time"], [time], "displacements")
+        connectivity, offsets, types = vtk_cells(self["mesh/elements"])
+        points = np.zeros((len(self["mesh/coordinates"]), 3))
+        points[:, :2] = self["mesh/coordinates"][:, :2]
+        cells = np.insert(connectivity, offsets[:-1], np.diff(offsets))
+        grid = pyvista.UnstructuredGrid(cells, types, points)
+        field = self["tape3/displacement"][row]
+        grid.point_data["displacement"] = field[:, :3]
+        grid.point_data["w"], grid.point_data["rotation"] = field[:, 2], field[:, 3:]
+        grid.field_data["time"] = [self["tape3/time"][row]]
+        return grid
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the result as a file, such as one of a run in memory.
@@ -382,7 +427,7 @@ class Result(groups.Contact):
         return compare(self, measurement_of(measured, declared_units(self.attributes)))
 
     def __getitem__(self, path: str) -> Array:
-        return self._arrays[path.strip("/")]
+        return np.asarray(self._arrays[path.strip("/")])
 
     def __contains__(self, path: str) -> bool:
         return path.strip("/") in self._arrays

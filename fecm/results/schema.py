@@ -166,6 +166,8 @@ _CONTACT = (
     ("acceleration", "acceleration of the impacted end", "length/time^2"),
 )
 
+CONTACT = tuple(name for name, _, _ in _CONTACT)
+
 DATASETS = {
     dataset.path: dataset
     for dataset in (

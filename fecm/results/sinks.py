@@ -8,37 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecm.results.schema import Dataset
 
+if TYPE_CHECKING:
+    from fecm.results.hdf5_writer import FileSink
+
 Array = NDArray[Any]
-
-
-class Sink(Protocol):
-    """Receives a result."""
-
-    @property
-    def arrays(self) -> Mapping[str, Array]:
-        """Datasets that are stored so far, by path."""
-
-    def attributes(self, group: str, values: Mapping[str, Any]) -> None:
-        """Set attributes of a group; ``""`` is the file itself."""
-
-    def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
-        """Create a dataset."""
-
-    def write(self, path: str, start: int, rows: Array) -> None:
-        """Store rows of a dataset, beginning at row `start`."""
-
-    def trim(self, path: str, rows: int) -> None:
-        """Truncate a dataset to its first rows; delete it if there are none."""
-
-    def text(self, path: str, value: str, description: str) -> None:
-        """Store a text."""
 
 
 class MemorySink:
@@ -50,7 +30,7 @@ class MemorySink:
         self.groups: dict[str, dict[str, Any]] = {}
 
     def attributes(self, group: str, values: Mapping[str, Any]) -> None:
-        """Set attributes of a group."""
+        """Set attributes of a group; ``""`` is the file itself."""
         self.groups.setdefault(group, {}).update(values)
 
     def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
@@ -58,11 +38,11 @@ class MemorySink:
         self.arrays[dataset.path] = np.zeros(shape, dtype=dataset.dtype)
 
     def write(self, path: str, start: int, rows: Array) -> None:
-        """Store rows of a dataset."""
+        """Store rows of a dataset, beginning at row `start`."""
         self.arrays[path][start : start + len(rows)] = rows
 
     def trim(self, path: str, rows: int) -> None:
-        """Truncate a dataset to its first rows."""
+        """Truncate a dataset to its first rows; delete it if there are none."""
         kept = self.arrays.pop(path)[:rows].copy()
         if rows:
             self.arrays[path] = kept
@@ -70,6 +50,9 @@ class MemorySink:
     def text(self, path: str, value: str, description: str) -> None:
         """Store a text."""
         self.texts[path] = value
+
+
+Sink: TypeAlias = "MemorySink | FileSink"
 
 
 class RowBuffer:

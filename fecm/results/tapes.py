@@ -1,24 +1,46 @@
-"""Writes the three tapes as text, in the formats of the printed program.
+"""Reads and writes the three tapes as text, in the formats of the printed program.
 
-tape3 holds w of every node, (6E12.4).  In the report tape8 holds strains, (2I6,5E12.4), and tape9
-contact, (6E12.4); the slip ``tapes`` exchanges both tapes and the columns of the shear strains.
+Numbers are in columns of twelve characters, as Fortran's E12.4 writes them.  tape3 holds w of every
+node, (6E12.4).  In the report tape8 holds strains, (2I6,5E12.4), beginning with element and point,
+gamma_yz before gamma_xz, and tape9 contact, (6E12.4); the slip ``tapes`` exchanges both tapes and
+the columns of the shear strains.  The lines show which one a file is.
+
+The text does not state the number of nodes.  Short lines show it unless it is a multiple of six;
+then tape3 is read as lines, and :meth:`TapeText.fitted` divides them into rows.
 """
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecm._files import beside
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.results.result import Result
-from fecm.results.schema import ResultFileError
+from fecm.results.schema import CONTACT, ResultFileError
 
+Array = NDArray[Any]
+
+TAPES = "tapes"  # form of a folder of tapes, as `Contents.form` of a file
+NAMES = ("tape3", "tape8", "tape9")
+WIDTH = 12  # characters per number
+PER_LINE = 6  # numbers per line without labels
+SHEARS = {"tape8": ("gamma_yz", "gamma_xz"), "tape9": ("gamma_xz", "gamma_yz")}
+W = "tape3/w"
 CURVATURES = ("kappa_x", "kappa_y", "kappa_xy")
-CONTACT = ("force", "indentation", "transducer", "displacement", "velocity", "acceleration")
+
+_LABELS = re.compile(rb" *\d+")
+# Allowed letters are those of Infinity, NaN and the exponents' E and D.
+_FOREIGN = re.compile(rb"[^0-9+\-. EDINFTYA]", re.IGNORECASE)
+_NUMBER = re.compile(rb"([+-]?(?:\d+\.?\d*|\.\d+))(?:[ED]([+-]?\d+)|([+-]\d+))?", re.IGNORECASE)
+_SPECIAL = re.compile(rb"[+-]?(?:inf(?:inity)?|nan)", re.IGNORECASE)
 
 
 def fortran_e(value: float) -> str:
@@ -42,39 +64,36 @@ def _lines(table: Floats) -> Iterator[str]:
             yield "".join(map(fortran_e, row[start : start + 6].tolist()))
 
 
-def _strains(result: Result, shears: tuple[str, str]) -> Iterator[str]:
-    columns = [result[f"tape8/{name}"] for name in (*CURVATURES, *shears)]
-    rows, numel, npt = columns[0].shape
-    for row in range(rows):
-        values = np.stack([column[row] for column in columns], axis=-1).tolist()
-        for element in range(numel):
-            for point in range(npt):
-                text = "".join(map(fortran_e, values[element][point]))
-                yield f"{element + 1:6d}{point + 1:6d}{text}"
+def _strain_lines(columns: Sequence[Array]) -> Iterator[str]:
+    """Lines of element, point and strains."""
+    for row in zip(*columns, strict=True):
+        values = np.stack(row, axis=-1)
+        for element, point in np.ndindex(values.shape[:2]):
+            text = "".join(map(fortran_e, values[element, point].tolist()))
+            yield f"{element + 1:6d}{point + 1:6d}{text}"
 
 
 def tape_texts(result: Result) -> dict[str, Iterator[str]]:
     """Lines of every tape that the run stored, by name."""
-    listing = result.has_listing_tapes
-    strains, contact = ("tape9", "tape8") if listing else ("tape8", "tape9")
-    shears = ("gamma_xz", "gamma_yz") if listing else ("gamma_yz", "gamma_xz")
+    strains, contact = ("tape9", "tape8") if result.has_listing_tapes else ("tape8", "tape9")
     texts: dict[str, Iterator[str]] = {}
     if "tape3/w" in result:
         texts["tape3"] = _lines(result["tape3/w"])
     if "tape8/kappa_x" in result:
-        _require(result, [f"tape8/{name}" for name in (*CURVATURES, *shears)])
-        texts[strains] = _strains(result, shears)
+        columns = _columns(result, "tape8", (*CURVATURES, *SHEARS[strains]))
+        texts[strains] = _strain_lines(columns)
     if "tape9/force" in result:
-        _require(result, [f"tape9/{name}" for name in CONTACT])
-        texts[contact] = _lines(np.stack([result[f"tape9/{n}"] for n in CONTACT], axis=-1))
+        texts[contact] = _lines(np.stack(_columns(result, "tape9", CONTACT), axis=-1))
     return dict(sorted(texts.items()))
 
 
-def _require(result: Result, paths: Iterable[str]) -> None:
-    """Require the datasets of a tape."""
+def _columns(result: Result, group: str, names: Iterable[str]) -> list[Array]:
+    """Datasets of a tape, all of which it needs."""
+    paths = [f"{group}/{name}" for name in names]
     for path in paths:
         if path not in result:
             raise ResultFileError(f"the result lacks {path}, which a tape needs")
+    return [result[path] for path in paths]
 
 
 def write_tapes(result: Result, folder: Path, *, overwrite: bool = True) -> list[Path]:
@@ -90,3 +109,198 @@ def write_tapes(result: Result, folder: Path, *, overwrite: bool = True) -> list
             with partial.open("w", encoding="ascii", newline="\n") as file:
                 file.writelines(f"{line}\n" for line in lines)
     return list(texts)
+
+
+@frozen
+class TapeText:
+    """Contents of a folder of tapes."""
+
+    # Datasets by their paths in a result: ``tape3/w`` (rows, nodes), ``tape8/kappa_x`` etc. (rows,
+    # elements, points), ``tape9/force`` etc. (rows,).
+    arrays: Mapping[str, Array]
+    # Whether ``tape3/w`` has the shape (lines, 6), because the number of nodes is not known.
+    lines: bool = False
+    form = TAPES
+
+    @property
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Shape of every dataset."""
+        return {name: values.shape for name, values in self.arrays.items()}
+
+    @property
+    def dtypes(self) -> dict[str, np.dtype[Any]]:
+        """Type of every dataset."""
+        return {name: values.dtype for name, values in self.arrays.items()}
+
+    def rows(self, path: str, start: int, stop: int) -> Array:
+        """Rows `start` to `stop` of a dataset."""
+        return self.arrays[path][start:stop]
+
+    def fitted(self, nodes: int) -> TapeText:
+        """Copy with the lines of ``tape3/w`` divided into rows of `nodes`, if possible."""
+        if not self.lines or nodes < 1 or nodes % PER_LINE or self.arrays[W].size % nodes:
+            return self
+        return TapeText({**self.arrays, W: self.arrays[W].reshape(-1, nodes)})
+
+
+def read_tapes(folder: Path) -> TapeText:
+    """Read tape3, tape8 and tape9 of a folder, with or without ``.txt``; some may be missing.
+
+    Raises ResultFileError if the folder has no tape, or a tape is invalid.
+    """
+    arrays: dict[str, Array] = {}
+    lines = False
+    for name in NAMES:
+        found = [path for path in (folder / name, folder / f"{name}.txt") if path.exists()]
+        if len(found) > 1:
+            raise ResultFileError(f"{folder}: there is both a {name} and a {name}.txt")
+        if not found:
+            continue
+        text = _Lines(found[0])
+        if not text.lines:
+            continue  # opened by the program, but never written
+        if name == "tape3":
+            arrays[W], lines = _displacements(text)
+            continue
+        if text.labelled:
+            read = _named("tape8", (*CURVATURES, *SHEARS[name]), _strains(text))
+        else:
+            read = _named("tape9", CONTACT, text.table(0, len(CONTACT), "contact"))
+        if twice := arrays.keys() & read.keys():
+            kind = "strains" if "tape8/kappa_x" in twice else "contact"
+            raise ResultFileError(f"{folder}: tape8 and tape9 both hold {kind}")
+        arrays.update(read)
+    if not arrays:
+        raise ResultFileError(
+            f"{folder}: no tape3, tape8 or tape9 in this folder, with or without .txt"
+        )
+    return TapeText(arrays, lines)
+
+
+class _Lines:
+    """The lines of one tape."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if not path.is_file():
+            raise ResultFileError(f"{path}: not a regular file")
+        self.lines = [line.rstrip(b" \r") for line in path.read_bytes().split(b"\n")]
+        while self.lines and not self.lines[-1]:
+            del self.lines[-1]
+        first = self.lines[0] if self.lines else b""
+        self.labelled = all(_LABELS.fullmatch(label) for label in (first[:6], first[6:12]))
+
+    def refuse(self, wrong: NDArray[np.bool_], message: Callable[[int], str]) -> None:
+        """Raise an error about the first wrong line, if any; the message gets its index."""
+        if wrong.any():
+            index = int(wrong.argmax())
+            raise ResultFileError(f"{self.path}:{index + 1}: {message(index)}")
+
+    def counts(self, lead: int) -> NDArray[np.int64]:
+        """Numbers of every line, (lines,), after `lead` characters of labels."""
+        lengths = np.fromiter(map(len, self.lines), dtype=np.int64, count=len(self.lines)) - lead
+        counts, rest = np.divmod(lengths, WIDTH)
+        self.refuse(
+            (rest != 0) | (counts < 1) | (counts > PER_LINE),
+            lambda n: (
+                f"a line of {lengths[n] + lead} characters does not consist of columns of {WIDTH}"
+            ),
+        )
+        return counts
+
+    def table(self, lead: int, width: int, what: str) -> Floats:
+        """Numbers of lines of equal length, (lines, width)."""
+        counts = self.counts(lead)
+        self.refuse(
+            counts != width, lambda n: f"a line of {what} has {width} numbers, not {counts[n]}"
+        )
+        return self.numbers(lead).reshape(-1, width)
+
+    def numbers(self, lead: int) -> Floats:
+        """All numbers of all lines, in order."""
+        text = b"".join(line[lead:] for line in self.lines)
+        fields = np.frombuffer(text, dtype=f"S{WIDTH}")
+        if not _FOREIGN.search(text):
+            try:
+                values = fields.astype(np.float64)
+            except ValueError:
+                pass  # an exponent without letter, or not a number
+            else:
+                if not np.isinf(values).any():
+                    return values
+        return self._slowly(lead)
+
+    def _slowly(self, lead: int) -> Floats:
+        """Read number by number; report the first that is invalid."""
+        values: list[float] = []
+        for index, line in enumerate(self.lines):
+            for start in range(lead, len(line), WIDTH):
+                field = line[start : start + WIDTH]
+                value = fortran_number(field)
+                if value is None:
+                    text = ascii(field.decode("latin-1"))[1:-1]
+                    raise ResultFileError(f"{self.path}:{index + 1}: `{text}` is not a number")
+                values.append(value)
+        return np.array(values)
+
+
+def fortran_number(field: bytes) -> float | None:
+    """Value of a field of Fortran's format E12.4; None if it is invalid or too large.
+
+    Such are ``  0.1234E+01``, ``  0.1234+100`` (a three-digit exponent has no letter),
+    ``         NaN``, ``   -Infinity``.
+    """
+    text = field.strip(b" ")
+    if _SPECIAL.fullmatch(text):
+        return float(text)
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        return None
+    value = float(match[1] + b"E" + (match[2] or match[3] or b"0"))
+    return value if np.isfinite(value) else None
+
+
+def _displacements(text: _Lines) -> tuple[Array, bool]:
+    """Displacements w, (rows, nodes); or (lines, 6) and True if the nodes can't be counted."""
+    counts = text.counts(0)
+    values = text.numbers(0)
+    ends = np.flatnonzero(counts < PER_LINE)
+    if not len(ends):
+        return values.reshape(-1, PER_LINE), True
+    lengths = np.diff(ends, prepend=-1)
+    wrong = np.zeros(len(counts), dtype=bool)
+    wrong[ends] = (lengths != lengths[0]) | (counts[ends] != counts[ends[0]])
+    text.refuse(wrong, lambda n: "the row that ends here differs in length from the first")
+    _require_complete(text, ends[-1] == len(counts) - 1)
+    return values.reshape(len(ends), -1), False
+
+
+def _require_complete(text: _Lines, complete: bool) -> None:
+    """Require that the last line ends a row."""
+    if not complete:
+        raise ResultFileError(f"{text.path}:{len(text.lines)}: the last row is not complete")
+
+
+def _named(group: str, names: Sequence[str], table: Floats) -> dict[str, Array]:
+    """Columns of a table by the paths of their datasets."""
+    return {f"{group}/{name}": table[..., i].copy() for i, name in enumerate(names)}
+
+
+def _strains(text: _Lines) -> Floats:
+    """Table of the strain tape, (rows, elements, points, 5)."""
+    table = text.table(2 * PER_LINE, 5, "strains")
+    pairs = [(line[:6], line[6:12]) for line in text.lines]
+    unlabelled = [not all(map(_LABELS.fullmatch, pair)) for pair in pairs]
+    text.refuse(
+        np.array(unlabelled), lambda n: "a line of strains begins with its element and point"
+    )
+    labels = np.array([(int(element), int(point)) for element, point in pairs])
+    numel, npt = (max(1, int(size)) for size in labels.max(axis=0))
+    order = np.arange(len(labels)) % (numel * npt)
+    expected = np.stack(np.divmod(order, npt), axis=1) + 1
+    text.refuse(
+        (labels != expected).any(axis=1),
+        lambda n: f"expected element {expected[n, 0]}, point {expected[n, 1]}",
+    )
+    _require_complete(text, not len(labels) % (numel * npt))
+    return table.reshape(-1, numel, npt, 5)

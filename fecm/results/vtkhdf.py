@@ -155,7 +155,8 @@ def _write_strains(root: h5py.Group, result: Result, steps: Ints, note: Note) ->
         return
     elements, numnp = result["mesh/elements"], len(result["mesh/coordinates"])
     npt = result["tape8/kappa_x"].shape[2]
-    at_nodes = result.tape8.attributes.get("location") == "nodes" and _covers(elements, npt)
+    all_nodes = npt in NODAL_POINTS and not (elements[:, npt:] > 0).any()
+    at_nodes = all_nodes and result.tape8.attributes.get("location") == "nodes"
     kind, length = ("Point", numnp) if at_nodes else ("Cell", len(elements))
     for name in STRAINS:
         field = _field(root, kind, name, len(steps), (length,))
@@ -213,11 +214,6 @@ def _largest(row: Array) -> Array:
     found = flat[np.arange(len(flat)), place]
     ply = place // (flat.shape[1] // values.shape[1]) + 1.0
     return np.stack([found, np.where(np.isnan(found), np.nan, ply)])
-
-
-def _covers(elements: Array, npt: int) -> bool:
-    """Whether the points are all nodes of every element."""
-    return npt in NODAL_POINTS and not (elements[:, npt:] > 0).any()
 
 
 def _nodal_means(row: Array, elements: Array, numnp: int) -> Array:

@@ -1,9 +1,10 @@
 """Checkpoints: the complete state of a run, stored beside its result.
 
 There are two files.  The checkpoint holds the state; it is written under another name, synced and
-renamed.  The spool holds everything stored so far and only grows.  A checkpoint names its part of
-the spool by length and checksum, so that the last checkpoint is valid however a run ends.  A
-resumed run gives the same bytes as an uninterrupted one.
+renamed.  The spool holds the operations on the result file so far, each a line of JSON, followed by
+the bytes of its rows if it has any; it only grows, and repeating them gives a file of the same
+bytes.  A checkpoint names its part of the spool by length and checksum, so that the last checkpoint
+is valid however a run ends.  A resumed run gives the same bytes as an uninterrupted one.
 """
 
 from __future__ import annotations
@@ -11,19 +12,27 @@ from __future__ import annotations
 import contextlib
 import os
 import time
-from collections.abc import Iterator
+import zlib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._files import beside, naming, open_ordinary, packed
+from fecm._errors import FecmError
+from fecm._files import beside, naming, open_ordinary, packed, sync
 from fecm._version import __version__
+from fecm.results.hdf5_writer import FileSink
+from fecm.results.schema import DATASETS
 from fecm.simulation.simulation import Simulation
-from fecm.simulation.spool import CheckpointError, Journal, Part
 
 FORMAT = 2
+CHUNK = 1_000_000  # bytes read at once when a spool is checked
+
+
+class CheckpointError(FecmError, ValueError):
+    """The checkpoint, or its spool, can't be used."""
 
 
 def checkpoint_of(result: Path) -> Path:
@@ -66,11 +75,17 @@ _NAMES = {
 
 
 class Checkpointer:
-    """Writes and reads the checkpoints of a run, beside the final path of its result."""
+    """Writes and reads the checkpoints of a run, beside the final path of its result.
 
-    def __init__(self, result: Path, journal: Journal) -> None:
+    Rows are not kept in memory: they are read back from the result when they are spooled.
+    """
+
+    def __init__(self, result: Path, sink: FileSink) -> None:
         self._checkpoint, self._spool = checkpoint_of(result), spool_of(result)
-        self._journal = journal
+        self._sink = sink
+        self._new = sink.operations = []
+        # Number of bytes of the part of the spool that a checkpoint names, and their CRC.
+        self._spooled = (0, 0)
         self._written = time.monotonic()
 
     @property
@@ -86,26 +101,53 @@ class Checkpointer:
         import json
 
         flags = os.O_RDWR
-        if not self._journal.spooled.length:
+        if not self._spooled[0]:
             self._spool.unlink(missing_ok=True)
             flags |= os.O_CREAT | os.O_EXCL
-        with naming(self._spool), open_ordinary(self._spool, flags) as spool:
-            part = self._journal.spool(spool)
+        with naming(self._spool), open_ordinary(self._spool, flags) as file:
+            spooled = self._append(file)
         state = simulation.save()
         arrays = {name: value for name, value in state.items() if isinstance(value, np.ndarray)}
         values = {name: value for name, value in state.items() if name not in arrays}
-        about = {"identity": identity(simulation), "spool": vars(part), "values": values}
+        part = dict(zip(("length", "checksum"), spooled, strict=True))
+        about = {"identity": identity(simulation), "spool": part, "values": values}
         text = np.frombuffer(json.dumps(about).encode(), np.uint8)
         with beside(self._checkpoint, follow=False) as partial:
             partial.write_bytes(packed({"about": text, **arrays}))
-        self._journal.keep(part)
+        self._spooled = spooled
+        self._new.clear()
         self._written = time.monotonic()
+
+    def _append(self, file: BinaryIO) -> tuple[int, int]:
+        """Append the new operations to the spool and sync it; return its length and checksum.
+
+        The next call overwrites them unless a checkpoint names them.
+        """
+        self._sink.check()
+        length, checksum = self._spooled
+        file.truncate(length)
+        file.seek(length)
+        for entry in self._new:
+            for data in self._data(entry):
+                file.write(data)
+                checksum = zlib.crc32(data, checksum)
+        file.flush()
+        sync(file.fileno())
+        return file.tell(), checksum
+
+    def _data(self, entry: dict[str, Any]) -> list[bytes | memoryview]:
+        """Return the line of an operation and its rows, if any."""
+        if entry["do"] != "write":
+            return [_line(entry)]
+        stop = entry["start"] + entry["rows"]
+        rows = np.ascontiguousarray(self._sink.arrays[entry["path"]][entry["start"] : stop])
+        return [_line({**entry, "dtype": rows.dtype.str, "shape": rows.shape}), rows.data.cast("B")]
 
     def restore(self, simulation: Simulation) -> None:
         """Set a new simulation and its result to the state of the checkpoint.
 
-        Raises CheckpointError if the checkpoint is missing, damaged, or belongs to another run.
-        Raises OSError if it can't be read.
+        Raises CheckpointError if checkpoint or spool are missing, damaged, or belong to another
+        run.  Raises OSError if they can't be read or the result can't be written.
         """
         with self._reading():
             about, arrays = self._read()
@@ -114,8 +156,12 @@ class Checkpointer:
                 if theirs.get(name) != value:
                     which = f" ({theirs['version']}, not {value})" if name == "version" else ""
                     raise CheckpointError(f"{self._checkpoint} belongs to {_NAMES[name]}{which}")
-            part = Part(**about["spool"])
-        self._journal.replay(self._spool, part)
+            part = about["spool"]
+            spooled = part["length"], part["checksum"]
+        with naming(self._spool), open_ordinary(self._spool) as file:
+            self._replay(file, *spooled)
+        self._spooled = spooled
+        self._new.clear()
         with self._reading():
             simulation.restore({**about["values"], **arrays})
 
@@ -136,6 +182,37 @@ class Checkpointer:
             arrays = {name: stored[name] for name in stored.files}
         return json.loads(arrays.pop("about").tobytes()), arrays
 
+    def _replay(self, file: BinaryIO, length: int, checksum: int) -> None:
+        """Repeat the operations of the first part of a spool on the result."""
+        import json
+
+        if _checksum(file, length) != checksum:
+            raise CheckpointError(f"{self._spool} is damaged, or was written by another run")
+        file.seek(0)
+        while file.tell() < length:
+            try:
+                self._repeat(json.loads(file.readline()), file)
+            except Exception as error:  # a damaged file raises anything in json, NumPy and h5py
+                self._sink.check()
+                raise CheckpointError(f"{self._spool} is damaged ({error})") from None
+
+    def _repeat(self, entry: dict[str, Any], file: BinaryIO) -> None:
+        """Repeat one operation."""
+        match entry["do"]:
+            case "attributes":
+                self._sink.attributes(entry["group"], entry["values"])
+            case "create":
+                self._sink.create(DATASETS[entry["path"]], tuple(entry["shape"]))
+            case "text":
+                self._sink.text(entry["path"], entry["value"], entry["description"])
+            case "write":
+                dtype, shape = np.dtype(entry["dtype"]), tuple(entry["shape"])
+                data = file.read(int(np.prod(shape)) * dtype.itemsize)
+                rows = np.frombuffer(data, dtype).reshape(shape)
+                self._sink.write(entry["path"], entry["start"], rows)
+            case other:
+                raise ValueError(f"unknown operation `{other}`")
+
     @contextlib.contextmanager
     def _reading(self) -> Iterator[None]:
         """Turn any error in the content into a CheckpointError."""
@@ -150,3 +227,19 @@ class Checkpointer:
         """Delete the checkpoint."""
         self._checkpoint.unlink(missing_ok=True)
         self._spool.unlink(missing_ok=True)
+
+
+def _checksum(file: BinaryIO, length: int) -> int:
+    """CRC of the first `length` bytes, or of all if there are fewer."""
+    checksum = 0
+    while length > 0 and (data := file.read(min(length, CHUNK))):
+        checksum = zlib.crc32(data, checksum)
+        length -= len(data)
+    return checksum
+
+
+def _line(entry: Mapping[str, Any]) -> bytes:
+    """An operation in JSON, with NumPy's numbers and arrays as Python's."""
+    import json
+
+    return json.dumps(entry, default=lambda value: value.tolist()).encode() + b"\n"

@@ -71,7 +71,12 @@ def impact_step(run: Simulation, n: int) -> None:
     if not plate.step:
         recorder.steps.begin(plate, impact)
         state.prop_force = None  # the listing's first impact step begins with PROP = 0
-    stores = _counted(run, n) if "counter" in slips else not (plate.step + 1) % n
+    stores = not (plate.step + 1) % n
+    if "counter" in slips:
+        state.steps_since_output += 1
+        stores = state.steps_since_output == n
+        if state.steps_since_output >= n:
+            state.steps_since_output = 0
     if stores and "tapes" in slips:  # strains one step late
         recorder.strains([plate.step + 1], [plate.time], run.displacement_field()[None])
     system.advance(impact, state.dt, run.force_factor(), state.prop_force)
@@ -123,16 +128,6 @@ def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
     run.interpreter.skip(count)
     run.observe()
     return True
-
-
-def _counted(run: Simulation, n: int) -> bool:
-    """Whether the step stores output, under the slip ``counter``."""
-    state = run.state
-    state.steps_since_output += 1
-    stores = state.steps_since_output == n
-    if state.steps_since_output >= n:
-        state.steps_since_output = 0
-    return stores
 
 
 def central_difference(run: Simulation) -> None:
@@ -207,10 +202,6 @@ def _at_passes(word: str, run: Simulation, n: int) -> None:
         STORING[word](run, [plate.step], [plate.time], run.displacement_field()[None])
 
 
-def _store_strains(run: Simulation, steps: Steps, times: Times, fields: Floats) -> None:
-    run.recorder.strains(steps, times, fields)
-
-
 def _store_displacements(run: Simulation, steps: Steps, times: Times, fields: Floats) -> None:
     run.recorder.displacements(steps, times, fields)
     if run.state.impact is None:
@@ -233,7 +224,7 @@ def _evaluate_failure(run: Simulation, _: Steps, times: Times, fields: Floats) -
 
 # What is done with displacement fields, (rows, numnp, 5), at every N-th step of RODP or pass.
 STORING: dict[str, Callable[[Simulation, Steps, Times, Floats], None]] = {
-    "RODP": _store_strains,
+    "RODP": lambda run, *rows: run.recorder.strains(*rows),
     "DISP": _store_displacements,
     "PLYS": _store_ply_stresses,
     "FAIL": _evaluate_failure,

@@ -6,6 +6,7 @@ a page: ``1`` a new page (a form feed), ``0`` a blank line, ``-`` two of them.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TextIO
@@ -69,9 +70,7 @@ class Printer:
 
     def _table(self, names: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
         """A table of right-aligned columns."""
-        self._write(["  " + "".join(name.rjust(13) for name in names)])
-        self._write("  " + "".join(_cell(value) for value in row) for row in rows)
-        self._write([""])
+        self._write(map(_row, itertools.chain([names], rows, [()])))
 
     # Input ---------------------------------------------------------------------------------------
 
@@ -80,16 +79,13 @@ class Printer:
         if not self.is_on:
             return
         self._title = deck.title
-        control = deck.control
-        counts = {
-            "Nodes": control.numnp,
-            "Elements": control.numel,
-            "Layers": control.layers,
-            "Dimensions of space": control.ndm,
-            "Dofs per node": control.ndf,
-            "Largest number of nodes": control.nen,
-        }
-        self._page("Control information", _values(counts))
+        names = (
+            "Nodes", "Elements", "Layers", "Dimensions of space", "Dofs per node",
+            "Largest number of nodes",
+        )  # fmt: skip
+        c = deck.control
+        counts = (c.numnp, c.numel, c.layers, c.ndm, c.ndf, c.nen)
+        self._page("Control information", _values(dict(zip(names, counts, strict=True))))
         echo = True
         for segment in deck.segments:
             if isinstance(segment, model.PrintOption):
@@ -110,13 +106,12 @@ class Printer:
                 self._material(segment, plate)
             case model.Indentation():
                 law = build_constants(segment)
-                values = {"Contact coefficient k": law.k}
-                if segment.word:
-                    values["Critical indentation alpha_cr"] = segment.alpha_p
-                else:
-                    values["Critical indentation alpha_p"] = segment.alpha_p
-                    values["Constant s_p"] = segment.s_p
-                values["Power of the unloading law q"] = law.q
+                values: dict[str, float | str] = {
+                    "Contact coefficient k": law.k,
+                    f"Critical indentation alpha_{'cr' if segment.word else 'p'}": segment.alpha_p,
+                    **({} if segment.word else {"Constant s_p": segment.s_p}),
+                    "Power of the unloading law q": law.q,
+                }
                 self._page("Indentation law", _values(values))
             case model.Impact():
                 dof = f"{segment.dof:8d} ({DOF_NAMES[segment.dof - 1]})"
@@ -152,12 +147,10 @@ class Printer:
             "",
         ]
         self._page("Material", lines)
-        layers = (
-            (n, layer.angle, layer.thickness) for n, layer in enumerate(material.layers, start=1)
-        )
+        layers = ((n, one.angle, one.thickness) for n, one in enumerate(material.layers, start=1))
         self._table(("layer", "angle", "thickness"), layers)
         for name in ("A", "B", "D", "shear"):
-            self._write([f"  {name}", *_matrix(getattr(laminate, name)), ""])
+            self._write([f"  {name}", *map(_row, getattr(laminate, name).tolist()), ""])
 
     def _program(self, deck: model.Deck) -> None:
         self._page("Macro program")
@@ -190,28 +183,22 @@ class Printer:
         self, values: Mapping[str, Floats], places: tuple[Floats, Floats], clock: float
     ) -> None:
         """Strains, and below each line the stress resultants, at every point."""
-        x, y = places
-        columns = [x, y, *(values[name] for name in (*GENERALISED_STRAINS, *RESULTANTS))]
-        split, indent = 2 + len(GENERALISED_STRAINS), "  " + " " * 39
+        strains = [*places, *(values[name] for name in GENERALISED_STRAINS)]
+        resultants = [values[name] for name in RESULTANTS]
 
-        def lines() -> Iterator[str]:
-            names = ("element", "x", "y", *GENERALISED_STRAINS)
-            yield "  " + "".join(f"{name:>13}" for name in names)
-            yield indent + "".join(f"{name:>13}" for name in RESULTANTS)
-            for element, point in np.ndindex(x.shape):
-                row = [float(column[element, point]) for column in columns]
-                yield "  " + "".join(map(_cell, (element + 1, *row[:split])))
-                yield indent + "".join(map(_cell, row[split:]))
-            yield ""
+        def rows() -> Iterator[Sequence[object]]:
+            yield "", "", "", *RESULTANTS
+            for at in np.ndindex(places[0].shape):
+                yield at[0] + 1, *(float(column[at]) for column in strains)
+                yield "", "", "", *(float(column[at]) for column in resultants)
 
-        self._page(f"Element strains and stress resultants at time {clock:.6g}", lines())
+        self._page(f"Element strains and stress resultants at time {clock:.6g}")
+        self._table(("element", "x", "y", *GENERALISED_STRAINS), rows())
 
     def modes(self, angular_frequency: Floats) -> None:
         """Natural frequencies."""
-        rows = (
-            (n, omega**2, omega, omega / (2.0 * np.pi))
-            for n, omega in enumerate(angular_frequency.tolist(), start=1)
-        )
+        omega = angular_frequency
+        rows = _numbered(np.column_stack([omega**2, omega, omega / (2.0 * np.pi)]))
         self._page("Natural modes")
         self._table(("mode", "eigenvalue", "angular", "frequency"), rows)
 
@@ -238,10 +225,7 @@ def _numbered(rows: NDArray[np.generic]) -> Iterator[Sequence[object]]:
     return ((n, *row) for n, row in enumerate(rows.tolist(), start=1))
 
 
-def _cell(value: object) -> str:
-    """A table's cell."""
-    return f"{value:13.5g}" if isinstance(value, float) else str(value).rjust(13)
-
-
-def _matrix(values: Floats) -> list[str]:
-    return ["  " + "".join(_cell(value) for value in row) for row in values.tolist()]
+def _row(values: Iterable[object]) -> str:
+    """Line of right-aligned cells."""
+    cells = (f"{v:13.5g}" if isinstance(v, float) else str(v).rjust(13) for v in values)
+    return "  " + "".join(cells)

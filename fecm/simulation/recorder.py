@@ -1,8 +1,12 @@
-"""The recorder of a run: creates its datasets and stores their rows in a sink."""
+"""The recorders of a run: they create its datasets and store their rows in a sink.
+
+Scalars of every step are gathered in blocks.  What can be computed from a block (transducer,
+projectile energies, energy balance) is computed when the block is full.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,12 +16,14 @@ from fecm._typing import Floats
 from fecm.deck.macros import WorkEstimate
 from fecm.mechanics.failure import CRITERIA, MODES
 from fecm.mechanics.failure_envelope import FailureEnvelope
+from fecm.mechanics.impact import ImpactState
+from fecm.mechanics.plate_motion import DofSums, PlateState
+from fecm.mechanics.projectile import Rod
 from fecm.mechanics.strains import STRAINS
 from fecm.problem.build import ImpactModel
-from fecm.results.schema import DATASETS, FIXED, INTERLAMINAR, Dataset
+from fecm.results.schema import CONTACT, DATASETS, FIXED, INTERLAMINAR, Dataset
 from fecm.results.sinks import RowBuffer, Sink
 from fecm.simulation.state import subset
-from fecm.simulation.step_recorder import OnBlock, StepRecorder
 
 # Of rows.
 Steps = Sequence[int]
@@ -26,6 +32,211 @@ Times = Sequence[float]
 FAILURE = ("failure", INTERLAMINAR, *(f"failure/{name}" for name in CRITERIA))
 DAMPING_WORK = "energy/damping_work"
 BUFFERED = ("tape3", "tape8", "stresses", "plies", "reactions", "modes")
+
+BLOCK = 1024
+
+SCALARS = (
+    "step", "time", "plate_kinetic", "plate_strain", "external_work",
+    "force", "indentation", "plate_w", "contact_work", "displacement",
+)  # fmt: skip
+# Those that follow from the motion of the projectile.
+PROJECTILE = ("velocity", "acceleration", "projectile_kinetic", "projectile_strain", "station")
+
+OnBlock = Callable[[Mapping[str, Floats], float], object]
+
+
+class StepRecorder:
+    """Stores every step in a sink; of a plate alone energies and gages only.
+
+    `all_contact` stores contact on tape9 at every step instead of every N-th (the slip
+    ``tapes``); `on_block` is called with the columns of each block and the initial energy.
+    """
+
+    def __init__(
+        self, sink: Sink, model: ImpactModel, all_contact: bool, on_block: OnBlock
+    ) -> None:
+        self._sink = sink
+        self._motion = model.motion
+        self._impact = impact = model.impact
+        self._on_block = on_block
+        self._all_contact = all_contact
+        self._table = np.zeros((len(SCALARS) + len(PROJECTILE), BLOCK))
+        # Rows of the table, and those whose projectile's columns are known.
+        self._count = self._known = 0
+        self._contact_rows: list[int] = []
+        self._stored = self._tape9_rows = 0
+        self._station = model.station
+        self._rod = np.empty((0, 3, 0))
+        if impact is not None:
+            self._rod = np.empty((BLOCK, 3, len(impact.rod_mass)))
+        self._gages: DofSums | None = None
+        self._strains = np.empty((0, 0))
+        if model.gages is not None:
+            self._gages = model.motion.dof_sums(model.gages.dof_indices, model.gages.weights)
+            self._strains = np.empty((BLOCK, len(model.gages.numbers)))
+        self.initial = 0.0
+        # Last time, power and work of the damping.
+        self._damped = (0.0, 0.0, 0.0)
+
+    def begin(self, plate: PlateState, impact: ImpactState | None) -> None:
+        """Store the energy before the first step (force*length)."""
+        energy = plate.strain_energy
+        if self._impact is not None and impact is not None:
+            energy += float(self._impact.rod.kinetic_energy(impact.rod.velocity[None])[0])
+        self.initial = float(energy)
+        self._sink.attributes("energy", {"initial": self.initial})
+
+    def step(
+        self,
+        plate: PlateState,
+        impact: ImpactState | None,
+        factor: float,
+        *,
+        contact_row: bool = False,
+    ) -> None:
+        """Add a row for the state after a step, with the load factor of the nodal forces.
+
+        `contact_row` stores the contact of the step on tape9.
+        """
+        applied = None
+        if self._impact is not None and impact is not None:
+            applied = self._impact.applied(impact)
+        kinetic = self._motion.kinetic_energy(plate, factor, applied)
+        strain = plate.strain_energy
+        own = (plate.step, plate.time, kinetic, strain, plate.external_work)
+        if self._gages is not None:
+            self._strains[self._count] = self._gages.evaluate(plate, factor)
+        if impact is None:
+            self._table[: len(own), self._count] = own
+        else:
+            self._rod[self._count] = impact.rod.motion
+            if contact_row or self._all_contact:
+                self._contact_rows.append(self._count)
+            indentation, force = impact.contact
+            hit = (force, indentation, impact.plate_w, impact.contact_work, impact.rod.tip)
+            self._table[: len(SCALARS), self._count] = (*own, *hit)
+        self._count += 1
+        if self._count == BLOCK:
+            self.flush()
+
+    def add(
+        self,
+        plate: PlateState,
+        columns: Mapping[str, Floats],
+        strains: Floats,
+        contact_rows: NDArray[np.intp],
+    ) -> None:
+        """Add rows for many steps, and the contact of some of them to tape9."""
+        given = {**columns, "external_work": np.full(len(strains), plate.external_work)}
+        values = np.array([given[name] for name in (*SCALARS, *PROJECTILE)])
+        done = 0
+        while done < len(strains):
+            self._add_projectile()
+            count = min(BLOCK - self._count, len(strains) - done)
+            rows = slice(self._count, self._count + count)
+            self._table[:, rows] = values[:, done : done + count]
+            self._strains[rows] = strains[done : done + count] if self._gages is not None else 0.0
+            inside = contact_rows[(contact_rows >= done) & (contact_rows < done + count)]
+            self._contact_rows += (inside - done + self._count).tolist()
+            self._count = self._known = rows.stop
+            done += count
+            if self._count == BLOCK:
+                self.flush()
+
+    def state(self) -> dict[str, Any]:
+        """Rows that are not stored yet, and how many are."""
+        self._add_projectile()
+        return {
+            "rows": self._table[:, : self._count].copy(),
+            "contact": list(self._contact_rows),
+            "strains": self._strains[: self._count].copy(),
+            "stored": self._stored,
+            "tape9": self._tape9_rows,
+            "initial": self.initial,
+            "damped": self._damped,
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from a :meth:`state`."""
+        self._count = self._known = state["rows"].shape[1]
+        self._table[:, : self._count] = state["rows"]
+        self._contact_rows = list(state["contact"])
+        self._strains[: self._count] = state["strains"]
+        self._stored, self._tape9_rows = state["stored"], state["tape9"]
+        self.initial, self._damped = state["initial"], tuple(state["damped"])
+
+    def flush(self) -> None:
+        """Store the gathered rows and pass them to `on_block`."""
+        count = self._count
+        if not count:
+            return
+        self._add_projectile()
+        columns = self._table[:, :count].copy()
+        table = dict(zip((*SCALARS, *PROJECTILE), columns, strict=True))
+        if self._impact is not None:
+            table["transducer"] = self._transducer(table["force"], table["station"])
+        table["held_energy"] = (
+            table["plate_kinetic"] + table["plate_strain"]
+            + table["projectile_kinetic"] + table["projectile_strain"] + table["contact_work"]
+        )  # fmt: skip
+        table["balance_error"] = table["held_energy"] - self.initial - table["external_work"]
+        if self._motion.damping:
+            self._add_damping(table)
+        self._on_block(table, self.initial)
+        table["strain"] = self._strains[:count]
+        groups = self.rows.keys() - {"tape9"}
+        for dataset in DATASETS.values():
+            if dataset.group in groups and dataset.shape[0] == "rows" and dataset.name in table:
+                self._sink.write(dataset.path, self._stored, table[dataset.name])
+        rows = np.array(self._contact_rows, dtype=int)
+        if len(rows):
+            for name in ("step", "time", *CONTACT):
+                self._sink.write(f"tape9/{name}", self._tape9_rows, table[name][rows])
+            self._tape9_rows += len(rows)
+        self._stored += count
+        self._count = self._known = 0
+        self._contact_rows.clear()
+
+    def _add_damping(self, table: dict[str, Floats]) -> None:
+        """Add the work of damping: its power v C v is 2 a times the plate's kinetic energy."""
+        last_time, last_power, work = self._damped
+        time, power = table["time"], 2.0 * self._motion.damping * table["plate_kinetic"]
+        means = 0.5 * (power + np.concatenate([[last_power], power[:-1]]))
+        table["damping_work"] = work + np.cumsum(means * np.diff(time, prepend=last_time))
+        table["balance_error"] += table["damping_work"]
+        self._damped = (float(time[-1]), float(power[-1]), float(table["damping_work"][-1]))
+
+    def _add_projectile(self) -> None:
+        """Set the columns that follow from the motion of the projectile."""
+        rows = slice(self._known, self._count)
+        self._known = self._count
+        if self._impact is None or rows.start == rows.stop:
+            return
+        u, v, a = self._rod[rows].swapaxes(0, 1)
+        u[:, 0] = 0.0  # displacements are relative to the tip
+        rod = self._impact.rod
+        self._table[len(SCALARS) :, rows] = (
+            v[:, 0], a[:, 0], rod.kinetic_energy(v), rod.strain_energy(u), u[:, self._station.dof],
+        )  # fmt: skip
+
+    def _transducer(self, force: Floats, deformation: Floats) -> Floats:
+        """Force at the transducer: E A du/dx of its node; the contact force on a rigid mass."""
+        node, sign = self._station.node, self._station.sign
+        if self._impact is None or not isinstance(self._impact.rod, Rod):
+            return -sign * force
+        rod = self._impact.rod
+        area = float(rod.areas[min(node, rod.elements) - 1])
+        return sign * rod.modulus * area * deformation
+
+    @property
+    def rows(self) -> dict[str, int]:
+        """Rows stored in each group."""
+        rows = {"energy": self._stored, "tape9": self._tape9_rows}
+        if self._impact is not None:
+            rows["history"] = self._stored
+        if self._gages is not None:
+            rows["gages"] = self._stored
+        return rows
 
 
 class Recorder:

@@ -12,7 +12,11 @@ from fecm._version import __version__
 from fecm.deck.model import Deck, Material
 from fecm.deck.units import unit_names
 from fecm.mechanics.failure import MODES
+from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.plate_motion import DivergenceError
+from fecm.mechanics.time_step import critical_time_step
+from fecm.problem.build import ImpactModel
+from fecm.problem.check_plausibility import contact_step
 from fecm.problem.options import RunOptions
 from fecm.problem.problem import Problem
 from fecm.problem.slips import mode_of
@@ -20,10 +24,12 @@ from fecm.results.result import Result
 from fecm.results.schema import FORMAT, FORMAT_VERSION
 from fecm.results.sinks import Sink
 from fecm.results.summary import OPEN_END
-from fecm.simulation.guard import ENERGY_WARNING, likely_cause
 from fecm.simulation.macros import bind, bind_loop
 from fecm.simulation.simulation import Observer, Simulation
 from fecm.simulation.validity import warnings_of
+
+# Error of the energy balance, relative to the supplied energy, that triggers a warning.
+ENERGY_WARNING = 0.01
 
 
 def simulate(
@@ -61,10 +67,36 @@ def run(simulation: Simulation) -> None:
                 simulation.recorder.failure(state.failure)
             simulation.recorder.finish()
     except DivergenceError as diverged:
-        cause = likely_cause(problem, simulation.model, state.dt)
+        cause = _likely_cause(problem, simulation.model, state.dt)
         raise DivergenceError(diverged.step, f"{diverged.reason}; {cause}") from None
     _write_footer(simulation)
     _judge(simulation)
+
+
+def _likely_cause(problem: Problem, model: ImpactModel, dt: float) -> str:
+    """Explain a divergence, as far as the time step does."""
+    try:
+        plate = model.motion.plate
+        critical = critical_time_step(plate)
+        contact = contact_step(problem, plate, dt, critical)
+    except UnsoundPlateError as error:
+        return str(error)
+    above = dt > critical
+    cause = (
+        f"DT = {dt:.4g} is {'above' if above else 'below'} the plate's critical time step "
+        f"{critical:.4g}"
+    )
+    if above:
+        return cause
+    if contact is not None and dt >= contact.limit:
+        return (
+            f"{cause}, but not below {contact.limit:.4g}, the stable step with the contact's "
+            f"stiffness k_t of about {contact.stiffness:.3g} (the contact needs DT < "
+            f"2 (m/k_t)^(1/2), m = {contact.mass:.3g})"
+        )
+    if len({macro.value for macro in problem.deck.macros if macro.word == "DT"}) > 1:
+        return f"{cause}, but DT changes: steps that alternate diverge below the critical one"
+    return cause
 
 
 def _write_header(simulation: Simulation) -> None:

@@ -34,8 +34,7 @@ from fecm.results.metrics import GAGE, HIT, Indentation, summarise
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.results.summary import largest_exposures
-from fecm.simulation.guard import ENERGY_WARNING
-from fecm.simulation.run import simulate
+from fecm.simulation.run import ENERGY_WARNING, simulate
 from fecm.sweeps import plan
 from fecm.sweeps.cases import PLATE, REFINE, THRESHOLD, Case, CasesError, Value, name_fault
 from fecm.sweeps.outcome import RUN, Outcome, merge, outcome_of
