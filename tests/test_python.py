@@ -15,15 +15,8 @@ import pytest
 
 import fecm
 from fecm.mechanics.contact_law import ContactPoint
-from fecm.results.groups import GROUPS, Exposure, Group
-from fecm.results.schema import DATASETS
 from tests.calls import call
 from tests.decks import APPENDIX, LONG, ROOT, small
-
-
-def annotated(kind: type[Group]) -> set[str]:
-    """Names of the datasets that a group declares for type checkers."""
-    return {name for base in kind.__mro__ for name in inspect.get_annotations(base)}
 
 
 def test_the_namespace_lists_the_public_names_and_nothing_else() -> None:
@@ -106,22 +99,6 @@ def test_no_command_imports_what_it_does_not_use(tmp_path: Path) -> None:
         env=os.environ | {"PYTHONPATH": str(ROOT)},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-
-
-@pytest.mark.parametrize("name", GROUPS)
-def test_the_typed_names_of_a_group_are_those_of_its_datasets(name: str) -> None:
-    stored = {
-        path.removeprefix(f"{name}/").partition("/")[0]
-        for path in DATASETS
-        if path.startswith(f"{name}/")
-    }
-    assert annotated(GROUPS[name]) == stored
-    if name == "failure":
-        assert annotated(Exposure) == {"exposure", "time", "mode"}
-
-
-def test_every_group_of_datasets_has_typed_names() -> None:
-    assert {path.partition("/")[0] for path in DATASETS} == set(GROUPS)
 
 
 def test_each_warning_of_a_deck_is_a_warning_in_python_at_the_users_line() -> None:

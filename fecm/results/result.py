@@ -15,8 +15,7 @@ from fecm._tables import html_table
 from fecm._typing import Floats
 from fecm.deck.model import Deck, Impact
 from fecm.deck.units import unit_of
-from fecm.results import groups
-from fecm.results.groups import Ints
+from fecm.results import schema
 from fecm.results.metrics import INTEGERS, METRICS, Indentation, summarise
 from fecm.results.schema import (
     AXIS_NAMES,
@@ -45,7 +44,7 @@ Array = NDArray[Any]
 HISTORY = "history"
 
 
-class PlyGroup(groups.PlyRows):
+class PlyGroup(schema.PlyRows):
     """The datasets of ``plies``; called, the stresses and strains of some plies."""
 
     def __init__(self, result: Result) -> None:
@@ -83,7 +82,7 @@ class PlyGroup(groups.PlyRows):
         return plies_of(self._result, time, elements)
 
 
-class Result(groups.Contact):
+class Result(schema.Contact):
     """Result of a run.
 
     Every dataset is available as ``result["tape3/w"]`` and ``result.tape3.w``; the columns of the
@@ -109,22 +108,22 @@ class Result(groups.Contact):
         Warnings and notes about the deck, of a run in this process; empty for a loaded result.
     """
 
-    step: Ints
+    step: schema.Ints
     time: Floats
     plate_w: Floats
-    mesh: groups.Mesh
-    laminate: groups.LaminateStiffness
-    tape3: groups.Tape3
-    tape8: groups.Tape8
-    tape9: groups.Tape9
-    history: groups.History
-    energy: groups.Energy
-    gages: groups.GageGroup
-    stresses: groups.Stresses
-    patch: groups.PatchGroup
-    failure: groups.Failure
-    reactions: groups.Reactions
-    modes: groups.Modes
+    mesh: schema.Mesh
+    laminate: schema.LaminateStiffness
+    tape3: schema.Tape3
+    tape8: schema.Tape8
+    tape9: schema.Tape9
+    history: schema.History
+    energy: schema.Energy
+    gages: schema.GageGroup
+    stresses: schema.Stresses
+    patch: schema.PatchGroup
+    failure: schema.Failure
+    reactions: schema.Reactions
+    modes: schema.Modes
 
     def __init__(
         self,
@@ -444,7 +443,7 @@ class Result(groups.Contact):
             if f"{HISTORY}/{name}" in self._arrays:
                 return self._arrays[f"{HISTORY}/{name}"]
             if any(path.startswith(f"{name}/") for path in self._arrays):
-                return groups.group(name, self._arrays, self._groups)
+                return schema.group(name, self._arrays, self._groups)
             raise NotStoredError(f"there is no {name} in this result")
 
     def __dir__(self) -> list[str]:

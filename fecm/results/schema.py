@@ -1,21 +1,30 @@
-"""Schema of a result file: path, shape, dimension and description of every dataset.
+"""Schema of a result file: groups, and type, shape, description and dimension of every dataset.
 
 Shapes use the sizes of a run: ``rows`` of the group, ``numnp``, ``ndm``, ``ndf``,
 ``numel``, ``nen``, ``npt`` and ``nps`` (points per element in tape8 and stresses), ``gages``;
 of ply stresses ``members`` (elements), ``npp`` (points per element), ``layers`` and :data:`FIXED`.
+The annotations of a group serve type checkers, editors and :data:`DATASETS`.
 """
-
-from __future__ import annotations
 
 import math
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fecm._errors import FecmError
 from fecm._frozen import frozen
+from fecm._tables import html_table
+from fecm._typing import Floats
 from fecm.deck.records import AXES, DOF_NAMES
-from fecm.mechanics.failure import CRITERIA
+
+Array = NDArray[Any]
+Ints = NDArray[np.int64]
+Int32s = NDArray[np.int32]
+Int8s = NDArray[np.int8]
+DTYPES: dict[object, str] = {Floats: "f8", Ints: "i8", Int32s: "i4", Int8s: "i1"}
 
 
 class ExportError(FecmError, ValueError):
@@ -132,183 +141,300 @@ class Dataset:
         return self.path.rpartition("/")[2]
 
 
-def _group(
-    group: str, rows: tuple[str | int, ...], *columns: tuple[str, str, str]
-) -> tuple[Dataset, ...]:
-    """Datasets of equal shape: (name, description, dimension)."""
-    return tuple(Dataset(f"{group}/{name}", rows, text, dim) for name, text, dim in columns)
+# Groups: each column has its type, sizes, description and, if it has one, dimension.
 
 
-def _clock(group: str) -> tuple[Dataset, ...]:
-    return (
-        Dataset(f"{group}/step", ("rows",), "number of time steps taken", dtype="i8"),
-        Dataset(f"{group}/time", ("rows",), "time integrated up to the row's state", "time"),
-    )
+class Group:
+    """The datasets of one group as attributes: ``result.tape3.w``."""
+
+    def __init__(
+        self, name: str, arrays: Mapping[str, Array], attributes: Mapping[str, Mapping[str, Any]]
+    ) -> None:
+        self._name = name
+        self._arrays = arrays
+        self._attributes = attributes
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of the group."""
+        return dict(self._attributes.get(self._name, {}))
+
+    if not TYPE_CHECKING:  # so that a misspelt name is a type error
+
+        def __getattr__(self, name):
+            if not name.startswith("_"):
+                path = f"{self._name}/{name}"
+                if path in self._arrays:
+                    return self._arrays[path]
+                if any(other.startswith(f"{path}/") for other in self._arrays):
+                    return group(path, self._arrays, self._attributes)
+            raise NotStoredError(f"there is no {self._name}/{name} in this result")
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *{name.partition("/")[0] for name in self._shapes()}]
+
+    def _shapes(self) -> dict[str, str]:
+        """Shapes of the datasets by their names."""
+        head = f"{self._name}/"
+        own = [path for path in self._arrays if path.startswith(head)]
+        return {path.removeprefix(head): str(self._arrays[path].shape) for path in own}
+
+    def __repr__(self) -> str:
+        shapes = ", ".join(f"{name} {shape}" for name, shape in self._shapes().items())
+        return f"<{self._name}: {shapes}>"
+
+    def _repr_html_(self) -> str:
+        """Table of the datasets, for notebooks."""
+        return html_table(self._name, self._shapes().items())
+
+
+class Rows(Group):
+    """Rows with the number of steps taken, and the time."""
+
+    step: Annotated[Ints, "rows", "number of time steps taken"]
+    time: Annotated[Floats, "rows", "time integrated up to the row's state", "time"]
+
+
+class Contact:
+    """Contact and projectile, a value per row."""
+
+    force: Annotated[Floats, "rows", "contact force, positive in compression", "force"]
+    indentation: Annotated[Floats, "rows", "indentation of the plate by the projectile", "length"]
+    transducer: Annotated[Floats, "rows", "force in the projectile at its transducer", "force"]
+    displacement: Annotated[
+        Floats, "rows", "displacement of the impacted end, positive away from the plate", "length"
+    ]
+    velocity: Annotated[
+        Floats, "rows", "velocity of the impacted end, positive away from the plate", "length/time"
+    ]
+    acceleration: Annotated[Floats, "rows", "acceleration of the impacted end", "length/time^2"]
+
+
+CONTACT = tuple(Contact.__annotations__)
+
+
+class Mesh(Group):
+    """The finite element mesh."""
+
+    coordinates: Annotated[Floats, "numnp ndm", "nodal coordinates", "length"]
+    elements: Annotated[Int32s, "numel nen", "node numbers from 1 of every element, 0 where absent"]
+    equations: Annotated[
+        Int32s, "numnp ndf", "equation numbers from 1 of every unknown, 0 where restrained"
+    ]
+
+
+class LaminateStiffness(Group):
+    """Stiffness of the laminate per area."""
+
+    A: Annotated[Floats, "3 3", "extensional stiffness, order xx, yy, xy", "force/length"]
+    B: Annotated[Floats, "3 3", "coupling stiffness, order xx, yy, xy", "force"]
+    D: Annotated[Floats, "3 3", "bending stiffness, order xx, yy, xy", "force*length"]
+    shear: Annotated[Floats, "2 2", "transverse shear stiffness, order xz, yz", "force/length"]
+
+
+class Tape3(Rows):
+    """Displacements of the nodes, stored by DISP."""
+
+    w: Annotated[Floats, "rows numnp", "transverse displacement of every node", "length"]
+    displacement: Annotated[
+        Floats, "rows numnp ndf", "u, v, w and the rotations theta_x, theta_y of every node",
+        "length (u, v, w), 1 (theta_x, theta_y)",
+    ]  # fmt: skip
+
+
+_Strain = Annotated[Floats, "rows numel npt"]
+
+
+class Tape8(Rows):
+    """Strains of the elements, stored by RODP."""
+
+    kappa_x: Annotated[_Strain, "curvature -theta_x,x at every point of every element", "1/length"]
+    kappa_y: Annotated[_Strain, "curvature -theta_y,y", "1/length"]
+    kappa_xy: Annotated[_Strain, "twist -theta_x,y - theta_y,x", "1/length"]
+    gamma_yz: Annotated[_Strain, "transverse shear strain w,y - theta_y"]
+    gamma_xz: Annotated[_Strain, "transverse shear strain w,x - theta_x"]
+
+
+class Tape9(Contact, Rows):
+    """Contact and projectile, stored by RODP."""
+
+
+class History(Contact, Rows):
+    """Contact and projectile at every step."""
+
+    plate_w: Annotated[
+        Floats, "rows", "displacement of the impact node that the contact law sees", "length"
+    ]
+
+
+_Energy = Annotated[Floats, "rows"]
+
+
+class Energy(Rows):
+    """Energies at every step."""
+
+    plate_kinetic: Annotated[_Energy, "kinetic energy of the plate", "force*length"]
+    plate_strain: Annotated[_Energy, "strain energy of the plate", "force*length"]
+    projectile_kinetic: Annotated[_Energy, "kinetic energy of the projectile", "force*length"]
+    projectile_strain: Annotated[_Energy, "strain energy of the projectile", "force*length"]
+    contact_work: Annotated[_Energy, "work of the contact force on the indentation", "force*length"]
+    external_work: Annotated[_Energy, "work of the nodal forces on the plate", "force*length"]
+    balance_error: Annotated[
+        _Energy,
+        "all energies and the contact work, less the initial energy and external work",
+        "force*length",
+    ]
+    damping_work: Annotated[
+        _Energy, "energy dissipated by DAMP, only with that card", "force*length"
+    ]
+
+
+class GageGroup(Rows):
+    """Strain gages, read at every step."""
+
+    number: Annotated[Int32s, "gages", "number of every gage"]
+    strain: Annotated[Floats, "rows gages", "normal strain of every gage in its direction"]
+
+
+_Stress = Annotated[Floats, "rows numel nps"]
+
+
+class Stresses(Rows):
+    """Strains and stress resultants, stored by STRE."""
+
+    x: Annotated[Floats, "numel nps", "x of every point of every element", "length"]
+    y: Annotated[Floats, "numel nps", "y of every point of every element", "length"]
+    eps_xx: Annotated[_Stress, "midplane strain u,x"]
+    eps_yy: Annotated[_Stress, "midplane strain v,y"]
+    gamma_xy: Annotated[_Stress, "midplane shear strain u,y + v,x"]
+    kappa_x: Annotated[_Stress, "curvature -theta_x,x", "1/length"]
+    kappa_y: Annotated[_Stress, "curvature -theta_y,y", "1/length"]
+    kappa_xy: Annotated[_Stress, "twist -theta_x,y - theta_y,x", "1/length"]
+    gamma_xz: Annotated[_Stress, "transverse shear strain w,x - theta_x"]
+    gamma_yz: Annotated[_Stress, "transverse shear strain w,y - theta_y"]
+    N_x: Annotated[_Stress, "stress resultant", "force/length"]
+    N_y: Annotated[_Stress, "stress resultant", "force/length"]
+    N_xy: Annotated[_Stress, "shear resultant", "force/length"]
+    M_x: Annotated[_Stress, "stress couple", "force"]
+    M_y: Annotated[_Stress, "stress couple", "force"]
+    M_xy: Annotated[_Stress, "twisting couple", "force"]
+    Q_x: Annotated[_Stress, "transverse shear force", "force/length"]
+    Q_y: Annotated[_Stress, "transverse shear force", "force/length"]
+
+
+class PatchGroup(Group):
+    """Nodal weights of the contact force."""
+
+    node: Annotated[Int32s, "patch_nodes", "node numbers from 1 that share the contact force"]
+    weight: Annotated[Floats, "patch_nodes", "share of every node in the contact force"]
+
+
+_InPlane = Annotated[Floats, "rows members npp layers faces"]
+_Interlaminar = Annotated[
+    Floats, "rows members layers levels", "interlaminar shear stress at the element's centre",
+    "force/length^2",
+]  # fmt: skip
+
+
+class PlyRows(Rows):
+    """Stresses ply by ply, stored by PLYS."""
+
+    element: Annotated[Int32s, "members", "number of every element with ply stresses"]
+    z: Annotated[Floats, "layers levels", "lower, middle and upper z of every ply", "length"]
+    under_load: Annotated[
+        Int32s, "members",
+        "1 where plate theory does not hold: within the patch's radius + h/2 of the load",
+    ]  # fmt: skip
+    sigma_1: Annotated[_InPlane, "normal stress along the fibres, at both faces", "force/length^2"]
+    sigma_2: Annotated[_InPlane, "normal stress across the fibres", "force/length^2"]
+    tau_12: Annotated[_InPlane, "shear stress in the axes of the ply", "force/length^2"]
+    tau_xz: _Interlaminar
+    tau_yz: _Interlaminar
+    residual: Annotated[
+        Floats, "rows members directions",
+        "tau_xz and tau_yz of equilibrium at z = h/2, removed linearly in z", "force/length^2",
+    ]  # fmt: skip
+
+
+class Exposure(Group):
+    """Largest exposures of a criterion, with their times and modes."""
+
+    # Sizes are those that `Failure` names.
+    exposure: Annotated[Floats, "", "largest exposure over time"]
+    time: Annotated[Floats, "", "its time", "time"]
+    mode: Annotated[Int8s, "", "its mode: index into the attribute modes"]
+
+
+_PlyExposure = Annotated[Exposure, "numel npp layers faces"]
+
+
+class Failure(Group):
+    """Largest exposures over time, found by FAIL."""
+
+    x: Annotated[Floats, "numel npp", "x of every point of every element", "length"]
+    y: Annotated[Floats, "numel npp", "y of every point of every element", "length"]
+    under_load: Annotated[
+        Int32s, "numel npp",
+        "1 where plate theory does not hold: nearer than the patch's radius + h/2 to the load",
+    ]  # fmt: skip
+    max_stress: _PlyExposure
+    tsai_wu: _PlyExposure
+    hashin: _PlyExposure
+    puck: _PlyExposure
+    interlaminar: Annotated[Exposure, "numel interfaces"]
 
 
 INTERLAMINAR = "failure/interlaminar"
 
 
-def _exposures(group: str, shape: tuple[str | int, ...]) -> tuple[Dataset, ...]:
-    return (
-        Dataset(f"{group}/exposure", shape, "largest exposure over time"),
-        Dataset(f"{group}/time", shape, "its time", "time"),
-        Dataset(f"{group}/mode", shape, "its mode: index into the attribute modes", dtype="i1"),
-    )
+class Reactions(Rows):
+    """Forces of the supports, stored by REAC."""
+
+    force: Annotated[
+        Floats, "rows numnp ndf",
+        "internal less applied force of every unknown: forces of the supports",
+        "force (u, v, w), force*length (theta_x, theta_y)",
+    ]  # fmt: skip
 
 
-_CONTACT = (
-    ("force", "contact force, positive in compression", "force"),
-    ("indentation", "indentation of the plate by the projectile", "length"),
-    ("transducer", "force in the projectile at its transducer", "force"),
-    ("displacement", "displacement of the impacted end, positive away from the plate", "length"),
-    ("velocity", "velocity of the impacted end, positive away from the plate", "length/time"),
-    ("acceleration", "acceleration of the impacted end", "length/time^2"),
-)
+class Modes(Rows):
+    """Natural modes, found by EIGE."""
 
-CONTACT = tuple(name for name, _, _ in _CONTACT)
+    number: Annotated[Ints, "rows", "number of the mode, from 1"]
+    angular_frequency: Annotated[Floats, "rows", "natural angular frequency", "1/time"]
+    shape: Annotated[Floats, "rows numnp ndf", "mode of unit modal mass: every unknown"]
 
-DATASETS = {
-    dataset.path: dataset
-    for dataset in (
-        Dataset("mesh/coordinates", ("numnp", "ndm"), "nodal coordinates", "length"),
-        Dataset(
-            "mesh/elements", ("numel", "nen"),
-            "node numbers from 1 of every element, 0 where absent", dtype="i4",
-        ),
-        Dataset(
-            "mesh/equations", ("numnp", "ndf"),
-            "equation numbers from 1 of every unknown, 0 where restrained", dtype="i4",
-        ),
-        Dataset("laminate/A", (3, 3), "extensional stiffness, order xx, yy, xy", "force/length"),
-        Dataset("laminate/B", (3, 3), "coupling stiffness, order xx, yy, xy", "force"),
-        Dataset("laminate/D", (3, 3), "bending stiffness, order xx, yy, xy", "force*length"),
-        Dataset(
-            "laminate/shear", (2, 2), "transverse shear stiffness, order xz, yz", "force/length"
-        ),
-        *_clock("tape3"),
-        Dataset("tape3/w", ("rows", "numnp"), "transverse displacement of every node", "length"),
-        Dataset(
-            "tape3/displacement", ("rows", "numnp", "ndf"),
-            "u, v, w and the rotations theta_x, theta_y of every node",
-            "length (u, v, w), 1 (theta_x, theta_y)",
-        ),
-        *_clock("tape8"),
-        *_group(
-            "tape8", ("rows", "numel", "npt"),
-            ("kappa_x", "curvature -theta_x,x at every point of every element", "1/length"),
-            ("kappa_y", "curvature -theta_y,y", "1/length"),
-            ("kappa_xy", "twist -theta_x,y - theta_y,x", "1/length"),
-            ("gamma_yz", "transverse shear strain w,y - theta_y", ""),
-            ("gamma_xz", "transverse shear strain w,x - theta_x", ""),
-        ),
-        *_clock("tape9"),
-        *_group("tape9", ("rows",), *_CONTACT),
-        *_clock("history"),
-        *_group(
-            "history", ("rows",), *_CONTACT,
-            ("plate_w", "displacement of the impact node that the contact law sees", "length"),
-        ),
-        *_clock("energy"),
-        *_group(
-            "energy", ("rows",),
-            ("plate_kinetic", "kinetic energy of the plate", "force*length"),
-            ("plate_strain", "strain energy of the plate", "force*length"),
-            ("projectile_kinetic", "kinetic energy of the projectile", "force*length"),
-            ("projectile_strain", "strain energy of the projectile", "force*length"),
-            ("contact_work", "work of the contact force on the indentation", "force*length"),
-            ("external_work", "work of the nodal forces on the plate", "force*length"),
-            (
-                "balance_error",
-                "all energies and the contact work, less the initial energy and external work",
-                "force*length",
-            ),
-            ("damping_work", "energy dissipated by DAMP, only with that card", "force*length"),
-        ),
-        *_clock("gages"),
-        Dataset("gages/number", ("gages",), "number of every gage", dtype="i4"),
-        Dataset("gages/strain", ("rows", "gages"), "normal strain of every gage in its direction"),
-        *_clock("stresses"),
-        Dataset("stresses/x", ("numel", "nps"), "x of every point of every element", "length"),
-        Dataset("stresses/y", ("numel", "nps"), "y of every point of every element", "length"),
-        *_group(
-            "stresses", ("rows", "numel", "nps"),
-            ("eps_xx", "midplane strain u,x", ""),
-            ("eps_yy", "midplane strain v,y", ""),
-            ("gamma_xy", "midplane shear strain u,y + v,x", ""),
-            ("kappa_x", "curvature -theta_x,x", "1/length"),
-            ("kappa_y", "curvature -theta_y,y", "1/length"),
-            ("kappa_xy", "twist -theta_x,y - theta_y,x", "1/length"),
-            ("gamma_xz", "transverse shear strain w,x - theta_x", ""),
-            ("gamma_yz", "transverse shear strain w,y - theta_y", ""),
-            ("N_x", "stress resultant", "force/length"),
-            ("N_y", "stress resultant", "force/length"),
-            ("N_xy", "shear resultant", "force/length"),
-            ("M_x", "stress couple", "force"),
-            ("M_y", "stress couple", "force"),
-            ("M_xy", "twisting couple", "force"),
-            ("Q_x", "transverse shear force", "force/length"),
-            ("Q_y", "transverse shear force", "force/length"),
-        ),
-        Dataset(
-            "patch/node", ("patch_nodes",), "node numbers from 1 that share the contact force",
-            dtype="i4",
-        ),
-        Dataset("patch/weight", ("patch_nodes",), "share of every node in the contact force"),
-        *_clock("plies"),
-        Dataset(
-            "plies/element", ("members",), "number of every element with ply stresses", dtype="i4"
-        ),
-        Dataset(
-            "plies/z", ("layers", "levels"), "lower, middle and upper z of every ply", "length"
-        ),
-        Dataset(
-            "plies/under_load", ("members",),
-            "1 where plate theory does not hold: within the patch's radius + h/2 of the load",
-            dtype="i4",
-        ),
-        *_group(
-            "plies", ("rows", "members", "npp", "layers", "faces"),
-            ("sigma_1", "normal stress along the fibres, at both faces", "force/length^2"),
-            ("sigma_2", "normal stress across the fibres", "force/length^2"),
-            ("tau_12", "shear stress in the axes of the ply", "force/length^2"),
-        ),
-        *_group(
-            "plies", ("rows", "members", "layers", "levels"),
-            ("tau_xz", "interlaminar shear stress at the element's centre", "force/length^2"),
-            ("tau_yz", "interlaminar shear stress at the element's centre", "force/length^2"),
-        ),
-        Dataset(
-            "plies/residual", ("rows", "members", "directions"),
-            "tau_xz and tau_yz of equilibrium at z = h/2, removed linearly in z", "force/length^2",
-        ),
-        Dataset("failure/x", ("numel", "npp"), "x of every point of every element", "length"),
-        Dataset("failure/y", ("numel", "npp"), "y of every point of every element", "length"),
-        Dataset(
-            "failure/under_load", ("numel", "npp"),
-            "1 where plate theory does not hold: nearer than the patch's radius + h/2 to the load",
-            dtype="i4",
-        ),
-        *(
-            dataset
-            for criterion in CRITERIA
-            for dataset in _exposures(f"failure/{criterion}", ("numel", "npp", "layers", "faces"))
-        ),
-        *_exposures(INTERLAMINAR, ("numel", "interfaces")),
-        *_clock("reactions"),
-        Dataset(
-            "reactions/force", ("rows", "numnp", "ndf"),
-            "internal less applied force of every unknown: forces of the supports",
-            "force (u, v, w), force*length (theta_x, theta_y)",
-        ),
-        *_clock("modes"),
-        Dataset("modes/number", ("rows",), "number of the mode, from 1", dtype="i8"),
-        Dataset("modes/angular_frequency", ("rows",), "natural angular frequency", "1/time"),
-        Dataset(
-            "modes/shape", ("rows", "numnp", "ndf"), "mode of unit modal mass: every unknown"
-        ),
-    )
+
+GROUPS: dict[str, type[Group]] = {
+    "mesh": Mesh, "laminate": LaminateStiffness, "tape3": Tape3, "tape8": Tape8, "tape9": Tape9,
+    "history": History, "energy": Energy, "gages": GageGroup, "stresses": Stresses,
+    "patch": PatchGroup, "plies": PlyRows, "failure": Failure, "reactions": Reactions,
+    "modes": Modes,
 }  # fmt: skip
+
+
+def group(
+    name: str, arrays: Mapping[str, Array], attributes: Mapping[str, Mapping[str, Any]]
+) -> Group:
+    """Return a group of a result by its path."""
+    kind = Exposure if name.startswith("failure/") else GROUPS.get(name, Group)
+    return kind(name, arrays, attributes)
+
+
+def _datasets(group: str, kind: type[Group], outer: str = "") -> Iterator[Dataset]:
+    """Datasets of a group, of these sizes unless they have their own."""
+    for base in reversed(kind.__mro__):
+        for name, column in getattr(base, "__annotations__", {}).items():
+            path, (sizes, *about) = f"{group}/{name}", column.__metadata__
+            if column.__origin__ is Exposure:
+                yield from _datasets(path, Exposure, sizes)
+            else:
+                shape = tuple(int(n) if n.isdigit() else n for n in (sizes or outer).split())
+                description, dimension = (*about, "")[:2]
+                yield Dataset(path, shape, description, dimension, DTYPES[column.__origin__])
+
+
+DATASETS = {d.path: d for name, kind in GROUPS.items() for d in _datasets(name, kind)}
 
 FIXED = {"faces": 2, "levels": 3, "directions": 2}  # sizes of axes that every result has
 
