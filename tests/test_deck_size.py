@@ -12,7 +12,7 @@ import pytest
 from fecm import _memory
 from fecm._memory import NotEnoughMemoryError
 from fecm.api import load_deck
-from fecm.deck import Finding, reader, segments
+from fecm.deck import Finding, reader
 from fecm.deck.card import Card, parse_integer
 from fecm.deck.findings import MOST, Findings, Place
 from fecm.deck.layup import LayupError, parse_layup
@@ -129,7 +129,7 @@ def test_blank_lines_between_segments_make_no_cards(monkeypatch: pytest.MonkeyPa
         cards += 1
         return Card(line, text)
 
-    monkeypatch.setattr(segments, "Card", counted)
+    monkeypatch.setattr(reader, "Card", counted)
     made = []
     for blanks in (0, 5000):
         cards = 0

@@ -19,10 +19,8 @@ from fecm._frozen import frozen
 from fecm.deck.findings import Findings, Place
 
 JUSTIFY = "right-justify each number in its own columns"
-
 # Characters of the longest number that is read.
 LONGEST = 100
-
 # No two parts of a pattern match the same characters, so that a mismatch takes linear time.
 _INTEGER = re.compile(r"[+-]?[0-9]+")
 
@@ -105,7 +103,6 @@ def _forms(numeral: str, letter: str) -> Iterator[str]:
 
 
 Value = int | float | str
-
 LARGEST_INTEGER = 2**31 - 1
 
 

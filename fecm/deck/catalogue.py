@@ -18,10 +18,8 @@ from fecm.deck.records import Ply
 from fecm.deck.units import DENSITY, MODULUS, TOUGHNESS, in_si
 
 # Systems of units: names of length, force and time.
-SYSTEMS = {
-    name: dict(zip(Units.NAMES, name.split("-"), strict=True))
-    for name in ("in-lbf-s", "m-N-s", "mm-N-s")
-}
+NAMES = ("in-lbf-s", "m-N-s", "mm-N-s")
+SYSTEMS = {name: dict(zip(Units.NAMES, name.split("-"), strict=True)) for name in NAMES}
 
 
 def convert(value: float, dimension: str, system: str, other: str) -> float:
@@ -143,7 +141,6 @@ def _text(file: str) -> str:
 
 
 MATERIALS = read_plies(_text("materials.toml"))
-
 # Constants of the report that are not the indenter's: alpha_p, s_p and reference 14's alpha_cr.
 ALPHA_P, S_P, ALPHA_CR = 6.564e-4, 0.094, 3.16e-3
 # System of units of the report.
@@ -161,11 +158,8 @@ class NamedContact:
 
     def converted(self, system: str) -> Indentation:
         """Constants in a system of units, a key of :data:`~fecm.deck.catalogue.SYSTEMS`."""
-        return replace(
-            self.law,
-            k=convert(self.law.k, COEFFICIENT, SYSTEM, system),
-            alpha_p=convert(self.law.alpha_p, "length", SYSTEM, system),
-        )
+        k = convert(self.law.k, COEFFICIENT, SYSTEM, system)
+        return replace(self.law, k=k, alpha_p=convert(self.law.alpha_p, "length", SYSTEM, system))
 
 
 CONTACTS = {

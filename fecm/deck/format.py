@@ -9,9 +9,8 @@ from __future__ import annotations
 from fecm.deck.card import Card, Fields, Value, write_card
 from fecm.deck.findings import DeckError
 from fecm.deck.model import STOP
-from fecm.deck.reader import Reader
+from fecm.deck.reader import READERS, Reader
 from fecm.deck.records import Macro
-from fecm.deck.segments import READERS
 
 RULER = "!:"
 

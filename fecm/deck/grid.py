@@ -64,14 +64,13 @@ def graded(length: float, elements: int, centre: float, ratio: float) -> list[Se
         side = _series(length, elements, ratio)
         steps = side if centre <= 0.0 else side[::-1]
     else:
-        left = min(
-            range(1, elements),
-            key=lambda n: abs(
-                math.log(
-                    _series(centre, n, ratio)[0] / _series(length - centre, elements - n, ratio)[0]
-                )
-            ),
-        )
+
+        def unlike(n: int) -> float:
+            """Difference of the smallest elements of both sides, n of them on the left."""
+            right = _series(length - centre, elements - n, ratio)
+            return abs(math.log(_series(centre, n, ratio)[0] / right[0]))
+
+        left = min(range(1, elements), key=unlike)
         steps = _series(centre, left, ratio)[::-1]
         steps += _series(length - centre, elements - left, ratio)
     sections: list[Section] = []
@@ -119,9 +118,8 @@ def framed(inner: Sequence[Section], length: float) -> list[Section]:
     starts = [round_to(start, length), *ends]
     sizes = [(section.end - section.start) / section.elements for section in inner]
     before, after = (max(LEAST_BESIDE, math.ceil(start / size)) for size in (sizes[0], sizes[-1]))
-    middle = (
-        Section(a, b, section.elements) for a, b, section in zip(starts, ends, inner, strict=False)
-    )
+    counts = (section.elements for section in inner)
+    middle = map(Section, starts, ends, counts)
     return [Section(0.0, starts[0], before), *middle, Section(ends[-1], length, after)]
 
 
@@ -150,9 +148,8 @@ def lines(sections: Sequence[Section]) -> list[float]:
 def _edges(sections: Sequence[Section], side: float) -> tuple[int, int]:
     """Numbers of the lines of nodes nearest to the edges of a window in the middle."""
     places, length = np.array(lines(sections)), sections[-1].end
-    near = (int(np.abs(places - (length + sign * side) / 2.0).argmin()) for sign in (-1.0, 1.0))
-    first, last = near
-    return first, last
+    first, last = (np.abs(places - (length + d) / 2.0).argmin() for d in (-side, side))
+    return int(first), int(last)
 
 
 @frozen
@@ -237,34 +234,28 @@ class Grid:
             for edge, support in supports.items()
             if support != "free"
         }
-        return self.boundary(everywhere, codes, window, HELD)
+        return self.boundary(everywhere, codes, window)
 
     def boundary(
         self,
         everywhere: Sequence[int],
         edges: Mapping[str, Sequence[int]],
         window: tuple[float, float] | None = None,
-        held: Sequence[int] = (),
     ) -> Boundary | None:
         """BOUN cards; None where nothing is restrained.
 
-        Codes are those of every node, of the nodes of each of the :data:`EDGES`, and of the edges
-        of a window in the middle of the plate, given by its sides.
+        Codes are those of every node, and of the nodes of each of the :data:`EDGES`; w is held
+        along the edges of a window in the middle of the plate, given by its sides.
         """
         codes = np.tile(np.array(everywhere), (self.up, self.across, 1))
         parts = {"left": codes[:, 0], "right": codes[:, -1], "bottom": codes[0], "top": codes[-1]}
         for name, code in edges.items():
             np.maximum(parts[name], code, out=parts[name])
         if window is not None:
-            (left, right), (low, high) = (
-                _edges(sections, side)
-                for sections, side in zip((self.columns, self.rows), window, strict=True)
-            )
-            for j, i in (
-                (slice(low, high + 1), [left, right]),
-                ([low, high], slice(left, right + 1)),
-            ):
-                codes[j, i] = np.maximum(codes[j, i], held)
+            (left, right), (low, high) = map(_edges, (self.columns, self.rows), window)
+            across, up = slice(left, right + 1), slice(low, high + 1)
+            for place in ((up, [left, right]), ([low, high], across)):
+                codes[place] = np.maximum(codes[place], HELD)
         return boundary_cards(codes.reshape(self.nodes, -1))
 
 

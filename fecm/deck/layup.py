@@ -14,12 +14,10 @@ from fecm._errors import FecmError
 
 # A layup of more plies is certainly a typo.
 MOST_PLIES = 10_000
-
 # Deepest nesting of groups.
 NESTING = 32
 # Characters of a layup that a message quotes.
 QUOTED = 60
-
 _ANGLE = re.compile(r"(±|\+-|\+/-)?([+-]?(?:\d+(?:\.\d*)?|\.\d+))(?:_\{?(\d+)\}?)?")
 _SUFFIX = re.compile(r"_?\{?(\d*)([sST]?)\}?")
 
@@ -45,9 +43,8 @@ def parse_layup(text: str) -> list[float]:
 def _error(text: str, position: int) -> LayupError:
     rest = text[position : position + 10]
     what = f"at `{rest}`" if rest else "at its end"
-    return LayupError(
-        f"the layup `{_quoted(text)}` can't be read {what}; write for example [0/45/-45/90]2s"
-    )
+    hint = "write for example [0/45/-45/90]2s"
+    return LayupError(f"the layup `{_quoted(text)}` can't be read {what}; {hint}")
 
 
 def _quoted(text: str) -> str:
@@ -69,10 +66,7 @@ def _group(text: str, start: int, depth: int = 1) -> tuple[list[float], int]:
             angles += inner
         else:
             match = _ANGLE.match(text, position)
-            if match is None:
-                raise _error(text, position)
-            angle = float(match[2])
-            if not math.isfinite(angle):
+            if match is None or not math.isfinite(angle := float(match[2])):
                 raise _error(text, position)
             plies = [angle, -angle] if match[1] else [angle]
             angles += plies * _times(match[3] or "1", len(plies), text, position)
@@ -97,10 +91,9 @@ def _group(text: str, start: int, depth: int = 1) -> tuple[list[float], int]:
 def _times(digits: str, plies: int, text: str, position: int) -> int:
     """Number of repeats, limited to :data:`MOST_PLIES` plies."""
     if len(digits) > 5 or int(digits) * plies > MOST_PLIES or int(digits) < 1:
-        raise LayupError(
-            f"the layup `{_quoted(text)}` repeats {_quoted(digits)} times at "
-            f"`{text[position : position + 10]}`; 1 to {MOST_PLIES} plies are possible"
-        )
+        where = f"{_quoted(digits)} times at `{text[position : position + 10]}`"
+        possible = f"1 to {MOST_PLIES} plies are possible"
+        raise LayupError(f"the layup `{_quoted(text)}` repeats {where}; {possible}")
     return int(digits)
 
 

@@ -15,7 +15,6 @@ from fecm.deck.findings import Findings
 from fecm.deck.records import Macro
 
 NESTING = 64
-
 # A program of more macros would run for days.
 MOST_MACROS = 10**9
 
@@ -178,14 +177,10 @@ def _check_unused(word: Word, macro: Macro, findings: Findings) -> None:
     if macro.option:
         is_number = word.value and not macro.value and parse_real(macro.option) is not None
         example = f"{word.name},{macro.option}"
-        findings.add(
-            "E514",
-            f"{word.name} takes no second word; the card has `{macro.option}`.",
-            macro.place("second word"),
-            f"the number is in columns 11-15 or after a comma: {example}"
-            if is_number
-            else "remove it",
-        )
+        hint = f"the number is in columns 11-15 or after a comma: {example}"
+        message = f"{word.name} takes no second word; the card has `{macro.option}`."
+        place = macro.place("second word")
+        findings.add("E514", message, place, hint if is_number else "remove it")
     elif macro.value and not word.value:
         message = f"{word.name} takes no number; the card has {macro.value:g}."
         findings.add("E514", message, macro.place("value"), "remove it")

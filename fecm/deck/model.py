@@ -33,10 +33,8 @@ from fecm.deck.records import (
 
 TITLE = "FECM"
 STOP = "STOP"
-
 # First fields of a card of a node.
 NODE = ("I5 node", "I5 increment|incr")
-
 _S = TypeVar("_S", bound="Segment")
 
 
@@ -45,6 +43,10 @@ class Segment(Record):
     """A keyword card and the data that follow it."""
 
     keyword: ClassVar[str]
+
+    def __init_subclass__(cls, keyword: str = "") -> None:
+        super().__init_subclass__()
+        cls.keyword = keyword
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards: the keyword card and, by default, one card of data."""
@@ -58,6 +60,10 @@ class NumberedSegment(Segment):
 
     records: tuple[Record, ...]
     record: ClassVar[type[Record]]
+
+    def __init_subclass__(cls, keyword: str, record: type[Record]) -> None:
+        super().__init_subclass__(keyword)
+        cls.record = record
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
@@ -74,12 +80,10 @@ class NumberedSegment(Segment):
 
 
 @frozen
-class Coordinates(NumberedSegment):
+class Coordinates(NumberedSegment, keyword="COOR", record=NodeValues):
     """COOR: (2I5,7F10.0); coordinates of the nodes (length), of which NDM are used."""
 
     records: tuple[NodeValues, ...]
-    record: ClassVar[type[Record]] = NodeValues
-    keyword: ClassVar[str] = "COOR"
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
@@ -88,12 +92,10 @@ class Coordinates(NumberedSegment):
 
 
 @frozen
-class Elements(NumberedSegment):
+class Elements(NumberedSegment, keyword="ELEM", record=ElementNodes):
     """ELEM: (16I5); nodes of the elements; the increment follows the last of the NEN nodes."""
 
     records: tuple[ElementNodes, ...]
-    record: ClassVar[type[Record]] = ElementNodes
-    keyword: ClassVar[str] = "ELEM"
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
@@ -103,12 +105,10 @@ class Elements(NumberedSegment):
 
 
 @frozen
-class Boundary(NumberedSegment):
+class Boundary(NumberedSegment, keyword="BOUN", record=NodeCodes):
     """BOUN: (16I5); restraint codes of the nodes; a dof with a code other than 0 is restrained."""
 
     records: tuple[NodeCodes, ...]
-    record: ClassVar[type[Record]] = NodeCodes
-    keyword: ClassVar[str] = "BOUN"
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
@@ -117,12 +117,10 @@ class Boundary(NumberedSegment):
 
 
 @frozen
-class Forces(NumberedSegment):
+class Forces(NumberedSegment, keyword="FORC", record=NodeValues):
     """FORC: (2I5,7F10.0); nodal forces, or displacements where the dof is restrained."""
 
     records: tuple[NodeValues, ...]
-    record: ClassVar[type[Record]] = NodeValues
-    keyword: ClassVar[str] = "FORC"
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
@@ -131,13 +129,12 @@ class Forces(NumberedSegment):
 
 
 @frozen
-class Material(Segment):
+class Material(Segment, keyword="MATE"):
     """MATE: integration orders, ply constants and layers, the first layer at z = -h/2."""
 
     integration: Integration
     ply: Ply
     layers: tuple[Layer, ...]
-    keyword: ClassVar[str] = "MATE"
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
@@ -147,13 +144,12 @@ class Material(Segment):
 
 
 @frozen
-class Impact(Segment):
+class Impact(Segment, keyword="ROD"):
     """ROD: (2I5,F10.0); impact point and velocity."""
 
     node: int  # impact node
     dof: int  # its dof in the direction of impact, from 1 (3 is w)
     velocity: float  # approach velocity, length/time
-    keyword: ClassVar[str] = "ROD"
 
     fields: ClassVar[Fields] = layout(
         "I5 impact node|node", "I5 impact dof|dof", "F10 impact velocity|velocity"
@@ -161,7 +157,7 @@ class Impact(Segment):
 
 
 @frozen
-class Indentation(Segment):
+class Indentation(Segment, keyword="EXPE"):
     """EXPE: (4F10.0); the measured indentation law, equations 3-1, 3-3 and 3-8.
 
     With the second word ACR the permanent indentation follows equation 3-7 instead of 3-8.
@@ -173,7 +169,6 @@ class Indentation(Segment):
     s_p: float  # slope of the permanent over the maximum indentation; 0 with ACR
     q: float  # power of the unloading curve; 5/2 or 0 (the same) with ACR
     word: str = ""  # the keyword card's second word: ``""`` for equation 3-8, ``"ACR"`` for 3-7
-    keyword: ClassVar[str] = "EXPE"
 
     ACR: ClassVar[str] = "ACR"
     fields: ClassVar[Fields] = layout(
@@ -203,7 +198,7 @@ class Indentation(Segment):
 
 
 @frozen
-class Projectile(Segment):
+class Projectile(Segment, keyword="PROJ"):
     """PROJ: (2I5,3F10.0) and, for a rod, its diameters; the projectile (not in the report)."""
 
     elements: int  # number of the rod's elements; 0 for a rigid mass
@@ -215,7 +210,6 @@ class Projectile(Segment):
     density: float = 0.0
     # From the impacted end on; those between two cards are interpolated.
     diameters: tuple[RodDiameter, ...] = ()
-    keyword: ClassVar[str] = "PROJ"
 
     optional: ClassVar[int] = 2
     fields: ClassVar[Fields] = layout(
@@ -233,7 +227,7 @@ class Projectile(Segment):
 
 
 @frozen
-class Patch(Segment):
+class Patch(Segment, keyword="PATC"):
     """PATC: (A4,6X,4F10.0); the contact force acts on a circle (not in the report's program)."""
 
     shape: str = "DISC"  # ``"DISC"``, a uniform pressure, or ``"HERT"``, Hertz's
@@ -243,7 +237,6 @@ class Patch(Segment):
     x: float | None = None
     y: float | None = None
     load: float = 0.0  # static force on the patch, scaled by PROP
-    keyword: ClassVar[str] = "PATC"
 
     optional: ClassVar[int] = 4
     fields: ClassVar[Fields] = layout(
@@ -262,7 +255,7 @@ class Patch(Segment):
 
 
 @frozen
-class Shear(Segment):
+class Shear(Segment, keyword="SHEA"):
     """SHEA: (F10.0); treatment of transverse shear (not in the report's program)."""
 
     # Shear correction factor: 1 in the report's program; its page on cut-off frequencies recommends
@@ -273,7 +266,6 @@ class Shear(Segment):
     # Stiffness from the equilibrium of the plies, ``EQUI`` on the keyword card; otherwise their
     # sum, equation 2-19.
     equilibrium: bool = False
-    keyword: ClassVar[str] = "SHEA"
 
     fields: ClassVar[Fields] = layout("F10 shear correction factor|factor")
     WORDS: ClassVar[tuple[str, ...]] = ("MITC", "EQUI")
@@ -288,7 +280,7 @@ class Shear(Segment):
 
 
 @frozen
-class Allowables(Segment):
+class Allowables(Segment, keyword="ALLO"):
     """ALLO: (7F10.0) and (3F10.0); strengths of the ply (not in the report's program)."""
 
     # Strengths along and across the fibres, in tension and compression: all positive, force/area.
@@ -304,7 +296,6 @@ class Allowables(Segment):
     # Puck's slopes; 0.35 and 0.3 if blank.
     p_plus: float = 0.35
     p_minus: float = 0.3
-    keyword: ClassVar[str] = "ALLO"
 
     fields: ClassVar[Fields] = layout(
         "F10 XT", "F10 XC", "F10 YT", "F10 YC", "F10 S12", "F10? S13", "F10? S23"
@@ -335,43 +326,38 @@ class Allowables(Segment):
 
 
 @frozen
-class Delamination(Segment):
+class Delamination(Segment, keyword="DELA"):
     """DELA: (2F10.0); toughness for the delamination threshold (not in the report's program)."""
 
     toughness: float  # G_IIc, force/length
     number: float = 1.0  # number of delaminations; 1 if blank
-    keyword: ClassVar[str] = "DELA"
 
     fields: ClassVar[Fields] = layout("F10 G_IIc", "F10? number of delaminations|number")
 
 
 @frozen
-class Damping(Segment):
+class Damping(Segment, keyword="DAMP"):
     """DAMP: (F10.0); mass-proportional damping of the plate (not in the report's program)."""
 
     coefficient: float  # a of the damping matrix C = a M, 1/time
-    keyword: ClassVar[str] = "DAMP"
 
     fields: ClassVar[Fields] = layout("F10 a")
 
 
 @frozen
-class Gages(NumberedSegment):
+class Gages(NumberedSegment, keyword="GAGE", record=Gage):
     """GAGE: strain gages, read at every step (not in the report's program)."""
 
     records: tuple[Gage, ...]
-    record: ClassVar[type[Record]] = Gage
-    keyword: ClassVar[str] = "GAGE"
 
 
 @frozen
-class Units(Segment):
+class Units(Segment, keyword="UNIT"):
     """UNIT: names of the deck's units, for output; nothing is converted."""
 
     length: str
     force: str
     time: str
-    keyword: ClassVar[str] = "UNIT"
 
     NAMES: ClassVar[tuple[str, ...]] = ("length", "force", "time")
 
@@ -382,11 +368,10 @@ class Units(Segment):
 
 
 @frozen
-class PrintOption(Segment):
+class PrintOption(Segment, keyword="PRIN"):
     """PRIN or NOPR: whether the data that follow are printed."""
 
     on: bool
-    keyword: ClassVar[str] = "PRIN"
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's card."""
@@ -394,11 +379,10 @@ class PrintOption(Segment):
 
 
 @frozen
-class Page(Segment):
+class Page(Segment, keyword="PAGE"):
     """PAGE: the printer's carriage control at the head of each page, on a separate card."""
 
     carriage_control: str
-    keyword: ClassVar[str] = "PAGE"
 
     fields: ClassVar[Fields] = layout("A4 carriage control")
 

@@ -8,30 +8,27 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TypeVar
 
 from fecm._memory import NotEnoughMemoryError, available, format_bytes, require
-from fecm.deck.card import Card, Source
+from fecm.deck import model, records
+from fecm.deck.card import Card, Fields, Source, Value, read_values
 from fecm.deck.findings import DeckError, Findings, Place
 from fecm.deck.model import STOP, TITLE, Deck, Segment
-from fecm.deck.records import DOF_NAMES, NODES_AN_ELEMENT, Control, LoadTable, Macro
-from fecm.deck.segments import READERS, SegmentReader, Stream
 
 MACROS = "MACR"
 END = "END"
 CONTROL_CARD = "(6I5): NUMNP, NUMEL, LAYER, NDM, NDF, NEN"
-
 # Largest number of nodes or elements, and of layers; anything beyond is certainly a typo.
 MOST = 1_000_000
 MOST_LAYERS = 10_000
-
 # Largest number of problems and segments of a file, and of cards of a macro program.
 MOST_PROBLEMS = 1000
 MOST_SEGMENTS = 20_000
 MOST_MACRO_CARDS = 100_000
-
 # No deck needs more bytes.
 LARGEST_FILE = 1_000_000_000
 # Largest memory of a deck per byte of text and per line, measured at 10 MB.
@@ -50,6 +47,9 @@ OTHERS = {
 }
 
 
+_R = TypeVar("_R", bound=records.Record)
+
+
 @dataclass
 class ParsedProblem:
     """The readable part of a problem."""
@@ -57,6 +57,263 @@ class ParsedProblem:
     deck: Deck | None  # the model; None where the control card could not be read
     # Keywords of segments with unreadable cards, from which no conclusion can be drawn.
     unsound: set[str] = field(default_factory=set)
+
+
+class Stream:
+    """Cards in the order of the file, without the lines that are comments.
+
+    With `blanks_are_zeros` blanks inside numbers are read as the zeros that they were on the
+    report's machine; `keeps_values` keeps the fields and values of every card in `read`.
+    """
+
+    def __init__(
+        self, text: str, *, blanks_are_zeros: bool = False, keeps_values: bool = False
+    ) -> None:
+        self.lines = text.removeprefix("\ufeff").splitlines()
+        numbered = enumerate(self.lines, start=1)
+        self._cards = [(n, line) for n, line in numbered if not line.startswith("!")]
+        self._blanks_are_zeros = blanks_are_zeros
+        self._keeps_values = keeps_values
+        self.position = 0  # number of cards taken
+        self.findings = Findings()
+        self.read: dict[int, tuple[Fields, list[Value]]] = {}  # by line number
+
+    @property
+    def at_end(self) -> bool:
+        """Whether every card was taken."""
+        return self.position == len(self._cards)
+
+    @property
+    def last(self) -> Card | None:
+        """The last card of the file; None if it is empty."""
+        return Card(*self._cards[-1]) if self._cards else None
+
+    def take(self) -> Card | None:
+        """The next card; None at the end of the file or when findings are closed."""
+        if self.at_end or self.findings.closed:
+            return None
+        self.position += 1
+        return Card(*self._cards[self.position - 1])
+
+    def take_filled(self) -> Card | None:
+        """The next card that is not blank, or None as in :meth:`take`."""
+        while not self.at_end and not self._cards[self.position][1].strip():
+            self.position += 1
+        while (card := self.take()) is not None and card.is_blank:
+            pass
+        return card
+
+    def give_back(self) -> None:
+        """Return the last card to the stream."""
+        self.position -= 1
+
+    def peek(self) -> Card | None:
+        """The next card as :meth:`take` gives it, which stays in the stream."""
+        if (card := self.take()) is not None:
+            self.give_back()
+        return card
+
+    def take_data(self) -> Card | None:
+        """The next card; None where that is a keyword card, which stays, or as in :meth:`take`."""
+        card = self.take()
+        if card is None or not card.is_keyword:
+            return card
+        self.give_back()
+        return None
+
+    def text_since(self, position: int) -> str:
+        """Text of the cards taken since a position."""
+        return "\n".join(line.rstrip() for _, line in self._cards[position : self.position])
+
+    def skip_data(self) -> None:
+        """Skip cards up to the next keyword."""
+        while self.take_data() is not None:
+            pass
+
+    def row(self, card: Card, fields: Fields) -> tuple[list[Value], Source] | None:
+        """Values of a card and their source; None after an error, which is reported."""
+        values = read_values(card, fields, self.findings, blanks_are_zeros=self._blanks_are_zeros)
+        if values is None:
+            return None
+        if self._keeps_values:
+            self.read[card.line] = (fields, values)
+        return values, Source(card, fields)
+
+    def record(self, card: Card, kind: type[_R], fields: Fields | None = None) -> _R | None:
+        """Record of a card; None after an error, which is reported."""
+        row = self.row(card, fields or kind.fields)
+        return None if row is None else kind.from_row(*row)
+
+
+class SegmentReader:
+    """Reads segments of one problem."""
+
+    def __init__(self, stream: Stream, control: records.Control) -> None:
+        self._stream = stream
+        self._control = control
+        self.unsound: set[str] = set()  # keywords of segments with unreadable cards
+
+    def read(self, head: Card) -> Segment | None:
+        """Read the segment of a keyword card; None after an error."""
+        segment = READERS[head.keyword](self, head)
+        if segment is None:
+            self.unsound.add(head.keyword)
+        return segment
+
+    # Numbered cards up to a blank one ------------------------------------------------------------
+
+    def _records(self, head: Card, kind: type[_R], fields: Fields) -> tuple[_R, ...]:
+        """Records of numbered cards up to a blank card, or up to the last element's card."""
+        found: list[_R] = []
+        while (card := self._stream.take_data()) is not None and not card.is_blank:
+            if (record := self._stream.record(card, kind, fields)) is None:
+                self.unsound.add(head.keyword)
+            else:
+                found.append(record)
+        last = found[-1] if found else None
+        complete = isinstance(last, records.ElementNodes) and last.element >= self._control.numel
+        if card is None and not complete:
+            following = self._stream.peek()
+            message = f"The {head.keyword} cards are not ended by a blank card."
+            hint = f"put a blank card {'before this one' if following else 'at the end'}"
+            self._stream.findings.add("E007", message, (following or head).place, hint)
+        return tuple(found)
+
+    def _numbered(self, head: Card) -> Segment:
+        kind = NUMBERED[head.keyword]
+        cards = self._records(head, kind.record, kind.card_fields(self._control))
+        return kind(cards, source=Source(head, ()))
+
+    # Cards of a fixed number ---------------------------------------------------------------------
+
+    def _single(self, head: Card, kind: type[_R], fields: Fields | None = None) -> _R | None:
+        """Record of a mandatory card; None if it is missing or unreadable."""
+        card = self._stream.take_data()
+        if card is None and head.keyword not in self.unsound:
+            message = f"A card of {head.keyword} is missing."
+            hint = f"its fields are {', '.join(field.name for field in fields or kind.fields)}"
+            self._stream.findings.add("E008", message, (self._stream.peek() or head).place, hint)
+        record = None if card is None else self._stream.record(card, kind, fields)
+        if record is None:
+            self.unsound.add(head.keyword)
+        return record
+
+    def _patch(self, head: Card) -> Segment | None:
+        # The card begins with a word, but not with that of another segment.
+        card = self._stream.peek()
+        if card is not None and card.keyword not in (*READERS, END):
+            self._stream.take()
+            return self._stream.record(card, model.Patch)
+        message = "A card of PATC is missing."
+        hint = "a blank card takes a disc of 0.327 times the thickness at the node of ROD"
+        self._stream.findings.add("E008", message, (card or head).place, hint)
+        return None
+
+    def _allowables(self, head: Card) -> Segment | None:
+        strengths = self._single(head, model.Allowables)
+        card = self._stream.take_data()
+        row = None if card is None else self._stream.row(card, model.Allowables.constants)
+        if strengths is None or (card is not None and row is None):
+            return None
+        return strengths if row is None else strengths.with_constants(row[0])
+
+    def _shear(self, head: Card) -> Segment | None:
+        words = head.data.replace(",", " ").upper().split()[1:]
+        for word in words:
+            if word not in model.Shear.WORDS:
+                message = f"`{word}` after SHEA is unknown."
+                hint = "SHEA takes MITC (assumed strains) and EQUI (stiffness from equilibrium)"
+                self._stream.findings.add("E446", message, head.place, hint)
+        assumed, equilibrium = (word in words for word in model.Shear.WORDS)
+        following = self._stream.peek()
+        if words and (following is None or following.is_keyword or following.is_blank):
+            return model.Shear(1.0, assumed, equilibrium, source=Source(head, ()))
+        found = self._single(head, model.Shear)
+        return found and replace(found, assumed=assumed, equilibrium=equilibrium)
+
+    def _indentation(self, head: Card) -> Segment | None:
+        word = " ".join(head.data.replace(",", " ").split()[1:]).upper()
+        if word and word != model.Indentation.ACR:
+            message = f"`{word}` after EXPE is not read: the law is that of equation 3-8."
+            hint = "EXPE ACR takes the law of equation 3-7"
+            self._stream.findings.add("W416", message, head.place, hint)
+            word = ""
+        law = self._single(head, model.Indentation, model.Indentation.acr_fields if word else None)
+        return law and replace(law, word=word)
+
+    def _projectile(self, head: Card) -> Segment | None:
+        projectile = self._single(head, model.Projectile)
+        if projectile is None or not projectile.elements:
+            return projectile
+        diameters = self._records(head, records.RodDiameter, records.RodDiameter.fields)
+        return replace(projectile, diameters=diameters)
+
+    def _units(self, head: Card) -> Segment | None:
+        card = self._stream.take()
+        names = [] if card is None else card.data.replace(",", " ").split()
+        if card is not None and len(names) == len(model.Units.NAMES):
+            return model.Units(*names, source=Source(card, ()))
+        if card is not None and card.keyword in (*READERS, END):
+            self._stream.give_back()
+        message = "UNIT takes one card with three names: the units of length, force and time."
+        self._stream.findings.add("E010", message, (card or head).place, "for example: in lbf s")
+        return None
+
+    def _print_option(self, head: Card) -> Segment:
+        return model.PrintOption(head.keyword == "PRIN", source=Source(head, ()))
+
+    def _page(self, head: Card) -> Segment:
+        card = self._stream.take()
+        return model.Page("" if card is None else card.data[:4].rstrip(), source=Source(head, ()))
+
+    def _material(self, head: Card) -> Segment | None:
+        integration, ply = self._single(head, records.Integration), self._single(head, records.Ply)
+        layers = self._layers(head) if integration or ply else None
+        if integration is None or ply is None or layers is None:
+            return None
+        return model.Material(integration, ply, layers, source=Source(head, ()))
+
+    def _layers(self, head: Card) -> tuple[records.Layer, ...] | None:
+        """Layer cards, as many as the control card says; None if one is missing or unreadable."""
+        count = self._control.layers
+        layers: list[records.Layer] = []
+        for number in range(count):
+            card = self._stream.take_data()
+            if card is None or card.is_blank:
+                message = f"MATE has {number} layer cards where the control card says {count}."
+                place = (card or self._stream.peek() or head).place
+                self._stream.findings.add("E202", message, place)
+                return None
+            if (layer := self._stream.record(card, records.Layer)) is not None:
+                layers.append(layer)
+        return tuple(layers) if len(layers) == count else None
+
+
+NUMBERED: dict[str, type[model.NumberedSegment]] = {
+    kind.keyword: kind
+    for kind in (model.Coordinates, model.Elements, model.Boundary, model.Forces, model.Gages)
+}
+# Readers of the segments, by keyword.
+READERS: dict[str, Callable[[SegmentReader, Card], Segment | None]] = {
+    "COOR": SegmentReader._numbered,
+    "ELEM": SegmentReader._numbered,
+    "BOUN": SegmentReader._numbered,
+    "MATE": SegmentReader._material,
+    "ROD": lambda reader, head: reader._single(head, model.Impact),
+    "EXPE": SegmentReader._indentation,
+    "FORC": SegmentReader._numbered,
+    "PROJ": SegmentReader._projectile,
+    "SHEA": SegmentReader._shear,
+    "PATC": SegmentReader._patch,
+    "ALLO": SegmentReader._allowables,
+    "DELA": lambda reader, head: reader._single(head, model.Delamination),
+    "DAMP": lambda reader, head: reader._single(head, model.Damping),
+    "GAGE": SegmentReader._numbered,
+    "UNIT": SegmentReader._units,
+    "PRIN": SegmentReader._print_option,
+    "NOPR": SegmentReader._print_option,
+    "PAGE": SegmentReader._page,
+}
 
 
 class Reader:
@@ -126,33 +383,33 @@ class Reader:
 
     # Control card --------------------------------------------------------------------------------
 
-    def _control(self, title: Card) -> Control | None:
+    def _control(self, title: Card) -> records.Control | None:
         """Read the control card; None if it is missing or invalid."""
         card = self.stream.take_data()
         if card is None:
             place = (self.stream.peek() or title).place
             self.findings.add("E003", "The control card is missing.", place, CONTROL_CARD)
             return None
-        control = self.stream.record(card, Control)
+        control = self.stream.record(card, records.Control)
         return control if control and self._is_sound(control) else None
 
-    def _is_sound(self, control: Control) -> bool:
+    def _is_sound(self, control: records.Control) -> bool:
         """Whether counts and dimensions are valid; report those that are not."""
         before = len(self.findings)
         if control.nen == 0:
-            named = zip(Control.fields, control.row(), strict=True)
+            named = zip(records.Control.fields, control.row(), strict=True)
             missing = [field.name for field, value in named if not value]
             verb = "is" if len(missing) == 1 else "are"
             message = f"{', '.join(missing)} {verb} missing on the control card."
             self.findings.add("E201", message, control.place(missing[0]), CONTROL_CARD)
             return False
-        low, high = NODES_AN_ELEMENT
+        low, high = records.NODES_AN_ELEMENT
         for name, value, least, most, hint in (
             ("NUMNP", control.numnp, 1, MOST, ""),
             ("NUMEL", control.numel, 1, MOST, ""),
             ("LAYER", control.layers, 1, MOST_LAYERS, ""),
             ("NDM", control.ndm, 2, 2, "the plate lies in 2 dimensions"),
-            ("NDF", control.ndf, 5, 5, f"a node has the dofs {', '.join(DOF_NAMES)}"),
+            ("NDF", control.ndf, 5, 5, f"a node has the dofs {', '.join(records.DOF_NAMES)}"),
             ("NEN", control.nen, low, high, "nodes per element"),
         ):
             if not least <= value <= most:
@@ -172,7 +429,7 @@ class Reader:
 
     # Mesh and data -------------------------------------------------------------------------------
 
-    def _mesh_and_data(self, title: Card, control: Control | None) -> list[Segment]:
+    def _mesh_and_data(self, title: Card, control: records.Control | None) -> list[Segment]:
         """Read the segments up to their END."""
         segments: list[Segment] = []
         reader = None if control is None else SegmentReader(self.stream, control)
@@ -226,7 +483,7 @@ class Reader:
 
     # Macro program -------------------------------------------------------------------------------
 
-    def _program(self, title: Card) -> list[Macro]:
+    def _program(self, title: Card) -> list[records.Macro]:
         """Read the macro program from its MACR card to its END."""
         while (card := self.stream.take_filled()) is not None:
             if card.keyword == MACROS:
@@ -247,8 +504,8 @@ class Reader:
         self._unsound.add(MACROS)
         return []
 
-    def _macros(self, head: Card) -> list[Macro]:
-        macros: list[Macro] = []
+    def _macros(self, head: Card) -> list[records.Macro]:
+        macros: list[records.Macro] = []
         card: Card | None = head
         while (card := self.stream.take_filled()) is not None:
             if card.keyword == END:
@@ -260,20 +517,22 @@ class Reader:
                 self._end(f"The macro program has more than {MOST_MACRO_CARDS} cards.", card)
                 break
             short = _leaves_out_second_word(card)
-            row = self.stream.row(card, Macro.short_fields if short else Macro.fields)
+            row = self.stream.row(
+                card, records.Macro.short_fields if short else records.Macro.fields
+            )
             if row is None:
                 self._unsound.add(MACROS)
             else:
                 (word, *option, value, second), source = row
                 name, text = str(word).strip().upper(), "".join(map(str, option)).strip().upper()
-                macros.append(Macro(name, text, float(value), float(second), source=source))
+                macros.append(records.Macro(name, text, float(value), float(second), source=source))
         self.findings.add("E004", "The macro program is not ended by END.", (card or head).place)
         self._unsound.add(MACROS)
         return macros
 
-    def _tables(self, macros: list[Macro]) -> list[LoadTable]:
+    def _tables(self, macros: list[records.Macro]) -> list[records.LoadTable]:
         """Read the cards of proportional loads, one for each PROP with a number."""
-        tables: list[LoadTable] = []
+        tables: list[records.LoadTable] = []
         for macro in macros:
             if macro.word != "PROP" or macro.value <= 0:
                 continue
@@ -283,7 +542,7 @@ class Reader:
                 hint = "(2I5,7F10.0): type, exponent, t_min, t_max, A1 to A5"
                 self.findings.add("E011", message, macro.place("macro"), hint)
                 break
-            if (table := self.stream.record(card, LoadTable)) is None:
+            if (table := self.stream.record(card, records.LoadTable)) is None:
                 self._unsound.add(MACROS)
             else:
                 tables.append(table)

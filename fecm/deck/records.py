@@ -27,12 +27,9 @@ def load_factor(table: LoadTable, clock: float) -> float:
 
 # Smallest and largest number of nodes per element.
 NODES_AN_ELEMENT = (3, 12)
-
 # Floats represent every integer below this number.
 EXACT = 2**53
-
 AXES = ("x", "y", "z")
-
 DOF_NAMES = ("u", "v", "w", "theta_x", "theta_y")
 
 

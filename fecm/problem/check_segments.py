@@ -104,10 +104,8 @@ def check_projectile(projectile: model.Projectile, findings: Findings) -> None:
         findings.add("E422", message, projectile.place("number of rod elements"), hint)
     for record in projectile.diameters:
         if not record.diameter > 0.0:
-            findings.add(
-                "E422", f"The diameter of rod element {record.element} is {record.diameter:g}; it "
-                "must be positive.", record.place("diameter"),
-            )  # fmt: skip
+            what = f"The diameter of rod element {record.element} is {record.diameter:g}"
+            findings.add("E422", f"{what}; it must be positive.", record.place("diameter"))
     if findings.error_count == before and not _is_computable(projectile, diameters):
         message = "The rod's mass or stiffness is beyond the range of numbers."
         hint = "check the units of length, diameters, modulus and density"
@@ -129,10 +127,8 @@ def check_gages(segment: model.Gages, mesh: Mesh, deck: model.Deck, findings: Fi
     """Check a GAGE segment on a mesh without errors."""
     count = len(segment.records)
     if count > MOST_GAGES or count * len(mesh.elements) > MOST_GAGE_PAIRS:
-        message = (
-            f"{count} gages on {len(mesh.elements)} elements are too many: at most {MOST_GAGES} "
-            f"gages and {MOST_GAGE_PAIRS:.0e} pairs of gage and element are allowed."
-        )
+        most = f"{MOST_GAGES} gages and {MOST_GAGE_PAIRS:.0e} pairs of gage and element are allowed"
+        message = f"{count} gages on {len(mesh.elements)} elements are too many: at most {most}."
         findings.add("E012", message, segment.place())
         return
     families = element_groups.element_blocks(mesh.elements, mesh.coordinates)
@@ -149,11 +145,9 @@ def check_gages(segment: model.Gages, mesh: Mesh, deck: model.Deck, findings: Fi
         material = deck.last(model.Material)
         half = 0.0 if material is None else material.integration.thickness / 2.0
         if material is not None and abs(record.z) > half * (1.0 + 1e-9):
-            findings.add(
-                "W426",
-                f"Gage {record.number} at z = {record.z:g} is outside the laminate, whose faces "
-                f"are at {half:g} from the mid-plane.", record.place("gage's z"),
-            )  # fmt: skip
+            what = f"Gage {record.number} at z = {record.z:g} is outside the laminate"
+            message = f"{what}, whose faces are at {half:g} from the mid-plane."
+            findings.add("W426", message, record.place("gage's z"))
 
 
 def check_gages_under_force(problem: Problem, findings: Findings) -> None:
@@ -165,13 +159,11 @@ def check_gages_under_force(problem: Problem, findings: Findings) -> None:
     for record in segment.records:
         distance = float(np.hypot(record.x - x, record.y - y))
         if distance < problem.laminate.thickness * (1.0 - 1e-9):
-            findings.add(
-                "W452",
-                f"Gage {record.number} is {distance:.3g} from the impact node: strains at the "
-                "impact node of a point force depend on the mesh.", record.place("gage's x"),
-                f"put it at least the thickness {problem.laminate.thickness:.3g} away, or give the "
-                "contact force an area by a PATC segment",
-            )  # fmt: skip
+            what = f"Gage {record.number} is {distance:.3g} from the impact node"
+            why = "strains at the impact node of a point force depend on the mesh"
+            hint = f"put it at least the thickness {problem.laminate.thickness:.3g} away"
+            hint += ", or give the contact force an area by a PATC segment"
+            findings.add("W452", f"{what}: {why}.", record.place("gage's x"), hint)
 
 
 def check_shear_correction(segment: model.Shear, findings: Findings) -> None:
@@ -202,23 +194,20 @@ def warn_of_the_reports_rod(deck: model.Deck, findings: Findings) -> None:
 
 def check_law(law: model.Indentation, findings: Findings) -> None:
     """Check an EXPE segment."""
+    rules = [(law.k > 0.0, "positive")]
     if law.word == model.Indentation.ACR:
-        rules = (
-            (law.k > 0.0, "positive"),
+        power = law.q in (0.0, ACR_POWER)
+        rules += [
             (law.alpha_p > 0.0, "positive"),
             (law.s_p == 0.0, "blank or 0 with ACR, whose equation 3-7 has no such constant"),
-            (
-                law.q in (0.0, ACR_POWER),
-                "blank or 2.5 with ACR, as equation 3-7 holds for no other",
-            ),
-        )
+            (power, "blank or 2.5 with ACR, as equation 3-7 holds for no other"),
+        ]
     else:
-        rules = (
-            (law.k > 0.0, "positive"),
+        rules += [
             (law.alpha_p >= 0.0, "0 or more"),
             (0.0 <= law.s_p < 1.0, "at least 0 and below 1"),
             (law.q > 0.0, "positive"),
-        )
+        ]
     for name, value, (valid, rule) in zip(law.names(), law.values(), rules, strict=True):
         if not valid:
             findings.add("E412", f"The {name} is {value:g}; it must be {rule}.", law.place(name))
@@ -300,14 +289,14 @@ def check_resolution(problem: Problem, findings: Findings) -> None:
     if not coarse and (found.error is None or found.error < WORTH_SAYING):
         return
     about = "" if found.error is None else f": {said_error(found.error)}"
-    findings.add(
-        "W415",
-        f"The mesh is {'too coarse' if coarse else 'coarse'} at the impact node: "
-        f"{found.elements:.1f} elements of side {found.side:.3g} per bending wave of the contact's "
-        f"duration, which is {found.wave:.3g} long{about}.",
-        problem.deck.require(model.Impact).place("impact node"),
-        f"use {ENOUGH_PER_WAVE} elements per wave: sides up to {found.wave / ENOUGH_PER_WAVE:.2g}",
+    what = f"The mesh is {'too coarse' if coarse else 'coarse'} at the impact node"
+    sides = f"{found.elements:.1f} elements of side {found.side:.3g}"
+    wave = f"bending wave of the contact's duration, which is {found.wave:.3g} long"
+    hint = (
+        f"use {ENOUGH_PER_WAVE} elements per wave: sides up to {found.wave / ENOUGH_PER_WAVE:.2g}"
     )
+    place = problem.deck.require(model.Impact).place("impact node")
+    findings.add("W415", f"{what}: {sides} per {wave}{about}.", place, hint)
 
 
 def check_material(material: model.Material, findings: Findings) -> None:

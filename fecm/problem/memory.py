@@ -39,7 +39,6 @@ ROWS = 8
 TANGENT, SHIFTED = 300, 70
 # Bytes per step of the summary after a run.
 STEP = 80
-
 STATIC = {"TANG", "EIGE"}
 
 

@@ -19,7 +19,6 @@ from fecm.deck.model import Boundary, Coordinates, Elements
 from fecm.deck.records import ElementNodes, NodeValues
 
 Integers = NDArray[np.int_]
-
 # Kinds of cells by their number of nodes: meshio's name, which is that of the corners' number too.
 KINDS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
 LINES = ("vertex", "line", "line3")

@@ -120,7 +120,6 @@ def _check_segments(deck: model.Deck, unsound: set[str], findings: Findings) -> 
 LARGE_OUTPUT = 10**9
 # Fraction of the critical time step below which a step's change, of its square, is rounded off.
 LEAST_STEP = math.sqrt(sys.float_info.epsilon)
-
 UNSTABLE = "E508"
 
 

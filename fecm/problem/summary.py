@@ -25,10 +25,8 @@ def larger_steps(problem: Problem) -> list[str]:
         return []
     least = problem.safe_time_step  # known, and a few per cent below the critical one
     taken = f"{taken_time_step(least):.3g} {unit_of('time', unit_names(problem.deck))}".rstrip()
-    return [
-        f"time step         DT is at most {largest / least:.2f} of the critical one; DT 0 takes at "
-        f"least {taken}: {taken_time_step(least) / largest:.1f} times fewer steps"
-    ]
+    fewer = f"DT 0 takes at least {taken}: {taken_time_step(least) / largest:.1f} times fewer steps"
+    return [f"time step         DT is at most {largest / least:.2f} of the critical one; {fewer}"]
 
 
 class ProblemSummary:

@@ -132,7 +132,7 @@ def built(build: plan.Build, case: Case) -> LoadedDeck:
             raise TypeError(f"returned {type(deck).__name__}, not a Deck")
         prepared = load_deck(deck)
     except Exception as error:
-        raise CasesError(f"build: {_told(error)}") from error
+        raise CasesError(f"build: {told(error)}") from error
     if errors := prepared.errors():
         raise CasesError(errors[0].message)
     if not any(macro.word == "RODP" for macro in deck.macros):
@@ -148,7 +148,7 @@ def _measured(measure: plan.Measure, result: Result, case: Case) -> dict[str, ND
             raise TypeError(f"returned {type(found).__name__}, not numbers by name")
         values = {name: np.asarray(value) for name, value in found.items()}
     except Exception as error:
-        raise CasesError(f"measure: {_told(error)}") from error
+        raise CasesError(f"measure: {told(error)}") from error
     for name, value in values.items():
         fault = name_fault(name)
         if name in case or name == "dt":
@@ -160,7 +160,7 @@ def _measured(measure: plan.Measure, result: Result, case: Case) -> dict[str, ND
     return {name: value.astype(float)[None] for name, value in values.items()}
 
 
-def _told(error: Exception) -> str:
+def told(error: Exception) -> str:
     """Type and text of an exception in one line."""
     return f"{type(error).__name__}: {' '.join(str(error).split())}"
 
@@ -199,10 +199,8 @@ def _found(numbers: list[int], decks: list[Deck], force: float, runs: Runs) -> O
         for row in np.flatnonzero(~right):
             text = f"at velocity {velocity[row]:.6g}: {outcome.status[row]}"
             if fine[row]:
-                text = (
-                    f"no peak force of {force:.6g}: from velocity {velocity[row]:.6g} on it is "
-                    f"{peak[row]:.6g}, and below it jumps or the run ends before its peak"
-                )
+                text = f"from velocity {velocity[row]:.6g} on it is {peak[row]:.6g}, and below it"
+                text = f"no peak force of {force:.6g}: {text} jumps or the run ends before its peak"
             parts.append(Outcome.failed({outcome.numbers[row]: text}))
     return merge(parts)
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._tables import aligned
 from fecm._typing import Floats
 from fecm.deck.macros import flat
 from fecm.mechanics.time_step import taken_time_step
@@ -101,11 +102,6 @@ def table(cases: Mapping[str, NDArray[Any]], summary: Mapping[str, NDArray[Any]]
         limit = "" if math.isnan(one.limit) else f"{one.limit:.6g}"
         values = (f"{value:.6g}" for value in summary[name].tolist())
         rows.append([name, *values, order, limit, one.remark])
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(
-            text.ljust(w) if n in (0, len(row) - 1) else text.rjust(w)
-            for n, (text, w) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]
+    names, *numbers, remarks = zip(*rows, strict=True)
+    justified = ([text.rjust(max(map(len, column))) for text in column] for column in numbers)
+    return aligned(list(zip(names, *justified, remarks, strict=True)))

@@ -214,10 +214,10 @@ def _shared(deck: Deck) -> Runs:
     """The function that runs cases of a deck by one response of its plate."""
     problem = problem_of(deck)
     if not shares_plate(problem):
-        raise StudyError(
-            "identify needs impact steps (RODP) of one size, and a plate without FORC, EXCD, TANG, "
-            "FORM and SOLV"
+        needed = (
+            "impact steps (RODP) of one size, and a plate without FORC, EXCD, TANG, FORM and SOLV"
         )
+        raise StudyError(f"identify needs {needed}")
     return runs_of(problem)
 
 
@@ -237,10 +237,8 @@ def fit(
     first, width = _check(measured, clock, own[:, 0], units)
     if DELAY not in free and abs(first) > width:
         side = "after" if first > 0.0 else "before"
-        raise StudyError(
-            f"{measured.name}: the force rises {abs(first):.3g} {side} "
-            "that of the deck's own run; fit delay too, or shift the times"
-        )
+        text = f"the force rises {abs(first):.3g} {side} that of the deck's own run"
+        raise StudyError(f"{measured.name}: {text}; fit delay too, or shift the times")
     start = {name: first if name == DELAY else _start(deck, name) for name in free}
     # A value is start exp(x), or start + size x; x is between low and high.
     depth = (own.max() / deck.require(Indentation).k) ** (2.0 / 3.0)
@@ -250,10 +248,8 @@ def fit(
     inside = np.abs(measured.time - start.get(DELAY, 0.0)) <= clock[-1] * (1.0 + 1e-9)
     time, force = measured.time[inside], measured.force[inside]
     if len(time) < POINTS:
-        raise StudyError(
-            f"{measured.name} has {len(time)} points during the run of the deck; at least {POINTS} "
-            "are needed"
-        )
+        text = f"{len(time)} points during the run of the deck; at least {POINTS} are needed"
+        raise StudyError(f"{measured.name} has {text}")
     peak = float(force.max())
 
     def trial(x: Floats) -> dict[str, float]:
@@ -349,11 +345,9 @@ def _check(
     for dimension, found, expected in (("force", force.max(), peak), ("time", long, width)):
         if not 1.0 / OFF < found / expected < OFF:
             what = {"force": "peak force", "time": "time above half of the peak"}[dimension]
-            raise StudyError(
-                f"{name}: the {what} is {found:.3g}, that of the deck's own run {expected:.3g} "
-                f"{units.get(dimension, '')}".rstrip()
-                + f"; {_cause(dimension, found / expected, units)}"
-            )
+            unit, cause = units.get(dimension, ""), _cause(dimension, found / expected, units)
+            usual = f"that of the deck's own run {expected:.3g} {unit}".rstrip()
+            raise StudyError(f"{name}: the {what} is {found:.3g}, {usual}; {cause}")
     return first - begin, width
 
 
@@ -372,28 +366,21 @@ def _covariance(jac: Floats, variance: float, names: Sequence[str]) -> Floats:
     """Covariance of the scaled parameters; IdentifyError if the residual doesn't determine them."""
     columns = np.sqrt(np.sum(jac**2, axis=0))
     if idle := [n for n, c in zip(names, columns, strict=True) if c < NO_EFFECT * len(jac) ** 0.5]:
-        raise IdentifyError(
-            f"the force does not depend on {_listed(idle)} here (does the indentation reach "
-            f"alpha_p?); leave {'it' if len(idle) == 1 else 'them'} out of the free parameters"
-        )
+        text = f"the force does not depend on {_listed(idle)} here"
+        hint = f"leave {'it' if len(idle) == 1 else 'them'} out of the free parameters"
+        raise IdentifyError(f"{text} (does the indentation reach alpha_p?); {hint}")
     _, singular, right = np.linalg.svd(jac / columns, full_matrices=False)
     if singular[-1] < SINGULAR:
         both = [n for n, share in zip(names, right[-1], strict=True) if abs(share) > SHARE]
-        raise IdentifyError(
-            f"the force determines only a combination of {_listed(both)} (singular value "
-            f"{singular[-1]:.1g}); give one of them the known value in the deck and leave it out"
-        )
+        text = f"a combination of {_listed(both)} (singular value {singular[-1]:.1g})"
+        hint = "give one of them the known value in the deck and leave it out"
+        raise IdentifyError(f"the force determines only {text}; {hint}")
     root = right.T / singular / columns[:, None]
     covariance: Floats = variance * root @ root.T
-    if vague := [
-        f"{name} ({100.0 * error:.0f} %)"
-        for name, error in zip(names, np.sqrt(np.diagonal(covariance)), strict=True)
-        if error > 1.0
-    ]:
-        raise IdentifyError(
-            f"the measurement does not determine {_listed(vague)}: the standard error is above "
-            "100 %; give known values in the deck and leave them out"
-        )
+    errors = zip(names, np.sqrt(np.diagonal(covariance)), strict=True)
+    if vague := [f"{name} ({100.0 * error:.0f} %)" for name, error in errors if error > 1.0]:
+        hint = "the standard error is above 100 %; give known values in the deck and leave them out"
+        raise IdentifyError(f"the measurement does not determine {_listed(vague)}: {hint}")
     return covariance
 
 
@@ -415,17 +402,14 @@ def _notes(
             yield f"{name} is at its bound {found.values[name]:.6g}; its standard error is void"
     names = list(found.values)
     for i, j in zip(*np.nonzero(np.triu(np.abs(found.correlation) > CORRELATED, 1)), strict=True):
-        yield (
-            f"{names[i]} and {names[j]} have the correlation {found.correlation[i, j]:.4f}: their "
-            "values can hardly be told apart"
-        )
+        text = f"{names[i]} and {names[j]} have the correlation {found.correlation[i, j]:.4f}"
+        yield f"{text}: their values can hardly be told apart"
     e = found.residual
     near = float(e[1:] @ e[:-1] / (e @ e)) if e.any() else 0.0
     if near > COLOURED and found.share > FAINT:
-        yield (
-            f"neighbouring residuals have the correlation {near:.2f}: the model does not describe "
-            "the measurement down to its noise, and the standard errors are too small"
-        )
+        text = "the model does not describe the measurement down to its noise"
+        text += ", and the standard errors are too small"
+        yield f"neighbouring residuals have the correlation {near:.2f}: {text}"
     status = model.runs([0], [found.deck], True).status[0]
     if status not in RUN:
         yield f"the run of the fitted deck fails: {status}"

@@ -14,7 +14,6 @@ from fecm.results.metrics import COLUMNS, SUMMARY
 
 # Numbers of cases, and their contact forces, (cases, steps).
 Forces = tuple[Sequence[int], Floats | None]
-
 FINE = "ok"
 # The run ends during contact.
 STILL = "still in contact"

@@ -39,7 +39,6 @@ from fecm.sweeps.vary import Clock, apply_case, check_deck, clock_of
 
 Build = Callable[[dict[str, Any]], Deck]
 Measure = Callable[[Result], Mapping[str, float]]
-
 # Cases advanced together.
 TOGETHER = 2048
 # Bytes per step and case advanced together: above the measured value.

@@ -18,15 +18,8 @@ from fecm._tables import html_table
 from fecm._version import __version__
 from fecm.deck.model import Delamination
 from fecm.deck.units import unit_names, unit_of
+from fecm.results import schema
 from fecm.results.metrics import COLUMNS, FOUND, SUMMARY, THRESHOLD, described
-from fecm.results.schema import (
-    FORMAT_VERSION,
-    SWEEP,
-    Dataset,
-    ExportError,
-    ResultFileError,
-    declared_units,
-)
 from fecm.sweeps.cases import pair
 from fecm.sweeps.convergence import Convergence, convergence
 from fecm.sweeps.outcome import RUN, STILL, Forces, Outcome
@@ -396,7 +389,11 @@ def save(
     if forces is not None and len(result):
         columns.append((FORCE, None, "contact force after every step", "force"))
     with writing(path, overwrite=overwrite) as sink:
-        about = {"format": SWEEP, "format_version": FORMAT_VERSION, "fecm_version": __version__}
+        about = {
+            "format": schema.SWEEP,
+            "format_version": schema.FORMAT_VERSION,
+            "fecm_version": __version__,
+        }
         sink.attributes("", {**about, "title": result.title, **units})
         sink.text("deck", result.deck, "the cards of the deck that was varied")
         if result.random is not None:
@@ -407,7 +404,7 @@ def save(
         for name, values, text, dimension, *own in columns:
             if name == FORCE:
                 longest = int(result.steps.max())
-                made = Dataset(FORCE, ("cases", "steps"), text, dimension)
+                made = schema.Dataset(FORCE, ("cases", "steps"), text, dimension)
                 sink.create(made, (len(result), longest))
                 for numbers, force in forces or ():
                     _write_forces(sink, numbers, force, longest)
@@ -417,7 +414,7 @@ def save(
                 sink.text(name, values.tolist(), text, axes)
                 continue
             dtype = "i8" if values.dtype.kind in "iu" else "f8"
-            sink.create(Dataset(name, axes, text, dimension, dtype), values.shape)
+            sink.create(schema.Dataset(name, axes, text, dimension, dtype), values.shape)
             sink.write(name, 0, values)
         for group, text in GROUPS.items():
             sink.attributes(group, {"description": text})
@@ -447,7 +444,7 @@ def load(path: Path) -> SweepResult:
     """
     from fecm.results.hdf5_reader import read
 
-    return sweep_of(read(path, SWEEP))
+    return sweep_of(read(path, schema.SWEEP))
 
 
 def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
@@ -466,7 +463,7 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     cases, summary = group("cases/"), group("summary/")
     missing = [name for name in (*SUMMARY, "status") if name not in summary]
     if missing or "history/dt" not in contents or "history/steps" not in contents:
-        raise ResultFileError(f"{path}: the result of the sweep is incomplete")
+        raise schema.ResultFileError(f"{path}: the result of the sweep is incomplete")
     summary = {name: summary[name] for name in (*SUMMARY, "status")} | summary  # in their order
     count = np.shape(contents["history/dt"])[:1]
     rows = (*cases.values(), *summary.values(), contents["history/dt"], contents["history/steps"])
@@ -480,17 +477,17 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
         or not set(kinds.values()) <= set("fiu")
     ):
         message = f"{path}: the data of this sweep do not match in type or number of cases"
-        raise ResultFileError(message)
+        raise schema.ResultFileError(message)
     steps = contents["history/steps"]
     most = np.inf if shape is None else shape[1]
     if steps.dtype.kind not in "iu" or not ((steps >= 0) & (steps <= most)).all():
-        raise ResultFileError(f"{path}: history/steps does not match the stored steps")
+        raise schema.ResultFileError(f"{path}: history/steps does not match the stored steps")
     return SweepResult(
         cases, summary, contents["history/dt"], steps,
         contents.get("history/force") if history else None,
         unconverged_steps,
         contents.texts.get("deck", ""), str(contents.attributes.get("title", "")),
-        declared_units(contents.attributes),
+        schema.declared_units(contents.attributes),
         random_of(contents, cases, summary, count[0]),
     )  # fmt: skip
 
@@ -511,9 +508,9 @@ def csv_lines(sweep: SweepResult, name: str = CASES) -> Iterator[str]:
     forces.
     """
     if name not in (CASES, HISTORY):
-        raise ExportError(f"unknown table {name}; a sweep has {CASES} and {HISTORY}")
+        raise schema.ExportError(f"unknown table {name}; a sweep has {CASES} and {HISTORY}")
     if name == HISTORY and sweep.force is None:
-        raise ExportError("the sweep has no stored forces; run it again with --history")
+        raise schema.ExportError("the sweep has no stored forces; run it again with --history")
     rows = _case_rows(sweep) if name == CASES else _step_rows(sweep)
     echo: Any = SimpleNamespace(write=str)  # writerow returns what write returns
     writer = csv.writer(echo, lineterminator="\n")

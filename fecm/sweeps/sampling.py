@@ -138,10 +138,8 @@ def design_of(
 def doubt(design: Design) -> str:
     """What is doubtful about a design; empty if nothing is."""
     if design.kind == "sobol" and design.samples & (design.samples - 1):
-        return (
-            f"{design.samples} samples are no power of 2, which a Sobol' design needs to be "
-            f"balanced; take {2 ** round(math.log2(design.samples))}"
-        )
+        why = "no power of 2, which a Sobol' design needs to be balanced"
+        return f"{design.samples} samples are {why}; take {2 ** round(math.log2(design.samples))}"
     return ""
 
 
@@ -168,10 +166,8 @@ def matrix(design: Design) -> Floats:
     and for each name A with the column of B (Saltelli et al., 2010).  Raises CasesError if a value
     is beyond the range of numbers.
     """
-    count = len(design.laws)
-    unit = unit_samples(
-        design.kind, design.samples, count * (2 if design.sensitivity else 1), design.seed
-    )
+    count, halves = len(design.laws), 2 if design.sensitivity else 1
+    unit = unit_samples(design.kind, design.samples, count * halves, design.seed)
     values = np.empty_like(unit)
     for place, (name, law) in enumerate(design.laws.items()):
         with np.errstate(over="ignore"):
@@ -210,8 +206,6 @@ def cost(cases: Sequence[Case], design: Design, *, shared: bool) -> str:
     causes = [name for name in design.laws if name in PLATE]
     if not causes:
         return f"{cases_in_words} share {plates} plate{'s' * (plates > 1)}"
-    return (
-        f"{cases_in_words} need {plates} plates, because {' and '.join(causes)} "
-        f"{'is' if len(causes) == 1 else 'are'} random; velocity, k, alpha_p, s_p, q and the "
-        "projectile share one"
-    )
+    why = f"because {' and '.join(causes)} {'is' if len(causes) == 1 else 'are'} random"
+    others = "velocity, k, alpha_p, s_p, q and the projectile share one"
+    return f"{cases_in_words} need {plates} plates, {why}; {others}"

@@ -21,7 +21,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent import futures
-from contextlib import contextmanager
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from pickle import PicklingError
 from typing import Any
@@ -31,14 +31,13 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm._files import beside, packed
-from fecm.sweeps.batch import run
+from fecm.sweeps.batch import run, told
 from fecm.sweeps.outcome import Forces, Outcome
 from fecm.sweeps.plan import Task
 
 Done = Callable[[Task, Outcome], None]
 # Called regularly while workers run, to handle signals.
 Idle = Callable[[], None]
-
 # Deaths of workers without a finished task after which the remaining tasks count as lost.
 DEATHS = 3
 # Polling interval in seconds.
@@ -125,14 +124,14 @@ def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> Non
 
 def _check_address(address: str) -> None:
     """Reject an invalid address, or one where nothing listens."""
-    invalid = f"`{address}` is not the address of a Dask scheduler (tcp://host:8786)"
     try:
         url = urlsplit(address if "://" in address else f"tcp://{address}")
-        host, port = url.hostname, url.port
+        host, port = url.hostname or "", url.port or 0
+        if not (host and port):
+            raise ValueError
     except ValueError:
-        raise SchedulerError(invalid) from None
-    if not (host and port):
-        raise SchedulerError(invalid)
+        what = "is not the address of a Dask scheduler (tcp://host:8786)"
+        raise SchedulerError(f"`{address}` {what}") from None
     if url.scheme in ("tcp", "tls"):
         try:
             socket.create_connection((host, port), float(PATIENCE.rstrip("s"))).close()
@@ -140,12 +139,10 @@ def _check_address(address: str) -> None:
             raise SchedulerError(f"no Dask scheduler answers at {address} ({error})") from None
 
 
-@contextmanager
-def _client(scheduler: Any) -> Iterator[Any]:
-    """Client of a scheduler, closed at the end unless it is the caller's own."""
+def _client(scheduler: Any) -> Any:
+    """Context of a scheduler's client, which it closes unless that is the caller's own."""
     if hasattr(scheduler, "get_executor"):
-        yield scheduler
-        return
+        return nullcontext(scheduler)
     address = getattr(scheduler, "scheduler_address", scheduler)
     if not isinstance(address, str):
         message = f"scheduler is {scheduler!r}, not an address, a Dask client or a cluster"
@@ -157,14 +154,11 @@ def _client(scheduler: Any) -> Iterator[Any]:
     module: Any = distributed
     try:
         if hasattr(scheduler, "get_client"):
-            client = scheduler.get_client()
-        else:
-            _check_address(address)
-            client = module.Client(address, timeout=PATIENCE, set_as_default=False)
+            return scheduler.get_client()
+        _check_address(address)
+        return module.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, RuntimeError, TimeoutError) as error:
         raise SchedulerError(f"no Dask scheduler answers at {address} ({error})") from None
-    with client:
-        yield client
 
 
 def on_dask(tasks: Sequence[Task], scheduler: Any, done: Done, idle: Idle) -> None:
@@ -188,8 +182,7 @@ def on_executor(tasks: Sequence[Task], executor: futures.Executor, done: Done, i
         try:
             outcome = future.result()
         except Exception as error:
-            reason = f"{LOST} ({type(error).__name__}: {' '.join(str(error).split())})"
-            outcome = Outcome.failed(dict.fromkeys(task.numbers, reason))
+            outcome = Outcome.failed(dict.fromkeys(task.numbers, f"{LOST} ({told(error)})"))
         done(task, outcome)
 
 
@@ -224,12 +217,13 @@ class PartialResults:
 
     def __init__(self, result: Path, fingerprint: str, *, restart: bool = False) -> None:
         self.folder = result.with_name(f".{result.name}.parts")
-        mark = self.folder / MARK
-        if self.folder.exists() and _mark(mark) != fingerprint:
+        mark, found = self.folder / MARK, ""
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            found = str(json.loads(mark.read_text())["fingerprint"])
+        if self.folder.exists() and found != fingerprint:
             if not restart:
-                raise OtherSweepError(
-                    f"{self.folder} holds the outcomes of another sweep; --overwrite deletes them"
-                )
+                text = "holds the outcomes of another sweep; --overwrite deletes them"
+                raise OtherSweepError(f"{self.folder} {text}")
             shutil.rmtree(self.folder)
         self.folder.mkdir(exist_ok=True)
         with beside(mark) as partial:
@@ -276,10 +270,3 @@ class PartialResults:
     def clear(self) -> None:
         """Delete the folder."""
         shutil.rmtree(self.folder, ignore_errors=True)
-
-
-def _mark(path: Path) -> str:
-    try:
-        return str(json.loads(path.read_text())["fingerprint"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -107,13 +107,9 @@ def _free_in_plane(deck: model.Deck) -> model.Deck:
         w = record.codes[2]
         return replace(record, codes=(w, w, *record.codes[2:]), source=None)
 
-    segments = tuple(
-        replace(s, records=tuple(map(freed, s.records)), source=None)
-        if isinstance(s, model.Boundary)
-        else s
-        for s in deck.segments
-    )
-    return replace(deck, segments=segments)
+    for old in boundaries:
+        deck = _swap(deck, old, replace(old, records=tuple(map(freed, old.records)), source=None))
+    return deck
 
 
 def _swap(deck: model.Deck, old: model.Segment | None, new: model.Segment) -> model.Deck:
@@ -172,10 +168,8 @@ def _radius(deck: model.Deck, name: str, value: Value) -> model.Deck:
     """Change k to that of a steel sphere on the laminate of the deck."""
     unit = in_si(MODULUS, unit_names(deck))
     if unit is None:
-        raise CasesError(
-            "radius: the modulus of steel needs the units of the deck; add a UNIT segment, or vary "
-            "k instead"
-        )
+        hint = "add a UNIT segment, or vary k instead"
+        raise CasesError(f"radius: the modulus of steel needs the units of the deck; {hint}")
     steel = E_S * (in_si(MODULUS, SYSTEMS[STANDARD]) or 1.0) / unit
     try:
         modulus = _indentation_modulus(deck.require(model.Material))
@@ -362,19 +356,16 @@ def with_time_step(
 
     Raises CasesError if whole numbers of passes miss the duration by a step and by 1 %.
     """
-    loops = _innermost_loops(deck.macros)
+    walked = list(_walk(deck.macros, taken))
     before, _ = _duration(deck.macros, taken)
     share = 1.0 if duration is None or not before else duration / before
     ratios: dict[int, float] = {}
-    now = 0.0
-    for macro, loop in zip(deck.macros, loops, strict=True):
-        if macro.word == "DT":
-            now = macro.value or taken
-        elif macro.word in STEPS and loop is not None and now > 0.0 and (dt is None or dt > 0.0):
+    for macro, loop, _, now in walked:
+        if macro.word in STEPS and loop is not None and now > 0.0 and (dt is None or dt > 0.0):
             ratios[loop] = share * (1.0 if dt is None else now / dt)
 
     def changed(place: int, macro: Macro) -> Macro:
-        loop = loops[place]
+        loop = walked[place][1]
         if macro.word == "DT" and dt is not None:
             return replace(macro, value=dt, source=None)
         if macro.word == "LOOP" and place in ratios:
@@ -388,36 +379,30 @@ def with_time_step(
     macros = tuple(changed(place, macro) for place, macro in enumerate(deck.macros))
     wanted, (made, step) = share * before, _duration(macros, taken)
     if ratios and abs(made - wanted) > max(0.01 * wanted, step):
-        raise CasesError(
-            f"the loops of the deck give the duration {made:.6g} instead of {wanted:.6g}; take all "
-            "steps in one loop"
-        )
+        text = f"the loops of the deck give the duration {made:.6g} instead of {wanted:.6g}"
+        raise CasesError(f"{text}; take all steps in one loop")
     return replace(deck, macros=macros)
 
 
 def _duration(macros: Sequence[Macro], taken: float) -> tuple[float, float]:
     """Time of all steps of a program, and its largest time step."""
-    passes, total, now, largest = [1.0], 0.0, 0.0, 0.0
-    for macro in macros:
-        if macro.word == "LOOP":
-            passes.append(passes[-1] * max(1.0, macro.value))
-        elif macro.word == "NEXT" and len(passes) > 1:
-            passes.pop()
+    steps = [(passes, now) for macro, _, passes, now in _walk(macros, taken) if macro.word in STEPS]
+    total = sum(passes * now for passes, now in steps)
+    return total, max((now for _, now in steps), default=0.0)
+
+
+def _walk(
+    macros: Sequence[Macro], taken: float
+) -> Iterator[tuple[Macro, int | None, float, float]]:
+    """Each macro, the place of the innermost LOOP around it, its passes and the time step."""
+    loops: list[tuple[int, float]] = []  # place and passes of the open ones
+    now = 0.0
+    for place, macro in enumerate(macros):
+        if macro.word == "NEXT" and loops:
+            loops.pop()
         elif macro.word == "DT":
             now = macro.value or taken
-        elif macro.word in STEPS:
-            total, largest = total + passes[-1] * now, max(largest, now)
-    return total, largest
-
-
-def _innermost_loops(macros: Sequence[Macro]) -> list[int | None]:
-    """Place of the innermost LOOP around each macro."""
-    open_loops: list[int] = []
-    found: list[int | None] = []
-    for place, macro in enumerate(macros):
-        if macro.word == "NEXT" and open_loops:
-            open_loops.pop()
-        found.append(open_loops[-1] if open_loops else None)
+        loop, passes = loops[-1] if loops else (None, 1.0)
+        yield macro, loop, passes, now
         if macro.word == "LOOP":
-            open_loops.append(place)
-    return found
+            loops.append((place, passes * max(1.0, macro.value)))
