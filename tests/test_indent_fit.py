@@ -7,10 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fecm.studies.indentation_test.constants import Fit, fit
-from fecm.studies.indentation_test.curves import Estimate
-from fecm.studies.indentation_test.cycles import divide
-from fecm.studies.indentation_test.report import notes
+from fecm.studies.indentation_test.constants import Fit, fit, notes
+from fecm.studies.indentation_test.curves import Estimate, divide
 from tests.indentation_tests import (
     ALPHA_P,
     PEAKS,

@@ -40,10 +40,10 @@ from fecm.mechanics.contact_law import (
 from fecm.problem.build import build_constants
 from fecm.problem.check_segments import check_law
 from fecm.studies import StudyError
+from fecm.studies.indentation_test.constants import card, lines, notes, plain
 from fecm.studies.indentation_test.constants import fit as fitted
 from fecm.studies.indentation_test.curves import LIMITS_Q
 from fecm.studies.indentation_test.modulus import effective_stiffness, indentation_modulus
-from fecm.studies.indentation_test.report import card, lines, notes, plain
 from fecm.studies.indentation_test.table import Test, read_test
 
 

@@ -22,7 +22,7 @@ from fecm.plot.style import (
     styled,
 )
 from fecm.studies.indentation_test.constants import Fit
-from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING
+from fecm.studies.indentation_test.curves import FALLING, LOADING, RISING
 
 LOOKS = {
     LOADING: (COLOURS[0], "first loading"),

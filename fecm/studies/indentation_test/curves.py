@@ -1,4 +1,7 @@
-"""Least squares fit of the curves of an indentation test, with the covariance of all parameters.
+"""Turning points of an indentation test, and least squares fits of the curves between them.
+
+A stretch is a run of points between two turns.  A turn is a point from which the path retreats by
+more than a threshold above its noise.  Points within the noise of a turn belong to no stretch.
 
 k follows from the first loading (equation 3-1 with n = 3/2).  With this k, one fit of all unloading
 and reloading curves (equations 3-3 and 3-11) gives the power q, the peak alpha_m and the permanent
@@ -13,8 +16,10 @@ k.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +28,190 @@ from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.mechanics.contact_law import LOADING_POWER, power_curve
 from fecm.studies import StudyError
-from fecm.studies.indentation_test.cycles import FALLING, LOADING, RISING, Division
+
+Ints = NDArray[np.int64]
+
+# Threshold of a turn: fraction of the range of the path, or standard deviations of its noise.
+LEAST_RETREAT = 0.02
+QUIET = 8.0
+# Standard deviations of a smoothed point within which its neighbours may be the turn.
+GUARD = 2.0
+# Noise below this fraction of a step reverses no step.
+NEGLIGIBLE = 0.1
+
+
+@frozen
+class Path:
+    """Moving mean of measured indentations, and their noise."""
+
+    smooth: Floats  # (n,), length
+    noise: float  # standard deviation of a smoothed point; 0 if noise reverses no step
+    reach: int  # points of the moving mean on either side
+
+    @property
+    def range(self) -> float:
+        """Largest minus smallest indentation (length)."""
+        return float(np.ptp(self.smooth))
+
+
+def smoothed(indentation: Floats) -> Path:
+    """Estimate the noise of a path, and smooth it only as much as needed to find its turns.
+
+    Third differences of a path without noise are almost zero; their median gives the noise.  A
+    moving mean over w points divides the noise by sqrt(w) and cuts off about w/4 steps at a turn; w
+    balances both.
+    """
+    n = len(indentation)
+    if n < 5:
+        return Path(indentation, 0.0, 0)
+    noise = float(np.median(np.abs(np.diff(indentation, 3)))) / (0.6745 * math.sqrt(20.0))
+    rough = _moving_mean(indentation, max(1, n // 200))
+    step = float(np.abs(np.diff(rough)).sum()) / (n - 1)
+    if noise <= NEGLIGIBLE * step:
+        return Path(indentation, 0.0, 0)
+    reach = max(1, round((4.0 * noise / step) ** (2.0 / 3.0) / 2.0))
+    reach = min(reach, n // 50 + 1)
+    return Path(_moving_mean(indentation, reach), noise / math.sqrt(2 * reach + 1), reach)
+
+
+def _moving_mean(values: Floats, reach: int) -> Floats:
+    """Mean of each point and up to `reach` neighbours on either side."""
+    sums = np.concatenate([[0.0], np.cumsum(values)])
+    n = np.arange(len(values))
+    first, last = np.maximum(n - reach, 0), np.minimum(n + reach + 1, len(values))
+    return np.asarray((sums[last] - sums[first]) / (last - first))
+
+
+def turns(path: Path, retreat: float) -> list[int]:
+    """Find points from which the path retreats by more than `retreat`, and the first and last."""
+    s = path.smooth
+    found, high, low, direction = [0], 0, 0, 0
+    for i in range(1, len(s)):
+        if s[i] > s[high]:
+            high = i
+        if s[i] < s[low]:
+            low = i
+        if direction >= 0 and s[high] - s[i] > retreat:
+            if direction:
+                found.append(high)
+            direction, low = -1, i
+        elif direction <= 0 and s[i] - s[low] > retreat:
+            if direction:
+                found.append(low)
+            direction, high = 1, i
+    if found[-1] != len(s) - 1:
+        found.append(len(s) - 1)
+    return found
+
+
+LOADING, FALLING, RISING = "loading", "unloading", "reloading"
+
+
+@frozen
+class Stretch:
+    """Points on one curve."""
+
+    kind: str  # LOADING, FALLING or RISING
+    cycle: int  # number of the last peak, from 0; of LOADING, of the next peak
+    rows: Ints  # numbers of the points
+    # Of FALLING, the corner at which it begins: the peak of its cycle, or a turn during reloading.
+    begin: int = -1
+    turn: float = 0.0  # of RISING, the recorded indentation at its beginning
+
+
+@frozen
+class Corner:
+    """An upper turn."""
+
+    indentation: float  # largest value of the smoothed path near the turn
+    cycle: int
+    is_peak: bool  # whether it is on the first loading curve
+    rise: int = -1  # otherwise, the number of the RISING stretch that ends there
+
+
+@frozen
+class Division:
+    """A test divided into stretches."""
+
+    path: Path
+    stretches: tuple[Stretch, ...]
+    corners: tuple[Corner, ...]
+
+    @property
+    def peaks(self) -> list[int]:
+        """Corners that are peaks, one per cycle."""
+        return [n for n, corner in enumerate(self.corners) if corner.is_peak]
+
+    def rows(self, kind: str) -> Ints:
+        """Return the points of all stretches of a kind."""
+        parts = [s.rows for s in self.stretches if s.kind == kind]
+        return np.concatenate([np.empty(0, dtype=np.int64), *parts])
+
+
+def divide(indentation: Floats, retreat: float | None = None) -> Division:
+    """Divide a test into stretches on the curves of the law.
+
+    A retreat of the path counts as a turn; by default if it exceeds 2 % of the range of the path
+    and eight standard deviations of its noise.
+    """
+    path = smoothed(indentation)
+    if path.range <= 0.0:
+        raise StudyError("the indentation never changes")
+    if retreat is None:
+        retreat = max(LEAST_RETREAT * path.range, QUIET * path.noise)
+    if retreat >= path.range:
+        raise StudyError(f"the range of the path is below the threshold of a turn ({retreat:g})")
+    found = turns(path, retreat)
+    s = path.smooth
+    if s[found[1]] <= s[0]:
+        raise StudyError("the test begins with unloading; it must begin with the first loading")
+    near = max(retreat / 2.0, 4.0 * path.noise)  # peaks within this distance are one
+    stretches: list[Stretch] = []
+    corners: list[Corner] = []
+    cycle = begin = -1
+    peak = -math.inf
+    for first, end in pairwise(found):
+        ends_in_turn = end != found[-1]
+        rows, top = _between(path, first, end, ends_in_turn), float(s[end])
+        if top <= s[first]:
+            stretches.append(Stretch(FALLING, cycle, rows, begin))
+            continue
+        if cycle >= 0:
+            below = rows[s[rows] <= peak]
+            stretches.append(Stretch(RISING, cycle, below, turn=float(s[first])))
+        rise = len(stretches) - 1
+        if top > peak + near:  # a rise continues on the first loading curve beyond the peak
+            stretches.append(Stretch(LOADING, cycle + 1, rows[s[rows] > peak]))
+            if ends_in_turn:
+                cycle, peak, begin = cycle + 1, top, len(corners)
+                corners.append(Corner(top, cycle, True))
+        elif ends_in_turn and top < peak - near:
+            begin = len(corners)
+            corners.append(Corner(top, cycle, False, rise))
+        elif ends_in_turn:
+            begin = max(n for n, corner in enumerate(corners) if corner.is_peak)
+    return Division(path, tuple(stretches), tuple(corners))
+
+
+def _between(path: Path, first: int, end: int, ends_in_turn: bool) -> Ints:
+    """Return the points between two turns, without the turns and points too close to them.
+
+    The point at a turn may have been recorded before or after it.
+    """
+    begin = first + 1 if first else 0
+    rows: Ints = np.arange(begin, end if ends_in_turn else end + 1, dtype=np.int64)
+    if not path.noise:
+        return rows
+    s, guard = path.smooth, GUARD * path.noise
+    keep = np.full(len(rows), True)
+    if first:
+        keep &= (np.abs(s[rows] - s[first]) > guard) & (rows > first + path.reach)
+    if ends_in_turn:
+        keep &= (np.abs(s[rows] - s[end]) > guard) & (rows < end - path.reach)
+    return np.asarray(rows[keep])
+
+
+# Curves ------------------------------------------------------------------------------------------
 
 
 @frozen
@@ -51,8 +239,6 @@ def influence(jacobian: Floats, residual: Floats) -> tuple[Floats, Floats]:
     leverage = np.clip(np.einsum("ij,ji->i", jacobian, inverse), 0.0, 0.999)
     return inverse, inverse * (residual / np.sqrt(1.0 - leverage))
 
-
-Ints = NDArray[np.int64]
 
 # Bounds of the unloading power.
 LIMITS_Q = (0.3, 12.0)
