@@ -115,7 +115,8 @@ def run_one(
     >>> print(f"{result.force.max():.2f} lb")
     86.20 lb
     """
-    choices = _options(mode, slips, solver, threads, rod_mass, rod_integrator, energy_limit, law)
+    rod = RodMethod(rod_mass, rod_integrator)
+    choices = RunOptions(active_slips(mode, slips), solver, threads, rod, energy_limit, law)
     return _run(deck, mode, force, choices, output, progress, one=True)[0]
 
 
@@ -193,17 +194,10 @@ def run(
     >>> print(f"{result.force.max():.2f} lb")
     6.19 lb
     """
-    choices = _options(mode, slips, solver, threads, rod_mass, rod_integrator, energy_limit, law)
+    rod = RodMethod(rod_mass, rod_integrator)
+    choices = RunOptions(active_slips(mode, slips), solver, threads, rod, energy_limit, law)
     results = _run(deck, mode, force, choices, output, progress, one=False)
     return results[0] if len(results) == 1 else results
-
-
-def _options(
-    mode: str, slips: Iterable[str], solver: str, threads: int, mass: str, integrator: str,
-    energy_limit: float, law: Law | None,
-) -> RunOptions:  # fmt: skip
-    rod = RodMethod(mass, integrator)
-    return RunOptions(active_slips(mode, slips), solver, threads, rod, energy_limit, law)
 
 
 def _check_one(found: Sequence[object]) -> None:

@@ -44,10 +44,8 @@ from fecm.problem.plate_mesh import (
 from fecm.studies import StudyError
 from fecm.studies.indentation_test.modulus import effective_stiffness, indentation_modulus
 
-# Most elements in one direction, and in all.
-MOST, MOST_ELEMENTS = 2000, 500_000
-# Least radius of a patch to which a mesh is refined, over the plate's side.
-LEAST_RADIUS = 1e-3
+MOST, MOST_ELEMENTS = 2000, 500_000  # most elements in one direction, and in all
+LEAST_RADIUS = 1e-3  # least radius of a patch to which a mesh is refined, over the plate's side
 # Elements of the window where the mesh does not give them, and their grading.
 WINDOW_MESH, WINDOW_GRADING = (20, 12), 3.0
 # Units of the standards; Young's modulus and Poisson's ratio of steel in them.

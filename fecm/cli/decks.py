@@ -263,8 +263,8 @@ def fmt(decks: tuple[Path, ...], output: Path | None, only_check: bool, overwrit
         raise click.UsageError("-o takes one DECK")
 
     def one(deck: Path) -> None:
-        target = deck if output is None or _same(output, deck) else output
-        in_place = target is deck
+        in_place = output is None or (output.exists() and deck.exists() and output.samefile(deck))
+        target = deck if output is None or in_place else output
         if not only_check and str(target) != "-":
             check_outputs([target], overwrite or in_place, [] if in_place else [deck])
         before, source = load_text(_input(deck))
@@ -283,8 +283,3 @@ def fmt(decks: tuple[Path, ...], output: Path | None, only_check: bool, overwrit
             write_text(target, after, overwrite=overwrite or in_place)
 
     _each(decks, one)
-
-
-def _same(one: Path, other: Path) -> bool:
-    """Whether two paths lead to one file."""
-    return one.exists() and other.exists() and one.samefile(other)

@@ -17,8 +17,7 @@ from fecm.mechanics.laminate import Laminate
 from fecm.problem.build import laminate_of
 from fecm.problem.check_segments import check_material
 
-# Key of the plies of --materials among the values of a context.
-_META = "fecm.plies"
+_META = "fecm.plies"  # key of the plies of --materials among the values of a context
 
 PLIES = file_of(read_plies)
 

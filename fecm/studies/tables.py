@@ -22,10 +22,8 @@ from fecm.studies import StudyError
 
 Row = tuple[int, list[str]]
 
-# A number with a decimal comma.
-_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
-# A name followed by its unit in brackets.
-_UNIT = re.compile(r"[^(\[]*[(\[]([^)\]]*)[)\]]")
+_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")  # a number with a decimal comma
+_UNIT = re.compile(r"[^(\[]*[(\[]([^)\]]*)[)\]]")  # a name followed by its unit in brackets
 
 
 @frozen

@@ -270,8 +270,7 @@ def _in_order(share: Floats) -> NDArray[np.intp]:
 # The squares of the five normal velocities are the eigenvalues of M^-1 L(n).  As functions of the
 # normal they form sheets; sheets that cross are identified by their modes.
 
-# Relative tolerance of equal squared velocities.
-EQUAL = 1e-10
+EQUAL = 1e-10  # relative tolerance of equal squared velocities
 # Squared scalar product above which one mode continues another; smallest step of the normal
 # (degrees).
 SURE, FINEST = 0.8, 1e-9
@@ -446,8 +445,7 @@ def _split(basis: Floats, operators: Sequence[Floats], limit: float) -> list[Flo
 # Names of the fronts, by their dominant component: u_n, u_t, phi_n, phi_t, w.
 FRONTS = ("extension", "in_plane_shear", "bending", "twisting", "transverse_shear")
 
-# Steps per degree for tracking sheets and searching cusps.
-STEPS = 10
+STEPS = 10  # steps per degree for tracking sheets and searching cusps
 
 
 @frozen

@@ -78,8 +78,7 @@ def free_power(curves: Curves) -> FreePower:
 # Both coordinates of a cycle have errors, which are correlated with each other and with those of
 # other cycles; the fit is by generalised least squares with the complete covariance.
 
-# Iterations of the weights, which depend on the slope.
-ROUNDS = 20
+ROUNDS = 20  # iterations of the weights, which depend on the slope
 # Probability below which the scatter about the line exceeds the noise of the points.
 UNLIKELY = 0.01
 # Smallest error of a coordinate relative to the largest indentation, for tests without noise.
@@ -190,8 +189,7 @@ def critical(peaks: Floats, permanents: Floats, covariance: Floats) -> Critical:
 
 # The whole test ---------------------------------------------------------------------------------
 
-# Largest number whose powers are finite.
-LARGEST = 1e60
+LARGEST = 1e60  # largest number whose powers are finite
 
 
 @frozen
@@ -320,12 +318,9 @@ def _cycle(solution: Solution, number: int) -> Cycle:
 
 # Fits as text, as plain values and as an EXPE card ------------------------------------------------
 
-# Digits on the card.
-DIGITS = 5
-# Standard errors within which a slope does not differ from 0.
-NOT_ZERO = 2.0
-# Scatter that triggers a note.
-BAD = 0.05
+DIGITS = 5  # digits on the card
+NOT_ZERO = 2.0  # standard errors within which a slope does not differ from 0
+BAD = 0.05  # scatter that triggers a note
 
 
 def card(fit: Fit) -> str:

@@ -34,10 +34,8 @@ Ints = NDArray[np.int64]
 # Threshold of a turn: fraction of the range of the path, or standard deviations of its noise.
 LEAST_RETREAT = 0.02
 QUIET = 8.0
-# Standard deviations of a smoothed point within which its neighbours may be the turn.
-GUARD = 2.0
-# Noise below this fraction of a step reverses no step.
-NEGLIGIBLE = 0.1
+GUARD = 2.0  # standard deviations of a smoothed point within which its neighbours may be the turn
+NEGLIGIBLE = 0.1  # noise below this fraction of a step reverses no step
 
 
 @frozen
@@ -240,23 +238,16 @@ def influence(jacobian: Floats, residual: Floats) -> tuple[Floats, Floats]:
     return inverse, inverse * (residual / np.sqrt(1.0 - leverage))
 
 
-# Bounds of the unloading power.
-LIMITS_Q = (0.3, 12.0)
-# Fewest points of a curve.
-FEWEST = 5
-# Initial guess of the unloading power.
-FIRST_Q = 2.2
-# Distance from a bound at which a value counts as at it, relative to the range.
-AT_LIMIT = 1e-4
+LIMITS_Q = (0.3, 12.0)  # bounds of the unloading power
+FEWEST = 5  # fewest points of a curve
+FIRST_Q = 2.2  # initial guess of the unloading power
+AT_LIMIT = 1e-4  # distance from a bound at which a value counts as at it, relative to the range
 # Bounds of peaks relative to the recorded value, and of origins relative to the peak.
 PEAK_MOVES = 0.15
 LIMITS_PERMANENT, LIMITS_ORIGIN = (-0.5, 0.8), (-3.0, 0.8)
-# Relative error above which the curves do not determine a peak.
-VAGUE = 0.05
-# Standard errors by which an origin must exceed a turn.
-SURE = 3.0
-# Step of the scaled parameters in derivatives.
-STEP = 1e-6
+VAGUE = 0.05  # relative error above which the curves do not determine a peak
+SURE = 3.0  # standard errors by which an origin must exceed a turn
+STEP = 1e-6  # step of the scaled parameters in derivatives
 
 
 @frozen

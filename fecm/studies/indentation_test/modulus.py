@@ -16,8 +16,7 @@ from fecm._typing import Floats
 from fecm.mechanics.laminate import PlyConstants
 from fecm.studies import StudyError
 
-# Directions in the surface and around each of them.
-SURFACE, AROUND = 72, 180
+SURFACE, AROUND = 72, 180  # directions in the surface and around each of them
 # In-plane and out-of-plane components.
 _A, _B = [0, 1, 5], [2, 4, 3]
 _VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])

@@ -35,8 +35,7 @@ CLASSES = ("60", "180", "600", "1000")
 USAGE = f"first-order:RISE, moving-average:RISE or cfc:CLASS with the class {', '.join(CLASSES)}"
 # Cut-off frequency of the two poles over the class, and fewest samples in 1/class (SAE J211-1).
 CUT_OFF, SAMPLES = 2.0775, 10
-# Relative difference of time steps that count as equal: of rounded times.
-UNEQUAL = 0.05
+UNEQUAL = 0.05  # relative difference of time steps that count as equal: of rounded times
 
 
 @frozen

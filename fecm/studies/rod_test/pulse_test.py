@@ -98,10 +98,8 @@ def _table(text: str) -> Pulse:
 # The rod ------------------------------------------------------------------------------------------
 
 MOST_STEPS = 2_000_000
-# Default time step relative to the travel time of a wave through an element.
-PART = 0.8
-# Fraction of the peak of the pulse above which a row counts in the mean ratio.
-COUNTS = 0.01
+PART = 0.8  # default time step relative to the travel time of a wave through an element
+COUNTS = 0.01  # fraction of the peak of the pulse above which a row counts in the mean ratio
 
 POINTS = ("struck_end", "middle", "far_end")
 
