@@ -218,10 +218,8 @@ def author(
             projectile = RigidMass(test.mass)
         if velocity is None and energy is None:
             energy = test.energy * laminate.thickness
-            notes.append(
-                f"the energy is {energy / 1000.0:.4g} J, {test.energy / 1000.0:g} J per mm of "
-                "thickness"
-            )
+            joules, each = energy / 1000.0, test.energy / 1000.0
+            notes.append(f"the energy is {joules:.4g} J, {each:g} J per mm of thickness")
         if contact in (None, Sphere()):
             contact = Sphere(test.radius)
     if patch == AUTO:
@@ -297,16 +295,9 @@ def _program(duration: float, dt: float, every: int | None, fails: bool) -> tupl
     """Macro program of an impact."""
     steps = max(1, math.ceil(duration / dt - 1e-9))
     rows = float(every if every is not None else max(1, steps // ROWS))
-    return (
-        Macro("LMAS"),
-        Macro("DT", value=dt),
-        Macro("LOOP", value=float(steps)),
-        Macro("TIME"),
-        Macro("RODP", value=rows),
-        Macro("DISP", value=rows),
-        *([Macro("FAIL", value=rows)] if fails else []),
-        Macro("NEXT"),
-    )
+    stored = dict.fromkeys(("RODP", "DISP", "FAIL") if fails else ("RODP", "DISP"), rows)
+    words = {"LMAS": 0.0, "DT": dt, "LOOP": float(steps), "TIME": 0.0, **stored, "NEXT": 0.0}
+    return tuple(Macro(word, value=value) for word, value in words.items())
 
 
 def _law(
@@ -375,10 +366,10 @@ def _placed(
     if isinstance(mesh, Grid) and plate.mesh and not plate.fixture and patch and patch.radius:
         counts = mesh.across // 2, mesh.up // 2
         if counts != plate.mesh:
+            new, old = (f"{nx}x{ny}" for nx, ny in (counts, plate.mesh))
             doubts.append(
-                f"the mesh has {counts[0]}x{counts[1]} elements instead of {plate.mesh[0]}x"
-                f"{plate.mesh[1]}: their sides at the patch are at most its radius "
-                f"{patch.radius:g}"
+                f"the mesh has {new} elements instead of {old}: their sides at the patch are at "
+                f"most its radius {patch.radius:g}"
             )
     return mesh, node, patch, doubts
 

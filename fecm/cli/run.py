@@ -229,11 +229,9 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
             f"{error}; --overwrite without --resume discards the checkpoint and starts over"
         ) from None
     except _StoppedError as stopped:
-        echo(
-            f"fecm: stopped after step {stopped.args[0]}; the same command with --resume continues "
-            f"{path}",
-            err=True,
-        )
+        step = stopped.args[0]
+        more = f"the same command with --resume continues {path}"
+        echo(f"fecm: stopped after step {step}; {more}", err=True)
         raise SystemExit(signals.status) from None
     except Exception as error:
         # h5py's own errors are OSErrors without a number.
