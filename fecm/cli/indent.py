@@ -44,7 +44,7 @@ from fecm.studies.indentation_test.constants import card, lines, notes, plain
 from fecm.studies.indentation_test.constants import fit as fitted
 from fecm.studies.indentation_test.curves import LIMITS_Q
 from fecm.studies.indentation_test.modulus import effective_stiffness, indentation_modulus
-from fecm.studies.indentation_test.table import Test, read_test
+from fecm.studies.tables import Test, read_test
 
 
 @click.group()

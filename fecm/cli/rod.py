@@ -20,9 +20,8 @@ from fecm.mechanics.projectile import REPORT_ELEMENTS, RigidMass, Rod
 from fecm.mechanics.rod_integrators import INTEGRATORS, LUMPED, MASSES, WILSON
 from fecm.problem.build import build_projectile, build_station
 from fecm.studies import StudyError
-from fecm.studies.rod_test.calibration import Calibration
-from fecm.studies.rod_test.calibration import calibrate as fit_sensitivity
-from fecm.studies.rod_test.filters import Filter, filter_of, recorded
+from fecm.studies.rod_test.filters import Calibration, Filter, filter_of, recorded
+from fecm.studies.rod_test.filters import calibrate as fit_sensitivity
 from fecm.studies.rod_test.pulse_test import (
     Pulse,
     RodHistory,

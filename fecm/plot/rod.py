@@ -24,7 +24,7 @@ from fecm.plot.style import (
     scale_in,
     styled,
 )
-from fecm.studies.rod_test.calibration import Calibration
+from fecm.studies.rod_test.filters import Calibration
 from fecm.studies.rod_test.pulse_test import RodHistory
 
 WIDTH = "column"
