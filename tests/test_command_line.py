@@ -221,9 +221,7 @@ def test_listing_mode_is_all_slips_and_report_mode_none() -> None:
     assert len(slips.NAMES) == len(set(slips.NAMES)) == 18
 
 
-@pytest.mark.parametrize(
-    "arguments", [("--help",), ("run", "--help"), ("indent", "contacts"), ("diff", "A", "B")]
-)
+@pytest.mark.parametrize("arguments", [("--help",), ("diff", "A", "B")])
 def test_a_reader_that_leaves_is_no_answer(arguments: tuple[str, ...], tmp_path: Path) -> None:
     run_result = tmp_path / "small.h5"
     if "A" in arguments:

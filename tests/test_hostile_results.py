@@ -58,7 +58,7 @@ def act(file, what):
     if what == "swallow":
         bytearray(10**12)
     if what == "work":
-        spin(1.5)
+        spin(1.1)
     if what == "no":
         raise SystemExit(1)
     click.echo("done")

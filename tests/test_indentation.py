@@ -129,7 +129,7 @@ def test_a_closed_path_never_gives_energy_back(path: list[float]) -> None:
 
 
 @pytest.mark.parametrize("kind", [HystereticLaw, ListingLaw])
-@settings(max_examples=50)
+@settings(max_examples=25)
 @given(paths=st.lists(st.lists(indentations, min_size=6, max_size=6), min_size=1, max_size=8))
 def test_many_cases_at_once_are_each_the_single_case(
     kind: type[HystereticLaw] | type[ListingLaw], paths: list[list[float]]

@@ -46,6 +46,8 @@ def test_the_second_peak_is_that_of_the_plate_with_elements_of_half_the_side(
     assert found["peak_force"] == pytest.approx(coarse, rel=1e-9)
     assert found["refined_peak_force"] == pytest.approx(fine, rel=1e-9)
     assert found["relative_change"] == pytest.approx(fine / coarse - 1.0, rel=1e-6)
+    if "hertz" not in options:
+        return
     text = call("check", deck, "--mesh-error").stdout
     assert f"{fine:.5g} N on 64, within " in text
     assert f"({fine / coarse - 1.0:+.2%})" in text

@@ -111,16 +111,16 @@ def test_the_law_of_many_cases_is_the_law_of_each() -> None:
     measured = [
         LinearPermanent(k, a, s, q)
         for k, a, s, q in zip(
-            random.uniform(1e6, 3e6, 40), random.uniform(0, 1e-3, 40), random.uniform(0, 0.2, 40),
-            random.uniform(1.5, 2.5, 40), strict=True,
+            random.uniform(1e6, 3e6, 15), random.uniform(0, 1e-3, 15), random.uniform(0, 0.2, 15),
+            random.uniform(1.5, 2.5, 15), strict=True,
         )
     ]  # fmt: skip
     together = HystereticLaw(stacked(measured))
-    memory, last = together.start(), ContactPoint(np.zeros(40), np.zeros(40))
+    memory, last = together.start(), ContactPoint(np.zeros(15), np.zeros(15))
     alone = [(HystereticLaw(c), HystereticLaw(c).start(), ContactPoint(0.0, 0.0)) for c in measured]
-    a = np.zeros(40)
+    a = np.zeros(15)
     for _ in range(300):
-        a = np.maximum(a + random.normal(0.0, 2e-4, 40), -1e-4)
+        a = np.maximum(a + random.normal(0.0, 2e-4, 15), -1e-4)
         force, _ = together.trial(memory, last, a)
         memory, last = together.accept(memory, last, a), ContactPoint(a, force)
         for case, (law, own, point) in enumerate(alone):

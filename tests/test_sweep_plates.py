@@ -33,8 +33,10 @@ def new(layup: str, *options: str) -> str:
     return made.stdout
 
 
-@pytest.mark.parametrize("support", ["free", "simple", "clamped"])
-@pytest.mark.parametrize("base", LAYUPS[:2])
+@pytest.mark.parametrize(
+    ("base", "support"),
+    [(LAYUPS[0], "simple"), (LAYUPS[1], "free"), (LAYUPS[1], "clamped")],
+)
 def test_a_sweep_of_layups_is_new_and_run_of_each(base: str, support: str) -> None:
     options = "--support", support, "--duration", "5e-5"
     found = fecm.sweep(new(base, *options), {"layup": LAYUPS}, history=True)
@@ -92,7 +94,7 @@ def test_supports_in_the_plane_that_hold_some_nodes_only_are_kept() -> None:
 
 def test_in_plane_unknowns_that_rest_do_not_limit_the_time_step() -> None:
     # Stiff plies at the faces: the plate is faster in its plane than in bending.
-    held = model(LONG)
+    held = model(LONG.read_text().replace("LOOP       4000", "LOOP       1000"))
     assert not is_coupled(held.require(fecm.deck.model.Material))
     free = Deck(
         held.title, held.control,

@@ -368,13 +368,13 @@ def test_fronts_turn_back_at_their_cusps_and_nowhere_else(
     report: WaveSurfaces, time: float, radius: float
 ) -> None:
     cusps = report.cusps(time, radius)
+    # Once around, from a normal of 30 degrees on, where the report's plate has no cusps.
+    normals = 30.0 + np.arange(-1, 3602) / 10.0 + 0.037
+    paths = report.fronts(normals).positions(time, radius)
     for place, mode in enumerate(FRONTS):
         ones = [cusp for cusp in cusps if cusp.mode == mode]
         assert len(ones) == (4 if mode in ("in_plane_shear", "twisting") else 0)
-        # Once around, from a normal of 30 degrees on, where the report's plate has no cusps.
-        normals = 30.0 + np.arange(-1, 3602) / 10.0 + 0.037
-        path = report.fronts(normals).positions(time, radius)[:, place]
-        back = normals[1:-1][turns(path) < 0.0] % 360.0
+        back = normals[1:-1][turns(paths[:, place]) < 0.0] % 360.0
         np.testing.assert_allclose(sorted(back), [cusp.normal for cusp in ones], atol=0.1)
         for cusp in ones:
             x, y = report.fronts(cusp.normal).positions(time, radius)[0, place]
