@@ -19,8 +19,7 @@ from fecm._frozen import frozen
 from fecm.deck.findings import Findings, Place
 
 JUSTIFY = "right-justify each number in its own columns"
-# Characters of the longest number that is read.
-LONGEST = 100
+LONGEST = 100  # characters of the longest number that is read
 # No two parts of a pattern match the same characters, so that a mismatch takes linear time.
 _INTEGER = re.compile(r"[+-]?[0-9]+")
 

@@ -12,12 +12,9 @@ from collections.abc import Iterator
 from fecm._errors import FecmError
 from fecm._frozen import frozen
 
-# Severities by the first letter of a code.
-SEVERITIES = {"E": "error", "W": "warning", "N": "note"}
-# Largest number of errors, and of warnings, that are kept.
-MOST = 1000
-# The code of the error that ends too many of them.
-TOO_MANY = "E000"
+SEVERITIES = {"E": "error", "W": "warning", "N": "note"}  # severities by the first letter of a code
+MOST = 1000  # largest number of errors, and of warnings, that are kept
+TOO_MANY = "E000"  # the code of the error that ends too many of them
 # Characters of a card, and of a message, that are shown.
 WIDEST = 200
 LONGEST = 600

@@ -12,10 +12,8 @@ import re
 
 from fecm._errors import FecmError
 
-# A layup of more plies is certainly a typo.
-MOST_PLIES = 10_000
-# Deepest nesting of groups.
-NESTING = 32
+MOST_PLIES = 10_000  # a layup of more plies is certainly a typo
+NESTING = 32  # deepest nesting of groups
 # Characters of a layup that a message quotes.
 QUOTED = 60
 _ANGLE = re.compile(r"(±|\+-|\+/-)?([+-]?(?:\d+(?:\.\d*)?|\.\d+))(?:_\{?(\d+)\}?)?")

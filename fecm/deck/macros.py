@@ -15,8 +15,7 @@ from fecm.deck.findings import Findings
 from fecm.deck.records import Macro
 
 NESTING = 64
-# A program of more macros would run for days.
-MOST_MACROS = 10**9
+MOST_MACROS = 10**9  # a program of more macros would run for days
 
 
 @frozen
@@ -237,8 +236,7 @@ def moves_only(body: Body) -> bool:
     return all(macro.word not in ("TANG", "FORM", "SOLV") for macro in flat(body))
 
 
-# Words that take a time step.
-STEPS = {"RODP", "EXCD"}
+STEPS = {"RODP", "EXCD"}  # words that take a time step
 
 
 @frozen

@@ -29,14 +29,12 @@ MOST_LAYERS = 10_000
 MOST_PROBLEMS = 1000
 MOST_SEGMENTS = 20_000
 MOST_MACRO_CARDS = 100_000
-# No deck needs more bytes.
-LARGEST_FILE = 1_000_000_000
+LARGEST_FILE = 1_000_000_000  # no deck needs more bytes
 # Largest memory of a deck per byte of text and per line, measured at 10 MB.
 BYTES_A_BYTE, BYTES_A_LINE = 12, 1100
 # Line ends, see str.splitlines.  The last three are the last bytes of longer characters.
 LINE_ENDS = b"\n\r\x0b\x0c\x1c\x1d\x1e\x85\xa8\xa9"
-# Number of bytes that identify a binary file.
-FIRST = 4096
+FIRST = 4096  # number of bytes that identify a binary file
 # Name of the deck on standard input.
 STDIN = "<stdin>"
 HDF5 = b"\x89HDF\r\n\x1a\n"

@@ -25,8 +25,7 @@ def load_factor(table: LoadTable, clock: float) -> float:
     return a1 + a2 * clock + a3 * wave ** max(table.exponent, 1)
 
 
-# Smallest and largest number of nodes per element.
-NODES_AN_ELEMENT = (3, 12)
+NODES_AN_ELEMENT = (3, 12)  # smallest and largest number of nodes per element
 # Floats represent every integer below this number.
 EXACT = 2**53
 AXES = ("x", "y", "z")
@@ -40,10 +39,8 @@ class Record:
     # The card; None for a record built in Python.
     source: Source | None = field(default=None, compare=False, repr=False, kw_only=True)
     fields: ClassVar[Fields]
-    # Values of the card that one attribute holds as a tuple.
-    packed: ClassVar[slice | None] = None
-    # Number of last values that are not written where they are 0.
-    optional: ClassVar[int] = 0
+    packed: ClassVar[slice | None] = None  # values of the card that one attribute holds as a tuple
+    optional: ClassVar[int] = 0  # number of last values that are not written where they are 0
 
     @classmethod
     def from_row(cls, values: Sequence[Value], source: Source) -> Self:

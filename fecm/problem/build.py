@@ -59,8 +59,7 @@ from fecm.problem.options import RunOptions
 
 # Dof w, from 0.
 W = 2
-# Number of equations above which threads save more than they cost.
-WORTH_SHARING = 100_000
+WORTH_SHARING = 100_000  # number of equations above which threads save more than they cost
 # Slips that change the plate or its loads.
 PLATE_SLIPS = {"g12", "small-stiffness", "shear-order", "tapes", "jacobian", "rod-force"}
 

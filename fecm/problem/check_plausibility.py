@@ -24,18 +24,14 @@ from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import Problem, build_constants, build_projectile
 
-# Thickness over the longer side of the plate.
-THINNEST, THICKEST = 1.0e-4, 0.25
-# Mass of the projectile over that of the plate.
-LIGHTEST, HEAVIEST = 1.0e-4, 1.0e4
+THINNEST, THICKEST = 1.0e-4, 0.25  # thickness over the longer side of the plate
+LIGHTEST, HEAVIEST = 1.0e-4, 1.0e4  # mass of the projectile over that of the plate
 # Wave speed in the rod over that along the fibres: lead and polythene are above 1/30.
 SLOWEST, FASTEST = 1.0 / 30.0, 30.0
-# Impact velocity over the wave speed along the fibres.
-CREEPING, HYPERSONIC = 1.0e-6, 0.1
+CREEPING, HYPERSONIC = 1.0e-6, 0.1  # impact velocity over the wave speed along the fibres
 # Powers of measured unloading curves lie between 1.5 and 2.5.
 LEAST_POWER, GREATEST_POWER = 1.0, 5.0
-# Time step over the stable one.
-WASTEFUL = 0.01
+WASTEFUL = 0.01  # time step over the stable one
 
 # Range of real materials and impacts in m, N and s, about a decade wider on each side: dimension,
 # smallest and largest value, unit.

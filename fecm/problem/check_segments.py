@@ -29,14 +29,12 @@ from fecm.problem.generate import rod_diameters
 REPORT_UNITS = [KNOWN["length"]["in"], KNOWN["force"]["lbf"], KNOWN["time"]["s"]]
 # A rod's step is a full matrix of three times as many rows and columns as it has dofs.
 MOST_ROD_ELEMENTS = 500
-# Each gage is compared with every element.
-MOST_GAGES, MOST_GAGE_PAIRS = 10_000, 10**8
+MOST_GAGES, MOST_GAGE_PAIRS = 10_000, 10**8  # each gage is compared with every element
 # Elements per bending wave of the contact's duration: the minimum, and enough for a peak.
 LEAST_PER_WAVE, ENOUGH_PER_WAVE = 4, 8
 # Mesh error of the peak that is warned of, and the largest that is estimated.
 WORTH_SAYING, MOST_ERROR = 0.03, 0.5
-# Difference of thicknesses that is rounding.
-THICKNESS_TOLERANCE = 1.0e-6
+THICKNESS_TOLERANCE = 1.0e-6  # difference of thicknesses that is rounding
 # Shear order at which 9-node elements have no zero-energy modes.
 FULL = 3
 

@@ -24,12 +24,9 @@ from fecm.mechanics.stiffness_product import AUTO, CSR, WORTH_GROUPING
 from fecm.problem.build import Problem
 from fecm.results.sinks import RowBuffer
 
-# Bytes per node: mesh, state, fields, buffered rows.
-NODE = 800
-# Bytes per dof of an element: its indices, its forces, and the matrix that sums them.
-PLACE = 60
-# Bytes per strain point of an element: Jacobians and strains.
-POINT = 250
+NODE = 800  # bytes per node: mesh, state, fields, buffered rows
+PLACE = 60  # bytes per dof of an element: its indices, its forces, and the matrix that sums them
+POINT = 250  # bytes per strain point of an element: Jacobians and strains
 # Bytes per entry of the element matrices that are kept; and of one under integration, for each row
 # of B and point.
 KEPT, INTEGRATED = 12, 24

@@ -10,8 +10,7 @@ from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.rod_integrators import RodMethod
 from fecm.mechanics.stiffness_product import AUTO, KERNELS, SOLVERS
 
-# Relative error of the energy balance that ends a run.
-ENERGY_LIMIT = 0.1
+ENERGY_LIMIT = 0.1  # relative error of the energy balance that ends a run
 
 
 @frozen

@@ -24,8 +24,7 @@ KINDS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
 LINES = ("vertex", "line", "line3")
 # Name of all sides that belong to one element, unless the mesh has a group of that name.
 BOUNDARY = "boundary"
-# Formats whose files name other files.
-ELSEWHERE = (".xdmf", ".xmf")
+ELSEWHERE = (".xdmf", ".xmf")  # formats whose files name other files
 # Coordinates that differ by less, over the size of the mesh, are equal; and areas over its square.
 SAME, NO_AREA = 1e-9, 1e-12
 # Most elements named in a message.

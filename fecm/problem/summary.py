@@ -14,8 +14,7 @@ from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import Problem, build_projectile
 from fecm.problem.check_segments import resolution, said_error
 
-# Share of the critical time step below which the step that DT 0 takes is shown.
-ROOM = 0.6
+ROOM = 0.6  # share of the critical time step below which the step that DT 0 takes is shown
 
 
 def larger_steps(problem: Problem) -> list[str]:

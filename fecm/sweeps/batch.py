@@ -44,8 +44,7 @@ from fecm.sweeps.vary import Clock, apply_case, check_deck, raise_first, with_ti
 # Runs decks by their numbers; doubtful ones in full if they are judged.
 Runs = Callable[[list[int], list[Deck], bool], Outcome]
 UNIT = RigidMass(1.0)
-# Relative difference of the peak force from the value searched, beyond which it jumps.
-ROUGH = 1e-4
+ROUGH = 1e-4  # relative difference of the peak force from the value searched, beyond which it jumps
 
 
 def run(task: plan.Task) -> Outcome:

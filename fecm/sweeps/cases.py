@@ -36,8 +36,7 @@ LAMINATE = (
 )  # fmt: skip
 PLATE = (*LOAD, *LAMINATE, "size", "support", "dt", "duration")
 NAMES = (*CONTACT, *PLATE)
-# Factor of a refinement study, which varies nothing else.
-REFINE = "refine"
+REFINE = "refine"  # factor of a refinement study, which varies nothing else
 # Of each of these names only one can vary.
 EXCLUDING = (
     ("velocity", "energy"), ("k", "radius"), ("mass", "rod_mass", "rod_density"),
@@ -50,8 +49,7 @@ AUTO = "auto"
 INTEGERS = ("impact_node",)
 # Names of results, which are no names of cases or of measured columns.
 RESERVED = ("case", "step", "steps", "status", "force", "unsettled_steps", *COLUMNS)
-# Largest number of cases.
-MOST = 1_000_000
+MOST = 1_000_000  # largest number of cases
 
 
 class CasesError(FecmError, ValueError):

@@ -28,12 +28,9 @@ from fecm.sweeps.plan import without_output
 from fecm.sweeps.vary import apply_case, check_deck, with_time_step
 
 FACTORS = "1,2,4,8"
-# Order that two factors assume, and the lowest that gives a limit.
-ASSUMED, LOWEST = 2.0, 0.5
-# Relative change that is rounding.
-SAME = 1e-12
-# Counts, which have no order.
-COUNTS = ("contacts",)
+ASSUMED, LOWEST = 2.0, 0.5  # order that two factors assume, and the lowest that gives a limit
+SAME = 1e-12  # relative change that is rounding
+COUNTS = ("contacts",)  # counts, which have no order
 
 
 @dataclass(frozen=True)

@@ -34,18 +34,14 @@ CARDS: dict[str, type[Impact | Indentation | Projectile]] = {
     **dict.fromkeys(("mass", "rod_length", "rod_modulus", "rod_density"), Projectile),
 }
 FREE = (*CARDS, DELAY)
-# Half of the step of central differences, in the scaled parameters.
-STEP = 1e-3
-# Factor between the parameters of the deck and their bounds.
-BOUND = 1e3
+STEP = 1e-3  # half of the step of central differences, in the scaled parameters
+BOUND = 1e3  # factor between the parameters of the deck and their bounds
 # Factor between measured and computed peak or duration beyond which a unit must be wrong.
 OFF = 20.0
-# Fewest measured points, and fewest above half of the peak.
-POINTS, TOP_POINTS = 10, 3
+POINTS, TOP_POINTS = 10, 3  # fewest measured points, and fewest above half of the peak
 # Smallest singular value of the Jacobian with unit columns, and smallest column (rms over peak).
 SINGULAR, NO_EFFECT = 1e-3, 1e-6
-# Share of a parameter in a singular vector above which the vector concerns it.
-SHARE = 0.1
+SHARE = 0.1  # share of a parameter in a singular vector above which the vector concerns it
 # A finding reports a larger correlation: of two parameters, and of neighbouring residuals where the
 # force exceeds a share of its peak.
 CORRELATED, COLOURED, FAINT = 0.99, 0.5, 1e-3

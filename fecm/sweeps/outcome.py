@@ -18,8 +18,7 @@ FINE = "ok"
 # The run ends during contact.
 STILL = "still in contact"
 RUN = (FINE, STILL)
-# Columns that describe the run of a case.
-ABOUT = ("status", "dt", "steps", "unsettled")
+ABOUT = ("status", "dt", "steps", "unsettled")  # columns that describe the run of a case
 
 
 @dataclass

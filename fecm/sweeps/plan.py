@@ -39,12 +39,10 @@ from fecm.sweeps.vary import Clock, apply_case, check_deck, clock_of
 
 Build = Callable[[dict[str, Any]], Deck]
 Measure = Callable[[Result], Mapping[str, float]]
-# Cases advanced together.
-TOGETHER = 2048
+TOGETHER = 2048  # cases advanced together
 # Bytes per step and case advanced together: above the measured value.
 ADVANCED = 34 if LIBRARY is None else 12
-# Velocities of the first round of a search.
-COUNT = 25
+COUNT = 25  # velocities of the first round of a search
 # Names of columns that are measured on request.
 DEFLECTION, GAGES, FAILURE = MEASURES = ("max_deflection", "gages", "failure")
 
@@ -209,8 +207,7 @@ def without_output(checked: Problem, extra: Sequence[str] = ()) -> Problem:
     return replace(checked, program=tuple(kept(checked.program)))
 
 
-# Bytes per step and case whose history is stored: above the measured value.
-KEPT = 24
+KEPT = 24  # bytes per step and case whose history is stored: above the measured value
 
 
 def check_memory(checked: Problem, made: Plan, workers: int, *, streamed: bool = False) -> None:

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 
 Array = NDArray[Any]
-# Share of failed draws above which the results are doubtful.
-FEW = 0.01
+FEW = 0.01  # share of failed draws above which the results are doubtful
 # Most quantities and combinations that are printed, and the quantities in their order.
 PRINTED = 4
 MAIN = ("found_velocity", "found_energy", "peak_force", "max_indentation", "contact_time",
@@ -309,8 +308,7 @@ COUNTS = 2_000_000
 # Ends of a 95 % interval.
 ENDS = (0.025, 0.975)
 Z = 1.959963984540054  # the standard normal distribution is 0.975 there
-# Variation relative to the largest value below which a quantity is constant.
-ROUNDING = 1e-12
+ROUNDING = 1e-12  # variation relative to the largest value below which a quantity is constant
 
 
 class Indices(NamedTuple):

@@ -30,8 +30,7 @@ from fecm.mechanics.projectile import Projectile, RigidMass
 from fecm.mechanics.rod_integrators import RodIntegrator, RodState, WilsonStep
 from fecm.results.metrics import Indentation
 
-# Steps of a block.
-BLOCK = 64
+BLOCK = 64  # steps of a block
 # Other blocks of a convolution.  A force acts at once on the rest of the smallest block, which acts
 # on the rest of the next larger one by a matrix product, and so on; complete largest blocks act on
 # later ones by Fourier transforms.

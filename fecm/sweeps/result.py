@@ -36,8 +36,7 @@ if TYPE_CHECKING:
 
 
 Array = NDArray[Any]
-# Letters of the names in the lines of the summary.
-WORDS = 18
+WORDS = 18  # letters of the names in the lines of the summary
 # Distance from the place given, relative to its coordinates, that is rounding.
 SAME = 1e-9
 FORCE = "history/force"
@@ -492,10 +491,8 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     )  # fmt: skip
 
 
-# First characters of a formula.
-FORMULA = ("=", "+", "-", "@")
-# Tables of the CSV export.
-CASES, HISTORY = "cases", "history"
+FORMULA = ("=", "+", "-", "@")  # first characters of a formula
+CASES, HISTORY = "cases", "history"  # tables of the CSV export
 
 
 def csv_lines(sweep: SweepResult, name: str = CASES) -> Iterator[str]:

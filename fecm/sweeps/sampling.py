@@ -22,8 +22,7 @@ LAWS = {
 }
 DesignKind = Literal["lhs", "sobol", "mc"]
 DESIGNS: tuple[DesignKind, ...] = get_args(DesignKind)
-# Fewest draws.
-FEWEST = 16
+FEWEST = 16  # fewest draws
 # Unit samples are kept this far from 0 and 1: half the resolution of a Sobol' sequence.
 MARGIN = 2.0**-31
 REMEDY = "lognormal, uniform and triangular can be kept to possible values"

@@ -40,8 +40,7 @@ Done = Callable[[Task, Outcome], None]
 Idle = Callable[[], None]
 # Deaths of workers without a finished task after which the remaining tasks count as lost.
 DEATHS = 3
-# Polling interval in seconds.
-LOOK = 0.5
+LOOK = 0.5  # polling interval in seconds
 # Timeout for the scheduler.
 PATIENCE = "5s"
 LOST = "lost with its worker"
@@ -196,8 +195,7 @@ def address_in(file: Path) -> str:
 
 
 MARK = "sweep.json"
-# Bytes of the checksum after the arrays of a file.
-CHECKSUM = hashlib.sha256().digest_size
+CHECKSUM = hashlib.sha256().digest_size  # bytes of the checksum after the arrays of a file
 
 
 class OtherSweepError(FecmError, ValueError):

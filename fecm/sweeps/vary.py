@@ -34,8 +34,7 @@ from fecm.studies.indentation_test.modulus import effective_stiffness, indentati
 from fecm.sweeps.cases import REFINE, Case, CasesError, Value, check_names, pair
 
 MASS = ("mass", "rod_mass")
-# Fields of a ply card.
-PLY = ("density", "nu12", "e1", "e2", "g12", "g13", "g23")
+PLY = ("density", "nu12", "e1", "e2", "g12", "g13", "g23")  # fields of a ply card
 
 
 def apply_case(deck: model.Deck, case: Case) -> model.Deck:
@@ -315,10 +314,8 @@ _SETTERS: dict[str, Callable[[model.Deck, str, Value], model.Deck]] = {
 }
 
 
-# Longest loop; the checks reject much shorter programs.
-LONGEST = 1e15
-# Macros that store every N-th step or pass.
-STORING = ("RODP", "DISP", "STRE", "PLYS")
+LONGEST = 1e15  # longest loop; the checks reject much shorter programs
+STORING = ("RODP", "DISP", "STRE", "PLYS")  # macros that store every N-th step or pass
 
 
 @dataclass(frozen=True)
