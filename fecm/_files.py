@@ -71,9 +71,8 @@ def _check(path: Path, overwrite: bool) -> None:
     if mode is not None and not overwrite:
         raise OutputError(f"{path} exists already; --overwrite replaces it")
     if path.is_symlink() and not overwrite:
-        raise OutputError(
-            f"{path} is a link to {target}, which does not exist; --overwrite creates it"
-        )
+        message = f"{path} is a link to {target}, which does not exist; --overwrite creates it"
+        raise OutputError(message)
     if not _discard(partial_of(target)):
         raise OutputError(f"{path} is being written by another process")
 
@@ -265,9 +264,8 @@ def _rename_exclusively(partial: Path, target: Path) -> None:
             os.close(os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL | NO_FOLLOW))
             partial.replace(target)
     except FileExistsError:
-        raise OutputError(
-            f"{target} was created by another program meanwhile and is not replaced"
-        ) from None
+        message = f"{target} was created by another program meanwhile and is not replaced"
+        raise OutputError(message) from None
 
 
 def open_ordinary(path: Path, flags: int = os.O_RDONLY) -> BinaryIO:

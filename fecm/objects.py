@@ -108,9 +108,8 @@ def parse_fixture(text: str) -> Fixture:
         raise ObjectError(f"{text!r} is not a fixture: {', '.join(FIXTURES)} or {CUSTOM}")
     lx, ly, wx, wy = map(float, match.groups())
     if not (0.0 < wx < lx < 1e30 and 0.0 < wy < ly < 1e30):
-        raise ObjectError(
-            f"the window of {wx:g} x {wy:g} is not smaller than the plate of {lx:g} x {ly:g}"
-        )
+        message = f"the window of {wx:g} x {wy:g} is not smaller than the plate of {lx:g} x {ly:g}"
+        raise ObjectError(message)
     return Fixture("window", (lx, ly), (wx, wy))
 
 
@@ -433,9 +432,8 @@ def parse_patch(text: str) -> Patch | None:
         check_positive(radius=radius)
         return Patch(PATCHES[shape], radius)
     except (KeyError, ValueError):
-        raise ObjectError(
-            f"{text!r} is not none, disc, hertz, disc:RADIUS or hertz:RADIUS"
-        ) from None
+        message = f"{text!r} is not none, disc, hertz, disc:RADIUS or hertz:RADIUS"
+        raise ObjectError(message) from None
 
 
 def check_positive(**values: float | None) -> None:

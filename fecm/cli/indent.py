@@ -243,9 +243,8 @@ def _report_length(deck: Deck, value: float, name: str, option: str) -> float:
     unit = unit_names(deck).get("length", "in")
     system = {names["length"]: key for key, names in SYSTEMS.items()}.get(unit)
     if system is None:
-        raise RefusedError(
-            f"the report's {name} is in inches and the deck's in {unit}: give {option}"
-        )
+        message = f"the report's {name} is in inches and the deck's in {unit}: give {option}"
+        raise RefusedError(message)
     note(f"{name} is the report's {value:g} in; {option} replaces it")
     return convert(value, "length", SYSTEM, system)
 

@@ -225,9 +225,8 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
             f"the run diverged at step {diverged.step}: {diverged.reason}; {path} was not written"
         ) from None
     except CheckpointError as error:
-        raise RefusedError(
-            f"{error}; --overwrite without --resume discards the checkpoint and starts over"
-        ) from None
+        message = f"{error}; --overwrite without --resume discards the checkpoint and starts over"
+        raise RefusedError(message) from None
     except _StoppedError as stopped:
         step = stopped.args[0]
         more = f"the same command with --resume continues {path}"

@@ -43,9 +43,8 @@ def _wavelengths(text: str) -> tuple[float, ...]:
     except (ValueError, IndexError):
         first, last, count = math.nan, math.nan, 0
     if len(parts) != 3 or not 0.0 < first <= last < math.inf or count < 1:
-        raise ValueError(
-            f"{text!r} is not FROM:TO:N with 0 < FROM <= TO and N >= 1, as in 0.1:20:200"
-        )
+        message = f"{text!r} is not FROM:TO:N with 0 < FROM <= TO and N >= 1, as in 0.1:20:200"
+        raise ValueError(message)
     if (count == 1) != (first == last):
         raise ValueError(f"{text}: FROM = TO is required for N = 1, and excluded for more")
     if count > MOST // 5:
@@ -74,9 +73,8 @@ def _medium(
     """Build the laminate, from a deck or from options, and name its units."""
     if deck is None:
         if options["layup"] is None:
-            raise click.UsageError(
-                "give a DECK, or --layup, --ply-thickness and --ply or --material"
-            )
+            message = "give a DECK, or --layup, --ply-thickness and --ply or --material"
+            raise click.UsageError(message)
         laminate, units = laminate_of_options(**options)
     else:
         for name, value in options.items():

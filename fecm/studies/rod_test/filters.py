@@ -59,9 +59,8 @@ class Filter:
         if self.kind != CFC or not time:
             return self
         if time not in KNOWN["time"]:
-            raise StudyError(
-                f"a class is in Hz, but the unit of time is {time}; s, ms, us are known"
-            )
+            message = f"a class is in Hz, but the unit of time is {time}; s, ms, us are known"
+            raise StudyError(message)
         return replace(self, size=self.size * KNOWN["time"][time])
 
     def __call__(self, time: Floats, values: Floats) -> Floats:
