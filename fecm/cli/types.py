@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -119,47 +118,3 @@ def assignment(text: str) -> tuple[str, str]:
     if not name or not value:
         raise ValueError(f"{text!r} is not of the form NAME=VALUE")
     return name, value
-
-
-def joined(
-    context: click.Context, option: click.Parameter, lists: tuple[tuple[Any, ...], ...]
-) -> tuple[Any, ...]:
-    """Callback of a repeated option of lists: join them, without repeated values."""
-    return tuple(dict.fromkeys(chain(*lists)))
-
-
-class ListCommand(click.Command):
-    """A command whose repeated options also take several values: ``--time 2e-6 4e-6``."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Repeat the options before click reads them."""
-        options = [param for param in self.params if isinstance(param, click.Option)]
-        names = {name for option in options if option.multiple for name in option.opts}
-        return super().parse_args(ctx, _repeat_options(args, names))
-
-
-def _repeat_options(args: Sequence[str], names: set[str]) -> list[str]:
-    """Put the option before every further number that follows one of the named options."""
-    repeated: list[str] = []
-    option, waits = "", False
-    for place, argument in enumerate(args):
-        if argument == "--":
-            return [*repeated, *args[place:]]
-        if option and not waits and _is_number(argument):
-            repeated.append(option)
-        elif waits:
-            waits = False
-        else:
-            name = argument.partition("=")[0]
-            option, waits = (name, argument == name) if name in names else ("", False)
-        repeated.append(argument)
-    return repeated
-
-
-def _is_number(text: str) -> bool:
-    """Whether a text is a number, or several with commas between them."""
-    try:
-        list(map(float, text.split(",")))
-    except ValueError:
-        return False
-    return True

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +16,7 @@ from fecm.cli.common import DECK_PATH, RefusedError, note
 from fecm.cli.decks import load_valid
 from fecm.cli.laminate_options import laminate_of_options, laminate_options
 from fecm.cli.outputs import OutputPaths, outputs
-from fecm.cli.types import (
-    NOT_NEGATIVE,
-    POSITIVE,
-    Finite,
-    ListCommand,
-    ListOf,
-    Parsed,
-    joined,
-    stacked,
-)
+from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, ListOf, Parsed, stacked
 from fecm.deck.units import unit_names
 from fecm.problem.build import laminate_of_deck
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces
@@ -51,6 +44,50 @@ def _wavelengths(text: str) -> tuple[float, ...]:
         raise ValueError(f"{text}: at most {MOST // 5} wavelengths are allowed")
     step = (last - first) / max(1, count - 1)
     return (*(first + n * step for n in range(count - 1)), last)
+
+
+def _joined(
+    context: click.Context, option: click.Parameter, lists: tuple[tuple[Any, ...], ...]
+) -> tuple[Any, ...]:
+    """Callback of a repeated option of lists: join them, without repeated values."""
+    return tuple(dict.fromkeys(chain(*lists)))
+
+
+class _ListCommand(click.Command):
+    """A command whose repeated options also take several values: ``--time 2e-6 4e-6``."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Repeat the options before click reads them."""
+        options = [param for param in self.params if isinstance(param, click.Option)]
+        names = {name for option in options if option.multiple for name in option.opts}
+        return super().parse_args(ctx, _repeat_options(args, names))
+
+
+def _repeat_options(args: Sequence[str], names: set[str]) -> list[str]:
+    """Put the option before every further number that follows one of the named options."""
+    repeated: list[str] = []
+    option, waits = "", False
+    for place, argument in enumerate(args):
+        if argument == "--":
+            return [*repeated, *args[place:]]
+        if option and not waits and _is_number(argument):
+            repeated.append(option)
+        elif waits:
+            waits = False
+        else:
+            name = argument.partition("=")[0]
+            option, waits = (name, argument == name) if name in names else ("", False)
+        repeated.append(argument)
+    return repeated
+
+
+def _is_number(text: str) -> bool:
+    """Whether a text is a number, or several with commas between them."""
+    try:
+        list(map(float, text.split(",")))
+    except ValueError:
+        return False
+    return True
 
 
 # The argument and the options of all three commands.
@@ -102,9 +139,9 @@ def waves() -> None:
     """Waves in the laminate of a DECK, or of a layup: the report's chapter 2, for any laminate."""
 
 
-@waves.command(cls=ListCommand)
+@waves.command(cls=_ListCommand)
 @click.option("--angle", "angles", type=ListOf("A,B,...", Finite()), multiple=True,
-              callback=joined, default=("0", "45", "90"), show_default=True, metavar="A ...",
+              callback=_joined, default=("0", "45", "90"), show_default=True, metavar="A ...",
               help="Directions of propagation, degrees; one or several.")  # fmt: skip
 @click.option("--wavelengths", type=Parsed(_wavelengths), default="0.1:20:200",
               show_default=True, metavar="FROM:TO:N",
@@ -145,9 +182,9 @@ def speeds(step: float, targets: OutputPaths, **shared: Any) -> None:
     targets.write(",".join(("angle_deg", *FRONTS)), rows)
 
 
-@waves.command(cls=ListCommand)
+@waves.command(cls=_ListCommand)
 @click.option("--time", "times", type=ListOf("T,T,...", NOT_NEGATIVE), multiple=True,
-              callback=joined, required=True, metavar="T ...",
+              callback=_joined, required=True, metavar="T ...",
               help="Times; one or several.")  # fmt: skip
 @click.option("--radius", type=NOT_NEGATIVE, metavar="R",
               help="Radius of the circular fronts at time 0.  [default: the thickness]",
