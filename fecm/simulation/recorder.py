@@ -23,7 +23,6 @@ from fecm.mechanics.strains import STRAINS
 from fecm.problem.build import ImpactModel
 from fecm.results.schema import CONTACT, DATASETS, FIXED, INTERLAMINAR, Dataset
 from fecm.results.sinks import RowBuffer, Sink
-from fecm.simulation.state import subset
 
 # Of rows.
 Steps = Sequence[int]
@@ -406,3 +405,8 @@ class Recorder:
             room, rows = self._room.get(dataset.group, 0), stored.get(dataset.group, 0)
             if room > rows and dataset.shape[0] == "rows":
                 self._sink.trim(dataset.path, rows)
+
+
+def subset(stored: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    """Return the entries whose names have a prefix, without it."""
+    return {n.removeprefix(prefix): v for n, v in stored.items() if n.startswith(prefix)}

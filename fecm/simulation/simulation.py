@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import dataclasses
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
@@ -11,16 +13,116 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.deck.records import load_factor
+from fecm.mechanics.failure_envelope import FailureEnvelope
+from fecm.mechanics.impact import ImpactState
+from fecm.mechanics.plate_motion import DivergenceError, PlateState
 from fecm.mechanics.statics import Tangent
-from fecm.problem.build import build_model
+from fecm.problem.build import Threshold, build_model
 from fecm.problem.options import RunOptions
 from fecm.problem.problem import Problem
 from fecm.results.sinks import Sink
-from fecm.simulation import state as run_state
 from fecm.simulation.interpreter import Interpreter
 from fecm.simulation.printout import Printer
-from fecm.simulation.recorder import Recorder
-from fecm.simulation.state import RunState
+from fecm.simulation.recorder import Recorder, subset
+
+# Relative change of the displacement below which CONV leaves its loop.
+TOLERANCE = 1.0e-9
+
+
+@dataclass
+class EnergyBalance:
+    """The energy balance of a run so far."""
+
+    # Largest and last work of the nodal forces, and its largest change in a step (force*length).
+    largest_work: float = 0.0
+    last_work: float = 0.0
+    largest_jump: float = 0.0
+    worst_error: float = 0.0  # largest error, relative to the supplied energy
+    worst_step: int = 0  # its step
+
+    def add(
+        self, block: Mapping[str, Floats], initial: float, *, limit: float | None = None
+    ) -> None:
+        """Add a block of steps; end the run if it diverges or exceeds the limit.
+
+        The error is relative to the energy supplied up to the end of the block: in its first steps
+        a load has done almost no work.  The work of one step is not counted as an error: the work
+        belongs to the step, the energies to its end.  `initial` is the energy before the first
+        step.  Without a limit only an energy that is not finite ends the run.  Raises
+        DivergenceError if the energy is not finite, or the error exceeds the limit.
+        """
+        lost = ~np.isfinite(block["held_energy"])
+        if lost.any():
+            step = int(block["step"][np.flatnonzero(lost)[0]])
+            raise DivergenceError(step, "the motion is no longer finite")
+        work = block["external_work"]
+        self.largest_work = max(self.largest_work, float(np.abs(work).max()))
+        jump = float(np.abs(np.diff(work, prepend=self.last_work)).max())
+        self.largest_jump, self.last_work = max(self.largest_jump, jump), float(work[-1])
+        supplied = initial + self.largest_work
+        if not supplied > 0.0:
+            return
+        error = np.maximum(np.abs(block["balance_error"]) - self.largest_jump, 0.0) / supplied
+        row = int(error.argmax())
+        if error[row] > self.worst_error:
+            self.worst_error, self.worst_step = float(error[row]), int(block["step"][row])
+        if limit is not None and error[row] > limit:
+            row = int(np.flatnonzero(error > limit)[0])
+            raise DivergenceError(
+                int(block["step"][row]),
+                f"the energy balance is off by {error[row]:.2%} of the supplied energy, more than "
+                f"the limit of {limit:.3g}",
+            )
+
+
+@dataclass
+class RunState:
+    """State passed from one macro to the next; a checkpoint stores every field."""
+
+    plate: PlateState
+    impact: ImpactState | None = None  # plate, projectile and contact; shares `plate`
+    # The interpreter's position; empty before the first macro.
+    position: list[tuple[int, int]] = field(default_factory=list)
+    # Time step, and the time that TIME advances.
+    dt: float = 0.0
+    clock: float = 0.0
+    load_clock: float = 0.0  # clock at the plate's last central difference
+    constant_factor: float = 1.0  # load factor without a table
+    table: int | None = None  # index of the current table of proportional loads
+    tables_read: int = 0  # tables that PROP has read
+    tolerance: float = TOLERANCE  # tolerance of CONV
+    consistent_mass: bool = False  # whether CMAS came after LMAS
+    # Whether TANG was carried out; whether the last SOLV met the tolerance.
+    factorised: bool = False
+    converged: bool = False
+    residual: Floats | None = None  # (neq,): load less internal force, formed by FORM
+    steps_since_output: int = 0  # impact steps since the last output (the slip ``counter``)
+    # Value of PROP that replaces the contact force (the slip ``prop-contact``).
+    prop_force: float | None = None
+    first_dt: float | None = None  # time step of the rod's constants
+    balance: EnergyBalance = field(default_factory=EnergyBalance)  # energy balance so far
+    peak_force: float = 0.0  # largest contact force so far
+    # Time at which it first reached the delamination threshold; NaN before.
+    crossing: float = math.nan
+    failure: FailureEnvelope | None = None  # largest exposures so far, of FAIL
+    notes: list[str] = field(default_factory=list)  # remarks for the user
+
+    def judge(
+        self,
+        block: Mapping[str, Floats],
+        initial: float,
+        *,
+        limit: float | None,
+        threshold: Threshold | None,
+    ) -> None:
+        """Add a block of steps to the energy balance, and compare the force with the threshold."""
+        self.balance.add(block, initial, limit=limit)
+        if threshold is not None:
+            self.peak_force = max(self.peak_force, float(block["force"].max()))
+            above = np.flatnonzero(block["force"] >= threshold.force)
+            if len(above) and math.isnan(self.crossing):
+                self.crossing = float(block["time"][above[0]])
+
 
 Observer = Callable[["Simulation"], object]
 
@@ -100,13 +202,69 @@ class Simulation:
             self.state.first_dt = self.model.impact.first_dt
         recorder = {f"recorder/{name}": value for name, value in self.recorder.state().items()}
         return {
-            **run_state.save(self.state, "state"), **recorder, "printed": self.printer.state()
+            **save(self.state, "state"), **recorder, "printed": self.printer.state()
         }  # fmt: skip
 
     def restore(self, stored: dict[str, Any]) -> None:
         """Continue from the saved state of another simulation of the same problem."""
-        run_state.restore(self.state, "state", stored)
+        restore(self.state, "state", stored)
         if self.model.impact is not None:
             self.model.impact.first_dt = self.state.first_dt
         self.printer.restore(stored["printed"])
-        self.recorder.restore(run_state.subset(stored, "recorder/"))
+        self.recorder.restore(subset(stored, "recorder/"))
+
+
+# Values of a state --------------------------------------------------------------------------------
+
+
+def save(state: object, name: str) -> dict[str, Any]:
+    """Values and arrays of a dataclass and its members, by path; shared members only once."""
+    return dict(_leaves(state, name, set()))
+
+
+def _names(value: object) -> tuple[str, ...]:
+    """Names of the fields of a dataclass or named tuple."""
+    if dataclasses.is_dataclass(value):
+        return tuple(f.name for f in dataclasses.fields(value) if f.init)
+    return getattr(value, "_fields", ())
+
+
+def _leaves(value: Any, path: str, seen: set[int]) -> Iterator[tuple[str, Any]]:
+    names = _names(value)
+    if not names:
+        yield path, value.copy() if isinstance(value, np.ndarray) else value
+    elif id(value) not in seen:
+        seen.add(id(value))
+        for name in names:
+            yield from _leaves(getattr(value, name), f"{path}/{name}", seen)
+
+
+def restore(state: object, name: str, stored: Mapping[str, Any]) -> None:
+    """Set a dataclass to the state that :func:`save` returned for another of the same type.
+
+    Raises KeyError if something is missing.  Raises ValueError if an array has another shape or
+    type.
+    """
+    _restored(state, name, stored, set())
+
+
+def _restored(value: Any, path: str, stored: Mapping[str, Any], seen: set[int]) -> Any:
+    """Return the stored value; dataclasses and arrays are changed in place where they can be."""
+    names = _names(value)
+    if not names:
+        new = stored[path]
+        if isinstance(value, np.ndarray):
+            if new.shape != value.shape or new.dtype != value.dtype:
+                raise ValueError(f"{path} has another shape or type")
+            value[...] = new
+            return value
+        return new
+    if id(value) in seen:
+        return value
+    seen.add(id(value))
+    new = {name: _restored(getattr(value, name), f"{path}/{name}", stored, seen) for name in names}
+    if isinstance(value, tuple) or "__setattr__" in vars(type(value)):  # frozen
+        return type(value)(**new)
+    for name, one in new.items():
+        setattr(value, name, one)
+    return value
