@@ -127,7 +127,7 @@ def test_a_deck_is_not_replaced_by_its_own_curve(tmp_path: Path) -> None:
 
 def test_the_picture_of_a_fit_holds_every_point_and_the_line() -> None:
     pytest.importorskip("matplotlib")
-    from fecm.plot.indentation import fit_picture as draw
+    from fecm.plot.studies import fit_picture as draw
 
     a, f = make_test()
     found = fit(a, noisy(f, 0))

@@ -97,7 +97,7 @@ def test_pictures_that_do_not_fit_the_axes_are_refused(
 def test_a_refused_picture_leaves_no_empty_figure(
     result: fecm.Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fecm.plot.histories.lines_legend", lambda *_: 1 / 0)
+    monkeypatch.setattr("fecm.plot.style.lines_legend", lambda *_: 1 / 0)
     with pytest.raises(PlotError, match="can't be drawn: ZeroDivisionError"):
         result.plot("force")
     assert not pyplot.get_fignums()

@@ -98,7 +98,7 @@ def fit(
     except StudyError as error:
         raise RefusedError(f"{test}: {error}") from None
     names = {**read.units, "time": "s"} if read.units else {}
-    targets.draw("indentation:fit_picture", read.indentation, read.force, found, names)
+    targets.draw("studies:fit_picture", read.indentation, read.force, found, names)
     for text in notes(found):
         note(text)
     if form == "json":
@@ -190,7 +190,7 @@ def _forces(deck: Path, path: Sequence[float], points: int, targets: OutputPaths
     if not walk or not all(math.isfinite(point.force) for point, _ in walk):
         raise RefusedError("the forces along --path overflow")
     columns = np.array([point for point, _ in walk]).T
-    targets.draw("indentation:path_picture", *columns, unit_names(problem))
+    targets.draw("studies:path_picture", *columns, unit_names(problem))
     branches = ("loading", "unloading", "reloading")
     rows = ((point.indentation, point.force, branches[branch]) for point, branch in walk)
     targets.write("indentation,force,branch", rows)
@@ -234,7 +234,7 @@ def _rigidities(
     if not np.all(np.isfinite(by)):
         raise RefusedError("the rigidities along --path overflow")
     named = dict(zip(("equation 3-9", "equation 3-7"), by, strict=True))
-    targets.draw("indentation:rigidity_picture", peaks, named, slope.q, unit_names(problem))
+    targets.draw("studies:rigidity_picture", peaks, named, slope.q, unit_names(problem))
     targets.write("alpha_m,s_3_9,s_3_7", np.column_stack([peaks, *by]).tolist())
 
 

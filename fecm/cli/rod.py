@@ -117,7 +117,7 @@ def pulse(
     filtered = None
     if transducer is not None:
         filtered = transducer.in_unit(units.get("time", ""))(history.time, history.forces)
-    targets.draw("rod:pulse_picture", history, filtered, units)
+    targets.draw("studies:pulse_picture", history, filtered, units)
     targets.write(*table(history, filtered))
     if targets.table != STANDARD_OUTPUT:
         click.echo("\n".join(_summary(struck, history)))
@@ -184,7 +184,7 @@ def filter_(history: Path, transducer: Filter, column: str | None, targets: Outp
     series = recorded(history, column)
     filtered = transducer.in_unit(series.units.get("time", ""))(series.time, series.values)
     named = {**series.beside, series.name: series.values, "filtered": filtered}
-    targets.draw("rod:filter_picture", series.time, named, series.units, series.dimension)
+    targets.draw("studies:filter_picture", series.time, named, series.units, series.dimension)
     columns = np.stack([series.time, series.values, filtered], axis=1)
     targets.write(f"time,{series.name},filtered", columns[series.first :].tolist())
 
@@ -213,7 +213,7 @@ def calibrate(
         raise RefusedError(f"{test}: {error}") from None
     names = dict(zip(map(str.casefold, measured.names), measured.units, strict=True))
     units = [names.get(name, "") for name in ("time", "v_f", "v_a")]
-    targets.draw("rod:calibration_picture", time, v_f, v_a, found, units)
+    targets.draw("studies:calibration_picture", time, v_f, v_a, found, units)
     click.echo(json.dumps(vars(found)) if form == "json" else "\n".join(_lines(found)))
 
 

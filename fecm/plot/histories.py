@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 
 from fecm._errors import warn
 from fecm.deck.model import Material
+from fecm.plot import style
 from fecm.plot.data import (
     LARGEST,
     Array,
@@ -23,23 +24,6 @@ from fecm.plot.data import (
     strain_points,
 )
 from fecm.plot.kinds import Picture, PlotError
-from fecm.plot.style import (
-    COLOURS,
-    RATIO,
-    STYLES,
-    WIDTHS,
-    Scale,
-    colours,
-    legend,
-    limit_count,
-    lines_legend,
-    panels,
-    peak,
-    scale,
-    scale_in,
-    scale_of,
-    styled,
-)
 from fecm.results.result import Result
 from fecm.results.schema import declared_units
 from fecm.studies.comparison import Measurement, Source, compare, measurement_of
@@ -69,7 +53,7 @@ ENERGIES = {
 }
 
 
-def _time_axis(axes: Axes, clock: Scale, times: Iterable[Array]) -> None:
+def _time_axis(axes: Axes, clock: style.Scale, times: Iterable[Array]) -> None:
     clock.name(axes.xaxis, "Time")
     axes.set_xlim(0.0, max(float(array[-1]) for array in times))
 
@@ -79,7 +63,8 @@ def _mark_open_ends(axes: Axes, results: Results, width: str) -> None:
     named = [name for name, result in results.items() if result.still_in_contact]
     if named:
         which = f" ({', '.join(named)})" if len(named) < len(results) else ""
-        text = textwrap.fill(f"still in contact at the end{which}", int(LETTERS * WIDTHS[width]))
+        letters = int(LETTERS * style.WIDTHS[width])
+        text = textwrap.fill(f"still in contact at the end{which}", letters)
         axes.set_title(text, loc="right", fontsize=7.0).set_parse_math(False)
 
 
@@ -90,21 +75,21 @@ def force(results: Results, *, overlay: Source | None = None, width: str = "colu
     measured force: a CSV file with the columns time and force (or transducer), or times and forces,
     in the deck's units.
     """
-    limit_count(len(results), "forces")
+    style.limit_count(len(results), "forces")
     paths = ("history/time", "history/force", "history/transducer")
     data = {name: require(result, name, *paths) for name, result in results.items()}
     times = [columns[0] for columns in data.values()]
-    clock = scale_of(results, "time", times)
+    clock = style.scale_of(results, "time", times)
     limits = _thresholds(results)
     units = declared_units(next(iter(results.values())).attributes)
     measured = None if overlay is None else measurement_of(overlay, units)
     forces = [c for columns in data.values() for c in columns[1:]]
     if measured is not None:
         forces.append(measured.force)
-    pound = scale_of(results, "force", [*forces, np.array(list(limits.values()))])
+    pound = style.scale_of(results, "force", [*forces, np.array(list(limits.values()))])
     if len(data) == 1:
-        figure, axes = panels(width, ratio=RATIO[width])
-        first, second, *_ = colours()
+        figure, axes = style.panels(width)
+        first, second, *_ = style.colours()
         ((time, contact, transducer),) = data.values()
         equal = np.array_equal(contact, transducer)  # of a rigid mass
         label = f"contact force{' and transducer, which are equal' if equal else ''}"
@@ -113,8 +98,8 @@ def force(results: Results, *, overlay: Source | None = None, width: str = "colu
             axes[0].plot(time, transducer, color=second, label="transducer")
         pound.name(axes[0].yaxis, "Force")
     else:
-        figure, axes = panels(width, 2, sharex=True, sharey=True, ratio=0.65 * RATIO[width])
-        for (name, (time, *both)), colour in zip(data.items(), colours(), strict=False):
+        figure, axes = style.panels(width, 2, sharex=True, sharey=True, tall=0.65)
+        for (name, (time, *both)), colour in zip(data.items(), style.colours(), strict=False):
             for ax, values in zip(axes, both, strict=True):
                 ax.plot(time, values, color=colour, label=name)
         for ax, label in zip(axes, ("Contact force", "Transducer"), strict=True):
@@ -122,13 +107,13 @@ def force(results: Results, *, overlay: Source | None = None, width: str = "colu
     shared = len(set(limits.values())) == 1
     for name, limit in list(limits.items())[: 1 if shared else None]:
         label = "delamination threshold" if shared else f"{name}, delamination threshold"
-        colour = "0.3" if shared else dict(zip(data, colours(), strict=False))[name]
-        axes[0].axhline(limit, color=colour, ls=STYLES[1], lw=0.8, label=label)
+        colour = "0.3" if shared else dict(zip(data, style.colours(), strict=False))[name]
+        axes[0].axhline(limit, color=colour, ls=style.STYLES[1], lw=0.8, label=label)
     _time_axis(axes[-1], clock, times)
     _mark_open_ends(axes[0], results, width)
     if measured is not None:
         _draw_measured(axes, measured)
-    lines_legend(figure, axes[0])
+    style.lines_legend(figure, axes[0])
     notes = [
         f"{measured.quantity} of {name} against {measured.name}: {compare(result, measured)}"
         for name, result in results.items()
@@ -139,32 +124,32 @@ def force(results: Results, *, overlay: Source | None = None, width: str = "colu
 
 def _draw_measured(axes: Sequence[Axes], measured: Measurement) -> None:
     """Draw a measured force over what it is compared with, a few times as points."""
-    style: dict[str, Any] = {"color": "0.2", "zorder": 3.0, "lw": 0.6, "label": measured.name}
+    look: dict[str, Any] = {"color": "0.2", "zorder": 3.0, "lw": 0.6, "label": measured.name}
     if len(measured.time) <= POINTS:
-        style |= {"ls": "none", "marker": ".", "ms": 3.0}
+        look |= {"ls": "none", "marker": ".", "ms": 3.0}
     ax = axes[-1] if measured.column == "transducer" else axes[0]
     if ax is not axes[0]:
-        axes[0].plot([], [], **style)  # for the legend
-    ax.plot(measured.time, measured.force, **style)
+        axes[0].plot([], [], **look)  # for the legend
+    ax.plot(measured.time, measured.force, **look)
 
 
-@styled
+@style.styled
 def fit_picture(found: Identification, units: Mapping[str, str]) -> Picture:
     """Measured and fitted force above, the residual below with plus and minus its rms."""
-    clock = scale_in(units, "time", found.time)
-    figure, (above, below) = panels("column", 2, sharex=True, ratio=0.6 * RATIO["column"])
+    clock = style.scale_in(units, "time", found.time)
+    figure, (above, below) = style.panels("column", 2, sharex=True, tall=0.6)
     few: dict[str, Any] = {"ls": "none", "marker": ".", "ms": 3.0}
-    style = few if len(found.time) <= POINTS else {"lw": 0.6}
-    above.plot(found.time, found.force, color="0.4", label="measured", **style)
-    above.plot(found.time, found.model, color=COLOURS[0], label="fitted")
-    below.plot(found.time, found.residual, color="0.4", **style)
-    below.axhline(0.0, color=COLOURS[0])
+    look = few if len(found.time) <= POINTS else {"lw": 0.6}
+    above.plot(found.time, found.force, color="0.4", label="measured", **look)
+    above.plot(found.time, found.model, color=style.COLOURS[0], label="fitted")
+    below.plot(found.time, found.residual, color="0.4", **look)
+    below.axhline(0.0, color=style.COLOURS[0])
     for value in (-found.rms, found.rms):
-        below.axhline(value, color=COLOURS[0], ls=STYLES[1], lw=0.6)
+        below.axhline(value, color=style.COLOURS[0], ls=style.STYLES[1], lw=0.6)
     for axes, name, values in ((above, "Force", found.force), (below, "Residual", found.residual)):
-        scale_in(units, "force", values).name(axes.yaxis, name)
+        style.scale_in(units, "force", values).name(axes.yaxis, name)
     clock.name(below.xaxis, "Time")
-    lines_legend(figure, above)
+    style.lines_legend(figure, above)
     return Picture(figure)
 
 
@@ -186,7 +171,7 @@ def loop(results: Results, *, against: str = "indentation", width: str = "column
     ``"deflection"`` is the displacement of the plate under the load, ``"displacement"`` that of the
     projectile's impacted end towards the plate, in contact the sum of both others.
     """
-    limit_count(len(results), "loops")
+    style.limit_count(len(results), "loops")
     if against not in AGAINST:
         raise PlotError(f"unknown against {against}; a loop is drawn against {', '.join(AGAINST)}")
     column, sign, label = AGAINST[against]
@@ -197,10 +182,10 @@ def loop(results: Results, *, against: str = "indentation", width: str = "column
     }
     # Without force the bodies move apart.
     touched = np.concatenate([[0.0], *(x[force > 0.0] for x, force in data.values())])
-    length = scale_of(results, "length", [touched])
-    pound = scale_of(results, "force", [f for _, f in data.values()])
-    figure, (axes,) = panels(width, ratio=1.2 * RATIO[width])
-    for (name, (x, values)), colour in zip(data.items(), colours(), strict=False):
+    length = style.scale_of(results, "length", [touched])
+    pound = style.scale_of(results, "force", [f for _, f in data.values()])
+    figure, (axes,) = style.panels(width, tall=1.2)
+    for (name, (x, values)), colour in zip(data.items(), style.colours(), strict=False):
         axes.plot(x, values, color=colour, label=name)
     if touched.any():
         axes.set_xlim(1.05 * touched.min(), 1.05 * touched.max())
@@ -209,26 +194,27 @@ def loop(results: Results, *, against: str = "indentation", width: str = "column
     pound.name(axes.yaxis, "Contact force")
     _mark_open_ends(axes, results, width)
     if len(data) > 1:
-        lines_legend(figure, axes)
+        style.lines_legend(figure, axes)
     return Picture(figure)
 
 
 def energy(results: Results, *, width: str = "column") -> Picture:
     """Energies of plate, projectile and indentation, and their sum; one line style per result."""
-    limit_count(len(results), "results", len(STYLES))
+    style.limit_count(len(results), "results", len(style.STYLES))
     energies = dict(ENERGIES)
     if not all("energy/damping_work" in result for result in results.values()):
         del energies["damping_work"]
     paths = ("energy/time", *(f"energy/{column}" for column in energies))
     data = {name: require(result, name, *paths) for name, result in results.items()}
     times = [columns[0] for columns in data.values()]
-    clock = scale_of(results, "time", times)
-    work = scale_of(results, "force*length", [c for columns in data.values() for c in columns[1:]])
-    figure, (axes,) = panels(width, ratio=1.1 * RATIO[width])
-    shades = [*colours()[: len(energies)], "0.5"]
-    for (time, *columns), style in zip(data.values(), STYLES, strict=False):
+    clock = style.scale_of(results, "time", times)
+    parts = [values for columns in data.values() for values in columns[1:]]
+    work = style.scale_of(results, "force*length", parts)
+    figure, (axes,) = style.panels(width, tall=1.1)
+    shades = [*style.colours()[: len(energies)], "0.5"]
+    for (time, *columns), look in zip(data.values(), style.STYLES, strict=False):
         for values, colour in zip((*columns, np.sum(columns, axis=0)), shades, strict=True):
-            axes.plot(time, values, color=colour, ls=style)
+            axes.plot(time, values, color=colour, ls=look)
     axes.set_ylim(bottom=0.0)
     work.name(axes.yaxis, "Energy")
     _mark_open_ends(axes, results, width)
@@ -236,9 +222,9 @@ def energy(results: Results, *, width: str = "column") -> Picture:
     handles = [Line2D([], [], color=c) for c in shades]
     labels = [*energies.values(), "sum"]
     if len(data) > 1:
-        handles += [Line2D([], [], color="0.3", ls=style) for style in STYLES[: len(data)]]
+        handles += [Line2D([], [], color="0.3", ls=look) for look in style.STYLES[: len(data)]]
         labels += list(data)
-    legend(figure, handles, labels)
+    style.legend(figure, handles, labels)
     return Picture(figure)
 
 
@@ -264,20 +250,23 @@ def strain(
         for label, values in _strains(result, name, at, gages, face).items():
             text = f"{name}, {label}" if len(results) > 1 else label
             lines[text] = (require(result, name, "tape8/time")[0], values)
-    if len(lines) > len(COLOURS):
+    if len(lines) > len(style.COLOURS):
         raise PlotError(
             f"{len(lines)} lines can't be told apart in one picture; ask for fewer points, "
-            f"directions or results, at most {len(COLOURS)} in all"
+            f"directions or results, at most {len(style.COLOURS)} in all"
         )
     times, values_of = zip(*lines.values(), strict=True)
     curvature = face == "curvature"
-    shown = scale_of(results, "1/length", values_of) if curvature else scale(peak(*values_of), "")
-    figure, (axes,) = panels(width, ratio=RATIO[width])
-    for (label, (time, values)), colour in zip(lines.items(), colours(), strict=False):
+    if curvature:
+        shown = style.scale_of(results, "1/length", values_of)
+    else:
+        shown = style.scale(style.peak(*values_of), "")
+    figure, (axes,) = style.panels(width)
+    for (label, (time, values)), colour in zip(lines.items(), style.colours(), strict=False):
         axes.plot(time, values, color=colour, label=label)
     shown.name(axes.yaxis, "Curvature" if curvature else f"Strain, {face} face")
-    _time_axis(axes, scale_of(results, "time", times), times)
-    lines_legend(figure, axes)
+    _time_axis(axes, style.scale_of(results, "time", times), times)
+    style.lines_legend(figure, axes)
     return Picture(figure)
 
 

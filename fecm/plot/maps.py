@@ -15,21 +15,8 @@ from numpy.typing import NDArray
 from fecm._errors import warn
 from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
+from fecm.plot import style
 from fecm.plot.kinds import Picture, PlotError
-from fecm.plot.style import (
-    COLOURS,
-    IN_ORDER,
-    RATIO,
-    WIDTHS,
-    Multiple,
-    Scale,
-    colour_bar,
-    colours,
-    lines_legend,
-    panels,
-    peak,
-    scale,
-)
 from fecm.results.metrics import COLUMNS
 from fecm.results.metrics import INTEGERS as WHOLE_NUMBERS
 from fecm.sweeps.cases import INTEGERS as WHOLE_VALUES
@@ -41,7 +28,7 @@ Array = NDArray[Any]
 Ints = NDArray[np.intp]
 
 INTEGERS = (*WHOLE_VALUES, *WHOLE_NUMBERS)
-CURVES = len(COLOURS)  # most texts with one curve each
+CURVES = len(style.COLOURS)  # most texts with one curve each
 LABELS = {
     "velocity": "Impact velocity", "k": "Contact coefficient $k$", "alpha_p": r"$\alpha_p$",
     "s_p": "$s_p$", "q": "$q$", "rod_length": "Length of the rod",
@@ -60,7 +47,7 @@ ROW, HEAD, BAR = 0.17, 0.75, 0.45
 DASHES = (0, (5, 1.5))
 # Style of a level among curves, and its colour and contour lines on a map.
 LEVEL: Any = {"color": "0.2", "linestyle": DASHES, "linewidth": 1.1}
-LEVEL_COLOUR = COLOURS[1]
+LEVEL_COLOUR = style.COLOURS[1]
 CONTOUR: Any = {"colors": LEVEL_COLOUR, "linestyles": [DASHES], "linewidths": 1.2}
 SHADES = 256  # of a colour map
 MARKERS = "osD^vP*"
@@ -79,7 +66,7 @@ class Axis:
     """A parameter or quantity, shown by an axis or by colours."""
 
     name: str
-    scale: Scale
+    scale: style.Scale
     values: Array  # (cases,): numbers; for texts their positions in `ticks`
     ticks: tuple[str, ...] = ()  # texts in the order of the cases; empty for numbers
 
@@ -194,7 +181,7 @@ def _text(sweep: SweepResult, name: str, row: int) -> str:
     value = sweep[name][row]
     if isinstance(value, str):
         return str(value)
-    return scale(abs(float(value)), sweep.unit(name)).show(float(value))
+    return style.scale(abs(float(value)), sweep.unit(name)).show(float(value))
 
 
 def _over(sweep: SweepResult, name: str, varying: list[str], asked: Sequence[str]) -> list[str]:
@@ -262,13 +249,14 @@ def _parameter(sweep: SweepResult, name: str, rows: Ints) -> Axis:
         return numbers(sweep, name, values)
     ticks = tuple(dict.fromkeys(values.tolist()))
     places = {text: place for place, text in enumerate(ticks)}
-    return Axis(name, Scale(1.0, ""), np.array([places[v] for v in values.tolist()]), ticks)
+    return Axis(name, style.Scale(1.0, ""), np.array([places[v] for v in values.tolist()]), ticks)
 
 
 def numbers(sweep: SweepResult, name: str, values: Array) -> Axis:
     """Axis of numbers; counts are not scaled."""
-    shown = Scale(1.0, "") if name in INTEGERS else scale(peak(values), sweep.unit(name))
-    return Axis(name, shown, values)
+    if name in INTEGERS:
+        return Axis(name, style.Scale(1.0, ""), values)
+    return Axis(name, style.scale(style.peak(values), sweep.unit(name)), values)
 
 
 # Pictures -----------------------------------------------------------------------------------------
@@ -341,8 +329,8 @@ def _mark_limits(axes: Axes, x: Axis, y: Axis, choice: Choice) -> None:
         for row in range(len(texts.ticks) if texts else 1):
             here = np.flatnonzero(texts.values == row) if texts else np.arange(len(limits))
             here = here[np.argsort(x.values[here], kind="stable")]
-            style = LEVEL | ({"color": colours()[row]} if texts else {})
-            axes.plot(x.values[here], limits[here], **style)
+            look = LEVEL | ({"color": style.colours()[row]} if texts else {})
+            axes.plot(x.values[here], limits[here], **look)
     elif x is shown:
         axes.plot(limits, y.values, "|", color="0.2", markersize=11.0)
     elif (found := _grid(x, y, above)) is None:
@@ -368,7 +356,7 @@ def _one(choice: Choice, width: str) -> Axes:
     if over.ticks:
         axes = _text_rows(width, over, 0.0 if other is None else BAR)
         if other is None:
-            axes.plot(shown.values, over.values, "o", color=colours()[0], markersize=3.5)
+            axes.plot(shown.values, over.values, "o", color=style.colours()[0], markersize=3.5)
         else:
             _coloured(axes, shown, over, other)
         _name_axes(axes, shown, None)
@@ -379,12 +367,14 @@ def _one(choice: Choice, width: str) -> Axes:
         axes.grid(axis="y", linewidth=0.4, color="0.85")
         axes.set_axisbelow(True)
         return axes
-    _, (axes,) = panels(width, ratio=RATIO[width])
+    _, (axes,) = style.panels(width)
     if other is not None:
         _coloured(axes, over, shown, other)
     else:
         order = np.argsort(over.values, kind="stable")
-        axes.plot(over.values[order], shown.values[order], "o-", color=colours()[0], markersize=2.5)
+        axes.plot(
+            over.values[order], shown.values[order], "o-", color=style.colours()[0], markersize=2.5
+        )
     _finish_curves(axes, over, shown, levels)
     return axes
 
@@ -392,7 +382,7 @@ def _one(choice: Choice, width: str) -> Axes:
 def _coloured(axes: Axes, x: Axis, y: Axis, other: Axis) -> None:
     """Points coloured by another parameter."""
     drawn = axes.scatter(
-        x.values, y.values, c=other.values, s=9.0, cmap=IN_ORDER, norm=_colours(other),
+        x.values, y.values, c=other.values, s=9.0, cmap=style.IN_ORDER, norm=_colours(other),
         linewidths=0.0,
     )  # fmt: skip
     _bar(axes, drawn, other, [])
@@ -418,7 +408,7 @@ def _name_axes(axes: Axes, x: Axis, y: Axis | None) -> None:
 def _text_rows(width: str, over: Axis, more: float) -> Axes:
     """Axes whose rows are texts, the first at the top, with more room above (in)."""
     height = HEAD + ROW * max(len(over.ticks), 4) + more
-    _, (axes,) = panels(width, ratio=height / WIDTHS[width])
+    _, (axes,) = style.panels(width, ratio=height / style.WIDTHS[width])
     axes.set_yticks(range(len(over.ticks)), over.ticks)
     axes.set_ylim(len(over.ticks) - 0.5, -0.5)
     return axes
@@ -436,7 +426,7 @@ def _two(first: Axis, second: Axis, shown: Axis, levels: list[float], width: str
     if second.ticks:
         axes = _text_rows(width, second, BAR)
     else:
-        _, (axes,) = panels(width, ratio=1.35 * RATIO[width])
+        _, (axes,) = style.panels(width, tall=1.35)
     _name_axes(axes, first, None if second.ticks else second)
     if found is None:
         _points(axes, first, second, shown, levels)
@@ -447,8 +437,8 @@ def _two(first: Axis, second: Axis, shown: Axis, levels: list[float], width: str
 
 def _curves(over: Axis, texts: Axis, shown: Axis, levels: list[float], width: str) -> Axes:
     """A curve a text."""
-    figure, (axes,) = panels(width, ratio=1.15 * RATIO[width])
-    for row, (text, colour) in enumerate(zip(texts.ticks, colours(), strict=False)):
+    figure, (axes,) = style.panels(width, tall=1.15)
+    for row, (text, colour) in enumerate(zip(texts.ticks, style.colours(), strict=False)):
         here = np.flatnonzero(texts.values == row)
         here = here[np.argsort(over.values[here], kind="stable")]
         if np.isnan(shown.values[here]).all():  # failed
@@ -458,7 +448,7 @@ def _curves(over: Axis, texts: Axis, shown: Axis, levels: list[float], width: st
             markersize=2.2, label=text,
         )  # fmt: skip
     _finish_curves(axes, over, shown, levels)
-    lines_legend(figure, axes)
+    style.lines_legend(figure, axes)
     return axes
 
 
@@ -472,7 +462,7 @@ def _colours(shown: Axis) -> Normalize:
 
 def _bar(axes: Axes, drawn: Any, shown: Axis, levels: list[float]) -> None:
     locator = MaxNLocator(6, integer=shown.whole)
-    bar = colour_bar(axes, drawn, shown.scale, shown.label, locator)
+    bar = style.colour_bar(axes, drawn, shown.scale, shown.label, locator)
     for level in levels:
         if drawn.norm.vmin <= level <= drawn.norm.vmax:
             bar.ax.axvline(level, color=LEVEL_COLOUR, linewidth=1.5)
@@ -482,7 +472,7 @@ def _cells(axes: Axes, grid: Grid, shown: Axis, levels: list[float], *, rows: bo
     """One cell per case, with contour lines unless the rows are texts."""
     values = grid[2]
     drawn = axes.pcolormesh(
-        *grid, shading="nearest", cmap=IN_ORDER, norm=_colours(shown), edgecolor="face",
+        *grid, shading="nearest", cmap=style.IN_ORDER, norm=_colours(shown), edgecolor="face",
         linewidth=0.1, rasterized=values.size > MANY,
     )  # fmt: skip
     _bar(axes, drawn, shown, levels)
@@ -495,10 +485,10 @@ def _cells(axes: Axes, grid: Grid, shown: Axis, levels: list[float], *, rows: bo
         ticks = MaxNLocator(LINES).tick_values(low, high)
         inner = [tick for tick in ticks if low < tick < high and tick not in levels]
         lines = axes.contour(*grid, inner, colors="white", linewidths=0.5)
-        axes.clabel(lines, fontsize=6.0, inline_spacing=2, fmt=Multiple(shown.scale.factor))
+        axes.clabel(lines, fontsize=6.0, inline_spacing=2, fmt=style.Multiple(shown.scale.factor))
     if inside := sorted({level for level in levels if low < level < high}):
         marked = axes.contour(*grid, inside, **CONTOUR)
-        form = Multiple(shown.scale.factor)
+        form = style.Multiple(shown.scale.factor)
         axes.clabel(marked, fontsize=6.0, inline_spacing=2, colors="white", fmt=form)
 
 
@@ -518,7 +508,7 @@ def _points(axes: Axes, first: Axis, second: Axis, shown: Axis, levels: list[flo
     """One coloured point per case; those above the lowest level have an edge."""
     fine = np.isfinite(shown.values)
     drawn: Any = axes.scatter(
-        first.values[fine], second.values[fine], c=shown.values[fine], s=14.0, cmap=IN_ORDER,
+        first.values[fine], second.values[fine], c=shown.values[fine], s=14.0, cmap=style.IN_ORDER,
         norm=_colours(shown), linewidths=0.0, rasterized=bool(fine.sum() > MANY),
     )  # fmt: skip
     if levels:

@@ -20,6 +20,7 @@ from matplotlib.tri import LinearTriInterpolator, Triangulation
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Impact
 from fecm.mechanics.element_groups import longest_sides
+from fecm.plot import style
 from fecm.plot.data import (
     Array,
     Patches,
@@ -32,21 +33,6 @@ from fecm.plot.data import (
     struck,
 )
 from fecm.plot.kinds import Picture, PlotError
-from fecm.plot.style import (
-    COLOURS,
-    IN_ORDER,
-    RATIO,
-    SIGNED,
-    WIDTHS,
-    Scale,
-    colour_bar,
-    colours,
-    legend,
-    limit_count,
-    lines_legend,
-    panels,
-    scale_of,
-)
 from fecm.results.result import Result
 
 Results = Mapping[str, Result]
@@ -58,10 +44,12 @@ LEVELS = 21
 EXAGGERATION = 0.3  # height of the deflected plate over its longer side
 # Marks of the supports by their label.
 MARKS: dict[str, dict[str, Any]] = {
-    "clamped": {"marker": "s", "color": COLOURS[0], "ms": 3.0},
-    "w held": {"marker": "^", "color": COLOURS[0], "ms": 3.5, "mfc": "white", "mew": 0.7},
-    "rotation held": {"marker": "o", "color": COLOURS[2], "ms": 3.0, "mfc": "white", "mew": 0.7},
-}
+    "clamped": {"marker": "s", "color": style.COLOURS[0], "ms": 3.0},
+    "w held": {"marker": "^", "color": style.COLOURS[0], "ms": 3.5, "mfc": "white", "mew": 0.7},
+    "rotation held": {
+        "marker": "o", "color": style.COLOURS[2], "ms": 3.0, "mfc": "white", "mew": 0.7
+    },
+}  # fmt: skip
 
 
 # The mesh -----------------------------------------------------------------------------------------
@@ -87,7 +75,7 @@ def _corners(elements: Array, w: Bools, full: Bools) -> Bools:
     return np.asarray(full & found & ~others)
 
 
-def draw_circle(axes: Axes, result: Result, name: str, **style: Any) -> list[Line2D]:
+def draw_circle(axes: Axes, result: Result, name: str, **look: Any) -> list[Line2D]:
     """Draw the circle of the contact patch, if there is one, on axes of x and y."""
     found = circle(result, name)
     if found is None:
@@ -95,7 +83,7 @@ def draw_circle(axes: Axes, result: Result, name: str, **style: Any) -> list[Lin
     centre, radius = found
     angle = np.linspace(0.0, 2.0 * np.pi, 73)
     x, y = centre[:, None] + radius * np.stack([np.cos(angle), np.sin(angle)])
-    return axes.plot(x, y, lw=0.7, **style)
+    return axes.plot(x, y, lw=0.7, **look)
 
 
 def mark_impact(axes: Axes, result: Result, name: str) -> None:
@@ -111,10 +99,12 @@ def mesh(
     ((name, result),) = results.items()
     coordinates, _ = require(result, name, "mesh/coordinates", "mesh/elements")
     cut = patches(result, 4, name)
-    place = scale_of(results, "length", [coordinates])
+    place = style.scale_of(results, "length", [coordinates])
     low, high = cut.points.min(axis=0), cut.points.max(axis=0)
     height = float(np.clip((high - low)[1] / (high - low)[0], 0.3, 2.0))
-    figure, (axes,) = panels(width, ratio=height + (0.55 - 0.5 * height) / WIDTHS[width])
+    figure, (axes,) = style.panels(
+        width, ratio=height + (0.55 - 0.5 * height) / style.WIDTHS[width]
+    )
     sides = [cut.points[edge] for edge in cut.edges]
     axes.add_collection(LineCollection(sides, colors="0.4", linewidths=0.4))
     handles, labels = [], []
@@ -129,19 +119,19 @@ def mesh(
             {"marker": "+"} if circle(result, name) else {"marker": "X", "mec": "white"}
         )
         handles += axes.plot(
-            *where.T, color=COLOURS[1], ms=6.0, mew=0.5, ls="", clip_on=False, **mark
+            *where.T, color=style.COLOURS[1], ms=6.0, mew=0.5, ls="", clip_on=False, **mark
         )
         labels.append("impact" if deck_of(result, name).has(Impact) else "load")
-    if ring := draw_circle(axes, result, name, color=COLOURS[1]):
+    if ring := draw_circle(axes, result, name, color=style.COLOURS[1]):
         handles += ring
         labels.append("contact patch")
     if at:
-        handles += axes.plot(*np.array(at).T, "D", color=COLOURS[3], ms=3.5, clip_on=False)
+        handles += axes.plot(*np.array(at).T, "D", color=style.COLOURS[3], ms=3.5, clip_on=False)
         labels.append("points")
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     place.name(axes.xaxis, "$x$")
     place.name(axes.yaxis, "$y$")
-    legend(figure, handles, labels)
+    style.legend(figure, handles, labels)
     return Picture(figure)
 
 
@@ -199,27 +189,28 @@ def line(
         require(result, name, "tape3/w")
         rows = stored_rows(result, name, times, 6 if len(results) == 1 else 3)
         data[name] = (result["tape3/time"][rows], *profile(result, name, along, rows))
-    limit_count(len(data), "results")
+    style.limit_count(len(data), "results")
     instants = [stored for stored, _, _ in data.values()]
     if len({len(stored) for stored in instants}) > 1:
         raise PlotError("the results differ in the number of stored rows; give --times")
-    clock = scale_of(results, "time", instants)
-    place = scale_of(results, "length", [position for _, position, _ in data.values()])
-    length = scale_of(results, "length", [w for _, _, w in data.values()])
+    clock = style.scale_of(results, "time", instants)
+    place = style.scale_of(results, "length", [position for _, position, _ in data.values()])
+    length = style.scale_of(results, "length", [w for _, _, w in data.values()])
     if len(data) == 1:
-        figure, axes = panels(width, ratio=RATIO[width])
+        figure, axes = style.panels(width)
         ((stored, position, w),) = data.values()
-        shades = matplotlib.colormaps[IN_ORDER](np.linspace(0.0, 0.85, len(stored)))
+        shades = matplotlib.colormaps[style.IN_ORDER](np.linspace(0.0, 0.85, len(stored)))
         for time, values, shade in zip(stored, w, shades, strict=True):
             axes[0].plot(position, values, color=shade, label=f"{clock.factor * time:.4g}")
     else:
-        ratio = 0.6 * RATIO[width]
-        figure, axes = panels(width, len(instants[0]), sharex=True, sharey=True, ratio=ratio)
-        for (name, (stored, position, w)), colour in zip(data.items(), colours(), strict=False):
+        figure, axes = style.panels(width, len(instants[0]), sharex=True, sharey=True, tall=0.6)
+        for (name, (stored, position, w)), colour in zip(
+            data.items(), style.colours(), strict=False
+        ):
             for ax, time, values in zip(axes, stored, w, strict=True):
                 ax.plot(position, values, color=colour, label=name)
                 ax.set_title(f"time {clock.show(time)}", loc="left")
-    lines_legend(figure, axes[0], clock.label("Time") if len(data) == 1 else "")
+    style.lines_legend(figure, axes[0], clock.label("Time") if len(data) == 1 else "")
     for ax in axes:
         length.name(ax.yaxis, "Deflection")
         ax.margins(x=0.0)
@@ -236,14 +227,14 @@ def contour(results: Results, *, times: Sequence[float] = (), width: str = "colu
     require(result, name, "tape3/w")
     rows = stored_rows(result, name, times, 4)
     cut, w = patches(result, 4, name), result["tape3/w"][rows]
-    clock = scale_of(results, "time", [result["tape3/time"][rows]])
-    length = scale_of(results, "length", [w])
-    place = scale_of(results, "length", [cut.points])
+    clock = style.scale_of(results, "time", [result["tape3/time"][rows]])
+    length = style.scale_of(results, "length", [w])
+    place = style.scale_of(results, "length", [cut.points])
     columns = min(len(rows), 2 if width == "column" else 4)
     height, wide = np.ptp(cut.points[:, 1]), np.ptp(cut.points[:, 0])
     lines = math.ceil(len(rows) / columns)
-    ratio = float(np.clip(height / wide, 0.3, 2.0)) + 0.65 * columns / lines / WIDTHS[width]
-    figure, axes = panels(width, lines, columns, sharex=True, sharey=True, ratio=ratio)
+    ratio = float(np.clip(height / wide, 0.3, 2.0)) + 0.65 * columns / lines / style.WIDTHS[width]
+    figure, axes = style.panels(width, lines, columns, sharex=True, sharey=True, ratio=ratio)
     fields = [cut.values(row) for row in w]
     peak = float(np.abs(fields).max()) or 1.0  # may exceed the nodal values
     levels = MaxNLocator(LEVELS).tick_values(np.min(fields), np.max(fields))
@@ -251,7 +242,7 @@ def contour(results: Results, *, times: Sequence[float] = (), width: str = "colu
     fills = []
     for ax, row, values in zip(axes, rows, fields, strict=False):
         norm = Normalize(-peak, peak)
-        fills.append(ax.tricontourf(triangles, values, levels, cmap=SIGNED, norm=norm))
+        fills.append(ax.tricontourf(triangles, values, levels, cmap=style.SIGNED, norm=norm))
         fills[-1].set(edgecolor="face", linewidth=0.2)  # hides white seams
         mark_impact(ax, result, name)
         ax.set_title(f"time {clock.show(float(result['tape3/time'][row]))}", loc="left")
@@ -262,7 +253,7 @@ def contour(results: Results, *, times: Sequence[float] = (), width: str = "colu
         place.name(ax.yaxis, "$y$")
     for ax in axes[len(rows) :]:
         ax.set_axis_off()
-    colour_bar(axes, fills[0], length, "Deflection", MaxNLocator(6), aspect=40, shrink=0.8)
+    style.colour_bar(axes, fills[0], length, "Deflection", MaxNLocator(6), aspect=40, shrink=0.8)
     return Picture(figure)
 
 
@@ -270,7 +261,12 @@ class _Plate:
     """The deflected plate in three-dimensional axes."""
 
     def __init__(
-        self, axes: Any, cut: Patches, place: Scale, length: Scale, span: tuple[float, float]
+        self,
+        axes: Any,
+        cut: Patches,
+        place: style.Scale,
+        length: style.Scale,
+        span: tuple[float, float],
     ) -> None:
         from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
@@ -278,7 +274,7 @@ class _Plate:
         peak = max(map(abs, span)) or 1.0
         self._title = axes.text2D(0.03, 0.94, "", transform=axes.transAxes)
         self.collection = Poly3DCollection(
-            self._at(np.zeros(len(cut.points))), cmap=SIGNED, norm=Normalize(-peak, peak),
+            self._at(np.zeros(len(cut.points))), cmap=style.SIGNED, norm=Normalize(-peak, peak),
             edgecolors="0.25", linewidths=0.12, clip_on=False,
         )  # fmt: skip
         axes.add_collection3d(self.collection)
@@ -320,7 +316,7 @@ def surface(results: Results, *, times: Sequence[float] = (), width: str = "colu
     rows = stored_rows(result, name, times, 1) if times else largest
     columns = 1 if width == "column" else min(len(rows), 2)
     figure, plates = _plates(results, width, rows, columns, len(rows))
-    clock = scale_of(results, "time", [result["tape3/time"]])
+    clock = style.scale_of(results, "time", [result["tape3/time"]])
     for plate, row in zip(plates, rows, strict=True):
         plate.show(w[row], f"time {clock.show(float(result['tape3/time'][row]))}")
     return Picture(figure)
@@ -332,15 +328,15 @@ def _plates(
     """Axes for `count` plates, on the common scale of all rows."""
     ((name, result),) = results.items()
     cut, w = patches(result, 2, name), result["tape3/w"][rows]
-    place = scale_of(results, "length", [cut.points])
-    length = scale_of(results, "length", [w])
+    place = style.scale_of(results, "length", [cut.points])
+    length = style.scale_of(results, "length", [w])
     span = (float(w.min()), float(w.max()))
     lines = math.ceil(count / columns)
-    figure, axes = panels(width, lines, columns, ratio=0.7, subplot_kw={"projection": "3d"})
+    figure, axes = style.panels(width, lines, columns, ratio=0.7, subplot_kw={"projection": "3d"})
     for ax in axes[count:]:
         ax.set_axis_off()
     plates = [_Plate(ax, cut, place, length, span) for ax in axes[:count]]
-    bar = colour_bar(
+    bar = style.colour_bar(
         axes, plates[0].collection, length, "Deflection", MaxNLocator(5),
         shrink=0.6, pad=0.0, fraction=0.06,
     )  # fmt: skip
@@ -355,7 +351,7 @@ def animation(results: Results, *, times: Sequence[float] = (), width: str = "co
     (w,) = require(result, name, "tape3/w")
     rows = stored_rows(result, name, times, FRAMES)
     figure, (plate, *_) = _plates(results, width, rows, 1, 1)
-    clock = scale_of(results, "time", [result["tape3/time"][rows]])
+    clock = style.scale_of(results, "time", [result["tape3/time"][rows]])
     frames = [
         functools.partial(plate.show, w[row], f"time {clock.show(result['tape3/time'][row])}")
         for row in rows

@@ -23,21 +23,10 @@ from fecm.mechanics.element_groups import element_blocks, element_centres
 from fecm.mechanics.elements.quadrature import Quadrature
 from fecm.mechanics.failure import CRITERIA
 from fecm.mechanics.locate import locate
+from fecm.plot import style
 from fecm.plot.data import Array, circle, deck_of, mesh_of, on_plate, require, struck
 from fecm.plot.kinds import Picture, PlotError
 from fecm.plot.plate import mark_impact
-from fecm.plot.style import (
-    COLOURS,
-    IN_ORDER,
-    WIDTHS,
-    Scale,
-    colour_bar,
-    colours,
-    legend,
-    literal,
-    panels,
-    scale_of,
-)
 from fecm.problem.build import rules
 from fecm.results.plies import Plies, places, rows_at
 from fecm.results.result import Result
@@ -46,7 +35,7 @@ from fecm.results.summary import LargestExposure, largest_exposures
 
 BETWEEN = "interlaminar"
 NAMES = (*CRITERIA, BETWEEN)
-COLOUR_OF = dict(zip(NAMES, COLOURS, strict=False))
+COLOUR_OF = dict(zip(NAMES, style.COLOURS, strict=False))
 LIMIT: dict[str, Any] = {"color": "#C00000", "linewidth": 1.0}
 HATCH: dict[str, Any] = {"facecolor": "white", "edgecolor": "0.55", "hatch": "//////"}
 LARGEST: dict[str, Any] = {
@@ -85,7 +74,7 @@ def failure(results: Mapping[str, Result], *, quantity: str = "", width: str = "
     ((name, result),) = results.items()
     found = _exposures(result, name, quantity)
     corners = _cells(result, name, found.under_load.shape[1])
-    place = scale_of(results, "length", [corners])
+    place = style.scale_of(results, "length", [corners])
     figure, plate, bars = _axes(corners, max(map(len, found.over_plies.values())), width)
     _map(plate, corners, found)
     mark_impact(plate, result, name)
@@ -171,7 +160,7 @@ def _axes(corners: Floats, plies: int, width: str) -> tuple[Figure, Axes, Axes]:
     """Axes of the map and of the bars: side by side on a page, one above the other in a column."""
     wide, high = np.ptp(corners.reshape(-1, 2), axis=0)
     aspect = float(np.clip(high / wide, 0.3, 2.0))
-    inches = WIDTHS[width]
+    inches = style.WIDTHS[width]
     bars = float(np.clip(0.8 + 0.07 * plies, 1.4, 4.0))
     if width == "column":
         plate = 0.85 * inches * aspect + 1.5
@@ -180,7 +169,7 @@ def _axes(corners: Floats, plies: int, width: str) -> tuple[Figure, Axes, Axes]:
     else:
         total, rows, columns = max(0.54 * inches * aspect + 1.5, bars + 0.4), 1, 2
         parts = {"width_ratios": (5.0, 3.0)}
-    figure, (first, second) = panels(
+    figure, (first, second) = style.panels(
         width, rows, columns, ratio=total * columns / (inches * rows), **parts
     )
     return figure, first, second
@@ -192,7 +181,7 @@ def _map(axes: Axes, cells: Floats, found: Exposures) -> None:
     values = found.over_plate[outside]
     peak = float(values.max())
     drawn = PolyCollection(
-        list(cells[outside]), array=values, cmap=IN_ORDER, norm=Normalize(0.0, peak or 1.0),
+        list(cells[outside]), array=values, cmap=style.IN_ORDER, norm=Normalize(0.0, peak or 1.0),
         edgecolors="face", linewidths=0.2, rasterized=len(values) > MANY,
     )  # fmt: skip
     axes.add_collection(drawn)
@@ -203,7 +192,7 @@ def _map(axes: Axes, cells: Floats, found: Exposures) -> None:
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     what = "the interfaces" if found.worst.criterion == BETWEEN else "the plies"
     label = f"Largest exposure of {what}"
-    bar = colour_bar(axes, drawn, Scale(1.0, ""), label, MaxNLocator(5))
+    bar = style.colour_bar(axes, drawn, style.Scale(1.0, ""), label, MaxNLocator(5))
     if peak >= 1.0:
         bar.ax.axvline(1.0, **LIMIT)
 
@@ -255,7 +244,7 @@ def _legend(figure: Figure, found: Exposures) -> None:
     if found.under_load.any():
         handles.append(Patch(linewidth=0.0, **HATCH))
         labels.append("under the load")
-    legend(figure, handles, labels)
+    style.legend(figure, handles, labels)
 
 
 def _note(under_load: Bools, name: str) -> None:
@@ -316,25 +305,25 @@ def thickness(
         drawn[r"$(\tau_{xz}^2 + \tau_{yz}^2)^{1/2}$"] = depth, np.hypot(xz, yz)
     _warn(result, name, plies, point)
     columns = 2 if width == "column" else 3
-    figure, axes = panels(
+    figure, axes = style.panels(
         width, math.ceil(len(drawn) / columns), columns, sharey=True, ratio=1.8 / columns
     )
-    place = scale_of(results, "length", [z])
+    place = style.scale_of(results, "length", [z])
     for ax, (label, (levels, values)) in zip(axes, drawn.items(), strict=False):
-        stress = scale_of(results, STRESS, [values])
+        stress = style.scale_of(results, STRESS, [values])
         for face in np.unique(z[:, ::2]):
             ax.axhline(face, color="0.6", lw=0.4, ls=":")
         ax.axvline(0.0, color="0.6", lw=0.4)
-        ax.plot(values.ravel(), levels.ravel(), color=colours()[0])
+        ax.plot(values.ravel(), levels.ravel(), color=style.colours()[0])
         stress.name(ax.xaxis, label)
         ax.set_ylim(z[-1, 2], z[0, 0])
     for ax in axes[len(drawn) :]:
         ax.set_axis_off()
     for ax in axes[: len(drawn) : columns]:
         place.name(ax.yaxis, "$z$")
-    clock = scale_of(results, "time", [plies.time])
+    clock = style.scale_of(results, "time", [plies.time])
     x, y = plies.x[0, point], plies.y[0, point]
-    where = f"{x:.4g}, {y:.4g} {literal(result.unit('length'))}".rstrip()
+    where = f"{x:.4g}, {y:.4g} {style.literal(result.unit('length'))}".rstrip()
     figure.suptitle(
         f"element {plies.element[0]} at {where}, time {clock.show(float(plies.time[0]))}",
         fontsize=8.0,

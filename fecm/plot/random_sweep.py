@@ -10,7 +10,7 @@ import numpy as np
 from fecm.plot.kinds import Picture, PlotError
 from fecm.plot.maps import LEVEL, Axis, Ints, case_rows, quantity_of
 from fecm.plot.maps import numbers as axis_of
-from fecm.plot.style import RATIO, WIDTHS, colours, legend, limit_count, lines_legend, panels
+from fecm.plot.style import WIDTHS, colours, legend, limit_count, lines_legend, panels
 from fecm.sweeps.random_result import Indices, RandomResult, wilson
 from fecm.sweeps.result import SweepResult
 
@@ -74,7 +74,7 @@ def exceedance(
     """
     name, sweep, random, chosen = _random(results, where)
     limit_count(len(chosen), "curves")
-    figure, (axes,) = panels(width, ratio=RATIO[width])
+    figure, (axes,) = panels(width)
     notes: list[str] = []
     shown: Axis | None = None
     for place, colour in zip(chosen, colours(), strict=False):

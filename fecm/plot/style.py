@@ -209,10 +209,14 @@ def style_on(axes: Axes | None) -> dict[str, Any]:
 
 
 def panels(
-    width: str, rows: int = 1, columns: int = 1, *, ratio: float, **options: Any
-) -> tuple[Figure, list[Axes]]:
-    """Figure with equal axes, row by row; `ratio` is height over width of each."""
-    inches, target = WIDTHS[width], TARGET.get()
+    width: str, rows: int = 1, columns: int = 1, *, ratio: float = 0.0, tall: float = 1.0,
+    **options: Any,
+) -> tuple[Figure, list[Axes]]:  # fmt: skip
+    """Figure with equal axes, row by row.
+
+    The height over the width of each is `ratio`, by default `tall` times that of a graph.
+    """
+    inches, target, ratio = WIDTHS[width], TARGET.get(), ratio or tall * RATIO[width]
     solid = "subplot_kw" in options and options["subplot_kw"].get("projection") == "3d"
     if isinstance(target, Axes):
         if rows * columns > 1:
