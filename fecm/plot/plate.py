@@ -13,7 +13,6 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
@@ -75,15 +74,13 @@ def _corners(elements: Array, w: Bools, full: Bools) -> Bools:
     return np.asarray(full & found & ~others)
 
 
-def draw_circle(axes: Axes, result: Result, name: str, **look: Any) -> list[Line2D]:
+def draw_circle(axes: Axes, result: Result, name: str, **look: Any) -> None:
     """Draw the circle of the contact patch, if there is one, on axes of x and y."""
-    found = circle(result, name)
-    if found is None:
-        return []
-    centre, radius = found
-    angle = np.linspace(0.0, 2.0 * np.pi, 73)
-    x, y = centre[:, None] + radius * np.stack([np.cos(angle), np.sin(angle)])
-    return axes.plot(x, y, lw=0.7, **look)
+    if (found := circle(result, name)) is not None:
+        centre, radius = found
+        angle = np.linspace(0.0, 2.0 * np.pi, 73)
+        x, y = centre[:, None] + radius * np.stack([np.cos(angle), np.sin(angle)])
+        axes.plot(x, y, lw=0.7, **look)
 
 
 def mark_impact(axes: Axes, result: Result, name: str) -> None:
@@ -107,31 +104,23 @@ def mesh(
     )
     sides = [cut.points[edge] for edge in cut.edges]
     axes.add_collection(LineCollection(sides, colors="0.4", linewidths=0.4))
-    handles, labels = [], []
     for label, nodes in supports(result).items():
         if nodes.any():
-            held = coordinates[nodes, :2]
-            handles += axes.plot(*held.T, ls="none", clip_on=False, **MARKS[label])
-            labels.append(label)
+            held = coordinates[nodes, :2].T
+            axes.plot(*held, ls="none", clip_on=False, label=label, **MARKS[label])
     where = struck(result, name)
     if len(where):
-        mark: dict[str, Any] = (
-            {"marker": "+"} if circle(result, name) else {"marker": "X", "mec": "white"}
-        )
-        handles += axes.plot(
-            *where.T, color=style.COLOURS[1], ms=6.0, mew=0.5, ls="", clip_on=False, **mark
-        )
-        labels.append("impact" if deck_of(result, name).has(Impact) else "load")
-    if ring := draw_circle(axes, result, name, color=style.COLOURS[1]):
-        handles += ring
-        labels.append("contact patch")
+        mark: Any = {"marker": "+"} if circle(result, name) else {"marker": "X", "mec": "white"}
+        mark["label"] = "impact" if deck_of(result, name).has(Impact) else "load"
+        axes.plot(*where.T, color=style.COLOURS[1], ms=6.0, mew=0.5, ls="", clip_on=False, **mark)
+    draw_circle(axes, result, name, color=style.COLOURS[1], label="contact patch")
     if at:
-        handles += axes.plot(*np.array(at).T, "D", color=style.COLOURS[3], ms=3.5, clip_on=False)
-        labels.append("points")
+        points: Any = {"color": style.COLOURS[3], "ms": 3.5, "label": "points"}
+        axes.plot(*np.array(at).T, "D", clip_on=False, **points)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     place.name(axes.xaxis, "$x$")
     place.name(axes.yaxis, "$y$")
-    style.legend(figure, handles, labels)
+    style.lines_legend(figure, axes)
     return Picture(figure)
 
 

@@ -226,24 +226,18 @@ def _bars(axes: Axes, found: Exposures) -> None:
 def _legend(figure: Figure, found: Exposures) -> None:
     """Legend of bars, marks and hatching, and the largest exposure above it."""
     plies = [name for name in found.over_plies if name != BETWEEN]
-    handles: list[Any] = []
-    if len(plies) > 1:
-        handles = [
-            Line2D([], [], color=COLOUR_OF[n], **m) for n, m in zip(plies, MARKS, strict=True)
-        ]
-    elif plies:
-        handles = [Patch(color=COLOUR_OF[plies[0]])]
-    labels = [name.replace("_", " ") for name in plies]
+    entries: list[tuple[str, Any]] = []
+    for name, mark in zip(plies, MARKS, strict=False):
+        handle = Line2D([], [], color=COLOUR_OF[name], **mark)
+        entries.append((name.replace("_", " "), handle))
+    if len(plies) == 1:
+        entries = [(entries[0][0], Patch(color=COLOUR_OF[plies[0]]))]
     if BETWEEN in found.over_plies:
-        handles.append(Patch(color=COLOUR_OF[BETWEEN]))
-        labels.append(BETWEEN)
-    handles.append(Line2D([], [], **LIMIT))
-    labels.append("exposure 1")
-    handles.append(Line2D([], [], **LARGEST))
-    labels.append("largest")
+        entries.append((BETWEEN, Patch(color=COLOUR_OF[BETWEEN])))
+    entries += ("exposure 1", Line2D([], [], **LIMIT)), ("largest", Line2D([], [], **LARGEST))
     if found.under_load.any():
-        handles.append(Patch(linewidth=0.0, **HATCH))
-        labels.append("under the load")
+        entries.append(("under the load", Patch(linewidth=0.0, **HATCH)))
+    labels, handles = zip(*entries, strict=True)
     style.legend(figure, handles, labels)
 
 
