@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import matplotlib
@@ -35,6 +35,8 @@ from fecm.plot.kinds import Picture, PlotError
 from fecm.results.result import Result
 
 Results = Mapping[str, Result]
+# Shows nodal deflections, and a title.
+Show = Callable[[Array, str], None]
 
 AXES = {"x": 0, "y": 1}
 FRAMES = 60
@@ -246,55 +248,45 @@ def contour(results: Results, *, times: Sequence[float] = (), width: str = "colu
     return Picture(figure)
 
 
-class _Plate:
-    """The deflected plate in three-dimensional axes."""
+def _plate(
+    axes: Any, cut: Patches, place: style.Scale, length: style.Scale, span: tuple[float, float]
+) -> tuple[Any, Show]:
+    """Draw the plate in three-dimensional axes; what is drawn, and what shows a deflection."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    def __init__(
-        self,
-        axes: Any,
-        cut: Patches,
-        place: style.Scale,
-        length: style.Scale,
-        span: tuple[float, float],
-    ) -> None:
-        from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+    flat = cut.points[cut.quads]
+    peak = max(map(abs, span)) or 1.0
+    title = axes.text2D(0.03, 0.94, "", transform=axes.transAxes)
+    collection = Poly3DCollection(
+        np.pad(flat, ((0, 0), (0, 0), (0, 1))), cmap=style.SIGNED, norm=Normalize(-peak, peak),
+        edgecolors="0.25", linewidths=0.12, clip_on=False,
+    )  # fmt: skip
+    axes.add_collection3d(collection)
+    low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    axes.set_zlim(min(span[0], 0.0), max(span[1], 0.0))
+    side = float((high - low).max())
+    axes.set_box_aspect((*(high - low) / side, EXAGGERATION), zoom=1.3)
+    axes.view_init(elev=28.0, azim=-62.0)
+    for axis, shown, text, pad in (
+        (axes.xaxis, place, "$x$", -4.0), (axes.yaxis, place, "$y$", -4.0),
+        (axes.zaxis, length, "Deflection", -7.0),
+    ):  # fmt: skip
+        shown.name(axis, text)
+        axis.labelpad = pad
+        axis.pane.set_visible(False)
+        axis._axinfo["grid"]["linewidth"] = 0.3
+    axes.tick_params(pad=-3.0)
+    axes.locator_params(nbins=5)
+    axes.locator_params(axis="z", nbins=4)
 
-        self._cut, self._flat = cut, cut.points[cut.quads]
-        peak = max(map(abs, span)) or 1.0
-        self._title = axes.text2D(0.03, 0.94, "", transform=axes.transAxes)
-        self.collection = Poly3DCollection(
-            self._at(np.zeros(len(cut.points))), cmap=style.SIGNED, norm=Normalize(-peak, peak),
-            edgecolors="0.25", linewidths=0.12, clip_on=False,
-        )  # fmt: skip
-        axes.add_collection3d(self.collection)
-        low, high = self._flat.min(axis=(0, 1)), self._flat.max(axis=(0, 1))
-        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        axes.set_zlim(min(span[0], 0.0), max(span[1], 0.0))
-        side = float((high - low).max())
-        axes.set_box_aspect((*(high - low) / side, EXAGGERATION), zoom=1.3)
-        axes.view_init(elev=28.0, azim=-62.0)
-        for axis, shown, text, pad in (
-            (axes.xaxis, place, "$x$", -4.0), (axes.yaxis, place, "$y$", -4.0),
-            (axes.zaxis, length, "Deflection", -7.0),
-        ):  # fmt: skip
-            shown.name(axis, text)
-            axis.labelpad = pad
-            axis.pane.set_visible(False)
-            axis._axinfo["grid"]["linewidth"] = 0.3
-        axes.tick_params(pad=-3.0)
-        axes.locator_params(nbins=5)
-        axes.locator_params(axis="z", nbins=4)
+    def show(w: Array, text: str) -> None:
+        heights = cut.values(w)[cut.quads]
+        collection.set_verts(np.concatenate([flat, heights[:, :, None]], axis=2))
+        collection.set_array(heights.mean(axis=1))
+        title.set_text(text)
 
-    def _at(self, values: Floats) -> Floats:
-        heights = values[self._cut.quads]
-        return np.concatenate([self._flat, heights[:, :, None]], axis=2)
-
-    def show(self, w: Array, text: str) -> None:
-        """Show the nodal deflections w."""
-        corners = self._at(self._cut.values(w))
-        self.collection.set_verts(corners)
-        self.collection.set_array(corners[:, :, 2].mean(axis=1))
-        self._title.set_text(text)
+    return collection, show
 
 
 def surface(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
@@ -304,17 +296,17 @@ def surface(results: Results, *, times: Sequence[float] = (), width: str = "colu
     largest = np.array([int(np.ptp(w, axis=1).argmax())])
     rows = stored_rows(result, name, times, 1) if times else largest
     columns = 1 if width == "column" else min(len(rows), 2)
-    figure, plates = _plates(results, width, rows, columns, len(rows))
+    figure, shows = _plates(results, width, rows, columns, len(rows))
     clock = style.scale_of(results, "time", [result["tape3/time"]])
-    for plate, row in zip(plates, rows, strict=True):
-        plate.show(w[row], f"time {clock.show(float(result['tape3/time'][row]))}")
+    for show, row in zip(shows, rows, strict=True):
+        show(w[row], f"time {clock.show(float(result['tape3/time'][row]))}")
     return Picture(figure)
 
 
 def _plates(
     results: Results, width: str, rows: Array, columns: int, count: int
-) -> tuple[Figure, list[_Plate]]:
-    """Axes for `count` plates, on the common scale of all rows."""
+) -> tuple[Figure, list[Show]]:
+    """Draw `count` plates, on the common scale of all rows."""
     ((name, result),) = results.items()
     cut, w = patches(result, 2, name), result["tape3/w"][rows]
     place = style.scale_of(results, "length", [cut.points])
@@ -324,14 +316,14 @@ def _plates(
     figure, axes = style.panels(width, lines, columns, ratio=0.7, subplot_kw={"projection": "3d"})
     for ax in axes[count:]:
         ax.set_axis_off()
-    plates = [_Plate(ax, cut, place, length, span) for ax in axes[:count]]
+    plates = [_plate(ax, cut, place, length, span) for ax in axes[:count]]
     bar = style.colour_bar(
-        axes, plates[0].collection, length, "Deflection", MaxNLocator(5),
+        axes, plates[0][0], length, "Deflection", MaxNLocator(5),
         shrink=0.6, pad=0.0, fraction=0.06,
     )  # fmt: skip
     if span[0] < span[1]:
         bar.ax.set_xlim(span)
-    return figure, plates
+    return figure, [show for _, show in plates]
 
 
 def animation(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
@@ -339,10 +331,10 @@ def animation(results: Results, *, times: Sequence[float] = (), width: str = "co
     ((name, result),) = results.items()
     (w,) = require(result, name, "tape3/w")
     rows = stored_rows(result, name, times, FRAMES)
-    figure, (plate, *_) = _plates(results, width, rows, 1, 1)
+    figure, (show,) = _plates(results, width, rows, 1, 1)
     clock = style.scale_of(results, "time", [result["tape3/time"][rows]])
     frames = [
-        functools.partial(plate.show, w[row], f"time {clock.show(result['tape3/time'][row])}")
+        functools.partial(show, w[row], f"time {clock.show(result['tape3/time'][row])}")
         for row in rows
     ]
     frames[-1]()

@@ -91,9 +91,7 @@ class Interpreter:
 
 
 def _bound(
-    body: Body,
-    bind: Callable[[Macro], Action],
-    bind_loop: Callable[[Body], Passes | None],
+    body: Body, bind: Callable[[Macro], Action], bind_loop: Callable[[Body], Passes | None]
 ) -> list[Any]:
     """Actions of a body; a loop is a tuple that begins a frame."""
     return [

@@ -313,13 +313,8 @@ class Recorder:
         for dataset, shape in self._datasets:
             self._sink.create(dataset, shape)
         constants: dict[str, NDArray[Any]] = {
-            "mesh/coordinates": mesh.coordinates,
-            "mesh/elements": mesh.elements,
-            "mesh/equations": mesh.equations,
-            "laminate/A": laminate.A,
-            "laminate/B": laminate.B,
-            "laminate/D": laminate.D,
-            "laminate/shear": laminate.shear,
+            **{f"mesh/{n}": getattr(mesh, n) for n in ("coordinates", "elements", "equations")},
+            **{f"laminate/{n}": getattr(laminate, n) for n in ("A", "B", "D", "shear")},
         }
         if self._room["gages"] and model.gages is not None:
             constants["gages/number"] = model.gages.numbers
@@ -352,11 +347,7 @@ class Recorder:
         self.rows(group, [step], [time], rows)
 
     def rows(
-        self,
-        group: str,
-        steps: Steps,
-        times: Times,
-        columns: Mapping[str, NDArray[Any]],
+        self, group: str, steps: Steps, times: Times, columns: Mapping[str, NDArray[Any]]
     ) -> None:
         """Store rows of a group, the first axis of every array."""
         own = {"step": np.array(steps), "time": np.array(times)}
