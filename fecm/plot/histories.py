@@ -12,17 +12,7 @@ from matplotlib.lines import Line2D
 
 from fecm._errors import warn
 from fecm.deck.model import Material
-from fecm.plot import style
-from fecm.plot.data import (
-    LARGEST,
-    Array,
-    circle,
-    deck_of,
-    impact_point,
-    nearest,
-    require,
-    strain_points,
-)
+from fecm.plot import data, style
 from fecm.plot.kinds import Picture, PlotError
 from fecm.results.result import Result
 from fecm.results.schema import declared_units
@@ -53,7 +43,7 @@ ENERGIES = {
 }
 
 
-def _time_axis(axes: Axes, clock: style.Scale, times: Iterable[Array]) -> None:
+def _time_axis(axes: Axes, clock: style.Scale, times: Iterable[data.Array]) -> None:
     clock.name(axes.xaxis, "Time")
     axes.set_xlim(0.0, max(float(array[-1]) for array in times))
 
@@ -77,20 +67,20 @@ def force(results: Results, *, overlay: Source | None = None, width: str = "colu
     """
     style.limit_count(len(results), "forces")
     paths = ("history/time", "history/force", "history/transducer")
-    data = {name: require(result, name, *paths) for name, result in results.items()}
-    times = [columns[0] for columns in data.values()]
+    drawn = {name: data.require(result, name, *paths) for name, result in results.items()}
+    times = [columns[0] for columns in drawn.values()]
     clock = style.scale_of(results, "time", times)
     limits = _thresholds(results)
     units = declared_units(next(iter(results.values())).attributes)
     measured = None if overlay is None else measurement_of(overlay, units)
-    forces = [c for columns in data.values() for c in columns[1:]]
+    forces = [c for columns in drawn.values() for c in columns[1:]]
     if measured is not None:
         forces.append(measured.force)
     pound = style.scale_of(results, "force", [*forces, np.array(list(limits.values()))])
-    if len(data) == 1:
+    if len(drawn) == 1:
         figure, axes = style.panels(width)
         first, second, *_ = style.colours()
-        ((time, contact, transducer),) = data.values()
+        ((time, contact, transducer),) = drawn.values()
         equal = np.array_equal(contact, transducer)  # of a rigid mass
         label = f"contact force{' and transducer, which are equal' if equal else ''}"
         axes[0].plot(time, contact, color=first, label=label)
@@ -99,7 +89,7 @@ def force(results: Results, *, overlay: Source | None = None, width: str = "colu
         pound.name(axes[0].yaxis, "Force")
     else:
         figure, axes = style.panels(width, 2, sharex=True, sharey=True, tall=0.65)
-        for (name, (time, *both)), colour in zip(data.items(), style.colours(), strict=False):
+        for (name, (time, *both)), colour in zip(drawn.items(), style.colours(), strict=False):
             for ax, values in zip(axes, both, strict=True):
                 ax.plot(time, values, color=colour, label=name)
         for ax, label in zip(axes, ("Contact force", "Transducer"), strict=True):
@@ -107,7 +97,7 @@ def force(results: Results, *, overlay: Source | None = None, width: str = "colu
     shared = len(set(limits.values())) == 1
     for name, limit in list(limits.items())[: 1 if shared else None]:
         label = "delamination threshold" if shared else f"{name}, delamination threshold"
-        colour = "0.3" if shared else dict(zip(data, style.colours(), strict=False))[name]
+        colour = "0.3" if shared else dict(zip(drawn, style.colours(), strict=False))[name]
         axes[0].axhline(limit, color=colour, ls=style.STYLES[1], lw=0.8, label=label)
     _time_axis(axes[-1], clock, times)
     _mark_open_ends(axes[0], results, width)
@@ -159,7 +149,7 @@ def _thresholds(results: Results) -> dict[str, float]:
     for name, result in results.items():
         if result.threshold:
             value = result.threshold.get("force")
-            if not isinstance(value, int | float) or not 0.0 < value <= LARGEST:
+            if not isinstance(value, int | float) or not 0.0 < value <= data.LARGEST:
                 raise PlotError(f"{name} has a delamination threshold that can't be drawn: {value}")
             found[name] = float(value)
     return found
@@ -175,17 +165,17 @@ def loop(results: Results, *, against: str = "indentation", width: str = "column
     if against not in AGAINST:
         raise PlotError(f"unknown against {against}; a loop is drawn against {', '.join(AGAINST)}")
     column, sign, label = AGAINST[against]
-    data = {
+    drawn = {
         name: [np.concatenate(([0.0], values)) for values in (sign * x, force)]
         for name, result in results.items()
-        for x, force in [require(result, name, f"history/{column}", "history/force")]
+        for x, force in [data.require(result, name, f"history/{column}", "history/force")]
     }
     # Without force the bodies move apart.
-    touched = np.concatenate([[0.0], *(x[force > 0.0] for x, force in data.values())])
+    touched = np.concatenate([[0.0], *(x[force > 0.0] for x, force in drawn.values())])
     length = style.scale_of(results, "length", [touched])
-    pound = style.scale_of(results, "force", [f for _, f in data.values()])
+    pound = style.scale_of(results, "force", [f for _, f in drawn.values()])
     figure, (axes,) = style.panels(width, tall=1.2)
-    for (name, (x, values)), colour in zip(data.items(), style.colours(), strict=False):
+    for (name, (x, values)), colour in zip(drawn.items(), style.colours(), strict=False):
         axes.plot(x, values, color=colour, label=name)
     if touched.any():
         axes.set_xlim(1.05 * touched.min(), 1.05 * touched.max())
@@ -193,7 +183,7 @@ def loop(results: Results, *, against: str = "indentation", width: str = "column
     length.name(axes.xaxis, label)
     pound.name(axes.yaxis, "Contact force")
     _mark_open_ends(axes, results, width)
-    if len(data) > 1:
+    if len(drawn) > 1:
         style.lines_legend(figure, axes)
     return Picture(figure)
 
@@ -205,14 +195,14 @@ def energy(results: Results, *, width: str = "column") -> Picture:
     if not all("energy/damping_work" in result for result in results.values()):
         del energies["damping_work"]
     paths = ("energy/time", *(f"energy/{column}" for column in energies))
-    data = {name: require(result, name, *paths) for name, result in results.items()}
-    times = [columns[0] for columns in data.values()]
+    drawn = {name: data.require(result, name, *paths) for name, result in results.items()}
+    times = [columns[0] for columns in drawn.values()]
     clock = style.scale_of(results, "time", times)
-    parts = [values for columns in data.values() for values in columns[1:]]
+    parts = [values for columns in drawn.values() for values in columns[1:]]
     work = style.scale_of(results, "force*length", parts)
     figure, (axes,) = style.panels(width, tall=1.1)
     shades = [*style.colours()[: len(energies)], "0.5"]
-    for (time, *columns), look in zip(data.values(), style.STYLES, strict=False):
+    for (time, *columns), look in zip(drawn.values(), style.STYLES, strict=False):
         for values, colour in zip((*columns, np.sum(columns, axis=0)), shades, strict=True):
             axes.plot(time, values, color=colour, ls=look)
     axes.set_ylim(bottom=0.0)
@@ -221,9 +211,9 @@ def energy(results: Results, *, width: str = "column") -> Picture:
     _time_axis(axes, clock, times)
     handles = [Line2D([], [], color=c) for c in shades]
     labels = [*energies.values(), "sum"]
-    if len(data) > 1:
-        handles += [Line2D([], [], color="0.3", ls=look) for look in style.STYLES[: len(data)]]
-        labels += list(data)
+    if len(drawn) > 1:
+        handles += [Line2D([], [], color="0.3", ls=look) for look in style.STYLES[: len(drawn)]]
+        labels += list(drawn)
     style.legend(figure, handles, labels)
     return Picture(figure)
 
@@ -245,11 +235,11 @@ def strain(
     the impact node that is at least the thickness h away; `gages` are degrees from the x-axis;
     `face` is ``"far"`` (z = h/2), ``"struck"`` (z = -h/2), or ``"curvature"``.
     """
-    lines: dict[str, tuple[Array, Array]] = {}
+    lines: dict[str, tuple[data.Array, data.Array]] = {}
     for name, result in results.items():
         for label, values in _strains(result, name, at, gages, face).items():
             text = f"{name}, {label}" if len(results) > 1 else label
-            lines[text] = (require(result, name, "tape8/time")[0], values)
+            lines[text] = (data.require(result, name, "tape8/time")[0], values)
     if len(lines) > len(style.COLOURS):
         raise PlotError(
             f"{len(lines)} lines can't be told apart in one picture; ask for fewer points, "
@@ -272,11 +262,12 @@ def strain(
 
 def _strains(
     result: Result, name: str, at: Sequence[tuple[float, float]], gages: Sequence[float], face: str
-) -> dict[str, Array]:
+) -> dict[str, data.Array]:
     """Histories of one result, by point and direction."""
-    columns = require(result, name, "tape8/kappa_x", "tape8/kappa_y", "tape8/kappa_xy")
-    points = strain_points(result, name)
-    thickness = sum(layer.thickness for layer in deck_of(result, name).require(Material).layers)
+    columns = data.require(result, name, "tape8/kappa_x", "tape8/kappa_y", "tape8/kappa_xy")
+    points = data.strain_points(result, name)
+    layers = data.deck_of(result, name).require(Material).layers
+    thickness = sum(layer.thickness for layer in layers)
     places = [np.array(place) for place in at] or [_default_place(result, name, points, thickness)]
     height = 1.0
     if face != "curvature":
@@ -286,9 +277,9 @@ def _strains(
                 f"the midplane of {name} may stretch; its strains are not stored, and the "
                 "picture shows those of bending alone"
             )
-    found: dict[str, Array] = {}
+    found: dict[str, data.Array] = {}
     for place in places:
-        there = nearest(points, place, name)
+        there = data.nearest(points, place, name)
         x, y = points[there].mean(axis=0)
         kappa_x, kappa_y, kappa_xy = (column[:, there].mean(axis=1) for column in columns)
         for angle in gages:
@@ -299,10 +290,10 @@ def _strains(
     return found
 
 
-def _default_place(result: Result, name: str, points: Array, thickness: float) -> Array:
+def _default_place(result: Result, name: str, points: data.Array, thickness: float) -> data.Array:
     """Place of the strain if none is given, (2,): not under a point force."""
-    hit = impact_point(result, name)
-    if circle(result, name) is not None:
+    hit = data.impact_point(result, name)
+    if data.circle(result, name) is not None:
         return hit
     distance = np.hypot(*np.moveaxis(points - hit, -1, 0))
     away = distance >= thickness * (1.0 - 1e-9)

@@ -19,24 +19,13 @@ from matplotlib.tri import LinearTriInterpolator, Triangulation
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Impact
 from fecm.mechanics.element_groups import longest_sides
-from fecm.plot import style
-from fecm.plot.data import (
-    Array,
-    Patches,
-    circle,
-    deck_of,
-    impact_point,
-    patches,
-    require,
-    stored_rows,
-    struck,
-)
+from fecm.plot import data, style
 from fecm.plot.kinds import Picture, PlotError
 from fecm.results.result import Result
 
 Results = Mapping[str, Result]
 # Shows nodal deflections, and a title.
-Show = Callable[[Array, str], None]
+Show = Callable[[data.Array, str], None]
 
 AXES = {"x": 0, "y": 1}
 FRAMES = 60
@@ -65,7 +54,7 @@ def supports(result: Result) -> dict[str, Bools]:
     return {"clamped": clamped, "w held": w & ~clamped, "rotation held": ~w & rotations.any(axis=1)}
 
 
-def _corners(elements: Array, w: Bools, full: Bools) -> Bools:
+def _corners(elements: data.Array, w: Bools, full: Bools) -> Bools:
     """Fully held nodes of elements with other nodes that hold w, none of these fully held."""
     nodes, present = elements - 1, elements > 0
     one = (full[nodes] & present).sum(axis=1) == 1
@@ -78,7 +67,7 @@ def _corners(elements: Array, w: Bools, full: Bools) -> Bools:
 
 def draw_circle(axes: Axes, result: Result, name: str, **look: Any) -> None:
     """Draw the circle of the contact patch, if there is one, on axes of x and y."""
-    if (found := circle(result, name)) is not None:
+    if (found := data.circle(result, name)) is not None:
         centre, radius = found
         angle = np.linspace(0.0, 2.0 * np.pi, 73)
         x, y = centre[:, None] + radius * np.stack([np.cos(angle), np.sin(angle)])
@@ -87,7 +76,7 @@ def draw_circle(axes: Axes, result: Result, name: str, **look: Any) -> None:
 
 def mark_impact(axes: Axes, result: Result, name: str) -> None:
     """Mark the impact point and the contact patch in black."""
-    axes.plot(*struck(result, name).T, "+", color="black", ms=4, mew=0.6, clip_on=False)
+    axes.plot(*data.struck(result, name).T, "+", color="black", ms=4, mew=0.6, clip_on=False)
     draw_circle(axes, result, name, color="black")
 
 
@@ -96,8 +85,8 @@ def mesh(
 ) -> Picture:
     """Elements, supports, impact point, contact patch, and points to mark (`at`)."""
     ((name, result),) = results.items()
-    coordinates, _ = require(result, name, "mesh/coordinates", "mesh/elements")
-    cut = patches(result, 4, name)
+    coordinates, _ = data.require(result, name, "mesh/coordinates", "mesh/elements")
+    cut = data.patches(result, 4, name)
     place = style.scale_of(results, "length", [coordinates])
     low, high = cut.points.min(axis=0), cut.points.max(axis=0)
     height = float(np.clip((high - low)[1] / (high - low)[0], 0.3, 2.0))
@@ -110,10 +99,11 @@ def mesh(
         if nodes.any():
             held = coordinates[nodes, :2].T
             axes.plot(*held, ls="none", clip_on=False, label=label, **MARKS[label])
-    where = struck(result, name)
+    where = data.struck(result, name)
     if len(where):
-        mark: Any = {"marker": "+"} if circle(result, name) else {"marker": "X", "mec": "white"}
-        mark["label"] = "impact" if deck_of(result, name).has(Impact) else "load"
+        in_patch = data.circle(result, name) is not None
+        mark: Any = {"marker": "+"} if in_patch else {"marker": "X", "mec": "white"}
+        mark["label"] = "impact" if data.deck_of(result, name).has(Impact) else "load"
         axes.plot(*where.T, color=style.COLOURS[1], ms=6.0, mew=0.5, ls="", clip_on=False, **mark)
     draw_circle(axes, result, name, color=style.COLOURS[1], label="contact patch")
     if at:
@@ -129,7 +119,7 @@ def mesh(
 # Along a line -----------------------------------------------------------------------------------
 
 
-def profile(result: Result, name: str, along: str, rows: Array) -> tuple[Floats, Floats]:
+def profile(result: Result, name: str, along: str, rows: data.Array) -> tuple[Floats, Floats]:
     """Deflection on a line through the impact point along x or y, at some rows of tape3.
 
     Returns the positions, (n,), and w, (rows, n), of the nodes on the line if they cover it, else
@@ -137,11 +127,11 @@ def profile(result: Result, name: str, along: str, rows: Array) -> tuple[Floats,
     """
     coordinates, w = result["mesh/coordinates"], result["tape3/w"][rows]
     axis, across = AXES[along], 1 - AXES[along]
-    level = impact_point(result, name)[across]
+    level = data.impact_point(result, name)[across]
     extent = float(np.ptp(coordinates[:, axis]))
     on = np.flatnonzero(np.abs(coordinates[:, across] - level) <= 1e-6 * extent)
     on = on[np.argsort(coordinates[on, axis])]
-    cut = patches(result, 4, name)
+    cut = data.patches(result, 4, name)
     position = np.linspace(*_chord(cut, axis, level), SAMPLES)
     inside = coordinates[on, axis]
     sides = np.diff(inside).max() if len(on) > 2 else math.inf
@@ -156,7 +146,7 @@ def profile(result: Result, name: str, along: str, rows: Array) -> tuple[Floats,
     return position, np.ma.filled(np.ma.stack(values), np.nan)
 
 
-def _chord(cut: Patches, axis: int, level: float) -> tuple[float, float]:
+def _chord(cut: data.Patches, axis: int, level: float) -> tuple[float, float]:
     """Ends of the plate on a line, from its intersections with sides of quadrilaterals."""
     corners = cut.points[cut.quads]
     ends = np.roll(corners, -1, axis=1)
@@ -175,33 +165,33 @@ def line(
     Drawn are the stored rows nearest to `times` (the deck's unit), by default a few, in the
     direction `along`, ``"x"`` or ``"y"``.
     """
-    data = {}
+    drawn = {}
     for name, result in results.items():
-        require(result, name, "tape3/w")
-        rows = stored_rows(result, name, times, 6 if len(results) == 1 else 3)
-        data[name] = (result["tape3/time"][rows], *profile(result, name, along, rows))
-    style.limit_count(len(data), "results")
-    instants = [stored for stored, _, _ in data.values()]
+        data.require(result, name, "tape3/w")
+        rows = data.stored_rows(result, name, times, 6 if len(results) == 1 else 3)
+        drawn[name] = (result["tape3/time"][rows], *profile(result, name, along, rows))
+    style.limit_count(len(drawn), "results")
+    instants = [stored for stored, _, _ in drawn.values()]
     if len({len(stored) for stored in instants}) > 1:
         raise PlotError("the results differ in the number of stored rows; give --times")
     clock = style.scale_of(results, "time", instants)
-    place = style.scale_of(results, "length", [position for _, position, _ in data.values()])
-    length = style.scale_of(results, "length", [w for _, _, w in data.values()])
-    if len(data) == 1:
+    place = style.scale_of(results, "length", [position for _, position, _ in drawn.values()])
+    length = style.scale_of(results, "length", [w for _, _, w in drawn.values()])
+    if len(drawn) == 1:
         figure, axes = style.panels(width)
-        ((stored, position, w),) = data.values()
+        ((stored, position, w),) = drawn.values()
         shades = matplotlib.colormaps[style.IN_ORDER](np.linspace(0.0, 0.85, len(stored)))
         for time, values, shade in zip(stored, w, shades, strict=True):
             axes[0].plot(position, values, color=shade, label=f"{clock.factor * time:.4g}")
     else:
         figure, axes = style.panels(width, len(instants[0]), sharex=True, sharey=True, tall=0.6)
         for (name, (stored, position, w)), colour in zip(
-            data.items(), style.colours(), strict=False
+            drawn.items(), style.colours(), strict=False
         ):
             for ax, time, values in zip(axes, stored, w, strict=True):
                 ax.plot(position, values, color=colour, label=name)
                 ax.set_title(f"time {clock.show(time)}", loc="left")
-    style.lines_legend(figure, axes[0], clock.label("Time") if len(data) == 1 else "")
+    style.lines_legend(figure, axes[0], clock.label("Time") if len(drawn) == 1 else "")
     for ax in axes:
         length.name(ax.yaxis, "Deflection")
         ax.margins(x=0.0)
@@ -215,9 +205,9 @@ def line(
 def contour(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
     """Deflection of the plate at given times, seen from above, on one colour scale."""
     ((name, result),) = results.items()
-    require(result, name, "tape3/w")
-    rows = stored_rows(result, name, times, 4)
-    cut, w = patches(result, 4, name), result["tape3/w"][rows]
+    data.require(result, name, "tape3/w")
+    rows = data.stored_rows(result, name, times, 4)
+    cut, w = data.patches(result, 4, name), result["tape3/w"][rows]
     clock = style.scale_of(results, "time", [result["tape3/time"][rows]])
     length = style.scale_of(results, "length", [w])
     place = style.scale_of(results, "length", [cut.points])
@@ -249,7 +239,7 @@ def contour(results: Results, *, times: Sequence[float] = (), width: str = "colu
 
 
 def _plate(
-    axes: Any, cut: Patches, place: style.Scale, length: style.Scale, span: tuple[float, float]
+    axes: Any, cut: data.Patches, place: style.Scale, length: style.Scale, span: tuple[float, float]
 ) -> tuple[Any, Show]:
     """Draw the plate in three-dimensional axes; what is drawn, and what shows a deflection."""
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
@@ -280,7 +270,7 @@ def _plate(
     axes.locator_params(nbins=5)
     axes.locator_params(axis="z", nbins=4)
 
-    def show(w: Array, text: str) -> None:
+    def show(w: data.Array, text: str) -> None:
         heights = cut.values(w)[cut.quads]
         collection.set_verts(np.concatenate([flat, heights[:, :, None]], axis=2))
         collection.set_array(heights.mean(axis=1))
@@ -292,9 +282,9 @@ def _plate(
 def surface(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
     """The deflected plate; by default at the instant of largest deflection range."""
     ((name, result),) = results.items()
-    (w,) = require(result, name, "tape3/w")
+    (w,) = data.require(result, name, "tape3/w")
     largest = np.array([int(np.ptp(w, axis=1).argmax())])
-    rows = stored_rows(result, name, times, 1) if times else largest
+    rows = data.stored_rows(result, name, times, 1) if times else largest
     columns = 1 if width == "column" else min(len(rows), 2)
     figure, shows = _plates(results, width, rows, columns, len(rows))
     clock = style.scale_of(results, "time", [result["tape3/time"]])
@@ -304,11 +294,11 @@ def surface(results: Results, *, times: Sequence[float] = (), width: str = "colu
 
 
 def _plates(
-    results: Results, width: str, rows: Array, columns: int, count: int
+    results: Results, width: str, rows: data.Array, columns: int, count: int
 ) -> tuple[Figure, list[Show]]:
     """Draw `count` plates, on the common scale of all rows."""
     ((name, result),) = results.items()
-    cut, w = patches(result, 2, name), result["tape3/w"][rows]
+    cut, w = data.patches(result, 2, name), result["tape3/w"][rows]
     place = style.scale_of(results, "length", [cut.points])
     length = style.scale_of(results, "length", [w])
     span = (float(w.min()), float(w.max()))
@@ -329,8 +319,8 @@ def _plates(
 def animation(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
     """The deflected plate, frame by frame; the figure shows the last frame."""
     ((name, result),) = results.items()
-    (w,) = require(result, name, "tape3/w")
-    rows = stored_rows(result, name, times, FRAMES)
+    (w,) = data.require(result, name, "tape3/w")
+    rows = data.stored_rows(result, name, times, FRAMES)
     figure, (show,) = _plates(results, width, rows, 1, 1)
     clock = style.scale_of(results, "time", [result["tape3/time"][rows]])
     frames = [

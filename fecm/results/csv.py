@@ -13,17 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm.results import schema
 from fecm.results.plies import IN_PLANE, INTERLAMINAR
 from fecm.results.result import Result
-from fecm.results.schema import (
-    AXIS_NAMES,
-    DATASETS,
-    SCALES,
-    STORED_BY,
-    ExportError,
-    remedy,
-    suggestion,
-)
 
 Array = NDArray[Any]
 
@@ -31,7 +23,7 @@ Array = NDArray[Any]
 CLOCK = ("step", "time", "number")
 # Axes with named positions become columns.
 NAMED: dict[str | int, tuple[str, ...]] = {
-    **AXIS_NAMES,
+    **schema.AXIS_NAMES,
     "nen": tuple(f"node_{n}" for n in range(1, 13)),
     3: ("xx", "yy", "xy"),
     2: ("xz", "yz"),
@@ -40,7 +32,7 @@ NAMED: dict[str | int, tuple[str, ...]] = {
     "directions": ("xz", "yz"),
 }
 # Names of the other axes' columns.
-KEYS = {size: name for size, (name, _) in SCALES.items()} | {
+KEYS = {size: name for size, (name, _) in schema.SCALES.items()} | {
     "members": "element", "npp": "point", "patch_nodes": "node"
 }  # fmt: skip
 # Datasets that number the positions along an axis.
@@ -77,8 +69,10 @@ def lines(result: Result, name: str = "history") -> Iterator[str]:
     shape = arrays[0].shape
     if any(array.shape != shape for array in arrays):
         choice = f"{', '.join(values[:-1])} or {values[-1]}"
-        raise ExportError(f"the datasets of {name} do not fit into one table; choose {choice}")
-    known = DATASETS[values[0]].shape if values[0] in DATASETS else shape
+        raise schema.ExportError(
+            f"the datasets of {name} do not fit into one table; choose {choice}"
+        )
+    known = schema.DATASETS[values[0]].shape if values[0] in schema.DATASETS else shape
     axes = list(zip(known, shape, strict=True))[bool(clock) :]
     columns = _names(values)
     if len(values) == 1 and axes and len(names := NAMED.get(axes[-1][0], ())) >= axes[-1][1]:
@@ -100,12 +94,12 @@ def _members(result: Result, name: str) -> list[str]:
         return [name]
     members = [path for path in result if path.startswith(f"{name}/")]
     if members:
-        known = list(DATASETS)
+        known = list(schema.DATASETS)
         return sorted(members, key=lambda path: known.index(path) if path in known else len(known))
     group = name.partition("/")[0]
-    if group in STORED_BY and not any(path.startswith(f"{group}/") for path in result):
-        raise ExportError(f"the result has no {name}{remedy(name)}")
-    raise ExportError(f"the result has no dataset {name}{suggestion(name, result)}")
+    if group in schema.STORED_BY and not any(path.startswith(f"{group}/") for path in result):
+        raise schema.ExportError(f"the result has no {name}{schema.remedy(name)}")
+    raise schema.ExportError(f"the result has no dataset {name}{schema.suggestion(name, result)}")
 
 
 def _names(paths: Sequence[str]) -> tuple[str, ...]:
@@ -115,7 +109,7 @@ def _names(paths: Sequence[str]) -> tuple[str, ...]:
 
 def _in_rows(path: str) -> bool:
     """Whether the rows of a dataset in a group with step and time are instants."""
-    return path not in DATASETS or DATASETS[path].shape[0] == "rows"
+    return path not in schema.DATASETS or schema.DATASETS[path].shape[0] == "rows"
 
 
 def _at_faces(result: Result) -> list[Array]:

@@ -14,15 +14,7 @@ from numpy.typing import NDArray
 
 from fecm._files import beside
 from fecm.deck.units import unit_of
-from fecm.results.schema import (
-    AXIS_NAMES,
-    FROM_0,
-    GROUP_DESCRIPTIONS,
-    SCALES,
-    Dataset,
-    ResultWriteError,
-    declared_units,
-)
+from fecm.results import schema
 
 Array = NDArray[Any]
 TIME = "time"
@@ -38,9 +30,9 @@ class FileSink:
         self._guarded = guarded
         self._units: dict[str, str] = {}
         self.arrays: dict[str, Any] = {}  # datasets that are stored so far, by path
-        self._made: list[Dataset] = []
+        self._made: list[schema.Dataset] = []
         self._groups: dict[str, h5py.Group] = {"": file}
-        self.axis_names = dict(AXIS_NAMES)
+        self.axis_names = dict(schema.AXIS_NAMES)
         # Operations so far, rows without their values, if a checkpoint needs them.
         self.operations: list[dict[str, Any]] | None = None
 
@@ -52,8 +44,8 @@ class FileSink:
         if name not in self._groups:
             new = name not in self._file
             group = self._groups[name] = self._file.require_group(name)
-            if new and name in GROUP_DESCRIPTIONS:
-                _set_text(group, GROUP_DESCRIPTIONS[name], "description")
+            if new and name in schema.GROUP_DESCRIPTIONS:
+                _set_text(group, schema.GROUP_DESCRIPTIONS[name], "description")
         return self._groups[name]
 
     def attributes(self, group: str, values: Mapping[str, Any]) -> None:
@@ -61,14 +53,14 @@ class FileSink:
         self._note("attributes", group=group, values=dict(values))
         target = self._group(group)
         if not group:
-            self._units = declared_units(values)
+            self._units = schema.declared_units(values)
         for name, value in values.items():
             if isinstance(value, list | tuple):
                 target.attrs.create(name, value, (len(value),), TEXT)
             else:
                 target.attrs[name] = value
 
-    def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
+    def create(self, dataset: schema.Dataset, shape: tuple[int, ...]) -> None:
         """Create a contiguous dataset of its full shape."""
         self._note("create", path=dataset.path, shape=shape)
         made = self._group(dataset.group).create_dataset(dataset.name, shape, dataset.dtype)
@@ -93,7 +85,7 @@ class FileSink:
             clock.make_scale(TIME)
         for dataset, made in made_of:
             clock = clocks.get(dataset.group)
-            if made == clock or not {*dataset.shape} <= {"rows", *SCALES}:
+            if made == clock or not {*dataset.shape} <= {"rows", *schema.SCALES}:
                 continue
             for axis, size in enumerate(dataset.shape):
                 rows = size == "rows"
@@ -102,13 +94,13 @@ class FileSink:
 
     def _scale(self, size: str, length: int) -> h5py.Dataset:
         """Scale of an axis, created on first use."""
-        name, description = SCALES[size]
+        name, description = schema.SCALES[size]
         if name not in self._file:
             if size in self.axis_names:
                 texts = self.axis_names[size][:length]
                 made = self._file.create_dataset(name, data=texts, dtype=TEXT)
             else:
-                numbers = np.arange(length, dtype="i4") + (size not in FROM_0)
+                numbers = np.arange(length, dtype="i4") + (size not in schema.FROM_0)
                 made = self._file.create_dataset(name, data=numbers)
             made.make_scale(name)
             _set_text(made, description, "description", "long_name")
@@ -158,7 +150,7 @@ class FileSink:
         made = self._file.create_dataset(path, data=value, dtype=TEXT)
         if not isinstance(value, str):
             self.arrays[path] = made
-            self._made.append(Dataset(path, axes, description))
+            self._made.append(schema.Dataset(path, axes, description))
         made.attrs["description"] = description
 
 
@@ -192,7 +184,7 @@ def new_hdf5(path: Path, *, overwrite: bool = True) -> Iterator[tuple[h5py.File,
                 if error is not guarded.error:
                     raise
         if (failed := guarded.error) is not None:
-            raise ResultWriteError(f"{path} can't be written: {failed.strerror or failed}")
+            raise schema.ResultWriteError(f"{path} can't be written: {failed.strerror or failed}")
 
 
 class _Guarded(io.FileIO):
