@@ -122,8 +122,7 @@ class Patches:
     quads: Ints  # (m, 4): rows of the corners in `points`
     # (k,) each: rows of the points around an element; the first is repeated at the end.
     edges: list[Ints]
-    # Elements, and the shape functions at their points.
-    parts: list[tuple[ElementBlock, Floats]]
+    parts: list[tuple[ElementBlock, Floats]]  # elements, and the shape functions at their points
 
     def values(self, nodal: Array) -> Floats:
         """Values at the points from values at the nodes, by the elements' own shape functions."""

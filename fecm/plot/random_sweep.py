@@ -15,10 +15,8 @@ from fecm.sweeps.random_result import Indices, RandomResult, wilson
 from fecm.sweeps.result import SweepResult
 
 Sweeps = Mapping[str, SweepResult]
-# Scatter plots side by side.
-BESIDE = {"column": 2, "full": 4}
-# Height of a pair of bars, and of what is around them (in).
-PAIR, AROUND = 0.3, 0.75
+BESIDE = {"column": 2, "full": 4}  # scatter plots side by side
+PAIR, AROUND = 0.3, 0.75  # height of a pair of bars, and of what is around them (in)
 
 
 def _random(

@@ -27,8 +27,7 @@ WIDTH = "column"
 MOST_LINES = len(style.COLOURS) - 1
 
 
-# Label, values, colour and style of a line.
-Line = tuple[str, Floats, str, Any]
+Line = tuple[str, Floats, str, Any]  # label, values, colour and style of a line
 
 
 # Indentation --------------------------------------------------------------------------------------
@@ -177,8 +176,7 @@ def pulse_picture(
     ]
     _against_time(below, history.time, ends, "Acceleration", "length/time^2", units)
     style.lines_legend(figure, above)
-    # The pulse is over by then: this corner is free.
-    below.legend(loc="upper right")
+    below.legend(loc="upper right")  # the pulse is over by then: this corner is free
     return Picture(figure)
 
 

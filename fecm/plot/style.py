@@ -28,8 +28,7 @@ from fecm.plot.kinds import PlotError
 from fecm.results.result import Result
 from fecm.results.schema import printable
 
-# Width of a column and of a page (in).
-WIDTHS = {"column": 3.5, "full": 7.2}
+WIDTHS = {"column": 3.5, "full": 7.2}  # width of a column and of a page (in)
 RATIO = {"column": 0.68, "full": 0.45}  # height over width of a graph
 BAR = 0.32  # height of a colour bar with its labels (in)
 RESOLUTION, SCREEN = 300, 150  # dots per inch in print and on a screen

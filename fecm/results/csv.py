@@ -19,8 +19,7 @@ from fecm.results.result import Result
 
 Array = NDArray[Any]
 
-# Key columns of rows: the instant, or the number of a mode.
-CLOCK = ("step", "time", "number")
+CLOCK = ("step", "time", "number")  # key columns of rows: the instant, or the number of a mode
 # Axes with named positions become columns.
 NAMED: dict[str | int, tuple[str, ...]] = {
     **schema.AXIS_NAMES,

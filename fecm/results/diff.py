@@ -39,8 +39,7 @@ ON_TAPE = {
 # Names and first numbers of the axes of a sweep's datasets: cases count from 0, as in commands.
 CASES = (("case", 0), ("step", 1))
 
-# Those of tape3 without a known number of nodes.
-LINES = (("line", 1), ("column", 1))
+LINES = (("line", 1), ("column", 1))  # those of tape3 without a known number of nodes
 
 SOURCE_NAMES = {
     FORMAT: "the result of a run", SWEEP: "the result of a sweep", TAPES: "a folder of tapes"

@@ -76,8 +76,7 @@ class Indentation(NamedTuple):
     permanent: Floats
 
 
-# Cases whose forces stay in the cache.
-PART = 16
+PART = 16  # cases whose forces stay in the cache
 
 
 def _total(weights: Floats, values: NDArray[Any]) -> Floats:

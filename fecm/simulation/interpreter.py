@@ -8,8 +8,7 @@ from typing import Any
 from fecm.deck.macros import Body, Loop
 from fecm.deck.records import Macro
 
-# Carries out a macro; True leaves the innermost loop.
-Action = Callable[[], "bool | None"]
+Action = Callable[[], "bool | None"]  # carries out a macro; True leaves the innermost loop
 # Carries out complete passes of a loop at their begin; False if there are none to carry out so.
 Passes = Callable[[], bool]
 

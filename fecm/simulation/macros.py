@@ -56,8 +56,7 @@ def proportional_load(run: Simulation, n: float) -> None:
         state.prop_force = run.load_factor(state.clock)
 
 
-# Numbers of the displacement fields that one call of the kernels stores.
-FIELDS = 4_000_000
+FIELDS = 4_000_000  # numbers of the displacement fields that one call of the kernels stores
 
 # Time steps --------------------------------------------------------------------------------------
 
@@ -229,8 +228,7 @@ STORING: dict[str, Callable[[Simulation, Steps, Times, Floats], None]] = {
     "PLYS": _store_ply_stresses,
     "FAIL": _evaluate_failure,
 }
-# Those that are macros of their own.
-AT_PASSES = ("DISP", "PLYS", "FAIL")
+AT_PASSES = ("DISP", "PLYS", "FAIL")  # those that are macros of their own
 
 
 def store_reactions(run: Simulation) -> None:

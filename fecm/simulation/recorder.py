@@ -74,8 +74,7 @@ class StepRecorder:
             self._gages = model.motion.dof_sums(model.gages.dof_indices, model.gages.weights)
             self._strains = np.empty((BLOCK, len(model.gages.numbers)))
         self.initial = 0.0
-        # Last time, power and work of the damping.
-        self._damped = (0.0, 0.0, 0.0)
+        self._damped = (0.0, 0.0, 0.0)  # last time, power and work of the damping
 
     def begin(self, plate: PlateState, impact: ImpactState | None) -> None:
         """Store the energy before the first step (force*length)."""

@@ -31,11 +31,9 @@ from fecm.simulation.simulation import Observer, Simulation
 
 # Error of the energy balance, relative to the supplied energy, that triggers a warning.
 ENERGY_WARNING = 0.01
-# Largest strain for which plies are taken as linear.
-STRAIN = 0.01
+STRAIN = 0.01  # largest strain for which plies are taken as linear
 
-# Value, time, x and y.
-Peak = tuple[float, float, float, float]
+Peak = tuple[float, float, float, float]  # value, time, x and y
 
 
 def simulate(

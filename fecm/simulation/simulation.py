@@ -25,8 +25,7 @@ from fecm.simulation.interpreter import Interpreter
 from fecm.simulation.printout import Printer
 from fecm.simulation.recorder import Recorder, subset
 
-# Relative change of the displacement below which CONV leaves its loop.
-TOLERANCE = 1.0e-9
+TOLERANCE = 1.0e-9  # relative change of the displacement below which CONV leaves its loop
 
 
 @dataclass
