@@ -25,14 +25,12 @@ Results = Mapping[str, Result]
 
 POINTS = 200  # measured points drawn one by one at most
 LETTERS = 16  # of small text per inch
-
 # What a loop is drawn against: column of the history, sign, and label.
 AGAINST = {
     "indentation": ("indentation", 1.0, "Indentation"),
     "deflection": ("plate_w", 1.0, "Deflection under the load"),
     "displacement": ("displacement", -1.0, "Displacement of the projectile"),
 }
-
 ENERGIES = {
     "plate_kinetic": "plate, kinetic",
     "plate_strain": "plate, strain",

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SUFFIXES = (".png", ".svg", ".pdf")
-
 MISSING = "pictures need matplotlib: pip install 'fecm[plot]'"
 
 

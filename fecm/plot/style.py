@@ -35,14 +35,12 @@ RESOLUTION, SCREEN = 300, 150  # dots per inch in print and on a screen
 
 # Okabe and Ito's colours, without yellow, which is hard to see on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-
 STYLES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))
 IN_ORDER = "viridis"  # sequential
 SIGNED = "RdBu_r"  # diverging, about zero
 
 # Where pictures are drawn: on axes, on a new figure of pyplot, or on a figure by itself.
 TARGET: ContextVar[Axes | Literal["pyplot"] | None] = ContextVar("TARGET", default=None)
-
 # Any: matplotlib's types of these names differ between versions.
 RC: Any = {
     "axes.prop_cycle": cycler(color=COLOURS),
@@ -64,20 +62,17 @@ RC: Any = {
     "pdf.fonttype": 42,
     "svg.hashsalt": "fecm",
 }
-
 UNDATED: dict[str, dict[str, Any]] = {
     ".png": {"Software": None},
     ".svg": {"Date": None, "Creator": None},
     ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
-
 # Units that take prefixes: base unit and power of ten.
 _PREFIXED = {
     "s": ("s", 0), "ms": ("s", -3), "us": ("s", -6), "µs": ("s", -6),
     "m": ("m", 0), "mm": ("m", -3), "N": ("N", 0), "kN": ("N", 3), "J": ("J", 0),
     "N*m": ("J", 0), "N*mm": ("J", -3), "kN*mm": ("J", 0), "kN*m": ("J", 3),
 }  # fmt: skip
-
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 

@@ -35,23 +35,17 @@ ON_TAPE = {
     W, *(f"tape8/{name}" for name in (*CURVATURES, *SHEARS["tape8"])),
     *(f"tape9/{name}" for name in CONTACT),
 }  # fmt: skip
-
 # Names and first numbers of the axes of a sweep's datasets: cases count from 0, as in commands.
 CASES = (("case", 0), ("step", 1))
-
 LINES = (("line", 1), ("column", 1))  # those of tape3 without a known number of nodes
-
 SOURCE_NAMES = {
     FORMAT: "the result of a run", SWEEP: "the result of a sweep", TAPES: "a folder of tapes"
 }  # fmt: skip
-
 # Names of the indices along each size of a dataset; rows are named by their step and time.
 AXES = {size: name for size, (name, _) in SCALES.items()}
-
 # Datasets of a resultant or strain that is zero in bending, and those of its bending counterpart.
 MEMBRANE = {"N": ("N_x", "N_y", "N_xy"), "eps": ("eps_xx", "eps_yy", "gamma_xy")}
 BENDING = {"N": ("M_x", "M_y", "M_xy"), "eps": ("kappa_x", "kappa_y", "kappa_xy")}
-
 # Scales other than the largest value of the dataset.
 SCALE_NAMES = {
     "energy/balance_error": "the energy put in",

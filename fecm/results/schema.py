@@ -437,7 +437,6 @@ def _datasets(group: str, kind: type[Group], outer: str = "") -> Iterator[Datase
 DATASETS = {d.path: d for name, kind in GROUPS.items() for d in _datasets(name, kind)}
 
 FIXED = {"faces": 2, "levels": 3, "directions": 2}  # sizes of axes that every result has
-
 # Dimension scales: name and description by size.
 SCALES = {
     "numnp": ("node", "number of the node"),

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from fecm.results.hdf5_reader import Contents
 
 LISTED = 6  # most contacts and frequencies listed individually
-
 OPEN_END = (
     "the run ends in contact: the end of the contact, the permanent indentation and the energies "
     "after it are open; take more steps"

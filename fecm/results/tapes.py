@@ -35,7 +35,6 @@ PER_LINE = 6  # numbers per line without labels
 SHEARS = {"tape8": ("gamma_yz", "gamma_xz"), "tape9": ("gamma_xz", "gamma_yz")}
 W = "tape3/w"
 CURVATURES = ("kappa_x", "kappa_y", "kappa_xy")
-
 _LABELS = re.compile(rb" *\d+")
 # Allowed letters are those of Infinity, NaN and the exponents' E and D.
 _FOREIGN = re.compile(rb"[^0-9+\-. EDINFTYA]", re.IGNORECASE)

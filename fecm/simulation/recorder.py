@@ -31,16 +31,13 @@ Times = Sequence[float]
 FAILURE = ("failure", INTERLAMINAR, *(f"failure/{name}" for name in CRITERIA))
 DAMPING_WORK = "energy/damping_work"
 BUFFERED = ("tape3", "tape8", "stresses", "plies", "reactions", "modes")
-
 BLOCK = 1024
-
 SCALARS = (
     "step", "time", "plate_kinetic", "plate_strain", "external_work",
     "force", "indentation", "plate_w", "contact_work", "displacement",
 )  # fmt: skip
 # Those that follow from the motion of the projectile.
 PROJECTILE = ("velocity", "acceleration", "projectile_kinetic", "projectile_strain", "station")
-
 OnBlock = Callable[[Mapping[str, Floats], float], object]
 
 
