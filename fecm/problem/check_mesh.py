@@ -287,8 +287,7 @@ def _report_hourglass(card: Integration, supported: bool, findings: Findings) ->
         findings.add("W322", f"{message}only the supports resist.", place, "take L2 = 3")
     else:
         message += "nothing resists in a plate without supports."
-        hint = "take L2 = 3; --force runs the deck nevertheless"
-        findings.add(HOURGLASS, message, place, hint)
+        findings.add(HOURGLASS, message, place, "take L2 = 3; --force runs the deck nevertheless")
 
 
 def _orders_without_motions(family: element_groups.ElementBlock) -> tuple[str, int, int]:

@@ -65,8 +65,7 @@ def check_impact(impact: model.Impact, deck: model.Deck, mesh: Mesh, findings: F
         findings.add("E411", message, impact.place("impact velocity"), hint)
     elif impact.velocity == 0.0:
         why = "the projectile rests on the plate, which only FORC's loads can move"
-        message = f"The impact velocity is 0: {why}."
-        findings.add("W411", message, impact.place("impact velocity"))
+        findings.add("W411", f"The impact velocity is 0: {why}.", impact.place("impact velocity"))
 
 
 def check_projectile(projectile: model.Projectile, findings: Findings) -> None:
@@ -377,8 +376,7 @@ def _check_layers(material: model.Material, findings: Findings) -> None:
         if layer.thickness <= 0.0:
             thick = False
             what = f"Layer {position} has the thickness {layer.thickness:g}"
-            message = f"{what}; it must be positive."
-            findings.add("E405", message, layer.place("layer thickness"))
+            findings.add("E405", f"{what}; it must be positive.", layer.place("layer thickness"))
         if layer.number != position:
             why = "layers are stacked in the order of their cards, whatever their numbers"
             message = f"Layer {position} has the number {layer.number}: {why}."

@@ -94,8 +94,7 @@ def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floa
             noted.add("E420", message, record.place("element"))
         elif known and record.element <= known[-1].node:
             what = f"Rod element {record.element} follows element {known[-1].node}"
-            message = f"{what}; elements must ascend."
-            noted.add("E421", message, record.place("element"))
+            noted.add("E421", f"{what}; elements must ascend.", record.place("element"))
         else:
             known.append(NodeValues(record.element, record.increment, (record.diameter,)))
     _interpolate(values, known, noted, _Budget(segment.elements, noted))
