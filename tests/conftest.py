@@ -10,9 +10,6 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-import fecm
-from tests.decks import APPENDIX, small
-
 # A busy machine fails no example.
 settings.register_profile("fecm", deadline=None)
 settings.load_profile("fecm")
@@ -36,6 +33,9 @@ def _few_pixels() -> Iterator[None]:
 @pytest.fixture(scope="session")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with results of the report's deck in both modes, and of a small deck; left alone."""
+    import fecm  # not in the process that only hands the tests out
+    from tests.decks import APPENDIX, small
+
     folder = tmp_path_factory.mktemp("runs")
     for mode in ("report", "listing"):
         fecm.run(APPENDIX, mode=mode, output=folder / f"{mode}.h5")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import shutil
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -188,9 +189,9 @@ def test_a_file_made_meanwhile_is_not_replaced_unasked(
 
 
 def test_commands_without_overwrite_rename_exclusively(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
+    folder: Path, runs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert call("run", "d.inp").exit_code == 0
+    shutil.copy(runs / "small.h5", "d.h5")
     finish = _files._finish
 
     def late(handle: int, partial: Path, target: Path, overwrite: bool) -> None:
@@ -248,9 +249,9 @@ def test_a_partial_file_that_somebody_removes_is_an_error(folder: Path) -> None:
 
 @pytest.mark.parametrize("code", [errno.ENOSPC, errno.EROFS])
 def test_every_disk_error_names_the_file(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, code: int
+    folder: Path, runs: Path, monkeypatch: pytest.MonkeyPatch, code: int
 ) -> None:
-    assert call("run", "d.inp").exit_code == 0
+    shutil.copy(runs / "small.h5", "d.h5")
 
     def full(handle: int) -> None:
         raise OSError(code, os.strerror(code))
@@ -271,9 +272,9 @@ def test_every_disk_error_names_the_file(
 
 
 def test_tapes_are_replaced_only_when_asked_for_and_all_or_none(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
+    folder: Path, runs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert call("run", "d.inp").exit_code == 0
+    shutil.copy(runs / "small.h5", "d.h5")
     Path("tape8").write_text("precious")
     assert_unusable(call("tapes", "d.h5"))
     assert names(folder) == ["d.h5", "d.inp", "tape8", "two.inp"]
@@ -310,9 +311,9 @@ def test_fmt_asks_before_it_replaces_another_file_and_reads_no_more_than_check(
     assert "more than 100 bytes" in done.stderr
 
 
-def test_pictures_go_to_a_folder_that_is_made(folder: Path) -> None:
+def test_pictures_go_to_a_folder_that_is_made(folder: Path, runs: Path) -> None:
     pytest.importorskip("matplotlib")
-    assert call("run", "d.inp").exit_code == 0
+    shutil.copy(runs / "small.h5", "d.h5")
     done = call("plot", "d.h5", "-o", "new/pictures/", "--kind", "force", "--kind", "energy")
     assert done.exit_code == 0
     assert names(folder / "new" / "pictures") == ["d-energy.png", "d-force.png"]

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -83,23 +81,6 @@ def test_a_call_that_makes_no_picture_is_refused_in_words(
     assert words in refused.stderr
     assert "Traceback" not in refused.stderr
     assert [p.name for p in file.parent.iterdir()] == ["small.h5"]
-
-
-def test_nothing_but_a_picture_imports_matplotlib(file: Path) -> None:
-    program = (
-        "import sys, fecm, fecm.cli, fecm.plot.pictures, fecm.cli.plot\n"
-        "for command in 'tapes small.h5', 'export small.h5 --to csv', '--help':\n"
-        "    try: fecm.cli.main(command.split())\n"
-        "    except SystemExit as end: assert not end.code\n"
-        "print([n for n in ('matplotlib', 'pandas', 'vtk') if n in sys.modules])\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=file.parent, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.splitlines()[-1] == "[]"
-    assert (file.parent / "small-history.csv").exists()
-    assert "Commands:" in done.stdout
-    assert "PLYS          5    2\n" in fecm.load(file).deck
 
 
 # Results without sense ----------------------------------------------------------------------------

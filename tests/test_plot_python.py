@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args
@@ -129,19 +127,6 @@ def test_a_file_is_that_of_the_command_line_whatever_the_users_style(
         result.plot("force", tmp_path / "b.svg")
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
     assert not pyplot.get_fignums()
-
-
-def test_the_command_line_does_not_import_pyplot(tmp_path: Path) -> None:
-    fecm.run(small(), output=tmp_path / "a.h5")
-    code = (
-        "import sys; from fecm.plot.pictures import draw, save; import fecm, pathlib\n"
-        "save(draw('force', {'a': fecm.load('a.h5')}), pathlib.Path('a.png'))\n"
-        "print('matplotlib.pyplot' in sys.modules)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert done.stdout == "False\n"
 
 
 def test_the_kinds_for_type_checkers_are_those_of_results() -> None:

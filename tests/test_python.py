@@ -71,7 +71,8 @@ UNUSED = {
     "info small.h5": f"{ELSEWHERE} matplotlib fecm.plot numpy.ma fecm.mechanics.kernels",
     "tapes small.h5": f"{ELSEWHERE} matplotlib numpy.ma fecm.mechanics.kernels",
     "diff small.h5 small.h5": "scipy matplotlib numpy.ma fecm.sweeps fecm.mechanics.kernels",
-    "export small.h5 --to csv": f"{ELSEWHERE} matplotlib numpy.ma fecm.mechanics.kernels",
+    "export small.h5 --to csv": f"{ELSEWHERE} matplotlib numpy.ma pandas fecm.mechanics.kernels",
+    "--help": "scipy matplotlib pandas vtk",
     "plot small.h5": "scipy fecm.sweeps fecm.objects fecm.mechanics.kernels matplotlib.pyplot",
 }
 LOADED = """

@@ -131,9 +131,10 @@ def test_numbers_in_the_place_of_texts_are_a_difference(swept: Path, tmp_path: P
     assert "type text against float64" in done.stdout
 
 
-def test_a_sweep_and_a_run_or_tapes_can_not_be_compared(swept: Path, tmp_path: Path) -> None:
-    run = tmp_path / "run.h5"
-    fecm.run(small(), output=run)
+def test_a_sweep_and_a_run_or_tapes_can_not_be_compared(
+    swept: Path, runs: Path, tmp_path: Path
+) -> None:
+    run = runs / "small.h5"
     assert call("tapes", run, "-d", tmp_path / "tapes").exit_code == 0
     for other in (run, tmp_path / "tapes"):
         for pair in ((swept, other), (other, swept)):
