@@ -208,9 +208,8 @@ def _check_others(axes: list[Axis], others: list[str], other: Axis | None) -> No
     if len(axes) > 1 and len(np.unique(points, axis=0)) < len(points):
         raise PlotError(f"{vary}, so that cases would hide one another; {selects} them")
     if len(axes) == 1 and (len(others) > 1 or (other is not None and len(other.ticks) > CURVES)):
-        raise PlotError(
-            f"{vary}; {selects} the cases, --over {axes[0].name},{others[0]} draws over both"
-        )
+        message = f"{vary}; {selects} the cases, --over {axes[0].name},{others[0]} draws over both"
+        raise PlotError(message)
 
 
 def quantity_of(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:

@@ -151,25 +151,23 @@ def scale(peak: float, unit: str) -> Scale:
     return Scale(10.0**-power, f"{power_of_ten}{text.replace('*', '·')}".strip())
 
 
-def common_unit(results: Mapping[str, Result], dimension: str) -> str:
-    """Common unit of a dimension; empty if a result names none.  Refuse different units."""
+def scale_of(results: Mapping[str, Result], dimension: str, arrays: Iterable[Any]) -> Scale:
+    """Scale for arrays of one dimension, in the results' unit if all name it.
+
+    Refuse different units.
+    """
     units = {name: result.unit(dimension) for name, result in results.items()}
     named = {unit: name for name, unit in units.items() if unit}
     if len(named) > 1:
         units_in = " and ".join(f"{unit} in {name}" for unit, name in named.items())
         raise PlotError(f"the results can't share axes: the unit of {dimension} is {units_in}")
-    return "" if "" in units.values() else next(iter(named))
+    return scale(peak(*arrays), "" if "" in units.values() else next(iter(named)))
 
 
 def peak(*arrays: Any) -> float:
     """Largest finite absolute value of arrays; 0 if there is none."""
     finite = (np.abs(array[np.isfinite(array)]) for array in arrays)
     return max((float(values.max(initial=0.0)) for values in finite), default=0.0)
-
-
-def scale_of(results: Mapping[str, Result], dimension: str, arrays: Iterable[Any]) -> Scale:
-    """Scale for arrays of one dimension, in the results' common unit."""
-    return scale(peak(*arrays), common_unit(results, dimension))
 
 
 def scale_in(units: Mapping[str, str] | None, dimension: str, *arrays: Any) -> Scale:

@@ -68,9 +68,8 @@ def lines(result: Result, name: str = "history") -> Iterator[str]:
     shape = arrays[0].shape
     if any(array.shape != shape for array in arrays):
         choice = f"{', '.join(values[:-1])} or {values[-1]}"
-        raise schema.ExportError(
-            f"the datasets of {name} do not fit into one table; choose {choice}"
-        )
+        message = f"the datasets of {name} do not fit into one table; choose {choice}"
+        raise schema.ExportError(message)
     known = schema.DATASETS[values[0]].shape if values[0] in schema.DATASETS else shape
     axes = list(zip(known, shape, strict=True))[bool(clock) :]
     columns = _names(values)

@@ -210,9 +210,8 @@ def _list(contents: Contents, file_size: int, name: str, item: h5py.HLObject) ->
         room = file_size * (PACKED if item.chunks else 1)
         # A damaged shape could have more rows than any disk holds.
         if math.prod(shape) * item.dtype.itemsize > room:
-            raise ResultFileError(
-                f"{path}: {name} has the shape {shape}, which is more than the file holds"
-            )
+            message = f"{path}: {name} has the shape {shape}, which is more than the file holds"
+            raise ResultFileError(message)
         contents.shapes[name], contents.dtypes[name] = shape, item.dtype.newbyteorder("=")
     elif h5py.check_ref_dtype(item.dtype) is not None:
         raise ResultFileError(f"{path}: {name} holds references; they are not followed")

@@ -76,7 +76,9 @@ def plies_of(
     if elements is not None:
         members = _members(numbers, np.atleast_1d(elements))
     chosen = {name: values[np.ix_(rows, members)] for name, values in stored.items()}
-    material = _material(result, len(z))
+    material = model_of(result).last(Material)
+    if material is None or len(material.layers) != len(z):
+        raise ResultFileError(f"the result's deck does not have the {len(z)} plies of its stresses")
     ply, g12 = material.ply, material.ply.g12
     if "g12" in result.slips and ply.e1 == ply.e2:
         g12 = ply.e1 / (2.0 * (1.0 + ply.nu12))
@@ -106,14 +108,6 @@ def _parsed(text: str, blanks_are_zeros: bool) -> Deck | None:
     """Parse a deck's text once, however often it is needed."""
     problems = Reader(text, blanks_are_zeros=blanks_are_zeros).problems()
     return next((problem.deck for problem in problems if problem.deck is not None), None)
-
-
-def _material(result: Result, plies: int) -> Material:
-    """Material of a result's deck, which must have as many layers as there are plies."""
-    material = model_of(result).last(Material)
-    if material is None or len(material.layers) != plies:
-        raise ResultFileError(f"the result's deck does not have the {plies} plies of its stresses")
-    return material
 
 
 def points_of(result: Result, numbers: Array, count: int, at_nodes: bool) -> Floats:
@@ -146,9 +140,8 @@ def rows_at(stored: Floats, times: Sequence[float] | Floats, what: str) -> Ints:
     spacing = float(np.diff(stored).max()) if len(stored) > 1 else float(stored[0])
     for time in times:
         if not stored[0] - spacing <= time <= stored[-1] + spacing:
-            raise NotStoredError(
-                f"no {what} at time {time:g}: the rows cover {stored[0]:g} to {stored[-1]:g}"
-            )
+            message = f"no {what} at time {time:g}: the rows cover {stored[0]:g} to {stored[-1]:g}"
+            raise NotStoredError(message)
     return np.array([np.abs(stored - time).argmin() for time in times], dtype=np.intp)
 
 

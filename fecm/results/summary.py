@@ -186,21 +186,18 @@ def describe_groups(contents: Contents) -> list[dict[str, Any]]:
     of the finite numbers (None without any), ``not_finite`` and, for texts, the number of
     ``different`` ones.
     """
-    datasets = [_describe(contents, path) for path in contents]
     members: dict[str, list[dict[str, Any]]] = {name: [] for name in contents.groups}
-    for dataset in datasets:
-        members.setdefault(dataset["name"].rpartition("/")[0], []).append(dataset)
+    for path in sorted(contents, key=lambda path: _order(DATASETS, path)):
+        members.setdefault(path.rpartition("/")[0], []).append(_describe(contents, path))
     groups: list[dict[str, Any]] = []
     for name in sorted(members, key=lambda name: _order(GROUP_DESCRIPTIONS, name)):
         if not name and not members[name]:
             continue
         attributes = dict(contents.groups.get(name, {})) if name else {}
         description = str(attributes.pop("description", ""))
-        clock = contents.shapes.get(f"{name}/step", ())
-        own = sorted(members[name], key=lambda d: _order(DATASETS, d["name"]))
-        rows = clock[0] if clock else None
+        rows, *_ = contents.shapes.get(f"{name}/step") or (None,)
         groups.append({"name": name, "description": description, "rows": rows,
-                       "attributes": attributes, "datasets": own})  # fmt: skip
+                       "attributes": attributes, "datasets": members[name]})  # fmt: skip
     return groups
 
 

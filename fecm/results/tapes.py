@@ -170,9 +170,8 @@ def read_tapes(folder: Path) -> TapeText:
             raise ResultFileError(f"{folder}: tape8 and tape9 both hold {kind}")
         arrays.update(read)
     if not arrays:
-        raise ResultFileError(
-            f"{folder}: no tape3, tape8 or tape9 in this folder, with or without .txt"
-        )
+        message = f"{folder}: no tape3, tape8 or tape9 in this folder, with or without .txt"
+        raise ResultFileError(message)
     return TapeText(arrays, lines)
 
 

@@ -202,7 +202,7 @@ def _at_passes(word: str, run: Simulation, n: int) -> None:
 
 
 def _store_displacements(run: Simulation, steps: Steps, times: Times, fields: Floats) -> None:
-    run.recorder.displacements(steps, times, fields)
+    run.recorder.rows("tape3", steps, times, {"w": fields[:, :, 2], "displacement": fields})
     if run.state.impact is None:
         for time, field in zip(times, fields, strict=True):
             run.printer.displacements(field, time)

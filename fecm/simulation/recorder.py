@@ -349,10 +349,6 @@ class Recorder:
         own = {"step": np.array(steps), "time": np.array(times)}
         self._buffers[group].put({**own, **columns})
 
-    def displacements(self, steps: Steps, times: Times, fields: Floats) -> None:
-        """Store rows of tape3: every dof of every node, (rows, numnp, 5)."""
-        self.rows("tape3", steps, times, {"w": fields[:, :, 2], "displacement": fields})
-
     def strains(self, steps: Steps, times: Times, fields: Floats) -> None:
         """Store rows of tape8: strains of the displacements at `times`, (rows, numnp, 5)."""
         strains = self._model.strains.evaluate(fields)
