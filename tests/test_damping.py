@@ -154,12 +154,10 @@ def test_the_impulse_response_of_a_sweep_is_damped() -> None:
 def test_a_stopped_damped_run_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
     text = damped(STEPS.replace("LOOP        100", "LOOP       1100"), "2e4,")
     run_stopped(text, tmp_path / "whole.h5")
-    for stop in (7, 1060):  # before and after the first block of rows
-        with pytest.raises(StoppedError):
-            run_stopped(text, tmp_path / "stopped.h5", stop)
-        run_stopped(text, tmp_path / "stopped.h5", resume=True)
-        assert (tmp_path / "stopped.h5").read_bytes() == (tmp_path / "whole.h5").read_bytes()
-        (tmp_path / "stopped.h5").unlink()
+    with pytest.raises(StoppedError):
+        run_stopped(text, tmp_path / "stopped.h5", 1060)  # after the first block of rows
+    run_stopped(text, tmp_path / "stopped.h5", resume=True)
+    assert (tmp_path / "stopped.h5").read_bytes() == (tmp_path / "whole.h5").read_bytes()
 
 
 @pytest.mark.parametrize(

@@ -425,12 +425,13 @@ def test_resultants_of_the_midplane_are_judged_by_those_of_bending(tmp_path: Pat
         curvature = max(abs(file[f"stresses/kappa_{name}"][()]).max() for name in ("x", "y", "xy"))
     # A = E h and D = E h^3 / 12 along the fibres; h is 0.106 in.
     scales = {"N_y": moment * 12.0**0.5 / 0.106, "eps_xx": curvature * 0.106 / 12.0**0.5}
-    for name, scale in scales.items():
-        shutil.copy(a, b)
-        with h5py.File(b, "r+") as file:
+    shutil.copy(a, b)
+    with h5py.File(b, "r+") as file:
+        for name, scale in scales.items():
             file[f"stresses/{name}"][0, 0, 0] = 1e-9 * scale
-        assert diff(a, b, "--rtol", "1.01e-9", "--only", "stresses").exit_code == 0
-        assert diff(a, b, "--rtol", "0.99e-9", "--only", "stresses").exit_code == 1
+    assert diff(a, b, "--rtol", "1.01e-9", "--only", "stresses").exit_code == 0
+    done = diff(a, b, "--rtol", "0.99e-9", "--only", "stresses")
+    assert all(told(done, f"stresses/{name}").startswith("different") for name in scales)
 
 
 def test_coupling_that_is_a_rounding_is_judged_by_stretching_and_bending(

@@ -46,7 +46,7 @@ def test_the_static_stiffness_of_d7136_is_that_of_another_code(plate: str) -> No
         (row,) = (r for r in csv.DictReader(file) if (r["plate"], r["support"]) == (plate, WINDOW))
     layup, thickness, ply = PLIES[plate]
     made = new("--fixture", "D7136", "--layup", layup, "--ply-thickness", thickness, "--ply", ply,
-               "--patch", "disc:2", "--duration", "1e-4")  # fmt: skip
+               "--patch", "disc:2", "--duration", "1e-4", "--mesh", "10x8")  # fmt: skip
     (problem,) = load_deck(made.stdout).problems
     assert problem.contact is not None
     stiffness = static_stiffness(problem.moving_plate, problem.contact)

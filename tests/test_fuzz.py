@@ -88,6 +88,7 @@ def decks(draw: st.DrawFn) -> Deck:
     return Deck("title", control, tuple(segments), tuple(macros))
 
 
+@settings(max_examples=60)
 @given(decks())
 def test_printing_and_reading_a_model_gives_it_back(deck: Deck) -> None:
     reader = Reader(deck.to_text())
@@ -110,7 +111,7 @@ def test_any_text_of_a_decks_own_letters_gives_findings(text: str) -> None:
     assert load_deck("FECM x\n" + text + "\n").findings
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(st.integers(0, 2**32))
 def test_any_mutation_of_a_deck_gives_a_model_or_findings(seed: int) -> None:
     assert examine(mutate(small(), random.Random(seed))) in ("errors", "warnings", "sound")

@@ -90,7 +90,7 @@ def test_zeners_parameter_classifies_the_reference_plates() -> None:
 
 @pytest.mark.parametrize(
     "row",
-    [r for r in table("plate_stiffness.csv") if r["source"].endswith(("computed", "37"))],
+    [r for r in table("plate_stiffness.csv") if r["source"].endswith(("computed", "37"))][::3],
     ids=lambda row: f"{row['plate']} {row['value']}",
 )
 def test_the_static_stiffness_of_thin_plates_is_timoshenkos(row: dict[str, str]) -> None:
