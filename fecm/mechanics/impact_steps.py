@@ -183,7 +183,7 @@ class ImpactSteps:
         rows = np.ascontiguousarray(stored, dtype=np.int64)
         records = np.empty((steps, len(COLUMNS)))
         strains = np.empty((steps, len(self._gage_entry)))
-        fields = np.empty((len(rows), *kernel.shape))
+        fields = np.empty((len(rows), len(kernel.u)))
         m: LoadingHistory = state.memory
         impact = Impact(
             c.k, c.q, *CRITICAL[type(c)](c), *m,
@@ -236,16 +236,16 @@ class ImpactSteps:
             (plate.u, state.displacement), (plate.d, state.increment),
             (plate.s, state.scaled_internal_force),
         ):  # fmt: skip
-            vector.ravel()[plate.position] = values
+            vector[plate.position] = values
         self._product.scale(state.dt2)
         plate.structure.damping = 0.5 * self._system.motion.damping * dt
 
     def _leave(self, state: PlateState) -> None:
         """Copy the vectors of the kernels into a state."""
         plate, count = self._plate, len(state.increment)
-        state.displacement[...] = plate.u.ravel()[plate.position]
-        state.increment[...] = plate.d.ravel()[plate.position]
-        state.scaled_internal_force[...] = plate.s.ravel()[plate.position]
+        state.displacement[...] = plate.u[plate.position]
+        state.increment[...] = plate.d[plate.position]
+        state.scaled_internal_force[...] = plate.s[plate.position]
         if len(state.padded) > count + 1:
             np.negative(state.displacement, out=state.padded[count:-1])
 

@@ -38,16 +38,15 @@ class Group(Structure):
 class Block(Structure):
     """Eight elements."""
 
-    _fields_ = _fields(
-        "group: group; ints: source target; floats: data; int: done", group=POINTER(Group)
-    )
+    _fields_ = _fields("group: group; ints: place; floats: data", group=POINTER(Group))
 
 
 class Chunk(Structure):
-    """Blocks whose elements share nodes with few others."""
+    """Blocks of near elements."""
 
     _fields_ = _fields(
-        "int: blocks; blocks: block; int: first nodes shared; ints: shares; floats: signs force",
+        "int: blocks; blocks: block; int: first nodes shared fixed; ints: shares copies at_rest;"
+        " floats: signs force",
         blocks=POINTER(Block),
     )
 
@@ -56,8 +55,9 @@ class Plate(Structure):
     """A plate and its state."""
 
     _fields_ = _fields(
-        "int: nd nodes own chunks followers most; chunks: chunk; ints: leader; floats: turned"
-        " stiffness shear; ints: kind; floats: mass scale factor u d s shared; float: damping",
+        "int: nd chunks nodes most; chunks: chunk; ints: lane; floats: stiffness shear;"
+        " int: transposed planes;"
+        " floats: mass inverse ratio rate u d s shared; float: damping",
         chunks=POINTER(Chunk),
     )
 

@@ -2,11 +2,11 @@
  *
  * Loaded with ctypes by __init__.py, whose structures mirror those below.
  *
- * A plate's vectors have `nd` entries for each of its nodes: 4 for w, theta_x, theta_y and 0, or 5.
- * Restrained dofs are among them; their inverse mass is zero, so that they stay at rest.  Nodes that
- * follow another one by symmetry come last.
  * Elements are taken eight at a time, one in each lane.  They belong to chunks, which threads share;
  * cuts and sums do not depend on the number of threads, and so neither do the results.
+ * A plate's vectors have a part (nd, nodes) for each chunk, with all of its nodes, and a last one for
+ * the nodes that several chunks share or that have images by symmetry.  Chunks have copies of these.
+ * nd is 3, for w, theta_x, theta_y, or 5.  Restrained dofs are among them.
  */
 #define Py_LIMITED_API 0x030B0000
 #include <Python.h>
@@ -48,7 +48,7 @@ typedef struct {
     int64_t bending, shear, tying;
     /* POINTS: (2 bending + values, nodes), (slopes, nodes).  FACTORIZED: points in a direction. */
     const double *rotations, *deflection;
-    const double *rotations_t, *deflection_t; /* POINTS: transposed */
+    const double *rotations_t, *deflection_t; /* POINTS: transposed.  FACTORIZED: weights of the points */
     const double *in_plane_t;                 /* POINTS: (nodes, 2 bending) */
     const double *tied, *tied_t;              /* POINTS: (2, shear, tying), (2, tying, shear) */
 } Group;
@@ -56,36 +56,37 @@ typedef struct {
 /* Eight elements. */
 typedef struct {
     const Group *group;
-    const int32_t *from, *to; /* (nodes, 8): nodes of the plate, and of the chunk's forces */
-    /* Inverse Jacobian.  POINTS: with its determinant times the weight, (points, 5, 8), and slopes of
-     * the mapping (2 tying, 2, 8).  FACTORIZED: times the root of that, (bending, 4, 8), followed by
-     * the root, (shear, 5, 8). */
+    /* (nodes,): place in the chunk of a node of the first element, followed by those of the others;
+     * or -1 - i, and the places are row i of `lane`. */
+    const int32_t *place;
+    /* POINTS: inverse Jacobian with its determinant times the weight, (points, 5, 8), and slopes of the
+     * mapping (2 tying, 2, 8).  FACTORIZED: a factor, and coefficients of x and y, (1 + 8 + 8, 8). */
     const double *data;
-    int64_t done;             /* nodes of the chunk that no later block touches */
 } Block;
 
-/* Blocks whose elements share nodes with few others. */
+/* Blocks of near elements; the last chunk has no blocks, and the nodes that others share. */
 typedef struct {
     int64_t blocks;
     const Block *block;
-    int64_t first, nodes, shared; /* first own node of the plate, own nodes, nodes shared */
-    const int32_t *shares;        /* (shared,): shared nodes of the plate */
-    const double *signs;          /* (shared, nd) */
-    double *force;                /* (shared, nd) */
+    int64_t first, nodes; /* nodes before it in the vectors; its own, a multiple of four */
+    int64_t shared, fixed;
+    const int32_t *shares, *copies; /* (shared,): places in the last chunk and in this one */
+    const int32_t *at_rest;         /* (fixed,): entries without a mass */
+    const double *signs;            /* (shared, nd) */
+    double *force;                  /* (shared, nd) */
 } Chunk;
 
 typedef struct {
-    int64_t nd, nodes, own, chunks, followers; /* entries of a node; nodes, those of one chunk */
-    int64_t most;                              /* nodes of the largest chunk, and one more */
+    int64_t nd, chunks, nodes, most; /* chunks but the last one; nodes of all, and of the largest */
     const Chunk *chunk;
-    const int32_t *leader;  /* (followers,) */
-    const double *turned;   /* (nd,): sign of a follower's dof */
+    const int32_t *lane;             /* (rows, 8) */
     const double *stiffness, *shear; /* (6, 6) of strains and negative curvatures; (2, 2) */
-    const int32_t *kind;             /* (nodes,): row of the next two */
-    const double *mass, *scale;      /* (kinds, nd): M, and dt^2 M^-1 */
-    const double *factor;            /* (nodes, 2): of these two; or NULL, for 1 */
-    double *u, *d, *s; /* (nodes, nd): displacement, increment, scaled internal force */
-    double *shared;    /* (nodes - own, nd) */
+    int64_t transposed;              /* whether the Jacobian of FACTORIZED elements is */
+    int64_t planes;                  /* of the next two: 1, or one for each dof */
+    const double *mass, *inverse;    /* divided by `ratio`; of each node, or of each entry */
+    const double *ratio, *rate;      /* (nd,): and dt^2 over it, or NULL for a scale of 1 */
+    double *u, *d, *s; /* displacement, increment, scaled internal force */
+    double *shared;    /* forces of the last chunk */
     double damping;    /* a dt/2 */
 } Plate;
 
@@ -181,7 +182,7 @@ typedef struct {
     Impact *impact;
     int64_t steps, taken, threads;
     half *sums;     /* (chunks, 4) */
-    double *forces; /* (threads, most, nd): of the chunk in work, zero between chunks */
+    double *forces; /* (threads, nd, most): of the chunk in work, zero between chunks */
     Sums result;
     int stop;
     atomic_int arrived, round, ready;
@@ -212,12 +213,6 @@ static void displace(const Plate *p) {
         p->d[i] = (keep * p->d[i] - p->s[i]) * share;
         p->u[i] += p->d[i];
     }
-}
-
-static void follow(const Plate *p) {
-    for (int64_t node = 0; node < p->followers; node++)
-        for (int64_t dof = 0; dof < p->nd; dof++)
-            p->u[p->nd * (p->nodes + node) + dof] = p->turned[dof] * p->u[p->nd * p->leader[node] + dof];
 }
 
 /* Contact, projectile and records of a step whose displacement is known. */
@@ -296,10 +291,7 @@ static void take_steps(Job *job, int64_t thread) {
         meet(job);
         if (thread) continue;
         job->result = CHOSEN(finish)(p, next, job->sums);
-        if (job->impact) {
-            end_step(job, step, next);
-            if (next) follow(p);
-        }
+        if (job->impact) end_step(job, step, next);
         job->taken = step + 1;
     }
 }
@@ -361,7 +353,6 @@ static int with_memory(Job *job) {
 /* s = scale K u. */
 EXPORT int fecm_internal_force(const Plate *plate, int64_t threads) {
     Job job = {.plate = plate, .steps = 1, .threads = threads};
-    follow(plate);
     return with_memory(&job);
 }
 
@@ -371,7 +362,6 @@ EXPORT int64_t fecm_impact_steps(const Plate *plate, Impact *impact, int64_t ste
     for (int64_t i = 0; i < impact->loaded; i++)
         plate->s[impact->entry[i]] -= impact->contact.force * impact->mobility[i] * impact->dt2;
     displace(plate);
-    follow(plate);
     return with_memory(&job) ? job.taken : -1;
 }
 

@@ -3,144 +3,119 @@
 INLINE half NAME(load)(const double *x) { return *(const half *)x; }
 INLINE void NAME(store)(double *x, half value) { *(half *)x = value; }
 
-/* y = A x, A (m, n), x and y a value in each lane; four rows at a time stay in registers. */
-INLINE void NAME(product)(const double *A, int m, int n, const lanes *x, lanes *y) {
-    int r = 0;
-    for (; r + 4 <= m; r += 4, A += 4 * n) {
-        half a0 = {0}, b0 = {0}, a1 = {0}, b1 = {0}, a2 = {0}, b2 = {0}, a3 = {0}, b3 = {0};
-        for (int c = 0; c < n; c++) {
-            const half a = x[c].a, b = x[c].b;
-            a0 += A[c] * a, b0 += A[c] * b;
-            a1 += A[n + c] * a, b1 += A[n + c] * b;
-            a2 += A[2 * n + c] * a, b2 += A[2 * n + c] * b;
-            a3 += A[3 * n + c] * a, b3 += A[3 * n + c] * b;
-        }
-        y[r] = (lanes){a0, b0}, y[r + 1] = (lanes){a1, b1};
-        y[r + 2] = (lanes){a2, b2}, y[r + 3] = (lanes){a3, b3};
+/* y = A x for `rows` rows of A (rows, n), x and y a value in each lane; the sums stay in registers. */
+INLINE void NAME(rows)(int rows, const double *A, int n, const lanes *x, lanes *y) {
+    half a[5] = {{0}}, b[5] = {{0}};
+    for (int c = 0; c < n; c++) {
+        const half left = x[c].a, right = x[c].b;
+#pragma GCC unroll 5
+        for (int r = 0; r < rows; r++) a[r] += A[n * r + c] * left, b[r] += A[n * r + c] * right;
     }
-    for (; r + 2 <= m; r += 2, A += 2 * n) {
-        half a0 = {0}, b0 = {0}, a1 = {0}, b1 = {0};
-        for (int c = 0; c < n; c++) {
-            const half a = x[c].a, b = x[c].b;
-            a0 += A[c] * a, b0 += A[c] * b;
-            a1 += A[n + c] * a, b1 += A[n + c] * b;
+#pragma GCC unroll 5
+    for (int r = 0; r < rows; r++) y[r] = (lanes){a[r], b[r]};
+}
+
+/* y = A x, A (m, n), by at most five rows at a time. */
+TARGET void NAME(product)(const double *A, int m, int n, const lanes *x, lanes *y) {
+    for (int r = 0; r < m;) {
+        const int left = m - r, times = (left + 4) / 5, rows = (left + times - 1) / times;
+        switch (rows) {
+        case 1: NAME(rows)(1, A + n * r, n, x, y + r); break;
+        case 2: NAME(rows)(2, A + n * r, n, x, y + r); break;
+        case 3: NAME(rows)(3, A + n * r, n, x, y + r); break;
+        case 4: NAME(rows)(4, A + n * r, n, x, y + r); break;
+        default: NAME(rows)(5, A + n * r, n, x, y + r);
         }
-        y[r] = (lanes){a0, b0}, y[r + 1] = (lanes){a1, b1};
-    }
-    for (; r < m; r++, A += n) {
-        half a = {0}, b = {0};
-        for (int c = 0; c < n; c++) a += A[c] * x[c].a, b += A[c] * x[c].b;
-        y[r] = (lanes){a, b};
+        r += rows;
     }
 }
 
-/* Rows of four nodes as columns, x (nd,). */
-INLINE void NAME(columns)(int nd, const int32_t *from, const double *u, half *x) {
-    const int64_t entries = nd == 3 ? 4 : nd;
-    const double *p0 = u + entries * from[0], *p1 = u + entries * from[1];
-    const double *p2 = u + entries * from[2], *p3 = u + entries * from[3];
-    const half r0 = NAME(load)(p0), r1 = NAME(load)(p1), r2 = NAME(load)(p2), r3 = NAME(load)(p3);
-    const half t0 = __builtin_shufflevector(r0, r1, 0, 4, 2, 6), t1 = __builtin_shufflevector(r0, r1, 1, 5, 3, 7);
-    const half t2 = __builtin_shufflevector(r2, r3, 0, 4, 2, 6), t3 = __builtin_shufflevector(r2, r3, 1, 5, 3, 7);
-    x[0] = __builtin_shufflevector(t0, t2, 0, 1, 4, 5);
-    x[1] = __builtin_shufflevector(t1, t3, 0, 1, 4, 5);
-    x[2] = __builtin_shufflevector(t0, t2, 2, 3, 6, 7);
-    if (nd == 5) {
-        x[3] = __builtin_shufflevector(t1, t3, 2, 3, 6, 7);
-        x[4] = (half){p0[4], p1[4], p2[4], p3[4]};
+/* Entries of eight nodes of a chunk, (nd, nodes), and y (nd,) added to them; see Block for `at`. */
+INLINE void NAME(take)(int nd, const Plate *p, const Chunk *c, int32_t at, const double *u, lanes *x, int step) {
+    if (at >= 0)
+        for (int dof = 0; dof < nd; dof++, u += c->nodes) x[dof * step] = (lanes){NAME(load)(u + at), NAME(load)(u + at + 4)};
+    else {
+        const int32_t *i = p->lane + LANES * (int64_t)~at;
+        for (int dof = 0; dof < nd; dof++, u += c->nodes)
+            x[dof * step] = (lanes){{u[i[0]], u[i[1]], u[i[2]], u[i[3]]}, {u[i[4]], u[i[5]], u[i[6]], u[i[7]]}};
     }
 }
 
-/* Add y (nd,), columns of four nodes, to the rows of their forces. */
-INLINE void NAME(add_columns)(int nd, const int32_t *to, const half *y, double *f) {
-    const int64_t entries = nd == 3 ? 4 : nd;
-    const half r3 = nd == 5 ? y[3] : (half){0};
-    const half t0 = __builtin_shufflevector(y[0], y[1], 0, 4, 2, 6), t1 = __builtin_shufflevector(y[0], y[1], 1, 5, 3, 7);
-    const half t2 = __builtin_shufflevector(y[2], r3, 0, 4, 2, 6), t3 = __builtin_shufflevector(y[2], r3, 1, 5, 3, 7);
-    const half rows[4] = {
-        __builtin_shufflevector(t0, t2, 0, 1, 4, 5), __builtin_shufflevector(t1, t3, 0, 1, 4, 5),
-        __builtin_shufflevector(t0, t2, 2, 3, 6, 7), __builtin_shufflevector(t1, t3, 2, 3, 6, 7)};
-    for (int lane = 0; lane < 4; lane++) {
-        double *p = f + entries * to[lane];
-        NAME(store)(p, NAME(load)(p) + rows[lane]);
-        if (nd == 5) p[4] += y[4][lane];
+INLINE void NAME(give)(int nd, const Plate *p, const Chunk *c, int32_t at, const lanes *y, int step, double *f) {
+    if (at >= 0)
+        for (int dof = 0; dof < nd; dof++, f += c->nodes) {
+            NAME(store)(f + at, NAME(load)(f + at) + y[dof * step].a);
+            NAME(store)(f + at + 4, NAME(load)(f + at + 4) + y[dof * step].b);
+        }
+    else {
+        const int32_t *i = p->lane + LANES * (int64_t)~at;
+        for (int dof = 0; dof < nd; dof++, f += c->nodes)
+            for (int lane = 0; lane < 4; lane++) f[i[lane]] += y[dof * step].a[lane];
+        f -= nd * c->nodes;
+        for (int dof = 0; dof < nd; dof++, f += c->nodes)
+            for (int lane = 0; lane < 4; lane++) f[i[4 + lane]] += y[dof * step].b[lane];
     }
-}
-
-/* Displacements (nd, nodes) of eight elements, and their forces y added to those of the nodes. */
-INLINE void NAME(gather)(int nd, int nodes, const Block *b, const double *u, lanes *x) {
-    half r[5];
-    for (int node = 0; node < nodes; node++)
-        for (int side = 0; side < 2; side++) {
-            NAME(columns)(nd, b->from + LANES * node + 4 * side, u, r);
-            for (int dof = 0; dof < nd; dof++) HALF(x[dof * nodes + node]) = r[dof];
-        }
-}
-
-INLINE void NAME(scatter)(int nd, int nodes, const Block *b, const lanes *y, double *f) {
-    half r[5];
-    for (int node = 0; node < nodes; node++)
-        for (int side = 0; side < 2; side++) {
-            for (int dof = 0; dof < nd; dof++) r[dof] = HALF(y[dof * nodes + node]);
-            NAME(add_columns)(nd, b->to + LANES * node + 4 * side, r, f);
-        }
 }
 
 /* Elements with one matrix. */
-INLINE void NAME(one_matrix)(int nd, int nodes, const Block *b, const double *u, double *f) {
+INLINE void NAME(one_matrix)(int nd, int nodes, const Plate *p, const Chunk *c, const Block *b, const double *u, double *f) {
     lanes x[60] ALIGNED, y[60] ALIGNED;
-    NAME(gather)(nd, nodes, b, u, x);
+    for (int node = 0; node < nodes; node++) NAME(take)(nd, p, c, b->place[node], u, x + node, nodes);
     NAME(product)(b->group->matrix, nd * nodes, nd * nodes, x, y);
-    NAME(scatter)(nd, nodes, b, y, f);
+    for (int node = 0; node < nodes; node++) NAME(give)(nd, p, c, b->place[node], y + node, nodes, f);
 }
 
 /* Elements with one matrix for even motions and one for odd ones: under half a turn w keeps its sign,
  * the other dofs change it.  Each has its dofs in order, (pairs,) or (pairs + 1,) with the centre. */
-INLINE void NAME(two_matrices)(int nd, int pairs, int centre, const Block *b, const double *u, double *f) {
+INLINE void NAME(two_matrices)(int nd, int pairs, int centre, const Plate *p, const Chunk *c, const Block *b, const double *u, double *f) {
     const int w = nd == 5 ? 2 : 0, even = nd * pairs + centre, odd = nd * (pairs + centre) - centre;
     const double *matrix = b->group->matrix;
-    lanes x[60] ALIGNED, y[60] ALIGNED;
-    half one[5] ALIGNED, other[5] ALIGNED = {{0}};
-    for (int node = 0; node < pairs + centre; node++)
-        for (int side = 0; side < 2; side++) {
-            const int32_t *from = b->from + LANES * (node < pairs ? node : 2 * pairs) + 4 * side;
-            NAME(columns)(nd, from, u, one);
-            if (node < pairs) NAME(columns)(nd, from + LANES * pairs, u, other);
-            for (int dof = 0, e = node, o = even + node; dof < nd; dof++) {
-                if (node == pairs)
-                    HALF(x[dof == w ? e : o]) = one[dof];
-                else {
-                    HALF(x[dof == w ? e : o]) = one[dof] + other[dof];
-                    HALF(x[dof == w ? o : e]) = one[dof] - other[dof];
-                }
-                e += pairs + (dof == w ? centre : 0), o += pairs + (dof == w ? 0 : centre);
-            }
+    lanes x[60] ALIGNED, y[60] ALIGNED, one[5] ALIGNED, other[5] ALIGNED;
+    for (int node = 0; node < pairs; node++) {
+        NAME(take)(nd, p, c, b->place[node], u, one, 1);
+        NAME(take)(nd, p, c, b->place[pairs + node], u, other, 1);
+        for (int dof = 0, e = node, o = even + node; dof < nd; dof++) {
+            lanes *sum = x + (dof == w ? e : o), *rest = x + (dof == w ? o : e);
+            *sum = (lanes){one[dof].a + other[dof].a, one[dof].b + other[dof].b};
+            *rest = (lanes){one[dof].a - other[dof].a, one[dof].b - other[dof].b};
+            e += pairs + (dof == w ? centre : 0), o += pairs + (dof == w ? 0 : centre);
         }
+    }
+    /* The centre's w is the last of its dof among the even ones, its other dofs are among the odd ones. */
+    if (centre) {
+        NAME(take)(nd, p, c, b->place[2 * pairs], u, one, 1);
+        for (int dof = 0, e = pairs, o = even + pairs; dof < nd; dof++) {
+            x[dof == w ? e : o] = one[dof];
+            e += pairs + (dof == w ? centre : 0), o += pairs + (dof == w ? 0 : centre);
+        }
+    }
     NAME(product)(matrix, even, even, x, y);
     NAME(product)(matrix + even * even, odd, odd, x + even, y + even);
-    for (int node = 0; node < pairs + centre; node++)
-        for (int side = 0; side < 2; side++) {
-            const int32_t *to = b->to + LANES * (node < pairs ? node : 2 * pairs) + 4 * side;
-            for (int dof = 0, e = node, o = even + node; dof < nd; dof++) {
-                const half sum = HALF(y[dof == w ? e : o]);
-                one[dof] = sum;
-                if (node < pairs) {
-                    const half rest = HALF(y[dof == w ? o : e]);
-                    one[dof] = sum + rest, other[dof] = sum - rest;
-                }
-                e += pairs + (dof == w ? centre : 0), o += pairs + (dof == w ? 0 : centre);
-            }
-            NAME(add_columns)(nd, to, one, f);
-            if (node < pairs) NAME(add_columns)(nd, to + LANES * pairs, other, f);
+    for (int node = 0; node < pairs; node++) {
+        for (int dof = 0, e = node, o = even + node; dof < nd; dof++) {
+            const lanes sum = y[dof == w ? e : o], rest = y[dof == w ? o : e];
+            one[dof] = (lanes){sum.a + rest.a, sum.b + rest.b};
+            other[dof] = (lanes){sum.a - rest.a, sum.b - rest.b};
+            e += pairs + (dof == w ? centre : 0), o += pairs + (dof == w ? 0 : centre);
         }
+        NAME(give)(nd, p, c, b->place[node], one, 1, f);
+        NAME(give)(nd, p, c, b->place[pairs + node], other, 1, f);
+    }
+    if (centre) {
+        for (int dof = 0, e = pairs, o = even + pairs; dof < nd; dof++) {
+            one[dof] = y[dof == w ? e : o];
+            e += pairs + (dof == w ? centre : 0), o += pairs + (dof == w ? 0 : centre);
+        }
+        NAME(give)(nd, p, c, b->place[2 * pairs], one, 1, f);
+    }
 }
 
 /* Strains at the points of quadrature from values and slopes in xi and eta, stresses, and back. */
-INLINE void NAME(no_matrix)(int nd, int nodes, const Plate *p, const Block *b, double *f) {
+INLINE void NAME(no_matrix)(int nd, int nodes, const Plate *p, const Chunk *c, const Block *b, const double *u, double *f) {
     const Group *g = b->group;
     const double *data = b->data;
     lanes x[60] ALIGNED, y[60] ALIGNED;
-    NAME(gather)(nd, nodes, b, p->u, x);
+    for (int node = 0; node < nodes; node++) NAME(take)(nd, p, c, b->place[node], u, x + node, nodes);
     const int nb = (int)g->bending, ns = (int)g->shear, nt = (int)g->tying;
     const int values = nt ? 2 * nt : ns, slopes = nt ? 2 * nt : 2 * ns, first = nd == 5 ? 2 : 0;
     lanes at_w[32], at_r[2][48], at_u[2][32], e[2][16], part[12];
@@ -165,11 +140,11 @@ INLINE void NAME(no_matrix)(int nd, int nodes, const Plate *p, const Block *b, d
             strain[5] = yx * HALF(a[0]) + ye * HALF(a[nb]) + xx * HALF(b[0]) + xe * HALF(b[nb]);
             int from = 3;
             if (nd == 5) {
-                const lanes *const c = at_u[0] + point, *const d = at_u[1] + point;
+                const lanes *const q = at_u[0] + point, *const d = at_u[1] + point;
                 from = 0;
-                strain[0] = xx * HALF(c[0]) + xe * HALF(c[nb]);
+                strain[0] = xx * HALF(q[0]) + xe * HALF(q[nb]);
                 strain[1] = yx * HALF(d[0]) + ye * HALF(d[nb]);
-                strain[2] = yx * HALF(c[0]) + ye * HALF(c[nb]) + xx * HALF(d[0]) + xe * HALF(d[nb]);
+                strain[2] = yx * HALF(q[0]) + ye * HALF(q[nb]) + xx * HALF(d[0]) + xe * HALF(d[nb]);
             }
             for (int i = from; i < 6; i++) {
                 half sum = zero;
@@ -179,8 +154,8 @@ INLINE void NAME(no_matrix)(int nd, int nodes, const Plate *p, const Block *b, d
             HALF(a[0]) = xx * stress[3] + yx * stress[5], HALF(a[nb]) = xe * stress[3] + ye * stress[5];
             HALF(b[0]) = xx * stress[5] + yx * stress[4], HALF(b[nb]) = xe * stress[5] + ye * stress[4];
             if (nd == 5) {
-                lanes *const c = at_u[0] + point, *const d = at_u[1] + point;
-                HALF(c[0]) = xx * stress[0] + yx * stress[2], HALF(c[nb]) = xe * stress[0] + ye * stress[2];
+                lanes *const q = at_u[0] + point, *const d = at_u[1] + point;
+                HALF(q[0]) = xx * stress[0] + yx * stress[2], HALF(q[nb]) = xe * stress[0] + ye * stress[2];
                 HALF(d[0]) = xx * stress[2] + yx * stress[1], HALF(d[nb]) = xe * stress[2] + ye * stress[1];
             }
         }
@@ -234,7 +209,7 @@ INLINE void NAME(no_matrix)(int nd, int nodes, const Plate *p, const Block *b, d
         NAME(product)(g->rotations_t, nodes, 2 * nb + values, at_r[i], yw + (1 + i) * nodes);
         if (nd == 5) NAME(product)(g->in_plane_t, nodes, 2 * nb, at_u[i], y + i * nodes);
     }
-    NAME(scatter)(nd, nodes, b, y, f);
+    for (int node = 0; node < nodes; node++) NAME(give)(nd, p, c, b->place[node], y + node, nodes, f);
 }
 
 /* Biquadratic elements with the points of a tensor product, by sum factorization.
@@ -296,208 +271,182 @@ INLINE void NAME(nodal)(half *f) {
         }
 }
 
-#define AT(k) NAME(load)(data + (k) * LANES)
-/* Forces on the coefficients, of membrane and bending strains at n x n points. */
-INLINE void NAME(bending)(int nd, int n, const Plate *p, const double *x, const double *data, half (*c)[9], half (*force)[9]) {
-    const int fields = nd - 1, from = nd == 5 ? 0 : 3; /* u, v if they move, theta_x, theta_y */
-    const double *C = p->stiffness;
-    half V[4][2][4] ALIGNED, D[4][3][4] ALIGNED;
-    for (int i = 0; i < fields; i++) {
-        const half *f = c[i < fields - 2 ? i : i + 1];
-        for (int b = 0; b < 3; b++, f += 3) {
-            NAME(slopes)(n, x, f[1], f[2], D[i][b], 1);
-            if (b) NAME(values)(n, x, f[0], f[1], f[2], V[i][b - 1], 1);
-        }
-    }
-    for (int k = 0; k < n; k++) {
-        half along[4][4] ALIGNED, across[4][4] ALIGNED;
-        for (int i = 0; i < fields; i++) {
-            NAME(values)(n, x, D[i][0][k], D[i][1][k], D[i][2][k], along[i], 1);
-            NAME(slopes)(n, x, V[i][0][k], V[i][1][k], across[i], 1);
-        }
-        for (int l = 0; l < n; l++, data += 4 * LANES) {
-            const half xx = AT(0), xe = AT(1), yx = AT(2), ye = AT(3);
-            half strain[6], stress[6];
-            for (int i = 0; i < fields; i += 2) {
-                half *e = strain + (i < fields - 2 ? 0 : 3);
-                const half a = along[i][l], b = across[i][l], d = along[i + 1][l], g = across[i + 1][l];
-                e[0] = xx * a + xe * b, e[1] = yx * d + ye * g;
-                e[2] = yx * a + ye * b + (xx * d + xe * g);
-            }
-            for (int i = from; i < 6; i++) {
-                stress[i] = C[6 * i + from] * strain[from];
-                for (int j = from + 1; j < 6; j++) stress[i] += C[6 * i + j] * strain[j];
-            }
-            for (int i = 0; i < fields; i += 2) {
-                const half *s = stress + (i < fields - 2 ? 0 : 3);
-                along[i][l] = xx * s[0] + yx * s[2], across[i][l] = xe * s[0] + ye * s[2];
-                along[i + 1][l] = xx * s[2] + yx * s[1], across[i + 1][l] = xe * s[2] + ye * s[1];
-            }
-        }
-        for (int i = 0; i < fields; i++) {
-            half d[3] = {{0}}, v[2] = {{0}};
-            NAME(sum_values)(n, x, along[i], 1, d, d + 1, d + 2);
-            NAME(sum_slopes)(n, x, across[i], 1, v, v + 1);
-            D[i][0][k] = d[0], D[i][1][k] = d[1], D[i][2][k] = d[2], V[i][0][k] = v[0], V[i][1][k] = v[1];
-        }
-    }
-    for (int i = 0; i < fields; i++) {
-        half *f = force[i < fields - 2 ? i : i + 1];
-        for (int b = 0; b < 3; b++, f += 3) {
-            half sum[3] = {{0}};
-            NAME(sum_slopes)(n, x, D[i][b], 1, sum + 1, sum + 2);
-            if (b) NAME(sum_values)(n, x, V[i][b - 1], 1, sum, sum + 1, sum + 2);
-            f[0] = sum[0], f[1] = sum[1], f[2] = sum[2];
-        }
-    }
-}
-
-/* Add those of transverse shear strains, which are the only ones on w. */
-INLINE void NAME(shear)(int n, const Plate *p, const double *x, const double *data, half (*c)[9], half (*force)[9]) {
-    const double *S = p->shear;
-    const half zero = {0};
-    half V[3][3][4] ALIGNED, D[3][4] ALIGNED; /* values of w, theta_x, theta_y along xi; slopes of w */
-    for (int i = 0; i < 3; i++)
+/* Forces on the coefficients of the dofs from strains at n x n points, added: those of membrane and
+ * bending strains, of transverse shear strains, or of both if they have the same points.
+ *
+ * Coefficients of x and y follow those of the dofs; `weight` are those of the points, and `factor`
+ * that of the element.  With twice the slopes J of x and y, d their determinant and g twice the slopes
+ * of a field, strains are adj(J) g/d and the area of a point is its weight times d/4. */
+INLINE void NAME(points)(int nd, int n, int bends, int shears, const Plate *p, const double *x, const double *weight,
+                         half factor, half (*c)[9], half (*force)[9]) {
+    const int w = nd - 3, fields = nd + 2;
+    const double *C = p->stiffness, *S = p->shear;
+    half V[7][3][4] ALIGNED, D[7][3][4] ALIGNED; /* values and slopes along xi */
+#define SLOPES(i) ((i) >= nd || ((i) == w ? shears : bends))
+#define VALUES(i) ((i) > w && (i) < nd && shears)
+    for (int i = 0; i < fields; i++)
         for (int b = 0; b < 3; b++) {
             const half *f = c[i] + 3 * b;
-            NAME(values)(n, x, f[0], f[1], f[2], V[i][b], 1);
-            if (!i) NAME(slopes)(n, x, f[1], f[2], D[b], 1);
+            if (SLOPES(i)) NAME(slopes)(n, x, f[1], f[2], D[i][b], 1);
+            if (VALUES(i) || (SLOPES(i) && b)) NAME(values)(n, x, f[0], f[1], f[2], V[i][b], 1);
         }
     for (int k = 0; k < n; k++) {
-        half along[4] ALIGNED, across[4] ALIGNED, angle[2][4] ALIGNED;
-        NAME(values)(n, x, D[0][k], D[1][k], D[2][k], along, 1);
-        NAME(slopes)(n, x, V[0][1][k], V[0][2][k], across, 1);
-        for (int i = 0; i < 2; i++)
-            NAME(values)(n, x, V[i + 1][0][k], V[i + 1][1][k], V[i + 1][2][k], angle[i], 1);
-        for (int l = 0; l < n; l++, data += 5 * LANES) {
-            const half xx = AT(0), xe = AT(1), yx = AT(2), ye = AT(3), root = AT(4);
-            const half sx = xx * along[l] + xe * across[l] - root * angle[0][l];
-            const half sy = yx * along[l] + ye * across[l] - root * angle[1][l];
-            const half qx = S[0] * sx + S[1] * sy, qy = S[2] * sx + S[3] * sy;
-            along[l] = xx * qx + yx * qy, across[l] = xe * qx + ye * qy;
-            angle[0][l] = -root * qx, angle[1][l] = -root * qy;
+        half along[7][4] ALIGNED, across[7][4] ALIGNED, angle[2][4] ALIGNED;
+        for (int i = 0; i < fields; i++) {
+            if (SLOPES(i)) {
+                NAME(values)(n, x, D[i][0][k], D[i][1][k], D[i][2][k], along[i], 1);
+                NAME(slopes)(n, x, V[i][1][k], V[i][2][k], across[i], 1);
+            }
+            if (VALUES(i)) NAME(values)(n, x, V[i][0][k], V[i][1][k], V[i][2][k], angle[i - w - 1], 1);
         }
-        half d[3] = {{0}}, v[3][3] = {{{0}}};
-        NAME(sum_values)(n, x, along, 1, d, d + 1, d + 2);
-        NAME(sum_slopes)(n, x, across, 1, v[0] + 1, v[0] + 2);
-        for (int i = 1; i < 3; i++) NAME(sum_values)(n, x, angle[i - 1], 1, v[i], v[i] + 1, v[i] + 2);
-        for (int b = 0; b < 3; b++) {
-            D[b][k] = d[b];
-            for (int i = 0; i < 3; i++) V[i][b][k] = v[i][b];
+        const half *const of_xe = p->transposed ? across[nd] : along[nd + 1];
+        const half *const of_yx = p->transposed ? along[nd + 1] : across[nd];
+        for (int l = 0; l < n; l++) {
+            const half xx = across[nd + 1][l], ye = along[nd][l], xe = -of_xe[l], yx = -of_yx[l];
+            const half det = xx * ye - xe * yx, area = factor * weight[n * k + l] / det;
+            if (bends) {
+                half strain[6], stress[6];
+                for (int i = w ? 0 : 1; i < nd; i += i ? 2 : 3) { /* u and v, theta_x and theta_y */
+                    half *e = strain + (i ? 3 : 0);
+                    const half a = along[i][l], b = across[i][l], d = along[i + 1][l], g = across[i + 1][l];
+                    e[0] = area * (xx * a + xe * b), e[1] = area * (yx * d + ye * g);
+                    e[2] = area * (yx * a + ye * b + (xx * d + xe * g));
+                }
+                for (int i = w ? 0 : 3; i < 6; i++) {
+                    stress[i] = C[6 * i + 3] * strain[3] + C[6 * i + 4] * strain[4] + C[6 * i + 5] * strain[5];
+                    if (w) stress[i] += C[6 * i] * strain[0] + C[6 * i + 1] * strain[1] + C[6 * i + 2] * strain[2];
+                }
+                for (int i = w ? 0 : 1; i < nd; i += i ? 2 : 3) {
+                    const half *q = stress + (i ? 3 : 0);
+                    along[i][l] = xx * q[0] + yx * q[2], across[i][l] = xe * q[0] + ye * q[2];
+                    along[i + 1][l] = xx * q[2] + yx * q[1], across[i + 1][l] = xe * q[2] + ye * q[1];
+                }
+            }
+            if (shears) {
+                const half sx = area * (xx * along[w][l] + xe * across[w][l] - det * angle[0][l]);
+                const half sy = area * (yx * along[w][l] + ye * across[w][l] - det * angle[1][l]);
+                const half qx = S[0] * sx + S[1] * sy, qy = S[2] * sx + S[3] * sy;
+                along[w][l] = xx * qx + yx * qy, across[w][l] = xe * qx + ye * qy;
+                angle[0][l] = -det * qx, angle[1][l] = -det * qy;
+            }
+        }
+        for (int i = 0; i < nd; i++) {
+            half d[3] = {{0}}, v[3] = {{0}};
+            if (SLOPES(i)) {
+                NAME(sum_values)(n, x, along[i], 1, d, d + 1, d + 2);
+                NAME(sum_slopes)(n, x, across[i], 1, v + 1, v + 2);
+            }
+            if (VALUES(i)) NAME(sum_values)(n, x, angle[i - w - 1], 1, v, v + 1, v + 2);
+            for (int b = 0; b < 3; b++) D[i][b][k] = d[b], V[i][b][k] = v[b];
         }
     }
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < nd; i++)
         for (int b = 0; b < 3; b++) {
-            half *f = force[i] + 3 * b, sum[3] = {{0}};
-            if (i || b) NAME(sum_values)(n, x, V[i][b], 1, sum, sum + 1, sum + 2);
-            if (!i) NAME(sum_slopes)(n, x, D[b], 1, sum + 1, sum + 2);
-            for (int a = 0; a < 3; a++) f[a] = sum[a] + (i ? f[a] : zero);
+            half sum[3] = {{0}};
+            if (SLOPES(i)) NAME(sum_slopes)(n, x, D[i][b], 1, sum + 1, sum + 2);
+            if (VALUES(i) || (SLOPES(i) && b)) NAME(sum_values)(n, x, V[i][b], 1, sum, sum + 1, sum + 2);
+            for (int a = 0; a < 3; a++) force[i][3 * b + a] += sum[a];
         }
+#undef SLOPES
+#undef VALUES
 }
-#undef AT
 
-INLINE void NAME(factorized)(int nd, const Plate *p, const Block *b, double *f) {
+INLINE void NAME(factorized)(int nd, const Plate *p, const Chunk *chunk, const Block *b, const double *u, double *f) {
     const Group *g = b->group;
-    const int w = nd - 3;
+    const int nb = (int)g->bending, ns = (int)g->shear;
+    const double *xb = g->rotations, *wb = g->rotations_t, *xs = g->deflection, *ws = g->deflection_t;
+    lanes x[5][9] ALIGNED, y[5][9] ALIGNED;
+    for (int node = 0; node < 9; node++) NAME(take)(nd, p, chunk, b->place[node], u, x[0] + node, 9);
     for (int side = 0; side < 2; side++) {
-        const double *data = b->data + 4 * side, *after = data + 4 * LANES * g->bending * g->bending;
-        half c[5][9] ALIGNED, force[5][9] ALIGNED, r[5] ALIGNED;
-        for (int node = 0; node < 9; node++) {
-            NAME(columns)(nd, b->from + LANES * node + 4 * side, p->u, r);
-            for (int dof = 0; dof < nd; dof++) c[dof][node] = r[dof];
+        half c[7][9] ALIGNED, force[5][9] ALIGNED;
+        const half factor = NAME(load)(b->data + 4 * side);
+        memset(force, 0, sizeof force);
+        for (int dof = 0; dof < nd; dof++) {
+            for (int node = 0; node < 9; node++) c[dof][node] = HALF(x[dof][node]);
+            NAME(coefficients)(c[dof]);
         }
-        for (int dof = 0; dof < nd; dof++) NAME(coefficients)(c[dof]);
-        switch (g->bending) {
-        case 1: NAME(bending)(nd, 1, p, g->rotations, data, c, force); break;
-        case 2: NAME(bending)(nd, 2, p, g->rotations, data, c, force); break;
-        case 3: NAME(bending)(nd, 3, p, g->rotations, data, c, force); break;
-        case 4: NAME(bending)(nd, 4, p, g->rotations, data, c, force); break;
+        c[nd][0] = c[nd + 1][0] = factor; /* of no effect on slopes */
+        for (int i = 1; i < 9; i++)
+            for (int axis = 0; axis < 2; axis++) c[nd + axis][i] = NAME(load)(b->data + LANES * (8 * axis + i) + 4 * side);
+        if (nb == 3 && ns == 3) /* the usual numbers, for which loops are unrolled */
+            NAME(points)(nd, 3, 1, 1, p, xb, wb, factor, c, force);
+        else {
+            NAME(points)(nd, nb, 1, 0, p, xb, wb, factor, c, force);
+            NAME(points)(nd, ns, 0, 1, p, xs, ws, factor, c, force);
         }
-        switch (g->shear) {
-        case 1: NAME(shear)(1, p, g->deflection, after, c + w, force + w); break;
-        case 2: NAME(shear)(2, p, g->deflection, after, c + w, force + w); break;
-        case 3: NAME(shear)(3, p, g->deflection, after, c + w, force + w); break;
-        case 4: NAME(shear)(4, p, g->deflection, after, c + w, force + w); break;
-        }
-        for (int dof = 0; dof < nd; dof++) NAME(nodal)(force[dof]);
-        for (int node = 0; node < 9; node++) {
-            for (int dof = 0; dof < nd; dof++) r[dof] = force[dof][node];
-            NAME(add_columns)(nd, b->to + LANES * node + 4 * side, r, f);
+        for (int dof = 0; dof < nd; dof++) {
+            NAME(nodal)(force[dof]);
+            for (int node = 0; node < 9; node++) HALF(y[dof][node]) = force[dof][node];
         }
     }
+    for (int node = 0; node < 9; node++) NAME(give)(nd, p, chunk, b->place[node], y[0] + node, 9, f);
 }
 
-/* Scale the internal forces of nodes, add to the sums, and take the next step if asked to. */
-INLINE void NAME(update)(int nd, const Plate *p, int64_t first, int64_t count, double *force, int next, half *sums) {
-    const int64_t entries = nd == 3 ? 4 : nd;
+/* Scale the internal forces of a chunk's nodes, add to the sums, and take the next step if asked to. */
+INLINE void NAME(update)(int nd, const Plate *p, const Chunk *c, double *force, int next, half *sums) {
+    const int64_t n = c->nodes;
     const double keep = 1.0 - p->damping, share = 1.0 / (1.0 + p->damping);
-    const int32_t *const kind = p->kind;
-    const double *const masses = p->mass, *const scales = p->scale, *const factor = p->factor;
-    double *u = p->u + entries * first, *d = p->d + entries * first, *s = p->s + entries * first;
+    const double *const mass = p->mass + p->planes * c->first, *const inverse = p->inverse + p->planes * c->first;
+    double *const u = p->u + nd * c->first, *const d = p->d + nd * c->first, *const s = p->s + nd * c->first;
     const half zero = {0};
-    half inertia = sums[0], power = sums[1], strain = sums[2], internal = sums[3];
-    for (int64_t node = first; node < first + count; node++) {
-        const double *mass = masses + entries * kind[node], *scale = scales + entries * kind[node];
-        const double heavy = factor ? factor[2 * node] : 1.0, light = factor ? factor[2 * node + 1] : 1.0;
-        const half f = NAME(load)(force), old = NAME(load)(d), v = NAME(load)(u);
-        const half scaled = f * (light * NAME(load)(scale));
-        NAME(store)(force, zero);
-        inertia += heavy * NAME(load)(mass) * old * old;
-        power += old * f, strain += v * f, internal += f * scaled;
-        if (next) {
-            const half now = (keep * old - scaled) * share;
-            NAME(store)(d, now);
-            NAME(store)(u, v + now);
-        } else
-            NAME(store)(s, scaled);
-        if (nd == 5) {
-            const double f4 = force[4], old4 = d[4], scaled4 = f4 * (light * scale[4]);
-            force[4] = 0.0;
-            inertia[0] += heavy * mass[4] * old4 * old4;
-            power[0] += old4 * f4, strain[0] += u[4] * f4, internal[0] += f4 * scaled4;
-            if (next) {
-                d[4] = (keep * old4 - scaled4) * share;
-                u[4] += d[4];
-            } else
-                s[4] = scaled4;
-        }
-        force += entries, u += entries, d += entries, s += entries;
+    for (int64_t i = 0; i < c->fixed; i++) force[c->at_rest[i]] = 0.0;
+    if (!p->rate) {
+        memcpy(s, force, sizeof(double) * nd * n);
+        memset(force, 0, sizeof(double) * nd * n);
+        return;
     }
+    half inertia = sums[0], power = sums[1], strain = sums[2], internal = sums[3];
+    for (int64_t i = 0; i < n; i += 4)
+        for (int64_t dof = 0, at = i; dof < nd; dof++, at += n) {
+            const int64_t of_mass = p->planes == 1 ? i : at;
+            const half f = NAME(load)(force + at), old = NAME(load)(d + at), v = NAME(load)(u + at);
+            const half scaled = f * (p->rate[dof] * NAME(load)(inverse + of_mass));
+            NAME(store)(force + at, zero);
+            inertia += p->ratio[dof] * NAME(load)(mass + of_mass) * old * old;
+            power += old * f, strain += v * f, internal += f * scaled;
+            if (next) {
+                const half now = (keep * old - scaled) * share;
+                NAME(store)(d + at, now);
+                NAME(store)(u + at, v + now);
+            } else
+                NAME(store)(s + at, scaled);
+        }
     sums[0] = inertia, sums[1] = power, sums[2] = strain, sums[3] = internal;
 }
 
-/* Forces of a chunk; its own nodes are updated as soon as their forces are complete. */
-INLINE void NAME(chunk)(int nd, const Plate *p, const Chunk *chunk, int next, double *force, half *sums) {
-    int64_t done = 0;
-    for (int64_t number = 0; number < chunk->blocks; number++) {
-        const Block *b = chunk->block + number;
+/* Forces of a chunk, and the update of the nodes that are its own. */
+INLINE void NAME(chunk)(int nd, const Plate *p, const Chunk *c, int next, double *force, half *sums) {
+    const Chunk *common = p->chunk + p->chunks;
+    double *u = p->u + nd * c->first;
+    const double *of_all = p->u + nd * common->first;
+    for (int64_t i = 0; i < c->shared; i++)
+        for (int64_t dof = 0; dof < nd; dof++)
+            u[dof * c->nodes + c->copies[i]] = c->signs[nd * i + dof] * of_all[dof * common->nodes + c->shares[i]];
+    for (int64_t number = 0; number < c->blocks; number++) {
+        const Block *b = c->block + number;
         const int nodes = (int)b->group->nodes, pairs = (int)b->group->pairs;
         switch (b->group->kind) {
-        case ONE: NAME(one_matrix)(nd, nodes, b, p->u, force); break;
+        case ONE: NAME(one_matrix)(nd, nodes, p, c, b, u, force); break;
         case TWO:
             if (pairs == 4 && nodes == 9)
-                NAME(two_matrices)(nd, 4, 1, b, p->u, force);
+                NAME(two_matrices)(nd, 4, 1, p, c, b, u, force);
             else
-                NAME(two_matrices)(nd, pairs, nodes - 2 * pairs, b, p->u, force);
+                NAME(two_matrices)(nd, pairs, nodes - 2 * pairs, p, c, b, u, force);
             break;
-        case FACTORIZED: NAME(factorized)(nd, p, b, force); break;
-        case POINTS: NAME(no_matrix)(nd, nodes, p, b, force); break;
-        }
-        if (b->done > done) {
-            NAME(update)(nd, p, chunk->first + done, b->done - done, force + p->nd * done, next, sums);
-            done = b->done;
+        case FACTORIZED: NAME(factorized)(nd, p, c, b, u, force); break;
+        case POINTS: NAME(no_matrix)(nd, nodes, p, c, b, u, force); break;
         }
     }
-    /* What is shared, and behind it what lanes without an element have added. */
-    force += p->nd * chunk->nodes;
-    memcpy(chunk->force, force, sizeof(double) * p->nd * chunk->shared);
-    memset(force, 0, sizeof(double) * p->nd * (chunk->shared + 1));
+    for (int64_t i = 0; i < c->shared; i++)
+        for (int64_t dof = 0; dof < nd; dof++)
+            c->force[nd * i + dof] = c->signs[nd * i + dof] * force[dof * c->nodes + c->copies[i]];
+    NAME(update)(nd, p, c, force, next, sums);
 }
 
-/* `force` is (most, nd) and zero, before and after. */
+/* `force` is (nd, most) and zero, before and after. */
 TARGET void NAME(run_chunk)(const Plate *p, int64_t number, int next, double *force, half *sums) {
     memset(sums, 0, 4 * sizeof *sums);
-    if (p->nd == 4)
+    if (p->nd == 3)
         NAME(chunk)(3, p, p->chunk + number, next, force, sums);
     else
         NAME(chunk)(5, p, p->chunk + number, next, force, sums);
@@ -506,20 +455,19 @@ TARGET void NAME(run_chunk)(const Plate *p, int64_t number, int next, double *fo
 /* Add up what the chunks share, update it, and add up the sums of all, (chunks, 4). */
 TARGET Sums NAME(finish)(const Plate *p, int next, half *sums) {
     const int64_t nd = p->nd;
+    const Chunk *common = p->chunk + p->chunks;
     half total[4];
     memset(total, 0, sizeof total);
     for (int64_t number = 0; number < p->chunks; number++) {
-        const Chunk *chunk = p->chunk + number;
-        for (int64_t node = 0; node < chunk->shared; node++)
-            for (int64_t dof = 0; dof < nd; dof++)
-                p->shared[nd * (chunk->shares[node] - p->own) + dof] +=
-                    chunk->signs[nd * node + dof] * chunk->force[nd * node + dof];
+        const Chunk *c = p->chunk + number;
+        for (int64_t i = 0; i < c->shared; i++)
+            for (int64_t dof = 0; dof < nd; dof++) p->shared[dof * common->nodes + c->shares[i]] += c->force[nd * i + dof];
         for (int i = 0; i < 4; i++) total[i] += sums[4 * number + i];
     }
-    if (nd == 4)
-        NAME(update)(3, p, p->own, p->nodes - p->own, p->shared, next, total);
+    if (nd == 3)
+        NAME(update)(3, p, common, p->shared, next, total);
     else
-        NAME(update)(5, p, p->own, p->nodes - p->own, p->shared, next, total);
+        NAME(update)(5, p, common, p->shared, next, total);
     double added[4];
     for (int i = 0; i < 4; i++) added[i] = (total[i][0] + total[i][1]) + (total[i][2] + total[i][3]);
     return (Sums){added[0], added[1], added[2], added[3]};

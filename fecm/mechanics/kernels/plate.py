@@ -27,14 +27,16 @@ LANES = 8
 ONE, TWO, FACTORIZED, POINTS = range(4)
 # With fewer congruent elements a shared matrix fills too few lanes.
 WORTH_GROUPING = 8
-# Elements of a chunk, approximately: the forces on their nodes stay in the cache.
-CHUNK = 512
-# Relative difference below which masses of nodes count as equal.
+# Largest number of elements of a chunk: the forces on their nodes stay in the cache.
+CHUNK = 1024
+# Elements of a strip that stay together.
+PIECE = 4 * LANES
+# Relative difference below which ratios of masses count as equal.
 EQUAL = 1e-12
 # Largest coupling of even and odd motions of an element, relative to its largest stiffness.
 SYMMETRIC = 1e-14
 # The structure Block of kernels.c.
-BLOCK = np.dtype([(name, np.uint64) for name in ("group", "source", "target", "data", "done")])
+BLOCK = np.dtype([(name, np.uint64) for name in ("group", "place", "data")])
 
 
 class _Elements:
@@ -54,11 +56,15 @@ class _Elements:
         rules = plate.rules
         shear = assumed_shear.quadrature(family) if rules.assumes_shear else rules.shear
         self.rules = rules.bending, shear
-        self.points = [self._at_points(rule) for rule in self.rules]
-        if self._factorizes():
-            lines = [distinct(rule.xi) for rule in self.rules]
-            self.numbers |= {"kind": FACTORIZED, "bending": len(lines[0]), "shear": len(lines[1])}
-            self.arrays = {"rotations": lines[0], "deflection": lines[1]}
+        # Sums over the points are products of sums along xi and eta.
+        if nn == family.shape.nodes == 9 and not rules.assumes_shear:
+            for name, count, rule in zip(
+                ("rotations", "deflection"), ("bending", "shear"), self.rules, strict=True
+            ):
+                self.arrays[name] = distinct(rule.xi)
+                self.arrays[name + "_t"] = rule.weights[np.lexsort((rule.eta, rule.xi))]
+                self.numbers[count] = len(self.arrays[name])
+            self.numbers["kind"] = FACTORIZED
             self.order = np.lexsort((family.shape.xi, family.shape.eta))
         else:
             self._tables(shear)
@@ -101,21 +107,12 @@ class _Elements:
             return None
         return np.concatenate([turned[:n, :n].ravel(), turned[n:, n:].ravel()])
 
-    def _at_points(self, rule: Quadrature) -> Floats:
+    def _at_points(self, rule: Quadrature, family: ElementBlock, members: Indices) -> Floats:
         """Inverse Jacobian, and its determinant times the weight, (ne, npt, 5)."""
-        _, local = local_shape_functions(self.family, rule)
-        inverse, determinant = jacobians(self.family, local, self.plate.rules.transposed_jacobian)
-        jxw = determinant * rule.weights * self.weights[:, None]
+        _, local = local_shape_functions(family, rule)
+        inverse, determinant = jacobians(family, local, self.plate.rules.transposed_jacobian)
+        jxw = determinant * rule.weights * self.weights[members, None]
         return np.concatenate([inverse, jxw[:, :, None]], axis=2)
-
-    def _factorizes(self) -> bool:
-        """Whether sums over the points are products of sums along xi and eta."""
-        grid = self.family.shape.nodes == 9 and self.family.present.all()
-        return bool(
-            grid
-            and not self.plate.rules.assumes_shear
-            and all((values[:, :, 4] > 0.0).all() for values in self.points)
-        )
 
     def _tables(self, shear: Quadrature) -> None:
         """Values and slopes of the shape functions at the points of quadrature."""
@@ -143,20 +140,26 @@ class _Elements:
         }  # fmt: skip
 
     def data(self, members: Indices) -> Floats:
-        """Jacobians at the points of the elements without a matrix, (blocks, numbers, 8)."""
-        rules, parts = self.plate.rules, [values[members] for values in self.points]
+        """Numbers of elements without a matrix, (blocks, numbers, 8); see Block of kernels.c."""
+        family = self.family.take(members)
         if self.numbers["kind"] == FACTORIZED:
-            for part in parts:
-                part[:, :, 4] = np.sqrt(part[:, :, 4])
-                part[:, :, :4] *= 0.5 * part[:, :, 4:]
-            along = [np.lexsort((rule.eta, rule.xi)) for rule in self.rules]
-            parts = [parts[0][:, along[0], :4], parts[1][:, along[1]]]
-        elif rules.assumes_shear:
-            family = self.family.take(members)
-            for axis in (0, 1):
-                points = assumed_shear.tying_points(family.nodes.shape[1], axis)
-                _, local = local_shape_functions(family, points)
-                parts.append(np.einsum("tn,eni->eti", local[:, axis], family.coordinates))
+            places = family.coordinates[:, self.order]
+            # Coefficients (eta, xi) of a biquadratic function of nodal values.
+            c = (places - places[:, 4:5]).reshape(-1, 3, 3, 2)
+            for axis in (1, 2):
+                first, middle, last = np.moveaxis(c, axis, 0)
+                c = np.stack([middle, last - first, first + last - 2.0 * middle], axis=axis)
+            parts = [
+                0.25 * self.weights[members, None],
+                *c.reshape(-1, 9, 2)[:, 1:].transpose(2, 0, 1),
+            ]
+        else:
+            parts = [self._at_points(rule, family, members) for rule in self.rules]
+            if self.plate.rules.assumes_shear:
+                for axis in (0, 1):
+                    points = assumed_shear.tying_points(family.nodes.shape[1], axis)
+                    _, local = local_shape_functions(family, points)
+                    parts.append(np.einsum("tn,eni->eti", local[:, axis], family.coordinates))
         values = np.concatenate([part.reshape(len(members), -1) for part in parts], axis=1)
         return np.ascontiguousarray(values.reshape(-1, LANES, values.shape[1]).swapaxes(1, 2))
 
@@ -175,30 +178,24 @@ def jacobians(family: ElementBlock, local: Floats, transposed: bool) -> tuple[Fl
 
 
 class _Layout(NamedTuple):
-    """Blocks of eight elements; lanes without one repeat another element of their block."""
+    """Blocks of eight elements, and chunks of blocks that are near each other."""
 
     chunks: int
     group: Indices  # (blocks,)
     chunk: Indices  # (blocks,)
-    member: Indices  # (blocks, 8): number of the element in its group
+    element: Indices  # (blocks, 8): number of the element among those of all groups
     filled: Bools  # (blocks, 8): whether the lane has an element of its own
-
-
-class _Nodes(NamedTuple):
-    """Numbers of nodes in the vectors of the kernels."""
-
-    number: Indices  # (numnp,): number; -1 if it has none
-    own: Bools  # (numnp,): whether one chunk alone touches it, and nothing follows it
-    followers: Indices  # nodes that follow others
-    final: Indices  # (own nodes,): last block that touches each, in the order of their numbers
-    total: int  # nodes with a number
+    at: Indices  # (elements,): chunk of each element
+    piece: Indices  # (elements,): number of its strip's piece, ascending with the chunks
+    place: Indices  # (elements,): place in the piece
+    axis: int  # along which the elements of a strip follow one another
 
 
 class CompiledPlate:
     """A plate in the layout of the kernels.
 
-    Vectors are (nodes, entries) over the nodes that move independently; `position` (count,) are the
-    places of the independent dofs in them.
+    Vectors have a part (nd, nodes) for each chunk, and a last one for the nodes that chunks share;
+    `position` (count,) are the places of the independent dofs in them.
     """
 
     def __init__(self, plate: PlateModel, kept: SymmetryReduction) -> None:
@@ -211,107 +208,115 @@ class CompiledPlate:
             for weights in [kept.weights[family.rows].astype(float)]
             for chosen, kind in _grouped(family, weights)
         ]
-        layout, leader = _layout(groups), _leaders(kept)
-        # Nodes of the blocks of each group, (blocks, nodes, 8).
-        touched = [
-            g.family.nodes[:, g.order][layout.member[layout.group == number]].swapaxes(1, 2)
-            for number, g in enumerate(groups)
-        ]
-        nodes = _numbered(layout, touched, leader)
-        entries = 4 if len(columns) == 3 else NDOF
-        self.shape = (nodes.total, entries)
-        self._number_dofs(kept, nodes.number)
-        mass = np.zeros(self.shape)
-        mass.ravel()[self.position] = kept.gather(kept.sign * plate.field(plate.mass, 0.0))
-        kinds, rows, factor = _kinds(mass)
-        self.inverse_mass, self.scale = np.zeros((2, *rows.shape))
-        np.divide(1.0, rows, out=self.inverse_mass, where=rows > 0.0)
-        both = None if factor is None else np.stack([factor, 1.0 / factor], axis=1)
-        self.factor = None if both is None else self._floats(both)
-        self.d, self.s = np.zeros((2, *self.shape))
-        self.u = np.zeros((nodes.total + len(nodes.followers), entries))
-        turned = np.zeros(entries)
-        turned[: len(columns)] = TURNED[columns]
-        cuts = self._chunks(layout, groups, touched, nodes, leader, turned)
+        layout, nd, leader = _layout(groups), len(columns), _leaders(kept)
+        numnp = len(leader)
+        chunk, node = _copies(layout, groups, numnp)
+        # Nodes of one chunk alone that nothing follows are its own; the others are shared.
+        follows = node[leader[node] != node]
+        own = np.bincount(node, minlength=numnp) == 1
+        own[follows] = own[leader[follows]] = False
+        shared = distinct(leader[node[~own[node]]])
+        # Places of each chunk: of its nodes, and one for lanes without an element.
+        here = np.bincount(chunk, minlength=layout.chunks)
+        sizes = np.append(here + 1, len(shared))
+        sizes += -sizes % 4
+        firsts = np.cumsum(sizes) - sizes
+        place = np.arange(len(node)) - (np.cumsum(here) - here)[chunk]
+        chunk_of, place_of = np.full((2, numnp), -1)
+        mine = own[node]
+        chunk_of[node[mine]], place_of[node[mine]] = chunk[mine], place[mine]
+        chunk_of[shared], place_of[shared] = layout.chunks, np.arange(len(shared))
+        nodes, dofs = np.nonzero(moves & (chunk_of >= 0)[:, None])
+        # A dof that follows another has a node without a place.
+        first, size = firsts[chunk_of[nodes]], sizes[chunk_of[nodes]]
+        dof = dofs - columns[0]
+        self.position = np.empty(kept.count, dtype=np.intp)
+        self.position[kept.index[nodes, dofs]] = nd * first + dof * size + place_of[nodes]
+        mass = np.zeros((sizes.sum(), nd))
+        masses = kept.gather(kept.sign * plate.field(plate.mass, 0.0))
+        mass[first + place_of[nodes], dof] = masses[kept.index[nodes, dofs]]
+        parts = [mass[a : a + n] for a, n in zip(firsts.tolist(), sizes.tolist(), strict=True)]
+        ratio, factor = _factors(mass)
+        if factor is None:
+            factor = np.concatenate([part.T.ravel() for part in parts])
+        inverse = np.zeros_like(factor)
+        np.divide(1.0, factor, out=inverse, where=factor > 0.0)
+        self._ratio, self._rate = ratio, np.empty(nd)
+        self.u, self.d, self.s = np.zeros((3, nd * len(mass)))
+        turned = TURNED[columns]
+        cuts = (Chunk * (layout.chunks + 1))()
+        self._held.append(cuts)
+        starts = np.searchsorted(chunk, np.arange(layout.chunks + 2))
+        for c, part in enumerate(parts):
+            inside = slice(starts[c], starts[c + 1])
+            (copies,) = np.nonzero(~mine[inside])
+            copied = node[inside][copies]
+            signs = np.where((leader[copied] != copied)[:, None], turned, 1.0)
+            at_rest = np.flatnonzero((part <= 0.0).T)
+            cuts[c] = Chunk(
+                0, None, int(firsts[c]), len(part), len(copies), len(at_rest),
+                self._ints(place_of[leader[copied]]), self._ints(copies), self._ints(at_rest),
+                self._floats(signs), self._floats(np.zeros(signs.shape)),
+            )  # fmt: skip
+        lanes = self._blocks(cuts, layout, groups, starts, node, place, numnp)
         laminate = plate.laminate
         stiffness = np.block([[laminate.A, -laminate.B], [-laminate.B, laminate.D]])
-        common = nodes.total - len(nodes.final)
         self.structure = Plate(
-            entries, nodes.total, len(nodes.final), layout.chunks, len(nodes.followers),
-            max(cut.nodes + cut.shared for cut in cuts) + 1,
-            cuts, self._ints(nodes.number[leader[nodes.followers]]), self._floats(turned),
-            self._floats(stiffness), self._floats(laminate.shear), self._ints(kinds),
-            self._floats(rows), floats(self.scale),
-            self.factor,
-            floats(self.u), floats(self.d), floats(self.s),
-            self._floats(np.zeros((common, entries))), 0.0,
+            nd, layout.chunks, len(mass), int(sizes.max()), cuts, self._ints(lanes),
+            self._floats(stiffness), self._floats(laminate.shear),
+            int(plate.rules.transposed_jacobian), len(factor) // len(mass),
+            self._floats(factor), self._floats(inverse),
+            floats(self._ratio), None, floats(self.u), floats(self.d), floats(self.s),
+            self._floats(np.zeros(nd * len(parts[-1]))), 0.0,
         )  # fmt: skip
 
-    def _chunks(
+    def _blocks(
         self,
+        cuts: Any,
         layout: _Layout,
         groups: list[_Elements],
-        touched: list[Indices],
-        nodes: _Nodes,
-        leader: Indices,
-        turned: Floats,
-    ) -> Any:
-        """The chunks, with their blocks."""
-        place = nodes.number.copy()  # in the displacement, where the followers come last
-        place[nodes.followers] = nodes.total + np.arange(len(nodes.followers))
-        starts = np.searchsorted(layout.chunk, np.arange(layout.chunks + 1))
-        firsts = np.searchsorted(layout.chunk[nodes.final], np.arange(layout.chunks + 1))
-        local = np.empty(len(leader), dtype=np.intp)
-        targets = [np.empty(part.shape, dtype=np.int32) for part in touched]
-        inside = [layout.chunk[layout.group == number] for number in range(len(groups))]
-        filled = [layout.filled[layout.group == number, None] for number in range(len(groups))]
-        cuts = (Chunk * layout.chunks)()
-        self._held.append(cuts)
-        for c in range(layout.chunks):
-            count = int(firsts[c + 1] - firsts[c])
-            parts = [part[at == c].ravel() for part, at in zip(touched, inside, strict=True)]
-            here = distinct(np.concatenate(parts))
-            mine = nodes.own[leader[here]]
-            shares = here[~mine]
-            local[here[mine]] = nodes.number[here[mine]] - firsts[c]
-            local[shares] = count + np.arange(len(shares))
-            for target, part, at, real in zip(targets, touched, inside, filled, strict=True):
-                rows = at == c
-                target[rows] = np.where(real[rows], local[part[rows]], count + len(shares))
-            signs = np.where((leader[shares] != shares)[:, None], turned, 1.0)
-            cuts[c] = Chunk(
-                starts[c + 1] - starts[c], None, int(firsts[c]), count, len(shares),
-                self._ints(nodes.number[leader[shares]]), self._floats(signs),
-                self._floats(np.zeros((len(shares), len(turned)))),
-            )  # fmt: skip
+        starts: Indices,
+        node: Indices,
+        place: Indices,
+        numnp: int,
+    ) -> Indices:
+        """Give the chunks their blocks; returns places of lanes that don't follow one another.
+
+        `node` and `place` are those of each chunk's nodes, from `starts`.
+        """
+        key = np.repeat(np.arange(layout.chunks), np.diff(starts[:-1])) * numnp + node
+        order = np.argsort(key)
         table = np.zeros(len(layout.group), dtype=BLOCK)
         self._held.append(table)
-        done = np.searchsorted(nodes.final, np.arange(len(table)), side="right")
-        table["done"] = done - firsts[layout.chunk]
+        lanes: list[Indices] = []
+        rows_before, elements_before = 0, 0
         for number, elements in enumerate(groups):
             (rows,) = np.nonzero(layout.group == number)
+            member = layout.element[rows] - elements_before
+            elements_before += len(elements.family.rows)
+            nodes = elements.family.nodes[:, elements.order][member].swapaxes(1, 2)
+            wanted = layout.chunk[rows, None, None] * numnp + nodes
+            at = place[order[np.searchsorted(key, wanted, sorter=order)]]
+            nobody = np.diff(starts)[layout.chunk[rows]]
+            at = np.where(layout.filled[rows, None], at, nobody[:, None, None])
+            apart = (np.diff(at, axis=2) != 1).any(axis=2)
+            lanes.append(at[apart])
+            begins = at[:, :, 0].copy()
+            begins[apart] = -1 - rows_before - np.arange(len(lanes[-1]))
+            rows_before += len(lanes[-1])
             arrays = {name: self._floats(array) for name, array in elements.arrays.items()}
             made = Group(**elements.numbers, **arrays)
             self._held.append(made)
             table["group"][rows] = ctypes.addressof(made)
-            table["source"][rows] = self._addresses(place[touched[number]].astype(np.int32))
-            table["target"][rows] = self._addresses(targets[number])
+            table["place"][rows] = self._addresses(begins.astype(np.int32))
             if "matrix" not in elements.arrays:
-                data = elements.data(layout.member[rows].ravel())
-                table["data"][rows] = self._addresses(data)
+                table["data"][rows] = self._addresses(elements.data(member.ravel()))
+        blocks = np.searchsorted(layout.chunk, np.arange(layout.chunks + 1))
         for c in range(layout.chunks):
-            where = ctypes.c_void_p(table.ctypes.data + int(starts[c]) * BLOCK.itemsize)
+            where = ctypes.c_void_p(table.ctypes.data + int(blocks[c]) * BLOCK.itemsize)
+            cuts[c].blocks = int(blocks[c + 1] - blocks[c])
             cuts[c].block = ctypes.cast(where, type(cuts[c].block))
-        return cuts
-
-    def _number_dofs(self, kept: SymmetryReduction, number: Indices) -> None:
-        """Set the places of the independent dofs in the vectors."""
-        self.position = np.empty(kept.count, dtype=np.intp)
-        nodes, dofs = np.nonzero((kept.sign != 0.0) & (number >= 0)[:, None])
-        # A dof that follows another has a node without a number.
-        self.position[kept.index[nodes, dofs]] = (
-            number[nodes] * self.shape[1] + dofs - self.columns[0]
-        )
+        return np.concatenate(lanes)
 
     def _floats(self, array: Floats) -> Any:
         held = np.ascontiguousarray(array, dtype=np.float64)
@@ -329,6 +334,12 @@ class CompiledPlate:
         self._held.append(held)
         step = held.strides[0]
         return np.uint64(held.ctypes.data) + np.arange(len(held), dtype=np.uint64) * np.uint64(step)
+
+    def set_scale(self, dt2: float | None) -> None:
+        """Make the kernels scale K u by dt2 and the inverse mass; by 1 without dt2."""
+        if dt2 is not None:
+            np.divide(dt2, self._ratio, out=self._rate)
+        self.structure.rate = None if dt2 is None else floats(self._rate)
 
     def internal_force(self, threads: int = 1) -> None:
         """Compute `s`, which is K u times `scale`."""
@@ -351,11 +362,9 @@ class CompiledProduct(StiffnessOperator):
         self._sign = kept.sign
 
     def scale(self, dt2: float | None) -> None:
-        """Make the kernels scale K u by dt2 and the inverse mass; by 1 without dt2."""
+        """See :meth:`CompiledPlate.set_scale`."""
         if self._scaled_for != dt2:
-            inverse = self.plate.inverse_mass
-            self.plate.scale[...] = inverse > 0.0 if dt2 is None else dt2 * inverse
-            self.plate.structure.factor = None if dt2 is None else self.plate.factor
+            self.plate.set_scale(dt2)
             self._scaled_for = dt2
 
     def each(self, padded: Floats, use: Callable[[int, Floats], R]) -> list[R]:
@@ -363,15 +372,15 @@ class CompiledProduct(StiffnessOperator):
         if self._signed:
             np.negative(padded[: self._count], out=padded[self._count : -1])
         plate = self.plate
-        plate.u.ravel()[plate.position] = padded[: self._count]
+        plate.u[plate.position] = padded[: self._count]
         self.scale(None)
         plate.internal_force(self._threads)
-        forces = plate.s.ravel()[plate.position]
+        forces = plate.s[plate.position]
         return [use(number, forces[piece]) for number, piece in enumerate(self._pieces)]
 
     def fields(self, stored: Floats) -> Floats:
-        """Fields (rows, numnp, 5) of stored vectors (rows, nodes, dofs)."""
-        fields = stored.reshape(len(stored), math.prod(stored.shape[1:])).take(self._field, axis=1)
+        """Fields (rows, numnp, 5) of stored vectors (rows, entries)."""
+        fields = stored.take(self._field, axis=1)
         fields *= self._sign
         fields += 0.0  # no negative zeros
         return fields
@@ -387,48 +396,121 @@ class CompiledProduct(StiffnessOperator):
 
 def _layout(groups: list[_Elements]) -> _Layout:
     """Put the elements of groups into blocks, and the blocks into chunks of near elements."""
-    sizes = np.array([len(g.family.rows) for g in groups])
-    group = np.repeat(np.arange(len(groups)), sizes)
-    along = _morton(np.concatenate([g.family.coordinates.mean(axis=1) for g in groups]))
-    chunks = 1 if len(along) < 2 * CHUNK else len(along) // CHUNK
-    chunk = np.empty(len(along), dtype=np.intp)
-    chunk[along] = np.arange(len(along)) * chunks // len(along)
-    # In each chunk the elements of a group follow one another.
-    order = along[np.lexsort((group[along], chunk[along]))]
-    begins = np.flatnonzero(np.diff(group[order], prepend=-1) | np.diff(chunk[order], prepend=-1))
+    families = [g.family for g in groups]
+    counts = np.array([len(family.rows) for family in families])
+    group = np.repeat(np.arange(len(groups)), counts)
+    # Along the axis with more blocks of elements that follow one another.
+    axis = max((0, 1), key=lambda axis: _full_blocks(families, axis))
+    strip, place = _strips(families, axis)
+    _, piece = np.unique(strip * len(group) + place // PIECE, return_inverse=True)
+    place %= PIECE
+    sizes = np.bincount(piece)
+    centres = np.concatenate([family.coordinates.mean(axis=1) for family in families])
+    middle = [np.bincount(piece, centres[:, i]) / sizes for i in (0, 1)]
+    cut = _cut(np.stack(middle, axis=1), sizes)
+    rank = np.empty(len(cut), dtype=np.intp)
+    rank[np.argsort(cut, kind="stable")] = np.arange(len(cut))
+    chunk, late = cut[piece], place >= sizes[piece] // LANES * LANES
+    piece = rank[piece]
+    order = np.lexsort((place, piece, late, group, chunk))
+    run = (chunk * len(groups) + group) * 2 + late
+    begins = np.flatnonzero(np.diff(run[order], prepend=-1))
     counts = np.diff(np.append(begins, len(order)))
     blocks = -(-counts // LANES)
     last = np.cumsum(blocks)
-    run = np.repeat(np.arange(len(counts)), blocks * LANES)
-    offset = np.arange(last[-1] * LANES) - LANES * (last - blocks)[run]
-    element = order[begins[run] + np.minimum(offset, counts[run] - 1)].reshape(-1, LANES)
-    one = element[:, 0]
-    member = element - (np.cumsum(sizes) - sizes)[group[one], None]
+    of_run = np.repeat(np.arange(len(counts)), blocks * LANES)
+    offset = np.arange(last[-1] * LANES) - LANES * (last - blocks)[of_run]
+    element = order[begins[of_run] + np.minimum(offset, counts[of_run] - 1)].reshape(-1, LANES)
+    one, filled = element[:, 0], (offset < counts[of_run]).reshape(-1, LANES)
     return _Layout(
-        chunks, group[one], chunk[one], member, (offset < counts[run]).reshape(-1, LANES)
+        int(cut.max()) + 1, group[one], chunk[one], element, filled, chunk, piece, place, axis
     )
 
 
-def _numbered(layout: _Layout, touched: list[Indices], leader: Indices) -> _Nodes:
-    """Number the nodes of a chunk alone by the last block that touches them, then the others."""
-    numnp = len(leader)
-    lowest, highest = np.full(numnp, layout.chunks), np.full(numnp, -1)
-    final = np.zeros(numnp, dtype=np.intp)
-    for number, nodes in enumerate(touched):
-        (rows,) = np.nonzero(layout.group == number)
-        chunk, at = layout.chunk[rows, None, None], leader[nodes]
-        np.minimum.at(lowest, at, chunk)
-        np.maximum.at(highest, at, chunk)
-        np.maximum.at(final, at, rows[:, None, None])
-    followers = distinct(np.concatenate([nodes[leader[nodes] != nodes] for nodes in touched]))
-    own = (highest >= 0) & (lowest == highest)
-    own[leader[followers]] = False
-    inside, common = np.flatnonzero(own), np.flatnonzero((highest >= 0) & ~own)
-    inside = inside[np.argsort(final[inside], kind="stable")]
-    count = len(inside) + len(common)
-    numbers = np.full(numnp, -1)
-    numbers[np.concatenate([inside, common])] = np.arange(count)
-    return _Nodes(numbers, own, followers, final[inside], count)
+def _full_blocks(families: list[ElementBlock], axis: int) -> int:
+    """Number of blocks of elements that follow one another along an axis."""
+    return int((np.bincount(_strips(families, axis)[0]) // LANES).sum())
+
+
+def _strips(families: list[ElementBlock], axis: int) -> tuple[Indices, Indices]:
+    """Strip of each element, and its place in it: elements of a family that share sides."""
+    follows = np.concatenate([
+        np.where(after < 0, -1, after + before)
+        for family, before in zip(families, _starts(families), strict=True)
+        for after in [_following(family, axis)]
+    ])  # fmt: skip
+    strip, place = np.full(len(follows), -1), np.zeros(len(follows), dtype=np.intp)
+    current = np.setdiff1d(np.arange(len(follows)), follows)
+    number, step = np.arange(len(current)), 0
+    while len(current):
+        strip[current], place[current] = number, step
+        current, step = follows[current], step + 1
+        current, number = current[current >= 0], number[current >= 0]
+    (rings,) = np.nonzero(strip < 0)
+    strip[rings] = len(follows) + np.arange(len(rings))
+    return np.unique(strip, return_index=True, return_inverse=True)[2], place
+
+
+def _starts(families: list[ElementBlock]) -> Indices:
+    """Number of elements before those of each family."""
+    counts = np.array([len(family.rows) for family in families])
+    return np.cumsum(counts) - counts
+
+
+def _following(family: ElementBlock, axis: int) -> Indices:
+    """Element behind the side at the end of an axis of each element, (ne,); -1 if there is none."""
+    shape, found = family.shape, np.full(len(family.rows), -1)
+    along, across = (shape.xi, shape.eta) if axis == 0 else (shape.eta, shape.xi)
+    side = [[np.flatnonzero((along == a) & (across == b)) for b in (-1, 1)] for a in (-1, 1)]
+    if any(len(corner) != 1 for corners in side for corner in corners):
+        return found
+    # Corners have the first numbers of an element's nodes.
+    near, far = (family.nodes[:, np.concatenate(corners)] @ [2**31, 1] for corners in side)
+    _, behind, before = np.intersect1d(near, far, return_indices=True)
+    found[before] = behind
+    return found
+
+
+def _cut(centres: Floats, sizes: Indices) -> Indices:
+    """Chunk of each piece, (pieces,): parts of the plate with at most CHUNK elements."""
+    chunk, count = np.zeros(len(sizes), dtype=np.intp), 0
+    parts = [np.arange(len(sizes))]
+    while parts:
+        part = parts.pop()
+        total = sizes[part].sum()
+        if len(part) == 1 or total <= CHUNK:
+            chunk[part], count = count, count + 1
+            continue
+        at = centres[part, np.argmax(np.ptp(centres[part], axis=0))]
+        order = np.argsort(at, kind="stable")
+        # At the widest gap of those near the middle, between two rows of pieces.
+        share = np.cumsum(sizes[part[order]])[:-1] / total
+        gap = np.where(abs(share - 0.5) < 0.1, np.diff(at[order]), -abs(share - 0.5))
+        half = int(np.argmax(gap)) + 1
+        parts += [part[order[half:]], part[order[:half]]]
+    return chunk
+
+
+def _copies(layout: _Layout, groups: list[_Elements], numnp: int) -> tuple[Indices, Indices]:
+    """Chunks and nodes of all places, (places,) each, in the order of the places.
+
+    Along a strip, nodes with the same place in the elements follow one another.
+    """
+    keys, pairs = [], []
+    for g, before in zip(groups, _starts([g.family for g in groups]), strict=True):
+        family, members = g.family, slice(before, before + len(g.family.rows))
+        levels = [np.unique(at[family.present], return_index=True, return_inverse=True)[2]
+                  for at in (family.shape.xi, family.shape.eta)]  # fmt: skip
+        along, across = levels[layout.axis], levels[1 - layout.axis]
+        last = along == along.max()  # the first of the next element
+        line = layout.piece[members, None] * len(along) + across
+        key = (line * len(along) + np.where(last, 0, along)) * (PIECE + 1)
+        keys.append((key + layout.place[members, None] + last).ravel())
+        pairs.append((layout.at[members, None] * numnp + family.nodes).ravel())
+    order = np.argsort(np.concatenate(keys), kind="stable")
+    found, first = np.unique(np.concatenate(pairs)[order], return_index=True)
+    chunk, node = np.divmod(found[np.argsort(first)], numnp)
+    return chunk, node
 
 
 def _leaders(kept: SymmetryReduction) -> Indices:
@@ -442,28 +524,18 @@ def _leaders(kept: SymmetryReduction) -> Indices:
     return leader
 
 
-def _kinds(mass: Floats) -> tuple[Indices, Floats, Floats | None]:
-    """Rows of a table of masses, one for each node, and the factors of nodes if not 1.
+def _factors(mass: Floats) -> tuple[Floats, Floats | None]:
+    """Ratio of the masses of a node's dofs, (nd,), and factors of nodes; None if it differs.
 
-    The ratio of the masses of a node's dofs is that of the laminate, but for supports.
+    The ratio is that of the laminate, but for supports, where masses are 0.
     """
-    row, table = _distinct(mass)
-    if 2 * len(table) < len(mass):
-        return row, table, None
-    largest = mass.max(axis=1)
-    factor = np.where(largest > 0.0, largest, 1.0)
-    return *_distinct(mass / factor[:, None]), factor
-
-
-def _distinct(rows: Floats) -> tuple[Indices, Floats]:
-    """Index of each row, (n,), in a table of those that differ."""
-    scale = rows.max(axis=0, initial=0.0)
-    relative = rows / np.where(scale > 0.0, scale, 1.0)
-    mixed = relative @ np.sqrt(np.arange(2.0, 2.0 + rows.shape[1]))
-    _, first, index = np.unique(np.round(mixed / EQUAL), return_index=True, return_inverse=True)
-    if np.abs(relative[first[index]] - relative).max() > EQUAL:  # in spite of equal sums
-        return np.arange(len(rows)), rows
-    return index, rows[first]
+    whole = mass[(mass > 0.0).all(axis=1)]
+    if len(whole):
+        ratio = whole[0] / whole[0, 0]
+        factor = (mass / ratio).max(axis=1)
+        if (abs(factor[:, None] * ratio - mass) <= EQUAL * mass)[mass > 0.0].all():
+            return ratio, factor
+    return np.ones(mass.shape[1]), None
 
 
 def _grouped(family: ElementBlock, weights: Floats) -> list[tuple[Indices, int]]:
@@ -476,14 +548,3 @@ def _grouped(family: ElementBlock, weights: Floats) -> list[tuple[Indices, int]]
     found = [(stepped[group == one], ONE) for one in many.tolist()]
     alone = stepped[counts[group] < WORTH_GROUPING]
     return [*found, (alone, POINTS)] if len(alone) else found
-
-
-def _morton(places: Floats) -> Indices:
-    """Order of places, (n, 2), along a curve that fills the plane."""
-    low = places.min(axis=0)
-    cells = ((places - low) * (2**15 / max(np.ptp(places, axis=0).max(), 1e-300))).astype(np.uint64)
-    code = np.zeros(len(places), dtype=np.uint64)
-    for bit in range(16):
-        for axis in (0, 1):
-            code |= (cells[:, axis] >> np.uint64(bit) & np.uint64(1)) << np.uint64(2 * bit + axis)
-    return np.argsort(code, kind="stable")
