@@ -68,7 +68,7 @@ typedef struct {
 typedef struct {
     int64_t blocks;
     const Block *block;
-    int64_t first, nodes; /* nodes before it in the vectors; its own, a multiple of four */
+    int64_t first, nodes; /* nodes before it in the vectors; its own, a multiple of eight */
     int64_t shared, fixed;
     const int32_t *shares, *copies; /* (shared,): places in the last chunk and in this one */
     const int32_t *at_rest;         /* (fixed,): entries without a mass */

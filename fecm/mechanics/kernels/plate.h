@@ -395,23 +395,29 @@ INLINE void NAME(update)(int nd, const Plate *p, const Chunk *c, double *force, 
         memset(force, 0, sizeof(double) * nd * n);
         return;
     }
-    half inertia = sums[0], power = sums[1], strain = sums[2], internal = sums[3];
-    for (int64_t i = 0; i < n; i += 4)
-        for (int64_t dof = 0, at = i; dof < nd; dof++, at += n) {
-            const int64_t of_mass = p->planes == 1 ? i : at;
-            const half f = NAME(load)(force + at), old = NAME(load)(d + at), v = NAME(load)(u + at);
-            const half scaled = f * (p->rate[dof] * NAME(load)(inverse + of_mass));
-            NAME(store)(force + at, zero);
-            inertia += p->ratio[dof] * NAME(load)(mass + of_mass) * old * old;
-            power += old * f, strain += v * f, internal += f * scaled;
-            if (next) {
-                const half now = (keep * old - scaled) * share;
-                NAME(store)(d + at, now);
-                NAME(store)(u + at, v + now);
-            } else
-                NAME(store)(s + at, scaled);
-        }
-    sums[0] = inertia, sums[1] = power, sums[2] = strain, sums[3] = internal;
+    half inertia[2] = {sums[0]}, power[2] = {sums[1]}, strain[2] = {sums[2]}, internal[2] = {sums[3]};
+    for (int dof = 0; dof < nd; dof++) {
+        const double ratio = p->ratio[dof], rate = p->rate[dof];
+        const int64_t before = dof * n, of_mass = p->planes == 1 ? 0 : before;
+        for (int64_t i = 0; i < n; i += LANES)
+#pragma GCC unroll 2
+            for (int side = 0; side < 2; side++) {
+                const int64_t node = i + 4 * side, at = before + node;
+                const half f = NAME(load)(force + at), old = NAME(load)(d + at), v = NAME(load)(u + at);
+                const half scaled = f * (rate * NAME(load)(inverse + of_mass + node));
+                NAME(store)(force + at, zero);
+                inertia[side] += ratio * NAME(load)(mass + of_mass + node) * old * old;
+                power[side] += old * f, strain[side] += v * f, internal[side] += f * scaled;
+                if (next) {
+                    const half now = (keep * old - scaled) * share;
+                    NAME(store)(d + at, now);
+                    NAME(store)(u + at, v + now);
+                } else
+                    NAME(store)(s + at, scaled);
+            }
+    }
+    sums[0] = inertia[0] + inertia[1], sums[1] = power[0] + power[1];
+    sums[2] = strain[0] + strain[1], sums[3] = internal[0] + internal[1];
 }
 
 /* Forces of a chunk, and the update of the nodes that are its own. */

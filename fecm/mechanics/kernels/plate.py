@@ -219,7 +219,7 @@ class CompiledPlate:
         # Places of each chunk: of its nodes, and one for lanes without an element.
         here = np.bincount(chunk, minlength=layout.chunks)
         sizes = np.append(here + 1, len(shared))
-        sizes += -sizes % 4
+        sizes += -sizes % LANES
         firsts = np.cumsum(sizes) - sizes
         place = np.arange(len(node)) - (np.cumsum(here) - here)[chunk]
         chunk_of, place_of = np.full((2, numnp), -1)
@@ -454,7 +454,7 @@ def _strips(families: list[ElementBlock], axis: int) -> tuple[Indices, Indices]:
 def _starts(families: list[ElementBlock]) -> Indices:
     """Number of elements before those of each family."""
     counts = np.array([len(family.rows) for family in families])
-    return np.cumsum(counts) - counts
+    return np.asarray(np.cumsum(counts) - counts)
 
 
 def _following(family: ElementBlock, axis: int) -> Indices:
