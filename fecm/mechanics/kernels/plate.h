@@ -71,42 +71,36 @@ INLINE void NAME(two_matrices)(int nd, int pairs, int centre, const Plate *p, co
     const int w = nd == 5 ? 2 : 0, even = nd * pairs + centre, odd = nd * (pairs + centre) - centre;
     const double *matrix = b->group->matrix;
     lanes x[60] ALIGNED, y[60] ALIGNED, one[5] ALIGNED, other[5] ALIGNED;
-    for (int node = 0; node < pairs; node++) {
-        NAME(take)(nd, p, c, b->place[node], u, one, 1);
-        NAME(take)(nd, p, c, b->place[pairs + node], u, other, 1);
+    for (int node = 0; node < pairs + centre; node++) {
+        const int pair = node < pairs;
+        NAME(take)(nd, p, c, b->place[pair ? node : 2 * pairs], u, one, 1);
+        if (pair) NAME(take)(nd, p, c, b->place[pairs + node], u, other, 1);
         for (int dof = 0, e = node, o = even + node; dof < nd; dof++) {
             lanes *sum = x + (dof == w ? e : o), *rest = x + (dof == w ? o : e);
-            *sum = (lanes){one[dof].a + other[dof].a, one[dof].b + other[dof].b};
-            *rest = (lanes){one[dof].a - other[dof].a, one[dof].b - other[dof].b};
-            e += pairs + (dof == w ? centre : 0), o += pairs + (dof == w ? 0 : centre);
-        }
-    }
-    /* The centre's w is the last of its dof among the even ones, its other dofs are among the odd ones. */
-    if (centre) {
-        NAME(take)(nd, p, c, b->place[2 * pairs], u, one, 1);
-        for (int dof = 0, e = pairs, o = even + pairs; dof < nd; dof++) {
-            x[dof == w ? e : o] = one[dof];
+            *sum = one[dof];
+            if (pair) {
+                *sum = (lanes){one[dof].a + other[dof].a, one[dof].b + other[dof].b};
+                *rest = (lanes){one[dof].a - other[dof].a, one[dof].b - other[dof].b};
+            }
             e += pairs + (dof == w ? centre : 0), o += pairs + (dof == w ? 0 : centre);
         }
     }
     NAME(product)(matrix, even, even, x, y);
     NAME(product)(matrix + even * even, odd, odd, x + even, y + even);
-    for (int node = 0; node < pairs; node++) {
+    for (int node = 0; node < pairs + centre; node++) {
+        const int pair = node < pairs;
         for (int dof = 0, e = node, o = even + node; dof < nd; dof++) {
-            const lanes sum = y[dof == w ? e : o], rest = y[dof == w ? o : e];
-            one[dof] = (lanes){sum.a + rest.a, sum.b + rest.b};
-            other[dof] = (lanes){sum.a - rest.a, sum.b - rest.b};
+            const lanes sum = y[dof == w ? e : o];
+            one[dof] = sum;
+            if (pair) {
+                const lanes rest = y[dof == w ? o : e];
+                one[dof] = (lanes){sum.a + rest.a, sum.b + rest.b};
+                other[dof] = (lanes){sum.a - rest.a, sum.b - rest.b};
+            }
             e += pairs + (dof == w ? centre : 0), o += pairs + (dof == w ? 0 : centre);
         }
-        NAME(give)(nd, p, c, b->place[node], one, 1, f);
-        NAME(give)(nd, p, c, b->place[pairs + node], other, 1, f);
-    }
-    if (centre) {
-        for (int dof = 0, e = pairs, o = even + pairs; dof < nd; dof++) {
-            one[dof] = y[dof == w ? e : o];
-            e += pairs + (dof == w ? centre : 0), o += pairs + (dof == w ? 0 : centre);
-        }
-        NAME(give)(nd, p, c, b->place[2 * pairs], one, 1, f);
+        NAME(give)(nd, p, c, b->place[pair ? node : 2 * pairs], one, 1, f);
+        if (pair) NAME(give)(nd, p, c, b->place[pairs + node], other, 1, f);
     }
 }
 

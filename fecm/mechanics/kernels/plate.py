@@ -191,6 +191,17 @@ class _Layout(NamedTuple):
     axis: int  # along which the elements of a strip follow one another
 
 
+class _Places(NamedTuple):
+    """Places of nodes in the vectors of the kernels."""
+
+    node: Indices  # (places,): node of each, chunk by chunk
+    starts: Indices  # (chunks + 2,): of each chunk in `node`; the last one has its nodes in `home`
+    # (chunks + 1,): nodes of the vectors before each chunk, and its own with room for another one.
+    firsts: Indices
+    sizes: Indices
+    home: Indices  # (2, numnp): chunk and place of nodes that move independently; otherwise -1
+
+
 class CompiledPlate:
     """A plate in the layout of the kernels.
 
@@ -209,56 +220,39 @@ class CompiledPlate:
             for chosen, kind in _grouped(family, weights)
         ]
         layout, nd, leader = _layout(groups), len(columns), _leaders(kept)
-        numnp = len(leader)
-        chunk, node = _copies(layout, groups, numnp)
-        # Nodes of one chunk alone that nothing follows are its own; the others are shared.
-        follows = node[leader[node] != node]
-        own = np.bincount(node, minlength=numnp) == 1
-        own[follows] = own[leader[follows]] = False
-        shared = distinct(leader[node[~own[node]]])
-        # Places of each chunk: of its nodes, and one for lanes without an element.
-        here = np.bincount(chunk, minlength=layout.chunks)
-        sizes = np.append(here + 1, len(shared))
-        sizes += -sizes % LANES
-        firsts = np.cumsum(sizes) - sizes
-        place = np.arange(len(node)) - (np.cumsum(here) - here)[chunk]
-        chunk_of, place_of = np.full((2, numnp), -1)
-        mine = own[node]
-        chunk_of[node[mine]], place_of[node[mine]] = chunk[mine], place[mine]
-        chunk_of[shared], place_of[shared] = layout.chunks, np.arange(len(shared))
-        nodes, dofs = np.nonzero(moves & (chunk_of >= 0)[:, None])
-        # A dof that follows another has a node without a place.
-        first, size = firsts[chunk_of[nodes]], sizes[chunk_of[nodes]]
-        dof = dofs - columns[0]
+        places = _places(layout, groups, leader)
+        firsts, sizes, (chunk, place) = places.firsts, places.sizes, places.home
+        nodes, dofs = np.nonzero(moves & (chunk >= 0)[:, None])
+        # A dof that follows another has a node without a home.
+        first, size, dof = firsts[chunk[nodes]], sizes[chunk[nodes]], dofs - columns[0]
+        index = kept.index[nodes, dofs]
         self.position = np.empty(kept.count, dtype=np.intp)
-        self.position[kept.index[nodes, dofs]] = nd * first + dof * size + place_of[nodes]
+        self.position[index] = nd * first + dof * size + place[nodes]
         mass = np.zeros((sizes.sum(), nd))
         masses = kept.gather(kept.sign * plate.field(plate.mass, 0.0))
-        mass[first + place_of[nodes], dof] = masses[kept.index[nodes, dofs]]
+        mass[first + place[nodes], dof] = masses[index]
         parts = [mass[a : a + n] for a, n in zip(firsts.tolist(), sizes.tolist(), strict=True)]
-        ratio, factor = _factors(mass)
+        self._ratio, factor = _factors(mass)
         if factor is None:
             factor = np.concatenate([part.T.ravel() for part in parts])
         inverse = np.zeros_like(factor)
         np.divide(1.0, factor, out=inverse, where=factor > 0.0)
-        self._ratio, self._rate = ratio, np.empty(nd)
+        self._rate = np.empty(nd)
         self.u, self.d, self.s = np.zeros((3, nd * len(mass)))
-        turned = TURNED[columns]
-        cuts = (Chunk * (layout.chunks + 1))()
+        cuts = (Chunk * len(parts))()
         self._held.append(cuts)
-        starts = np.searchsorted(chunk, np.arange(layout.chunks + 2))
         for c, part in enumerate(parts):
-            inside = slice(starts[c], starts[c + 1])
-            (copies,) = np.nonzero(~mine[inside])
-            copied = node[inside][copies]
-            signs = np.where((leader[copied] != copied)[:, None], turned, 1.0)
+            here = places.node[places.starts[c] : places.starts[c + 1]]
+            copies = np.flatnonzero(chunk[here] != c)
+            copied = leader[here[copies]]
+            signs = np.where((copied != here[copies])[:, None], TURNED[columns], 1.0)
             at_rest = np.flatnonzero((part <= 0.0).T)
             cuts[c] = Chunk(
                 0, None, int(firsts[c]), len(part), len(copies), len(at_rest),
-                self._ints(place_of[leader[copied]]), self._ints(copies), self._ints(at_rest),
+                self._ints(place[copied]), self._ints(copies), self._ints(at_rest),
                 self._floats(signs), self._floats(np.zeros(signs.shape)),
             )  # fmt: skip
-        lanes = self._blocks(cuts, layout, groups, starts, node, place, numnp)
+        lanes = self._blocks(cuts, layout, groups, places)
         laminate = plate.laminate
         stiffness = np.block([[laminate.A, -laminate.B], [-laminate.B, laminate.D]])
         self.structure = Plate(
@@ -271,20 +265,12 @@ class CompiledPlate:
         )  # fmt: skip
 
     def _blocks(
-        self,
-        cuts: Any,
-        layout: _Layout,
-        groups: list[_Elements],
-        starts: Indices,
-        node: Indices,
-        place: Indices,
-        numnp: int,
+        self, cuts: Any, layout: _Layout, groups: list[_Elements], places: _Places
     ) -> Indices:
-        """Give the chunks their blocks; returns places of lanes that don't follow one another.
-
-        `node` and `place` are those of each chunk's nodes, from `starts`.
-        """
-        key = np.repeat(np.arange(layout.chunks), np.diff(starts[:-1])) * numnp + node
+        """Give the chunks their blocks; returns places of lanes that don't follow one another."""
+        numnp, counts = places.home.shape[1], np.diff(places.starts)
+        key = np.repeat(np.arange(len(counts)), counts) * numnp + places.node
+        place = np.arange(len(key)) - np.repeat(places.starts[:-1], counts)
         order = np.argsort(key)
         table = np.zeros(len(layout.group), dtype=BLOCK)
         self._held.append(table)
@@ -297,8 +283,8 @@ class CompiledPlate:
             nodes = elements.family.nodes[:, elements.order][member].swapaxes(1, 2)
             wanted = layout.chunk[rows, None, None] * numnp + nodes
             at = place[order[np.searchsorted(key, wanted, sorter=order)]]
-            nobody = np.diff(starts)[layout.chunk[rows]]
-            at = np.where(layout.filled[rows, None], at, nobody[:, None, None])
+            # Behind the nodes is a place for lanes without an element.
+            at = np.where(layout.filled[rows, None], at, counts[layout.chunk[rows], None, None])
             apart = (np.diff(at, axis=2) != 1).any(axis=2)
             lanes.append(at[apart])
             begins = at[:, :, 0].copy()
@@ -400,9 +386,11 @@ def _layout(groups: list[_Elements]) -> _Layout:
     counts = np.array([len(family.rows) for family in families])
     group = np.repeat(np.arange(len(groups)), counts)
     # Along the axis with more blocks of elements that follow one another.
-    axis = max((0, 1), key=lambda axis: _full_blocks(families, axis))
-    strip, place = _strips(families, axis)
-    _, piece = np.unique(strip * len(group) + place // PIECE, return_inverse=True)
+    strips = [_strips(families, axis) for axis in (0, 1)]
+    axis = max((0, 1), key=lambda axis: int((np.bincount(strips[axis][0]) // LANES).sum()))
+    strip, place = strips[axis]
+    cells = strip * len(group) + place // PIECE
+    piece = np.unique(cells, return_index=True, return_inverse=True)[2]
     place %= PIECE
     sizes = np.bincount(piece)
     centres = np.concatenate([family.coordinates.mean(axis=1) for family in families])
@@ -427,11 +415,6 @@ def _layout(groups: list[_Elements]) -> _Layout:
     )
 
 
-def _full_blocks(families: list[ElementBlock], axis: int) -> int:
-    """Number of blocks of elements that follow one another along an axis."""
-    return int((np.bincount(_strips(families, axis)[0]) // LANES).sum())
-
-
 def _strips(families: list[ElementBlock], axis: int) -> tuple[Indices, Indices]:
     """Strip of each element, and its place in it: elements of a family that share sides."""
     follows = np.concatenate([
@@ -440,7 +423,7 @@ def _strips(families: list[ElementBlock], axis: int) -> tuple[Indices, Indices]:
         for after in [_following(family, axis)]
     ])  # fmt: skip
     strip, place = np.full(len(follows), -1), np.zeros(len(follows), dtype=np.intp)
-    current = np.setdiff1d(np.arange(len(follows)), follows)
+    current = np.flatnonzero(np.bincount(follows + 1, minlength=len(follows) + 1)[1:] == 0)
     number, step = np.arange(len(current)), 0
     while len(current):
         strip[current], place[current] = number, step
@@ -491,12 +474,12 @@ def _cut(centres: Floats, sizes: Indices) -> Indices:
     return chunk
 
 
-def _copies(layout: _Layout, groups: list[_Elements], numnp: int) -> tuple[Indices, Indices]:
-    """Chunks and nodes of all places, (places,) each, in the order of the places.
+def _places(layout: _Layout, groups: list[_Elements], leader: Indices) -> _Places:
+    """Number the nodes of each chunk, and in the last one those that others share.
 
     Along a strip, nodes with the same place in the elements follow one another.
     """
-    keys, pairs = [], []
+    numnp, keys, pairs = len(leader), [], []
     for g, before in zip(groups, _starts([g.family for g in groups]), strict=True):
         family, members = g.family, slice(before, before + len(g.family.rows))
         levels = [np.unique(at[family.present], return_index=True, return_inverse=True)[2]
@@ -510,7 +493,19 @@ def _copies(layout: _Layout, groups: list[_Elements], numnp: int) -> tuple[Indic
     order = np.argsort(np.concatenate(keys), kind="stable")
     found, first = np.unique(np.concatenate(pairs)[order], return_index=True)
     chunk, node = np.divmod(found[np.argsort(first)], numnp)
-    return chunk, node
+    # Nodes of one chunk alone that nothing follows are its own; the others are shared.
+    follows = node[leader[node] != node]
+    own = np.bincount(node, minlength=numnp) == 1
+    own[follows] = own[leader[follows]] = False
+    shared = distinct(leader[node[~own[node]]])
+    starts = np.searchsorted(chunk, np.arange(layout.chunks + 2))
+    sizes = np.append(np.diff(starts)[:-1] + 1, len(shared))
+    sizes += -sizes % LANES
+    home = np.full((2, numnp), -1)
+    mine = own[node]
+    home[:, node[mine]] = chunk[mine], (np.arange(len(node)) - starts[chunk])[mine]
+    home[:, shared] = np.broadcast_arrays(layout.chunks, np.arange(len(shared)))
+    return _Places(node, starts, np.cumsum(sizes) - sizes, sizes, home)
 
 
 def _leaders(kept: SymmetryReduction) -> Indices:
