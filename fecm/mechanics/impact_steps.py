@@ -23,7 +23,8 @@ from fecm.mechanics.contact_law import (
 )
 from fecm.mechanics.impact import ImpactState, ImpactSystem
 from fecm.mechanics.kernels import COLUMNS, LIBRARY, Impact, Longs, floats
-from fecm.mechanics.kernels.plate import CompiledPlate, CompiledProduct, Indices
+from fecm.mechanics.kernels.layout import Indices
+from fecm.mechanics.kernels.plate import CompiledPlate, CompiledProduct
 from fecm.mechanics.plate_motion import (
     DivergenceError,
     DofSums,
@@ -237,7 +238,7 @@ class ImpactSteps:
             (plate.s, state.scaled_internal_force),
         ):  # fmt: skip
             vector[plate.position] = values
-        self._product.scale(state.dt2)
+        plate.set_scale(state.dt2)
         plate.structure.damping = 0.5 * self._system.motion.damping * dt
 
     def _leave(self, state: PlateState) -> None:

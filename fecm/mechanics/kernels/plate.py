@@ -3,34 +3,27 @@
 from __future__ import annotations
 
 import ctypes
-import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._typing import Bools, Floats
+from fecm._typing import Floats
 from fecm.mechanics import assumed_shear
 from fecm.mechanics.element_groups import ElementBlock, congruence, distinct
 from fecm.mechanics.elements.quadrature import Quadrature
 from fecm.mechanics.interpolation import NDOF, local_shape_functions
 from fecm.mechanics.kernels import LIBRARY, Chunk, Group, Integers, Plate, floats
+from fecm.mechanics.kernels.layout import LANES, Indices, Layout, Places, layout_of, places_of
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.stiffness_operator import R, StiffnessOperator, pieces
 from fecm.mechanics.symmetry import TURNED, SymmetryReduction, opposite_nodes
 
-Indices = NDArray[np.intp]
-
-LANES = 8
 # The kinds of kernels.c.
 ONE, TWO, FACTORIZED, POINTS = range(4)
 # With fewer congruent elements a shared matrix fills too few lanes.
 WORTH_GROUPING = 8
-# Largest number of elements of a chunk: the forces on their nodes stay in the cache.
-CHUNK = 1024
-# Elements of a strip that stay together.
-PIECE = 4 * LANES
 # Relative difference below which ratios of masses count as equal.
 EQUAL = 1e-12
 # Largest coupling of even and odd motions of an element, relative to its largest stiffness.
@@ -177,31 +170,6 @@ def jacobians(family: ElementBlock, local: Floats, transposed: bool) -> tuple[Fl
     return np.stack(rows, axis=2) / determinant[:, :, None], determinant
 
 
-class _Layout(NamedTuple):
-    """Blocks of eight elements, and chunks of blocks that are near each other."""
-
-    chunks: int
-    group: Indices  # (blocks,)
-    chunk: Indices  # (blocks,)
-    element: Indices  # (blocks, 8): number of the element among those of all groups
-    filled: Bools  # (blocks, 8): whether the lane has an element of its own
-    at: Indices  # (elements,): chunk of each element
-    piece: Indices  # (elements,): number of its strip's piece, ascending with the chunks
-    place: Indices  # (elements,): place in the piece
-    axis: int  # along which the elements of a strip follow one another
-
-
-class _Places(NamedTuple):
-    """Places of nodes in the vectors of the kernels."""
-
-    node: Indices  # (places,): node of each, chunk by chunk
-    starts: Indices  # (chunks + 2,): of each chunk in `node`; the last one has its nodes in `home`
-    # (chunks + 1,): nodes of the vectors before each chunk, and its own with room for another one.
-    firsts: Indices
-    sizes: Indices
-    home: Indices  # (2, numnp): chunk and place of nodes that move independently; otherwise -1
-
-
 class CompiledPlate:
     """A plate in the layout of the kernels.
 
@@ -219,8 +187,9 @@ class CompiledPlate:
             for weights in [kept.weights[family.rows].astype(float)]
             for chosen, kind in _grouped(family, weights)
         ]
-        layout, nd, leader = _layout(groups), len(columns), _leaders(kept)
-        places = _places(layout, groups, leader)
+        families, nd, leader = [g.family for g in groups], len(columns), _leaders(kept)
+        layout = layout_of(families)
+        places = places_of(layout, families, leader)
         firsts, sizes, (chunk, place) = places.firsts, places.sizes, places.home
         nodes, dofs = np.nonzero(moves & (chunk >= 0)[:, None])
         # A dof that follows another has a node without a home.
@@ -265,7 +234,7 @@ class CompiledPlate:
         )  # fmt: skip
 
     def _blocks(
-        self, cuts: Any, layout: _Layout, groups: list[_Elements], places: _Places
+        self, cuts: Any, layout: Layout, groups: list[_Elements], places: Places
     ) -> Indices:
         """Give the chunks their blocks; returns places of lanes that don't follow one another."""
         numnp, counts = places.home.shape[1], np.diff(places.starts)
@@ -341,17 +310,9 @@ class CompiledProduct(StiffnessOperator):
         self._count, self._signed, self._threads = kept.count, kept.signed, threads
         self.size = (2 if kept.signed else 1) * kept.count + 1
         self._pieces = pieces(kept.count)
-        # Factors of the internal force: 1, or those of a time step and its square.
-        self._scaled_for: float | None = math.nan
         rests = kept.sign == 0.0
         self._field = self.plate.position[np.where(rests, 0, kept.index)]
         self._sign = kept.sign
-
-    def scale(self, dt2: float | None) -> None:
-        """See :meth:`CompiledPlate.set_scale`."""
-        if self._scaled_for != dt2:
-            self.plate.set_scale(dt2)
-            self._scaled_for = dt2
 
     def each(self, padded: Floats, use: Callable[[int, Floats], R]) -> list[R]:
         """Compute K u and apply a function to each piece."""
@@ -359,7 +320,7 @@ class CompiledProduct(StiffnessOperator):
             np.negative(padded[: self._count], out=padded[self._count : -1])
         plate = self.plate
         plate.u[plate.position] = padded[: self._count]
-        self.scale(None)
+        plate.set_scale(None)
         plate.internal_force(self._threads)
         forces = plate.s[plate.position]
         return [use(number, forces[piece]) for number, piece in enumerate(self._pieces)]
@@ -378,134 +339,6 @@ class CompiledProduct(StiffnessOperator):
         dofs = np.where(rest, 0, np.where(turned, indices - self._count, indices))
         signed = np.where(rest, 0.0, np.where(turned, -weights, weights))
         return self.plate.position[dofs].astype(np.int64), np.ascontiguousarray(signed)
-
-
-def _layout(groups: list[_Elements]) -> _Layout:
-    """Put the elements of groups into blocks, and the blocks into chunks of near elements."""
-    families = [g.family for g in groups]
-    counts = np.array([len(family.rows) for family in families])
-    group = np.repeat(np.arange(len(groups)), counts)
-    # Along the axis with more blocks of elements that follow one another.
-    strips = [_strips(families, axis) for axis in (0, 1)]
-    axis = max((0, 1), key=lambda axis: int((np.bincount(strips[axis][0]) // LANES).sum()))
-    strip, place = strips[axis]
-    cells = strip * len(group) + place // PIECE
-    piece = np.unique(cells, return_index=True, return_inverse=True)[2]
-    place %= PIECE
-    sizes = np.bincount(piece)
-    centres = np.concatenate([family.coordinates.mean(axis=1) for family in families])
-    middle = [np.bincount(piece, centres[:, i]) / sizes for i in (0, 1)]
-    cut = _cut(np.stack(middle, axis=1), sizes)
-    rank = np.empty(len(cut), dtype=np.intp)
-    rank[np.argsort(cut, kind="stable")] = np.arange(len(cut))
-    chunk, late = cut[piece], place >= sizes[piece] // LANES * LANES
-    piece = rank[piece]
-    order = np.lexsort((place, piece, late, group, chunk))
-    run = (chunk * len(groups) + group) * 2 + late
-    begins = np.flatnonzero(np.diff(run[order], prepend=-1))
-    counts = np.diff(np.append(begins, len(order)))
-    blocks = -(-counts // LANES)
-    last = np.cumsum(blocks)
-    of_run = np.repeat(np.arange(len(counts)), blocks * LANES)
-    offset = np.arange(last[-1] * LANES) - LANES * (last - blocks)[of_run]
-    element = order[begins[of_run] + np.minimum(offset, counts[of_run] - 1)].reshape(-1, LANES)
-    one, filled = element[:, 0], (offset < counts[of_run]).reshape(-1, LANES)
-    return _Layout(
-        int(cut.max()) + 1, group[one], chunk[one], element, filled, chunk, piece, place, axis
-    )
-
-
-def _strips(families: list[ElementBlock], axis: int) -> tuple[Indices, Indices]:
-    """Strip of each element, and its place in it: elements of a family that share sides."""
-    follows = np.concatenate([
-        np.where(after < 0, -1, after + before)
-        for family, before in zip(families, _starts(families), strict=True)
-        for after in [_following(family, axis)]
-    ])  # fmt: skip
-    strip, place = np.full(len(follows), -1), np.zeros(len(follows), dtype=np.intp)
-    current = np.flatnonzero(np.bincount(follows + 1, minlength=len(follows) + 1)[1:] == 0)
-    number, step = np.arange(len(current)), 0
-    while len(current):
-        strip[current], place[current] = number, step
-        current, step = follows[current], step + 1
-        current, number = current[current >= 0], number[current >= 0]
-    (rings,) = np.nonzero(strip < 0)
-    strip[rings] = len(follows) + np.arange(len(rings))
-    return np.unique(strip, return_index=True, return_inverse=True)[2], place
-
-
-def _starts(families: list[ElementBlock]) -> Indices:
-    """Number of elements before those of each family."""
-    counts = np.array([len(family.rows) for family in families])
-    return np.asarray(np.cumsum(counts) - counts)
-
-
-def _following(family: ElementBlock, axis: int) -> Indices:
-    """Element behind the side at the end of an axis of each element, (ne,); -1 if there is none."""
-    shape, found = family.shape, np.full(len(family.rows), -1)
-    along, across = (shape.xi, shape.eta) if axis == 0 else (shape.eta, shape.xi)
-    side = [[np.flatnonzero((along == a) & (across == b)) for b in (-1, 1)] for a in (-1, 1)]
-    if any(len(corner) != 1 for corners in side for corner in corners):
-        return found
-    # Corners have the first numbers of an element's nodes.
-    near, far = (family.nodes[:, np.concatenate(corners)] @ [2**31, 1] for corners in side)
-    _, behind, before = np.intersect1d(near, far, return_indices=True)
-    found[before] = behind
-    return found
-
-
-def _cut(centres: Floats, sizes: Indices) -> Indices:
-    """Chunk of each piece, (pieces,): parts of the plate with at most CHUNK elements."""
-    chunk, count = np.zeros(len(sizes), dtype=np.intp), 0
-    parts = [np.arange(len(sizes))]
-    while parts:
-        part = parts.pop()
-        total = sizes[part].sum()
-        if len(part) == 1 or total <= CHUNK:
-            chunk[part], count = count, count + 1
-            continue
-        at = centres[part, np.argmax(np.ptp(centres[part], axis=0))]
-        order = np.argsort(at, kind="stable")
-        # At the widest gap of those near the middle, between two rows of pieces.
-        share = np.cumsum(sizes[part[order]])[:-1] / total
-        gap = np.where(abs(share - 0.5) < 0.1, np.diff(at[order]), -abs(share - 0.5))
-        half = int(np.argmax(gap)) + 1
-        parts += [part[order[half:]], part[order[:half]]]
-    return chunk
-
-
-def _places(layout: _Layout, groups: list[_Elements], leader: Indices) -> _Places:
-    """Number the nodes of each chunk, and in the last one those that others share.
-
-    Along a strip, nodes with the same place in the elements follow one another.
-    """
-    numnp, keys, pairs = len(leader), [], []
-    for g, before in zip(groups, _starts([g.family for g in groups]), strict=True):
-        family, members = g.family, slice(before, before + len(g.family.rows))
-        levels = [np.unique(at[family.present], return_index=True, return_inverse=True)[2]
-                  for at in (family.shape.xi, family.shape.eta)]  # fmt: skip
-        along, across = levels[layout.axis], levels[1 - layout.axis]
-        last = along == along.max()  # the first of the next element
-        line = layout.piece[members, None] * len(along) + across
-        key = (line * len(along) + np.where(last, 0, along)) * (PIECE + 1)
-        keys.append((key + layout.place[members, None] + last).ravel())
-        pairs.append((layout.at[members, None] * numnp + family.nodes).ravel())
-    order = np.argsort(np.concatenate(keys), kind="stable")
-    found, first = np.unique(np.concatenate(pairs)[order], return_index=True)
-    chunk, node = np.divmod(found[np.argsort(first)], numnp)
-    # Nodes of one chunk alone that nothing follows are its own; the others are shared.
-    follows = node[leader[node] != node]
-    own = np.bincount(node, minlength=numnp) == 1
-    own[follows] = own[leader[follows]] = False
-    shared = distinct(leader[node[~own[node]]])
-    starts = np.searchsorted(chunk, np.arange(layout.chunks + 2))
-    sizes = np.append(np.diff(starts)[:-1] + 1, len(shared))
-    sizes += -sizes % LANES
-    home = np.full((2, numnp), -1)
-    mine = own[node]
-    home[:, node[mine]] = chunk[mine], (np.arange(len(node)) - starts[chunk])[mine]
-    home[:, shared] = np.broadcast_arrays(layout.chunks, np.arange(len(shared)))
-    return _Places(node, starts, np.cumsum(sizes) - sizes, sizes, home)
 
 
 def _leaders(kept: SymmetryReduction) -> Indices:
