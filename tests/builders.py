@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.deck.records import Ply
-from fecm.mechanics.elements.quadrature import gauss
+from fecm.mechanics.elements import gauss
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.plate import IntegrationRules

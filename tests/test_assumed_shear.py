@@ -10,9 +10,9 @@ from scipy import sparse
 from scipy.sparse.linalg import eigsh, spsolve
 
 from fecm.mechanics.assumed_shear import strain_matrix
-from fecm.mechanics.element_groups import element_blocks
-from fecm.mechanics.elements.quadrature import gauss, nodal
+from fecm.mechanics.elements import gauss, nodal
 from fecm.mechanics.interpolation import interpolate
+from fecm.mechanics.mesh import element_blocks
 from fecm.mechanics.plate import IntegrationRules, PlateModel
 from fecm.mechanics.strains import StrainField
 from tests.builders import (

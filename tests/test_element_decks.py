@@ -7,7 +7,7 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.mechanics import element_groups
+from fecm.mechanics.mesh import element_blocks
 from fecm.results.result import Result
 from tests.builders import (
     Floats,
@@ -142,7 +142,7 @@ def test_a_4_node_element_without_its_fourth_node_is_a_triangle() -> None:
     coordinates, elements = square(2, 2, 4)
     elements[3, 3] = 0
     problem = load_deck(deck((coordinates, elements), (2, 2, 2))).problems[0]
-    found = element_groups.element_blocks(problem.mesh.elements, problem.mesh.coordinates)
+    found = element_blocks(problem.mesh.elements, problem.mesh.coordinates)
     names = {tuple(family.rows.tolist()): family.shape.name for family in found}
     assert names == {(0, 1, 2): "quadrilateral", (3,): "triangle"}
 

@@ -9,8 +9,9 @@ import pytest
 from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
-from fecm.mechanics import element_groups, element_matrices, interpolation
-from fecm.mechanics.elements.quadrature import gauss
+from fecm.mechanics import element_matrices, interpolation
+from fecm.mechanics.elements import gauss
+from fecm.mechanics.mesh import element_blocks
 from fecm.mechanics.plate import PlateModel
 from tests.builders import (
     GENERAL_LAYERS,
@@ -83,7 +84,7 @@ def test_mass_is_shared_as_the_squares_of_the_shape_functions(
     kind: int, order: int, shares: list[float]
 ) -> None:
     coordinates, elements = one_element(SQUARE, kind)
-    (family,) = element_groups.element_blocks(elements, coordinates)
+    (family,) = element_blocks(elements, coordinates)
     lumped = element_matrices.lumped_mass(family, isotropic_plate(0.2), gauss(order))[0]
     area = area_of(SQUARE[:3] if kind == 3 else SQUARE)
     inertia = area * np.array([0.2, 0.2, 0.2, 0.2**3 / 12.0, 0.2**3 / 12.0])
@@ -126,7 +127,7 @@ def test_consistent_mass_of_small_elements_is_that_of_textbooks(
     kind: int, corners: Corners, table: list[list[int]], divisor: float
 ) -> None:
     coordinates, elements = one_element(corners, kind)
-    (family,) = element_groups.element_blocks(elements, coordinates)
+    (family,) = element_blocks(elements, coordinates)
     M = element_matrices.consistent_mass(family, isotropic_plate(0.2), gauss(2))
     assert M.shape == (1, 5 * kind, 5 * kind)
     shared = area_of(corners) * np.array(table) / divisor
@@ -209,7 +210,7 @@ def test_bending_converges_on_ever_finer_distorted_meshes_of_triangles_and_cubic
     errors = []
     for n in (4, 8, 16):
         coordinates, elements = mesh = distorted_square(n, n, kind)
-        (family,) = element_groups.element_blocks(elements, coordinates)
+        (family,) = element_blocks(elements, coordinates)
         at = interpolation.interpolate(family, gauss(3))
         loads = summed(family.nodes, at.jxw @ at.N, len(coordinates))
         errors.append(1.0 - deflections(mesh, loads, 0.1, orders)[0] / exact)

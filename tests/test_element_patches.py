@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fecm.mechanics import element_groups, interpolation
-from fecm.mechanics.elements.quadrature import Quadrature, gauss, nodal
+from fecm.mechanics import interpolation
+from fecm.mechanics.elements import Quadrature, gauss, nodal
+from fecm.mechanics.mesh import element_blocks
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.stiffness_product import stiffness_operator
 from fecm.mechanics.strains import StrainField
@@ -125,7 +126,7 @@ def test_a_transition_element_in_a_patch_reproduces_constant_membrane_strain(
 
 def test_triangles_quadrilaterals_and_cubic_elements_in_one_mesh_pass_the_patch_test() -> None:
     coordinates, elements = mesh = three_families()
-    names = [family.shape.name for family in element_groups.element_blocks(elements, coordinates)]
+    names = [family.shape.name for family in element_blocks(elements, coordinates)]
     assert set(names) == {"triangle", "quadrilateral", "cubic quadrilateral"}
     exact_on(mesh, stretched(coordinates, STRAIN))
 
@@ -159,7 +160,7 @@ def test_strains_of_linear_curvature_are_exact_in_12_node_parallelograms(
     field[:, 3] = 3 * a * x**2 + 2 * b * x * y + c * y**2
     field[:, 4] = b * x**2 + 2 * c * x * y + 3 * d * y**2
     strains = StrainField(elements, coordinates, rule).evaluate(field)
-    (family,) = element_groups.element_blocks(elements, coordinates)
+    (family,) = element_blocks(elements, coordinates)
     values, _ = interpolation.local_shape_functions(family, rule)
     px, py = np.einsum("pn,enk->kep", values, family.coordinates)
     expected = [-6 * a * px - 2 * b * py, -2 * c * px - 6 * d * py, -4 * (b * px + c * py)]

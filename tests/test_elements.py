@@ -8,10 +8,9 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fecm.mechanics import element_groups, interpolation
-from fecm.mechanics.element_groups import SHAPES, shape_of
-from fecm.mechanics.elements.quadrature import Quadrature
-from fecm.mechanics.elements.shape import CUBIC, QUADRILATERAL, TRIANGLE, ElementShape
+from fecm.mechanics import interpolation
+from fecm.mechanics.elements import CUBIC, QUADRILATERAL, TRIANGLE, ElementShape, Quadrature
+from fecm.mechanics.mesh import SHAPES, ElementBlock, element_blocks, longest_sides, shape_of
 from tests.builders import Bools, Floats
 
 BY_NAME = pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.name)
@@ -289,13 +288,13 @@ def test_there_is_no_family_with_a_thirteenth_node() -> None:
         shape_of(np.ones(13, dtype=bool))
 
 
-def sorted_elements(*rows: list[int]) -> list[element_groups.ElementBlock]:
+def sorted_elements(*rows: list[int]) -> list[ElementBlock]:
     """Families of elements with twelve columns over nodes on a line of no meaning."""
     elements = np.zeros((len(rows), 12), dtype=np.int32)
     for row, nodes in zip(elements, rows, strict=True):
         row[: len(nodes)] = nodes
     coordinates = np.random.default_rng(0).uniform(size=(30, 2))
-    return element_groups.element_blocks(elements, coordinates)
+    return element_blocks(elements, coordinates)
 
 
 def test_elements_are_sorted_by_their_nodes_and_keep_their_rows() -> None:
@@ -334,7 +333,7 @@ def test_an_element_without_one_of_its_corners_is_named(nodes: list[int], messag
 def test_the_longest_side_of_a_triangle_is_one_of_its_three() -> None:
     coordinates = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0], [0.0, 4.0], [100.0, 0.0]])
     elements = np.array([[1, 2, 3, 0], [1, 2, 3, 4]], dtype=np.int32)
-    assert element_groups.longest_sides(elements, coordinates).tolist() == [5.0, 4.0]
+    assert longest_sides(elements, coordinates).tolist() == [5.0, 4.0]
 
 
 def test_shape_functions_of_a_family_come_for_the_nodes_it_has() -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from fecm.mechanics import element_groups, element_matrices, plate
-from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
-from fecm.mechanics.elements.shape import QUADRILATERAL
+from fecm.mechanics import element_matrices, plate
+from fecm.mechanics.elements import HIGHEST_ORDER, QUADRILATERAL, Quadrature, gauss, nodal
+from fecm.mechanics.mesh import element_blocks
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.stiffness_product import stiffness_operator
 from fecm.mechanics.strains import StrainField
@@ -214,7 +214,7 @@ def test_turning_a_plate_with_its_fibres_changes_no_eigenvalue(turn: float) -> N
     turned = coordinates @ np.array([[c, s], [-s, c]])
 
     def eigenvalues(at: Floats, fibres: float) -> Floats:
-        (family,) = element_groups.element_blocks(elements, at)
+        (family,) = element_blocks(elements, at)
         K = element_matrices.stiffness(family, general_plate(fibres), gauss(3), gauss(3))[0]
         return np.asarray(np.linalg.eigvalsh(K))
 
@@ -253,7 +253,7 @@ def test_the_assembled_stiffness_is_the_sum_of_the_elements() -> None:
     coordinates[elements[4, 0] - 1] += 1e-6
     expected = np.zeros((len(coordinates), 5, len(coordinates), 5))
     for element in elements:
-        (family,) = element_groups.element_blocks(element[None], coordinates)
+        (family,) = element_blocks(element[None], coordinates)
         K = element_matrices.stiffness(family, general_plate(), gauss(3), gauss(3)).reshape(
             9, 5, 9, 5
         )
@@ -284,7 +284,7 @@ def test_every_way_to_multiply_by_the_stiffness_gives_the_same_forces(
 def stiffness_of(corners: Corners, *, transposed_jacobian: bool) -> Floats:
     """Stiffness of one element of the general laminate."""
     coordinates, elements = one_element(corners)
-    (family,) = element_groups.element_blocks(elements, coordinates)
+    (family,) = element_blocks(elements, coordinates)
     return element_matrices.stiffness(
         family, general_plate(), gauss(3), gauss(3), transposed_jacobian=transposed_jacobian
     )
@@ -321,7 +321,7 @@ def test_the_transposed_jacobian_fails_the_patch_tests() -> None:
 
 def test_a_family_holds_the_elements_that_have_the_same_nodes() -> None:
     coordinates, elements = mixed(3, 4, 9)
-    found = element_groups.element_blocks(elements, coordinates)
+    found = element_blocks(elements, coordinates)
     assert sorted(row for family in found for row in family.rows) == list(range(12))
     for family in found:
         assert len(family.present) == QUADRILATERAL.nodes

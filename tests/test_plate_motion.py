@@ -8,8 +8,9 @@ from scipy import sparse
 from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
 
-from fecm.mechanics import element_groups, element_matrices, interpolation
-from fecm.mechanics.elements.quadrature import gauss
+from fecm.mechanics import element_matrices, interpolation
+from fecm.mechanics.elements import gauss
+from fecm.mechanics.mesh import element_blocks
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.time_step import critical_time_step
 from tests.builders import (
@@ -80,7 +81,7 @@ def test_a_squares_mass_is_shared_as_the_squares_of_its_shape_functions(
     kind: int, order: int, shares: list[float]
 ) -> None:
     coordinates, elements = one_element(SQUARE, kind)
-    (family,) = element_groups.element_blocks(elements, coordinates)
+    (family,) = element_blocks(elements, coordinates)
     lumped = element_matrices.lumped_mass(family, isotropic_plate(0.2), gauss(order))[0]
     inertia = np.array([0.2, 0.2, 0.2, 0.2**3 / 12.0, 0.2**3 / 12.0])
     np.testing.assert_allclose(lumped, np.outer(shares, inertia), rtol=1e-13)
@@ -247,7 +248,7 @@ def test_bending_converges_on_ever_finer_distorted_meshes(
     errors = []
     for n in (4, 8, 16):
         coordinates, elements = mesh = distorted_square(n, n, kind)
-        (family,) = element_groups.element_blocks(elements, coordinates)
+        (family,) = element_blocks(elements, coordinates)
         at = interpolation.interpolate(family, gauss(3))
         loads = summed(family.nodes, at.jxw @ at.N, len(coordinates))
         errors.append(abs(deflections(mesh, loads, 0.1, orders)[0] / expected - 1.0))

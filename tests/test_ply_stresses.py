@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from fecm.deck.records import Ply
-from fecm.mechanics.element_groups import element_blocks
-from fecm.mechanics.elements.quadrature import gauss
+from fecm.mechanics.elements import gauss
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.locate import locate
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.mesh import Mesh, element_blocks
 from fecm.mechanics.ply_stresses import (
     PlyStresses,
     equilibrium_shear_stiffness,

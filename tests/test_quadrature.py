@@ -8,8 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
-from fecm.mechanics.elements.shape import QUADRILATERAL
+from fecm.mechanics.elements import HIGHEST_ORDER, QUADRILATERAL, Quadrature, gauss, nodal
 from tests.builders import Bools, Floats
 from tests.patches import PATTERNS
 

@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from fecm._typing import Floats
-from fecm.mechanics.element_groups import ElementBlock
-from fecm.mechanics.elements.quadrature import Quadrature, gauss
+from fecm.mechanics.elements import Quadrature, gauss
 from fecm.mechanics.interpolation import NDOF, inverse_jacobian, local_shape_functions
+from fecm.mechanics.mesh import ElementBlock
 
 # By number of nodes: tying points of e_xi along xi and along eta, and the order of the quadrature.
 _G, _H = 3.0**-0.5, 0.6**0.5

@@ -15,10 +15,9 @@ from dataclasses import field, fields, replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecm._frozen import frozen
-from fecm._typing import Floats
+from fecm._typing import Floats, Indices
 
 # float or Floats, and bool or Bools: one case, or an array of cases.
 Number = Any
@@ -71,7 +70,7 @@ class ContactParameters(ABC):
     def permanent(self, peak: Number) -> Number:
         """Permanent indentation after a peak (length)."""
 
-    def of_cases(self, cases: NDArray[np.intp]) -> ContactParameters:
+    def of_cases(self, cases: Indices) -> ContactParameters:
         """Select some cases."""
         selected: ContactParameters = _map(lambda values: values[0][cases], [self])
         return selected
@@ -270,7 +269,7 @@ class HystereticLaw(MeasuredLaw):
 
     def _turning(
         self, m: LoadingHistory, last: ContactPoint, a: Floats
-    ) -> tuple[NDArray[np.intp], LoadingHistory | None]:
+    ) -> tuple[Indices, LoadingHistory | None]:
         """Cases that may leave their branch, and their loading histories; None without any."""
         falls, rises = a < last.indentation, a > last.indentation
         virgin, unloading = m.branch == VIRGIN, m.branch == UNLOADING

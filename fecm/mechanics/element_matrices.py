@@ -12,8 +12,7 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.mechanics import assumed_shear
-from fecm.mechanics.element_groups import ElementBlock
-from fecm.mechanics.elements.quadrature import Quadrature
+from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import (
     NDOF,
     Interpolation,
@@ -22,6 +21,7 @@ from fecm.mechanics.interpolation import (
     local_shape_functions,
 )
 from fecm.mechanics.laminate import Laminate
+from fecm.mechanics.mesh import ElementBlock
 
 
 def _membrane_and_bending(at: Interpolation) -> Floats:

@@ -17,7 +17,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._typing import Floats
+from fecm._typing import Floats, Indices
 
 MODES = (
     "none", "fibre tension", "fibre compression", "matrix tension", "matrix compression", "shear",
@@ -48,7 +48,7 @@ class Strengths(Protocol):
     p_minus: float
 
 
-def modes_of(candidates: Candidates, where: NDArray[np.intp] | None = None) -> Codes:
+def modes_of(candidates: Candidates, where: Indices | None = None) -> Codes:
     """Mode of the largest candidate, the first one of equals, at all or some flat indices."""
     values = np.stack([v if where is None else v.ravel()[where] for _, v in candidates])
     codes = np.array([_CODE[mode] for mode, _ in candidates], np.int8)

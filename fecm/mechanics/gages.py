@@ -17,15 +17,12 @@ from numpy.typing import NDArray
 
 from fecm._errors import FecmError
 from fecm._frozen import frozen
-from fecm._typing import Floats
-from fecm.mechanics import element_groups, interpolation
-from fecm.mechanics.element_groups import ElementBlock
-from fecm.mechanics.elements.quadrature import Quadrature
+from fecm._typing import Floats, Indices
+from fecm.mechanics import interpolation
+from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import NDOF
 from fecm.mechanics.locate import locate
-from fecm.mechanics.mesh import Mesh
-
-Indices = NDArray[np.intp]
+from fecm.mechanics.mesh import ElementBlock, Mesh, element_blocks
 
 
 class OutsideError(FecmError, ValueError):
@@ -59,7 +56,7 @@ def gages(
 
     Raises OutsideError if a gage is not on the plate.
     """
-    families = element_groups.element_blocks(mesh.elements, mesh.coordinates)
+    families = element_blocks(mesh.elements, mesh.coordinates)
     rows = [_functional(families, record, transposed_jacobian) for record in records]
     most = max(len(indices) for indices, _ in rows)
     dof_indices = np.zeros((len(rows), most), dtype=np.intp)

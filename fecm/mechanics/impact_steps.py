@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fecm._typing import Floats
+from fecm._typing import Floats, Indices
 from fecm.mechanics.contact_law import (
     ContactPoint,
     HystereticLaw,
@@ -23,7 +23,6 @@ from fecm.mechanics.contact_law import (
 )
 from fecm.mechanics.impact import ImpactState, ImpactSystem
 from fecm.mechanics.kernels import COLUMNS, LIBRARY, Impact, Longs, floats
-from fecm.mechanics.kernels.layout import Indices
 from fecm.mechanics.kernels.plate import CompiledPlate, CompiledProduct
 from fecm.mechanics.plate_motion import (
     DivergenceError,

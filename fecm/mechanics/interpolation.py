@@ -11,9 +11,8 @@ import numpy as np
 
 from fecm._frozen import frozen
 from fecm._typing import Floats
-from fecm.mechanics.element_groups import ElementBlock
-from fecm.mechanics.elements.quadrature import Quadrature
-from fecm.mechanics.elements.shape import ElementShape
+from fecm.mechanics.elements import ElementShape, Quadrature
+from fecm.mechanics.mesh import ElementBlock
 
 # Degrees of freedom of a node: u, v, w, theta_x, theta_y.
 NDOF = 5

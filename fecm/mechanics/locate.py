@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fecm._typing import Bools, Floats
-from fecm.mechanics.element_groups import ElementBlock
-from fecm.mechanics.elements.quadrature import Quadrature
+from fecm._typing import Bools, Floats, Indices
+from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import local_shape_functions
-
-Indices = NDArray[np.intp]
+from fecm.mechanics.mesh import ElementBlock
 
 # Tolerance, in local coordinates, for points on the edge of an element.
 MARGIN = 1.0e-6

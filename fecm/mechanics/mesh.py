@@ -1,4 +1,4 @@
-"""Mesh and equation numbers.
+"""Mesh and equation numbers; blocks of elements, and groups of congruent ones.
 
 Nodes, elements and equations are numbered from 1 as on the cards; row n - 1 of an array belongs to
 node or element n.  An absent node of an element and the equation of a restrained dof are 0.
@@ -6,13 +6,25 @@ node or element n.  An absent node of an element and the equation of a restraine
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fecm._frozen import frozen
-from fecm._typing import Bools, Floats
+from fecm._typing import Bools, Floats, Indices
+from fecm.mechanics.elements import CUBIC, QUADRILATERAL, TRIANGLE, ElementShape
 
 Ints = NDArray[np.int32]
+
+# In ascending order of their number of nodes.
+SHAPES = (TRIANGLE, QUADRILATERAL, CUBIC)
+# Number of nodes of the largest element.
+MOST_NODES = SHAPES[-1].nodes
+# Tolerance of the relative node positions of congruent elements, relative to the largest element.
+TOLERANCE = 1.0e-9
 
 
 @frozen
@@ -23,8 +35,7 @@ class Mesh:
     elements: Ints  # (numel, nen): node numbers, 0 where absent
     codes: Ints  # (numnp, 5): restraint codes; a dof with a nonzero code is restrained
     forces: Floats  # (numnp, 5): nodal force, or displacement of a restrained dof
-    # (numnp, 5): equation numbers in the order of nodes and dofs, 0 where restrained.
-    equations: Ints
+    equations: Ints  # (numnp, 5): numbers in the order of nodes and dofs, 0 where restrained
 
     @property
     def number_of_equations(self) -> int:
@@ -54,3 +65,106 @@ def equation_numbers(codes: Ints) -> Ints:
 def holds_the_plane(codes: Ints) -> bool:
     """Whether restraint codes, (numnp, 5), restrain u and v of every node."""
     return bool((codes[:, :2] != 0).all())
+
+
+@frozen
+class ElementBlock:
+    """Elements that have the same nodes present."""
+
+    rows: Indices  # (ne,): rows of the elements in the mesh
+    nodes: Indices  # (ne, nn): rows of their nodes, from 0
+    coordinates: Floats  # (ne, nn, 2): length
+    present: Bools  # (shape.nodes,) of bool: which nodes of the shape are present
+    shape: ElementShape  # triangle, quadrilateral or cubic quadrilateral
+
+    def blocks(self, size: int) -> Iterator[ElementBlock]:
+        """Split into blocks of at most `size` elements."""
+        for start in range(0, len(self.rows), size):
+            yield self.take(np.arange(start, min(start + size, len(self.rows))))
+
+    def take(self, members: Indices) -> ElementBlock:
+        """Select elements by their position in the block."""
+        names = ("rows", "nodes", "coordinates")
+        return replace(self, **{name: getattr(self, name)[members] for name in names})
+
+
+def element_blocks(elements: Ints, coordinates: Floats) -> list[ElementBlock]:
+    """Sort elements, (numel, nen), node numbers from 1 or 0, into blocks with the same nodes.
+
+    Raises ValueError if a corner is missing: three for a triangle, four for the others.
+    """
+    nodes = np.zeros((len(elements), max(MOST_NODES, elements.shape[1])), dtype=np.intp)
+    nodes[:, : elements.shape[1]] = elements
+    found: list[ElementBlock] = []
+    given = nodes > 0
+    # Patterns in the order of their bits, first node first.
+    codes = given @ (1 << np.arange(given.shape[1])[::-1])
+    for code in distinct(codes):
+        rows = np.flatnonzero(codes == code)
+        present = given[rows[0]]
+        shape = shape_of(present)
+        if not present[: shape.corners].all():
+            raise ValueError(
+                f"element {rows[0] + 1} lacks one of the {shape.corners} corners of a {shape.name}"
+            )
+        members, places = nodes[rows][:, present] - 1, present[: shape.nodes]
+        found.append(ElementBlock(rows, members, coordinates[members], places, shape))
+    return found
+
+
+def shape_of(present: Bools) -> ElementShape:
+    """Shape of an element by its last node present (NEL of the listing): up to 3, 9 or 12.
+
+    Raises ValueError if a node follows the twelfth.
+    """
+    last = int(np.flatnonzero(present).max(initial=-1)) + 1
+    for shape in SHAPES:
+        if last <= shape.nodes:
+            return shape
+    raise ValueError(f"an element has at most {MOST_NODES} nodes; this one has a node {last}")
+
+
+def element_centres(elements: Ints, coordinates: Floats) -> Floats:
+    """Mean of the corners of every element, (numel, 2)."""
+    centres = np.empty((len(elements), 2))
+    for block in element_blocks(elements, coordinates):
+        centres[block.rows] = block.coordinates[:, : block.shape.corners].mean(axis=1)
+    return centres
+
+
+def longest_sides(elements: Ints, coordinates: Floats) -> Floats:
+    """Longest side of every element, corner to corner, (numel,)."""
+    longest = np.empty(len(elements))
+    for block in element_blocks(elements, coordinates):
+        corners = block.coordinates[:, : block.shape.corners]
+        sides = np.hypot(*np.moveaxis(corners - np.roll(corners, 1, axis=1), 2, 0))
+        longest[block.rows] = sides.max(axis=1)
+    return longest
+
+
+def distinct(values: ArrayLike) -> NDArray[Any]:
+    """Sorted distinct values; without an index np.unique would import numpy.ma."""
+    return np.unique(values, return_index=True)[0]
+
+
+@frozen
+class Congruence:
+    """Groups of elements of a block that are translations of one another."""
+
+    representatives: Indices  # (ng,): position in the block of one element per group
+    group: Indices  # (ne,): group of every element
+
+
+def congruence(family: ElementBlock) -> Congruence:
+    """Group the congruent elements of a block.
+
+    Positions are compared on a grid of :data:`TOLERANCE` times the largest element's size.
+    Congruent elements that rounding separates form two groups, which costs time but no accuracy.
+    """
+    places = family.coordinates[:, 1:] - family.coordinates[:, :1]
+    flat = places.reshape(len(places), -1)
+    pitch = TOLERANCE * float(np.abs(flat).max())
+    # An uncommon offset keeps round numbers away from the grid lines.
+    cells = np.floor(flat / pitch + 1.0 / np.pi).astype(np.int64)
+    _, representatives, group = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+    return Congruence(representatives.astype(np.intp), group.ravel().astype(np.intp))

@@ -11,11 +11,10 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm._typing import Floats
-from fecm.mechanics import element_groups
-from fecm.mechanics.elements.quadrature import Quadrature
+from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.locate import locate
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.mesh import Mesh, element_blocks
 
 DISC, HERTZ = "DISC", "HERT"
 # Radius, over the thickness, whose midplane deflection is that of a plate pressed on one face over
@@ -46,7 +45,7 @@ def patch_weights(mesh: Mesh, shape: str, radius: float, x: float, y: float) -> 
     shares = np.repeat(np.concatenate([shares, 0.0 * rim]) / ANGLES, ANGLES)
     weights = np.zeros(len(mesh.coordinates))
     found = np.zeros(len(points), dtype=bool)
-    for family in element_groups.element_blocks(mesh.elements, mesh.coordinates):
+    for family in element_blocks(mesh.elements, mesh.coordinates):
         members, which, xi = locate(family, points)
         # A point on a common edge counts once.
         which, first = np.unique(which, return_index=True)

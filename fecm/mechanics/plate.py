@@ -11,23 +11,20 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecm._errors import FecmError
 from fecm._frozen import frozen
 from fecm._memory import require
-from fecm._typing import Floats
-from fecm.mechanics import element_groups, element_matrices, interpolation
-from fecm.mechanics.element_groups import congruence
-from fecm.mechanics.elements.quadrature import Quadrature
+from fecm._typing import Bools, Floats, Indices
+from fecm.mechanics import element_matrices, interpolation
+from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.laminate import Laminate
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.mesh import ElementBlock, Mesh, congruence, element_blocks
 from fecm.mechanics.strains import StrainField
 
 if TYPE_CHECKING:
     from scipy import sparse
 
-Indices = NDArray[np.intp]
 
 # Upper bound of the bytes that assembly needs per entry of the element matrices.
 ASSEMBLED = 24
@@ -66,7 +63,7 @@ class PlateModel:
         return self.mesh.number_of_equations
 
     @cached_property
-    def _free(self) -> NDArray[np.bool_]:
+    def _free(self) -> Bools:
         return np.asarray(self.mesh.equations > 0)
 
     @cached_property
@@ -83,11 +80,11 @@ class PlateModel:
         return numbers
 
     @cached_property
-    def families(self) -> list[element_groups.ElementBlock]:
+    def families(self) -> list[ElementBlock]:
         """The elements, in blocks with the same nodes present."""
-        return element_groups.element_blocks(self.mesh.elements, self.mesh.coordinates)
+        return element_blocks(self.mesh.elements, self.mesh.coordinates)
 
-    def stiffness_of(self, family: element_groups.ElementBlock) -> Floats:
+    def stiffness_of(self, family: ElementBlock) -> Floats:
         """Element stiffness matrices, (ne, 5 nn, 5 nn)."""
         rules = self.rules
         return element_matrices.stiffness(
@@ -99,14 +96,14 @@ class PlateModel:
             assumes_shear=rules.assumes_shear,
         )
 
-    def _dofs(self, family: element_groups.ElementBlock) -> Indices:
+    def _dofs(self, family: ElementBlock) -> Indices:
         return self._numbers[family.nodes].reshape(len(family.rows), -1)
 
-    def _mass_of(self, family: element_groups.ElementBlock) -> Floats:
+    def _mass_of(self, family: ElementBlock) -> Floats:
         return element_matrices.consistent_mass(family, self.laminate, self.rules.bending)
 
     def _element_matrices(
-        self, matrices_of: Callable[[element_groups.ElementBlock], Floats]
+        self, matrices_of: Callable[[ElementBlock], Floats]
     ) -> Iterator[tuple[Indices, Floats]]:
         """Dofs (ne, n) and matrices (ne, n, n) of all elements, block by block."""
         for family in self.families:
@@ -124,9 +121,7 @@ class PlateModel:
             f.nodes.shape[0] * (interpolation.NDOF * f.nodes.shape[1]) ** 2 for f in self.families
         )
 
-    def _assembled(
-        self, matrices_of: Callable[[element_groups.ElementBlock], Floats]
-    ) -> sparse.csr_array:
+    def _assembled(self, matrices_of: Callable[[ElementBlock], Floats]) -> sparse.csr_array:
         """Assembled matrix (neq, neq + restrained); columns of restrained dofs come last."""
         from scipy import sparse  # slow to import, and not needed by most runs
 

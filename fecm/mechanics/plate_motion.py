@@ -22,17 +22,14 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecm._errors import FecmError
 from fecm._frozen import frozen
-from fecm._typing import Floats
+from fecm._typing import Floats, Indices
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.stiffness_operator import pieces
 from fecm.mechanics.stiffness_product import AUTO, CSR, Workers, resolved, stiffness_operator
 from fecm.mechanics.symmetry import SymmetryReduction, unreduced
-
-Indices = NDArray[np.intp]
 
 # Length of a product for which BLAS uses one thread, whatever the number of threads.
 SERIAL = 8192

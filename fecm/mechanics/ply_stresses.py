@@ -8,14 +8,12 @@ midplane strains eps and the curvatures kappa, eps(z) = eps + z kappa, or in the
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fecm._typing import Bools, Floats
-from fecm.mechanics.element_groups import ElementBlock, element_blocks
-from fecm.mechanics.elements.quadrature import Quadrature, gauss
+from fecm._typing import Bools, Floats, Indices
+from fecm.mechanics.elements import Quadrature, gauss
 from fecm.mechanics.interpolation import interpolate, inverse_jacobian, local_shape_functions
 from fecm.mechanics.laminate import Laminate
-from fecm.mechanics.mesh import Ints, Mesh
+from fecm.mechanics.mesh import ElementBlock, Ints, Mesh, element_blocks
 
 
 def in_plane_stresses(laminate: Laminate) -> Floats:
@@ -136,7 +134,7 @@ class PlyStresses:
         mesh: Mesh,
         laminate: Laminate,
         rule: Quadrature,
-        members: NDArray[np.intp] | None = None,
+        members: Indices | None = None,
     ) -> None:
         self.members = np.arange(len(mesh.elements)) if members is None else members
         elements = mesh.elements[self.members]

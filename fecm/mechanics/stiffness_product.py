@@ -16,12 +16,11 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fecm._typing import Floats
+from fecm._typing import Floats, Indices
 from fecm.mechanics import kernels
-from fecm.mechanics.element_groups import congruence, distinct
 from fecm.mechanics.kernels.plate import CompiledProduct
+from fecm.mechanics.mesh import congruence, distinct
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.stiffness_operator import R, StiffnessOperator, pieces
 from fecm.mechanics.symmetry import SymmetryReduction, unreduced
@@ -79,8 +78,6 @@ class Workers:
 def _each(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
     return [function(item) for item in items]
 
-
-Indices = NDArray[np.intp]
 
 # Elements per matrix product: it fits the cache, and BLAS uses one thread.
 BLOCK = 256

@@ -6,14 +6,13 @@ import math
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fecm._typing import Floats
+from fecm._typing import Floats, Indices
 from fecm.mechanics.assumed_shear import TiedStrains
-from fecm.mechanics.element_groups import Ints, element_blocks
-from fecm.mechanics.elements.quadrature import Quadrature
+from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import NDOF, inverse_jacobian, local_shape_functions
 from fecm.mechanics.laminate import Laminate
+from fecm.mechanics.mesh import Ints, element_blocks
 
 GENERALISED_STRAINS = (
     "eps_xx", "eps_yy", "gamma_xy", "kappa_x", "kappa_y", "kappa_xy", "gamma_xz", "gamma_yz",
@@ -69,7 +68,7 @@ class StrainField:
     @cached_property
     def _blocks(
         self,
-    ) -> list[tuple[NDArray[np.intp], NDArray[np.intp], Floats, Floats, TiedStrains | None]]:
+    ) -> list[tuple[Indices, Indices, Floats, Floats, TiedStrains | None]]:
         blocks = []
         for family in self.families:
             values, local = local_shape_functions(family, self.rule)

@@ -14,12 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._frozen import frozen
-from fecm._typing import Floats
-from fecm.mechanics.element_groups import ElementBlock
-from fecm.mechanics.mesh import equation_numbers
+from fecm._typing import Bools, Floats, Indices
+from fecm.mechanics.mesh import ElementBlock, equation_numbers
 from fecm.mechanics.plate import PlateModel
-
-Indices = NDArray[np.intp]
 
 # Signs of u, v, w, theta_x, theta_y under the half turn.
 TURNED = np.array([-1.0, -1.0, 1.0, -1.0, -1.0])
@@ -120,7 +117,7 @@ def restrain_resting_dofs(plate: PlateModel, contact: Floats | None) -> PlateMod
 
 
 def _numbered(
-    moves: NDArray[np.bool_], dof_indices: Indices, sign: Floats, weights: NDArray[np.int_]
+    moves: Bools, dof_indices: Indices, sign: Floats, weights: NDArray[np.int_]
 ) -> SymmetryReduction:
     """Number the independent dofs in the order of nodes and dofs."""
     leaders = (dof_indices == np.arange(moves.size).reshape(moves.shape)) & moves
@@ -132,7 +129,7 @@ def _numbered(
 
 
 def _images(
-    plate: PlateModel, free: NDArray[np.bool_], contact: Floats | None
+    plate: PlateModel, free: Bools, contact: Floats | None
 ) -> tuple[Indices, Indices] | None:
     """Images of nodes and elements under the half turn, if it maps the plate onto itself."""
     mesh = plate.mesh

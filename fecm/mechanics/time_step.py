@@ -12,7 +12,7 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.mechanics import element_matrices
-from fecm.mechanics.element_groups import congruence
+from fecm.mechanics.mesh import congruence
 from fecm.mechanics.plate import BLOCK, PlateModel, UnsoundPlateError
 from fecm.mechanics.stiffness_product import SAFE, stiffness_operator
 

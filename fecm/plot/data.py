@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Deck, Impact
-from fecm.mechanics.element_groups import ElementBlock, element_blocks
-from fecm.mechanics.elements.quadrature import Quadrature
+from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import local_shape_functions
+from fecm.mechanics.mesh import ElementBlock, element_blocks
 from fecm.plot.kinds import PlotError
 from fecm.results.plies import model_of, points_of, rows_at
 from fecm.results.result import Result

@@ -18,7 +18,7 @@ from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Impact
-from fecm.mechanics.element_groups import longest_sides
+from fecm.mechanics.mesh import longest_sides
 from fecm.plot import data, style
 from fecm.plot.kinds import Picture, PlotError
 from fecm.results.result import Result

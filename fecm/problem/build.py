@@ -26,8 +26,7 @@ from fecm.mechanics.contact_law import (
     YangSunPermanent,
 )
 from fecm.mechanics.delamination import effective_rigidity, threshold_force
-from fecm.mechanics.element_groups import element_centres
-from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
+from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.failure_envelope import FailureMonitor
 from fecm.mechanics.gages import GageArray, gages
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
@@ -35,7 +34,7 @@ from fecm.mechanics.impact_steps import ImpactSteps, supports
 from fecm.mechanics.kernels.failure import CompiledMonitor
 from fecm.mechanics.kernels.strains import CompiledStrains
 from fecm.mechanics.laminate import Laminate, laminate
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.mesh import Mesh, element_centres
 from fecm.mechanics.patch import RADIUS_PER_THICKNESS, patch_weights
 from fecm.mechanics.plate import IntegrationRules, PlateModel
 from fecm.mechanics.plate_motion import PlateMotion

@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 from fecm.deck import model
 from fecm.deck.findings import Findings, Place
 from fecm.deck.records import Integration
-from fecm.mechanics import assumed_shear, element_groups, interpolation
-from fecm.mechanics.element_groups import distinct
-from fecm.mechanics.elements.quadrature import HIGHEST_ORDER
-from fecm.mechanics.elements.shape import CUBIC, TRIANGLE
-from fecm.mechanics.mesh import Mesh, holds_the_plane
+from fecm.mechanics import assumed_shear, interpolation
+from fecm.mechanics.elements import CUBIC, HIGHEST_ORDER, TRIANGLE
+from fecm.mechanics.mesh import ElementBlock, Mesh, distinct, element_blocks, holds_the_plane
 from fecm.problem.build import Problem, has_assumed_shear, rules
 from fecm.problem.generate import place_of_element
 
@@ -28,7 +26,7 @@ RUNS = 8
 LISTING_LAYERS = 25
 ANOTHER_MODE = "run the deck in report mode"
 CORNERS = TRIANGLE.corners
-Blocks = list[element_groups.ElementBlock]
+Blocks = list[ElementBlock]
 W, THETA_X = 2, 3
 # Loaded nodes up to this number are single forces, more are a pressure.
 FEW_LOADED = 4
@@ -129,7 +127,7 @@ def check_assumed_shear(deck: model.Deck, mesh: Mesh, findings: Findings) -> Non
     if not deck.require(model.Shear).assumed:
         return
     wrong = np.zeros(len(mesh.elements), dtype=bool)
-    for family in element_groups.element_blocks(mesh.elements, mesh.coordinates):
+    for family in element_blocks(mesh.elements, mesh.coordinates):
         wrong[family.rows] = not assumed_shear.supports(family)
     report_elements(
         findings, "E451", np.flatnonzero(wrong), deck, "has no assumed shear strains (SHEA MITC)",
@@ -161,7 +159,7 @@ def check_in_plane_supports(problem: Problem, findings: Findings) -> None:
 def check_side_nodes(deck: model.Deck, mesh: Mesh, findings: Findings) -> None:
     """Warn of nodes on sides that are off the middle or the third points, seen along the side."""
     wrong: list[int] = []
-    for family in element_groups.element_blocks(mesh.elements, mesh.coordinates):
+    for family in element_blocks(mesh.elements, mesh.coordinates):
         if family.shape is TRIANGLE:
             continue
         thirds = family.shape is CUBIC
@@ -211,7 +209,7 @@ def _check_shapes(deck: model.Deck, mesh: Mesh, findings: Findings, *, listing: 
     material = deck.last(model.Material)
     if material is None or not 1 <= abs(material.integration.points) <= HIGHEST_ORDER:
         return
-    families = element_groups.element_blocks(mesh.elements, mesh.coordinates)
+    families = element_blocks(mesh.elements, mesh.coordinates)
     card, used = material.integration, rules(material)
     folded: dict[str, list[int]] = {}
     massless: list[NDArray[np.intp]] = []
@@ -290,7 +288,7 @@ def _report_hourglass(card: Integration, supported: bool, findings: Findings) ->
         findings.add(HOURGLASS, message, place, "take L2 = 3; --force runs the deck nevertheless")
 
 
-def _orders_without_motions(family: element_groups.ElementBlock) -> tuple[str, int, int]:
+def _orders_without_motions(family: ElementBlock) -> tuple[str, int, int]:
     """Name of a block's elements, and the least shear orders without zero-energy modes.
 
     The first order is for a plate whose w is free; the second, which may be lower, for a plate

@@ -15,9 +15,8 @@ from fecm.deck import model
 from fecm.deck.findings import Findings, Place
 from fecm.deck.records import Layer, Ply, Record
 from fecm.deck.units import in_si, unit_names
-from fecm.mechanics.element_groups import distinct
 from fecm.mechanics.laminate import Laminate
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.mesh import Mesh, distinct
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError
 from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.mechanics.stiffness_product import SAFE

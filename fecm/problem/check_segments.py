@@ -13,12 +13,10 @@ from fecm.deck import model
 from fecm.deck.findings import Findings
 from fecm.deck.records import Integration, Ply
 from fecm.deck.units import KNOWN, in_si, unit_names
-from fecm.mechanics import element_groups
 from fecm.mechanics.contact_law import ACR_POWER
-from fecm.mechanics.element_groups import element_blocks, longest_sides
-from fecm.mechanics.elements.quadrature import HIGHEST_ORDER
+from fecm.mechanics.elements import HIGHEST_ORDER
 from fecm.mechanics.locate import locate
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.mesh import Mesh, element_blocks, longest_sides
 from fecm.mechanics.patch import DISC, HERTZ, RADIUS_PER_THICKNESS, PatchError
 from fecm.mechanics.projectile import Rod, report_rod
 from fecm.problem import check_mesh
@@ -128,7 +126,7 @@ def check_gages(segment: model.Gages, mesh: Mesh, deck: model.Deck, findings: Fi
         message = f"{count} gages on {len(mesh.elements)} elements are too many: at most {most}."
         findings.add("E012", message, segment.place())
         return
-    families = element_groups.element_blocks(mesh.elements, mesh.coordinates)
+    families = element_blocks(mesh.elements, mesh.coordinates)
     seen: set[int] = set()
     for record in segment.records:
         if record.number in seen:
@@ -244,7 +242,7 @@ def resolution(problem: Problem) -> Resolution | None:
     rigidity = float(min(laminate.D[0, 0], laminate.D[1, 1]))
     wave = 2.0 * np.pi * (rigidity / (laminate.mass * (np.pi / contact) ** 2)) ** 0.25
     touching = (mesh.elements == impact.node).any(axis=1)
-    side = float(element_groups.longest_sides(mesh.elements[touching], mesh.coordinates).max())
+    side = float(longest_sides(mesh.elements[touching], mesh.coordinates).max())
     if not np.isfinite(wave):
         return None
     quadratic = bool((mesh.elements[touching, 4:8] > 0).all()) and mesh.elements.shape[1] <= 9

@@ -16,7 +16,7 @@ from fecm import _memory
 from fecm.deck.macros import every, flat
 from fecm.deck.model import Projectile
 from fecm.mechanics import interpolation
-from fecm.mechanics.element_groups import congruence
+from fecm.mechanics.mesh import congruence
 from fecm.mechanics.natural_modes import DENSE
 from fecm.mechanics.plate import ASSEMBLED, BLOCK, PlateModel
 from fecm.mechanics.projectile import REPORT_ELEMENTS

@@ -15,8 +15,7 @@ from fecm._errors import FecmError
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Boundary, Coordinates, Deck, Elements, Forces, Segment
 from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
-from fecm.mechanics.element_groups import element_blocks
-from fecm.mechanics.mesh import Ints, Mesh
+from fecm.mechanics.mesh import Ints, Mesh, element_blocks
 
 # Corners at the ends of each side, and the local coordinate that runs along it.
 _SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))

@@ -14,9 +14,9 @@ from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Deck, Material
 from fecm.deck.reader import Reader
-from fecm.mechanics.element_groups import element_blocks
-from fecm.mechanics.elements.quadrature import HIGHEST_ORDER, Quadrature, gauss, nodal
+from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.interpolation import local_shape_functions
+from fecm.mechanics.mesh import element_blocks
 from fecm.results.schema import NotStoredError, ResultFileError, remedy
 
 if TYPE_CHECKING:

@@ -20,12 +20,12 @@ from functools import cached_property
 from itertools import combinations, permutations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg.lapack import dgejsv
 from scipy.optimize import brentq
 
 from fecm._frozen import frozen
-from fecm._typing import Floats
+from fecm._typing import Floats, Indices
 from fecm.mechanics.laminate import Laminate
 from fecm.studies import StudyError
 
@@ -123,7 +123,7 @@ def shares(inertia: Floats, vectors: Floats) -> Floats:
     return np.asarray(np.swapaxes(energy / energy.sum(axis=-2, keepdims=True), -1, -2))
 
 
-def best(scores: Floats) -> NDArray[np.intp]:
+def best(scores: Floats) -> Indices:
     """Index of the largest score of every row; the first of those equal up to rounding.
 
     The scores, (n, choices), are sums of shares, of the order of 1.
@@ -257,7 +257,7 @@ def _singular_values(matrices: Floats) -> tuple[Floats, Floats]:
 _PAIRS = np.array(list(combinations(range(5), 2)))  # candidates for the two in-plane modes
 
 
-def _in_order(share: Floats) -> NDArray[np.intp]:
+def _in_order(share: Floats) -> Indices:
     """Indices of the modes, sorted by velocity, in the order of :data:`MODES`; (n, 5)."""
     in_plane = share[:, :, :2].sum(axis=2)
     pair = _PAIRS[best(in_plane[:, _PAIRS].sum(axis=2))]
@@ -313,7 +313,7 @@ def sheets(medium: Medium, normal: Floats) -> Sheets:
     return Sheets(normal, velocity, slope, curvature, basis, share)
 
 
-def match_modes(before: Floats, after: Floats) -> tuple[NDArray[np.intp], Floats]:
+def match_modes(before: Floats, after: Floats) -> tuple[Indices, Floats]:
     """Match modes of neighbouring normals; the modes are columns, (n, 5, 5).
 
     Indices in `after` of the modes that continue those of `before`, (n, 5), and the smallest
@@ -325,7 +325,7 @@ def match_modes(before: Floats, after: Floats) -> tuple[NDArray[np.intp], Floats
     return _ORDERS[place], pairs[np.arange(len(pairs)), place].min(axis=1)
 
 
-def track_branch(medium: Medium, first: float, last: float) -> NDArray[np.intp]:
+def track_branch(medium: Medium, first: float, last: float) -> Indices:
     """Match the sheets of two close normals in degrees, (5,), bisecting the step as necessary.
 
     Sheets that approach each other without crossing exchange their modes within a small angle;
@@ -333,14 +333,14 @@ def track_branch(medium: Medium, first: float, last: float) -> NDArray[np.intp]:
     """
     before, after = sheets(medium, np.array([first, last])).mode
     place, likeness = match_modes(before[None], after[None])
-    found: NDArray[np.intp] = place[0]
+    found: Indices = place[0]
     if likeness[0] <= SURE and last - first >= FINEST:
         middle = (first + last) / 2.0
         found = track_branch(medium, middle, last)[track_branch(medium, first, middle)]
     return found
 
 
-def assigned(share: Floats) -> NDArray[np.intp]:
+def assigned(share: Floats) -> Indices:
     """Assign a mode to each component, (5,), so that the sum of the shares is largest.
 
     The components are the columns of `share`, the modes its rows.
@@ -417,7 +417,7 @@ def _kept_apart(values: Floats, vectors: Floats, derivatives: Floats, limit: flo
     return np.concatenate(parts, axis=1)
 
 
-def _runs(values: Floats, limit: float) -> list[NDArray[np.intp]]:
+def _runs(values: Floats, limit: float) -> list[Indices]:
     """Indices of runs of sorted values that are equal up to `limit`."""
     steps = np.flatnonzero(np.abs(np.diff(values)) >= limit) + 1
     return np.split(np.arange(len(values)), steps)

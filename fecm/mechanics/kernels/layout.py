@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Bools, Floats
-from fecm.mechanics.element_groups import ElementBlock, distinct
+from fecm.mechanics.mesh import ElementBlock, distinct
 
 Indices = NDArray[np.intp]
 

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
-from fecm.mechanics.element_groups import congruence
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.kernels import LIBRARY, Longs, Strains, floats
 from fecm.mechanics.kernels.plate import jacobians
+from fecm.mechanics.mesh import congruence
 from fecm.mechanics.strains import STRAINS, StrainField
 
 

@@ -6,11 +6,11 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecm._frozen import frozen
 from fecm._tables import aligned
-from fecm._typing import Floats
+from fecm._typing import Floats, Indices
 from fecm.deck.model import Indentation
 from fecm.mechanics.contact_law import (
     ACR_POWER,
@@ -116,7 +116,7 @@ def line(peaks: Floats, permanents: Floats, covariance: Floats) -> Line | None:
 
 
 def _split(
-    peaks: Floats, permanents: Floats, covariance: Floats, elastic: NDArray[np.intp]
+    peaks: Floats, permanents: Floats, covariance: Floats, elastic: Indices
 ) -> tuple[float, Line] | None:
     """Return chi² and the line for a set of elastic cycles."""
     n = len(peaks)

@@ -1,20 +1,90 @@
-"""Element shapes: node positions and shape functions on the square -1 <= xi, eta <= 1.
+"""Element shapes and quadrature on the square -1 <= xi, eta <= 1.
 
 Shape functions are in the order of the node numbers; those of an absent node are zero.  Corners run
 counter-clockwise from (-1, -1) and are always present.  A quadrilateral stays compatible with
 neighbours that have the same nodes on the common side, and reproduces every linear field.
 
-Functions return values, d/dxi and d/deta, (3, nodes, n), at n points.
+Quadrature points are in the report's order: corners counter-clockwise from (-1, -1), mid-sides
+starting at eta = -1, centre.  Order 4 has the corners of the large square, of the tall and the wide
+rectangle, and of the small square.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from fecm._typing import Bools, Floats
+
+# Corners, mid-sides from node 5 between corners 1 and 2, centre.
+_XI_9 = np.array([-1.0, 1.0, 1.0, -1.0, 0.0, 1.0, 0.0, -1.0, 0.0])
+_ETA_9 = np.array([-1.0, -1.0, 1.0, 1.0, -1.0, 0.0, 1.0, 0.0, 0.0])
+
+# Quadrature ---------------------------------------------------------------------------------------
+
+HIGHEST_ORDER = 4
+
+# Points and weights of the Gauss-Legendre rules of the orders 1 to 4.
+_LEGENDRE = (
+    ((0.0,), (2.0,)),
+    ((-0.5773502691896257, 0.5773502691896257), (1.0, 1.0)),
+    (
+        (-0.7745966692414834, 0.0, 0.7745966692414834),
+        (0.5555555555555557, 0.8888888888888888, 0.5555555555555557),
+    ),
+    (
+        (-0.8611363115940526, -0.33998104358485626, 0.33998104358485626, 0.8611363115940526),
+        (0.34785484513745357, 0.6521451548625464, 0.6521451548625464, 0.34785484513745357),
+    ),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Quadrature:
+    """Points and weights of a quadrature rule."""
+
+    # (n,): local coordinates.
+    xi: Floats
+    eta: Floats
+    weights: Floats  # (n,): their sum is 4, the area of the square
+
+
+@cache
+def gauss(order: int) -> Quadrature:
+    """Gauss rule with `order` points in each direction; a ValueError outside 1 to 4."""
+    return _rule(order, equal=False)
+
+
+@cache
+def nodal(order: int) -> Quadrature:
+    """Grid of `order` equally spaced points in each direction, including the edges.
+
+    Order 3 gives the nodes of the 9-node element.  Weights are those of the Gauss rule and must not
+    be used for integration.  A ValueError outside 1 to 4.
+    """
+    return _rule(order, equal=True)
+
+
+def _rule(order: int, *, equal: bool) -> Quadrature:
+    """Tensor product of Gauss points or of equally spaced ones, in the report's order."""
+    if not 1 <= order <= HIGHEST_ORDER:
+        raise ValueError(f"quadrature order {order} is outside 1 to {HIGHEST_ORDER}")
+    points, weights = np.array(_LEGENDRE[order - 1])
+    if equal and order > 1:
+        points = np.linspace(-1.0, 1.0, order)
+    signs = np.array([_XI_9, _ETA_9], dtype=int)[:, : min(order, 3) ** 2]
+    if order <= 3:
+        i, j = (signs + 1) * (order - 1) // 2
+    else:  # four corners at each distance from the edge in xi and in eta
+        away = np.repeat([[0, 1, 0, 1], [0, 0, 1, 1]], 4, axis=1)
+        i, j = np.where(np.tile(signs[:, :4], 4) < 0, away, order - 1 - away)
+    return Quadrature(points[i], points[j], weights[i] * weights[j])
+
+
+# Shapes -------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +97,7 @@ class ElementShape:
     eta: Floats
     corners: int  # number of corners, the first nodes, which are never absent
     numbering: str  # order of the nodes, for messages
-    # ``functions(xi, eta, present)`` returns the values and derivatives, (3, nodes, n).
+    # ``functions(xi, eta, present)`` returns values, d/dxi and d/deta at n points, (3, nodes, n).
     functions: Callable[[Floats, Floats, Bools], Floats]
 
     @property
@@ -57,17 +127,10 @@ def _triangle(xi: Floats, eta: Floats, present: Bools) -> Floats:
 def _bilinear(nodes: int, xi: Floats, eta: Floats) -> Floats:
     """Bilinear functions of the corners (equation 4-11); those of other nodes are zero."""
     S = np.zeros((3, nodes, len(xi)))
-    for i, (x, y) in enumerate(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))):
+    for i, (x, y) in enumerate(zip(_XI_9[:4], _ETA_9[:4], strict=True)):
         a, b = 1.0 + x * xi, 1.0 + y * eta
         S[:, i] = a * b / 4.0, x * b / 4.0, y * a / 4.0
     return S
-
-
-# Corners, mid-sides from node 5 between corners 1 and 2, centre.
-_XI_9 = np.array([-1.0, 1.0, 1.0, -1.0, 0.0, 1.0, 0.0, -1.0, 0.0])
-_ETA_9 = np.array([-1.0, -1.0, 1.0, 1.0, -1.0, 0.0, 1.0, 0.0, 0.0])
-# Mid-side nodes next to each corner.
-_MID_SIDES = ((7, 4), (4, 5), (5, 6), (6, 7))
 
 
 def _quadratic(xi: Floats, eta: Floats, present: Bools) -> Floats:
@@ -87,7 +150,7 @@ def _quadratic(xi: Floats, eta: Floats, present: Bools) -> Floats:
     for i in range(4, 8):
         if present[i]:
             S[:, i] -= centre / 2.0
-    for i, (before, after) in enumerate(_MID_SIDES):
+    for i, (before, after) in enumerate(((7, 4), (4, 5), (5, 6), (6, 7))):  # mid-sides beside it
         S[:, i] -= centre / 4.0 + (S[:, before] + S[:, after]) / 2.0
     return S
 
@@ -125,31 +188,14 @@ def _cubic(xi: Floats, eta: Floats, present: Bools) -> Floats:
 def _side(t: Floats, node: float) -> tuple[Floats, Floats]:
     """Cubic along a side, 1 at one third point and 0 at the other and the ends, and its slope."""
     f = 9.0 / 16.0 * (1.0 - t**2) * (1.0 + 9.0 * node * t)
-    slope = 9.0 / 16.0 * (9.0 * node - 2.0 * t - 27.0 * node * t**2)
-    return f, slope
+    return f, 9.0 / 16.0 * (9.0 * node - 2.0 * t - 27.0 * node * t**2)
 
 
+COUNTER_CLOCKWISE = "corners run counter-clockwise"
 TRIANGLE = ElementShape(
-    "triangle",
-    np.array([-1.0, 1.0, 0.0]),
-    np.array([-1.0, -1.0, 1.0]),
-    3,
-    "corners run counter-clockwise",
-    _triangle,
+    "triangle", np.array([-1.0, 1.0, 0.0]), _ETA_9[[0, 1, 2]], 3, COUNTER_CLOCKWISE, _triangle
 )
-QUADRILATERAL = ElementShape(
-    "quadrilateral",
-    _XI_9,
-    _ETA_9,
-    4,
-    "corners run counter-clockwise, mid-side 5 lies between corners 1 and 2",
-    _quadratic,
-)
-CUBIC = ElementShape(
-    "cubic quadrilateral",
-    _XI_12,
-    _ETA_12,
-    4,
-    "corners run counter-clockwise, nodes 5 and 10 divide the side from corner 1 to 2 in thirds",
-    _cubic,
-)
+MIDDLE = f"{COUNTER_CLOCKWISE}, mid-side 5 lies between corners 1 and 2"
+QUADRILATERAL = ElementShape("quadrilateral", _XI_9, _ETA_9, 4, MIDDLE, _quadratic)
+THIRDS = f"{COUNTER_CLOCKWISE}, nodes 5 and 10 divide the side from corner 1 to 2 in thirds"
+CUBIC = ElementShape("cubic quadrilateral", _XI_12, _ETA_12, 4, THIRDS, _cubic)

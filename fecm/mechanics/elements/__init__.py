@@ -1,1 +1,0 @@
-"""Shape functions and quadrature of the plate's elements."""
