@@ -22,7 +22,6 @@ JUSTIFY = "right-justify each number in its own columns"
 LONGEST = 100  # characters of the longest number that is read
 # No two parts of a pattern match the same characters, so that a mismatch takes linear time.
 _INTEGER = re.compile(r"[+-]?[0-9]+")
-
 _REAL = re.compile(
     r"(?P<mantissa>[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))"
     r"(?:[EeDd](?P<marked>[+-]?[0-9]+)|(?P<bare>[+-][0-9]+))?"
@@ -86,12 +85,9 @@ def _forms(numeral: str, letter: str) -> Iterator[str]:
     digits = "".join(map(str, numerals))
     if -20 < exponent < 20:
         fixed = format(abs(number), "f")
-        if "." not in fixed:
-            yield f"{minus}{fixed}.0"
-            yield f"{minus}{fixed}."
-        else:
-            yield minus + fixed
-            yield minus + fixed.removeprefix("0")
+        whole = "." not in fixed
+        forms = (f"{fixed}.0", f"{fixed}.") if whole else (fixed, fixed.removeprefix("0"))
+        yield from (minus + form for form in forms)
     marked = "" if letter else "+"
     for before in (1, *range(2, len(digits) + 1), 0):
         power = exponent + len(digits) - before
@@ -233,17 +229,18 @@ def read_values(
         return None
     if fixed and not _is_aligned(card, fields, findings, cut_is_meant=blanks_are_zeros):
         return None
-    pieces = card.cut(fields)
-    if not _ends_with_fields(card, fields, pieces, findings):
-        return None
-    texts = [text for _, text in pieces[: len(fields)]]
-    texts += [""] * (len(fields) - len(texts))
-    values: list[Value | None] = []
-    for field, text in zip(fields, texts, strict=True):
-        if field.kind == "A":
-            values.append(_word(field, text, source, findings))
-        else:
-            values.append(_number(field, text, source, findings, fixed and blanks_are_zeros))
+    texts = [text for _, text in card.cut(fields)] + [""] * len(fields)
+    if more := card.data[fields[-1].last :].lstrip() if fixed else texts[len(fields)].lstrip(", "):
+        what = "is beyond the last field of the card and is not read."
+        if not fixed:
+            what = f"follows the last of the card's {len(fields)} values."
+        end = len(card.data)
+        place = Place(card.line, end - len(more) + 1, end, card.text)
+        findings.add("W106" if fixed else "E106", f"`{more}` {what}", place)
+        if not fixed:
+            return None
+    zeros, pairs = fixed and blanks_are_zeros, zip(fields, texts, strict=False)
+    values = [_value(f, text, source, findings, zeros) for f, text in pairs]
     valid = [value for value in values if value is not None]
     return valid if len(valid) == len(values) else None
 
@@ -323,40 +320,17 @@ def _remedy(card: Card, fields: Fields, length: int, width: int) -> str:
     return f"{too_long}: with commas the card is `{','.join(texts).rstrip(',')}`"
 
 
-def _ends_with_fields(
-    card: Card, fields: Fields, pieces: Sequence[tuple[int, str]], findings: Findings
-) -> bool:
-    """Whether no value follows the last field; in fixed columns that is only a warning."""
-    data = card.data
-    if "," in data:
-        start, rest = pieces[len(fields)] if len(pieces) > len(fields) else (0, "")
-        more = rest.lstrip(", ")
-        first = start + len(rest) - len(more) if more else 0
-        code, what = "E106", f"follows the last of the card's {len(fields)} values."
-    else:
-        tail = data[fields[-1].last :]
-        first = len(data) - len(tail.lstrip()) + 1 if tail.strip() else 0
-        code, what = "W106", "is beyond the last field of the card and is not read."
-    if first:
-        place = Place(card.line, first, len(data), card.text)
-        findings.add(code, f"`{data[first - 1 :]}` {what}", place)
-    return not first or code == "W106"
-
-
-def _word(field: Field, text: str, source: Source, findings: Findings) -> str | None:
-    """A field's word, or None after reporting that it is too long."""
-    word = text.rstrip()
-    if len(word) <= field.width:
-        return word
-    message = f"`{word}` has {len(word)} characters; the field takes {field.width}."
-    findings.add("E109", message, source.place(field.name), "values are separated by commas")
-    return None
-
-
-def _number(
+def _value(
     field: Field, text: str, source: Source, findings: Findings, zeros: bool
 ) -> Value | None:
-    """A field's number, ``""`` where a blank has a default, or None after reporting an error."""
+    """A field's value, ``""`` where a blank has a default, or None after reporting an error."""
+    if field.kind == "A":
+        word = text.rstrip()
+        if len(word) <= field.width:
+            return word
+        message = f"`{word}` has {len(word)} characters; the field takes {field.width}."
+        findings.add("E109", message, source.place(field.name), "values are separated by commas")
+        return None
     parse = parse_integer if field.kind == "I" else parse_real
     written = text.strip()
     if not written:
@@ -370,9 +344,12 @@ def _number(
     left = text.lstrip()
     padded = parse(left.replace(" ", "0")) if " " in left else plain
     if plain is None and padded is None:
-        kind = "whole number" if field.kind == "I" else "number"
-        place = source.place(field.name)
-        findings.add("E101", f"`{written}` is not a {kind}.", place, _why(field, squeezed))
+        kind, hint = "whole number" if field.kind == "I" else "number", ""
+        if field.kind == "I" and parse_real(squeezed) is not None:
+            hint = "this field takes no decimal point"
+        elif re.search("[A-Za-z]", squeezed):
+            hint = "it has a letter in place of a digit"
+        findings.add("E101", f"`{written}` is not a {kind}.", source.place(field.name), hint)
         return None
     value = padded if zeros else plain
     if plain != padded:
@@ -385,15 +362,6 @@ def _number(
         findings.add("E107", f"`{written}` is too large a number.", source.place(field.name))
         return None
     return value
-
-
-def _why(field: Field, text: str) -> str:
-    """Why a text is not a number."""
-    if field.kind == "I" and parse_real(text) is not None:
-        return "this field takes no decimal point"
-    if re.search("[A-Za-z]", text):
-        return "it has a letter in place of a digit"
-    return ""
 
 
 def _refuse_blank(
@@ -418,20 +386,14 @@ def write_card(fields: Fields, values: Sequence[Value]) -> str:
     """
     line = ""
     for field, value in zip(fields, values, strict=True):
-        text = _written(field, value)
-        if text is None:
-            return _with_commas(values)
+        text = format_real(float(value), field.width) if isinstance(value, float) else str(value)
+        if text is None or len(text) > field.width:
+            texts = [_free(value) for value in values]
+            texts += [""] * (len(texts) == 1)  # a comma makes the format free
+            return (", " if all(texts) else ",").join(texts)
         line = line.ljust(field.first - 1)
         line += text.ljust(field.width) if field.kind == "A" else text.rjust(field.width)
     return line.rstrip()
-
-
-def _with_commas(values: Sequence[Value]) -> str:
-    """A card in free format, which has at least one comma."""
-    texts = [_free(value) for value in values]
-    if len(texts) == 1:
-        texts.append("")
-    return (", " if all(texts) else ",").join(texts)
 
 
 def _free(value: Value) -> str:
@@ -442,11 +404,3 @@ def _free(value: Value) -> str:
         raise ValueError(f"{value} can't be written on a card")
     digits, exponential, exponent = repr(float(value)).partition("e")
     return f"{digits}E{int(exponent)}" if exponential else digits
-
-
-def _written(field: Field, value: Value) -> str | None:
-    """A value's text in its columns; None when it does not fit."""
-    if isinstance(value, float):
-        return format_real(float(value), field.width)
-    text = str(value)
-    return text if len(text) <= field.width else None

@@ -85,34 +85,23 @@ class Finding:
         if place and self.severity != "note":
             number = str(place.line)
             margin = " " * len(number)
-            card, first, last = _excerpt(place)
-            mark = " " * (first - 1) + "^" * max(1, last - first + 1)
-            if place.field:
-                mark += f" {place.field}"
-            lines += [f" {number} | {card}", f" {margin} | {mark}"]
+            card, begin = place.text.rstrip(), 0
+            last = place.last
+            if len(card) > WIDEST:  # the part around the place
+                begin = max(0, place.first - 1 - WIDEST // 2)
+                card = card[begin : begin + WIDEST]
+                last = min(last, begin + len(card))
+            mark = " " * (place.first - begin - 1) + "^" * max(1, last - place.first + 1)
+            lines += [f" {number} | {card}", f" {margin} | {mark} {place.field}".rstrip()]
         if self.hint:
             lines.append(f"   hint: {self.hint}")
-        return "\n".join(map(_printable, lines))
-
-
-def _excerpt(place: Place) -> tuple[str, int, int]:
-    """The card, or of a long one the part around the place; first and last column in it."""
-    text = place.text.rstrip()
-    if len(text) <= WIDEST:
-        return text, place.first, place.last
-    begin = max(0, place.first - 1 - WIDEST // 2)
-    part = text[begin : begin + WIDEST]
-    return part, place.first - begin, min(place.last - begin, len(part))
+        # A terminal would interpret control characters.
+        return "\n".join("".join(c if c.isprintable() else "·" for c in line) for line in lines)
 
 
 def _shortened(text: str) -> str:
     """A long text without its middle."""
     return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
-
-
-def _printable(text: str) -> str:
-    """Replace control characters, which a terminal would interpret, by dots."""
-    return "".join(char if char.isprintable() else "·" for char in text)
 
 
 class Findings:

@@ -21,16 +21,14 @@ def format_deck(text: str, source: str = "<text>") -> str:
     reader.problems()
     if reader.findings.errors:
         raise DeckError(list(reader.findings), source)
-    read = reader.stream.read
     written: list[str] = []
     above: Fields | None = None
-    lines = reader.stream.lines
-    for number, line in enumerate(lines, start=1):
+    for number, line in enumerate(reader.lines, start=1):
         if line.startswith(RULER):
             continue
         card = Card(number, line)
-        if number in read:
-            fields, values = read[number]
+        if number in reader.read:
+            fields, values = reader.read[number]
             aligned = _aligned(card, fields, values)
             if fields != above and "," not in aligned and fields[0] != Macro.fields[0]:
                 written.append(ruler(fields))
@@ -44,7 +42,7 @@ def format_deck(text: str, source: str = "<text>") -> str:
             known = card.keyword if keyword and len(words) == 1 else card.data
             written.append(line.rstrip() if line.startswith("!") else _with_comment(known, line))
         if card.keyword == STOP and not line.startswith("!"):
-            written += [rest.rstrip() for rest in lines[number:]]
+            written += [rest.rstrip() for rest in reader.lines[number:]]
             break
     return "\n".join(written) + "\n"
 

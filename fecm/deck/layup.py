@@ -14,8 +14,7 @@ from fecm._errors import FecmError
 
 MOST_PLIES = 10_000  # a layup of more plies is certainly a typo
 NESTING = 32  # deepest nesting of groups
-# Characters of a layup that a message quotes.
-QUOTED = 60
+QUOTED = 60  # characters of a layup that a message quotes
 _ANGLE = re.compile(r"(±|\+-|\+/-)?([+-]?(?:\d+(?:\.\d*)?|\.\d+))(?:_\{?(\d+)\}?)?")
 _SUFFIX = re.compile(r"_?\{?(\d*)([sST]?)\}?")
 
@@ -33,7 +32,7 @@ def parse_layup(text: str) -> list[float]:
     if not compact.startswith("["):
         compact = f"[{compact}]" if compact[-1:] not in "])" or "[" not in compact else compact
     angles, end = _group(compact, 0)
-    if end != len(compact):
+    if end != len(compact) or len(angles) > MOST_PLIES:
         raise _error(compact, end)
     return angles
 
@@ -69,7 +68,8 @@ def _group(text: str, start: int, depth: int = 1) -> tuple[list[float], int]:
             plies = [angle, -angle] if match[1] else [angle]
             angles += plies * _times(match[3] or "1", len(plies), text, position)
             position = match.end()
-        _bound(angles, text, position)
+        if len(angles) > MOST_PLIES:
+            raise _error(text, position)
         following = text[position : position + 1]
         position += 1
         if following == close:
@@ -82,7 +82,6 @@ def _group(text: str, start: int, depth: int = 1) -> tuple[list[float], int]:
         if suffix[2] in ("s", "S"):
             angles = angles + angles[::-1]
         position = suffix.end()
-    _bound(angles, text, position)
     return angles, position
 
 
@@ -93,8 +92,3 @@ def _times(digits: str, plies: int, text: str, position: int) -> int:
         possible = f"1 to {MOST_PLIES} plies are possible"
         raise LayupError(f"the layup `{_quoted(text)}` repeats {where}; {possible}")
     return int(digits)
-
-
-def _bound(angles: list[float], text: str, position: int) -> None:
-    if len(angles) > MOST_PLIES:
-        raise _error(text, position)

@@ -43,8 +43,6 @@ OTHERS = {
     r"\*\*|\*[a-z]": "an input file of Abaqus or CalculiX",
     r"\$MeshFormat": "a mesh of Gmsh",
 }
-
-
 _R = TypeVar("_R", bound=records.Record)
 
 
@@ -81,11 +79,6 @@ class Stream:
         """Whether every card was taken."""
         return self.position == len(self._cards)
 
-    @property
-    def last(self) -> Card | None:
-        """The last card of the file; None if it is empty."""
-        return Card(*self._cards[-1]) if self._cards else None
-
     def take(self) -> Card | None:
         """The next card; None at the end of the file or when findings are closed."""
         if self.at_end or self.findings.closed:
@@ -119,10 +112,6 @@ class Stream:
         self.give_back()
         return None
 
-    def text_since(self, position: int) -> str:
-        """Text of the cards taken since a position."""
-        return "\n".join(line.rstrip() for _, line in self._cards[position : self.position])
-
     def skip_data(self) -> None:
         """Skip cards up to the next keyword."""
         while self.take_data() is not None:
@@ -143,200 +132,23 @@ class Stream:
         return None if row is None else kind.from_row(*row)
 
 
-class SegmentReader:
-    """Reads segments of one problem."""
-
-    def __init__(self, stream: Stream, control: records.Control) -> None:
-        self._stream = stream
-        self._control = control
-        self.unsound: set[str] = set()  # keywords of segments with unreadable cards
-
-    def read(self, head: Card) -> Segment | None:
-        """Read the segment of a keyword card; None after an error."""
-        segment = READERS[head.keyword](self, head)
-        if segment is None:
-            self.unsound.add(head.keyword)
-        return segment
-
-    # Numbered cards up to a blank one ------------------------------------------------------------
-
-    def _records(self, head: Card, kind: type[_R], fields: Fields) -> tuple[_R, ...]:
-        """Records of numbered cards up to a blank card, or up to the last element's card."""
-        found: list[_R] = []
-        while (card := self._stream.take_data()) is not None and not card.is_blank:
-            if (record := self._stream.record(card, kind, fields)) is None:
-                self.unsound.add(head.keyword)
-            else:
-                found.append(record)
-        last = found[-1] if found else None
-        complete = isinstance(last, records.ElementNodes) and last.element >= self._control.numel
-        if card is None and not complete:
-            following = self._stream.peek()
-            message = f"The {head.keyword} cards are not ended by a blank card."
-            hint = f"put a blank card {'before this one' if following else 'at the end'}"
-            self._stream.findings.add("E007", message, (following or head).place, hint)
-        return tuple(found)
-
-    def _numbered(self, head: Card) -> Segment:
-        kind = NUMBERED[head.keyword]
-        cards = self._records(head, kind.record, kind.card_fields(self._control))
-        return kind(cards, source=Source(head, ()))
-
-    # Cards of a fixed number ---------------------------------------------------------------------
-
-    def _single(self, head: Card, kind: type[_R], fields: Fields | None = None) -> _R | None:
-        """Record of a mandatory card; None if it is missing or unreadable."""
-        card = self._stream.take_data()
-        if card is None and head.keyword not in self.unsound:
-            message = f"A card of {head.keyword} is missing."
-            hint = f"its fields are {', '.join(field.name for field in fields or kind.fields)}"
-            self._stream.findings.add("E008", message, (self._stream.peek() or head).place, hint)
-        record = None if card is None else self._stream.record(card, kind, fields)
-        if record is None:
-            self.unsound.add(head.keyword)
-        return record
-
-    def _patch(self, head: Card) -> Segment | None:
-        # The card begins with a word, but not with that of another segment.
-        card = self._stream.peek()
-        if card is not None and card.keyword not in (*READERS, END):
-            self._stream.take()
-            return self._stream.record(card, model.Patch)
-        message = "A card of PATC is missing."
-        hint = "a blank card takes a disc of 0.327 times the thickness at the node of ROD"
-        self._stream.findings.add("E008", message, (card or head).place, hint)
-        return None
-
-    def _allowables(self, head: Card) -> Segment | None:
-        strengths = self._single(head, model.Allowables)
-        card = self._stream.take_data()
-        row = None if card is None else self._stream.row(card, model.Allowables.constants)
-        if strengths is None or (card is not None and row is None):
-            return None
-        return strengths if row is None else strengths.with_constants(row[0])
-
-    def _shear(self, head: Card) -> Segment | None:
-        words = head.data.replace(",", " ").upper().split()[1:]
-        for word in words:
-            if word not in model.Shear.WORDS:
-                message = f"`{word}` after SHEA is unknown."
-                hint = "SHEA takes MITC (assumed strains) and EQUI (stiffness from equilibrium)"
-                self._stream.findings.add("E446", message, head.place, hint)
-        assumed, equilibrium = (word in words for word in model.Shear.WORDS)
-        following = self._stream.peek()
-        if words and (following is None or following.is_keyword or following.is_blank):
-            return model.Shear(1.0, assumed, equilibrium, source=Source(head, ()))
-        found = self._single(head, model.Shear)
-        return found and replace(found, assumed=assumed, equilibrium=equilibrium)
-
-    def _indentation(self, head: Card) -> Segment | None:
-        word = " ".join(head.data.replace(",", " ").split()[1:]).upper()
-        if word and word != model.Indentation.ACR:
-            message = f"`{word}` after EXPE is not read: the law is that of equation 3-8."
-            hint = "EXPE ACR takes the law of equation 3-7"
-            self._stream.findings.add("W416", message, head.place, hint)
-            word = ""
-        law = self._single(head, model.Indentation, model.Indentation.acr_fields if word else None)
-        return law and replace(law, word=word)
-
-    def _projectile(self, head: Card) -> Segment | None:
-        projectile = self._single(head, model.Projectile)
-        if projectile is None or not projectile.elements:
-            return projectile
-        diameters = self._records(head, records.RodDiameter, records.RodDiameter.fields)
-        return replace(projectile, diameters=diameters)
-
-    def _units(self, head: Card) -> Segment | None:
-        card = self._stream.take()
-        names = [] if card is None else card.data.replace(",", " ").split()
-        if card is not None and len(names) == len(model.Units.NAMES):
-            return model.Units(*names, source=Source(card, ()))
-        if card is not None and card.keyword in (*READERS, END):
-            self._stream.give_back()
-        message = "UNIT takes one card with three names: the units of length, force and time."
-        self._stream.findings.add("E010", message, (card or head).place, "for example: in lbf s")
-        return None
-
-    def _print_option(self, head: Card) -> Segment:
-        return model.PrintOption(head.keyword == "PRIN", source=Source(head, ()))
-
-    def _page(self, head: Card) -> Segment:
-        card = self._stream.take()
-        return model.Page("" if card is None else card.data[:4].rstrip(), source=Source(head, ()))
-
-    def _material(self, head: Card) -> Segment | None:
-        integration, ply = self._single(head, records.Integration), self._single(head, records.Ply)
-        layers = self._layers(head) if integration or ply else None
-        if integration is None or ply is None or layers is None:
-            return None
-        return model.Material(integration, ply, layers, source=Source(head, ()))
-
-    def _layers(self, head: Card) -> tuple[records.Layer, ...] | None:
-        """Layer cards, as many as the control card says; None if one is missing or unreadable."""
-        count = self._control.layers
-        layers: list[records.Layer] = []
-        for number in range(count):
-            card = self._stream.take_data()
-            if card is None or card.is_blank:
-                message = f"MATE has {number} layer cards where the control card says {count}."
-                place = (card or self._stream.peek() or head).place
-                self._stream.findings.add("E202", message, place)
-                return None
-            if (layer := self._stream.record(card, records.Layer)) is not None:
-                layers.append(layer)
-        return tuple(layers) if len(layers) == count else None
-
-
-NUMBERED: dict[str, type[model.NumberedSegment]] = {
-    kind.keyword: kind
-    for kind in (model.Coordinates, model.Elements, model.Boundary, model.Forces, model.Gages)
-}
-# Readers of the segments, by keyword.
-READERS: dict[str, Callable[[SegmentReader, Card], Segment | None]] = {
-    "COOR": SegmentReader._numbered,
-    "ELEM": SegmentReader._numbered,
-    "BOUN": SegmentReader._numbered,
-    "MATE": SegmentReader._material,
-    "ROD": lambda reader, head: reader._single(head, model.Impact),
-    "EXPE": SegmentReader._indentation,
-    "FORC": SegmentReader._numbered,
-    "PROJ": SegmentReader._projectile,
-    "SHEA": SegmentReader._shear,
-    "PATC": SegmentReader._patch,
-    "ALLO": SegmentReader._allowables,
-    "DELA": lambda reader, head: reader._single(head, model.Delamination),
-    "DAMP": lambda reader, head: reader._single(head, model.Damping),
-    "GAGE": SegmentReader._numbered,
-    "UNIT": SegmentReader._units,
-    "PRIN": SegmentReader._print_option,
-    "NOPR": SegmentReader._print_option,
-    "PAGE": SegmentReader._page,
-}
-
-
-class Reader:
+class Reader(Stream):
     """Reads the cards of a file, problem by problem; the options are those of :class:`Stream`."""
 
-    def __init__(
-        self, text: str, *, blanks_are_zeros: bool = False, keeps_values: bool = False
-    ) -> None:
-        self.stream = Stream(text, blanks_are_zeros=blanks_are_zeros, keeps_values=keeps_values)
-        self._unsound: set[str] = set()
+    def __init__(self, text: str, **options: bool) -> None:
+        super().__init__(text, **options)
+        self._control: records.Control  # of the problem that is read
+        self._unsound: set[str] = set()  # keywords of its segments with unreadable cards
         self._segments = 0
         self._counted = Counter[str]()
-
-    @property
-    def findings(self) -> Findings:
-        """Findings about the file."""
-        return self.stream.findings
 
     def problems(self) -> list[ParsedProblem]:
         """Read every problem of the file."""
         problems: list[ParsedProblem] = []
         stopped = False
-        while (card := self.stream.take_filled()) is not None:
-            first = not (problems or stopped or self.findings)
-            if first and (other := _program_of(card.data)):
+        while (card := self.take_filled()) is not None:
+            others = (kind for head, kind in OTHERS.items() if re.match(head, card.data, re.I))
+            if not (problems or self.findings) and (other := next(others, "")):
                 message = f"This is {other}, not a deck."
                 hint = "`fecm new DECK --mesh FILE`, or fecm.Plate.from_mesh, takes a mesh from it"
                 self.findings.add("E013", message, card.place, hint)
@@ -352,12 +164,12 @@ class Reader:
                 problems.append(self._problem(card))
             else:
                 self._stray(card, [TITLE, STOP])
-        last = self.stream.last
         if not problems and not self.findings.errors:
             message = "The file contains no problem."
             self.findings.add("E001", message, None, "a problem begins with a FECM card")
-        elif last is not None and not stopped and not self.findings.counts["E004"]:
-            self.findings.add("W002", "The deck does not end with a STOP card.", last.place)
+        elif self._cards and not stopped and not self.findings.counts["E004"]:
+            place = Card(*self._cards[-1]).place
+            self.findings.add("W002", "The deck does not end with a STOP card.", place)
         return problems
 
     def _end(self, message: str, card: Card) -> None:
@@ -367,28 +179,27 @@ class Reader:
 
     def _problem(self, title: Card) -> ParsedProblem:
         """Read one problem, from its FECM card on."""
-        first = self.stream.position - 1
+        first = self.position - 1
         self._unsound = set()
-        control = self._control(title)
+        control = self._control_card(title)
         segments = self._mesh_and_data(title, control)
-        macros = [] if self.stream.at_end else self._program(title)
+        macros = [] if self.at_end else self._program(title)
         if control is None:
             return ParsedProblem(None, self._unsound)
         parts = tuple(segments), tuple(macros), tuple(self._tables(macros))
-        text, source = f"{self.stream.text_since(first)}\n{STOP}\n", Source(title, ())
-        deck = Deck(title.data[4:].strip(), control, *parts, text, source=source)
+        lines = [line.rstrip() for _, line in self._cards[first : self.position]]
+        text = "\n".join([*lines, STOP, ""])
+        deck = Deck(title.data[4:].strip(), control, *parts, text, source=Source(title, ()))
         return ParsedProblem(deck, self._unsound)
 
-    # Control card --------------------------------------------------------------------------------
-
-    def _control(self, title: Card) -> records.Control | None:
+    def _control_card(self, title: Card) -> records.Control | None:
         """Read the control card; None if it is missing or invalid."""
-        card = self.stream.take_data()
+        card = self.take_data()
         if card is None:
-            place = (self.stream.peek() or title).place
+            place = (self.peek() or title).place
             self.findings.add("E003", "The control card is missing.", place, CONTROL_CARD)
             return None
-        control = self.stream.record(card, records.Control)
+        control = self.record(card, records.Control)
         return control if control and self._is_sound(control) else None
 
     def _is_sound(self, control: records.Control) -> bool:
@@ -425,34 +236,33 @@ class Reader:
                 self.findings.add("E201", message, control.place(name), hint)
         return len(self.findings) == before
 
-    # Mesh and data -------------------------------------------------------------------------------
-
     def _mesh_and_data(self, title: Card, control: records.Control | None) -> list[Segment]:
         """Read the segments up to their END."""
         segments: list[Segment] = []
-        reader = None if control is None else SegmentReader(self.stream, control)
-        if reader is not None:
-            self._unsound = reader.unsound
-        while (card := self.stream.take_filled()) is not None:
+        if control is not None:
+            self._control = control
+        while (card := self.take_filled()) is not None:
             keyword = card.keyword
             if keyword == END:
                 return segments
             if keyword in (MACROS, STOP, TITLE):
-                self.stream.give_back()
+                self.give_back()
                 message = f"The mesh data are not ended by END before {keyword}."
                 self.findings.add("E004", message, card.place)
                 return segments
             if keyword not in READERS or not card.is_keyword:
                 self._stray(card, [*READERS, END])
                 if not card.is_keyword:
-                    self.stream.skip_data()
-            elif reader is None:
-                self.stream.skip_data()  # without counts the cards are ambiguous
+                    self.skip_data()
+            elif control is None:
+                self.skip_data()  # without counts the cards are ambiguous
             elif self._segments == MOST_SEGMENTS:
                 self._end(f"The file has more than {MOST_SEGMENTS} segments.", card)
             else:
                 self._segments += 1
-                if (segment := reader.read(card)) is not None:
+                if (segment := READERS[keyword](self, card)) is None:
+                    self._unsound.add(keyword)
+                else:
                     segments.append(segment)
         self.findings.add("E004", "The mesh data are not ended by END.", title.place)
         return segments
@@ -472,25 +282,22 @@ class Reader:
             self.findings.add("E005", message, card.place, "move it to the left")
         else:
             message = "A keyword is expected, not a card of data."
-            hint = (
-                "a segment has more cards than its counts say, or a blank card ended it too early"
-            )
+            why = "a segment has more cards than its counts say"
+            hint = f"{why}, or a blank card ended it too early"
             self.findings.add("E006", message, card.place, hint)
         if known != [MACROS]:
-            self.stream.skip_data()
-
-    # Macro program -------------------------------------------------------------------------------
+            self.skip_data()
 
     def _program(self, title: Card) -> list[records.Macro]:
         """Read the macro program from its MACR card to its END."""
-        while (card := self.stream.take_filled()) is not None:
+        while (card := self.take_filled()) is not None:
             if card.keyword == MACROS:
                 return self._macros(card)
             if card.keyword in (TITLE, STOP):
-                self.stream.give_back()
+                self.give_back()
                 break
             if card.is_keyword and not _close(card.keyword, [MACROS]):
-                self.stream.give_back()
+                self.give_back()
                 message = "The MACR card before the macro program is missing."
                 self.findings.add("E009", message, card.place)
                 return self._macros(card)
@@ -504,20 +311,18 @@ class Reader:
 
     def _macros(self, head: Card) -> list[records.Macro]:
         macros: list[records.Macro] = []
-        card: Card | None = head
-        while (card := self.stream.take_filled()) is not None:
+        while (card := self.take_filled()) is not None:
             if card.keyword == END:
                 return macros
             if card.keyword in (STOP, TITLE):
-                self.stream.give_back()
+                self.give_back()
                 break
             if len(macros) == MOST_MACRO_CARDS:
                 self._end(f"The macro program has more than {MOST_MACRO_CARDS} cards.", card)
                 break
-            short = _leaves_out_second_word(card)
-            row = self.stream.row(
-                card, records.Macro.short_fields if short else records.Macro.fields
-            )
+            # In free format a number may stand where the second word belongs.
+            short = card.data.partition(",")[2].lstrip()[:1] in tuple("0123456789.+-")
+            row = self.row(card, records.Macro.short_fields if short else records.Macro.fields)
             if row is None:
                 self._unsound.add(MACROS)
             else:
@@ -534,17 +339,159 @@ class Reader:
         for macro in macros:
             if macro.word != "PROP" or macro.value <= 0:
                 continue
-            card = self.stream.take_data()
+            card = self.take_data()
             if card is None or card.is_blank:
                 message = "The card of PROP's load table is missing after the macro program's END."
                 hint = "(2I5,7F10.0): type, exponent, t_min, t_max, A1 to A5"
                 self.findings.add("E011", message, macro.place("macro"), hint)
                 break
-            if (table := self.stream.record(card, records.LoadTable)) is None:
+            if (table := self.record(card, records.LoadTable)) is None:
                 self._unsound.add(MACROS)
             else:
                 tables.append(table)
         return tables
+
+    def _records(self, head: Card, kind: type[_R], fields: Fields) -> tuple[_R, ...]:
+        """Records of numbered cards up to a blank card, or up to the last element's card."""
+        found: list[_R] = []
+        while (card := self.take_data()) is not None and not card.is_blank:
+            if (record := self.record(card, kind, fields)) is None:
+                self._unsound.add(head.keyword)
+            else:
+                found.append(record)
+        last = found[-1] if found else None
+        complete = isinstance(last, records.ElementNodes) and last.element >= self._control.numel
+        if card is None and not complete:
+            following = self.peek()
+            message = f"The {head.keyword} cards are not ended by a blank card."
+            hint = f"put a blank card {'before this one' if following else 'at the end'}"
+            self.findings.add("E007", message, (following or head).place, hint)
+        return tuple(found)
+
+    def _numbered(self, head: Card, kind: type[model.NumberedSegment]) -> Segment:
+        cards = self._records(head, kind.record, kind.card_fields(self._control))
+        return kind(cards, source=Source(head, ()))
+
+    def _single(self, head: Card, kind: type[_R], fields: Fields | None = None) -> _R | None:
+        """Record of a mandatory card; None if it is missing or unreadable."""
+        card = self.take_data()
+        if card is None and head.keyword not in self._unsound:
+            message = f"A card of {head.keyword} is missing."
+            hint = f"its fields are {', '.join(field.name for field in fields or kind.fields)}"
+            self.findings.add("E008", message, (self.peek() or head).place, hint)
+        record = None if card is None else self.record(card, kind, fields)
+        if record is None:
+            self._unsound.add(head.keyword)
+        return record
+
+    def _patch(self, head: Card) -> Segment | None:
+        # The card begins with a word, but not with that of another segment.
+        card = self.peek()
+        if card is not None and card.keyword not in (*READERS, END):
+            self.take()
+            return self.record(card, model.Patch)
+        message = "A card of PATC is missing."
+        hint = "a blank card takes a disc of 0.327 times the thickness at the node of ROD"
+        self.findings.add("E008", message, (card or head).place, hint)
+        return None
+
+    def _allowables(self, head: Card) -> Segment | None:
+        strengths = self._single(head, model.Allowables)
+        card = self.take_data()
+        row = None if card is None else self.row(card, model.Allowables.constants)
+        if strengths is None or (card is not None and row is None):
+            return None
+        return strengths if row is None else strengths.with_constants(row[0])
+
+    def _shear(self, head: Card) -> Segment | None:
+        words = head.data.replace(",", " ").upper().split()[1:]
+        for word in words:
+            if word not in model.Shear.WORDS:
+                message = f"`{word}` after SHEA is unknown."
+                hint = "SHEA takes MITC (assumed strains) and EQUI (stiffness from equilibrium)"
+                self.findings.add("E446", message, head.place, hint)
+        assumed, equilibrium = (word in words for word in model.Shear.WORDS)
+        following = self.peek()
+        if words and (following is None or following.is_keyword or following.is_blank):
+            return model.Shear(1.0, assumed, equilibrium, source=Source(head, ()))
+        found = self._single(head, model.Shear)
+        return found and replace(found, assumed=assumed, equilibrium=equilibrium)
+
+    def _indentation(self, head: Card) -> Segment | None:
+        word = " ".join(head.data.replace(",", " ").split()[1:]).upper()
+        if word and word != model.Indentation.ACR:
+            message = f"`{word}` after EXPE is not read: the law is that of equation 3-8."
+            hint = "EXPE ACR takes the law of equation 3-7"
+            self.findings.add("W416", message, head.place, hint)
+            word = ""
+        law = self._single(head, model.Indentation, model.Indentation.acr_fields if word else None)
+        return law and replace(law, word=word)
+
+    def _projectile(self, head: Card) -> Segment | None:
+        projectile = self._single(head, model.Projectile)
+        if projectile is None or not projectile.elements:
+            return projectile
+        diameters = self._records(head, records.RodDiameter, records.RodDiameter.fields)
+        return replace(projectile, diameters=diameters)
+
+    def _units(self, head: Card) -> Segment | None:
+        card = self.take()
+        if card is not None and len(names := card.data.replace(",", " ").split()) == 3:
+            return model.Units(*names, source=Source(card, ()))
+        if card is not None and card.keyword in (*READERS, END):
+            self.give_back()
+        message = "UNIT takes one card with three names: the units of length, force and time."
+        self.findings.add("E010", message, (card or head).place, "for example: in lbf s")
+        return None
+
+    def _page(self, head: Card) -> Segment:
+        card = self.take()
+        return model.Page("" if card is None else card.data[:4].rstrip(), source=Source(head, ()))
+
+    def _material(self, head: Card) -> Segment | None:
+        integration, ply = self._single(head, records.Integration), self._single(head, records.Ply)
+        layers = self._layers(head) if integration or ply else None
+        if integration is None or ply is None or layers is None:
+            return None
+        return model.Material(integration, ply, layers, source=Source(head, ()))
+
+    def _layers(self, head: Card) -> tuple[records.Layer, ...] | None:
+        """Layer cards, as many as the control card says; None if one is missing or unreadable."""
+        count = self._control.layers
+        layers: list[records.Layer] = []
+        for number in range(count):
+            card = self.take_data()
+            if card is None or card.is_blank:
+                message = f"MATE has {number} layer cards where the control card says {count}."
+                place = (card or self.peek() or head).place
+                self.findings.add("E202", message, place)
+                return None
+            if (layer := self.record(card, records.Layer)) is not None:
+                layers.append(layer)
+        return tuple(layers) if len(layers) == count else None
+
+
+# Readers of the segments, by keyword.
+READERS: dict[str, Callable[[Reader, Card], Segment | None]] = {
+    "COOR": lambda reader, head: reader._numbered(head, model.Coordinates),
+    "ELEM": lambda reader, head: reader._numbered(head, model.Elements),
+    "BOUN": lambda reader, head: reader._numbered(head, model.Boundary),
+    "MATE": Reader._material,
+    "ROD": lambda reader, head: reader._single(head, model.Impact),
+    "EXPE": Reader._indentation,
+    "FORC": lambda reader, head: reader._numbered(head, model.Forces),
+    "PROJ": Reader._projectile,
+    "SHEA": Reader._shear,
+    "PATC": Reader._patch,
+    "ALLO": Reader._allowables,
+    "DELA": lambda reader, head: reader._single(head, model.Delamination),
+    "DAMP": lambda reader, head: reader._single(head, model.Damping),
+    "GAGE": lambda reader, head: reader._numbered(head, model.Gages),
+    "UNIT": Reader._units,
+    "PRIN": lambda _, head: model.PrintOption(True, source=Source(head, ())),
+    "NOPR": lambda _, head: model.PrintOption(False, source=Source(head, ())),
+    "PAGE": Reader._page,
+}
 
 
 def _close(word: str, known: list[str]) -> list[str]:
@@ -554,38 +501,18 @@ def _close(word: str, known: list[str]) -> list[str]:
     return difflib.get_close_matches(word, known, 1, 0.6)
 
 
-def _leaves_out_second_word(card: Card) -> bool:
-    """Whether a macro card in free format has a number where the second word belongs."""
-    _, comma, rest = card.data.partition(",")
-    text = rest.partition(",")[0].strip()
-    return bool(comma) and text[:1] in tuple("0123456789.+-")
-
-
-def decode(data: bytes) -> str:
-    """Text of a deck's bytes: UTF-8, or Latin-1 where it is not."""
-    try:
-        return data.decode("utf-8")
-    except UnicodeDecodeError:
-        return data.decode("latin-1")
-
-
-def _program_of(line: str) -> str:
-    """The kind of file that begins with a line, if it is another program's."""
-    return next((kind for head, kind in OTHERS.items() if re.match(head, line, re.I)), "")
-
-
 def load_text(path_or_text: str | Path | BinaryIO) -> tuple[str, str]:
     """Text and name of a deck, see :func:`read_deck`; of an open file it is standard input."""
     if isinstance(path_or_text, str) and ("\n" in path_or_text or not path_or_text.strip()):
         return path_or_text, "<text>"
     if not isinstance(path_or_text, str | Path):
-        return decode(_bytes(path_or_text, STDIN)), STDIN
+        return _text(path_or_text, STDIN), STDIN
     with Path(path_or_text).open("rb") as file:
-        return decode(_bytes(file, str(path_or_text))), str(path_or_text)
+        return _text(file, str(path_or_text)), str(path_or_text)
 
 
-def _bytes(file: BinaryIO, path: str) -> bytes:
-    """All bytes of a deck, which may be an endless pipe.
+def _text(file: BinaryIO, path: str) -> str:
+    """Text of a deck, which may be an endless pipe: UTF-8, or Latin-1 where it is not.
 
     Raises NotEnoughMemoryError if its cards need more memory than is free.  Raises OSError if it
     can't be read or is not text.
@@ -602,7 +529,10 @@ def _bytes(file: BinaryIO, path: str) -> bytes:
         raise NotEnoughMemoryError(f"{path}: a deck of more than {format_bytes(most)} is not read")
     lines = len(data) - len(data.translate(None, LINE_ENDS)) - data.count(b"\r\n")
     require(BYTES_A_BYTE * len(data) + BYTES_A_LINE * lines, f"{path}: the deck")
-    return data
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
 
 
 def read_deck(path_or_text: str | Path) -> Deck | list[Deck]:
