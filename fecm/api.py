@@ -14,7 +14,7 @@ from fecm.deck.findings import DeckError, Finding
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, load_text, read_deck
 from fecm.mechanics.contact_law import Law
-from fecm.mechanics.rod_integrators import Integrator, MassMatrix, RodMethod
+from fecm.mechanics.projectile import Integrator, MassMatrix, RodMethod
 from fecm.problem.check_mesh import HOURGLASS, check_listing
 from fecm.problem.memory import check_memory
 from fecm.problem.options import ENERGY_LIMIT, RunOptions

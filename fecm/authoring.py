@@ -27,7 +27,7 @@ from fecm.deck.findings import DeckError
 from fecm.deck.grid import Grid
 from fecm.deck.records import Control, Gage, Integration, Layer, Macro, Ply
 from fecm.mechanics.laminate import laminate as stiffness_of
-from fecm.mechanics.patch import HERTZ
+from fecm.mechanics.points import HERTZ
 from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.objects import (

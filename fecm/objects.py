@@ -32,7 +32,7 @@ from fecm.deck.model import Indentation, Patch
 from fecm.deck.records import Ply
 from fecm.deck.units import MODULUS
 from fecm.mechanics.contact_law import hertz_coefficient
-from fecm.mechanics.patch import DISC, HERTZ
+from fecm.mechanics.points import DISC, HERTZ
 from fecm.problem.plate_mesh import (
     BOUNDARY,
     MeshLike,

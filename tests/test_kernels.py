@@ -20,8 +20,7 @@ from fecm.mechanics import kernels
 from fecm.mechanics.impact_steps import Modes
 from fecm.mechanics.interpolation import NDOF
 from fecm.mechanics.kernels.plate import CompiledProduct
-from fecm.mechanics.projectile import Rod
-from fecm.mechanics.rod_integrators import RodState, WilsonStep
+from fecm.mechanics.projectile import Rod, RodState, WilsonStep
 from fecm.mechanics.stiffness_product import stiffness_operator
 from fecm.problem.build import build_model
 from fecm.problem.options import RunOptions

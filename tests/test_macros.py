@@ -11,7 +11,7 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.deck.records import LoadTable, load_factor
-from fecm.mechanics.natural_modes import modes
+from fecm.mechanics.solutions import modes
 from fecm.problem.build import build_plate
 from fecm.results.result import Result
 from tests.calls import call

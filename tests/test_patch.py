@@ -9,9 +9,9 @@ import pytest
 
 from fecm.mechanics.laminate import laminate
 from fecm.mechanics.mesh import Mesh
-from fecm.mechanics.patch import DISC, HERTZ, PatchError, patch_weights
 from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.statics import Tangent
+from fecm.mechanics.points import DISC, HERTZ, PatchError, patch_weights
+from fecm.mechanics.solutions import Tangent
 from tests.builders import (
     REPORT_PLY,
     Floats,

@@ -13,9 +13,9 @@ from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.mesh import Mesh
-from fecm.mechanics.patch import DISC, HERTZ, patch_weights
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import PlateMotion
+from fecm.mechanics.points import DISC, HERTZ, patch_weights
 from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.symmetry import symmetry_reduction
 from fecm.mechanics.time_step import critical_time_step

@@ -10,7 +10,6 @@ import pytest
 from fecm.deck.records import Ply
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.laminate import Laminate, laminate
-from fecm.mechanics.locate import locate
 from fecm.mechanics.mesh import Mesh, element_blocks
 from fecm.mechanics.ply_stresses import (
     PlyStresses,
@@ -19,6 +18,7 @@ from fecm.mechanics.ply_stresses import (
     interlaminar_stresses,
     second_derivatives,
 )
+from fecm.mechanics.points import locate
 from tests.builders import (
     DATA,
     GENERAL_ANGLES,

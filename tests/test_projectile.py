@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fecm.mechanics.projectile import Rod, report_rod, rigid_approach
-from fecm.mechanics.rod_integrators import RodState, WilsonStep
+from fecm.mechanics.projectile import Rod, RodState, WilsonStep, report_rod, rigid_approach
 
 
 def test_the_reports_rod_weighs_what_page_81_says() -> None:

@@ -15,7 +15,7 @@ from fecm.deck import Deck
 from fecm.deck.grid import Grid, Section
 from fecm.deck.model import Impact, Indentation, Material, Projectile
 from fecm.deck.records import Control, Integration, Layer, Macro, Ply
-from fecm.mechanics.gages import gages
+from fecm.mechanics.points import gages
 from fecm.mechanics.projectile import RigidMass, Rod, report_rod
 from fecm.problem.build import build_plate, build_projectile
 from fecm.problem.generate import generate

@@ -11,8 +11,7 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.deck.records import Ply
-from fecm.mechanics.delamination import SMALL_MASS, effective_rigidity, threshold_force
-from fecm.mechanics.laminate import laminate
+from fecm.mechanics.laminate import SMALL_MASS, effective_rigidity, laminate, threshold_force
 from fecm.results.result import Result
 from fecm.studies.estimate import (
     inelasticity,

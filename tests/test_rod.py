@@ -12,8 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.mechanics.projectile import Rod, report_rod
-from fecm.mechanics.rod_integrators import AVERAGE, CONSISTENT
+from fecm.mechanics.projectile import AVERAGE, CONSISTENT, Rod, report_rod
 from fecm.studies.rod_test.filters import Filter
 from fecm.studies.rod_test.pulse_test import (
     Pulse,

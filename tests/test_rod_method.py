@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 import fecm
-from fecm.mechanics.projectile import Rod, report_rod
-from fecm.mechanics.rod_integrators import (
+from fecm.mechanics.projectile import (
     AVERAGE,
     CONSISTENT,
     INTEGRATORS,
@@ -20,8 +19,10 @@ from fecm.mechanics.rod_integrators import (
     STEPS,
     WILSON,
     Integrator,
+    Rod,
     RodIntegrator,
     RodState,
+    report_rod,
 )
 from fecm.results.result import Result
 from tests.calls import call

@@ -14,8 +14,7 @@ import fecm
 from fecm.deck import Deck
 from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent, stacked
 from fecm.mechanics.plate_motion import DivergenceError
-from fecm.mechanics.projectile import RigidMass
-from fecm.mechanics.rod_integrators import WilsonStep
+from fecm.mechanics.projectile import RigidMass, WilsonStep
 from fecm.results.metrics import PEAKS, SUMMARY
 from fecm.sweeps import batch
 from fecm.sweeps.outcome import STILL

@@ -12,14 +12,11 @@ import pytest
 import fecm
 from fecm.deck import records
 from fecm.mechanics import (
-    delamination,
     element_matrices,
-    gages,
     interpolation,
-    patch,
     ply_stresses,
+    points,
     projectile,
-    rod_integrators,
     strains,
 )
 from fecm.mechanics import impact as impacts
@@ -228,12 +225,12 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
         {"resultants": ("Q_x", "Q_y")},
     ),
     "a gage on the other face": (
-        instead(gages, "_functional",
+        instead(points, "_functional",
                 lambda right, f, gage, t: right(f, replace(gage, z=-gage.z), t)),
         {"forced-plate": ("strain",)},
     ),
     "a gage turned the other way": (
-        instead(gages, "_functional",
+        instead(points, "_functional",
                 lambda right, f, gage, t: right(f, replace(gage, direction=-gage.direction), t)),
         {"forced-plate": ("strain",)},
     ),
@@ -263,11 +260,11 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
         {"wave-fronts": ("bending",), "dispersion": ("ω, wavelength", )},
     ),
     "theta of Wilson's method dropped": (
-        value(rod_integrators.WilsonStep, "theta", 1.0),
+        value(projectile.WilsonStep, "theta", 1.0),
         {"rod-pulse": ("largest", "the same", "mean", "velocity")},
     ),
     "theta of Wilson's method 4": (
-        value(rod_integrators.WilsonStep, "theta", 4.0), {"rod-waves": ("wave", "peak")},
+        value(projectile.WilsonStep, "theta", 4.0), {"rod-waves": ("wave", "peak")},
     ),
     "lumped mass of a quarter": (
         changed(projectile.Rod, "lumped_mass", quarter_of_mass),
@@ -341,20 +338,20 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
         instead(impacts, "couple_step", work_of_the_new_force), {"report-impact": ("worst",)},
     ),
     "a patch of half the radius": (
-        instead(patch, "patch_weights",
+        instead(points, "patch_weights",
                 lambda right, mesh, shape, c, *place: right(mesh, shape, c / 2.0, *place)),
         {"patch-compliance": ("W",), "patch-impact": ("largest", "its time")},
     ),
     "Hertz's pressure taken for a uniform one": (
-        instead(patch, "patch_weights",
-                lambda right, mesh, shape, *circle: right(mesh, patch.DISC, *circle)),
+        instead(points, "patch_weights",
+                lambda right, mesh, shape, *circle: right(mesh, points.DISC, *circle)),
         {"patch-compliance": ("W, Hertz",)},
     ),
     "MITC ignored": (
         changed(build, "has_assumed_shear", lambda found: False), {"assumed-shear": ("w",)},
     ),
     "D for 12 D in the delamination threshold": (
-        changed(delamination, "threshold_force", lambda force: force / 12.0**0.5),
+        changed(laminates, "threshold_force", lambda force: force / 12.0**0.5),
         {"threshold": ("",)},
     ),
     "a tenth of the plate's inertia missing in Zener's parameter": (

@@ -21,7 +21,7 @@ from fecm.deck.catalogue import CONTACTS, MATERIALS, STRENGTHS, NamedContact, Na
 from fecm.deck.format import format_deck
 from fecm.deck.grid import SUPPORTS
 from fecm.deck.model import Deck, Indentation, Material, Patch, Shear
-from fecm.mechanics.patch import DISC, RADIUS_PER_THICKNESS
+from fecm.mechanics.points import DISC, RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.objects import CUSTOM, FIXTURES, MOST, Laminate, ObjectError, Plate, Sphere, parse_patch
 from fecm.problem.plate_mesh import BOUNDARY

@@ -16,8 +16,15 @@ from fecm.cli.outputs import STANDARD_OUTPUT, OutputPaths, outputs
 from fecm.cli.types import POSITIVE, Finite, Parsed
 from fecm.deck.catalogue import SYSTEMS
 from fecm.deck.units import unit_names
-from fecm.mechanics.projectile import REPORT_ELEMENTS, RigidMass, Rod
-from fecm.mechanics.rod_integrators import INTEGRATORS, LUMPED, MASSES, WILSON
+from fecm.mechanics.projectile import (
+    INTEGRATORS,
+    LUMPED,
+    MASSES,
+    REPORT_ELEMENTS,
+    WILSON,
+    RigidMass,
+    Rod,
+)
 from fecm.problem.build import build_projectile, build_station
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import Calibration, Filter, filter_of, recorded

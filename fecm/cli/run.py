@@ -28,8 +28,8 @@ from fecm.cli.common import (
 from fecm.cli.decks import load_valid
 from fecm.cli.types import POSITIVE, Finite
 from fecm.mechanics.plate_motion import DivergenceError
-from fecm.mechanics.rod_integrators import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
-from fecm.mechanics.statics import SingularStiffnessError
+from fecm.mechanics.projectile import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
+from fecm.mechanics.solutions import SingularStiffnessError
 from fecm.mechanics.stiffness_product import AUTO, SOLVERS
 from fecm.problem.memory import check_memory
 from fecm.problem.options import ENERGY_LIMIT, RunOptions

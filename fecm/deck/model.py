@@ -231,7 +231,7 @@ class Patch(Segment, keyword="PATC"):
     """PATC: (A4,6X,4F10.0); the contact force acts on a circle (not in the report's program)."""
 
     shape: str = "DISC"  # ``"DISC"``, a uniform pressure, or ``"HERT"``, Hertz's
-    # Length; None takes :data:`~fecm.mechanics.patch.RADIUS_PER_THICKNESS` times the thickness.
+    # Length; None takes :data:`~fecm.mechanics.points.RADIUS_PER_THICKNESS` times the thickness.
     radius: float | None = None
     # Centre, length; None takes the node of ROD.
     x: float | None = None

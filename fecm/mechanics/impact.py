@@ -18,8 +18,7 @@ import numpy as np
 from fecm._frozen import frozen
 from fecm.mechanics.contact_law import ContactPoint, Law, Number, Truth
 from fecm.mechanics.plate_motion import AppliedForce, DivergenceError, Load, PlateMotion, PlateState
-from fecm.mechanics.projectile import Projectile, rigid_approach
-from fecm.mechanics.rod_integrators import RodIntegrator, TipStep, WilsonStep
+from fecm.mechanics.projectile import Projectile, RodIntegrator, TipStep, WilsonStep, rigid_approach
 
 # The listing's contact iteration; the number of passes affects the results.
 PASSES = 5

@@ -31,7 +31,7 @@ from fecm.mechanics.plate_motion import (
     PointLoad,
     Sums,
 )
-from fecm.mechanics.rod_integrators import RodIntegrator, RodState
+from fecm.mechanics.projectile import RodIntegrator, RodState
 
 # Difference of squares of frequencies below which modes count as equal, relative to the largest.
 EQUAL = 1e-10
@@ -92,7 +92,7 @@ class Modes:
     def step(self, integrator: RodIntegrator) -> tuple[Floats, Floats]:
         """Matrices (9, modes) of a step and motion per force on the tip (3, modes).
 
-        Those of :class:`~fecm.mechanics.rod_integrators.RodIntegrator`, mode by mode.
+        Those of :class:`~fecm.mechanics.projectile.RodIntegrator`, mode by mode.
         """
         theta, r, dt = integrator.theta, integrator.inverse_beta, integrator.dt
         a0, a2 = r / (theta * dt) ** 2, r / (theta * dt)

@@ -7,6 +7,7 @@ shear), transverse shear in the order xz, yz.  No shear correction factor is app
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -18,9 +19,7 @@ from fecm._typing import Floats
 
 # The slip ``small-stiffness`` sets entries of A, B and D below the first limit to 0, except
 # rounding errors below the second one, relative to A h^n.
-LISTING_LEAST = 1.0e-6
-
-ROUNDING = 1.0e-12
+LISTING_LEAST, ROUNDING = 1.0e-6, 1.0e-12
 
 
 @dataclass(frozen=True, match_args=False)  # attributes that need not be assignable
@@ -160,3 +159,29 @@ def laminate(
         thickness=h,
         plies=Plies(np.array(angles, dtype=float), faces, bars, shears),
     )
+
+
+# Delamination threshold of a small-mass impact over the static one (Olsson, Donadon, Falzon 2006).
+SMALL_MASS = 1.213
+
+
+def effective_rigidity(laminate: Laminate) -> float:
+    """Bending stiffness D* of the isotropic plate of equal threshold (force*length).
+
+    sqrt(D11 D22 (eta + 1)/2) with eta = (D12 + 2 D66)/sqrt(D11 D22), Olsson 1992; an unsymmetric
+    laminate has D - B A^-1 B for D.
+    """
+    A, B, D = laminate.A, laminate.B, laminate.D
+    if laminate.is_coupled:
+        D = D - B @ np.linalg.solve(A, B)
+    mean = math.sqrt(D[0, 0] * D[1, 1])
+    return mean * math.sqrt(((D[0, 1] + 2.0 * D[2, 2]) / mean + 1.0) / 2.0)
+
+
+def threshold_force(rigidity: float, toughness: float, delaminations: int = 1) -> float:
+    """Force at which n circular delaminations grow, pi sqrt(32 D* G_IIc/(n + 2)).
+
+    The rigidity D* is force*length, the toughness G_IIc force/length.  One delamination: Davies and
+    Robinson 1992; n of them: Suemasu and Majima 1996, Olsson 2001.
+    """
+    return math.pi * math.sqrt(32.0 * rigidity * toughness / (delaminations + 2.0))

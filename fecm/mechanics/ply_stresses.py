@@ -1,4 +1,4 @@
-"""Stresses ply by ply, and the transverse shear stiffness that follows from equilibrium.
+"""Stresses ply by ply, their failure, and the transverse shear stiffness from equilibrium.
 
 z runs from the struck face, -h/2, to h/2; ply 1 is at the struck face.  Stresses of a ply are in
 its own axes; interlaminar shear stresses are in the axes of the plate.  Both are linear in the
@@ -7,9 +7,12 @@ midplane strains eps and the curvatures kappa, eps(z) = eps + z kappa, or in the
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from fecm._typing import Bools, Floats, Indices
+from fecm.mechanics import failure
 from fecm.mechanics.elements import Quadrature, gauss
 from fecm.mechanics.interpolation import interpolate, inverse_jacobian, local_shape_functions
 from fecm.mechanics.laminate import Laminate
@@ -24,9 +27,9 @@ def in_plane_stresses(laminate: Laminate) -> Floats:
     """
     plies = laminate.plies
     m, n = np.cos(np.deg2rad(plies.angles)), np.sin(np.deg2rad(plies.angles))
-    T = np.array(
-        [[m * m, n * n, 2 * m * n], [n * n, m * m, -2 * m * n], [-m * n, m * n, m * m - n * n]]
-    )
+    T = np.array([
+        [m * m, n * n, 2 * m * n], [n * n, m * m, -2 * m * n], [-m * n, m * n, m * m - n * n]
+    ])  # fmt: skip
     stiffness = T.transpose(2, 0, 1) @ plies.stiffness
     z = np.stack([plies.faces[:-1], plies.faces[1:]], axis=1)[:, :, None, None]
     parts = np.broadcast_arrays(stiffness[:, None], z * stiffness[:, None])
@@ -64,10 +67,8 @@ def interlaminar_stresses(laminate: Laminate) -> tuple[Floats, Floats]:
 
     residual = shear(faces[-1:])[0]
     share = (z - faces[0]) / (faces[-1] - faces[0])
-    stresses = (
-        shear(z.ravel()).reshape(*z.shape, 2, 2, 6) - share[:, :, None, None, None] * residual
-    )
-    return stresses, residual
+    stresses = shear(z.ravel()).reshape(*z.shape, 2, 2, 6)
+    return stresses - share[:, :, None, None, None] * residual, residual
 
 
 def equilibrium_shear_stiffness(laminate: Laminate) -> Floats:
@@ -93,13 +94,11 @@ def equilibrium_shear_stiffness(laminate: Laminate) -> Floats:
 
 
 # Second derivatives d2/dxi2, d2/deta2 and d2/dxi deta of the 9-node shape functions at the centre.
-_CURVED = np.array(
-    [
-        [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, -2.0],
-        [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, -2.0],
-        [0.25, -0.25, 0.25, -0.25, 0.0, 0.0, 0.0, 0.0, 0.0],
-    ]
-)
+_CURVED = np.array([
+    [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, -2.0],
+    [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, -2.0],
+    [0.25, -0.25, 0.25, -0.25, 0.0, 0.0, 0.0, 0.0, 0.0],
+])  # fmt: skip
 
 
 def second_derivatives(family: ElementBlock) -> Floats:
@@ -108,15 +107,11 @@ def second_derivatives(family: ElementBlock) -> Floats:
     inverse, _ = inverse_jacobian(family, local)
     xi, eta = np.linalg.inv(inverse[:, 0]).swapaxes(0, 1)  # x and y by xi, by eta: (ne, 2)
     # d2N/dxi2 = x,xi^2 N,xx + y,xi^2 N,yy + 2 x,xi y,xi N,xy + x,xixi N,x + y,xixi N,y, and so on.
-    chain = np.stack(
-        [
-            np.stack(
-                [a[:, 0] * b[:, 0], a[:, 1] * b[:, 1], a[:, 0] * b[:, 1] + a[:, 1] * b[:, 0]], 1
-            )
-            for a, b in ((xi, xi), (eta, eta), (xi, eta))
-        ],
-        axis=1,
-    )
+    terms = [
+        (a[:, 0] * b[:, 0], a[:, 1] * b[:, 1], a[:, 0] * b[:, 1] + a[:, 1] * b[:, 0])
+        for a, b in ((xi, xi), (eta, eta), (xi, eta))
+    ]
+    chain = np.array(terms).transpose(2, 0, 1)
     slopes = np.einsum("eia,an->ein", inverse[:, 0], local[0])
     curved = np.einsum("an,eni->eai", _CURVED, family.coordinates)  # of x and y
     return np.linalg.solve(chain, _CURVED - curved @ slopes)
@@ -130,11 +125,7 @@ class PlyStresses:
     """
 
     def __init__(
-        self,
-        mesh: Mesh,
-        laminate: Laminate,
-        rule: Quadrature,
-        members: Indices | None = None,
+        self, mesh: Mesh, laminate: Laminate, rule: Quadrature, members: Indices | None = None
     ) -> None:
         self.members = np.arange(len(mesh.elements)) if members is None else members
         elements = mesh.elements[self.members]
@@ -169,9 +160,8 @@ class PlyStresses:
             q[:, :, 2:] *= -1.0  # curvatures are the strains of the rotations' negatives
             strains[family.rows] = _strains(slopes @ q[:, None])
             if curved is not None:
-                xx, yy, xy = (curved @ q).swapaxes(0, 1)
-                by_x, by_y = np.stack([xx, xy], 1), np.stack([xy, yy], 1)
-                gradients[family.rows] = _strains(np.stack([by_x, by_y], 1))
+                # By x, y of the derivatives by x, y: xx, xy; xy, yy.
+                gradients[family.rows] = _strains((curved @ q)[:, [[0, 2], [2, 1]]])
         return strains, gradients
 
     def evaluate(self, field: Floats) -> dict[str, Floats]:
@@ -205,3 +195,83 @@ def is_complete(elements: Ints) -> Bools:
     nodes = np.zeros((len(elements), 12), dtype=bool)
     nodes[:, : elements.shape[1]] = elements > 0
     return np.asarray(nodes[:, :9].all(axis=1) & ~nodes[:, 9:].any(axis=1))
+
+
+# Largest exposures over time: of all states, and modes only where an exposure rises ---------------
+
+# Points per matrix product: so few that BLAS uses one thread.
+BLOCK = 512
+
+
+@dataclass
+class Maxima:
+    """Largest exposure of every state so far, its time and mode."""
+
+    exposure: Floats
+    time: Floats
+    mode: failure.Codes  # index into :data:`~fecm.mechanics.failure.MODES`
+
+    @classmethod
+    def none(cls, *shape: int) -> Maxima:
+        """No exposure yet."""
+        return cls(np.zeros(shape), np.zeros(shape), np.zeros(shape, np.int8))
+
+
+@dataclass
+class FailureEnvelope:
+    """Largest exposures over time."""
+
+    # (criteria, states): states are elements, points, plies and faces.
+    plies: Maxima
+    interfaces: Maxima  # (elements, plies - 1)
+
+
+class FailureMonitor:
+    """Evaluates the failure criteria of all plies."""
+
+    def __init__(
+        self, stresses: PlyStresses, laminate: Laminate, strengths: failure.Strengths
+    ) -> None:
+        self.stresses, self._strengths = stresses, strengths
+        plies = len(laminate.plies.angles)
+        # Stresses (components, plies * 2) and (interfaces, plies beside, tau_13 tau_23).
+        self._in_plane = in_plane_stresses(laminate).transpose(3, 2, 0, 1).reshape(6, -1).copy()
+        tau = interlaminar_stresses(laminate)[0][:-1, 2].reshape(plies - 1, 2, 12)
+        angles = np.deg2rad(laminate.plies.angles)
+        c, s = np.cos(angles), np.sin(angles)
+        turn = np.array([[c, s], [-s, c]]).transpose(2, 0, 1)
+        beside = np.stack([turn[:-1], turn[1:]], axis=1)
+        self._shear = np.einsum("ibct,itg->gibc", beside, tau).reshape(12, -1)
+
+    def start(self) -> FailureEnvelope:
+        """No exposure yet."""
+        elements, points, plies = self.stresses.shape
+        states = Maxima.none(len(failure.CRITERIA), elements * points * plies * 2)
+        return FailureEnvelope(states, Maxima.none(elements, max(plies - 1, 0)))
+
+    def update(self, envelope: FailureEnvelope, field: Floats, time: float) -> None:
+        """Raise the exposures to those of a displacement field, (numnp, 5)."""
+        strains, gradients = self.stresses.strains(field)
+        self._raise_plies(envelope.plies, strains.reshape(-1, 6), time)
+        interfaces, shear = envelope.interfaces, gradients.reshape(-1, 12) @ self._shear
+        shear = shear.reshape(*interfaces.exposure.shape, 2, 2)
+        worst = failure.interlaminar(self._strengths, shear[..., 0], shear[..., 1]).max(axis=2)
+        # Elements without nine nodes have no interlaminar stresses.
+        interfaces.exposure[np.isnan(worst)] = np.nan
+        higher = worst > interfaces.exposure
+        interfaces.exposure[higher], interfaces.time[higher] = worst[higher], time
+        interfaces.mode[higher] = failure.MODES.index("interlaminar shear")
+
+    def _raise_plies(self, plies: Maxima, strains: Floats, time: float) -> None:
+        """Raise the exposures of all plies to those of strains, (elements * points, 6)."""
+        for start in range(0, len(strains), BLOCK):
+            stresses = np.split(strains[start : start + BLOCK] @ self._in_plane, 3, axis=1)
+            s1, s2, tau = (np.ascontiguousarray(part).ravel() for part in stresses)
+            first = start * self._in_plane.shape[1] // 3
+            for number, criterion in enumerate(failure.CRITERIA.values()):
+                candidates = criterion(self._strengths, s1, s2, tau)
+                exposure = failure.exposure_of(candidates)
+                own = plies.exposure[number, first : first + len(s1)]
+                (larger,) = np.nonzero(exposure > own)
+                own[larger], plies.time[number, first + larger] = exposure[larger], time
+                plies.mode[number, first + larger] = failure.modes_of(candidates, larger)

@@ -1,4 +1,4 @@
-"""The projectile: a rigid mass, or an elastic rod, report section 4.3.2.
+"""The projectile: a rigid mass, or an elastic rod with implicit steps, report section 4.3.2.
 
 Conventions: the dofs of a node are u and du/dx, node by node; x runs from the impacted end (node 1)
 into the rod.  Displacement, velocity and acceleration are positive away from the plate: an approach
@@ -8,13 +8,13 @@ state arrays is over dofs; another axis, one column per case, may follow.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Literal, Protocol
 
 import numpy as np
 
 from fecm._frozen import frozen
 from fecm._typing import Floats
-from fecm.mechanics.rod_integrators import CONSISTENT, RodState
 
 # The report's steel rod, in lb, in and s: a spherical cap of five steps, then the cylinder.
 REPORT_CAP = (0.22, 0.36, 0.43, 0.48, 0.50)
@@ -24,6 +24,38 @@ REPORT_LENGTH = 1.0
 REPORT_MODULUS = 30.0e6
 REPORT_DENSITY = 0.0006875
 LISTING_DENSITY = 0.0003225
+
+# The report's program uses the lumped mass, its text the consistent one (equation 4-24).
+MassMatrix = Literal["lumped", "consistent"]
+LUMPED: MassMatrix = "lumped"
+CONSISTENT: MassMatrix = "consistent"
+MASSES = (LUMPED, CONSISTENT)
+Integrator = Literal["wilson", "average-acceleration"]
+WILSON: Integrator = "wilson"
+AVERAGE: Integrator = "average-acceleration"
+INTEGRATORS = (WILSON, AVERAGE)
+
+
+@frozen
+class RodMethod:
+    """Mass matrix and integration method of a rod; the defaults are the report program's.
+
+    Raises ValueError if mass or integrator is unknown.
+    """
+
+    mass: str = LUMPED  # one of `MASSES`
+    integrator: str = WILSON  # one of `INTEGRATORS`
+
+    def __post_init__(self) -> None:
+        for name, known in (("mass", MASSES), ("integrator", INTEGRATORS)):
+            if (value := getattr(self, name)) not in known:
+                raise ValueError(f"unknown rod {name} {value!r}; known are {', '.join(known)}")
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Attributes of a result: the values that differ from the defaults."""
+        values = {"rod_mass": self.mass, "rod_integrator": self.integrator}
+        return {name: value for name, value in values.items() if value not in (LUMPED, WILSON)}
 
 
 @frozen
@@ -50,6 +82,11 @@ class Rod:
         return len(self.diameters)
 
     @property
+    def element_length(self) -> float:
+        """Length of an element."""
+        return self.length / self.elements
+
+    @property
     def areas(self) -> Floats:
         """Cross-sectional area of each element, length squared."""
         return np.pi * np.array(self.diameters) ** 2 / 4.0
@@ -61,16 +98,8 @@ class Rod:
 
     def stiffness(self) -> Floats:
         """Stiffness matrix, equation 4-23: (n, n)."""
-        L = self.length / self.elements
-        shape = np.array(
-            [
-                [36.0, 3.0 * L, -36.0, 3.0 * L],
-                [3.0 * L, 4.0 * L**2, -3.0 * L, -(L**2)],
-                [-36.0, -3.0 * L, 36.0, -3.0 * L],
-                [3.0 * L, -(L**2), -3.0 * L, 4.0 * L**2],
-            ]
-        )
-        return self._assemble(self.modulus * self.areas / (30.0 * L), shape)
+        ratios = [[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]]
+        return self._assemble(self.modulus * self.areas / (30.0 * self.element_length), ratios)
 
     def with_mass(self, mass: str) -> Rod:
         """The same rod with another mass matrix, ``"lumped"`` or ``"consistent"``."""
@@ -82,19 +111,13 @@ class Rod:
 
     def consistent_mass(self) -> Floats:
         """Consistent mass matrix, equation 4-24: (n, n)."""
-        L = self.length / self.elements
-        shape = np.array(
-            [
-                [156.0, 22.0 * L, 54.0, -13.0 * L],
-                [22.0 * L, 4.0 * L**2, 13.0 * L, -3.0 * L**2],
-                [54.0, 13.0 * L, 156.0, -22.0 * L],
-                [-13.0 * L, -3.0 * L**2, -22.0 * L, 4.0 * L**2],
-            ]
-        )
-        return self._assemble(self.density * self.areas * L / 420.0, shape)
+        ratios = [[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]
+        return self._assemble(self.density * self.areas * self.element_length / 420.0, ratios)
 
-    def _assemble(self, factors: Floats, shape: Floats) -> Floats:
-        """Sum of the element matrices `factors` times `shape`."""
+    def _assemble(self, factors: Floats, ratios: list[list[int]]) -> Floats:
+        """Sum of the element matrices; dofs du/dx add a factor of the element's length."""
+        L = self.element_length
+        shape = ratios * np.tile([[1.0, L], [L, L**2]], (2, 2))
         matrix = np.zeros((2 * self.elements + 2, 2 * self.elements + 2))
         for element, factor in enumerate(factors):
             dofs = slice(2 * element, 2 * element + 4)
@@ -103,7 +126,7 @@ class Rod:
 
     def lumped_mass(self) -> Floats:
         """Lumped mass of each dof, (n,): rho A L/2 for u and rho A L^3/420 for du/dx (listing)."""
-        L = self.length / self.elements
+        L = self.element_length
         m = np.zeros(2 * self.elements + 2)
         for element, area in enumerate(self.areas):
             share = self.density * area * L * np.array([0.5, L**2 / 420.0])
@@ -121,11 +144,9 @@ class Rod:
 
 def _energy(matrix: Floats, x: Floats) -> Floats:
     """X' A x / 2 for each row of x (rows, n); A is diagonal, (n,), or the rod's band matrix."""
-    if matrix.ndim == 1:
-        return np.asarray(0.5 * np.einsum("ri,ri,i->r", x, x, matrix))
-    # Diagonal by diagonal, in a fixed order of summation.
-    energy = 0.5 * np.einsum("ri,ri,i->r", x, x, np.diagonal(matrix))
-    for off in range(1, 4):
+    band = matrix.ndim == 2
+    energy = 0.5 * np.einsum("ri,ri,i->r", x, x, np.diagonal(matrix) if band else matrix)
+    for off in range(1, 4 if band else 1):  # in a fixed order of summation
         energy += np.einsum("ri,ri,i->r", x[:, :-off], x[:, off:], np.diagonal(matrix, off))
     return np.asarray(energy)
 
@@ -173,10 +194,165 @@ class Transducer:
         return max(0, 2 * self.node - 1)
 
 
+@dataclass(slots=True)
+class RodState:
+    """State of a rod.
+
+    Displacements are relative to the tip, so that a long flight does not cancel the strains.
+    """
+
+    # (3, n, ...): displacement relative to the tip, velocity and acceleration of every dof; the
+    # first displacement is the tip's increment of the last step.
+    motion: Floats
+    tip: Any = 0.0  # displacement of the tip
+
+    @classmethod
+    def of(cls, displacement: Floats, velocity: Floats, acceleration: Floats) -> RodState:
+        """State with the displacement, velocity and acceleration of every dof."""
+        motion = np.array([displacement, velocity, acceleration])
+        motion[0, ::2] -= displacement[0]
+        return cls(motion, displacement[0])
+
+    @property
+    def deformation(self) -> Floats:
+        """Displacement of every dof relative to the tip, (n, ...)."""
+        deformation = self.motion[0].copy()
+        deformation[0] = 0.0
+        return np.asarray(deformation)
+
+    @property
+    def displacement(self) -> Floats:
+        """Displacement of every dof, (n, ...)."""
+        displacement = self.deformation
+        displacement[::2] += self.tip
+        return displacement
+
+    @property
+    def velocity(self) -> Floats:
+        """Velocity of every dof, (n, ...)."""
+        return np.asarray(self.motion[1])
+
+    @property
+    def acceleration(self) -> Floats:
+        """Acceleration of every dof, (n, ...)."""
+        return np.asarray(self.motion[2])
+
+
+class TipStep(Protocol):
+    """Interface of a projectile's step to the contact iteration; see :class:`RodIntegrator`."""
+
+    gain: Any  # tip acceleration per force
+    weight: Any  # tip displacement per new acceleration
+
+    @property
+    def theta(self) -> float:
+        """Time of equilibrium, as a fraction of the step."""
+
+    def begin(self, state: Any) -> tuple[Any, Any, Any, Any]:
+        """Free motion, and the tip's acceleration in it, drift and last acceleration."""
+
+    def end(self, state: Any, motion: Any, force: Any) -> Any:
+        """State after the step."""
+
+
+class RodIntegrator:
+    r"""One step of an implicit method as a linear map, for a rod and a time step.
+
+    Equilibrium (equation 4-25) is satisfied at :math:`t + \theta \Delta t`, with the acceleration
+    linear from :math:`a` to :math:`a'` over the step [1]_.  Displacements are those of Newmark's
+    method,
+    :math:`u' = u + \Delta t v + \Delta t^2 ((1/2 - \beta) a + \beta a')`, velocities
+    :math:`v' = v + \Delta t (a + a') / 2`.  With :math:`y` the motion of :class:`RodState` and
+    :math:`f` the force on the tip at :math:`t + \theta \Delta t`, the new motion is
+    :math:`y' = T y + h f`.
+
+    `K` is the stiffness, `m` the lumped mass (n,) or a mass matrix (n, n); `constants_dt` is the
+    time step of the method's constants if that is not `dt` (the slip ``rod-dt``).
+
+    References
+    ----------
+    .. [1] K.-J. Bathe and E. L. Wilson, Numerical Methods in Finite Element Analysis, 1976.
+    """
+
+    theta: ClassVar[float]  # time of equilibrium, as a fraction of the step
+    inverse_beta: ClassVar[float]  # 1/beta, above 2
+
+    def __init__(self, K: Floats, m: Floats, dt: float, constants_dt: float | None = None) -> None:
+        theta, tau, r = self.theta, dt if constants_dt is None else constants_dt, self.inverse_beta
+        self.dt = dt
+        self.n = n = len(m)
+        begin = 2.0 * r / (r - 2.0)  # 1/begin = 1/2 - beta
+        # Tip displacement per acceleration at the start and at the end of the step.
+        self.weights = (dt**2 / begin, dt**2 / r)
+        self.weight = self.weights[1]
+        a0, a2 = r / (theta * tau) ** 2, r / (theta * tau)
+        a4 = a0 / theta
+        one, none = np.eye(n), np.zeros((n, n))
+        lumped = m.ndim == 1
+        effective = np.linalg.inv(K + a0 * (np.diag(m) if lumped else m))
+
+        def on_mass(factor: float) -> Floats:
+            weighed = factor * effective
+            return np.asarray(weighed * m if lumped else weighed @ m)
+
+        # In terms of the increment from u, to avoid cancellation with the rigid motion.
+        of_velocity = on_mass(a4 * a2) - a2 / theta * one
+        of_acceleration = on_mass((r / 2.0 - 1.0) * a4) + (1.0 - r / 2.0 / theta) * one
+        acceleration = np.hstack([-a4 * effective @ K, of_velocity, of_acceleration])
+        # Rigid displacements cause no force; displacements are relative to the tip.
+        acceleration[:, 0] = 0.0
+        kept, relative = one.copy(), one.copy()
+        kept[0, 0] = 0.0
+        relative[2::2, 0] = -1.0
+        velocity = np.hstack([none, one, tau / 2.0 * one]) + tau / 2.0 * acceleration
+        moved = np.hstack([none, dt * one, tau**2 / begin * one]) + tau**2 / r * acceleration
+        displacement = np.hstack([kept, none, none]) + relative @ moved
+        self.T = np.vstack([displacement, velocity, acceleration])
+        gain = a4 * effective[:, 0]
+        self.h = np.concatenate([tau**2 / r * relative @ gain, tau / 2.0 * gain, gain])
+        self.gain = float(gain[0])  # tip acceleration per force
+
+    def begin(self, state: RodState) -> tuple[Floats, Any, Any, Any]:
+        """New motion without a force on the tip, (3 n, ...), and three values of the tip.
+
+        These are its acceleration in that motion, its new displacement without `weight` times the
+        new acceleration, and its last acceleration.
+        """
+        motion = np.dot(self.T, state.motion.reshape(3 * self.n, *state.motion.shape[2:]))
+        _, v, a = state.motion[:, 0].tolist() if motion.ndim == 1 else state.motion[:, 0]
+        base = motion.item(2 * self.n) if motion.ndim == 1 else motion[2 * self.n]
+        return motion, base, state.tip + self.dt * v + self.weights[0] * a, a
+
+    def end(self, state: RodState, motion: Floats, force: Any) -> RodState:
+        """Complete a step of free motion `motion` under a force on the tip at t + theta dt."""
+        h = self.h if motion.ndim == 1 else self.h[:, None]
+        motion += h * force
+        moved = motion.item(0) if motion.ndim == 1 else motion[0]
+        return RodState(motion.reshape(3, self.n, *motion.shape[1:]), state.tip + moved)
+
+    def advance(self, state: RodState, force: Any = 0.0) -> RodState:
+        """State after a step under a force on the tip at t + theta dt."""
+        return self.end(state, self.begin(state)[0], force)
+
+
+class WilsonStep(RodIntegrator):
+    """Wilson's theta method, used by the report's program."""
+
+    theta, inverse_beta = 1.4, 6.0
+
+
+class AverageAccelerationStep(RodIntegrator):
+    """Newmark's average acceleration, which conserves the energy of free motion."""
+
+    theta, inverse_beta = 1.0, 4.0
+
+
+STEPS: dict[str, type[RodIntegrator]] = {WILSON: WilsonStep, AVERAGE: AverageAccelerationStep}
+
+
 def report_rod(density: float = REPORT_DENSITY) -> Rod:
     """Build the rod of the report's program (lb, in, s)."""
-    rest = REPORT_ELEMENTS - len(REPORT_CAP)
-    diameters = REPORT_CAP + (REPORT_DIAMETER,) * rest
+    diameters = REPORT_CAP + (REPORT_DIAMETER,) * (REPORT_ELEMENTS - len(REPORT_CAP))
     return Rod(REPORT_LENGTH, diameters, REPORT_MODULUS, density)
 
 

@@ -21,8 +21,8 @@ from fecm._typing import Bools, Floats
 from fecm.deck.model import Material
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.failure import CRITERIA
-from fecm.mechanics.locate import locate
 from fecm.mechanics.mesh import element_blocks, element_centres
+from fecm.mechanics.points import locate
 from fecm.plot import style
 from fecm.plot.data import Array, circle, deck_of, mesh_of, on_plate, require, struck
 from fecm.plot.kinds import Picture, PlotError

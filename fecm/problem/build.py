@@ -25,30 +25,27 @@ from fecm.mechanics.contact_law import (
     ListingLaw,
     YangSunPermanent,
 )
-from fecm.mechanics.delamination import effective_rigidity, threshold_force
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
-from fecm.mechanics.failure_envelope import FailureMonitor
-from fecm.mechanics.gages import GageArray, gages
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.impact_steps import ImpactSteps, supports
 from fecm.mechanics.kernels.failure import CompiledMonitor
 from fecm.mechanics.kernels.strains import CompiledStrains
-from fecm.mechanics.laminate import Laminate, laminate
+from fecm.mechanics.laminate import Laminate, effective_rigidity, laminate, threshold_force
 from fecm.mechanics.mesh import Mesh, element_centres
-from fecm.mechanics.patch import RADIUS_PER_THICKNESS, patch_weights
 from fecm.mechanics.plate import IntegrationRules, PlateModel
 from fecm.mechanics.plate_motion import PlateMotion
-from fecm.mechanics.ply_stresses import PlyStresses, equilibrium_shear_stiffness
+from fecm.mechanics.ply_stresses import FailureMonitor, PlyStresses, equilibrium_shear_stiffness
+from fecm.mechanics.points import RADIUS_PER_THICKNESS, GageArray, gages, patch_weights
 from fecm.mechanics.projectile import (
     LISTING_DENSITY,
     REPORT_DENSITY,
+    STEPS,
     Projectile,
     RigidMass,
     Rod,
     Transducer,
     report_rod,
 )
-from fecm.mechanics.rod_integrators import STEPS
 from fecm.mechanics.stiffness_product import CSR, KERNELS, Workers, available
 from fecm.mechanics.strains import StrainField
 from fecm.mechanics.symmetry import half_turn_images, restrain_resting_dofs, symmetry_reduction

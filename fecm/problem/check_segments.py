@@ -15,9 +15,8 @@ from fecm.deck.records import Integration, Ply
 from fecm.deck.units import KNOWN, in_si, unit_names
 from fecm.mechanics.contact_law import ACR_POWER
 from fecm.mechanics.elements import HIGHEST_ORDER
-from fecm.mechanics.locate import locate
 from fecm.mechanics.mesh import Mesh, element_blocks, longest_sides
-from fecm.mechanics.patch import DISC, HERTZ, RADIUS_PER_THICKNESS, PatchError
+from fecm.mechanics.points import DISC, HERTZ, RADIUS_PER_THICKNESS, PatchError, locate
 from fecm.mechanics.projectile import Rod, report_rod
 from fecm.problem import check_mesh
 from fecm.problem.build import ContactPatch, Problem, W, build_projectile

@@ -17,9 +17,9 @@ from fecm.deck.macros import every, flat
 from fecm.deck.model import Projectile
 from fecm.mechanics import interpolation
 from fecm.mechanics.mesh import congruence
-from fecm.mechanics.natural_modes import DENSE
 from fecm.mechanics.plate import ASSEMBLED, BLOCK, PlateModel
 from fecm.mechanics.projectile import REPORT_ELEMENTS
+from fecm.mechanics.solutions import DENSE
 from fecm.mechanics.stiffness_product import AUTO, CSR, WORTH_GROUPING
 from fecm.problem.build import Problem
 from fecm.results.sinks import RowBuffer

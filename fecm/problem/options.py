@@ -7,7 +7,7 @@ from dataclasses import field
 from fecm._frozen import frozen
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.kernels import LIBRARY
-from fecm.mechanics.rod_integrators import RodMethod
+from fecm.mechanics.projectile import RodMethod
 from fecm.mechanics.stiffness_product import AUTO, KERNELS, SOLVERS
 
 ENERGY_LIMIT = 0.1  # relative error of the energy balance that ends a run

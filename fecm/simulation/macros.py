@@ -13,8 +13,7 @@ import numpy as np
 from fecm._typing import Floats
 from fecm.deck.macros import WORDS, Body, number
 from fecm.deck.records import Macro, load_factor
-from fecm.mechanics.natural_modes import modes
-from fecm.mechanics.statics import reactions
+from fecm.mechanics.solutions import modes, reactions
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.strains import strains_and_resultants
 from fecm.mechanics.time_step import critical_time_step, taken_time_step

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from fecm._typing import Floats
 from fecm.deck.macros import WorkEstimate
 from fecm.mechanics.failure import CRITERIA, MODES
-from fecm.mechanics.failure_envelope import FailureEnvelope
 from fecm.mechanics.impact import ImpactState
 from fecm.mechanics.plate_motion import DofSums, PlateState
+from fecm.mechanics.ply_stresses import FailureEnvelope
 from fecm.mechanics.projectile import Rod
 from fecm.mechanics.strains import STRAINS
 from fecm.problem.build import ImpactModel

@@ -13,10 +13,10 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.deck.records import load_factor
-from fecm.mechanics.failure_envelope import FailureEnvelope
 from fecm.mechanics.impact import ImpactState
 from fecm.mechanics.plate_motion import DivergenceError, PlateState
-from fecm.mechanics.statics import Tangent
+from fecm.mechanics.ply_stresses import FailureEnvelope
+from fecm.mechanics.solutions import Tangent
 from fecm.problem.build import Threshold, build_model
 from fecm.problem.options import RunOptions
 from fecm.problem.problem import Problem

@@ -17,9 +17,9 @@ from scipy.optimize import brentq
 from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.deck.model import Impact, Indentation
-from fecm.mechanics.delamination import SMALL_MASS, effective_rigidity
+from fecm.mechanics.laminate import SMALL_MASS, effective_rigidity
 from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.statics import SingularStiffnessError, Tangent
+from fecm.mechanics.solutions import SingularStiffnessError, Tangent
 from fecm.problem.build import build_projectile
 from fecm.problem.problem import Problem
 from fecm.studies import StudyError

@@ -26,8 +26,7 @@ from fecm.mechanics.impact import ContactState, ImpactConditions, ImpactSystem, 
 from fecm.mechanics.impact_steps import CRITICAL, ImpactSteps, Modes, supports
 from fecm.mechanics.kernels import floats
 from fecm.mechanics.plate_motion import AppliedForce, DofSums, Load, PlateMotion
-from fecm.mechanics.projectile import Projectile, RigidMass
-from fecm.mechanics.rod_integrators import RodIntegrator, RodState, WilsonStep
+from fecm.mechanics.projectile import Projectile, RigidMass, RodIntegrator, RodState, WilsonStep
 from fecm.results.metrics import Indentation
 
 BLOCK = 64  # steps of a block
@@ -214,7 +213,7 @@ class TipSteps:
 
         `speed` (cases,) and `force` (steps, cases) are the impact velocities and contact forces of
         the cases of all kinds; yields arrays (3 n, cases of the kind) as in
-        :class:`~fecm.mechanics.rod_integrators.RodState`.
+        :class:`~fecm.mechanics.projectile.RodState`.
         """
         step, cases = self._steps[kind], np.flatnonzero(self.kinds == kind)
         before = np.zeros((1, len(cases)))

@@ -19,8 +19,8 @@ from fecm.deck.reader import ParsedProblem
 from fecm.deck.records import Layer, Macro, NodeCodes, NodeValues
 from fecm.deck.units import MODULUS, in_si, unit_names
 from fecm.mechanics.contact_law import hertz_coefficient
-from fecm.mechanics.locate import locate
 from fecm.mechanics.mesh import element_blocks, holds_the_plane
+from fecm.mechanics.points import locate
 from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.time_step import rounded_time_step, taken_time_step
 from fecm.objects import E_S, NU_S, STANDARD

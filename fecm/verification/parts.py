@@ -20,10 +20,8 @@ from fecm.mechanics.contact_law import (
     YangSunPermanent,
     follow,
 )
-from fecm.mechanics.delamination import effective_rigidity, threshold_force
-from fecm.mechanics.laminate import Laminate, laminate
-from fecm.mechanics.projectile import Rod, report_rod
-from fecm.mechanics.rod_integrators import CONSISTENT
+from fecm.mechanics.laminate import Laminate, effective_rigidity, laminate, threshold_force
+from fecm.mechanics.projectile import CONSISTENT, Rod, report_rod
 from fecm.studies.rod_test.pulse_test import gauss_pulse, simulate_pulse, sine_pulse
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from fecm.verification.case import Value, case

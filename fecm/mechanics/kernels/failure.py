@@ -9,8 +9,8 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.mechanics.failure import puck_limits
-from fecm.mechanics.failure_envelope import FailureMonitor, Maxima
 from fecm.mechanics.kernels import LIBRARY, Codes, Failure, floats
+from fecm.mechanics.ply_stresses import FailureMonitor, Maxima
 
 
 class CompiledMonitor(FailureMonitor):

@@ -15,8 +15,7 @@ import numpy as np
 
 from fecm._frozen import frozen
 from fecm._typing import Floats
-from fecm.mechanics.projectile import Rod
-from fecm.mechanics.rod_integrators import STEPS, WILSON, RodState
+from fecm.mechanics.projectile import STEPS, WILSON, Rod, RodState
 from fecm.studies import StudyError
 from fecm.studies.tables import read_table
 
@@ -152,7 +151,7 @@ def simulate_pulse(
     As in an impact, the force is linear between two steps, and extrapolated linearly to t + theta
     dt.  If the pulse starts with a jump, the rod has the corresponding acceleration at t = 0.  The
     last step ends at or after the duration; the integrator is a key of
-    :data:`fecm.mechanics.rod_integrators.STEPS`.  Raises StudyError if a station is not on the rod,
+    :data:`fecm.mechanics.projectile.STEPS`.  Raises StudyError if a station is not on the rod,
     the steps are more than two million, or the motion is not finite.
     """
     for x in stations:

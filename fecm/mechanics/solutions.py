@@ -1,4 +1,4 @@
-"""Static solution K u = P by sparse factorisation, and support reactions."""
+"""Solutions with the sparse matrices: static ones, support reactions, natural modes."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fecm._errors import FecmError
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics.plate import PlateModel
 
@@ -16,6 +17,11 @@ if TYPE_CHECKING:
 
 # Residual relative to the load above which the stiffness is considered singular.
 SINGULAR = 1.0e-6
+# Modes of fewer equations are those of a dense problem.
+DENSE = 60
+# Shift of the spectrum relative to the largest eigenvalue, about half the digits of a double, which
+# makes the matrix of a plate without supports regular.
+SHIFT = 1.0e-9
 
 
 class SingularStiffnessError(FecmError, ArithmeticError):
@@ -35,14 +41,12 @@ class Tangent:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error", MatrixRankWarning)
+                # K is positive definite; pivoting only costs fill, a factor of 40 on a plate of
+                # 30 x 30 elements.
                 self._factors: SuperLU = splu(
-                    plate.stiffness.tocsc(),
-                    permc_spec="MMD_AT_PLUS_A",
-                    # K is positive definite; pivoting only costs fill, a factor of 40 on a plate
-                    # of 30 x 30 elements.
-                    diag_pivot_thresh=0.0,
+                    plate.stiffness.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
                     options={"SymmetricMode": True},
-                )
+                )  # fmt: skip
         except (RuntimeError, MatrixRankWarning) as error:
             raise SingularStiffnessError(f"the stiffness is singular ({error})") from None
 
@@ -67,3 +71,31 @@ def reactions(plate: PlateModel, field: Floats, factor: float) -> Floats:
     free = plate.mesh.equations > 0
     internal[free] -= factor * plate.mesh.forces[free]
     return internal
+
+
+@frozen
+class Modes:
+    """The lowest modes of a plate, K x = omega^2 M x."""
+
+    angular_frequency: Floats  # (n,): ascending; rigid motions are 0 (1/time)
+    shapes: Floats  # (n, neq): unit modal mass; the largest entry is positive
+
+
+def modes(plate: PlateModel, count: int, *, consistent: bool) -> Modes:
+    """Compute the lowest modes, at most as many as equations, with the chosen mass matrix."""
+    from scipy import linalg, sparse  # slow to import
+    from scipy.sparse.linalg import eigsh
+
+    K = plate.stiffness
+    M = plate.consistent_mass if consistent else sparse.diags_array(plate.mass, format="csr")
+    count = min(count, plate.neq)
+    if plate.neq < DENSE or count >= plate.neq // 2:
+        values, vectors = linalg.eigh(K.toarray(), M.toarray(), subset_by_index=[0, count - 1])
+    else:
+        shift = -SHIFT * float((K.diagonal() / M.diagonal()).max())
+        start = np.random.default_rng(0).standard_normal(plate.neq)
+        values, vectors = eigsh(K, count, M, sigma=shift, which="LM", v0=start)
+        order = np.argsort(values)
+        values, vectors = values[order], vectors[:, order]
+    largest = vectors[np.abs(vectors).argmax(axis=0), np.arange(count)]
+    return Modes(np.sqrt(np.maximum(values, 0.0)), (vectors * np.sign(largest)).T)

@@ -1,0 +1,190 @@
+"""Points of the plate: the elements that contain them, contact patches and strain gages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._errors import FecmError
+from fecm._frozen import frozen
+from fecm._typing import Bools, Floats, Indices
+from fecm.mechanics.elements import Quadrature
+from fecm.mechanics.interpolation import NDOF, interpolate, local_shape_functions
+from fecm.mechanics.mesh import ElementBlock, Mesh, element_blocks
+
+# Tolerance, in local coordinates, for points on the edge of an element.
+MARGIN = 1.0e-6
+# The Jacobian of a triangle is singular at node 3.
+INSIDE = 1.0 - 1.0e-9
+PASSES = 50
+
+
+def locate(family: ElementBlock, points: Floats) -> tuple[Indices, Indices, Floats]:
+    """Find every element of a block that contains one of the points, (n, 2), edges included.
+
+    Positions of the elements in the block (k,), their points (k,), and the points' local
+    coordinates in the elements (k, 2).
+    """
+    low, high = family.coordinates.min(axis=1), family.coordinates.max(axis=1)
+    margin = 0.1 * (high - low).max(axis=1, keepdims=True)  # sides may bulge
+    low, high = low - margin, high + margin
+    close = np.flatnonzero(
+        (low <= points.max(axis=0)).all(axis=1) & (points.min(axis=0) <= high).all(axis=1)
+    )
+    near = (low[close, None] <= points).all(axis=2) & (points <= high[close, None]).all(axis=2)
+    members, which = np.nonzero(near)
+    members = close[members]
+    xi, inside = _local(family.take(members), points[which])
+    return members[inside], which[inside], xi[inside]
+
+
+def _local(elements: ElementBlock, points: Floats) -> tuple[Floats, Bools]:
+    """Local coordinates of one point per element, by Newton's method, and whether it is inside."""
+    xi = np.zeros_like(points)
+    highest = np.array([2.0, INSIDE if elements.shape.corners == 3 else 2.0])
+    active = np.arange(len(points))
+    for _ in range(PASSES):
+        if not len(active):
+            break
+        at, coordinates = xi[active], elements.coordinates[active]
+        rule = Quadrature(at[:, 0], at[:, 1], np.ones(len(at)))
+        values, local = local_shape_functions(elements, rule)
+        miss = points[active] - (values.copy()[:, None] @ coordinates)[:, 0]
+        jacobian = np.einsum("pan,pni->pia", local, coordinates)
+        step = np.linalg.solve(jacobian, miss[:, :, None])[:, :, 0]
+        xi[active] = np.clip(xi[active] + step, -2.0, highest)
+        active = active[np.abs(step).max(axis=1) >= 1e-13]
+    rule = Quadrature(xi[:, 0], xi[:, 1], np.ones(len(xi)))
+    values, _ = local_shape_functions(elements, rule)
+    miss = np.abs(points - (values.copy()[:, None] @ elements.coordinates)[:, 0]).max(axis=1)
+    size = np.ptp(elements.coordinates, axis=1).max(axis=1)
+    return xi, (np.abs(xi).max(axis=1) <= 1.0 + MARGIN) & (miss <= MARGIN * size)
+
+
+# Contact force over a finite area: a pressure on a circle of the midplane -------------------------
+
+# A unit pressure of radius c about (x, y) is uniform, p = 1/(pi c^2), or Hertz's,
+# p = 3/(2 pi c^2) sqrt(1 - r^2/c^2).  Its nodal weights g_i, the integral of N_i p, distribute the
+# contact force, F g, and average the displacement in the contact law, W = g w.
+
+DISC, HERTZ = "DISC", "HERT"
+# Radius, over the thickness, whose midplane deflection is that of a plate pressed on one face over
+# a contact small against the thickness (Westergaard; three-dimensional elasticity, nu = 0.3).
+RADIUS_PER_THICKNESS = {DISC: 0.327, HERTZ: 0.377}
+
+# Gauss points along the radius and equal angles.
+RADII, ANGLES = 24, 48
+
+
+class PatchError(FecmError, ValueError):
+    """The patch is not entirely on the plate."""
+
+
+def patch_weights(mesh: Mesh, shape: str, radius: float, x: float, y: float) -> Floats:
+    """Nodal weights of w, (numnp,), of a unit pressure on a circle; their sum is 1.
+
+    Raises PatchError if a part of the circle is not on the plate.
+    """
+    t, dt = np.polynomial.legendre.leggauss(RADII)
+    t, dt = (t + 1.0) / 2.0, dt / 2.0
+    # Shares by r^2/c^2 = t; for Hertz's pressure by t^2 = 1 - r^2/c^2: both exact for polynomials.
+    inner, shares = (1.0 - t * t, 3.0 * t * t * dt) if shape == HERTZ else (t, dt)
+    angles = (np.arange(ANGLES) + 0.5) * (2.0 * np.pi / ANGLES)
+    # The rim has no weight, and must be on the plate.
+    r = radius * np.sqrt(np.append(inner, 1.0))[:, None]
+    points = np.stack([x + r * np.cos(angles), y + r * np.sin(angles)], axis=-1).reshape(-1, 2)
+    shares = np.repeat(np.append(shares, 0.0) / ANGLES, ANGLES)
+    weights = np.zeros(len(mesh.coordinates))
+    found = np.zeros(len(points), dtype=bool)
+    for family in element_blocks(mesh.elements, mesh.coordinates):
+        members, which, xi = locate(family, points)
+        # A point on a common edge counts once.
+        which, first = np.unique(which, return_index=True)
+        fresh = ~found[which]
+        members, which, xi = members[first][fresh], which[fresh], xi[first][fresh]
+        found[which] = True
+        rule = Quadrature(xi[:, 0], xi[:, 1], shares[which])
+        values, _ = local_shape_functions(family, rule)
+        np.add.at(weights, family.nodes[members], shares[which, None] * values)
+    if not found.all():
+        missing = points[~found][0]
+        raise PatchError(f"the patch is not on the plate at ({missing[0]:.6g}, {missing[1]:.6g})")
+    return np.asarray(weights / weights.sum())
+
+
+# Strain gages: the normal strain at a point of the plate, in a direction and at a depth -----------
+
+# z runs from the midplane towards the face away from the projectile.  Normals stay straight,
+# u(z) = u - z theta, so that the strain at z is the midplane strain plus z times the curvature.
+# Strains are discontinuous between elements: a gage on a common edge or node reads the mean of the
+# adjacent elements.
+
+
+class OutsideError(FecmError, ValueError):
+    """A point is not on the plate."""
+
+
+@dataclass(frozen=True, match_args=False)  # attributes that need not be assignable
+class GagePlace(Protocol):
+    """Number, position (length) and direction (degrees from the x-axis) of a gage."""
+
+    number: int
+    x: float
+    y: float
+    z: float
+    direction: float
+
+
+@frozen
+class GageArray:
+    """Strains of gages as weighted sums of dofs."""
+
+    numbers: NDArray[np.int32]  # (gages,)
+    dof_indices: Indices  # (gages, m): indices into a flattened field
+    weights: Floats  # (gages, m): strain per unit of the dof
+
+
+def gages(
+    mesh: Mesh, records: Sequence[GagePlace], *, transposed_jacobian: bool = False
+) -> GageArray:
+    """Express the gages' strains by the dofs of their elements.
+
+    Raises OutsideError if a gage is not on the plate.
+    """
+    families = element_blocks(mesh.elements, mesh.coordinates)
+    rows = [_functional(families, record, transposed_jacobian) for record in records]
+    most = max(len(indices) for indices, _ in rows)
+    dof_indices = np.zeros((len(rows), most), dtype=np.intp)
+    weights = np.zeros((len(rows), most))
+    for number, (indices, values) in enumerate(rows):
+        dof_indices[number, : len(indices)] = indices
+        weights[number, : len(values)] = values
+    numbers = np.array([record.number for record in records], np.int32)
+    return GageArray(numbers, dof_indices, weights)
+
+
+def _functional(
+    families: Sequence[ElementBlock], gage: GagePlace, transposed_jacobian: bool
+) -> tuple[Indices, Floats]:
+    """Dofs and weights of a gage's strain."""
+    point = np.array([[gage.x, gage.y]])
+    found = [
+        (family.take(np.array([member])), Quadrature(at[:1], at[1:], np.ones(1)))
+        for family in families
+        for member, _, at in zip(*locate(family, point), strict=True)
+    ]
+    if not found:
+        raise OutsideError(f"gage {gage.number} at ({gage.x:g}, {gage.y:g}) is not on the plate")
+    c, s = np.cos(np.deg2rad(gage.direction)), np.sin(np.deg2rad(gage.direction))
+    parts: list[tuple[Indices, Floats]] = []
+    for element, rule in found:
+        at = interpolate(element, rule, transposed_jacobian=transposed_jacobian)
+        along = c * at.dN[0, 0, 0] + s * at.dN[0, 0, 1]  # derivative in the gage's direction
+        for dof, factor in ((0, c), (1, s), (3, -gage.z * c), (4, -gage.z * s)):
+            parts.append((element.nodes[0] * NDOF + dof, factor * along / len(found)))
+    dof_indices, weights = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return dof_indices, weights
