@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis as PlotAxis
 from matplotlib.colors import BoundaryNorm, Normalize
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
@@ -51,14 +52,9 @@ LEVEL_COLOUR = style.COLOURS[1]
 CONTOUR: Any = {"colors": LEVEL_COLOUR, "linestyles": [DASHES], "linewidths": 1.2}
 SHADES = 256  # of a colour map
 MARKERS = "osD^vP*"
-
-
 # A quantity on a full grid of two parameters: x (nx,) and y (ny,), ascending, and the values,
 # (ny, nx), masked where a case has none.
 Grid = tuple[Floats, Floats, Any]
-
-
-# Data ---------------------------------------------------------------------------------------------
 
 
 @frozen
@@ -81,6 +77,12 @@ class Axis:
     def whole(self) -> bool:
         """Whether the numbers are counts."""
         return self.name in INTEGERS
+
+    def mark(self, axis: PlotAxis) -> None:
+        """Label an axis of a graph; counts have ticks at integers only."""
+        self.scale.name(axis, self.label)
+        if self.whole:
+            axis.set_major_locator(MaxNLocator(integer=True))
 
 
 @frozen
@@ -114,8 +116,15 @@ def choose(
     axes = [_parameter(sweep, parameter, rows) for parameter in _over(sweep, name, varying, over)]
     others = [parameter for parameter in varying if parameter not in [axis.name for axis in axes]]
     other = _parameter(sweep, others[0], rows) if others and len(axes) == 1 else None
-    if others:
-        _check_others(axes, others, other)
+    if others:  # refuse them if cases would hide one another
+        vary = f"{_listed(others)} {'varies' if len(others) == 1 else 'vary'} too"
+        selects = f"--where {others[0]}=VALUE selects some of"
+        points = np.column_stack([axis.values for axis in axes])
+        if other is None and len(np.unique(points, axis=0)) < len(points):
+            raise PlotError(f"{vary}, so that cases would hide one another; {selects} them")
+        if other is not None and (len(others) > 1 or len(other.ticks) > CURVES):
+            both = f"--over {axes[0].name},{others[0]} draws over both"
+            raise PlotError(f"{vary}; {selects} the cases, {both}")
     shown = quantity_of(sweep, name, rows, quantity)
     title = ", ".join(f"{held} {_text(sweep, held, rows[0])}" for held in where)
     still = sweep["status"][rows] == STILL
@@ -200,18 +209,6 @@ def _over(sweep: SweepResult, name: str, varying: list[str], asked: Sequence[str
     return over
 
 
-def _check_others(axes: list[Axis], others: list[str], other: Axis | None) -> None:
-    """Refuse parameters that vary and are not shown, if cases would hide one another."""
-    vary = f"{_listed(others)} {'varies' if len(others) == 1 else 'vary'} too"
-    selects = f"--where {others[0]}=VALUE selects some of"
-    points = np.column_stack([axis.values for axis in axes])
-    if len(axes) > 1 and len(np.unique(points, axis=0)) < len(points):
-        raise PlotError(f"{vary}, so that cases would hide one another; {selects} them")
-    if len(axes) == 1 and (len(others) > 1 or (other is not None and len(other.ticks) > CURVES)):
-        message = f"{vary}; {selects} the cases, --over {axes[0].name},{others[0]} draws over both"
-        raise PlotError(message)
-
-
 def quantity_of(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
     """The quantity to show, with a note about cases that lack it."""
     quantity = quantity or ("found_velocity" if "found_velocity" in sweep.summary else "peak_force")
@@ -221,11 +218,9 @@ def quantity_of(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axi
     status, values = sweep["status"][rows], sweep[quantity][rows].astype(float)
     run, still = np.isin(status, RUN), status == STILL
     values = np.where(run, values, np.nan)
-    failures = ""
-    if not run.all():
-        failed = f"{(~run).sum()} of {len(rows)} cases of {name} failed"
-        failures = f"{failed} ({reasons(status[~run])})"
-    open_ends = f"{still.sum()} of {len(rows)} cases of {name} were still in contact at the end"
+    cases = f"of {len(rows)} cases of {name}"
+    failures = "" if run.all() else f"{(~run).sum()} {cases} failed ({reasons(status[~run])})"
+    open_ends = f"{still.sum()} {cases} were still in contact at the end"
     if np.isnan(values).all():
         nothing = f"no case of {name} has a {quantity}"
         if still.any():
@@ -258,9 +253,6 @@ def numbers(sweep: SweepResult, name: str, values: Array) -> Axis:
     return Axis(name, style.scale(style.peak(values), sweep.unit(name)), values)
 
 
-# Pictures -----------------------------------------------------------------------------------------
-
-
 def parameter_map(
     results: Mapping[str, SweepResult],
     *,
@@ -282,173 +274,120 @@ def parameter_map(
     """
     ((name, sweep),) = results.items()
     choice = choose(sweep, name, quantity, over, where or {}, level)
-    shown = choice.shown
-    if len(choice.over) == 1:
-        (first,) = choice.over
-        axes = _one(choice, width)
-        place = (shown, first) if first.ticks else (first, shown)
-    else:
-        first, second = choice.over
-        axes = _two(first, second, shown, choice.levels, width)
-        first, second = (second, first) if first.ticks else (first, second)
-        place = (first, shown) if 0 < len(second.ticks) <= CURVES else (first, second)
-    _mark_still(axes, *place, choice.still)
+    axes, x, y = _draw(choice, width)
+    if (still := choice.still).any():
+        mark: Any = {"marker": "x", "color": "0.25", "ms": 3.5, "ls": "none"}
+        axes.plot(x.values[still], y.values[still], zorder=4, clip_on=False, **mark)
+        text = f"still in contact at the end: {still.sum()} of {len(still)} cases"
+        axes.set_xlabel(f"{axes.get_xlabel()}\n\N{MULTIPLICATION SIGN} {text}")
     if len(choice.limits):
-        _mark_limits(axes, *place, choice)
+        _mark_limits(axes, x, y, choice)
     if choice.title:
         axes.set_title(choice.title, loc="left")
     figure: Any = axes.figure
     return Picture(figure)
 
 
-def _mark_still(axes: Axes, x: Axis, y: Axis, still: Bools) -> None:
-    """Mark the cases that ended in contact with crosses, and count them."""
-    if not still.any():
-        return
-    mark: Any = {"marker": "x", "color": "0.25", "markersize": 3.5, "linestyle": "none"}
-    axes.plot(x.values[still], y.values[still], zorder=4, clip_on=False, **mark)
-    text = (
-        f"\N{MULTIPLICATION SIGN} still in contact at the end: {still.sum()} of {len(still)} cases"
-    )
-    axes.set_xlabel(f"{axes.get_xlabel()}\n{text}")
+def _draw(choice: Choice, width: str) -> tuple[Axes, Axis, Axis]:
+    """Draw the values; the axes, and what lies along x and y."""
+    shown, other, levels = choice.shown, choice.other, choice.levels
+    x, y = choice.over if len(choice.over) > 1 else (choice.over[0], shown)
+    texts = other if y is shown else y
+    if x.ticks:
+        x, y, texts = y, x, None if y is shown else x
+    if texts and 0 < len(texts.ticks) <= CURVES:
+        return _curves(x, texts, choice, width), x, shown
+    if y.ticks:  # in rows, the first at the top
+        bar = 0.0 if x is shown and other is None else BAR
+        height = HEAD + ROW * max(len(y.ticks), 4) + bar
+        _, (axes,) = style.panels(width, ratio=height / style.WIDTHS[width])
+        axes.set_yticks(range(len(y.ticks)), y.ticks)
+        axes.set_ylim(len(y.ticks) - 0.5, -0.5)
+    else:
+        _, (axes,) = style.panels(width, tall=1.0 if y is shown else 1.35)
+    if shown not in (x, y):
+        _label(axes, x, y)
+        if (found := _grid(x, y, shown)) is None:
+            _points(axes, x, y, shown, levels)
+        else:
+            _cells(axes, found, shown, levels, rows=bool(y.ticks))
+        return axes, x, y
+    if other is not None:
+        look: Any = {"s": 9.0, "cmap": style.IN_ORDER, "norm": _colours(other), "linewidths": 0.0}
+        _bar(axes, axes.scatter(x.values, y.values, c=other.values, **look), other, [])
+    elif x is shown:
+        axes.plot(x.values, y.values, "o", color=style.colours()[0], ms=3.5)
+    else:
+        (order,) = _runs(x, None)
+        axes.plot(x.values[order], y.values[order], "o-", color=style.colours()[0], ms=2.5)
+    _finish(axes, x, y, choice)
+    return axes, x, y
+
+
+def _curves(x: Axis, texts: Axis, choice: Choice, width: str) -> Axes:
+    """A curve a text."""
+    figure, (axes,) = style.panels(width, tall=1.15)
+    looks = zip(texts.ticks, style.colours(), MARKERS, strict=False)
+    for here, (text, colour, marker) in zip(_runs(x, texts), looks, strict=True):
+        values = choice.shown.values[here]
+        if not np.isnan(values).all():  # failed
+            axes.plot(x.values[here], values, marker=marker, color=colour, ms=2.2, label=text)
+    _finish(axes, x, choice.shown, choice)
+    style.lines_legend(figure, axes)
+    return axes
+
+
+def _runs(x: Axis, texts: Axis | None) -> list[Ints]:
+    """Cases in the order of x: those of every text, or all."""
+    order = np.argsort(x.values, kind="stable")
+    if texts is None:
+        return [order]
+    return [order[texts.values[order] == row] for row in range(len(texts.ticks))]
+
+
+def _label(axes: Axes, x: Axis, y: Axis) -> None:
+    x.mark(axes.xaxis)
+    if not y.ticks:
+        y.mark(axes.yaxis)
+
+
+def _finish(axes: Axes, x: Axis, y: Axis, choice: Choice) -> None:
+    """Label the axes and mark the levels; the axis of the quantity begins at zero if it can."""
+    across = x is choice.shown
+    if np.nanmin(choice.shown.values) >= 0.0:
+        axes.set(**{"xlim" if across else "ylim": (0.0, None)})
+    _label(axes, x, y)
+    for level in choice.levels:
+        (axes.axvline if across else axes.axhline)(level, **LEVEL)
+    if across:
+        axes.grid(axis="y", linewidth=0.4, color="0.85")
+        axes.set_axisbelow(True)
 
 
 def _mark_limits(axes: Axes, x: Axis, y: Axis, choice: Choice) -> None:
     """Mark the delamination thresholds of cases whose plates differ."""
     shown, limits = choice.shown, choice.limits
     above = replace(shown, values=shown.values - limits)
-    if y is shown:
-        axes.set_ylim(top=max(axes.get_ylim()[1], 1.05 * np.nanmax(limits)))
-    elif x is shown:
-        axes.set_xlim(right=max(axes.get_xlim()[1], 1.05 * np.nanmax(limits)))
-    if y is shown and choice.other is not None and not choice.other.ticks:
-        axes.plot(x.values, limits, "_", color="0.2")
+    highest = 1.05 * np.nanmax(limits)
+    texts = next((axis for axis in (*choice.over, choice.other) if axis and axis.ticks), None)
+    if x is shown:
+        axes.set_xlim(right=max(axes.get_xlim()[1], highest))
+        axes.plot(limits, y.values, "|", color="0.2", ms=11.0)
     elif y is shown:
-        texts = next((axis for axis in (*choice.over, choice.other) if axis and axis.ticks), None)
-        for row in range(len(texts.ticks) if texts else 1):
-            here = np.flatnonzero(texts.values == row) if texts else np.arange(len(limits))
-            here = here[np.argsort(x.values[here], kind="stable")]
+        axes.set_ylim(top=max(axes.get_ylim()[1], highest))
+        if texts is None and choice.other is not None:
+            axes.plot(x.values, limits, "_", color="0.2")
+            return
+        for row, here in enumerate(_runs(x, texts)):
             look = LEVEL | ({"color": style.colours()[row]} if texts else {})
             axes.plot(x.values[here], limits[here], **look)
-    elif x is shown:
-        axes.plot(limits, y.values, "|", color="0.2", markersize=11.0)
     elif (found := _grid(x, y, above)) is None:
-        reached = above.values >= 0.0
-        axes.plot(
-            x.values[reached], y.values[reached], "o", markersize=4.2, markerfacecolor="none",
-            markeredgecolor=LEVEL_COLOUR,
-        )  # fmt: skip
+        at = above.values >= 0.0
+        axes.plot(x.values[at], y.values[at], "o", ms=4.2, mfc="none", mec=LEVEL_COLOUR)
     elif y.ticks:
         _crossings(axes, found, 0.0)
     elif found[2].min() < 0.0 < found[2].max():
         axes.contour(*found, [0.0], **CONTOUR)
-
-
-# One value ---------------------------------------------------------------------------------------
-
-
-def _one(choice: Choice, width: str) -> Axes:
-    """Points, joined if the cases differ in nothing else; texts are rows."""
-    (over,), shown, levels, other = choice.over, choice.shown, choice.levels, choice.other
-    if other is not None and other.ticks and not over.ticks:
-        return _curves(over, other, shown, levels, width)
-    if over.ticks:
-        axes = _text_rows(width, over, 0.0 if other is None else BAR)
-        if other is None:
-            axes.plot(shown.values, over.values, "o", color=style.colours()[0], markersize=3.5)
-        else:
-            _coloured(axes, shown, over, other)
-        _name_axes(axes, shown, None)
-        if np.nanmin(shown.values) >= 0.0:
-            axes.set_xlim(left=0.0)
-        for level in levels:
-            axes.axvline(level, **LEVEL)
-        axes.grid(axis="y", linewidth=0.4, color="0.85")
-        axes.set_axisbelow(True)
-        return axes
-    _, (axes,) = style.panels(width)
-    if other is not None:
-        _coloured(axes, over, shown, other)
-    else:
-        order = np.argsort(over.values, kind="stable")
-        axes.plot(
-            over.values[order], shown.values[order], "o-", color=style.colours()[0], markersize=2.5
-        )
-    _finish_curves(axes, over, shown, levels)
-    return axes
-
-
-def _coloured(axes: Axes, x: Axis, y: Axis, other: Axis) -> None:
-    """Points coloured by another parameter."""
-    drawn = axes.scatter(
-        x.values, y.values, c=other.values, s=9.0, cmap=style.IN_ORDER, norm=_colours(other),
-        linewidths=0.0,
-    )  # fmt: skip
-    _bar(axes, drawn, other, [])
-
-
-def _finish_curves(axes: Axes, over: Axis, shown: Axis, levels: list[float]) -> None:
-    if np.nanmin(shown.values) >= 0.0:
-        axes.set_ylim(bottom=0.0)
-    _name_axes(axes, over, shown)
-    for level in levels:
-        axes.axhline(level, **LEVEL)
-
-
-def _name_axes(axes: Axes, x: Axis, y: Axis | None) -> None:
-    """Label the axes; counts have ticks at integers only."""
-    for axis, shown in ((axes.xaxis, x), (axes.yaxis, y)):
-        if shown is not None:
-            shown.scale.name(axis, shown.label)
-            if shown.whole:
-                axis.set_major_locator(MaxNLocator(integer=True))
-
-
-def _text_rows(width: str, over: Axis, more: float) -> Axes:
-    """Axes whose rows are texts, the first at the top, with more room above (in)."""
-    height = HEAD + ROW * max(len(over.ticks), 4) + more
-    _, (axes,) = style.panels(width, ratio=height / style.WIDTHS[width])
-    axes.set_yticks(range(len(over.ticks)), over.ticks)
-    axes.set_ylim(len(over.ticks) - 0.5, -0.5)
-    return axes
-
-
-# Two values --------------------------------------------------------------------------------------
-
-
-def _two(first: Axis, second: Axis, shown: Axis, levels: list[float], width: str) -> Axes:
-    if first.ticks:
-        first, second = second, first
-    if second.ticks and len(second.ticks) <= CURVES:
-        return _curves(first, second, shown, levels, width)
-    found = _grid(first, second, shown)
-    if second.ticks:
-        axes = _text_rows(width, second, BAR)
-    else:
-        _, (axes,) = style.panels(width, tall=1.35)
-    _name_axes(axes, first, None if second.ticks else second)
-    if found is None:
-        _points(axes, first, second, shown, levels)
-    else:
-        _cells(axes, found, shown, levels, rows=bool(second.ticks))
-    return axes
-
-
-def _curves(over: Axis, texts: Axis, shown: Axis, levels: list[float], width: str) -> Axes:
-    """A curve a text."""
-    figure, (axes,) = style.panels(width, tall=1.15)
-    for row, (text, colour) in enumerate(zip(texts.ticks, style.colours(), strict=False)):
-        here = np.flatnonzero(texts.values == row)
-        here = here[np.argsort(over.values[here], kind="stable")]
-        if np.isnan(shown.values[here]).all():  # failed
-            continue
-        axes.plot(
-            over.values[here], shown.values[here], marker=MARKERS[row], color=colour,
-            markersize=2.2, label=text,
-        )  # fmt: skip
-    _finish_curves(axes, over, shown, levels)
-    style.lines_legend(figure, axes)
-    return axes
 
 
 def _colours(shown: Axis) -> Normalize:
@@ -470,25 +409,23 @@ def _bar(axes: Axes, drawn: Any, shown: Axis, levels: list[float]) -> None:
 def _cells(axes: Axes, grid: Grid, shown: Axis, levels: list[float], *, rows: bool) -> None:
     """One cell per case, with contour lines unless the rows are texts."""
     values = grid[2]
+    look: Any = {"edgecolor": "face", "linewidth": 0.1, "rasterized": values.size > MANY}
     drawn = axes.pcolormesh(
-        *grid, shading="nearest", cmap=style.IN_ORDER, norm=_colours(shown), edgecolor="face",
-        linewidth=0.1, rasterized=values.size > MANY,
-    )  # fmt: skip
+        *grid, shading="nearest", cmap=style.IN_ORDER, norm=_colours(shown), **look
+    )
     _bar(axes, drawn, shown, levels)
     low, high = values.min(), values.max()
     if rows:
         for level in levels:
             _crossings(axes, grid, level)
         return
+    text: Any = {"fontsize": 6.0, "inline_spacing": 2, "fmt": style.Multiple(shown.scale.factor)}
     if not shown.whole and low < high:
         ticks = MaxNLocator(LINES).tick_values(low, high)
         inner = [tick for tick in ticks if low < tick < high and tick not in levels]
-        lines = axes.contour(*grid, inner, colors="white", linewidths=0.5)
-        axes.clabel(lines, fontsize=6.0, inline_spacing=2, fmt=style.Multiple(shown.scale.factor))
+        axes.clabel(axes.contour(*grid, inner, colors="white", linewidths=0.5), **text)
     if inside := sorted({level for level in levels if low < level < high}):
-        marked = axes.contour(*grid, inside, **CONTOUR)
-        form = style.Multiple(shown.scale.factor)
-        axes.clabel(marked, fontsize=6.0, inline_spacing=2, colors="white", fmt=form)
+        axes.clabel(axes.contour(*grid, inside, **CONTOUR), colors="white", **text)
 
 
 def _crossings(axes: Axes, grid: Grid, level: float) -> None:
@@ -496,23 +433,22 @@ def _crossings(axes: Axes, grid: Grid, level: float) -> None:
     x, y, shown = grid
     for row, values in zip(y, shown.filled(np.nan) - level, strict=True):
         before, after = values[:-1], values[1:]
-        passed = np.flatnonzero((before < 0.0) != (after < 0.0))
-        passed = passed[np.isfinite(before[passed]) & np.isfinite(after[passed])]
+        passed = np.isfinite(before + after) & ((before < 0.0) != (after < 0.0))
         share = before[passed] / (before[passed] - after[passed])
-        at = x[passed] + share * np.diff(x)[passed]
+        at = x[:-1][passed] + share * np.diff(x)[passed]
         axes.vlines(at, row - 0.5, row + 0.5, color=LEVEL_COLOUR, linewidth=1.2)
 
 
-def _points(axes: Axes, first: Axis, second: Axis, shown: Axis, levels: list[float]) -> None:
+def _points(axes: Axes, x: Axis, y: Axis, shown: Axis, levels: list[float]) -> None:
     """One coloured point per case; those above the lowest level have an edge."""
     fine = np.isfinite(shown.values)
+    values = shown.values[fine]
     drawn: Any = axes.scatter(
-        first.values[fine], second.values[fine], c=shown.values[fine], s=14.0, cmap=style.IN_ORDER,
-        norm=_colours(shown), linewidths=0.0, rasterized=bool(fine.sum() > MANY),
+        x.values[fine], y.values[fine], c=values, s=14.0, cmap=style.IN_ORDER,
+        norm=_colours(shown), linewidths=0.0, rasterized=len(values) > MANY,
     )  # fmt: skip
     if levels:
-        above = shown.values[fine] >= min(levels)
-        drawn.set_linewidths(np.where(above, 0.9, 0.0))
+        drawn.set_linewidths(np.where(values >= min(levels), 0.9, 0.0))
         drawn.set_edgecolors(LEVEL_COLOUR)
     _bar(axes, drawn, shown, levels)
 
