@@ -305,7 +305,7 @@ def _draw(choice: Choice, width: str) -> tuple[Axes, Axis, Axis]:
         axes.set_ylim(len(y.ticks) - 0.5, -0.5)
     else:
         _, (axes,) = style.panels(width, tall=1.0 if y is shown else 1.35)
-    if shown not in (x, y):
+    if len(choice.over) > 1:
         _label(axes, x, y)
         if (found := _grid(x, y, shown)) is None:
             _points(axes, x, y, shown, levels)

@@ -170,9 +170,9 @@ def peak(*arrays: Any) -> float:
     return max((float(values.max(initial=0.0)) for values in finite), default=0.0)
 
 
-def scale_in(units: Mapping[str, str] | None, dimension: str, *arrays: Any) -> Scale:
+def scale_in(units: Mapping[str, str], dimension: str, *arrays: Any) -> Scale:
     """Scale for arrays of one dimension, in named units."""
-    return scale(peak(*arrays), unit_of(dimension, dict(units or {})))
+    return scale(peak(*arrays), unit_of(dimension, dict(units)))
 
 
 def limit_count(count: int, what: str, most: int = len(COLOURS)) -> None:
