@@ -16,7 +16,7 @@ from fecm.plot import data, style
 from fecm.plot.kinds import Picture, PlotError
 from fecm.results.result import Result
 from fecm.results.schema import declared_units
-from fecm.studies.comparison import Measurement, Source, compare, measurement_of
+from fecm.studies.comparison import Source, compare, measurement_of
 
 if TYPE_CHECKING:
     from fecm.sweeps.identify import Identification
@@ -69,29 +69,29 @@ def force(results: Results, *, overlay: Source | None = None, width: str = "colu
     times = [columns[0] for columns in drawn.values()]
     clock = style.scale_of(results, "time", times)
     limits = _thresholds(results)
-    units = declared_units(next(iter(results.values())).attributes)
-    measured = None if overlay is None else measurement_of(overlay, units)
     forces = [c for columns in drawn.values() for c in columns[1:]]
-    if measured is not None:
+    measured = None
+    if overlay is not None:
+        first = next(iter(results.values()))
+        measured = measurement_of(overlay, declared_units(first.attributes))
         forces.append(measured.force)
     pound = style.scale_of(results, "force", [*forces, np.array(list(limits.values()))])
     if len(drawn) == 1:
         figure, axes = style.panels(width)
-        first, second, *_ = style.colours()
         ((time, contact, transducer),) = drawn.values()
         equal = np.array_equal(contact, transducer)  # of a rigid mass
         label = f"contact force{' and transducer, which are equal' if equal else ''}"
-        axes[0].plot(time, contact, color=first, label=label)
+        axes[0].plot(time, contact, color=style.colours()[0], label=label)
         if not equal:
-            axes[0].plot(time, transducer, color=second, label="transducer")
+            axes[0].plot(time, transducer, color=style.colours()[1], label="transducer")
         pound.name(axes[0].yaxis, "Force")
     else:
         figure, axes = style.panels(width, 2, sharex=True, sharey=True, tall=0.65)
         for (name, (time, *both)), colour in zip(drawn.items(), style.colours(), strict=False):
             for ax, values in zip(axes, both, strict=True):
                 ax.plot(time, values, color=colour, label=name)
-        for ax, label in zip(axes, ("Contact force", "Transducer"), strict=True):
-            pound.name(ax.yaxis, label)
+        pound.name(axes[0].yaxis, "Contact force")
+        pound.name(axes[1].yaxis, "Transducer")
     shared = len(set(limits.values())) == 1
     for name, limit in list(limits.items())[: 1 if shared else None]:
         label = "delamination threshold" if shared else f"{name}, delamination threshold"
@@ -99,26 +99,23 @@ def force(results: Results, *, overlay: Source | None = None, width: str = "colu
         axes[0].axhline(limit, color=colour, ls=style.STYLES[1], lw=0.8, label=label)
     _time_axis(axes[-1], clock, times)
     _mark_open_ends(axes[0], results, width)
-    if measured is not None:
-        _draw_measured(axes, measured)
+    notes = []
+    if measured is not None:  # over what it is compared with
+        look = _measured_look(measured.time) | {"color": "0.2", "zorder": 3.0}
+        ax = axes[-1] if measured.column == "transducer" else axes[0]
+        if ax is not axes[0]:
+            axes[0].plot([], [], label=measured.name, **look)  # for the legend
+        ax.plot(measured.time, measured.force, label=measured.name, **look)
+        for name, result in results.items():
+            compared = compare(result, measured)
+            notes.append(f"{measured.quantity} of {name} against {measured.name}: {compared}")
     style.lines_legend(figure, axes[0])
-    notes = [
-        f"{measured.quantity} of {name} against {measured.name}: {compare(result, measured)}"
-        for name, result in results.items()
-        if measured is not None
-    ]
     return Picture(figure, notes=notes)
 
 
-def _draw_measured(axes: Sequence[Axes], measured: Measurement) -> None:
-    """Draw a measured force over what it is compared with, a few times as points."""
-    look: dict[str, Any] = {"color": "0.2", "zorder": 3.0, "lw": 0.6, "label": measured.name}
-    if len(measured.time) <= POINTS:
-        look |= {"ls": "none", "marker": ".", "ms": 3.0}
-    ax = axes[-1] if measured.column == "transducer" else axes[0]
-    if ax is not axes[0]:
-        axes[0].plot([], [], **look)  # for the legend
-    ax.plot(measured.time, measured.force, **look)
+def _measured_look(time: data.Array) -> dict[str, Any]:
+    """Look of measured numbers: points if they are few, else a thin line."""
+    return {"lw": 0.6} | ({"ls": "none", "marker": ".", "ms": 3.0} if len(time) <= POINTS else {})
 
 
 @style.styled
@@ -126,8 +123,7 @@ def fit_picture(found: Identification, units: Mapping[str, str]) -> Picture:
     """Measured and fitted force above, the residual below with plus and minus its rms."""
     clock = style.scale_in(units, "time", found.time)
     figure, (above, below) = style.panels("column", 2, sharex=True, tall=0.6)
-    few: dict[str, Any] = {"ls": "none", "marker": ".", "ms": 3.0}
-    look = few if len(found.time) <= POINTS else {"lw": 0.6}
+    look = _measured_look(found.time)
     above.plot(found.time, found.force, color="0.4", label="measured", **look)
     above.plot(found.time, found.model, color=style.COLOURS[0], label="fitted")
     below.plot(found.time, found.residual, color="0.4", **look)
@@ -143,14 +139,13 @@ def fit_picture(found: Identification, units: Mapping[str, str]) -> Picture:
 
 def _thresholds(results: Results) -> dict[str, float]:
     """Delamination thresholds by the names of the results that have one."""
-    found = {}
-    for name, result in results.items():
-        if result.threshold:
-            value = result.threshold.get("force")
-            if not isinstance(value, int | float) or not 0.0 < value <= data.LARGEST:
-                raise PlotError(f"{name} has a delamination threshold that can't be drawn: {value}")
-            found[name] = float(value)
-    return found
+    values: dict[str, Any] = {
+        name: result.threshold.get("force") for name, result in results.items() if result.threshold
+    }
+    for name, value in values.items():
+        if not isinstance(value, int | float) or not 0.0 < value <= data.LARGEST:
+            raise PlotError(f"{name} has a delamination threshold that can't be drawn: {value}")
+    return values
 
 
 def loop(results: Results, *, against: str = "indentation", width: str = "column") -> Picture:
@@ -163,11 +158,10 @@ def loop(results: Results, *, against: str = "indentation", width: str = "column
     if against not in AGAINST:
         raise PlotError(f"unknown against {against}; a loop is drawn against {', '.join(AGAINST)}")
     column, sign, label = AGAINST[against]
-    drawn = {
-        name: [np.concatenate(([0.0], values)) for values in (sign * x, force)]
-        for name, result in results.items()
-        for x, force in [data.require(result, name, f"history/{column}", "history/force")]
-    }
+    drawn = {}
+    for name, result in results.items():
+        x, values = data.require(result, name, f"history/{column}", "history/force")
+        drawn[name] = np.append(0.0, sign * x), np.append(0.0, values)
     # Without force the bodies move apart.
     touched = np.concatenate([[0.0], *(x[force > 0.0] for x, force in drawn.values())])
     length = style.scale_of(results, "length", [touched])
@@ -237,22 +231,20 @@ def strain(
     for name, result in results.items():
         for label, values in _strains(result, name, at, gages, face).items():
             text = f"{name}, {label}" if len(results) > 1 else label
-            lines[text] = (data.require(result, name, "tape8/time")[0], values)
+            lines[text] = data.require(result, name, "tape8/time")[0], values
     if len(lines) > len(style.COLOURS):
         raise PlotError(
             f"{len(lines)} lines can't be told apart in one picture; ask for fewer points, "
             f"directions or results, at most {len(style.COLOURS)} in all"
         )
     times, values_of = zip(*lines.values(), strict=True)
-    curvature = face == "curvature"
-    if curvature:
-        shown = style.scale_of(results, "1/length", values_of)
-    else:
-        shown = style.scale(style.peak(*values_of), "")
+    shown, name = style.scale(style.peak(*values_of), ""), f"Strain, {face} face"
+    if face == "curvature":
+        shown, name = style.scale_of(results, "1/length", values_of), "Curvature"
     figure, (axes,) = style.panels(width)
     for (label, (time, values)), colour in zip(lines.items(), style.colours(), strict=False):
         axes.plot(time, values, color=colour, label=label)
-    shown.name(axes.yaxis, "Curvature" if curvature else f"Strain, {face} face")
+    shown.name(axes.yaxis, name)
     _time_axis(axes, style.scale_of(results, "time", times), times)
     style.lines_legend(figure, axes)
     return Picture(figure)
@@ -266,18 +258,16 @@ def _strains(
     points = data.strain_points(result, name)
     layers = data.deck_of(result, name).require(Material).layers
     thickness = sum(layer.thickness for layer in layers)
-    places = [np.array(place) for place in at] or [_default_place(result, name, points, thickness)]
-    height = 1.0
-    if face != "curvature":
-        height = thickness / 2.0 if face == "far" else -thickness / 2.0
-        if result["mesh/equations"][:, :2].any():
-            warn(
-                f"the midplane of {name} may stretch; its strains are not stored, and the "
-                "picture shows those of bending alone"
-            )
+    places: Sequence[Any] = at or [_default_place(result, name, points, thickness)]
+    height = {"far": thickness / 2.0, "curvature": 1.0}.get(face, -thickness / 2.0)
+    if face != "curvature" and result["mesh/equations"][:, :2].any():
+        warn(
+            f"the midplane of {name} may stretch; its strains are not stored, and the picture "
+            "shows those of bending alone"
+        )
     found: dict[str, data.Array] = {}
     for place in places:
-        there = data.nearest(points, place, name)
+        there = data.nearest(points, np.array(place), name)
         x, y = points[there].mean(axis=0)
         kappa_x, kappa_y, kappa_xy = (column[:, there].mean(axis=1) for column in columns)
         for angle in gages:

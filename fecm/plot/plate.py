@@ -24,8 +24,7 @@ from fecm.plot.kinds import Picture, PlotError
 from fecm.results.result import Result
 
 Results = Mapping[str, Result]
-# Shows nodal deflections, and a title.
-Show = Callable[[data.Array, str], None]
+Show = Callable[[int], None]  # shows a row of tape3
 
 AXES = {"x": 0, "y": 1}
 FRAMES = 60
@@ -42,27 +41,26 @@ MARKS: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 
 
-# The mesh -----------------------------------------------------------------------------------------
-
-
 def supports(result: Result) -> dict[str, Bools]:
     """Masks of the nodes held against bending, by kind of support; each (numnp,)."""
     held = result["mesh/equations"][:, 2:5] == 0
     w, rotations = held[:, 0], held[:, 1:]
-    clamped = w & rotations.all(axis=1)
-    clamped &= ~_corners(result["mesh/elements"], w, clamped)
+    full = w & rotations.all(axis=1)
+    # At a corner of a simply supported plate one node of an element is fully held, others hold w.
+    nodes, present = result["mesh/elements"] - 1, result["mesh/elements"] > 0
+    one = (full[nodes] & present).sum(axis=1) == 1
+    several = (w[nodes] & present).sum(axis=1) > 1
+    corners, others = np.zeros_like(full), np.zeros_like(full)
+    corners[nodes[(one & several)[:, None] & present]] = True
+    others[nodes[~one[:, None] & present]] = True
+    clamped = full & ~(corners & ~others)
     return {"clamped": clamped, "w held": w & ~clamped, "rotation held": ~w & rotations.any(axis=1)}
 
 
-def _corners(elements: data.Array, w: Bools, full: Bools) -> Bools:
-    """Fully held nodes of elements with other nodes that hold w, none of these fully held."""
-    nodes, present = elements - 1, elements > 0
-    one = (full[nodes] & present).sum(axis=1) == 1
-    several = (w[nodes] & present).sum(axis=1) > 1
-    found, others = np.zeros_like(full), np.zeros_like(full)
-    found[nodes[(one & several)[:, None] & present]] = True
-    others[nodes[~one[:, None] & present]] = True
-    return np.asarray(full & found & ~others)
+def aspect(points: Floats) -> float:
+    """Height over width of the plate's picture, from its points (n, 2)."""
+    wide, high = np.ptp(points, axis=0)
+    return float(np.clip(high / wide, 0.3, 2.0))
 
 
 def draw_circle(axes: Axes, result: Result, name: str, **look: Any) -> None:
@@ -89,34 +87,29 @@ def mesh(
     cut = data.patches(result, 4, name)
     place = style.scale_of(results, "length", [coordinates])
     low, high = cut.points.min(axis=0), cut.points.max(axis=0)
-    height = float(np.clip((high - low)[1] / (high - low)[0], 0.3, 2.0))
-    figure, (axes,) = style.panels(
-        width, ratio=height + (0.55 - 0.5 * height) / style.WIDTHS[width]
-    )
+    height = aspect(cut.points)
+    ratio = height + (0.55 - 0.5 * height) / style.WIDTHS[width]
+    figure, (axes,) = style.panels(width, ratio=ratio)
     sides = [cut.points[edge] for edge in cut.edges]
     axes.add_collection(LineCollection(sides, colors="0.4", linewidths=0.4))
     for label, nodes in supports(result).items():
         if nodes.any():
             held = coordinates[nodes, :2].T
             axes.plot(*held, ls="none", clip_on=False, label=label, **MARKS[label])
-    where = data.struck(result, name)
-    if len(where):
+    if len(where := data.struck(result, name)):
         in_patch = data.circle(result, name) is not None
         mark: Any = {"marker": "+"} if in_patch else {"marker": "X", "mec": "white"}
         mark["label"] = "impact" if data.deck_of(result, name).has(Impact) else "load"
         axes.plot(*where.T, color=style.COLOURS[1], ms=6.0, mew=0.5, ls="", clip_on=False, **mark)
     draw_circle(axes, result, name, color=style.COLOURS[1], label="contact patch")
     if at:
-        points: Any = {"color": style.COLOURS[3], "ms": 3.5, "label": "points"}
-        axes.plot(*np.array(at).T, "D", clip_on=False, **points)
+        look: Any = {"color": style.COLOURS[3], "ms": 3.5, "label": "points"}
+        axes.plot(*np.array(at).T, "D", clip_on=False, **look)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     place.name(axes.xaxis, "$x$")
     place.name(axes.yaxis, "$y$")
     style.lines_legend(figure, axes)
     return Picture(figure)
-
-
-# Along a line -----------------------------------------------------------------------------------
 
 
 def profile(result: Result, name: str, along: str, rows: data.Array) -> tuple[Floats, Floats]:
@@ -132,29 +125,23 @@ def profile(result: Result, name: str, along: str, rows: data.Array) -> tuple[Fl
     on = np.flatnonzero(np.abs(coordinates[:, across] - level) <= 1e-6 * extent)
     on = on[np.argsort(coordinates[on, axis])]
     cut = data.patches(result, 4, name)
-    position = np.linspace(*_chord(cut, axis, level), SAMPLES)
+    # The ends of the plate on the line, from its intersections with sides of quadrilaterals.
+    corners = cut.points[cut.quads]
+    ends = np.roll(corners, -1, axis=1)
+    a, b = corners[..., across] - level, ends[..., across] - level
+    crossed = (a * b <= 0.0) & (a != b)
+    share = a[crossed] / (a[crossed] - b[crossed])
+    at = corners[crossed][:, axis] + share * (ends[crossed] - corners[crossed])[:, axis]
+    position = np.linspace(at.min(), at.max(), SAMPLES)
     inside = coordinates[on, axis]
     sides = np.diff(inside).max() if len(on) > 2 else math.inf
     longest = longest_sides(result["mesh/elements"], coordinates).max()
     if sides <= 2.0 * longest and np.isclose(np.ptp(inside), np.ptp(position)):
         return inside, w[:, on]
-    points = [position, np.full(SAMPLES, level)]
+    points = [position, np.full(SAMPLES, level)][:: 1 - 2 * axis]
     triangles = Triangulation(cut.points[:, 0], cut.points[:, 1], cut.triangles)
-    values = [
-        LinearTriInterpolator(triangles, cut.values(row))(points[axis], points[across]) for row in w
-    ]
+    values = [LinearTriInterpolator(triangles, cut.values(row))(*points) for row in w]
     return position, np.ma.filled(np.ma.stack(values), np.nan)
-
-
-def _chord(cut: data.Patches, axis: int, level: float) -> tuple[float, float]:
-    """Ends of the plate on a line, from its intersections with sides of quadrilaterals."""
-    corners = cut.points[cut.quads]
-    ends = np.roll(corners, -1, axis=1)
-    a, b = corners[..., 1 - axis] - level, ends[..., 1 - axis] - level
-    crossed = (a * b <= 0.0) & (a != b)
-    share = a[crossed] / (a[crossed] - b[crossed])
-    at = corners[crossed][:, axis] + share * (ends[crossed] - corners[crossed])[:, axis]
-    return float(at.min()), float(at.max())
 
 
 def line(
@@ -185,9 +172,8 @@ def line(
             axes[0].plot(position, values, color=shade, label=f"{clock.factor * time:.4g}")
     else:
         figure, axes = style.panels(width, len(instants[0]), sharex=True, sharey=True, tall=0.6)
-        for (name, (stored, position, w)), colour in zip(
-            drawn.items(), style.colours(), strict=False
-        ):
+        looks = zip(drawn.items(), style.colours(), strict=False)
+        for (name, (stored, position, w)), colour in looks:
             for ax, time, values in zip(axes, stored, w, strict=True):
                 ax.plot(position, values, color=colour, label=name)
                 ax.set_title(f"time {clock.show(time)}", loc="left")
@@ -197,9 +183,6 @@ def line(
         ax.margins(x=0.0)
     place.name(axes[-1].xaxis, f"${along}$")
     return Picture(figure)
-
-
-# The entire plate -------------------------------------------------------------------------------
 
 
 def contour(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
@@ -212,9 +195,8 @@ def contour(results: Results, *, times: Sequence[float] = (), width: str = "colu
     length = style.scale_of(results, "length", [w])
     place = style.scale_of(results, "length", [cut.points])
     columns = min(len(rows), 2 if width == "column" else 4)
-    height, wide = np.ptp(cut.points[:, 1]), np.ptp(cut.points[:, 0])
     lines = math.ceil(len(rows) / columns)
-    ratio = float(np.clip(height / wide, 0.3, 2.0)) + 0.65 * columns / lines / style.WIDTHS[width]
+    ratio = aspect(cut.points) + 0.65 * columns / lines / style.WIDTHS[width]
     figure, axes = style.panels(width, lines, columns, sharex=True, sharey=True, ratio=ratio)
     fields = [cut.values(row) for row in w]
     peak = float(np.abs(fields).max()) or 1.0  # may exceed the nodal values
@@ -238,10 +220,63 @@ def contour(results: Results, *, times: Sequence[float] = (), width: str = "colu
     return Picture(figure)
 
 
+def surface(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
+    """The deflected plate; by default at the instant of largest deflection range."""
+    ((name, result),) = results.items()
+    (w,) = data.require(result, name, "tape3/w")
+    largest = np.array([int(np.ptp(w, axis=1).argmax())])
+    rows = data.stored_rows(result, name, times, 1) if times else largest
+    clock = style.scale_of(results, "time", [result["tape3/time"]])
+    figure, shows = _plates(results, width, rows, len(rows), clock)
+    for show, row in zip(shows, rows, strict=True):
+        show(row)
+    return Picture(figure)
+
+
+def animation(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
+    """The deflected plate, frame by frame; the figure shows the last frame."""
+    ((name, result),) = results.items()
+    data.require(result, name, "tape3/w")
+    rows = data.stored_rows(result, name, times, FRAMES)
+    clock = style.scale_of(results, "time", [result["tape3/time"][rows]])
+    figure, (show,) = _plates(results, width, rows, 1, clock)
+    show(rows[-1])
+    return Picture(figure, [functools.partial(show, row) for row in rows])
+
+
+def _plates(
+    results: Results, width: str, rows: data.Array, count: int, clock: style.Scale
+) -> tuple[Figure, list[Show]]:
+    """Draw `count` flat plates on the common scale of all rows, and what shows a row on each."""
+    ((name, result),) = results.items()
+    cut, w = data.patches(result, 2, name), result["tape3/w"]
+    place = style.scale_of(results, "length", [cut.points])
+    length = style.scale_of(results, "length", [w[rows]])
+    span = (float(w[rows].min()), float(w[rows].max()))
+    columns = 1 if width == "column" else min(count, 2)
+    lines = math.ceil(count / columns)
+    figure, axes = style.panels(width, lines, columns, ratio=0.7, subplot_kw={"projection": "3d"})
+    for ax in axes[count:]:
+        ax.set_axis_off()
+
+    def show(collection: Any, title: Any, row: int) -> None:
+        heights = cut.values(w[row])[cut.quads]
+        collection.set_verts(np.dstack([cut.points[cut.quads], heights]))
+        collection.set_array(heights.mean(axis=1))
+        title.set_text(f"time {clock.show(float(result['tape3/time'][row]))}")
+
+    plates = [_plate(ax, cut, place, length, span) for ax in axes[:count]]
+    look = {"shrink": 0.6, "pad": 0.0, "fraction": 0.06}
+    bar = style.colour_bar(axes, plates[0][0], length, "Deflection", MaxNLocator(5), **look)
+    if span[0] < span[1]:
+        bar.ax.set_xlim(span)
+    return figure, [functools.partial(show, *plate) for plate in plates]
+
+
 def _plate(
     axes: Any, cut: data.Patches, place: style.Scale, length: style.Scale, span: tuple[float, float]
-) -> tuple[Any, Show]:
-    """Draw the plate in three-dimensional axes; what is drawn, and what shows a deflection."""
+) -> tuple[Any, Any]:
+    """Draw the flat plate in three-dimensional axes; what is drawn, and an empty title."""
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     flat = cut.points[cut.quads]
@@ -269,63 +304,4 @@ def _plate(
     axes.tick_params(pad=-3.0)
     axes.locator_params(nbins=5)
     axes.locator_params(axis="z", nbins=4)
-
-    def show(w: data.Array, text: str) -> None:
-        heights = cut.values(w)[cut.quads]
-        collection.set_verts(np.concatenate([flat, heights[:, :, None]], axis=2))
-        collection.set_array(heights.mean(axis=1))
-        title.set_text(text)
-
-    return collection, show
-
-
-def surface(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
-    """The deflected plate; by default at the instant of largest deflection range."""
-    ((name, result),) = results.items()
-    (w,) = data.require(result, name, "tape3/w")
-    largest = np.array([int(np.ptp(w, axis=1).argmax())])
-    rows = data.stored_rows(result, name, times, 1) if times else largest
-    columns = 1 if width == "column" else min(len(rows), 2)
-    figure, shows = _plates(results, width, rows, columns, len(rows))
-    clock = style.scale_of(results, "time", [result["tape3/time"]])
-    for show, row in zip(shows, rows, strict=True):
-        show(w[row], f"time {clock.show(float(result['tape3/time'][row]))}")
-    return Picture(figure)
-
-
-def _plates(
-    results: Results, width: str, rows: data.Array, columns: int, count: int
-) -> tuple[Figure, list[Show]]:
-    """Draw `count` plates, on the common scale of all rows."""
-    ((name, result),) = results.items()
-    cut, w = data.patches(result, 2, name), result["tape3/w"][rows]
-    place = style.scale_of(results, "length", [cut.points])
-    length = style.scale_of(results, "length", [w])
-    span = (float(w.min()), float(w.max()))
-    lines = math.ceil(count / columns)
-    figure, axes = style.panels(width, lines, columns, ratio=0.7, subplot_kw={"projection": "3d"})
-    for ax in axes[count:]:
-        ax.set_axis_off()
-    plates = [_plate(ax, cut, place, length, span) for ax in axes[:count]]
-    bar = style.colour_bar(
-        axes, plates[0][0], length, "Deflection", MaxNLocator(5),
-        shrink=0.6, pad=0.0, fraction=0.06,
-    )  # fmt: skip
-    if span[0] < span[1]:
-        bar.ax.set_xlim(span)
-    return figure, [show for _, show in plates]
-
-
-def animation(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
-    """The deflected plate, frame by frame; the figure shows the last frame."""
-    ((name, result),) = results.items()
-    (w,) = data.require(result, name, "tape3/w")
-    rows = data.stored_rows(result, name, times, FRAMES)
-    figure, (show,) = _plates(results, width, rows, 1, 1)
-    clock = style.scale_of(results, "time", [result["tape3/time"][rows]])
-    frames = [
-        functools.partial(show, w[row], f"time {clock.show(result['tape3/time'][row])}")
-        for row in rows
-    ]
-    frames[-1]()
-    return Picture(figure, frames)
+    return collection, title
