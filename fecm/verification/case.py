@@ -75,8 +75,9 @@ class Row:
 CASE_OF: dict[str, Case] = {}
 
 
-def case(name: str) -> Callable[[Compute], Compute]:
-    """Return a decorator that makes a function compute a case of `checks.toml`."""
+def case(compute: Compute) -> Compute:
+    """Decorate a function that computes the case of its name in `checks.toml`."""
+    name = compute.__name__[1:].replace("_", "-")
     common = dict(TABLES[name])
     title, groups = common.pop("title"), common.pop("checks")
     checks = tuple(
@@ -84,12 +85,8 @@ def case(name: str) -> Callable[[Compute], Compute]:
         for group in groups
         for quantity, expected in group["expected"].items()
     )
-
-    def made(compute: Compute) -> Compute:
-        CASE_OF[name] = Case(name, title, checks, compute)
-        return compute
-
-    return made
+    CASE_OF[name] = Case(name, title, checks, compute)
+    return compute
 
 
 def carry_out(one: Case) -> list[Row]:
@@ -102,10 +99,8 @@ def carry_out(one: Case) -> list[Row]:
     except Exception as error:  # any exception fails the rows
         failure = f"{type(error).__name__}: {error}".splitlines()[0]
         numbers = [math.nan] * len(one.checks)
-    return [
-        Row(one.name, check, number, failure)
-        for check, number in zip(one.checks, numbers, strict=True)
-    ]
+    pairs = zip(one.checks, numbers, strict=True)
+    return [Row(one.name, check, number, failure) for check, number in pairs]
 
 
 def _number(value: Value, expected: float) -> float:

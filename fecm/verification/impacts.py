@@ -19,21 +19,8 @@ from fecm.results.result import Result
 from fecm.studies.estimate import infinite_plate, static_plate, static_stiffness
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.plan import plan
+from fecm.verification import decks
 from fecm.verification.case import Value, case
-from fecm.verification.decks import (
-    MITC,
-    SUPPORTED,
-    deck,
-    elastic,
-    impact_program,
-    isotropic,
-    material,
-    quarter_plate,
-    report_impact,
-    result_of,
-    struck_plate,
-    supports,
-)
 from fecm.verification.plates import SIDES, rectangle
 
 V = 100.0
@@ -44,44 +31,42 @@ def peak(found: Result) -> list[float]:
     return [found.force.max(), found.time[found.force.argmax()]]
 
 
-@case("rigid-target")
-def rigid() -> Sequence[Value]:
-    """Extremes of the history on a plate of extreme stiffness and density, and its end."""
+@case
+def _rigid_target() -> Sequence[Value]:
+    """A plate of extreme stiffness and density."""
     grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
     ply = Ply(1.48e6, 0.3, 1.75e16, 1.75e16, 5e15, 5e15, 5e15)
-    plate, mass = material(ply, (0.0, 90.0), 0.053), Projectile(0, 0, 2.0e-4)
-    found = result_of(struck_plate(grid, plate, mass, V, elastic(1.0e6), 2e-8, 9000))
+    plate, mass = decks.material(ply, (0.0, 90.0), 0.053), Projectile(0, 0, 2.0e-4)
+    law = decks.elastic(1.0e6)
+    found = decks.result_of(decks.struck_plate(grid, plate, mass, V, law, 2e-8, 9000))
     touching = found.time[found.force > 0.0]
     return [found.indentation.max(), found.force.max(), touching[-1], found.velocity[-1]]
 
 
-@case("infinite-plate")
-def infinite() -> Sequence[Value]:
-    """Peak and end of a history on a thin plate of 12 x 12 in, stiff in transverse shear.
-
-    No reflection returns within 200 us.
-    """
+@case
+def _infinite_plate() -> Sequence[Value]:
+    """A thin plate of 12 x 12 in, stiff in shear; no reflection returns within 200 us."""
     grid = Grid(uniform(12.0, 48), uniform(12.0, 48))
-    plate = material(isotropic(1.0e7, 0.3, 2.5e-4, 13.0), [0.0], 0.1)
-    mass = Projectile(0, 0, 2.0e-5)
-    found = result_of(struck_plate(grid, plate, mass, V, elastic(5.0e4), 5e-8, 4000))
+    plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4, 13.0), [0.0], 0.1)
+    mass, law = Projectile(0, 0, 2.0e-5), decks.elastic(5.0e4)
+    found = decks.result_of(decks.struck_plate(grid, plate, mass, V, law, 5e-8, 4000))
     return [*peak(found), found.velocity[-1]]
 
 
-@case("supported-plate")
-def supported() -> Sequence[Value]:
-    """Extremes and end of a history on a quarter with a quarter of mass and contact coefficient."""
-    plate = material(isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.03)
-    hit = (Projectile(0, 0, 5.0e-6 / 4.0), Impact(1, 3, V), elastic(1.0e5 / 4.0))
-    found = result_of(quarter_plate(8, plate, impact_program(8e-8, 2500), others=hit))
+@case
+def _supported_plate() -> Sequence[Value]:
+    """A quarter of the plate, with a quarter of mass and contact coefficient."""
+    plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.03)
+    hit = (Projectile(0, 0, 5.0e-6 / 4.0), Impact(1, 3, V), decks.elastic(1.0e5 / 4.0))
+    macros = decks.impact_program(8e-8, 2500)
+    found = decks.result_of(decks.quarter_plate(8, plate, macros, others=hit))
     force, time = peak(found)
     return [4.0 * force, time, found.plate_w.max(), found.velocity[-1]]
 
 
-@case("report-impact")
-def report() -> Sequence[Value]:
-    """Energy, and forces at instants and at their peaks."""
-    found = result_of(report_impact())
+@case
+def _report_impact() -> Sequence[Value]:
+    found = decks.result_of(decks.report_impact())
     energy = found.energy
     balance = float(np.abs(energy.balance_error).max()) / float(energy.attributes["initial"])
     first = int(found.force[found.time < 500e-6].argmax())
@@ -97,34 +82,31 @@ def _at(result: Result, name: str, time: float) -> float:
     return float(values[int(np.abs(result.time - time).argmin())])
 
 
-@case("listing-impact")
-def listing() -> Sequence[Value]:
-    """Listing mode."""
-    found = result_of(report_impact(500), "listing")
+@case
+def _listing_impact() -> Sequence[Value]:
+    found = decks.result_of(decks.report_impact(500), "listing")
     end = found.time[found.force > 0.0][-1]
     return [_at(found, "force", 46e-6), _at(found, "transducer", 46e-6), end]
 
 
-@case("convolution")
-def convolution() -> Sequence[Value]:
-    """Force of 60 in/s where the deck says 115."""
-    deck = report_impact(1000)
-    problem = problem_of(deck)
+@case
+def _convolution() -> Sequence[Value]:
+    made = decks.report_impact(1000)
+    problem = problem_of(made)
     swept = carry_out(problem, plan(problem, [{"velocity": 60.0}], history=True)).force
     if swept is None:
         raise ValueError("the sweep has kept no forces")
-    slower = tuple(replace(s, velocity=60.0) if isinstance(s, Impact) else s for s in deck.segments)
-    full = result_of(replace(deck, segments=slower)).force
+    slower = tuple(replace(s, velocity=60.0) if isinstance(s, Impact) else s for s in made.segments)
+    full = decks.result_of(replace(made, segments=slower)).force
     return [np.abs(swept[0] - full).max() / full.max()]
 
 
-@case("patch-impact")
-def on_a_patch() -> Sequence[Value]:
-    """Peak of the force on a patch."""
+@case
+def _patch_impact() -> Sequence[Value]:
     patch = Patch("DISC", 0.125, SIDES[0] / 2.0, SIDES[1] / 2.0)
     middle = 97 * 32 + 49  # of 97 by 65 nodes
-    hit = (Projectile(0, 0, 0.000181), Impact(middle, 3, 115.0), elastic(1.912e6))
-    return peak(result_of(rectangle(48, patch, impact_program(1.0e-7, 1250), *hit)))
+    hit = (Projectile(0, 0, 0.000181), Impact(middle, 3, 115.0), decks.elastic(1.912e6))
+    return peak(decks.result_of(rectangle(48, patch, decks.impact_program(1.0e-7, 1250), *hit)))
 
 
 def struck_square(mass: float, end: float) -> Deck:
@@ -134,25 +116,23 @@ def struck_square(mass: float, end: float) -> Deck:
     grid = Grid(sections, sections)
     middle = grid.nearest(side / 2.0, side / 2.0)[0]
     segments = (
-        supports(grid, SUPPORTED), Projectile(0, 0, mass), Impact(middle, 3, 1.0),
-        Patch("DISC", radius), elastic(8.2641942e9), MITC,
-        material(isotropic(240e9, 0.3, 1600.0), [0.0], 0.004),
+        decks.supports(grid, decks.SUPPORTED), Projectile(0, 0, mass), Impact(middle, 3, 1.0),
+        Patch("DISC", radius), decks.elastic(8.2641942e9), decks.MITC,
+        decks.material(decks.isotropic(240e9, 0.3, 1600.0), [0.0], 0.004),
     )  # fmt: skip
-    made = deck(grid, segments, ())
+    made = decks.deck(grid, segments, ())
     dt = rounded_time_step(critical_time_step(build_plate(made, generate(made))))
-    return replace(made, macros=impact_program(dt, round(end / dt)))
+    return replace(made, macros=decks.impact_program(dt, round(end / dt)))
 
 
-@case("small-mass")
-def small_mass() -> Sequence[Value]:
-    """Peak and time of the dashpot model, peak of a run."""
+@case
+def _small_mass() -> Sequence[Value]:
     model = infinite_plate(1.0, 1.0, 1.0, 1.0)
-    return [model.peak, model.time, result_of(struck_square(0.0128, 3e-5)).force.max()]
+    return [model.peak, model.time, decks.result_of(struck_square(0.0128, 3e-5)).force.max()]
 
 
-@case("large-mass")
-def large_mass() -> Sequence[Value]:
-    """Static stiffness of the struck square, and peak of the energy balance."""
+@case
+def _large_mass() -> Sequence[Value]:
     (problem,) = load_deck(struck_square(1.0, 1e-6).to_text()).problems
     assert problem.contact is not None
     stiffness = static_stiffness(problem.moving_plate, problem.contact)

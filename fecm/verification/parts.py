@@ -32,9 +32,8 @@ FIBRES = Ply(2.5e-4, 0.3, 17.5e6, 1.15e6, 0.8e6, 0.8e6, 0.5e6)
 THICK = 0.02
 
 
-@case("isotropic-ply")
-def isotropic_ply() -> Sequence[Value]:
-    """A, B, D, shear, mass and inertia."""
+@case
+def _isotropic_ply() -> Sequence[Value]:
     h, plate = 0.1, 1.0e7 / (1.0 - 0.3**2)
     made = laminate(isotropic(1.0e7, 0.3, 2.5e-4), [30.0], [h])
     vanishing = [*made.A[:2, 2] / h, *made.B.ravel() / h**2, *made.D[:2, 2] / h**3]
@@ -44,9 +43,8 @@ def isotropic_ply() -> Sequence[Value]:
     ]  # fmt: skip
 
 
-@case("cross-ply")
-def cross_ply() -> Sequence[Value]:
-    """A, B, D and shear."""
+@case
+def _cross_ply() -> Sequence[Value]:
     made = laminate(FIBRES, [0.0, 90.0], [THICK / 2.0] * 2)
     return [
         made.A[0, 0], made.A[0, 1], made.A[2, 2], made.B[0, 0], made.B[1, 1], made.D[0, 0],
@@ -54,9 +52,8 @@ def cross_ply() -> Sequence[Value]:
     ]  # fmt: skip
 
 
-@case("angle-ply")
-def angle_ply() -> Sequence[Value]:
-    """A, B, D, and the coupling of transverse shear of a ply at 45 degrees."""
+@case
+def _angle_ply() -> Sequence[Value]:
     made = laminate(FIBRES, [45.0, -45.0], [THICK / 2.0] * 2)
     a11 = made.A[0, 0]
     return [
@@ -71,9 +68,8 @@ def report_laminate() -> Laminate:
     return laminate(REPORT_PLY, REPORT_ANGLES, [REPORT_THICKNESS] * len(REPORT_ANGLES))
 
 
-@case("threshold")
-def threshold() -> Sequence[Value]:
-    """Threshold forces of one delamination."""
+@case
+def _threshold() -> Sequence[Value]:
     plates = ((laminate(isotropic(60e3, 0.3, 1.0), [0.0], [2.0]), 0.8), (report_laminate(), 2.9))
     return [threshold_force(effective_rigidity(plate), toughness) for plate, toughness in plates]
 
@@ -81,9 +77,8 @@ def threshold() -> Sequence[Value]:
 # Waves -------------------------------------------------------------------------------------------
 
 
-@case("wave-fronts")
-def wave_fronts() -> Sequence[Value]:
-    """Normal velocities, and a ray."""
+@case
+def _wave_fronts() -> Sequence[Value]:
     found = WaveSurfaces(Medium(report_laminate())).fronts([0.0, 45.0])
     names = ("extension", "in_plane_shear", "bending", "twisting", "transverse_shear")
     extension = FRONTS.index("extension")
@@ -93,9 +88,8 @@ def wave_fronts() -> Sequence[Value]:
     ]  # fmt: skip
 
 
-@case("dispersion")
-def harmonic() -> Sequence[Value]:
-    """Angular frequencies."""
+@case
+def _dispersion() -> Sequence[Value]:
     found = dispersion(Medium(report_laminate()), 0.0, [10.0, 1.0, 1e5]).angular_frequency
     first, last = MODES.index("flexural_1"), MODES.index("flexural_3")
     return [found[0, first], found[1, first], found[2, last]]
@@ -111,9 +105,8 @@ def bar(length: float) -> Rod:
     return Rod(length, (0.625,) * round(20 * length), 30.0e6, 7.33e-4)
 
 
-@case("rod-pulse")
-def rod_pulse() -> Sequence[Value]:
-    """Forces in the middle, final velocity, mass."""
+@case
+def _rod_pulse() -> Sequence[Value]:
     pulse, later = (gauss_pulse(1000.0, middle, 40e-6) for middle in (200e-6, 300e-6))
     found = simulate_pulse(bar(1.0), pulse, DT, 600e-6, (0.5,))
     second = simulate_pulse(bar(1.0), later, DT, 300e-6, (0.5,))
@@ -122,22 +115,19 @@ def rod_pulse() -> Sequence[Value]:
     return [found.forces.max(), at, found.mean_ratios[0], velocity, report_rod().total_mass]
 
 
-@case("rod-waves")
-def rod_waves() -> Sequence[Value]:
-    """Speed of the pulse's centroid between two stations; frequencies."""
+@case
+def _rod_waves() -> Sequence[Value]:
     ends = (1.0, 4.0)
     found = simulate_pulse(bar(5.0), sine_pulse(1000.0, 8e-6), DT / 2.0, 29e-6, ends)
     centroids = (found.time @ found.forces) / found.forces.sum(axis=0)
     speed = (ends[1] - ends[0]) / (centroids[1] - centroids[0])
-    rods = (bar(1.0), bar(1.0).with_mass(CONSISTENT))
-    return [speed, found.forces[:, 1].max(), *map(_first_frequency, rods)]
-
-
-def _first_frequency(rod: Rod) -> float:
-    """Lowest angular frequency after that of the rigid motion."""
-    mass = rod.mass()
-    squares = eigh(rod.stiffness(), np.diag(mass) if mass.ndim == 1 else mass, eigvals_only=True)
-    return math.sqrt(float(squares[1]))
+    frequencies = []
+    for rod in (bar(1.0), bar(1.0).with_mass(CONSISTENT)):
+        mass = rod.mass()
+        matrix = np.diag(mass) if mass.ndim == 1 else mass
+        squares = eigh(rod.stiffness(), matrix, eigvals_only=True)
+        frequencies.append(math.sqrt(float(squares[1])))  # the first is that of the rigid motion
+    return [speed, found.forces[:, 1].max(), *frequencies]
 
 
 # The indentation law along paths -----------------------------------------------------------------
@@ -150,13 +140,10 @@ HALFWAY = (PEAK + REMAINS) / 2.0
 ACR_REMAINS = PEAK - ALPHA_CR**0.4 * PEAK**0.6
 
 
-@case("indentation")
-def indentation() -> Sequence[Value]:
-    """Forces at places of several paths, and the area of a loop."""
-    law, acr = (
-        HystereticLaw(permanent)
-        for permanent in (LinearPermanent(K, ALPHA_P, S_P, Q), YangSunPermanent(K, ALPHA_CR))
-    )
+@case
+def _indentation() -> Sequence[Value]:
+    law = HystereticLaw(LinearPermanent(K, ALPHA_P, S_P, Q))
+    acr = HystereticLaw(YangSunPermanent(K, ALPHA_CR))
 
     def path(*corners: float, points: int = 1, law: HystereticLaw = law) -> list[ContactPoint]:
         return [point for point, _ in follow(law, corners, points)]

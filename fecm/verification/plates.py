@@ -9,19 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from fecm._typing import Floats
+from fecm.deck import model
 from fecm.deck.catalogue import MATERIALS
 from fecm.deck.grid import Grid, Section, lines, uniform
-from fecm.deck.model import (
-    Boundary,
-    Coordinates,
-    Deck,
-    Gages,
-    Impact,
-    Patch,
-    Projectile,
-    Segment,
-    Shear,
-)
+from fecm.deck.model import Deck, Patch, Segment
 from fecm.deck.records import Gage, LoadTable, Macro, NodeCodes, NodeValues, Ply
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import build_plate
@@ -44,9 +35,8 @@ CORNERS = np.array([
 ])  # fmt: skip
 
 
-@case("patch")
-def patch() -> Sequence[Value]:
-    """Strains and a couple of distorted elements in a field of constant strains."""
+@case
+def _patch() -> Sequence[Value]:
     fine = np.empty((5, 5, 2))
     fine[::2, ::2] = CORNERS
     fine[::2, 1::2] = (CORNERS[:, 1:] + CORNERS[:, :-1]) / 2.0
@@ -59,7 +49,7 @@ def patch() -> Sequence[Value]:
     places = enumerate(fine.reshape(-1, 2).tolist(), start=1)
     plate = decks.material(FIBRES, (0.0, 90.0), THICK / 2.0)
     segments = (decks.supports(grid, "00000" + 4 * " 11111"), decks.forces(field), plate)
-    coordinates = Coordinates(tuple(NodeValues(n, 0, tuple(place)) for n, place in places))
+    coordinates = model.Coordinates(tuple(NodeValues(n, 0, tuple(place)) for n, place in places))
     found = decks.result_of(decks.deck(grid, segments, STRESSES, coordinates))
     shears = np.array(decks.fields(found, "stresses", "gamma_xz gamma_yz"))
     return [*decks.fields(found, "stresses", IN_PLANE), shears, found["stresses/M_x"]]
@@ -71,9 +61,8 @@ def loaded_rectangle(x: Sequence[float], y: Sequence[float], *, shears: bool = F
     `x` and `y` are the forces per length of the five dofs on an edge with normal x or y.  With
     `shears` only w moves, and a shear correction factor acts.
     """
-    grid = Grid(
-        [Section(0.0, 1.2, 1), Section(1.2, 2.0, 1)], [Section(0.0, 0.5, 1), Section(0.5, 1.5, 1)]
-    )
+    columns = [Section(0.0, 1.2, 1), Section(1.2, 2.0, 1)]
+    grid = Grid(columns, [Section(0.0, 0.5, 1), Section(0.5, 1.5, 1)])
     codes = np.tile([1, 1, 0, 1, 1] if shears else [0] * 5, (grid.up, grid.across, 1))
     codes[0, 0, :3] = 1
     if not shears:
@@ -84,33 +73,30 @@ def loaded_rectangle(x: Sequence[float], y: Sequence[float], *, shears: bool = F
         loads[place] += sign * np.outer(decks.weights(lines(grid.columns)), y)
     rows = enumerate(codes.reshape(-1, 5).tolist(), start=1)
     segments = (
-        Boundary(tuple(NodeCodes(n, 0, tuple(code)) for n, code in rows if any(code))),
+        model.Boundary(tuple(NodeCodes(n, 0, tuple(code)) for n, code in rows if any(code))),
         decks.forces(np.where(codes == 0, loads, 0.0)),
         decks.material(FIBRES, (0.0, 45.0), THICK / 2.0),
-        Shear(0.8) if shears else None,
+        model.Shear(0.8) if shears else None,
     )
     return decks.deck(grid, segments, STRESSES)
 
 
-@case("resultants")
-def resultants() -> Sequence[Value]:
-    """Uniform strains and resultants."""
+@case
+def _resultants() -> Sequence[Value]:
     n_x, n_y, n_xy, m_x, m_y, m_xy = 100.0, -40.0, 30.0, 0.5, 0.3, -0.2
     # A couple M does work on -theta.
-    found = decks.result_of(
-        loaded_rectangle((n_x, n_xy, 0.0, -m_x, -m_xy), (n_xy, n_y, 0.0, -m_xy, -m_y))
-    )
-    sheared = decks.result_of(
-        loaded_rectangle((0.0, 0.0, 20.0, 0.0, 0.0), (0.0, 0.0, -8.0, 0.0, 0.0), shears=True)
-    )
+    pulled = loaded_rectangle((n_x, n_xy, 0.0, -m_x, -m_xy), (n_xy, n_y, 0.0, -m_xy, -m_y))
+    shears = (0.0, 0.0, 20.0, 0.0, 0.0), (0.0, 0.0, -8.0, 0.0, 0.0)
+    found = decks.result_of(pulled)
+    sheared = decks.result_of(loaded_rectangle(*shears, shears=True))
     return [
         *decks.fields(found, "stresses", f"{IN_PLANE} N_x N_y N_xy M_x M_y M_xy"),
         *decks.fields(sheared, "stresses", "gamma_xz gamma_yz Q_x Q_y"),
     ]
 
 
-@case("tape8")
-def tape8() -> Sequence[Value]:
+@case
+def _tape8() -> Sequence[Value]:
     """Strains of a plate whose nodes are held in a field of constant strains, except one w.
 
     A very slow rigid mass hits this dof, in the middle of the first element, for one step: the
@@ -122,29 +108,25 @@ def tape8() -> Sequence[Value]:
     field = decks.constant_strains(x, y, (0.4, -0.5, 0.6), shear=(0.02, -0.03))
     field[struck - 1, 2] = 0.0
     codes = [NodeCodes(n, 0, (1, 1, int(n != struck), 1, 1)) for n in range(1, grid.nodes + 1)]
-    segments = (
-        Boundary(tuple(codes)), decks.forces(field), Projectile(0, 0, 1e-6),
-        Impact(struck, 3, 1e-12), decks.elastic(1.0), decks.material(FIBRES, (0.0, 90.0), 0.01),
-    )  # fmt: skip
+    hit = (model.Projectile(0, 0, 1e-6), model.Impact(struck, 3, 1e-12), decks.elastic(1.0))
+    plate = decks.material(FIBRES, (0.0, 90.0), 0.01)
+    segments = (model.Boundary(tuple(codes)), decks.forces(field), *hit, plate)
     found = decks.result_of(decks.deck(grid, segments, decks.impact_program(1e-7, 1)))
     names = "kappa_x kappa_y kappa_xy gamma_yz gamma_xz"
     return [field[:, 1:] for field in decks.fields(found, "tape8", names)]
 
 
-@case("time-step")
-def time_step() -> Sequence[Value]:
-    """Time step 2/ω of the only mode."""
+@case
+def _time_step() -> Sequence[Value]:
     grid = Grid(uniform(0.3, 1), uniform(0.3, 1))
     made = decks.deck(grid, [decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.1)], ())
-    return [_critical(made, dof) for dof in (2, 3)]
-
-
-def _critical(made: Deck, dof: int) -> float:
-    """Critical time step where one dof of node 5, the centre, is free."""
-    mesh = generate(made)
-    codes, equations = np.ones_like(mesh.codes), np.zeros_like(mesh.equations)
-    codes[4, dof], equations[4, dof] = 0, 1
-    return critical_time_step(build_plate(made, replace(mesh, codes=codes, equations=equations)))
+    mesh, found = generate(made), []
+    for dof in (2, 3):  # of node 5, the centre
+        codes, equations = np.ones_like(mesh.codes), np.zeros_like(mesh.equations)
+        codes[4, dof], equations[4, dof] = 0, 1
+        held = replace(mesh, codes=codes, equations=equations)
+        found.append(critical_time_step(build_plate(made, held)))
+    return found
 
 
 # Statics, frequencies, motion --------------------------------------------------------------------
@@ -154,21 +136,17 @@ ELEMENTS = 8  # of 16 a side
 ONE = decks.isotropic(1.0, 0.3, 1.0)
 
 
-@case("static-bending")
-def static_bending() -> Sequence[Value]:
-    """Deflections, with transverse shear integrated by order 2, which does not lock, and 3."""
+@case
+def _static_bending() -> Sequence[Value]:
+    """Transverse shear integrated by order 2 does not lock; by order 3 it does."""
 
     def w(thickness: float, factor: float = 1.0, shear_order: int = 2) -> Floats:
-        plate = decks.material(
-            decks.isotropic(1.0, 0.3, 1.0, factor), [0.0], thickness, shear_order
-        )
-        row: Floats = decks.result_of(
-            decks.quarter_plate(ELEMENTS, plate, DEFLECTION, 1.0)
-        ).tape3.w[0]
-        return row
+        ply = decks.isotropic(1.0, 0.3, 1.0, factor)
+        plate = decks.material(ply, [0.0], thickness, shear_order)
+        made = decks.quarter_plate(ELEMENTS, plate, DEFLECTION, 1.0)
+        return np.asarray(decks.result_of(made).tape3.w[0])
 
-    across = 2 * ELEMENTS + 1
-    quarter = ELEMENTS + ELEMENTS * across  # the row of the node at (a/4, a/4)
+    quarter = ELEMENTS + ELEMENTS * (2 * ELEMENTS + 1)  # the row of the node at (a/4, a/4)
     thick = w(0.1)
     return [
         thick[0], thick[quarter], w(0.01)[0], w(0.1, 5.0 / 6.0)[0],
@@ -176,25 +154,22 @@ def static_bending() -> Sequence[Value]:
     ]  # fmt: skip
 
 
-@case("frequencies")
-def frequencies() -> Sequence[Value]:
+@case
+def _frequencies() -> Sequence[Value]:
     """Frequencies of the symmetric modes, on a quarter of the plate, and of uniform shear."""
     plate = decks.material(ONE, [0.0], 0.1, 2)
     macros = decks.program("LMAS EIGE=4 CMAS EIGE=4")
     found = decks.result_of(decks.quarter_plate(ELEMENTS, plate, macros)).modes.angular_frequency
     scaled = found * math.sqrt(0.1 / (0.1**3 / (12.0 * (1.0 - 0.3**2))))
-    # Modes 11, 13 and 31, 33 with the lumped mass, then with the consistent mass.
-    return [scaled[0], scaled[1], scaled[4], scaled[7], _shear_frequency()]
-
-
-def _shear_frequency() -> float:
-    """Rayleigh quotient of a free plate in uniform transverse shear."""
     grid = Grid(uniform(0.7, 2), uniform(1.3, 2))
     held = grid.boundary((1, 1, 1, 0, 1), {})
     made = decks.deck(grid, (held, decks.material(ONE, [0.0], 0.1)), ())
-    model = build_plate(made, generate(made))
-    ones = np.ones(model.neq)
-    return math.sqrt(float(ones @ (model.stiffness @ ones)) / float(model.mass @ ones))
+    free = build_plate(made, generate(made))
+    ones = np.ones(free.neq)
+    # Rayleigh's quotient of a free plate in uniform transverse shear.
+    shear = math.sqrt(float(ones @ (free.stiffness @ ones)) / float(free.mass @ ones))
+    # Modes 11, 13 and 31, 33 with the lumped mass, then with the consistent mass.
+    return [scaled[0], scaled[1], scaled[4], scaled[7], shear]
 
 
 # Coupled laminates -------------------------------------------------------------------------------
@@ -215,28 +190,25 @@ def two_layers(angles: Sequence[float], codes: str, mode: int, node: int) -> Seq
     return [modes[0][0], modes[0][mode], modes[1][0], first[0, 2], first[node, 0], second[0, 2]]
 
 
-@case("cross-ply-plate")
-def cross_ply_plate() -> Sequence[Value]:
-    """Frequencies and deflections of [0/90]."""
+@case
+def _cross_ply_plate() -> Sequence[Value]:
     return two_layers((0.0, 90.0), decks.CROSS_PLY, 1, 2 * FEWER)
 
 
-@case("angle-ply-plate")
-def angle_ply_plate() -> Sequence[Value]:
-    """Frequencies and deflections of [45/-45]."""
+@case
+def _angle_ply_plate() -> Sequence[Value]:
     return two_layers((45.0, -45.0), decks.ANGLE_PLY, 2, (2 * FEWER + 1) * 2 * FEWER)
 
 
-@case("forced-plate")
-def forced_plate() -> Sequence[Value]:
-    """Last rows of tape3 and of a gage of [0/90] under a uniform load that varies as sin²."""
+@case
+def _forced_plate() -> Sequence[Value]:
     # One of the 2 x 2 points where the strains of a 9-node element are most accurate; the face away
     # from the load.
     root = (1.0 - 1.0 / np.sqrt(3.0)) / 2.0 * 0.5 / FEWER
     gage = Gage(1, float(f"{1 / 12 + root:.9g}"), float(f"{0.25 + root:.9g}"), H / 2.0, 30.0)
     steps = decks.program("LMAS DT=1.08e-7 PROP=1 LOOP=600 TIME EXCD DISP=600 NEXT")
     card = decks.material(FIBRES, (0.0, 90.0), H / 2.0, 2)
-    made = decks.quarter_plate(FEWER, card, steps, 1.0, decks.CROSS_PLY, [Gages((gage,))])
+    made = decks.quarter_plate(FEWER, card, steps, 1.0, decks.CROSS_PLY, [model.Gages((gage,))])
     table = LoadTable(1, 2, 0.0, 1.0, (0.0, 0.0, 1.0, 5.0e4, 0.0))
     found = decks.result_of(replace(made, tables=(table,)))
     return [found.tape3.w[-1, 0], found.gages.strain[-1, 0]]
@@ -254,14 +226,12 @@ def rectangle(along: int, patch: Patch, macros: Sequence[Macro], *others: Segmen
     """Build a simply supported [0/90]5s of the report's ply with MITC, pressed on a patch."""
     grid = Grid(uniform(SIDES[0], along), uniform(SIDES[1], along * 2 // 3))
     plate = decks.material(decks.REPORT_PLY, 5 * (0.0, 90.0) + 5 * (90.0, 0.0), 0.106 / 20)
-    return decks.deck(
-        grid, (decks.supports(grid, decks.SUPPORTED), patch, *others, decks.MITC, plate), macros
-    )
+    held = decks.supports(grid, decks.SUPPORTED)
+    return decks.deck(grid, (held, patch, *others, decks.MITC, plate), macros)
 
 
-@case("patch-compliance")
-def compliance() -> Sequence[Value]:
-    """Mean of w, weighted by the pressure."""
+@case
+def _patch_compliance() -> Sequence[Value]:
     found = []
     for shape in ("DISC", "HERT"):
         patch = Patch(shape, 0.5, SIDES[0] / 2.0, SIDES[1] / 2.0, 1.0)
@@ -270,21 +240,19 @@ def compliance() -> Sequence[Value]:
     return found
 
 
-@case("assumed-shear")
-def assumed_shear() -> Sequence[Value]:
-    """Deflections of a plate of four times four elements a quarter."""
+@case
+def _assumed_shear() -> Sequence[Value]:
     cards = (decks.material(ONE, [0.0], h) for h in (0.1, 0.001))
     made = [decks.quarter_plate(4, card, DEFLECTION, 1.0, others=[decks.MITC]) for card in cards]
     return [decks.result_of(one).tape3.w[0, 0] for one in made]
 
 
-@case("equilibrium-shear")
-def equilibrium_shear() -> Sequence[Value]:
-    """Transverse shear stiffness of the plates of two decks."""
+@case
+def _equilibrium_shear() -> Sequence[Value]:
 
     def shear(ply: Ply, angles: Sequence[float]) -> Floats:
         plate = decks.material(ply, angles, 1.0 / len(angles))
-        made = decks.quarter_plate(1, plate, (), others=[Shear(equilibrium=True)])
+        made = decks.quarter_plate(1, plate, (), others=[model.Shear(equilibrium=True)])
         return build_plate(made, generate(made)).laminate.shear.diagonal()
 
     return [shear(ONE, [0.0])[0] / ONE.g13, *shear(STIFF, CROSS)]
@@ -300,14 +268,12 @@ def bent(
     along = np.cos(np.pi * np.array(lines(uniform(0.5, ELEMENTS))))
     plate = decks.material(ply, angles, thickness / len(angles), points=2)
     macros, load = decks.program(f"TANG FORM SOLV STRE {word}"), np.outer(along, along)
-    return decks.result_of(
-        decks.quarter_plate(ELEMENTS, plate, macros, load, others=[decks.MITC, *others])
-    )
+    made = decks.quarter_plate(ELEMENTS, plate, macros, load, others=[decks.MITC, *others])
+    return decks.result_of(made)
 
 
-@case("ply-stresses")
-def sinusoidal() -> Sequence[Value]:
-    """Stresses and their shapes."""
+@case
+def _ply_stresses() -> Sequence[Value]:
     found = bent(STIFF, CROSS)
     x, y = decks.fields(found, "stresses", "x y")
     even, odd = np.cos(np.pi * x) * np.cos(np.pi * y), np.sin(np.pi * x) * np.sin(np.pi * y)
@@ -322,9 +288,8 @@ def sinusoidal() -> Sequence[Value]:
     ]  # fmt: skip
 
 
-@case("ply-shear")
-def homogeneous() -> Sequence[Value]:
-    """Stresses at heights of the third ply, and at the faces, and their shape."""
+@case
+def _ply_shear() -> Sequence[Value]:
     found = bent(ONE, (0.0,) * 4)
     x, y = (place.mean(axis=1) for place in decks.fields(found, "stresses", "x y"))
     shape = np.sin(np.pi * x) * np.cos(np.pi * y)
@@ -333,9 +298,8 @@ def homogeneous() -> Sequence[Value]:
     return [*((tau[:, 2, height], shape) for height in (0, 2, 1)), at_faces]
 
 
-@case("failure")
-def failure() -> Sequence[Value]:
-    """Reciprocals of the largest exposures under a load of 1 Pa."""
+@case
+def _failure() -> Sequence[Value]:
     named = MATERIALS["T300/5208"]
     strengths = named.allowables("m-N-s")
     assert strengths is not None

@@ -11,6 +11,7 @@ from fecm.verification.case import CASE_OF, INTRODUCTION, Case, Row
 
 HEAD = ("case", "source", "quantity", "expected", "got", "error", "allowed", "label", "verdict")
 FINE, NOT_FINE = "ok", "FAILED"
+COLUMNS = "| quantity | source | expected | got | error | allowed | because | label |"
 
 
 def cells(row: Row) -> tuple[str, ...]:
@@ -54,23 +55,14 @@ def values(row: Row) -> dict[str, Any]:
     }  # fmt: skip
 
 
-COLUMNS = ("quantity", "source", "expected", "got", "error", "allowed", "because", "label")
-
-
 def page(rows: Iterable[Row]) -> str:
     """Return the documentation page in Markdown."""
     text = [INTRODUCTION]
     for name, group in groupby(rows, key=lambda row: row.case):
-        text += ["", f"## `{name}`: {CASE_OF[name].title}", "", _row(COLUMNS), "|---" * 8 + "|"]
-        text += [_row(_cells(row)) for row in group]
+        text += ["", f"## `{name}`: {CASE_OF[name].title}", "", COLUMNS, "|---" * 8 + "|"]
+        for row in group:
+            _, source, quantity, expected, got, error, allowed, label, _ = cells(row)
+            shown = got if row.within else f"**{got}**"
+            texts = (quantity, source, expected, shown, error, allowed, row.check.why, label)
+            text.append(f"| {' | '.join(texts)} |")
     return "\n".join([*text, ""])
-
-
-def _cells(row: Row) -> tuple[str, ...]:
-    _, source, quantity, expected, got, error, allowed, label, verdict = cells(row)
-    shown = got if verdict == FINE else f"**{got}**"
-    return quantity, source, expected, shown, error, allowed, row.check.why, label
-
-
-def _row(texts: Iterable[str]) -> str:
-    return "| " + " | ".join(texts) + " |"
