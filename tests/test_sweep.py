@@ -27,8 +27,7 @@ from fecm.problem.build import build_law, build_model, build_projectile
 from fecm.sweeps import schedule
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.cases import Case, CasesError, grid, parse_vary, read_cases
-from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.plan import Task, plan, shares_plate, tasks
+from fecm.sweeps.plan import Outcome, Task, plan, shares_plate, tasks
 from fecm.sweeps.responses import Convolution, plate_response
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.schedule import LOST, OtherSweepError, PartialResults, on_workers

@@ -16,8 +16,7 @@ from fecm.sweeps import schedule
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.batch import run
 from fecm.sweeps.cases import grid
-from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.plan import Plan, Task, plan, tasks
+from fecm.sweeps.plan import Outcome, Plan, Task, plan, tasks
 from fecm.sweeps.schedule import LOST, DamagedPartError, PartialResults
 from fecm.sweeps.vary import with_time_step
 from tests.calls import call

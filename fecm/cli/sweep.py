@@ -33,7 +33,6 @@ from fecm.sweeps.cases import (
 )
 from fecm.sweeps.convergence import refined_cases
 from fecm.sweeps.convergence import table as table_of
-from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.random_result import tables
 from fecm.sweeps.result import SweepResult, save, summary, verdict
 from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_in
@@ -218,7 +217,7 @@ def _carry_out(
         per_core = finished / seconds / workers if seconds else 0.0
         return f"{finished} cases, {per_core:.3g} a second per worker" if finished else ""
 
-    def done(task: plans.Task, outcome: Outcome) -> None:
+    def done(task: plans.Task, outcome: plans.Outcome) -> None:
         nonlocal finished
         finished += len(task.numbers)
         advance(len(task.numbers))

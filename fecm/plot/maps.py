@@ -22,7 +22,7 @@ from fecm.results.metrics import COLUMNS
 from fecm.results.metrics import INTEGERS as WHOLE_NUMBERS
 from fecm.sweeps.cases import INTEGERS as WHOLE_VALUES
 from fecm.sweeps.cases import NAMES
-from fecm.sweeps.outcome import RUN, STILL
+from fecm.sweeps.plan import RUN, STILL
 from fecm.sweeps.result import SweepResult, reasons
 
 Array = NDArray[Any]

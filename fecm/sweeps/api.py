@@ -16,12 +16,12 @@ from fecm.api import LoadedDeck, Progress, load_deck
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
 from fecm.problem.problem import Problem
+from fecm.sweeps import plan as plans
 from fecm.sweeps import sampling, schedule
 from fecm.sweeps.batch import built, deck_of
-from fecm.sweeps.cases import Case, CasesError, Limit, checked, combined, parse_exceed
+from fecm.sweeps.cases import Case, CasesError, checked, combined, parse_exceed
 from fecm.sweeps.convergence import refined_cases
-from fecm.sweeps.outcome import RUN, Outcome, merge
-from fecm.sweeps.plan import DEFLECTION, Build, Measure, Plan, Task, check_memory, plan, tasks
+from fecm.sweeps.plan import RUN, Build, Measure, Outcome, Plan, Task, merge, plan
 from fecm.sweeps.result import SweepResult, result_of, save
 from fecm.sweeps.sampling import DesignKind
 
@@ -38,17 +38,6 @@ def _loaded(deck: str | Path | Deck) -> LoadedDeck:
     if (count := len(prepared.problems)) != 1:
         raise CasesError(f"{prepared.source} has {count} problems; a sweep takes one")
     return prepared
-
-
-def _limits(exceed: Mapping[str, Any]) -> list[Limit]:
-    """Limits by quantity, each a value or a sequence of values."""
-    if not isinstance(exceed, Mapping):
-        raise CasesError(f'exceed is {exceed!r}; write {{"peak_force": [100.0]}} or the like')
-    return [
-        parse_exceed(f"{name}={value}")
-        for name, given in exceed.items()
-        for value in np.atleast_1d(given).tolist()
-    ]
 
 
 def check_draws(planned: Plan) -> None:
@@ -68,13 +57,13 @@ def check_draws(planned: Plan) -> None:
 
 def _first_built(build: Build, cases: Sequence[Case]) -> LoadedDeck:
     """The first deck that can be built: it has the units, and tells the memory of a case."""
-    reasons: list[str] = []
+    first = ""
     for case in cases:
         try:
             return built(build, case)
         except CasesError as error:
-            reasons.append(str(error))
-    raise CasesError(f"no case has a deck; case 0: {reasons[0]}")
+            first = first or str(error)
+    raise CasesError(f"no case has a deck; case 0: {first}")
 
 
 def _check_sendable(spawned: bool, **functions: object) -> None:
@@ -115,17 +104,17 @@ def carry_out(
     left: list[Task] = []
 
     def take(task: Task, outcome: Outcome) -> None:
-        if parts is not None or not made.history:
+        if parts is not None:
             outcome.force = None
         outcomes.append(outcome)
         done(task, outcome)
 
-    for task in tasks(problem, made):
+    for task in plans.tasks(problem, made):
+        before = None
         try:
             before = None if parts is None else parts.get(task)
         except schedule.DamagedPartError as error:
             note(f"{error}; its cases are run again")
-            before = None
         if before is None:
             left.append(task)
         else:
@@ -143,11 +132,10 @@ def carry_out(
     elif workers > 1 and len(left) > 1:
         schedule.on_workers(left, workers, keep, idle)
     else:
-        schedule.run_serial(left, keep, idle)
-    outcome = merge(outcomes)
-    if parts is not None or not made.history:
-        outcome.force = None
-    return result_of(made, outcome)
+        for task in left:
+            idle()
+            keep(task, schedule.attempt(task))
+    return result_of(made, merge(outcomes, made.history and parts is None))
 
 
 def sweep(
@@ -293,7 +281,7 @@ def sweep(
         made = combined({} if vary is None else vary, free=free)
     else:
         made = checked(cases, free=free)
-    drawn: sampling.Design | None = None
+    drawn = None
     if random is not None:
         laws = {name: sampling.parse_law(name, law, free=free) for name, law in random.items()}
         drawn = sampling.design_of(laws, samples, seed, design, sensitivity=sensitivity)
@@ -313,14 +301,21 @@ def sweep(
             warn(finding.render(prepared.source))
     (problem,) = prepared.problems
     if refine is not None:
-        made, extra = refined_cases(problem, refine), (DEFLECTION,)
+        made, extra = refined_cases(problem, refine), (plans.DEFLECTION,)
+    if not isinstance(exceed or {}, Mapping):
+        raise CasesError(f'exceed is {exceed!r}; write {{"peak_force": [100.0]}} or the like')
+    limits = [
+        parse_exceed(f"{name}={value}")
+        for name, given in (exceed or {}).items()
+        for value in np.atleast_1d(given).tolist()
+    ]
     planned = plan(
         problem, made, history=history, until=until, build=build, measure=own, extra=extra,
-        design=drawn, limits=_limits(exceed or {}),
+        design=drawn, limits=tuple(limits),
     )  # fmt: skip
     check_draws(planned)
     here = workers if executor is None else getattr(executor, "_max_workers", 0)
-    check_memory(problem, planned, 0 if scheduler is not None else here)
+    plans.check_memory(problem, planned, 0 if scheduler is not None else here)
     finished = 0
     first: tuple[int, list[str]] | None = None
 

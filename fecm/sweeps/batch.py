@@ -6,10 +6,10 @@ then stepped once under a unit force; every case follows by convolution with its
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,6 @@ from fecm.deck.model import Deck, Impact, Projectile
 from fecm.deck.model import Indentation as LawCards
 from fecm.deck.units import unit_names
 from fecm.mechanics.contact_law import HystereticLaw, stacked
-from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.time_step import taken_time_step
@@ -36,13 +35,13 @@ from fecm.results.sinks import MemorySink
 from fecm.results.summary import largest_exposures
 from fecm.simulation.run import ENERGY_WARNING, simulate
 from fecm.sweeps import plan
-from fecm.sweeps.cases import PLATE, REFINE, THRESHOLD, Case, CasesError, Value, name_fault
-from fecm.sweeps.outcome import RUN, Outcome, merge, outcome_of
+from fecm.sweeps.cases import THRESHOLD, Case, CasesError, Value, name_fault, plate_values
+from fecm.sweeps.plan import RUN, Outcome, merge, outcome_of
 from fecm.sweeps.responses import Hits, impacts, largest_sums, plate_response
 from fecm.sweeps.vary import Clock, apply_case, check_deck, raise_first, with_time_step
 
-# Runs decks by their numbers; doubtful ones in full if they are judged.
-Runs = Callable[[list[int], list[Deck], bool], Outcome]
+Decks = Mapping[int, Deck]  # by the numbers of their cases, ascending
+Runs = Callable[[Decks, bool], Outcome]  # runs decks; doubtful ones in full if they are judged
 UNIT = RigidMass(1.0)
 ROUGH = 1e-4  # relative difference of the peak force from the value searched, beyond which it jumps
 
@@ -50,49 +49,41 @@ ROUGH = 1e-4  # relative difference of the peak force from the value searched, b
 def run(task: plan.Task) -> Outcome:
     """Run the cases of a task; a case that cannot be run becomes a row with the reason."""
     if task.alone:
-        found = merge([_in_full(task, n, c) for n, c in zip(task.numbers, task.cases, strict=True)])
-        return found if task.history else replace(found, force=None)
-    first = {n: value for n, value in task.cases[0].items() if n in (*PLATE, REFINE)}
+        cases = zip(task.numbers, task.cases, strict=True)
+        return merge([_in_full(task, number, case) for number, case in cases], task.history)
+    first = plate_values(task.cases[0])
+    plate = tuple(first.items())
     try:
-        checked, runs = _prepared(
-            task.deck, tuple(first.items()), task.clock, task.extra, task.history
-        )
+        checked, runs = _prepared(task.deck, plate, task.clock, task.extra, task.history)
     except CasesError as error:
         return Outcome.failed(dict.fromkeys(task.numbers, str(error)))
-    numbers: list[int] = []
-    decks: list[Deck] = []
+    decks: dict[int, Deck] = {}
     lost: dict[int, str] = {}
     for number, case in zip(task.numbers, task.cases, strict=True):
         try:
-            own = {n: value for n, value in case.items() if n not in first}
-            deck = apply_case(checked.deck, own)
-            _check_contact(deck, checked.mesh)
+            deck = apply_case(checked.deck, {n: v for n, v in case.items() if n not in first})
+            findings = Findings()
+            check_impact(deck.require(Impact), deck, checked.mesh, findings)
+            check_law(deck.require(LawCards), findings)
+            if (projectile := deck.last(Projectile)) is not None:
+                check_projectile(projectile, findings)
+            raise_first(findings)
+            decks[number] = deck
         except CasesError as error:
             lost[number] = str(error)
-            continue
-        numbers.append(number)
-        decks.append(deck)
-    parts = [Outcome.failed(lost)] if lost else []
+    parts = [Outcome.failed(lost)]
     if decks:
-        if task.until is None:
-            outcome = runs(numbers, decks, True)
-        else:
-            force = _threshold(checked) if task.until == THRESHOLD else None
-            force = float(task.until) if force is None else force
-            outcome = _found(numbers, decks, force, runs)
+        force = _threshold(checked) if task.until == THRESHOLD else task.until
+        outcome = runs(decks, True) if force is None else _found(decks, float(force), runs)
         parts.append(_with_hit(outcome, checked, first))
-    outcome = merge(parts)
-    return outcome if task.history else replace(outcome, force=None)
+    return merge(parts, task.history)
 
 
 @lru_cache(maxsize=1)
 def _prepared(
-    deck: Deck,
-    plate: tuple[tuple[str, Value], ...],
-    clock: Clock | None,
-    extra: tuple[str, ...],
-    history: bool,
-) -> tuple[Problem, Runs]:
+    deck: Deck, plate: tuple[tuple[str, Value], ...], clock: Clock | None,
+    extra: tuple[str, ...], history: bool,
+) -> tuple[Problem, Runs]:  # fmt: skip
     """The problem of a plate, given by values of names, and what runs its cases."""
     case = dict(plate)
     checked = _timed(apply_case(deck, case), clock, case)
@@ -108,7 +99,7 @@ def _in_full(task: plan.Task, number: int, case: Case) -> Outcome:
             (checked,) = built(task.build, case).problems
             if unit_names(checked.deck) != unit_names(task.deck):
                 raise CasesError("build: the units of the deck are not those of the other cases")
-        outcome = _alone(number, checked, task.measure, case, task.extra)
+        outcome = _alone(number, checked, task.extra, task.measure, case)
         return _with_hit(outcome, checked, {} if task.build else case)
     except CasesError as error:
         return Outcome.failed({number: str(error)})
@@ -168,29 +159,28 @@ def runs_of(checked: Problem, extra: Sequence[str] = (), *, history: bool = True
     """Return the function that runs decks which share the plate of a problem."""
     if plan.shares_plate(checked):
         return partial(_together, checked, _plate(checked, extra), extra, history)
-    return lambda numbers, decks, judged: merge(
-        [_alone(n, replace(checked, deck=deck), extra=extra)
-         for n, deck in zip(numbers, decks, strict=True)]
-    )  # fmt: skip
+    return lambda decks, judged: merge(
+        [_alone(number, replace(checked, deck=deck), extra) for number, deck in decks.items()]
+    )
 
 
-def _found(numbers: list[int], decks: list[Deck], force: float, runs: Runs) -> Outcome:
+def _found(decks: Decks, force: float, runs: Runs) -> Outcome:
     """Run cases at the velocities at which their peaks reach a force."""
 
-    def at(pairs: Iterable[tuple[int, float]]) -> list[Deck]:
-        return [apply_case(decks[case], {"velocity": velocity}) for case, velocity in pairs]
+    def at(case: int, velocity: float) -> Deck:
+        return apply_case(decks[case], {"velocity": velocity})
 
     def peaks(pairs: list[tuple[int, float]]) -> Floats:
-        return runs(list(range(len(pairs))), at(pairs), False).columns["peak_force"]
+        return runs({n: at(*pair) for n, pair in enumerate(pairs)}, False).columns["peak_force"]
 
-    found = search([deck.require(Impact).velocity for deck in decks], force, peaks)
-    pairs = [(case, v) for case, v in enumerate(found) if isinstance(v, float)]
-    reasons = {numbers[case]: v for case, v in enumerate(found) if isinstance(v, str)}
-    parts = [Outcome.failed(reasons)]
-    if pairs:
-        outcome = runs([numbers[case] for case, _ in pairs], at(pairs), True)
-        velocity = np.array([v for _, v in pairs])
-        mass = np.array([build_projectile(decks[case]).total_mass for case, _ in pairs])
+    starts = {case: deck.require(Impact).velocity for case, deck in decks.items()}
+    found = search(starts, force, peaks)
+    velocities = {case: v for case, v in found.items() if isinstance(v, float)}
+    parts = [Outcome.failed({case: v for case, v in found.items() if isinstance(v, str)})]
+    if velocities:
+        outcome = runs({case: at(case, v) for case, v in velocities.items()}, True)
+        velocity = np.array(list(velocities.values()))
+        mass = np.array([build_projectile(decks[case]).total_mass for case in velocities])
         peak, fine = outcome.columns["peak_force"], np.isin(outcome.columns["status"], RUN)
         outcome.columns |= {"found_velocity": velocity, "found_energy": 0.5 * mass * velocity**2}
         right = fine & (np.abs(peak - force) <= ROUGH * force)
@@ -214,11 +204,10 @@ def _timed(deck: Deck, clock: Clock | None, case: Case) -> Problem:
     """Check the deck of a case, with the time step of its plate."""
     if clock is None:
         return check_deck(deck)
-    # DT 0 is below the critical time step of any plate.
-    checked = check_deck(with_time_step(deck, 0.0))
-    dt = clock.time_step(checked.critical_time_step)
+    own, rule = clock
+    checked = check_deck(with_time_step(deck, 0.0))  # below the critical time step of any plate
     duration = float(case["duration"]) if "duration" in case else None
-    timed = with_time_step(deck, dt, clock.dt, duration)
+    timed = with_time_step(deck, rule(checked.critical_time_step), own, duration)
     findings = Findings()
     problem = Problem(timed, checked.mesh, compile_program(timed.macros, findings))
     check_program(problem, findings)
@@ -226,23 +215,12 @@ def _timed(deck: Deck, clock: Clock | None, case: Case) -> Problem:
     return problem
 
 
-def _check_contact(deck: Deck, mesh: Mesh) -> None:
-    """Check the impact, law and projectile of a case."""
-    findings = Findings()
-    check_impact(deck.require(Impact), deck, mesh, findings)
-    check_law(deck.require(LawCards), findings)
-    if (projectile := deck.last(Projectile)) is not None:
-        check_projectile(projectile, findings)
-    raise_first(findings)
-
-
 def _threshold(checked: Problem) -> float | None:
     """Delamination threshold of a plate, force; None without a DELA segment."""
     return None if checked.threshold is None else checked.threshold.force
 
 
-@dataclass(frozen=True)
-class Plate:
+class Plate(NamedTuple):
     """Response of a plate to a unit force in its first step of size `dt`, and the mass it moves."""
 
     response: Floats
@@ -267,34 +245,28 @@ def _plate(checked: Problem, extra: Sequence[str]) -> Plate:
 
 
 def _together(
-    checked: Problem,
-    plate: Plate,
-    extra: Sequence[str],
-    history: bool,
-    numbers: list[int],
-    decks: list[Deck],
-    judged: bool,
+    checked: Problem, plate: Plate, extra: Sequence[str], history: bool, decks: Decks, judged: bool
 ) -> Outcome:
     """Run cases that share a plate by its response to a unit force.
 
     The outcome has the contact forces if `history` is set.  Cases with doubtful energies are run in
     full if they are judged.
     """
-    steps, dt = len(plate.response), plate.dt
-    rods = [build_projectile(deck) for deck in decks]
+    steps, dt, numbers = len(plate.response), plate.dt, list(decks)
+    rods = [build_projectile(deck) for deck in decks.values()]
     # All rigid masses are one kind: a unit mass under the force over the mass.
     units = [UNIT if isinstance(rod, RigidMass) else rod for rod in rods]
     kinds = {unit: number for number, unit in enumerate(dict.fromkeys(units))}
-    # Cases with the same projectile are adjacent.
-    order = sorted(range(len(decks)), key=lambda case: kinds[units[case]])
-    kind = np.array([kinds[units[case]] for case in order], dtype=np.intp)
-    mass = np.array([rods[case].total_mass for case in order])
-    scale = np.where([isinstance(rods[case], RigidMass) for case in order], mass, 1.0)
+    kind = np.array([kinds[unit] for unit in units], dtype=np.intp)
+    order = np.argsort(kind, kind="stable")  # cases with the same projectile are adjacent
+    mass = np.array([rod.total_mass for rod in rods])[order]
+    scale = np.where([units[case] is UNIT for case in order], mass, 1.0)
     require(plan.ADVANCED * steps * len(decks), f"{len(decks)} cases of {steps} steps")
+    ordered = [decks[numbers[case]] for case in order]
     with np.errstate(all="ignore"):
-        law = HystereticLaw(stacked([build_law(decks[case]).constants for case in order]))
-        speed = np.array([decks[case].require(Impact).velocity for case in order])
-        hits = Hits(list(kinds), kind, scale, law, speed)
+        law = HystereticLaw(stacked([build_law(deck).constants for deck in ordered]))
+        speed = np.array([deck.require(Impact).velocity for deck in ordered])
+        hits = Hits(list(kinds), kind[order], scale, law, speed)
         found = impacts(plate.response, dt, plate.node_mass, hits)
         times = np.add.accumulate(np.full(steps, dt))
         summary = summarise(found.force, times, found.indentation, mass, speed, _threshold(checked))
@@ -308,15 +280,16 @@ def _together(
     outcome = outcome_of(numbers, columns, found.force[-1, back], steps, dt, unsettled)
     if history:
         outcome.force = np.ascontiguousarray(found.force.T[back])
-    doubtful = np.flatnonzero(~(found.error[back] < ENERGY_WARNING) | (unsettled > 0))
-    if not (judged and len(doubtful)):
+    doubtful = ~(found.error[back] < ENERGY_WARNING) | (unsettled > 0)
+    if not (judged and doubtful.any()):
         return outcome
-    rest = np.setdiff1d(np.arange(len(numbers)), doubtful)
     # Cases near the limits of a run are run in full, which accepts or rejects them.
     full = [
-        _alone(numbers[case], replace(checked, deck=decks[case]), extra=extra) for case in doubtful
+        _alone(number, replace(checked, deck=deck), extra)
+        for (number, deck), is_doubtful in zip(decks.items(), doubtful, strict=True)
+        if is_doubtful
     ]
-    return merge([outcome.select(rest), *full])
+    return merge([outcome.select(np.flatnonzero(~doubtful)), *full])
 
 
 def _known(largest: Floats, last: Floats, force: Floats) -> Floats:
@@ -341,37 +314,33 @@ def _extra(extra: Sequence[str], result: Result) -> dict[str, NDArray[Any]]:
 
 
 def _alone(
-    number: int,
-    checked: Problem,
-    measure: plan.Measure | None = None,
-    case: Case | None = None,
-    extra: Sequence[str] = (),
-) -> Outcome:
+    number: int, checked: Problem, extra: Sequence[str],
+    measure: plan.Measure | None = None, case: Case | None = None,
+) -> Outcome:  # fmt: skip
     """Run one case in full, without storing fields unless it is measured."""
     sink = MemorySink()
-    if measure is None:
-        checked = plan.without_output(checked, extra)
     try:
-        simulation = simulate(checked, sink)
+        stored = checked if measure else plan.without_output(checked, extra)
+        simulation = simulate(stored, sink)
     except (DivergenceError, ArithmeticError) as error:
         return Outcome.failed({number: str(error)})
-    force, times = sink.arrays["history/force"], sink.arrays["history/time"]
-    indentation = sink.arrays["history/indentation"]
-    largest = np.maximum(indentation.max(keepdims=True), 0.0)
+    force, depth, times = (
+        sink.arrays[f"history/{name}"] for name in ("force", "indentation", "time")
+    )
+    about = sink.groups["history"]
+    permanent = np.array([about.get("permanent_indentation", 0.0)])
+    indentation = Indentation(np.maximum(depth.max(keepdims=True), 0.0), depth[-1:], permanent)
     mass = build_projectile(checked.deck).total_mass
     speed = checked.deck.require(Impact).velocity
-    values = sink.groups["history"]
-    permanent = values.get("permanent_indentation", 0.0)
-    found = Indentation(largest, indentation[-1:], np.array([permanent]))
-    summary = summarise(force[:, None], times, found, mass, np.array([speed]), _threshold(checked))
-    unsettled = np.array([values.get("unsettled_steps", 0)])
+    summary = summarise(force[:, None], times, indentation, mass, speed, _threshold(checked))
+    unsettled = np.array([about.get("unsettled_steps", 0)])
     outcome = outcome_of(
         [number], summary, force[-1:], len(force), simulation.state.dt, unsettled, force[None]
     )
-    if measure is not None or extra:
-        result = Result(sink.arrays, sink.texts, sink.groups)
-        outcome.columns |= _extra(extra, result)
-        outcome.columns |= {} if measure is None else _measured(measure, result, case or {})
+    result = Result(sink.arrays, sink.texts, sink.groups)
+    outcome.columns |= _extra(extra, result)
+    if measure is not None:
+        outcome.columns |= _measured(measure, result, case or {})
     return outcome
 
 
@@ -380,8 +349,10 @@ RANGE, ERROR = 100.0, 1e-6
 
 
 def search(
-    starts: Sequence[float], force: float, peaks: Callable[[list[tuple[int, float]]], Floats]
-) -> list[float | str]:
+    starts: Mapping[int, float],
+    force: float,
+    peaks: Callable[[list[tuple[int, float]]], Floats],
+) -> dict[int, float | str]:
     """Find the lowest velocity of each case at which the contact force reaches a value.
 
     The range from 1/100 to 100 times the start is searched, by rounds of velocities.  Later rounds
@@ -389,8 +360,8 @@ def search(
     returns peak forces of pairs of case and velocity; NaN where unknown.  A text is the reason why
     a case has no velocity.
     """
-    found: list[float | str] = [""] * len(starts)
-    trials = {n: np.geomspace(v / RANGE, v * RANGE, plan.COUNT) for n, v in enumerate(starts)}
+    found: dict[int, float | str] = dict.fromkeys(starts, "")
+    trials = {n: np.geomspace(v / RANGE, v * RANGE, plan.COUNT) for n, v in starts.items()}
     first = True
     while trials:
         given = peaks([(n, float(v)) for n, values in trials.items() for v in values])
@@ -400,23 +371,21 @@ def search(
             if not first:  # the ends of a bracket, whatever rounding makes of them
                 own[0], own[-1] = min(own[0], np.nextafter(force, 0.0)), np.fmax(own[-1], force)
             (above,) = np.nonzero(own >= force)
+            after = above[0] if len(above) else 0
+            low, high = values[after - 1], values[after]
             if not len(above):
                 found[n] = f"the peak force is below {force:.6g} up to velocity {values[-1]:.6g}"
-                continue
-            after = above[0]
-            if not after:
+            elif not after:
                 found[n] = f"the peak force is above {force:.6g} from velocity {values[0]:.6g} on"
-                continue
-            low, high = values[after - 1 : after + 1]
-            if high - low <= ERROR * high:
+            elif high - low <= ERROR * high:
                 found[n] = float(high)
-                continue
-            with np.errstate(all="ignore"):  # a power law; without a finite one the middle alone
-                share = np.log(force / own[after - 1]) / np.log(own[after] / own[after - 1])
-                guess = low * (high / low) ** share
-            offsets = (high - low) * 10.0 ** -np.arange(1.0, 9.0)
-            around = np.concatenate([guess - offsets, guess + offsets])
-            inside = around[(around > low) & (around < high)]
-            left[n] = np.unique(np.concatenate([[low, (low + high) / 2.0, high], inside]))
+            else:
+                with np.errstate(all="ignore"):  # a power law; else the middle alone
+                    share = np.log(force / own[after - 1]) / np.log(own[after] / own[after - 1])
+                    guess = low * (high / low) ** share
+                offsets = (high - low) * 10.0 ** -np.arange(1.0, 9.0)
+                around = np.concatenate([guess - offsets, guess + offsets])
+                inside = around[(around > low) & (around < high)]
+                left[n] = np.unique(np.concatenate([[low, (low + high) / 2.0, high], inside]))
         trials, first = left, False
     return found

@@ -42,10 +42,8 @@ EXCLUDING = (
     ("velocity", "energy"), ("k", "radius"), ("mass", "rod_mass", "rod_density"),
     ("at", "impact_node"), ("at", "x0"), ("at", "y0"),
 )  # fmt: skip
-# Names with texts; two numbers as a text have a form and separators.
-TEXTS = ("layup", "at", "size", "support")
-PAIRS = {"at": ("({},{})", r"[,;\s]+"), "size": ("{}x{}", "[xX×]")}
-AUTO = "auto"
+TEXTS = ("layup", "at", "size", "support")  # names with texts
+PAIRS = {"at": ("({},{})", r"[,;\s]+"), "size": ("{}x{}", "[xX×]")}  # their forms and separators
 INTEGERS = ("impact_node",)
 # Names of results, which are no names of cases or of measured columns.
 RESERVED = ("case", "step", "steps", "status", "force", "unsettled_steps", *COLUMNS)
@@ -65,28 +63,28 @@ def parse_vary(text: str) -> tuple[str, list[Value]]:
     _known(name, text)
     if not equals or not text_of_values:
         raise CasesError(f"`{text}`: write {name}=FROM:TO:N or {name}=A,B,C")
-    if name not in TEXTS and ":" in text_of_values:
-        parts = text_of_values.split(":")
-        if len(parts) != 3 or not re.fullmatch(r"\d+", parts[2].strip()) or not int(parts[2]):
-            raise CasesError(f"`{text}`: a range is FROM:TO:N with N of at least 1")
-        begin, end = (_number(name, part) for part in parts[:2])
-        count = int(parts[2])
-        if count > MOST:
-            raise CasesError(f"`{text}`: {count} values; at most {MOST} are allowed")
-        with np.errstate(all="ignore"):
-            values = np.linspace(begin, end, count).tolist()
-        if not all(map(math.isfinite, values)):
-            raise CasesError(f"`{text}`: the range is beyond the range of numbers")
-        return name, [_value(name, repr(v)) for v in values]
-    return name, [_value(name, part) for part in _split(text_of_values)]
+    if name in TEXTS or ":" not in text_of_values:  # split at commas outside brackets
+        parts = re.split(r",(?![^\[]*\]|[^(]*\))", text_of_values)
+        return name, [_value(name, part) for part in parts if part.strip()]
+    parts = text_of_values.split(":")
+    if len(parts) != 3 or not re.fullmatch(r"\d+", parts[2].strip()) or not int(parts[2]):
+        raise CasesError(f"`{text}`: a range is FROM:TO:N with N of at least 1")
+    begin, end, count = _number(name, parts[0]), _number(name, parts[1]), int(parts[2])
+    if count > MOST:
+        raise CasesError(f"`{text}`: {count} values; at most {MOST} are allowed")
+    with np.errstate(all="ignore"):
+        values = np.linspace(begin, end, count).tolist()
+    if not all(map(math.isfinite, values)):
+        raise CasesError(f"`{text}`: the range is beyond the range of numbers")
+    return name, [_value(name, repr(v)) for v in values]
 
 
 def parse_until(text: str) -> float | str:
     """Read ``peak_force=NUMBER`` or ``peak_force=threshold``; CasesError if it is neither."""
     name, _, value = (part.strip() for part in text.partition("="))
     if name != "peak_force" or not value:
-        raise CasesError(f"`{text}`: write peak_force=NUMBER or peak_force=threshold")
-    return value if value == "threshold" else _number(name, value)
+        raise CasesError(f"`{text}`: write peak_force=NUMBER or peak_force={THRESHOLD}")
+    return parse_exceed(text)[1]
 
 
 def parse_exceed(text: str) -> Limit:
@@ -111,6 +109,11 @@ def pair(name: str, text: str) -> tuple[float, float]:
     if len(parts) != 2:
         raise CasesError(f"{name} must be two numbers as in {form.format(6, 4)}, not `{text}`")
     return _number(name, parts[0]), _number(name, parts[1])
+
+
+def plate_values(case: Case) -> Case:
+    """The values of a case that need another response of the plate."""
+    return {name: value for name, value in case.items() if name in (*PLATE, REFINE)}
 
 
 def grid(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
@@ -167,20 +170,18 @@ def combined(vary: Mapping[str, Iterable[Any]], *, free: bool = False) -> list[C
     """
     if not isinstance(vary, Mapping):
         raise CasesError(f'vary is {vary!r}; write a mapping such as {{"velocity": [50.0, 115.0]}}')
-    return grid([(name, _listed(name, values, free)) for name, values in vary.items()])
-
-
-def _listed(name: str, given: Iterable[Any], free: bool) -> list[Value]:
-    """Values of a name; a lone text or number is refused."""
-    values: list[Any] | None = None
-    if not isinstance(given, str | bytes):
+    lists: list[tuple[str, list[Value]]] = []
+    for name, given in vary.items():
+        values: list[Any] | None = None
         with suppress(TypeError):
-            values = list(given)
-    if values is None:
-        raise CasesError(f'vary: {name} is one value; write a list: {{"{name}": [{given!r}]}}')
-    if not values:
-        raise CasesError(f"vary: {name} has no values")
-    return [case[name] for case in checked(({name: v} for v in values), "vary", free=free)]
+            values = None if isinstance(given, str | bytes) else list(given)
+        if values is None:
+            raise CasesError(f'vary: {name} is one value; write a list: {{"{name}": [{given!r}]}}')
+        if not values:
+            raise CasesError(f"vary: {name} has no values")
+        cases = checked(({name: value} for value in values), "vary", free=free)
+        lists.append((name, [case[name] for case in cases]))
+    return grid(lists)
 
 
 def checked(
@@ -228,10 +229,11 @@ def _given(name: str, value: Any, where: str, free: bool) -> Value:
     if isinstance(value, np.generic):
         value = value.item()
     if free:
-        if isinstance(value, str) or (isinstance(value, float | int) and math.isfinite(value)):
-            free_value: Value = value
-            return free_value
-        raise CasesError(f"{where}: {name} is {value!r}, not a finite number or a text")
+        if not (
+            isinstance(value, str) or (isinstance(value, float | int) and math.isfinite(value))
+        ):
+            raise CasesError(f"{where}: {name} is {value!r}, not a finite number or a text")
+        return value
     if name in TEXTS and isinstance(value, Iterable) and not isinstance(value, str):
         value = {"at": ",", "size": "x"}.get(name, "/").join(map(str, value))
     try:
@@ -247,13 +249,10 @@ def _known(name: str, where: str) -> None:
 
 
 def _number(name: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise CasesError(f"{name} must be a finite number, not `{text.strip()}`")
-    return value
+    with suppress(ValueError):
+        if math.isfinite(value := float(text)):
+            return value
+    raise CasesError(f"{name} must be a finite number, not `{text.strip()}`")
 
 
 def _value(name: str, text: str) -> Value:
@@ -263,14 +262,9 @@ def _value(name: str, text: str) -> Value:
         raise CasesError(f"support must be {', '.join(SUPPORTS)}, not `{text.strip()}`")
     if name in TEXTS:
         return text.strip()
-    value = 0.0 if name == "dt" and text.strip() == AUTO else _number(name, text)
-    if name in INTEGERS:
-        if not value.is_integer():
-            raise CasesError(f"{name} must be an integer, not {value:g}")
-        return int(value)
-    return value
-
-
-def _split(text: str) -> list[str]:
-    """Split at commas outside brackets."""
-    return [part for part in re.split(r",(?![^\[]*\]|[^(]*\))", text) if part.strip()]
+    value = 0.0 if name == "dt" and text.strip() == "auto" else _number(name, text)
+    if name not in INTEGERS:
+        return value
+    if not value.is_integer():
+        raise CasesError(f"{name} must be an integer, not {value:g}")
+    return int(value)

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from fecm._tables import aligned
 from fecm._typing import Floats
 from fecm.deck.macros import flat
-from fecm.deck.model import Deck
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.check_segments import resolution
 from fecm.problem.memory import check_memory
@@ -25,7 +24,7 @@ from fecm.problem.problem import Problem
 from fecm.problem.refine import RefineError, refined
 from fecm.sweeps.cases import REFINE, Case, CasesError
 from fecm.sweeps.plan import without_output
-from fecm.sweeps.vary import apply_case, check_deck, with_time_step
+from fecm.sweeps.vary import apply_case, check_deck, stable_time_step, with_time_step
 
 FACTORS = "1,2,4,8"
 ASSUMED, LOWEST = 2.0, 0.5  # order that two factors assume, and the lowest that gives a limit
@@ -51,17 +50,14 @@ def refined_cases(checked: Problem, factors: Sequence[int]) -> list[Case]:
     given = ",".join(map(str, factors))
     if len(factors) < 2 or given not in FACTORS:
         raise CasesError(f"refine takes {FACTORS} or a part of it, at least two, not {given}")
-    numbers = [int(factor) for factor in factors]
     sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
     if len(sizes) != 1:
         raise CasesError("refine needs one DT in the program of the deck")
     (dt,) = sizes
     if not dt:
-        decks = [with_time_step(apply_case(checked.deck, {REFINE: f}), 0.0) for f in numbers]
-        critical = [check_deck(deck).critical_time_step for deck in decks]
-        dt = min(f * taken_time_step(c) for f, c in zip(numbers, critical, strict=True))
+        dt = min(f * stable_time_step(apply_case(checked.deck, {REFINE: f})) for f in factors)
     count = checked.deck.control.numel
-    return [{REFINE: f, "elements": count * f * f, "dt": dt / f} for f in numbers]
+    return [{REFINE: f, "elements": count * f * f, "dt": dt / f} for f in map(int, factors)]
 
 
 def convergence(
@@ -76,15 +72,15 @@ def convergence(
 
 def _limit(values: Floats) -> Convergence:
     """Order and limit of the values of two or three meshes, each twice as fine as the last."""
-    none, (*_, before, last) = math.nan, values.tolist()
+    none, (*earlier, before, last) = math.nan, values.tolist()
     change = last - before
     if not np.isfinite(values).all():
         return Convergence(none, none, "a value is missing")
     if abs(change) <= SAME * abs(last):
         return Convergence(none, last, "the last two are equal")
-    if len(values) < 3:
+    if not earlier:
         return Convergence(none, last + change / (2.0**ASSUMED - 1.0), "order 2 is assumed")
-    ratio = (before - float(values[0])) / change
+    ratio = (before - earlier[0]) / change
     if ratio <= 0.0:
         return Convergence(none, none, "not monotone: no order")
     order = math.log2(ratio)
@@ -140,8 +136,10 @@ def bisected(problem: Problem) -> Problem:
     """
     near = problem.distances <= max(_distance(problem), problem.distances.min())
     deck = refined(problem.deck, problem.mesh, near)
+    taken = taken_time_step(problem.critical_time_step)
+    sizes = [macro.value or taken for macro in flat(problem.program) if macro.word == "DT"]
     try:
-        return check_deck(_timed(deck, problem))
+        return check_deck(with_time_step(deck, min(*sizes, stable_time_step(deck)), taken))
     except CasesError as error:
         raise RefineError(f"the mesh with bisected elements cannot be run: {error}") from None
 
@@ -152,14 +150,6 @@ def _distance(problem: Problem) -> float:
     if found is None:
         raise RefineError("nothing hits the plate: there is no peak force whose mesh error to find")
     return found.wave
-
-
-def _timed(deck: Deck, problem: Problem) -> Deck:
-    """The bisected deck of a problem with a stable time step."""
-    taken = taken_time_step(problem.critical_time_step)
-    sizes = [macro.value or taken for macro in flat(problem.program) if macro.word == "DT"]
-    stable = taken_time_step(check_deck(with_time_step(deck, 0.0)).critical_time_step)
-    return with_time_step(deck, min(*sizes, stable), taken)
 
 
 def mesh_error(

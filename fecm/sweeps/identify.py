@@ -22,8 +22,7 @@ from fecm.studies.comparison import Measurement, measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of
 from fecm.sweeps.api import problem_of
 from fecm.sweeps.batch import Runs, runs_of
-from fecm.sweeps.outcome import RUN
-from fecm.sweeps.plan import shares_plate
+from fecm.sweeps.plan import RUN, shares_plate
 from fecm.sweeps.vary import apply_case
 
 # Delay of the measurement: its time at which the approach of the projectile ends in a contact.
@@ -189,12 +188,11 @@ class _Model:
 
     def histories(self, trials: Sequence[Mapping[str, float]]) -> tuple[Floats, Floats]:
         """Times, from one duration before the contact on, and forces (times, trials)."""
-        decks = [_fitted(self.deck, trial) for trial in trials]
-        found = self.runs(list(range(len(decks))), decks, False)
+        found = self.runs({n: _fitted(self.deck, one) for n, one in enumerate(trials)}, False)
         assert found.force is not None
         steps = found.force.shape[1]
         clock = float(found.columns["dt"][0]) * np.arange(-steps, steps + 1.0)
-        forces = np.vstack([np.zeros((steps + 1, len(decks))), found.force.T])
+        forces = np.vstack([np.zeros((steps + 1, len(trials))), found.force.T])
         return clock, forces if self.sensor is None else self.sensor(clock, forces)
 
     def at(self, time: Floats, trials: Sequence[Mapping[str, float]]) -> Floats:
@@ -210,10 +208,8 @@ def _shared(deck: Deck) -> Runs:
     """The function that runs cases of a deck by one response of its plate."""
     problem = problem_of(deck)
     if not shares_plate(problem):
-        needed = (
-            "impact steps (RODP) of one size, and a plate without FORC, EXCD, TANG, FORM and SOLV"
-        )
-        raise StudyError(f"identify needs {needed}")
+        needed = "impact steps (RODP) of one size, and a plate without FORC, EXCD, TANG, FORM and"
+        raise StudyError(f"identify needs {needed} SOLV")
     return runs_of(problem)
 
 
@@ -252,19 +248,17 @@ def fit(
         values = np.where(size > 0.0, middle + size * x, middle * np.exp(x))
         return dict(zip(start, values.tolist(), strict=True))
 
-    last: list[Floats] = []  # x, force over peak, and its Jacobian
-
-    def evaluate(x: Floats) -> list[Floats]:
-        if not last or not np.array_equal(last[0], x):
-            steps = STEP * np.eye(len(x))
-            up, down = np.minimum(x + steps, high), np.maximum(x - steps, low)
-            forces = model.at(time, [trial(row) for row in (x, *up, *down)]) / peak
-            above, below = np.split(forces[:, 1:], 2, axis=1)
-            last[:] = x.copy(), forces[:, 0], (above - below) / np.diagonal(up - down)
-        return last
+    @lru_cache(maxsize=1)
+    def evaluate(*given: float) -> tuple[Floats, Floats]:
+        """Force over peak and its Jacobian."""
+        x, steps = np.array(given), STEP * np.eye(len(given))
+        up, down = np.minimum(x + steps, high), np.maximum(x - steps, low)
+        forces = model.at(time, [trial(row) for row in (x, *up, *down)]) / peak
+        above, below = np.split(forces[:, 1:], 2, axis=1)
+        return forces[:, 0], (above - below) / np.diagonal(up - down)
 
     found = least_squares(
-        lambda x: evaluate(x)[1] - force / peak, np.zeros(len(start)), lambda x: evaluate(x)[2],
+        lambda x: evaluate(*x)[0] - force / peak, np.zeros(len(start)), lambda x: evaluate(*x)[1],
         (low, high), max_nfev=MOST_EVALUATIONS, ftol=SETTLED**2 / len(time), xtol=1e-7,
     )  # fmt: skip
     values = trial(found.x)
@@ -329,8 +323,8 @@ def _check(
     name, force, peak = measured.name, measured.force, float(own.max())
     begin, width = _top(clock, own)
     if measured.column != "force":
-        message = f"{name} has a column transducer and no force; the contact force is fitted"
-        raise StudyError(message)
+        text = "has a column transducer and no force; the contact force is fitted"
+        raise StudyError(f"{name} {text}")
     if not (peak > 0.0 and width > 0.0):
         raise StudyError("the deck's own run has no contact force to compare with; check its ROD")
     if -force.min() > force.max():
@@ -406,6 +400,6 @@ def _notes(
         text = "the model does not describe the measurement down to its noise"
         text += ", and the standard errors are too small"
         yield f"neighbouring residuals have the correlation {near:.2f}: {text}"
-    status = model.runs([0], [found.deck], True).status[0]
+    status = model.runs({0: found.deck}, True).status[0]
     if status not in RUN:
         yield f"the run of the fitted deck fails: {status}"

@@ -1,4 +1,4 @@
-"""Plan of a sweep: its cases, its tasks, and the memory that they need."""
+"""Plan of a sweep: its cases, its tasks and their outcomes, and the memory that they need."""
 
 from __future__ import annotations
 
@@ -7,10 +7,14 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fecm import _memory
+from fecm._typing import Floats
 from fecm._version import __version__
 from fecm.deck.macros import Body, Loop, flat
 from fecm.deck.model import Boundary, Deck, Delamination, Gages, Impact
@@ -25,15 +29,14 @@ from fecm.sweeps.cases import (
     CONTACT,
     LAMINATE,
     LOAD,
-    PLATE,
     REFINE,
     THRESHOLD,
     Case,
     CasesError,
     Limit,
     check_names,
+    plate_values,
 )
-from fecm.sweeps.random_result import check_limits
 from fecm.sweeps.sampling import Design
 from fecm.sweeps.vary import Clock, apply_case, check_deck, clock_of
 
@@ -45,6 +48,10 @@ ADVANCED = 34 if LIBRARY is None else 12
 COUNT = 25  # velocities of the first round of a search
 # Names of columns that are measured on request.
 DEFLECTION, GAGES, FAILURE = MEASURES = ("max_deflection", "gages", "failure")
+# Numbers of cases, and their contact forces, (cases, steps).
+Forces = tuple[Sequence[int], Floats | None]
+RUN = FINE, STILL = "ok", "still in contact"  # status of a case whose run has ended
+ABOUT = ("status", "dt", "steps", "unsettled")  # columns that describe the run of a case
 
 
 @dataclass(frozen=True)
@@ -54,8 +61,7 @@ class Plan:
     deck: Deck  # deck that is varied
     cases: tuple[Case, ...]  # values of every case
     history: bool = False  # whether contact forces are stored
-    # Rule for the time step of each plate; None if the deck's time step applies to all.
-    clock: Clock | None = None
+    clock: Clock | None = None  # None if the deck's time step applies to every plate
     # Peak force whose velocity is searched in every case: a number, or ``"threshold"``.
     until: float | str | None = None
     build: Build | None = None  # makes the deck of a case; `deck` is that of one of the cases
@@ -84,61 +90,57 @@ class Task(Plan):
     numbers: tuple[int, ...] = ()  # numbers of the cases
 
 
-def plan(
-    checked: Problem,
-    cases: Sequence[Case],
-    *,
-    history: bool = False,
-    until: float | str | None = None,
-    build: Build | None = None,
-    measure: Measure | None = None,
-    extra: Sequence[str] = (),
-    design: Design | None = None,
-    limits: Sequence[Limit] = (),
-) -> Plan:
-    """Create the plan of a sweep.
+def check_limits(limits: Sequence[Limit], known: Sequence[str], *, threshold: bool) -> None:
+    """Raise CasesError if a quantity is not among the known ones, or the deck has no threshold."""
+    for name, value in limits:
+        if name not in known:
+            raise CasesError(f"there is no quantity `{name}`; there are {', '.join(known)}")
+        if value == THRESHOLD and not threshold:
+            raise CasesError("the threshold needs a DELA segment, which the deck does not have")
+
+
+def plan(checked: Problem, cases: Sequence[Case], **options: Any) -> Plan:
+    """Create the plan of a sweep; the options are fields of :class:`Plan`.
 
     Raises CasesError if the deck has no impact, there are no cases, names exclude each other, or
     the deck lacks what is searched or measured.
     """
-    if not any(macro.word == "RODP" for macro in checked.deck.macros):
+    made = Plan(checked.deck, tuple(cases), **options)
+    deck, until, extra = made.deck, made.until, made.extra
+    words = {macro.word for macro in deck.macros}
+    if "RODP" not in words:
         raise CasesError("the deck has no impact step (RODP); there is nothing to sweep")
     if not cases:
         raise CasesError("a sweep needs at least one case")
-    if build is None:
+    if made.build is None:
         check_names(cases[0])
     if unknown := sorted({*extra} - {*MEASURES}):
         raise CasesError(f"measure has {unknown[0]!r}; the names are {', '.join(MEASURES)}")
-    if GAGES in extra and not checked.deck.has(Gages):
+    if GAGES in extra and not deck.has(Gages):
         raise CasesError("measure gages: the deck has no strain gages; add a GAGE segment")
-    if FAILURE in extra and all(macro.word != "FAIL" for macro in checked.deck.macros):
+    if FAILURE in extra and "FAIL" not in words:
         raise CasesError("measure failure: the program of the deck has no FAIL; add it to the loop")
+    limited = deck.last(Delamination) is not None
     if until is not None:
-        if build is not None or measure is not None or FAILURE in extra:
+        if made.alone:
             raise CasesError("until can't be given together with build, measure or failure")
         if not {"velocity", "energy"}.isdisjoint(cases[0]):
             raise CasesError("velocity is what is searched; it can't be varied as well")
-        if not checked.deck.require(Impact).velocity:
+        if not deck.require(Impact).velocity:
             raise CasesError("the search begins at the velocity of ROD, which must not be 0")
-        if until == THRESHOLD and checked.deck.last(Delamination) is None:
+        if until == THRESHOLD and not limited:
             raise CasesError("the threshold needs a DELA segment, which the deck does not have")
         if until != THRESHOLD and not (isinstance(until, float | int) and 0.0 < until < math.inf):
             raise CasesError(f"the peak force to reach is a positive number, not {until}")
-    if measure is None:
+    if made.measure is None:
         known = [*SUMMARY, *(FOUND if until is not None else ())]
         if extra:
-            known += [name for name, _ in limits if name in COLUMNS or name.startswith(GAGE)]
-        limited = checked.deck.last(Delamination) is not None
-        known += LIMITED if limited else ()
-        check_limits(limits, known, threshold=limited)
+            known += [name for name, _ in made.limits if name in COLUMNS or name.startswith(GAGE)]
+        check_limits(made.limits, [*known, *(LIMITED if limited else ())], threshold=limited)
     same = {*LOAD, *CONTACT, "duration"}  # names of cases that keep the critical time step
-    own = build is None and "dt" not in cases[0] and not same.issuperset(cases[0])
-    clock = clock_of(checked) if own else None
+    own = made.build is None and "dt" not in cases[0] and not same.issuperset(cases[0])
     chosen = tuple(name for name in MEASURES if name in extra)
-    return Plan(
-        checked.deck, tuple(cases), history, clock, until, build, measure, chosen, design,
-        tuple(limits),
-    )  # fmt: skip
+    return replace(made, clock=clock_of(checked) if own else None, extra=chosen)
 
 
 def shares_plate(checked: Problem) -> bool:
@@ -163,18 +165,88 @@ def _together(checked: Problem, made: Plan) -> int:
 def tasks(checked: Problem, made: Plan) -> list[Task]:
     """Split a plan into tasks: cases that share a plate together, full runs one by one."""
     together = max(1, _together(checked, made) // (1 if made.until is None else COUNT))
-    groups: dict[tuple[object, ...], list[int]] = {}
+    groups: dict[object, list[int]] = {}
     for number, case in enumerate(made.cases):
-        key = tuple(case[name] for name in (*PLATE, REFINE) if name in case)
-        groups.setdefault(key, []).append(number)
+        groups.setdefault(frozenset(plate_values(case).items()), []).append(number)
     found: list[Task] = []
     for numbers in groups.values():
         for start in range(0, len(numbers), together):
             some = tuple(numbers[start : start + together])
-            cases = tuple(made.cases[n] for n in some)
-            plain = Task(**vars(made), number=len(found), numbers=some)
-            found.append(replace(plain, cases=cases))
+            given = {**vars(made), "cases": tuple(made.cases[n] for n in some)}
+            found.append(Task(**given, number=len(found), numbers=some))
     return found
+
+
+@dataclass
+class Outcome:
+    """Results of some cases."""
+
+    numbers: list[int]  # of the cases, from 0
+    # (cases,) each, by name: those of :data:`~fecm.results.metrics.METRICS` are NaN if the case
+    # failed, or if they are unknown because the run ended in contact.  ``status`` is ``"ok"``,
+    # ``"still in contact"``, or the reason for the failure; ``dt``, ``steps``; ``unsettled`` counts
+    # the steps whose contact iteration did not converge.
+    columns: dict[str, NDArray[Any]]
+    # (cases, steps) or None: contact force after every step.
+    force: Floats | None = field(default=None, repr=False)
+
+    @property
+    def status(self) -> list[str]:
+        """Status of each case."""
+        texts: list[str] = self.columns["status"].tolist()
+        return texts
+
+    @property
+    def measured(self) -> list[str]:
+        """Names of the columns that the caller computes."""
+        return [name for name in self.columns if name not in (*COLUMNS, *ABOUT)]
+
+    def select(self, rows: NDArray[np.intp]) -> Outcome:
+        """Return the outcome of some of the cases."""
+        columns = {name: values[rows] for name, values in self.columns.items()}
+        force = None if self.force is None else self.force[rows]
+        return Outcome([self.numbers[row] for row in rows], columns, force)
+
+    @classmethod
+    def failed(cls, reasons: Mapping[int, str]) -> Outcome:
+        """Return the outcome of cases that could not be run, from the reasons by their numbers."""
+        count, texts = len(reasons), list(reasons.values())
+        columns: dict[str, NDArray[Any]] = {name: np.full(count, np.nan) for name in SUMMARY}
+        columns |= {"status": np.array(texts, dtype=np.str_), "dt": np.full(count, np.nan)}
+        columns |= {name: np.zeros(count, dtype=np.int64) for name in ("steps", "unsettled")}
+        return cls(list(reasons), columns)
+
+
+def merge(parts: Sequence[Outcome], history: bool = True) -> Outcome:
+    """Merge outcomes, ordered by the numbers of the cases; their forces only with `history`."""
+    given = [number for part in parts for number in part.numbers]
+    order, numbers = np.argsort(given), sorted(given)
+    columns: dict[str, NDArray[Any]] = {}
+    for name in dict.fromkeys(name for part in parts for name in part.columns):
+        found = [part.columns.get(name, np.full(len(part.numbers), np.nan)) for part in parts]
+        columns[name] = np.concatenate(found)[order]
+    if not history:
+        return Outcome(numbers, columns)
+    longest = max((0 if part.force is None else part.force.shape[1] for part in parts), default=0)
+    force = np.full((len(numbers), longest), np.nan)
+    ends = np.cumsum([len(part.numbers) for part in parts])
+    for part, end in zip(parts, ends, strict=True):
+        if part.force is not None:
+            force[end - len(part.numbers) : end, : part.force.shape[1]] = part.force
+    return Outcome(numbers, columns, force[order])
+
+
+def outcome_of(
+    numbers: list[int], summary: Mapping[str, Floats], last: Floats, steps: int, dt: float,
+    unsettled: NDArray[np.int64], force: Floats | None = None,
+) -> Outcome:  # fmt: skip
+    """Return the outcome of cases that were run with one time step.
+
+    `last` (cases,) are the contact forces after the last step, `force` (cases, steps) all.
+    """
+    cases, status = len(numbers), np.where(last > 0.0, STILL, FINE)
+    about = status, np.full(cases, dt), np.full(cases, steps, dtype=np.int64), unsettled
+    return Outcome(numbers, {**summary, **dict(zip(ABOUT, about, strict=True))}, force)
 
 
 def freed(some: Sequence[Task]) -> int:
@@ -190,12 +262,9 @@ def freed(some: Sequence[Task]) -> int:
     return count
 
 
-FIELDS = ("DISP", "STRE", "PLYS", "FAIL", "REAC", "EIGE")
-
-
 def without_output(checked: Problem, extra: Sequence[str] = ()) -> Problem:
     """Return a problem whose program stores no fields, but those of more columns."""
-    dropped = {*FIELDS} - ({"FAIL"} if FAILURE in extra else set())
+    dropped = {"DISP", "STRE", "PLYS", "REAC", "EIGE", "" if FAILURE in extra else "FAIL"}
 
     def kept(body: Body) -> Iterator[Macro | Loop]:
         for item in body:

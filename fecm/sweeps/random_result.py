@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from fecm._typing import Floats
 from fecm.results.metrics import COLUMNS
 from fecm.results.schema import ResultFileError
-from fecm.sweeps.cases import THRESHOLD, CasesError, Limit
-from fecm.sweeps.outcome import RUN
+from fecm.sweeps.cases import THRESHOLD, Limit
+from fecm.sweeps.plan import RUN, check_limits
 from fecm.sweeps.sampling import DESIGNS, REMEDY, Design, Law
 
 if TYPE_CHECKING:
@@ -98,15 +98,6 @@ class RandomResult:
     def label(self, combination: int) -> str:
         """Varied values of a combination, in words."""
         return ", ".join(f"{n} {values[combination]}" for n, values in self.combinations.items())
-
-
-def check_limits(limits: Sequence[Limit], known: Sequence[str], *, threshold: bool) -> None:
-    """Raise CasesError if a quantity is not among the known ones, or the deck has no threshold."""
-    for name, value in limits:
-        if name not in known:
-            raise CasesError(f"there is no quantity `{name}`; there are {', '.join(known)}")
-        if value == THRESHOLD and not threshold:
-            raise CasesError("the threshold needs a DELA segment, which the deck does not have")
 
 
 def evaluate(
@@ -216,22 +207,22 @@ def _index_lines(
         yield f"{law:{width}}{texts[0]:>29}{texts[1]:>29}"
 
 
-def stored(random: RandomResult) -> Iterator[tuple[str, Array, str, str, tuple[str, ...]]]:
+def stored(random: RandomResult) -> Iterator[tuple[Any, ...]]:
     """Path, values, description, dimension and axes of every dataset of the file."""
     first = ("combinations",) if random.combinations else ()
     for name, made in random.statistics.items():
         text, dimension = COLUMNS.get(name, (name, ""))
         values = np.concatenate([np.stack(made[:3], axis=-1), made.quantiles], axis=-1)
         text = f"draws with a value, and their statistics: {text}"
-        yield f"statistics/{name}", values, text, dimension, (*first, "statistics")
+        yield f"statistics/{name}", values, text, dimension, *first, "statistics"
     for name, found in random.sensitivity.items():
         for part, values in found._asdict().items():
             text, axes = PARTS[part]
-            yield f"sensitivity/{name}/{part}", values, text, "", (*first, *axes)
+            yield f"sensitivity/{name}/{part}", values, text, "", *first, *axes
     if len(random.exceedance.quantity):
         for part, values in random.exceedance._asdict().items():
-            axes = ("limits",) if part in ("quantity", "limit") else (*first, "limits")
-            yield f"exceedance/{part}", values, LIMIT_PARTS[part], "", axes
+            own = () if part in ("quantity", "limit") else first
+            yield f"exceedance/{part}", values, LIMIT_PARTS[part], "", *own, "limits"
 
 
 def attributes(random: RandomResult) -> dict[str, dict[str, Any]]:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -68,11 +67,9 @@ def plate_response(
 
 def tip_response(step: RodIntegrator, steps: int) -> Floats:
     """Acceleration per force of a tip after 1 to `steps` steps, the first under a unit force."""
-    state = step.advance(RodState(np.zeros((3, step.n))), 1.0)
-    response = np.empty(steps)
-    response[0] = state.acceleration[0]
-    for number in range(1, steps):
-        state = step.advance(state)
+    state, response = RodState(np.zeros((3, step.n))), np.empty(steps)
+    for number in range(steps):
+        state = step.advance(state, float(number == 0))
         response[number] = state.acceleration[0]
     return response
 
@@ -169,8 +166,7 @@ class Convolution:
             self._block[tile] = irfft(total, axis=1)[:, :FAR]
 
 
-@dataclass(slots=True)
-class TipState:
+class TipState(NamedTuple):
     """Motion of the tips of projectiles, (cases,) each."""
 
     tip: Floats
@@ -269,8 +265,7 @@ class Hits(NamedTuple):
     speed: Floats  # (cases,): approach velocity
 
 
-@dataclass(frozen=True)
-class Impacts:
+class Impacts(NamedTuple):
     """Histories of many impacts on one plate."""
 
     force: Floats  # (steps, cases): contact force after every step

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -22,8 +23,7 @@ from fecm.results import schema
 from fecm.results.metrics import COLUMNS, FOUND, SUMMARY, THRESHOLD, described
 from fecm.sweeps.cases import pair
 from fecm.sweeps.convergence import Convergence, convergence
-from fecm.sweeps.outcome import RUN, STILL, Forces, Outcome
-from fecm.sweeps.plan import Plan
+from fecm.sweeps.plan import RUN, STILL, Forces, Outcome, Plan
 from fecm.sweeps.random_result import RandomResult, attributes, evaluate, random_of, stored
 
 if TYPE_CHECKING:
@@ -37,11 +37,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 WORDS = 18  # letters of the names in the lines of the summary
-# Distance from the place given, relative to its coordinates, that is rounding.
-SAME = 1e-9
+SAME = 1e-9  # distance from the place given, relative to its coordinates, that is rounding
 FORCE = "history/force"
-# Reasons of failure that the summary lists.
-LISTED = 5
+LISTED = 5  # reasons of failure that the summary lists
+STATUS = "ok, still in contact, or why the case failed"
 
 
 def summary(result: SweepResult) -> list[str]:
@@ -52,19 +51,16 @@ def summary(result: SweepResult) -> list[str]:
     if "found_velocity" in result.summary:
         word, names = "found", ["found_velocity", "found_energy"]
     shown = np.where(fine, result[names[0]], np.nan)
-    show = "{}".format if result.random is None else _short
     if np.isfinite(shown).any():
+        digits = 8 if word == "found" else 6
         for size, case in (("smallest", np.nanargmin(shown)), ("largest", np.nanargmax(shown))):
+            texts = [f"{result[n][case]:.{digits}g} {result.unit(n)}".rstrip() for n in names]
             values = ", ".join(
-                f"{name} {show(values[case])}" for name, values in result.cases.items()
+                f"{name} {v[case]:{'.6g' if result.random and v.dtype.kind == 'f' else ''}}"
+                for name, v in result.cases.items()
             )
-            texts = [
-                f"{result[n][case]:.{8 if n in FOUND else 6}g} {result.unit(n)}" for n in names
-            ]
-            found = ", ".join(text.rstrip() for text in texts)
-            lines.append(
-                f"{size} {word:{16 - len(size)}} {found}{f' ({values})' if values else ''}"
-            )
+            given = f" ({values})" if values else ""
+            lines.append(f"{size} {word:{16 - len(size)}} {', '.join(texts)}{given}")
     if "at" in result.cases and "hit_x" in result.summary:
         asked = np.array([pair("at", text) for text in result.cases["at"].tolist()]).T
         moved = np.hypot(*(asked - (result["hit_x"], result["hit_y"])))
@@ -79,11 +75,6 @@ def summary(result: SweepResult) -> list[str]:
     if result.random is not None and failed:
         lines.append(f"failed share      {(~fine).mean():.3%} of the draws")
     return lines
-
-
-def _short(value: Any) -> str:
-    """A value with few digits."""
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def verdict(result: SweepResult) -> str:
@@ -101,27 +92,32 @@ def reasons(status: Array) -> str:
 
 def _counts(result: SweepResult) -> list[tuple[int, str]]:
     """Numbers of cases with doubtful results and of failures, which are last."""
-    steps = result.unconverged_steps
-    unconverged = 0 if steps is None else int((steps > 0)[result.fine].sum())
-    counts = (
-        (int(result.still.sum()), "still in contact at the end"),
-        (unconverged, "with a contact iteration that did not converge"),
-        (int((~result.fine).sum()), "failed"),
-    )
-    return [(count, what) for count, what in counts if count]
+    fine, steps = result.fine, result.unconverged_steps
+    unconverged = np.zeros_like(fine) if steps is None else fine & (steps > 0)
+    cases = {
+        "still in contact at the end": result.still,
+        "with a contact iteration that did not converge": unconverged,
+        "failed": ~fine,
+    }
+    return [(int(some.sum()), what) for what, some in cases.items() if some.any()]
 
 
 # Physical dimensions of the values, and of the stored force.
 DIMENSIONS = {
-    "velocity": "length/time", "k": "force/length^1.5", "alpha_p": "length",
-    "rod_length": "length", "rod_modulus": "force/length^2",
-    "rod_density": "force*time^2/length^4", "energy": "force*length",
+    "velocity": "length/time", "energy": "force*length", "force": "force",
+    "k": "force/length^1.5", "thickness": "length",
+    **dict.fromkeys(("alpha_p", "radius", "rod_length", "patch", "x0", "y0"), "length"),
     **dict.fromkeys(("mass", "rod_mass"), "force*time^2/length"),
-    **dict.fromkeys(("patch", "x0", "y0", "thickness", "radius"), "length"),
-    "density": "force*time^2/length^4", "dt": "time", "duration": "time", "force": "force",
-    **dict.fromkeys(("e1", "e2", "g12", "g13", "g23"), "force/length^2"),
+    **dict.fromkeys(("density", "rod_density"), "force*time^2/length^4"),
+    **dict.fromkeys(("e1", "e2", "g12", "g13", "g23", "rod_modulus"), "force/length^2"),
+    **dict.fromkeys(("dt", "duration"), "time"),
 }  # fmt: skip
-
+# Description and dimension of what the file has of the steps of every case.
+STEPS = {
+    "dt": ("time step of every case", "time"),
+    "steps": ("number of steps of every case", ""),
+    "unsettled_steps": ("steps whose contact iteration did not converge", ""),
+}
 # Groups of the file.
 GROUPS = {
     "cases": "values of what varies",
@@ -195,6 +191,12 @@ class SweepResult:
         return np.asarray(self.summary["status"] == STILL)
 
     @property
+    def _steps(self) -> dict[str, Array]:
+        """Time step, number of steps and unconverged steps of every case, (n,) each."""
+        columns = zip(STEPS, (self.dt, self.steps, self.unconverged_steps), strict=True)
+        return {name: values for name, values in columns if values is not None}
+
+    @property
     def convergence(self) -> dict[str, Convergence]:
         """Order and limit of every quantity of a refinement study; empty for other sweeps."""
         return convergence(self.cases, self.summary)
@@ -253,12 +255,12 @@ class SweepResult:
             made = values[rows].reshape(*shape, *values.shape[1:])
             return [*axes, "step"][: made.ndim], made, named
 
-        columns: dict[str, Array | None] = {**self.cases, **self.summary, "dt": self.dt}
-        columns |= {"steps": self.steps, "unsettled_steps": self.unconverged_steps}
-        columns["force"] = self.force
+        columns = {**self.cases, **self.summary, **self._steps}
+        if self.force is not None:
+            columns["force"] = self.force
         found = xarray.Dataset(
             {name: variable(name, values) for name, values in columns.items()
-             if values is not None and name not in levels},
+             if name not in levels},
             {name: (name, values, {"units": unit} if (unit := self.unit(name)) else {})
              for name, values in (levels or {"case": np.arange(len(self))}).items()},
             {"title": self.title},
@@ -325,33 +327,27 @@ def _grid(cases: Mapping[str, Array], count: int) -> tuple[dict[str, Array], NDA
         order = np.argsort(first) if values.dtype.kind == "U" else np.arange(len(found))
         levels[name] = found[order]
         places.append(np.argsort(order)[place])
-    shape = tuple(map(len, levels.values()))
-    if places and math.prod(shape) == count:
-        flat = np.ravel_multi_index(tuple(places), shape)
-        if len(np.unique(flat)) == count:
-            return levels, np.argsort(flat)
+    if len(set(zip(*places, strict=True))) == math.prod(map(len, levels.values())) == count:
+        return levels, np.lexsort(places[::-1])
     return {}, np.arange(count)
 
 
 def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
     """Create the result from a plan and its outcome."""
-    names = list(plan.cases[0])
-    cases = {name: np.array([case[name] for case in plan.cases]) for name in names}
+    cases = {name: np.array([case[name] for case in plan.cases]) for name in plan.cases[0]}
     columns, deck = outcome.columns, plan.deck
     limited = deck.last(Delamination) is not None or not columns.keys().isdisjoint(THRESHOLD)
     found = [*SUMMARY, *(THRESHOLD if limited else ())]
     found += FOUND if plan.until is not None else ()
     found += [name for name in COLUMNS if name in columns and name not in found]
-    found += [*outcome.measured, "status"]
     none = np.full(len(plan.cases), np.nan)
-    summary = {name: columns.get(name, none) for name in found}
-    random = None
-    if plan.design is not None:
-        random = evaluate(plan.design, cases, summary, plan.limits)
+    summary = {name: columns.get(name, none) for name in (*found, *outcome.measured, "status")}
+    design = plan.design
     return SweepResult(
         cases, summary,
         columns["dt"], columns["steps"], outcome.force, columns["unsettled"],
-        deck.text or deck.to_text(), deck.title, unit_names(deck), random,
+        deck.text or deck.to_text(), deck.title, unit_names(deck),
+        None if design is None else evaluate(design, cases, summary, plan.limits),
     )  # fmt: skip
 
 
@@ -369,52 +365,43 @@ def save(
     """
     from fecm.results.hdf5_writer import writing
 
-    units = {f"unit_{name}": unit for name, unit in result.units.items()}
-    columns: list[tuple[Any, ...]] = [
-        *((f"cases/{name}", values, f"{name} of every case", DIMENSIONS.get(name, ""))
-          for name, values in result.cases.items()),
-        *((f"summary/{name}", values, described(name), COLUMNS.get(name, ("", ""))[1])
-          for name, values in result.summary.items() if name != "status"),
-        ("summary/status", result.summary["status"],
-         "ok, still in contact, or why the case failed", ""),
-        ("history/dt", result.dt, "time step of every case", "time"),
-        ("history/steps", result.steps, "number of steps of every case", ""),
-    ]  # fmt: skip
-    if (unconverged := result.unconverged_steps) is not None:
-        text = "steps whose contact iteration did not converge"
-        columns.append(("history/unsettled_steps", unconverged, text, ""))
     if result.force is not None:
         forces = [(range(len(result)), result.force)]
-    if forces is not None and len(result):
-        columns.append((FORCE, None, "contact force after every step", "force"))
     with writing(path, overwrite=overwrite) as sink:
-        about = {
-            "format": schema.SWEEP,
-            "format_version": schema.FORMAT_VERSION,
-            "fecm_version": __version__,
-        }
-        sink.attributes("", {**about, "title": result.title, **units})
-        sink.text("deck", result.deck, "the cards of the deck that was varied")
-        if result.random is not None:
-            columns += stored(result.random)
-            sink.axis_names["laws"] = tuple(result.random.design.laws)
-            for group, values in attributes(result.random).items():
-                sink.attributes(group, values)
-        for name, values, text, dimension, *own in columns:
-            if name == FORCE:
-                longest = int(result.steps.max())
-                made = schema.Dataset(FORCE, ("cases", "steps"), text, dimension)
-                sink.create(made, (len(result), longest))
-                for numbers, force in forces or ():
-                    _write_forces(sink, numbers, force, longest)
-                continue
-            axes = own[0] if own else ("cases", "steps")[: values.ndim]
+
+        def put(name: str, values: Array, text: str, dimension: str, *axes: str) -> None:
+            axes = axes or ("cases",)
             if values.dtype.kind in "US":
                 sink.text(name, values.tolist(), text, axes)
-                continue
+                return
             dtype = "i8" if values.dtype.kind in "iu" else "f8"
             sink.create(schema.Dataset(name, axes, text, dimension, dtype), values.shape)
             sink.write(name, 0, values)
+
+        about = {"format": schema.SWEEP, "format_version": schema.FORMAT_VERSION}
+        about |= {"fecm_version": __version__, "title": result.title}
+        sink.attributes("", about | {f"unit_{name}": unit for name, unit in result.units.items()})
+        sink.text("deck", result.deck, "the cards of the deck that was varied")
+        if result.random is not None:
+            sink.axis_names["laws"] = tuple(result.random.design.laws)
+            for group, attribute_values in attributes(result.random).items():
+                sink.attributes(group, attribute_values)
+        for name, values in result.cases.items():
+            put(f"cases/{name}", values, f"{name} of every case", DIMENSIONS.get(name, ""))
+        for name, values in result.summary.items():
+            text = STATUS if name == "status" else described(name)
+            put(f"summary/{name}", values, text, COLUMNS.get(name, ("", ""))[1])
+        for name, values in result._steps.items():
+            put(f"history/{name}", values, *STEPS[name])
+        if forces is not None and len(result):
+            longest = int(result.steps.max())
+            text = "contact force after every step"
+            made = schema.Dataset(FORCE, ("cases", "steps"), text, "force")
+            sink.create(made, (len(result), longest))
+            for numbers, force in forces:
+                _write_forces(sink, numbers, force, longest)
+        for row in () if result.random is None else stored(result.random):
+            put(*row)
         for group, text in GROUPS.items():
             sink.attributes(group, {"description": text})
         for name, one in result.convergence.items():
@@ -453,22 +440,18 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     are missing, or their number of cases differs.
     """
     path = contents.path
-
-    def group(prefix: str) -> dict[str, Array]:
-        # Numbers before texts.
-        names = sorted(contents, key=lambda name: name in contents.lists)
-        return {p.removeprefix(prefix): contents[p] for p in names if p.startswith(prefix)}
-
-    cases, summary = group("cases/"), group("summary/")
-    missing = [name for name in (*SUMMARY, "status") if name not in summary]
-    if missing or "history/dt" not in contents or "history/steps" not in contents:
+    names = sorted(contents, key=lambda name: name in contents.lists)  # numbers before texts
+    cases, summary, steps = (
+        {n.removeprefix(group): contents[n] for n in names if n.startswith(group) and n != FORCE}
+        for group in ("cases/", "summary/", "history/")
+    )
+    required = (*SUMMARY, "status")
+    if not (summary.keys() >= {*required} and steps.keys() >= {"dt", "steps"}):
         raise schema.ResultFileError(f"{path}: the result of the sweep is incomplete")
-    summary = {name: summary[name] for name in (*SUMMARY, "status")} | summary  # in their order
-    count = np.shape(contents["history/dt"])[:1]
-    rows = (*cases.values(), *summary.values(), contents["history/dt"], contents["history/steps"])
-    unconverged_steps = contents.get("history/unsettled_steps")
-    rows += () if unconverged_steps is None else (unconverged_steps,)
-    shape = contents.shapes.get("history/force")
+    summary = {name: summary[name] for name in required} | summary  # in their order
+    count = np.shape(steps["dt"])[:1]
+    rows = (*cases.values(), *summary.values(), *steps.values())
+    shape = contents.shapes.get(FORCE)
     kinds = {name: values.dtype.kind for name, values in summary.items() if name != "status"}
     if (
         any(values.shape != count for values in rows)
@@ -477,14 +460,12 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     ):
         message = f"{path}: the data of this sweep do not match in type or number of cases"
         raise schema.ResultFileError(message)
-    steps = contents["history/steps"]
-    most = np.inf if shape is None else shape[1]
-    if steps.dtype.kind not in "iu" or not ((steps >= 0) & (steps <= most)).all():
+    counts, most = steps["steps"], np.inf if shape is None else shape[1]
+    if counts.dtype.kind not in "iu" or not ((counts >= 0) & (counts <= most)).all():
         raise schema.ResultFileError(f"{path}: history/steps does not match the stored steps")
     return SweepResult(
-        cases, summary, contents["history/dt"], steps,
-        contents.get("history/force") if history else None,
-        unconverged_steps,
+        cases, summary, steps["dt"], counts, contents.get(FORCE) if history else None,
+        steps.get("unsettled_steps"),
         contents.texts.get("deck", ""), str(contents.attributes.get("title", "")),
         schema.declared_units(contents.attributes),
         random_of(contents, cases, summary, count[0]),
@@ -508,18 +489,15 @@ def csv_lines(sweep: SweepResult, name: str = CASES) -> Iterator[str]:
         raise schema.ExportError(f"unknown table {name}; a sweep has {CASES} and {HISTORY}")
     if name == HISTORY and sweep.force is None:
         raise schema.ExportError("the sweep has no stored forces; run it again with --history")
-    rows = _case_rows(sweep) if name == CASES else _step_rows(sweep)
+    rows = _step_rows(sweep)
+    if name == CASES:
+        columns = {**sweep.cases, **sweep.summary}
+        columns |= {"dt": sweep.dt, "steps": sweep.steps, "status": columns.pop("status")}
+        values = [range(len(sweep)), *(column.tolist() for column in columns.values())]
+        rows = itertools.chain([("case", *columns)], zip(*values, strict=True))
     echo: Any = SimpleNamespace(write=str)  # writerow returns what write returns
     writer = csv.writer(echo, lineterminator="\n")
     return (writer.writerow(map(_cell, row)) for row in rows)
-
-
-def _case_rows(sweep: SweepResult) -> Iterator[Iterable[Any]]:
-    columns = {**sweep.cases, **sweep.summary}
-    columns |= {"dt": sweep.dt, "steps": sweep.steps, "status": columns.pop("status")}
-    yield ("case", *columns)
-    values = [column.tolist() for column in columns.values()]
-    yield from zip(range(len(sweep)), *values, strict=True)
 
 
 def _step_rows(sweep: SweepResult) -> Iterator[Iterable[Any]]:

@@ -4,22 +4,34 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
 from fecm._typing import Floats
-from fecm.sweeps.cases import INTEGERS, MOST, NAMES, PLATE, TEXTS, Case, CasesError, name_fault
+from fecm.sweeps.cases import (
+    INTEGERS,
+    MOST,
+    NAMES,
+    PLATE,
+    TEXTS,
+    Case,
+    CasesError,
+    name_fault,
+    plate_values,
+)
 
 # Parameters of the laws, and what must hold for them.
-LAWS = {
-    "normal": ("MEAN,SD", "SD must be positive"),
-    "lognormal": ("MEDIAN,SIGMA", "MEDIAN and SIGMA must be positive"),
-    "uniform": ("A,B", "A must be less than B"),
-    "triangular": ("A,MODE,B", "MODE must be from A to B, and A less than B"),
-}
+LAWS: dict[str, tuple[str, str, Callable[..., bool]]] = {
+    "normal": ("MEAN,SD", "SD must be positive", lambda _, sd: sd > 0.0),
+    "lognormal": ("MEDIAN,SIGMA", "MEDIAN and SIGMA must be positive", lambda *v: min(v) > 0.0),
+    "uniform": ("A,B", "A must be less than B", lambda a, b: a < b),
+    "triangular": ("A,MODE,B", "MODE must be from A to B, and A less than B",
+                   lambda a, mode, b: a <= mode <= b > a),
+}  # fmt: skip
 DesignKind = Literal["lhs", "sobol", "mc"]
 DESIGNS: tuple[DesignKind, ...] = get_args(DesignKind)
 FEWEST = 16  # fewest draws
@@ -64,24 +76,17 @@ def parse_law(name: str, text: str, *, free: bool = False) -> Law:
         raise CasesError(f"`{name}` cannot be random; the names are {', '.join(numbers)}")
     kind, _, given = (part.strip() for part in str(text).partition(":"))
     if kind not in LAWS:
-        laws = ", ".join(f"{kind}:{names}" for kind, (names, _) in LAWS.items())
+        laws = ", ".join(f"{kind}:{known[0]}" for kind, known in LAWS.items())
         raise CasesError(f"{name}: `{text}` is not a law; the laws are {laws}")
-    names, rule = LAWS[kind]
-    try:
-        numbers_given = tuple(map(float, given.split(",")))
-    except ValueError:
-        numbers_given = ()
-    if len(numbers_given) != names.count(",") + 1 or not all(map(math.isfinite, numbers_given)):
+    names, rule, holds = LAWS[kind]
+    parameters: tuple[float, ...] = ()
+    with suppress(ValueError):
+        parameters = tuple(map(float, given.split(",")))
+    if len(parameters) != names.count(",") + 1 or not all(map(math.isfinite, parameters)):
         raise CasesError(f"{name}: `{text}` is not {kind}:{names} with finite numbers")
-    first, *middle, last = numbers_given
-    if not {
-        "normal": last > 0.0,
-        "lognormal": min(first, last) > 0.0,
-        "uniform": first < last,
-        "triangular": first < last and all(first <= mode <= last for mode in middle),
-    }[kind]:
+    if not holds(*parameters):
         raise CasesError(f"{name}: `{text}`: {rule}")
-    return Law(kind, numbers_given)
+    return Law(kind, parameters)
 
 
 def parse_random(text: str) -> tuple[str, Law]:
@@ -114,12 +119,7 @@ class Design:
 
 
 def design_of(
-    laws: Mapping[str, Law],
-    samples: int | None,
-    seed: int = 0,
-    kind: DesignKind = "lhs",
-    *,
-    sensitivity: bool = False,
+    laws: Mapping[str, Law], samples: int | None, seed: int, kind: DesignKind, sensitivity: bool
 ) -> Design:
     """Check and create a design.  Raises CasesError if it is invalid."""
     for name, value in (("samples", samples), ("seed", seed)):
@@ -152,9 +152,9 @@ def unit_samples(kind: DesignKind, samples: int, columns: int, seed: int) -> Flo
             unit: Floats = qmc.Sobol(columns, seed=generator).random(samples)
     else:
         unit = generator.random((samples, columns))
-        if kind == "lhs":  # one sample in each of N equal intervals
-            cells = np.tile(np.arange(samples), (columns, 1))
-            unit = (generator.permuted(cells, axis=1).T + unit) / samples
+    if kind == "lhs":  # one sample in each of N equal intervals
+        cells = np.tile(np.arange(samples), (columns, 1))
+        unit = (generator.permuted(cells, axis=1).T + unit) / samples
     return np.clip(unit, MARGIN, 1.0 - MARGIN)
 
 
@@ -175,9 +175,8 @@ def matrix(design: Design) -> Floats:
             raise CasesError(f"{name}: {law} is beyond the range of numbers")
     if not design.sensitivity:
         return values
-    a, b = values[:, :count], values[:, count:]
-    mixed = [np.where(np.arange(count) == column, b, a) for column in range(count)]
-    return np.concatenate([a, b, *mixed])
+    a, b = np.hsplit(values, 2)
+    return np.concatenate([a, b, *(np.where(chosen, b, a) for chosen in np.eye(count, dtype=bool))])
 
 
 def random_cases(design: Design, varied: Sequence[Case]) -> list[Case]:
@@ -186,7 +185,7 @@ def random_cases(design: Design, varied: Sequence[Case]) -> list[Case]:
     Raises CasesError if a name is varied too, or there are too many cases.
     """
     for name in design.laws:
-        if varied and name in varied[0]:
+        if name in varied[0]:
             raise CasesError(f"{name} is both varied and random")
     if (count := len(varied) * design.rows) > MOST:
         raise CasesError(f"{count} cases; at most {MOST} are allowed")
@@ -196,15 +195,14 @@ def random_cases(design: Design, varied: Sequence[Case]) -> list[Case]:
 
 def cost(cases: Sequence[Case], design: Design, *, shared: bool) -> str:
     """Say how many plates a random sweep needs, and which names cause them."""
-    cases_in_words = f"{design.draws} draws"
-    if len(cases) != design.draws:
-        cases_in_words = f"{len(cases)} cases of {cases_in_words}"
+    more = "" if len(cases) == design.draws else f"{len(cases)} cases of "
+    given = f"{more}{design.draws} draws"
     if not shared:
-        return f"{cases_in_words} are run in full, one by one"
-    plates = len({tuple(case[name] for name in PLATE if name in case) for case in cases})
+        return f"{given} are run in full, one by one"
+    plates = len({frozenset(plate_values(case).items()) for case in cases})
     causes = [name for name in design.laws if name in PLATE]
     if not causes:
-        return f"{cases_in_words} share {plates} plate{'s' * (plates > 1)}"
+        return f"{given} share {plates} plate{'s' * (plates > 1)}"
     why = f"because {' and '.join(causes)} {'is' if len(causes) == 1 else 'are'} random"
     others = "velocity, k, alpha_p, s_p, q and the projectile share one"
-    return f"{cases_in_words} need {plates} plates, {why}; {others}"
+    return f"{given} need {plates} plates, {why}; {others}"

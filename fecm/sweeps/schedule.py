@@ -32,8 +32,7 @@ import numpy as np
 from fecm._errors import FecmError
 from fecm._files import beside, packed
 from fecm.sweeps.batch import run, told
-from fecm.sweeps.outcome import Forces, Outcome
-from fecm.sweeps.plan import Task
+from fecm.sweeps.plan import Forces, Outcome, Task
 
 Done = Callable[[Task, Outcome], None]
 # Called regularly while workers run, to handle signals.
@@ -61,13 +60,6 @@ def attempt(task: Task) -> Outcome:
         return run(task)
     except Exception as error:  # a failed case must not end the sweep
         return Outcome.failed(dict.fromkeys(task.numbers, f"{type(error).__name__}: {error}"))
-
-
-def run_serial(tasks: Sequence[Task], done: Done, idle: Idle) -> None:
-    """Run tasks one after the other."""
-    for task in tasks:
-        idle()
-        done(task, attempt(task))
 
 
 def _end_with(parent: int) -> None:

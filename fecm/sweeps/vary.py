@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -56,8 +56,13 @@ def apply_case(deck: model.Deck, case: Case) -> model.Deck:
     before = deck.last(model.Material)
     if before and not is_coupled(before) and is_coupled(made.require(model.Material)):
         made = _free_in_plane(made)
-    if "dt" in case or "duration" in case:
-        made = _timed(made, case, _taken_time_step(deck))
+    dt, duration = (None if n not in case else float(case[n]) for n in ("dt", "duration"))
+    if duration is not None and not duration > 0.0:
+        raise CasesError(f"duration must be positive, not {duration:g}")
+    if dt == 0.0:
+        dt = stable_time_step(made)
+    if dt is not None or duration is not None:
+        made = with_time_step(made, dt, _taken_time_step(deck), duration)
     return replace(made, text="")
 
 
@@ -79,14 +84,10 @@ def raise_first(findings: Findings) -> None:
         raise CasesError(f"{first.message}{remedy}")
 
 
-def _timed(deck: model.Deck, case: Case, taken: float) -> model.Deck:
-    """The deck with the time step and the duration of a case."""
-    dt, duration = (None if n not in case else float(case[n]) for n in ("dt", "duration"))
-    if duration is not None and not duration > 0.0:
-        raise CasesError(f"duration must be positive, not {duration:g}")
-    if dt == 0.0:
-        dt = taken_time_step(check_deck(with_time_step(deck, 0.0)).critical_time_step)
-    return with_time_step(deck, dt, taken, duration)
+def stable_time_step(deck: model.Deck) -> float:
+    """Time step that DT 0 would mean in a deck."""
+    # DT 0 is below the critical time step of any plate.
+    return taken_time_step(check_deck(with_time_step(deck, 0.0)).critical_time_step)
 
 
 @lru_cache(maxsize=8)
@@ -139,20 +140,17 @@ def _field(deck: model.Deck, name: str, value: Value) -> model.Deck:
 
 def _rod(deck: model.Deck, name: str, value: Value) -> model.Deck:
     """Change the projectile; add the segment if the deck has none."""
-    rod, old = build_projectile(deck), deck.last(model.Projectile)
-    number = float(value)
+    rod, old, number = build_projectile(deck), deck.last(model.Projectile), float(value)
     if isinstance(rod, RigidMass):
         if name not in MASS:
             raise CasesError(f"{name}: the projectile of the deck is a rigid mass")
-        new = projectile_segment(RigidMass(number))
-    else:
-        new = projectile_segment(rod, 0 if old is None else old.transducer)
-        field = {"rod_length": "size", "rod_modulus": "modulus"}.get(name, "density")
-        changed: dict[str, Any] = {
-            field: rod.density * number / rod.total_mass if name in MASS else number
-        }
-        new = replace(new, **changed)
-    return _swap(deck, old, new)
+        return _swap(deck, old, projectile_segment(RigidMass(number)))
+    field = {"rod_length": "size", "rod_modulus": "modulus"}.get(name, "density")
+    if name in MASS:
+        number = rod.density * number / rod.total_mass
+    changed: dict[str, Any] = {field: number}
+    new = projectile_segment(rod, 0 if old is None else old.transducer)
+    return _swap(deck, old, replace(new, **changed))
 
 
 def _energy(deck: model.Deck, name: str, value: Value) -> model.Deck:
@@ -236,46 +234,33 @@ def _support(deck: model.Deck, name: str, value: Value) -> model.Deck:
     return replace(deck, segments=others if made is None else (*others, made))
 
 
-def _with_material(deck: model.Deck, **values: Any) -> model.Deck:
-    """The deck with other values of its MATE segment."""
-    old = deck.require(model.Material)
-    return _swap(deck, old, replace(old, **values))
-
-
-def _ply(deck: model.Deck, name: str, value: Value) -> model.Deck:
-    changed: dict[str, Any] = {name: float(value), "source": None}
-    return _with_material(deck, ply=replace(deck.require(model.Material).ply, **changed))
-
-
-def _thickness(deck: model.Deck, name: str, value: Value) -> model.Deck:
-    old, total = deck.require(model.Material), float(value)
-    factor = total / sum(layer.thickness for layer in old.layers)
-    layers = (replace(y, thickness=y.thickness * factor, source=None) for y in old.layers)
-    integration = replace(old.integration, thickness=total, source=None)
-    return _with_material(deck, integration=integration, layers=tuple(layers))
-
-
-def _angle(deck: model.Deck, name: str, value: Value) -> model.Deck:
-    """Turn all plies."""
-    layers = deck.require(model.Material).layers
-    turned = (replace(y, angle=y.angle + float(value), source=None) for y in layers)
-    return _with_material(deck, layers=tuple(turned))
-
-
-def _layup(deck: model.Deck, name: str, value: Value) -> model.Deck:
-    old = deck.require(model.Material)
-    thicknesses = {layer.thickness for layer in old.layers}
-    if len(thicknesses) > 1:
-        raise CasesError("layup: the plies of the deck differ in thickness")
-    (ply,) = thicknesses
-    try:
-        angles = parse_layup(str(value))
-    except LayupError as error:
-        raise CasesError(f"layup: {error}") from None
-    layers = tuple(Layer(n, angle, ply) for n, angle in enumerate(angles, start=1))
-    integration = replace(old.integration, thickness=len(angles) * ply, source=None)
-    control = replace(deck.control, layers=len(layers), source=None)
-    return replace(_with_material(deck, integration=integration, layers=layers), control=control)
+def _material(deck: model.Deck, name: str, value: Value) -> model.Deck:
+    """Change all plies, or their number; a thickness is that of the laminate."""
+    old, control = deck.require(model.Material), deck.control
+    ply, layers, total = old.ply, old.layers, sum(layer.thickness for layer in old.layers)
+    if name == "layup":
+        if len({layer.thickness for layer in layers}) > 1:
+            raise CasesError("layup: the plies of the deck differ in thickness")
+        try:
+            angles = parse_layup(str(value))
+        except LayupError as error:
+            raise CasesError(f"layup: {error}") from None
+        thickness = layers[0].thickness
+        layers = tuple(Layer(n, angle, thickness) for n, angle in enumerate(angles, start=1))
+        control, total = replace(control, layers=len(layers), source=None), len(angles) * thickness
+    elif name == "thickness":
+        factor, total = float(value) / total, float(value)
+        layers = tuple(replace(y, thickness=y.thickness * factor, source=None) for y in layers)
+    elif name == "angle":
+        layers = tuple(replace(y, angle=y.angle + float(value), source=None) for y in layers)
+    else:
+        changed: dict[str, Any] = {name: float(value), "source": None}
+        ply = replace(ply, **changed)
+    integration = old.integration
+    if name in ("layup", "thickness"):
+        integration = replace(integration, thickness=total, source=None)
+    new = replace(old, ply=ply, layers=layers, integration=integration)
+    return replace(_swap(deck, old, new), control=control)
 
 
 @lru_cache(maxsize=8)
@@ -299,10 +284,7 @@ def _refined(deck: model.Deck, name: str, value: Value) -> model.Deck:
 # In the order in which they are applied.
 _SETTERS: dict[str, Callable[[model.Deck, str, Value], model.Deck]] = {
     REFINE: _refined,
-    "layup": _layup,
-    "angle": _angle,
-    "thickness": _thickness,
-    **dict.fromkeys(PLY, _ply),
+    **dict.fromkeys(("layup", "angle", "thickness", *PLY), _material),
     "size": _size,
     "support": _support,
     **dict.fromkeys(_FIELDS, _field),
@@ -317,28 +299,19 @@ LONGEST = 1e15  # longest loop; the checks reject much shorter programs
 STORING = ("RODP", "DISP", "STRE", "PLYS")  # macros that store every N-th step or pass
 
 
-@dataclass(frozen=True)
-class Clock:
-    """Rule for the time step of each plate."""
-
-    dt: float  # time step of the deck (time)
-    rounded: bool  # whether the rule is that of ``fecm new`` instead of that of DT 0
-
-    def time_step(self, critical: float) -> float:
-        """Return the time step for a critical time step."""
-        return rounded_time_step(critical) if self.rounded else taken_time_step(critical)
+# Time step of the deck, and the rule that gives that of a plate from its critical time step.
+Clock = tuple[float, Callable[[float], float]]
 
 
 def clock_of(checked: Problem) -> Clock | None:
-    """Find the rule of a deck; None if its DT applies to every case."""
+    """Rule of a deck, that of DT 0 or of ``fecm new``; None if its DT applies to every case."""
     sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
     if len(sizes) != 1:
         return None
     (dt,) = sizes
-    critical = checked.critical_time_step
-    if not dt:
-        return Clock(taken_time_step(critical), rounded=False)
-    return Clock(dt, rounded=True) if dt == rounded_time_step(critical) else None
+    rule = rounded_time_step if dt else taken_time_step
+    taken = rule(checked.critical_time_step)
+    return (taken, rule) if dt in (0.0, taken) else None
 
 
 def with_time_step(
