@@ -82,9 +82,9 @@ def in_laminate(**changes: Callable[[Any], Any]) -> Break:
 def in_stiffness(**changes: Callable[[Any], Any]) -> Break:
     """Change parts of the laminate that the elements' stiffness is made of, and nothing else."""
 
-    def broken(right: Any, family: Any, laminate: Any, *rules: Any, **kwargs: Any) -> Any:
+    def broken(right: Any, family: Any, laminate: Any, rules: Any) -> Any:
         other = {name: change(getattr(laminate, name)) for name, change in changes.items()}
-        return right(family, replace(laminate, **other), *rules, **kwargs)
+        return right(family, replace(laminate, **other), rules)
 
     return instead(element_matrices, "stiffness", broken)
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm.deck.records import Ply
+from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.mesh import Mesh
-from fecm.mechanics.plate import IntegrationRules
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

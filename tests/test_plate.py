@@ -215,7 +215,7 @@ def test_turning_a_plate_with_its_fibres_changes_no_eigenvalue(turn: float) -> N
 
     def eigenvalues(at: Floats, fibres: float) -> Floats:
         (family,) = element_blocks(elements, at)
-        K = element_matrices.stiffness(family, general_plate(fibres), gauss(3), gauss(3))[0]
+        K = element_matrices.stiffness(family, general_plate(fibres), rules())[0]
         return np.asarray(np.linalg.eigvalsh(K))
 
     expected = eigenvalues(coordinates, 0.0)
@@ -254,9 +254,7 @@ def test_the_assembled_stiffness_is_the_sum_of_the_elements() -> None:
     expected = np.zeros((len(coordinates), 5, len(coordinates), 5))
     for element in elements:
         (family,) = element_blocks(element[None], coordinates)
-        K = element_matrices.stiffness(family, general_plate(), gauss(3), gauss(3)).reshape(
-            9, 5, 9, 5
-        )
+        K = element_matrices.stiffness(family, general_plate(), rules()).reshape(9, 5, 9, 5)
         for a, b in product(range(9), repeat=2):
             expected[element[a] - 1, :, element[b] - 1] += K[a, :, b]
     found = free_stiffness((coordinates, elements))
@@ -285,9 +283,8 @@ def stiffness_of(corners: Corners, *, transposed_jacobian: bool) -> Floats:
     """Stiffness of one element of the general laminate."""
     coordinates, elements = one_element(corners)
     (family,) = element_blocks(elements, coordinates)
-    return element_matrices.stiffness(
-        family, general_plate(), gauss(3), gauss(3), transposed_jacobian=transposed_jacobian
-    )
+    chosen = rules(transposed_jacobian=transposed_jacobian)
+    return element_matrices.stiffness(family, general_plate(), chosen)
 
 
 def test_the_transposed_jacobian_does_no_harm_on_rectangles_along_the_axes() -> None:

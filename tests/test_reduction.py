@@ -162,7 +162,7 @@ def test_any_number_of_threads_gives_the_same_forces_to_the_last_bit(
     assert isinstance(deck, Deck)
     plate = build_plate(deck, fecm.problem.generate.generate(deck))
     monkeypatch.setattr(stiffness_product, "BATCH", 500)
-    monkeypatch.setattr("fecm.mechanics.stiffness_operator.PIECE", 100)
+    monkeypatch.setattr("fecm.mechanics.plate.PIECE", 100)
     u = np.random.default_rng(3).standard_normal(plate.neq)
     alone = stiffness_operator(plate, "numpy")
     shared = stiffness_operator(plate, "numpy", workers=Workers(threads))

@@ -76,14 +76,12 @@ class TiedStrains:
 
     def covariant(self, q: Floats) -> tuple[Floats, Floats]:
         """Strains e_xi, e_eta (fields, npt, ne) of w, theta_x, theta_y (fields, nn, 3 ne)."""
-        e_xi, e_eta = (self._strain(q, *axis) for axis in self._axes)
-        return e_xi, e_eta
-
-    @staticmethod
-    def _strain(q: Floats, table: Floats, slope: Floats, weights: Floats) -> Floats:
-        at = (table @ q).reshape(len(q), 2, len(table) // 2, 3, -1)
-        strain = at[:, 0, :, 0] - at[:, 1, :, 1] * slope[0] - at[:, 1, :, 2] * slope[1]
-        return np.asarray(weights @ strain)
+        found: list[Floats] = []
+        for table, slope, weights in self._axes:
+            at = (table @ q).reshape(len(q), 2, len(table) // 2, 3, -1)
+            strain = at[:, 0, :, 0] - at[:, 1, :, 1] * slope[0] - at[:, 1, :, 2] * slope[1]
+            found.append(weights @ strain)
+        return found[0], found[1]
 
 
 def _lagrange(nodes: tuple[float, ...], at: Floats) -> Floats:

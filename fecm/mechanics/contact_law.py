@@ -12,7 +12,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import field, fields, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, cast
 
 import numpy as np
 
@@ -46,10 +46,8 @@ def _any(condition: Truth) -> bool:
 def hertz_coefficient(radius: float, e_s: float, nu_s: float, e_t: float) -> float:
     """Contact coefficient of a sphere (s) on a half-space (t), equation 3-2 (force/length^1.5).
 
-    Raises
-    ------
-    ValueError
-        If radius or a modulus is not positive, or Poisson's ratio not between -1 and 0.5.
+    Raises ValueError if radius or a modulus is not positive, or Poisson's ratio not between -1 and
+    0.5.
     """
     for name, value in (("radius", radius), ("E_s", e_s), ("E_t", e_t)):
         if not 0.0 < value < math.inf:
@@ -72,8 +70,7 @@ class ContactParameters(ABC):
 
     def of_cases(self, cases: Indices) -> ContactParameters:
         """Select some cases."""
-        selected: ContactParameters = _map(lambda values: values[0][cases], [self])
-        return selected
+        return stacked([self], lambda values: values[0][cases])
 
     def loading(self, indentation: Number) -> Number:
         """Force on the first loading curve, equation 3-1."""
@@ -125,16 +122,13 @@ def power_curve(f: Number, b: Number, w: Number, p: Number, a: Number) -> Number
     return f * ((a - b) / w) ** p if a > b else 0.0
 
 
-def _map(function: Callable[[list[Any]], Any], records: Sequence[Any]) -> Any:
-    """Replace every parameter by a function of its values in several records."""
+def stacked(
+    records: Sequence[Any], function: Callable[[list[Any]], Any] = np.array
+) -> ContactParameters:
+    """Parameters of many cases, all of one class, as arrays: a function of the values of each."""
     names = [part.name for part in fields(records[0]) if part.init]
-    return replace(records[0], **{n: function([getattr(r, n) for r in records]) for n in names})
-
-
-def stacked(records: Sequence[ContactParameters]) -> ContactParameters:
-    """Parameters of many cases, all of one class, as arrays."""
-    parameters: ContactParameters = _map(np.array, records)
-    return parameters
+    made = {name: function([getattr(record, name) for record in records]) for name in names}
+    return cast(ContactParameters, replace(records[0], **made))
 
 
 class LoadingHistory(NamedTuple):
@@ -213,11 +207,10 @@ class MeasuredLaw:
 
     def start(self) -> LoadingHistory:
         """Loading history before the first contact."""
-        zero = 0.0 * self.constants.k
-        one = zero + 1.0
+        k = self.constants.k
+        zero, one = 0.0 * k, 0.0 * k + 1.0
         branch = VIRGIN + (zero == one)  # VIRGIN for every case
-        k, power = self.constants.k, LOADING_POWER * one
-        return LoadingHistory(branch, k, zero, one, power, zero, zero, zero)
+        return LoadingHistory(branch, k, zero, one, LOADING_POWER * one, zero, zero, zero)
 
     def permanent(self, memory: LoadingHistory, last: ContactPoint) -> Number:
         """Permanent indentation after unloading from the last accepted point (length)."""
@@ -296,26 +289,21 @@ class HystereticLaw(MeasuredLaw):
         begin = _select(leaves, peak_force, last.force)
         down = _unloading(c.q, last.indentation, begin, peak, peak_force, permanent)
         up = self._reloading(m, last)
-        first = LoadingHistory(
-            VIRGIN, c.k, 0.0, 1.0, LOADING_POWER, m.peak, m.peak_force, m.permanent
-        )
+        first = m._replace(branch=VIRGIN, f=c.k, b=0.0, w=1.0, p=LOADING_POWER)
         return _choose(leaves | turns_down, down, _choose(turns_up, up, _choose(returns, first, m)))
 
     def _reloading(self, m: LoadingHistory, last: ContactPoint) -> LoadingHistory:
         """Reloading from the last point to the peak, equation 3-11."""
         loaded = (last.force > 0.0) & (last.force < m.peak_force)
-        ratio = (_select(loaded, last.force, 0.0) / _select(loaded, m.peak_force, 1.0)) ** (
-            1.0 / LOADING_POWER
-        )
+        share = _select(loaded, last.force, 0.0) / _select(loaded, m.peak_force, 1.0)
+        ratio = share ** (1.0 / LOADING_POWER)
         origin = _select(loaded, (last.indentation - ratio * m.peak) / (1.0 - ratio), m.permanent)
         # The accepted force is one iteration older than the indentation.  If it has not fallen
         # below the peak's, it stays constant up to the peak.
         level = (last.force > 0.0) & (last.force >= m.peak_force)
-        width = m.peak - origin
-        power = _select(level, 0.0, LOADING_POWER)
-        return LoadingHistory(
-            RELOADING, _select(width > 0.0, m.peak_force, 0.0), origin,
-            _select(width > 0.0, width, 1.0), power, m.peak, m.peak_force, m.permanent,
+        return _curve(
+            RELOADING, m.peak_force, origin, m.peak - origin, _select(level, 0.0, LOADING_POWER),
+            m.peak, m.peak_force, m.permanent,
         )  # fmt: skip
 
 
@@ -341,11 +329,8 @@ class ListingLaw(MeasuredLaw):
             force = m.force(indentation)
         turns = (m.branch == UNLOADING) & (indentation > m.permanent) & (force >= last.force)
         if _any(turns):
-            up = LoadingHistory(
-                RELOADING, m.peak_force * (m.w > 0.0), m.permanent, m.w, LOADING_POWER,
-                m.peak, m.peak_force, m.permanent,
-            )  # fmt: skip
-            m = _choose(turns, up, m)
+            f = m.peak_force * (m.w > 0.0)
+            m = _choose(turns, m._replace(branch=RELOADING, f=f, b=m.permanent, p=LOADING_POWER), m)
             force = m.force(indentation)
         return force, m
 
@@ -360,11 +345,15 @@ def _unloading(
     q: Number, a: Number, f: Number, peak: Number, peak_force: Number, permanent: Number
 ) -> LoadingHistory:
     """Unloading from the point (a, f), equation 3-3."""
-    width = a - permanent
-    return LoadingHistory(
-        UNLOADING, _select(width > 0.0, f, 0.0), permanent, _select(width > 0.0, width, 1.0), q,
-        peak, peak_force, permanent,
-    )  # fmt: skip
+    return _curve(UNLOADING, f, permanent, a - permanent, q, peak, peak_force, permanent)
+
+
+def _curve(
+    branch: int, f: Number, b: Number, w: Number, p: Number, *peak: Number
+) -> LoadingHistory:
+    """A branch; its force is zero if its width is not positive."""
+    f, w = _select(w > 0.0, f, 0.0), _select(w > 0.0, w, 1.0)
+    return LoadingHistory(branch, f, b, w, p, *peak)
 
 
 def follow(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics import assumed_shear
 from fecm.mechanics.elements import Quadrature
@@ -22,6 +23,19 @@ from fecm.mechanics.interpolation import (
 )
 from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.mesh import ElementBlock
+
+
+@frozen
+class IntegrationRules:
+    """Quadrature rules of a plate."""
+
+    # Membrane, bending and mass; transverse shear.
+    bending: Quadrature
+    shear: Quadrature
+    strains: Quadrature  # points of the stored strains
+    transposed_jacobian: bool = False  # transpose the inverse Jacobian (the slip ``jacobian``)
+    # Take the transverse shear strains of :mod:`~fecm.mechanics.assumed_shear`.
+    assumes_shear: bool = False
 
 
 def _membrane_and_bending(at: Interpolation) -> Floats:
@@ -57,28 +71,20 @@ def _integrate(B: Floats, C: Floats, jxw: Floats) -> Floats:
     return np.asarray((product + product.swapaxes(1, 2)) / 2.0)
 
 
-def stiffness(
-    family: ElementBlock,
-    laminate: Laminate,
-    bending: Quadrature,
-    shear: Quadrature,
-    *,
-    transposed_jacobian: bool = False,
-    assumes_shear: bool = False,
-) -> Floats:
+def stiffness(family: ElementBlock, laminate: Laminate, rules: IntegrationRules) -> Floats:
     """Element stiffness matrices, K_p of equation 4-14, (ne, 5 nn, 5 nn).
 
-    The rules are those of the membrane and bending energy, and of the transverse shear energy;
-    :mod:`~fecm.mechanics.assumed_shear` has its own.
+    :mod:`~fecm.mechanics.assumed_shear` has its own rule of the transverse shear energy.
     """
     ABD = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
-    at = interpolate(family, bending, transposed_jacobian=transposed_jacobian)
+    slip = rules.transposed_jacobian
+    at = interpolate(family, rules.bending, transposed_jacobian=slip)
     K = _integrate(_membrane_and_bending(at), ABD, at.jxw)
-    if assumes_shear:
+    if rules.assumes_shear:
         rule = assumed_shear.quadrature(family)
         jxw = jacobian_determinants(family, rule) * rule.weights
         return K + _integrate(assumed_shear.strain_matrix(family, rule), laminate.shear, jxw)
-    at = interpolate(family, shear, transposed_jacobian=transposed_jacobian)
+    at = interpolate(family, rules.shear, transposed_jacobian=slip)
     return K + _integrate(_transverse_shear(at), laminate.shear, at.jxw)
 
 

@@ -74,12 +74,8 @@ class ImpactSystem:
         contact: ImpactConditions,
         integrator: type[RodIntegrator] = WilsonStep,
     ) -> None:
-        self.motion = motion
-        self.rod = rod
-        self.law = law
-        self.contact = contact
-        self.rod_stiffness = rod.stiffness()
-        self.rod_mass = rod.mass()
+        self.motion, self.rod, self.law, self.contact = motion, rod, law, contact
+        self.rod_stiffness, self.rod_mass = rod.stiffness(), rod.mass()
         self._integrator = integrator
         self._step: RodIntegrator | None = None
         self.first_dt: float | None = None  # time step of the rod's constants
@@ -89,10 +85,10 @@ class ImpactSystem:
 
         The plate's state is shared with the caller; it is at rest by default.
         """
+        contact, state = self.contact, self.motion.start() if plate is None else plate
         rod = rigid_approach(
-            self.rod, self.contact.velocity, derivatives_too=self.contact.strains_start_moving
+            self.rod, contact.velocity, derivatives_too=contact.strains_start_moving
         )
-        state = self.motion.start() if plate is None else plate
         return ImpactState(rod, self.law.start(), ContactPoint(0.0, 0.0), plate=state)
 
     def applied(self, state: ImpactState, force: float | None = None) -> AppliedForce:

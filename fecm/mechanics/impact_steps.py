@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -23,14 +23,8 @@ from fecm.mechanics.contact_law import (
 )
 from fecm.mechanics.impact import ImpactState, ImpactSystem
 from fecm.mechanics.kernels import COLUMNS, LIBRARY, Impact, Longs, floats
-from fecm.mechanics.kernels.plate import CompiledPlate, CompiledProduct
-from fecm.mechanics.plate_motion import (
-    DivergenceError,
-    DofSums,
-    PlateState,
-    PointLoad,
-    Sums,
-)
+from fecm.mechanics.kernels.plate import CompiledProduct
+from fecm.mechanics.plate_motion import DivergenceError, DofSums, PlateState, PointLoad, Sums
 from fecm.mechanics.projectile import RodIntegrator, RodState
 
 # Difference of squares of frequencies below which modes count as equal, relative to the largest.
@@ -144,12 +138,9 @@ class ImpactSteps:
     def __init__(
         self, system: ImpactSystem, gages: DofSums | None, station: int, threads: int
     ) -> None:
-        product = system.motion.product
-        if not isinstance(product, CompiledProduct):
-            raise TypeError("the plate has no compiled product")
         self._system, self._threads = system, threads
-        self._plate: CompiledPlate = product.plate
-        self._product = product
+        self._product = product = cast(CompiledProduct, system.motion.product)
+        self._plate = product.plate
         self._modes = Modes.of(system.rod_stiffness, system.rod_mass)
         shapes = self._modes.shapes
         self._tip_shape = np.ascontiguousarray(shapes[0])
@@ -178,8 +169,7 @@ class ImpactSteps:
         integrator = system._rod_step(dt)
         T, h = self._modes.step(integrator)
         motion = self._modes.motion(state.rod)
-        law: Any = system.law
-        c = law.constants
+        c = cast(Any, system.law).constants
         rows = np.ascontiguousarray(stored, dtype=np.int64)
         records = np.empty((steps, len(COLUMNS)))
         strains = np.empty((steps, len(self._gage_entry)))
@@ -209,18 +199,14 @@ class ImpactSteps:
             raise DivergenceError(plate.step + taken + 1, "the motion is no longer finite")
         self._leave(plate)
         columns = dict(zip(COLUMNS, records.T, strict=True))
-        last = {name: float(values[-1]) for name, values in columns.items()}
-        plate.sums = Sums(
-            last["inertia"], last["power"], last["strain"], last["internal"], 0.0, 0.0
-        )
+        inertia, power, strain, internal = records[-1, 1:5].tolist()
+        plate.sums = Sums(inertia, power, strain, internal, 0.0, 0.0)
         plate.step, plate.time = plate.step + steps, impact.time
         tips = columns["displacement"]
         moved = tips[-1] - (tips[-2] if steps > 1 else state.rod.tip)
         state.rod = self._modes.state(motion, impact.tip, float(moved))
-        state.memory = LoadingHistory(
-            int(impact.branch), impact.f, impact.b, impact.w, impact.p, impact.peak,
-            impact.peak_force, impact.permanent,
-        )  # fmt: skip
+        memory = (getattr(impact, name) for name in LoadingHistory._fields[1:])
+        state.memory = LoadingHistory(int(impact.branch), *memory)
         state.contact = ContactPoint(impact.indentation, impact.force)
         state.plate_w, state.contact_work = impact.plate_w, impact.work
         state.unconverged_steps = impact.unconverged

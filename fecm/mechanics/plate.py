@@ -6,9 +6,10 @@ contains all dofs of all nodes, (numnp, 5).
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -16,8 +17,10 @@ from fecm._errors import FecmError
 from fecm._frozen import frozen
 from fecm._memory import require
 from fecm._typing import Bools, Floats, Indices
-from fecm.mechanics import element_matrices, interpolation
+from fecm.mechanics import element_matrices
+from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import Quadrature
+from fecm.mechanics.interpolation import NDOF, jacobian_determinants
 from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.mesh import ElementBlock, Mesh, congruence, element_blocks
 from fecm.mechanics.strains import StrainField
@@ -25,28 +28,16 @@ from fecm.mechanics.strains import StrainField
 if TYPE_CHECKING:
     from scipy import sparse
 
-
 # Upper bound of the bytes that assembly needs per entry of the element matrices.
 ASSEMBLED = 24
 # Number of element matrices in memory at the same time.
 BLOCK = 1024
 
+MatricesOf = Callable[[ElementBlock], Floats]
+
 
 class UnsoundPlateError(FecmError, ArithmeticError):
     """The plate's stiffness is not finite or has no largest frequency."""
-
-
-@frozen
-class IntegrationRules:
-    """Quadrature rules of a plate."""
-
-    # Membrane, bending and mass; transverse shear.
-    bending: Quadrature
-    shear: Quadrature
-    strains: Quadrature  # points of the stored strains
-    transposed_jacobian: bool = False  # transpose the inverse Jacobian (the slip ``jacobian``)
-    # Take the transverse shear strains of :mod:`~fecm.mechanics.assumed_shear`.
-    assumes_shear: bool = False
 
 
 @frozen
@@ -67,11 +58,6 @@ class PlateModel:
         return np.asarray(self.mesh.equations > 0)
 
     @cached_property
-    def _free_indices(self) -> Indices:
-        """Indices of the free dofs in a flattened field."""
-        return np.flatnonzero(self._free)
-
-    @cached_property
     def _numbers(self) -> Indices:
         """Number of every dof from 0: equations first, then restrained dofs."""
         numbers = self.mesh.equations.astype(np.intp) - 1
@@ -86,25 +72,12 @@ class PlateModel:
 
     def stiffness_of(self, family: ElementBlock) -> Floats:
         """Element stiffness matrices, (ne, 5 nn, 5 nn)."""
-        rules = self.rules
-        return element_matrices.stiffness(
-            family,
-            self.laminate,
-            rules.bending,
-            rules.shear,
-            transposed_jacobian=rules.transposed_jacobian,
-            assumes_shear=rules.assumes_shear,
-        )
+        return element_matrices.stiffness(family, self.laminate, self.rules)
 
     def _dofs(self, family: ElementBlock) -> Indices:
         return self._numbers[family.nodes].reshape(len(family.rows), -1)
 
-    def _mass_of(self, family: ElementBlock) -> Floats:
-        return element_matrices.consistent_mass(family, self.laminate, self.rules.bending)
-
-    def _element_matrices(
-        self, matrices_of: Callable[[ElementBlock], Floats]
-    ) -> Iterator[tuple[Indices, Floats]]:
+    def _element_matrices(self, matrices_of: MatricesOf) -> Iterator[tuple[Indices, Floats]]:
         """Dofs (ne, n) and matrices (ne, n, n) of all elements, block by block."""
         for family in self.families:
             same = congruence(family)
@@ -117,11 +90,9 @@ class PlateModel:
     @property
     def entries(self) -> int:
         """Number of entries of all element matrices."""
-        return sum(
-            f.nodes.shape[0] * (interpolation.NDOF * f.nodes.shape[1]) ** 2 for f in self.families
-        )
+        return sum(len(f.nodes) * (NDOF * f.nodes.shape[1]) ** 2 for f in self.families)
 
-    def _assembled(self, matrices_of: Callable[[ElementBlock], Floats]) -> sparse.csr_array:
+    def _assembled(self, matrices_of: MatricesOf) -> sparse.csr_array:
         """Assembled matrix (neq, neq + restrained); columns of restrained dofs come last."""
         from scipy import sparse  # slow to import, and not needed by most runs
 
@@ -132,9 +103,8 @@ class PlateModel:
             rows = np.broadcast_to(dofs[:, :, None], matrices.shape)
             columns = np.broadcast_to(dofs[:, None, :], matrices.shape)
             wanted = (rows < neq) & (matrices != 0.0)
-            total = total + sparse.coo_array(
-                (matrices[wanted], (rows[wanted], columns[wanted])), shape=(neq, ndof)
-            )
+            entries = matrices[wanted], (rows[wanted], columns[wanted])
+            total = total + sparse.coo_array(entries, shape=(neq, ndof))
         total = total.tocsr()
         total.sort_indices()
         return total
@@ -167,15 +137,15 @@ class PlateModel:
     @cached_property
     def consistent_mass(self) -> sparse.csr_array:
         """Consistent M, sparse (neq, neq), with the bending rule; assembled on first access."""
-        return self._assembled(self._mass_of)[:, : self.neq].tocsr()
+        laminate, rule = self.laminate, self.rules.bending
+        made = self._assembled(lambda f: element_matrices.consistent_mass(f, laminate, rule))
+        return made[:, : self.neq].tocsr()
 
     def area(self) -> float:
         """Area of the plate, length squared."""
         rule = self.rules.bending
-        return sum(
-            float((interpolation.jacobian_determinants(family, rule) @ rule.weights).sum())
-            for family in self.families
-        )
+        areas = (jacobian_determinants(family, rule) @ rule.weights for family in self.families)
+        return sum(float(area.sum()) for area in areas)
 
     def profile(self) -> int:
         """Number of entries of K in the listing's profile storage, from the first of each column.
@@ -213,17 +183,47 @@ class PlateModel:
     def field(self, displacement: Floats, scale: float = 1.0) -> Floats:
         """All dofs, (numnp, 5): the free ones, (neq,), and `scale` times the prescribed ones."""
         full = scale * self.mesh.forces
-        full.reshape(-1)[self._free_indices] = displacement
+        full[self._free] = displacement
         return full
 
     def strain_field(
         self, points: Quadrature, kind: type[StrainField] = StrainField
     ) -> StrainField:
         """Strains at points of every element."""
+        mesh, rules = self.mesh, self.rules
         return kind(
-            self.mesh.elements,
-            self.mesh.coordinates,
-            points,
-            transposed_jacobian=self.rules.transposed_jacobian,
-            assumes_shear=self.rules.assumes_shear,
-        )
+            mesh.elements, mesh.coordinates, points,
+            transposed_jacobian=rules.transposed_jacobian, assumes_shear=rules.assumes_shear,
+        )  # fmt: skip
+
+
+# The product K u, whose result is processed in pieces that fit the cache --------------------------
+
+R = TypeVar("R")
+
+# Equations per piece: BLAS sums vectors of this length in one thread.
+PIECE = 8192
+
+
+def pieces(neq: int) -> list[slice]:
+    """Slices of the equations."""
+    return [slice(i, min(i + PIECE, neq)) for i in range(0, neq, PIECE)]
+
+
+class StiffnessOperator(ABC):
+    """The internal forces of a displacement."""
+
+    size: int  # entries of a padded vector
+
+    @abstractmethod
+    def each(self, padded: Floats, use: Callable[[int, Floats], R]) -> list[R]:
+        """Compute K u and apply a function to the number and forces of each piece, in order.
+
+        The padded vector, (size,), starts with the displacement and ends with a zero.
+        """
+
+    def __call__(self, displacement: Floats) -> Floats:
+        """K u, (neq,)."""
+        padded = np.zeros(self.size)
+        padded[: len(displacement)] = displacement
+        return np.concatenate(self.each(padded, lambda _, forces: forces.copy()))

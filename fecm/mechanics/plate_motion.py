@@ -26,8 +26,7 @@ import numpy as np
 from fecm._errors import FecmError
 from fecm._frozen import frozen
 from fecm._typing import Floats, Indices
-from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.stiffness_operator import pieces
+from fecm.mechanics.plate import PlateModel, pieces
 from fecm.mechanics.stiffness_product import AUTO, CSR, Workers, resolved, stiffness_operator
 from fecm.mechanics.symmetry import SymmetryReduction, unreduced
 
@@ -38,21 +37,12 @@ SHORT, NEAR = 2048, 8
 
 
 class DivergenceError(FecmError, ArithmeticError):
-    """The solution diverged.
-
-    Attributes
-    ----------
-    step : int
-        Step at which it diverged.
-    reason : str
-        Symptom.
-    """
+    """The solution diverged at a `step`; the `reason` is the symptom."""
 
     exit_code = 1
 
     def __init__(self, step: int, reason: str) -> None:
-        self.step = step
-        self.reason = reason
+        self.step, self.reason = step, reason
         super().__init__(f"step {step}: {reason}")
 
     def __reduce__(self) -> tuple[type[DivergenceError], tuple[int, str]]:
@@ -180,8 +170,8 @@ class DofSums:
 class PlateMotion:
     """Time integration of a plate with the damping matrix C = a M.
 
-    Solver and workers belong to :func:`~fecm.mechanics.stiffness_product.stiffness_operator`.  All
-    dofs are independent by default, and with the sparse matrix.
+    Solver and workers are those of :func:`~fecm.mechanics.stiffness_product.stiffness_operator`.
+    All dofs are independent by default, and with the sparse matrix.
     """
 
     def __init__(
@@ -192,17 +182,13 @@ class PlateMotion:
         workers: Workers | None = None,
         damping: float = 0.0,
     ) -> None:
-        self.damping = damping
-        self.solver = resolved(solver)
-        kept = unreduced(plate) if reduced is None or solver == CSR else reduced
-        self.plate = plate
-        self._reduction = kept
+        self.plate, self.damping, self.solver = plate, damping, resolved(solver)
+        self._reduction = kept = unreduced(plate) if reduced is None or solver == CSR else reduced
         self.product = stiffness_operator(plate, solver, kept, workers)
         self.mass = kept.gather(kept.sign * plate.field(plate.mass, 0.0))
         self._dof_indices = kept.dof_indices
         self._inverse_mass = 1.0 / self.mass
-        self._scale = np.zeros(kept.count)  # M^-1 times the state's dt2
-        self._scaled_for = 0.0
+        self._scale, self._scaled_for = np.zeros(kept.count), 0.0  # M^-1 times the state's dt2
         work = np.empty(kept.count)
         loads = kept.gather(plate.field(plate.nodal_loads, 0.0))
         self._loads = loads if loads.any() else None
@@ -258,8 +244,7 @@ class PlateMotion:
 
     def displace(self, state: PlateState, change: Floats) -> None:
         """Add to the displacement of a state, (n,), without a time step."""
-        displacement = state.displacement
-        displacement += change
+        state.padded[: len(change)] += change
         self._update_forces(state)
 
     def _update_forces(self, state: PlateState) -> None:
@@ -269,7 +254,6 @@ class PlateMotion:
         state.sums = sums[0] if len(sums) == 1 else Sums(*map(sum, zip(*sums, strict=True)))
 
     def _scale_for(self, dt2: float) -> None:
-        """Set the factors of the internal force."""
         if self._scaled_for != dt2:
             np.multiply(self._inverse_mass, dt2, out=self._scale)
             self._scaled_for = dt2

@@ -21,17 +21,14 @@ from fecm._typing import Floats, Indices
 from fecm.mechanics import kernels
 from fecm.mechanics.kernels.plate import CompiledProduct
 from fecm.mechanics.mesh import congruence, distinct
-from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.stiffness_operator import R, StiffnessOperator, pieces
+from fecm.mechanics.plate import PlateModel, R, StiffnessOperator, pieces
 from fecm.mechanics.symmetry import SymmetryReduction, unreduced
 
 if TYPE_CHECKING:
     from scipy import sparse
 
 # The kernels where they are compiled, else NumPy; or always one of them, or the sparse matrix.
-AUTO, KERNELS, NUMPY, CSR = "auto", "kernels", "numpy", "csr"
-
-SOLVERS = (AUTO, KERNELS, NUMPY, CSR)
+SOLVERS = AUTO, KERNELS, NUMPY, CSR = "auto", "kernels", "numpy", "csr"
 
 # Fraction of the critical time step used if the deck has no time step.
 SAFE = 0.9
@@ -65,29 +62,20 @@ class Workers:
         if self._pool is None or len(items) < 2:
             return [function(item) for item in items]
         share = -(-len(items) // self.count)
-        others = [
-            self._pool.submit(_each, function, items[start : start + share])
-            for start in range(share, len(items), share)
-        ]
-        results = _each(function, items[:share])
+        shares = [items[start : start + share] for start in range(0, len(items), share)]
+        others = [self._pool.submit(list, map(function, part)) for part in shares[1:]]
+        results = [function(item) for item in shares[0]]
         for other in others:
             results += other.result()
         return results
 
 
-def _each(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
-    return [function(item) for item in items]
-
-
 # Elements per matrix product: it fits the cache, and BLAS uses one thread.
 BLOCK = 256
-
 # With fewer congruent elements, one matrix per element is as fast as a shared one.
 WORTH_GROUPING = 4
-
 # Nodal values per domain, which fit the cache.
 BATCH = 65536
-
 # The number of domains of a large mesh is a multiple of this, for equal shares of the threads.
 SHARES = 4
 
@@ -119,18 +107,17 @@ class _Domain:
     """
 
     def __init__(self, groups: Sequence[Group], count: int, size: int, scratch: Floats) -> None:
-        lists: list[Indices] = []
-        matrices: list[Floats] = []
+        moving: list[Group] = []
         for K, dof_indices in groups:
             kept = (dof_indices < size - 1).any(axis=0)
-            lists.append(dof_indices[:, kept])
-            matrices.append(np.ascontiguousarray(K[..., kept, :][..., kept]))
-        self.dof_indices = np.concatenate([part.ravel() for part in lists])
+            matrices = np.ascontiguousarray(K[..., kept, :][..., kept])
+            moving.append((matrices, dof_indices[:, kept]))
+        self.dof_indices = np.concatenate([part.ravel() for _, part in moving])
         self._gathered, self.forces = scratch[:, : len(self.dof_indices)]
         # Product function, nodal values, matrix or matrices, forces.
         self._parts: list[tuple[Callable[..., Any], Floats, Floats, Floats]] = []
         end = 0
-        for K, part in zip(matrices, lists, strict=True):
+        for K, part in moving:
             for first in range(0, len(part), BLOCK):
                 rows = slice(first, first + BLOCK)
                 shape = part[rows].shape

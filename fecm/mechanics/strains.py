@@ -17,8 +17,11 @@ from fecm.mechanics.mesh import Ints, element_blocks
 GENERALISED_STRAINS = (
     "eps_xx", "eps_yy", "gamma_xy", "kappa_x", "kappa_y", "kappa_xy", "gamma_xz", "gamma_yz",
 )  # fmt: skip
-
 RESULTANTS = ("N_x", "N_y", "N_xy", "M_x", "M_y", "M_xy", "Q_x", "Q_y")
+STRAINS = ("kappa_x", "kappa_y", "kappa_xy", "gamma_yz", "gamma_xz")
+
+# Elements per product: so few that BLAS uses one thread.
+STRAIN_BLOCK = 256
 
 
 def strains_and_resultants(
@@ -42,12 +45,6 @@ def strains_and_resultants(
     return dict(zip((*GENERALISED_STRAINS, *RESULTANTS), values, strict=True))
 
 
-STRAINS = ("kappa_x", "kappa_y", "kappa_xy", "gamma_yz", "gamma_xz")
-
-# Elements per product: so few that BLAS uses one thread.
-STRAIN_BLOCK = 256
-
-
 class StrainField:
     """Curvatures and transverse shear strains at the same points of every element."""
 
@@ -66,25 +63,20 @@ class StrainField:
         self.families = element_blocks(elements, coordinates)
 
     @cached_property
-    def _blocks(
-        self,
-    ) -> list[tuple[Indices, Indices, Floats, Floats, TiedStrains | None]]:
+    def _blocks(self) -> list[tuple[Indices, Indices, Floats, Floats, TiedStrains | None]]:
         blocks = []
         for family in self.families:
             values, local = local_shape_functions(family, self.rule)
             # Rows: d/dxi, d/deta and value at every point, for one matrix product.
             table = np.concatenate([local[:, 0], local[:, 1], values])
-            inverse, _ = inverse_jacobian(
-                family, local, transposed_jacobian=self.transposed_jacobian
-            )
+            slip = self.transposed_jacobian
+            inverse, _ = inverse_jacobian(family, local, transposed_jacobian=slip)
             for start in range(0, len(family.rows), STRAIN_BLOCK):
                 cut = slice(start, start + STRAIN_BLOCK)
                 places = family.nodes[cut].T[:, None] * NDOF + np.array([2, 3, 4])[:, None]
                 metric = inverse[cut].transpose(2, 3, 1, 0)[:, :, :, None].copy()
-                tied = None
-                if self.assumes_shear:
-                    block = family.take(np.arange(len(family.rows))[cut])
-                    tied = TiedStrains(block, self.rule)
+                members = np.arange(len(family.rows))[cut]
+                tied = TiedStrains(family.take(members), self.rule) if self.assumes_shear else None
                 blocks.append((family.rows[cut], places, table, metric, tied))
         return blocks
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._frozen import frozen
-from fecm._typing import Bools, Floats, Indices
+from fecm._typing import Floats, Indices
 from fecm.mechanics.mesh import ElementBlock, equation_numbers
 from fecm.mechanics.plate import PlateModel
 
@@ -60,27 +60,34 @@ class SymmetryReduction:
 
 def unreduced(plate: PlateModel) -> SymmetryReduction:
     """All dofs without restraint, each independent."""
-    free = plate.mesh.equations > 0
-    ones = np.ones(len(plate.mesh.elements), dtype=int)
-    return _numbered(free, np.arange(free.size).reshape(free.shape), free.astype(float), ones)
+    return _reduction(plate, None)
 
 
 def symmetry_reduction(plate: PlateModel, contact: Floats | None) -> SymmetryReduction:
     """Independent dofs of a plate at rest under its loads and a contact force, (numnp, 5)."""
-    free = restrain_resting_dofs(plate, contact).mesh.equations > 0
-    dof_indices = np.arange(free.size).reshape(free.shape)
-    sign, weights = free.astype(float), np.ones(len(plate.mesh.elements), dtype=int)
-    images = _images(plate, free, contact)
+    resting = restrain_resting_dofs(plate, contact)
+    return _reduction(resting, _images(resting, contact))
+
+
+def _reduction(plate: PlateModel, images: tuple[Indices, Indices] | None) -> SymmetryReduction:
+    """Number the independent dofs in the order of nodes and dofs."""
+    sign = (plate.mesh.equations > 0).astype(float)
+    dof_indices = np.arange(sign.size).reshape(sign.shape)
+    leaders, weights = dof_indices, np.ones(len(plate.mesh.elements), dtype=int)
     if images is not None:
         nodes, elements = images
-        own = np.arange(len(elements))
+        own, at = np.arange(len(elements)), np.arange(len(nodes))
         weights = np.where(own < elements, 2, np.where(own == elements, 1, 0))
-        follows = nodes < np.arange(len(nodes))
-        dof_indices[follows] = dof_indices[nodes[follows]]
+        follows = nodes < at
+        leaders = np.where(follows[:, None], dof_indices[nodes], dof_indices)
         sign[follows] *= TURNED
         # A node at the centre is its own image: its dofs that change sign are at rest.
-        sign[nodes == np.arange(len(nodes))] *= TURNED > 0.0
-    return _numbered(sign != 0.0, dof_indices, sign, weights)
+        sign[nodes == at] *= TURNED > 0.0
+    leads = (leaders == dof_indices) & (sign != 0.0)
+    count = int(np.count_nonzero(leads))
+    numbers = np.full(sign.size, count, dtype=np.intp)
+    numbers[leads.ravel()] = np.arange(count)
+    return SymmetryReduction(count, np.where(sign != 0.0, numbers[leaders], count), sign, weights)
 
 
 def half_turn_images(coordinates: Floats) -> Indices | None:
@@ -116,31 +123,15 @@ def restrain_resting_dofs(plate: PlateModel, contact: Floats | None) -> PlateMod
     return replace(plate, mesh=replace(mesh, codes=codes, equations=equation_numbers(codes)))
 
 
-def _numbered(
-    moves: Bools, dof_indices: Indices, sign: Floats, weights: NDArray[np.int_]
-) -> SymmetryReduction:
-    """Number the independent dofs in the order of nodes and dofs."""
-    leaders = (dof_indices == np.arange(moves.size).reshape(moves.shape)) & moves
-    count = int(np.count_nonzero(leaders))
-    numbers = np.full(moves.size, count, dtype=np.intp)
-    numbers[leaders.ravel()] = np.arange(count)
-    index = np.where(moves, numbers[dof_indices], count)
-    return SymmetryReduction(count, index, sign, weights)
-
-
-def _images(
-    plate: PlateModel, free: Bools, contact: Floats | None
-) -> tuple[Indices, Indices] | None:
+def _images(plate: PlateModel, contact: Floats | None) -> tuple[Indices, Indices] | None:
     """Images of nodes and elements under the half turn, if it maps the plate onto itself."""
-    mesh = plate.mesh
+    mesh, free = plate.mesh, plate.mesh.equations > 0
     nodes = half_turn_images(mesh.coordinates)
     if nodes is None:
         return None
     if contact is not None and not np.allclose(contact, TURNED * contact[nodes], 0.0, TOLERANCE):
         return None
-    same_supports = (free == free[nodes]).all()
-    same_loads = (mesh.forces == TURNED * mesh.forces[nodes]).all()
-    if not (same_supports and same_loads):
+    if (free != free[nodes]).any() or (mesh.forces != TURNED * mesh.forces[nodes]).any():
         return None
     elements = np.full(len(mesh.elements), -1, dtype=np.intp)
     for family in plate.families:
@@ -148,8 +139,7 @@ def _images(
         if opposite is None:
             return None
         turned = nodes[family.nodes][:, opposite]
-        order = np.lexsort(family.nodes.T[::-1])
-        images = np.lexsort(turned.T[::-1])
+        order, images = np.lexsort(family.nodes.T[::-1]), np.lexsort(turned.T[::-1])
         if not np.array_equal(family.nodes[order], turned[images]):
             return None
         elements[family.rows[images]] = family.rows[order]

@@ -25,6 +25,7 @@ from fecm.mechanics.contact_law import (
     ListingLaw,
     YangSunPermanent,
 )
+from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.impact_steps import ImpactSteps, supports
@@ -32,7 +33,7 @@ from fecm.mechanics.kernels.failure import CompiledMonitor
 from fecm.mechanics.kernels.strains import CompiledStrains
 from fecm.mechanics.laminate import Laminate, effective_rigidity, laminate, threshold_force
 from fecm.mechanics.mesh import Mesh, element_centres
-from fecm.mechanics.plate import IntegrationRules, PlateModel
+from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.ply_stresses import FailureMonitor, PlyStresses, equilibrium_shear_stiffness
 from fecm.mechanics.points import RADIUS_PER_THICKNESS, GageArray, gages, patch_weights

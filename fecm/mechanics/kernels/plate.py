@@ -16,8 +16,7 @@ from fecm.mechanics.interpolation import NDOF, local_shape_functions
 from fecm.mechanics.kernels import LIBRARY, Chunk, Group, Integers, Plate, floats
 from fecm.mechanics.kernels.layout import LANES, Indices, Layout, Places, layout_of, places_of
 from fecm.mechanics.mesh import ElementBlock, congruence, distinct
-from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.stiffness_operator import R, StiffnessOperator, pieces
+from fecm.mechanics.plate import PlateModel, R, StiffnessOperator, pieces
 from fecm.mechanics.symmetry import TURNED, SymmetryReduction, opposite_nodes
 
 # The kinds of kernels.c.
