@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm.results.schema import ResultFileError
-from fecm.sweeps.cases import CasesError
-from fecm.sweeps.plan import plan
-from fecm.sweeps.random_result import QUANTILES, Indices, indices, wilson
-from fecm.sweeps.sampling import (
+from fecm.sweeps.cases import (
     DESIGNS,
+    CasesError,
     Design,
     DesignKind,
     Law,
@@ -24,6 +22,8 @@ from fecm.sweeps.sampling import (
     random_cases,
     unit_samples,
 )
+from fecm.sweeps.plan import plan
+from fecm.sweeps.random_result import QUANTILES, Indices, indices, wilson
 from tests.calls import Done, assert_unusable, call
 from tests.decks import DATA, DATA_CARDS, small
 

@@ -16,21 +16,11 @@ from fecm.deck.findings import DeckError
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
 from fecm.simulation.run import simulate
+from fecm.sweeps import cases as inputs
 from fecm.sweeps import plan as plans
-from fecm.sweeps import sampling
 from fecm.sweeps.api import carry_out, check_draws, problem_of
 from fecm.sweeps.batch import deck_of
-from fecm.sweeps.cases import (
-    NAMES,
-    CasesError,
-    Limit,
-    Value,
-    grid,
-    parse_exceed,
-    parse_until,
-    parse_vary,
-    read_cases,
-)
+from fecm.sweeps.cases import NAMES, CasesError, Limit, Value
 from fecm.sweeps.convergence import refined_cases
 from fecm.sweeps.convergence import table as table_of
 from fecm.sweeps.random_result import tables
@@ -40,34 +30,34 @@ from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_i
 
 @click.command()
 @click.argument("deck", type=DECK_PATH)
-@click.option("--vary", "varied", type=Parsed(parse_vary), multiple=True, metavar="NAME=VALUES",
-              help="FROM:TO:N or A,B,C; may be repeated, for a full grid.  Names: "
-                   f"{', '.join(NAMES)}.")  # fmt: skip
+@click.option("--vary", "varied", type=Parsed(inputs.parse_vary), multiple=True,
+              metavar="NAME=VALUES", help="FROM:TO:N or A,B,C; may be repeated, for a full grid.  "
+                                          f"Names: {', '.join(NAMES)}.")  # fmt: skip
 @click.option("--cases", "table", type=DECK_PATH, metavar="CASES.csv",
               help="A table instead of --vary: a header of names, one row per case.")  # fmt: skip
 @click.option("--refine", "factors", type=ListOf("FACTOR,...", click.IntRange(1, 8)),
               metavar="1,2,4",
               help="Instead: divide the sides of all elements and DT by factors; order "
                    "and limit of every quantity.")  # fmt: skip
-@click.option("--random", "laws", type=Parsed(sampling.parse_random), multiple=True,
+@click.option("--random", "laws", type=Parsed(inputs.parse_random), multiple=True,
               metavar="NAME=LAW",
               help="Random value: normal:MEAN,SD, lognormal:MEDIAN,SIGMA, uniform:A,B or "
                    "triangular:A,MODE,B; may be repeated, together with --vary.")  # fmt: skip
 @click.option("--samples", type=int, metavar="N", help="Number of samples of --random.")
 @click.option("--seed", type=int, metavar="S", help="Seed of --random.  [default: 0]")
-@click.option("--design", "kind", type=click.Choice(sampling.DESIGNS),
+@click.option("--design", "kind", type=click.Choice(inputs.DESIGNS),
               help="Design of --random: Latin hypercube, Sobol' sequence, or independent draws "
                    "(Monte Carlo).  [default: lhs]")  # fmt: skip
 @click.option("--sensitivity", is_flag=True,
               help="Sobol' indices of the random values, from N times (their number + 2) "
                    "cases.")  # fmt: skip
-@click.option("--exceed", "limits", type=Parsed(parse_exceed), multiple=True,
+@click.option("--exceed", "limits", type=Parsed(inputs.parse_exceed), multiple=True,
               metavar="QUANTITY=VALUE",
               help="Probability that a quantity of the summary exceeds a value; of peak_force also "
                    "threshold, that of DELA.  May be repeated.")  # fmt: skip
 @click.option("--find", type=click.Choice(["velocity"]),
               help="Search in every case for the velocity at which --until holds.")  # fmt: skip
-@click.option("--until", type=Parsed(parse_until), metavar="peak_force=VALUE",
+@click.option("--until", type=Parsed(inputs.parse_until), metavar="peak_force=VALUE",
               help="Peak force to reach: a number, or threshold, that of DELA.")  # fmt: skip
 @click.option("-o", "--output", type=FILE_PATH, metavar="SWEEP.h5",
               help="Result file.  [default: the deck's name with -sweep.h5, in this "
@@ -93,10 +83,10 @@ def sweep(
     varied: tuple[tuple[str, list[Value]], ...],
     table: Path | None,
     factors: tuple[int, ...] | None,
-    laws: tuple[tuple[str, sampling.Law], ...],
+    laws: tuple[tuple[str, inputs.Law], ...],
     samples: int | None,
     seed: int | None,
-    kind: sampling.DesignKind | None,
+    kind: inputs.DesignKind | None,
     sensitivity: bool,
     limits: tuple[Limit, ...],
     find: str | None,
@@ -140,15 +130,15 @@ def sweep(
     if full and find:
         raise click.UsageError("--full runs given velocities: --vary velocity=FOUND --full 0")
     problem = _problem(deck)
-    cases = grid(varied) if table is None else read_cases(table)
+    cases = inputs.grid(varied) if table is None else inputs.read_cases(table)
     if factors:
         cases, extra = refined_cases(problem, factors), (plans.DEFLECTION,)
     design = None
     if laws:
-        design = sampling.design_of(
+        design = inputs.design_of(
             dict(laws), samples, seed or 0, kind or "lhs", sensitivity=sensitivity
         )
-        cases = sampling.random_cases(design, cases)
+        cases = inputs.random_cases(design, cases)
     chosen = tuple(dict.fromkeys(full or ()))
     if chosen and max(chosen) >= len(cases):
         raise click.UsageError(f"--full {max(chosen)}: the cases are 0 to {len(cases) - 1}")
@@ -161,7 +151,7 @@ def sweep(
     check_draws(planned)
     if design is not None:
         shared = plans.shares_plate(problem) and not planned.alone
-        for text in (sampling.doubt(design), sampling.cost(cases, design, shared=shared)):
+        for text in (inputs.doubt(design), inputs.cost(cases, design, shared=shared)):
             if text:
                 note(text)
     plans.check_memory(problem, planned, 0 if scheduler is not None else workers, streamed=True)

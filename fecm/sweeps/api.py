@@ -16,14 +16,14 @@ from fecm.api import LoadedDeck, Progress, load_deck
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
 from fecm.problem.problem import Problem
+from fecm.sweeps import cases as inputs
 from fecm.sweeps import plan as plans
-from fecm.sweeps import sampling, schedule
+from fecm.sweeps import schedule
 from fecm.sweeps.batch import built, deck_of
-from fecm.sweeps.cases import Case, CasesError, checked, combined, parse_exceed
+from fecm.sweeps.cases import Case, CasesError, DesignKind
 from fecm.sweeps.convergence import refined_cases
 from fecm.sweeps.plan import RUN, Build, Measure, Outcome, Plan, Task, merge, plan
 from fecm.sweeps.result import SweepResult, result_of, save
-from fecm.sweeps.sampling import DesignKind
 
 
 def problem_of(deck: str | Path | Deck) -> Problem:
@@ -52,7 +52,7 @@ def check_draws(planned: Plan) -> None:
                 deck_of(planned, values.index(value))
             except CasesError as error:
                 text = f"{name} {value:.6g}: {str(error).rstrip('.')}; sensitivity needs all draws"
-                raise CasesError(f"{text}; {sampling.REMEDY}") from None
+                raise CasesError(f"{text}; {inputs.REMEDY}") from None
 
 
 def _first_built(build: Build, cases: Sequence[Case]) -> LoadedDeck:
@@ -278,15 +278,15 @@ def sweep(
             raise CasesError(f"{name} is {function!r}, not a function")
     free = build is not None
     if cases is None:
-        made = combined({} if vary is None else vary, free=free)
+        made = inputs.combined({} if vary is None else vary, free=free)
     else:
-        made = checked(cases, free=free)
+        made = inputs.checked(cases, free=free)
     drawn = None
     if random is not None:
-        laws = {name: sampling.parse_law(name, law, free=free) for name, law in random.items()}
-        drawn = sampling.design_of(laws, samples, seed, design, sensitivity=sensitivity)
-        made = sampling.random_cases(drawn, made)
-        if text := sampling.doubt(drawn):
+        laws = {name: inputs.parse_law(name, law, free=free) for name, law in random.items()}
+        drawn = inputs.design_of(laws, samples, seed, design, sensitivity=sensitivity)
+        made = inputs.random_cases(drawn, made)
+        if text := inputs.doubt(drawn):
             warn(text)
     if workers > 1 or isinstance(executor, ProcessPoolExecutor):
         _check_sendable(workers > 1, build=build, measure=own)
@@ -305,7 +305,7 @@ def sweep(
     if not isinstance(exceed or {}, Mapping):
         raise CasesError(f'exceed is {exceed!r}; write {{"peak_force": [100.0]}} or the like')
     limits = [
-        parse_exceed(f"{name}={value}")
+        inputs.parse_exceed(f"{name}={value}")
         for name, given in (exceed or {}).items()
         for value in np.atleast_1d(given).tolist()
     ]

@@ -25,19 +25,8 @@ from fecm.problem.problem import Problem
 from fecm.results.metrics import COLUMNS, FOUND, GAGE, SUMMARY
 from fecm.results.metrics import THRESHOLD as LIMITED
 from fecm.results.result import Result
-from fecm.sweeps.cases import (
-    CONTACT,
-    LAMINATE,
-    LOAD,
-    REFINE,
-    THRESHOLD,
-    Case,
-    CasesError,
-    Limit,
-    check_names,
-    plate_values,
-)
-from fecm.sweeps.sampling import Design
+from fecm.sweeps import cases as inputs
+from fecm.sweeps.cases import REFINE, THRESHOLD, Case, CasesError, Design, Limit, plate_values
 from fecm.sweeps.vary import Clock, apply_case, check_deck, clock_of
 
 Build = Callable[[dict[str, Any]], Deck]
@@ -113,7 +102,7 @@ def plan(checked: Problem, cases: Sequence[Case], **options: Any) -> Plan:
     if not cases:
         raise CasesError("a sweep needs at least one case")
     if made.build is None:
-        check_names(cases[0])
+        inputs.check_names(cases[0])
     if unknown := sorted({*extra} - {*MEASURES}):
         raise CasesError(f"measure has {unknown[0]!r}; the names are {', '.join(MEASURES)}")
     if GAGES in extra and not deck.has(Gages):
@@ -137,7 +126,11 @@ def plan(checked: Problem, cases: Sequence[Case], **options: Any) -> Plan:
         if extra:
             known += [name for name, _ in made.limits if name in COLUMNS or name.startswith(GAGE)]
         check_limits(made.limits, [*known, *(LIMITED if limited else ())], threshold=limited)
-    same = {*LOAD, *CONTACT, "duration"}  # names of cases that keep the critical time step
+    same = {
+        *inputs.LOAD,
+        *inputs.CONTACT,
+        "duration",
+    }  # names of cases that keep the critical time step
     own = made.build is None and "dt" not in cases[0] and not same.issuperset(cases[0])
     chosen = tuple(name for name in MEASURES if name in extra)
     return replace(made, clock=clock_of(checked) if own else None, extra=chosen)
@@ -255,7 +248,7 @@ def freed(some: Sequence[Task]) -> int:
     for task in some:
         if "support" in task.cases[0]:  # which has its own u and v
             continue
-        plate = {name: value for name, value in task.cases[0].items() if name in LAMINATE}
+        plate = {name: value for name, value in task.cases[0].items() if name in inputs.LAMINATE}
         with suppress(CasesError):
             if apply_case(task.deck, plate).all(Boundary) != task.deck.all(Boundary):
                 count += len(task.numbers)

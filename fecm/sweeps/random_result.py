@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from fecm._typing import Floats
 from fecm.results.metrics import COLUMNS
 from fecm.results.schema import ResultFileError
-from fecm.sweeps.cases import THRESHOLD, Limit
+from fecm.sweeps.cases import DESIGNS, REMEDY, THRESHOLD, Design, Law, Limit
 from fecm.sweeps.plan import RUN, check_limits
-from fecm.sweeps.sampling import DESIGNS, REMEDY, Design, Law
 
 if TYPE_CHECKING:
     from fecm.results.hdf5_reader import Contents
