@@ -54,15 +54,14 @@ class Comparison:
     def __str__(self) -> str:
         clock, pound = (self.units.get(name, "") for name in ("time", "force"))
         both = f"{pound}*{clock}" if clock and pound else ""
-        return ", ".join(
-            (
-                f"{self.points} points from time {self.begin:g} to {self.end:g} {clock}".rstrip(),
-                _against("peak", self.peak, self.measured_peak, pound),
-                _against("impulse", self.impulse, self.measured_impulse, both),
-                f"rms of the difference {self.rms:.4g} {pound}".rstrip(),
-                f"correlation {self.correlation:.4f}",
-            )
+        parts = (
+            f"{self.points} points from time {self.begin:g} to {self.end:g} {clock}".rstrip(),
+            _against("peak", self.peak, self.measured_peak, pound),
+            _against("impulse", self.impulse, self.measured_impulse, both),
+            f"rms of the difference {self.rms:.4g} {pound}".rstrip(),
+            f"correlation {self.correlation:.4f}",
         )
+        return ", ".join(parts)
 
 
 def _against(name: str, own: float, measured: float, unit: str) -> str:
@@ -103,16 +102,15 @@ def _from_file(path: Path, units: Mapping[str, str]) -> Measurement:
     for place, (name, unit) in enumerate(zip(names, table.units, strict=True)):
         for wanted, dimension in (("time", "time"), (column, "force")):
             first = not any(same_name(wanted, one) for one in names)
-            if same_name(name, wanted) or (first and place == (wanted != "time")):
-                _check_unit(path, name, unit, units.get(dimension, ""), KNOWN[dimension])
+            if not same_name(name, wanted) and not (first and place == (wanted != "time")):
+                continue
+            deck, sizes = units.get(dimension, ""), KNOWN[dimension]
+            same = unit == deck or (unit in sizes and sizes[unit] == sizes.get(deck))
+            if unit and deck and not same:
+                raise StudyError(
+                    f"{path}: {name} is in {unit}, and the deck in {deck}; convert the column"
+                )
     return Measurement(printable(path.name), column, *columns.values())
-
-
-def _check_unit(path: Path, name: str, own: str, deck: str, known: Mapping[str, float]) -> None:
-    """Refuse a column in another unit than the deck's."""
-    same = own == deck or (own in known and known[own] == known.get(deck))
-    if own and deck and not same:
-        raise StudyError(f"{path}: {name} is in {own}, and the deck in {deck}; convert the column")
 
 
 def compare(result: Result, measured: Measurement) -> Comparison:

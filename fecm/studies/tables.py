@@ -55,19 +55,16 @@ class Table:
             raise StudyError(f"{self.path}: the table has fewer than two rows of numbers")
         values = np.array([self._values(row, names, own) for row in self.rows])
         columns = dict(zip(names, values.T, strict=True))
-        if increasing:
-            for before, after, (line, _) in zip(
-                columns[increasing], columns[increasing][1:], self.rows[1:], strict=False
-            ):
-                if not after > before:
-                    others = [
-                        n for n in names if n != increasing and (np.diff(columns[n]) > 0).all()
-                    ]
-                    swapped = f"; are {increasing} and {others[0]} swapped?" if others else ""
-                    raise StudyError(
-                        f"{self.path}:{line}: {increasing} must increase: {after:g} follows "
-                        f"{before:g}{swapped}"
-                    )
+        rises = {name: np.diff(column) > 0 for name, column in columns.items()}
+        if increasing and not rises[increasing].all():
+            row = int(rises[increasing].argmin())
+            before, after = columns[increasing][row : row + 2]
+            others = [n for n in names if n != increasing and rises[n].all()]
+            swapped = f"; are {increasing} and {others[0]} swapped?" if others else ""
+            raise StudyError(
+                f"{self.path}:{self.rows[row + 1][0]}: {increasing} must increase: {after:g} "
+                f"follows {before:g}{swapped}"
+            )
         return columns
 
     def _places(self, names: Sequence[str]) -> list[int]:
@@ -149,17 +146,13 @@ def read_rows(path: Path) -> list[Row]:
         except csv.Error as error:
             raise StudyError(f"{path}:{number}: {error}") from None
         found.append((number, [field.strip() for field in fields]))
-    return found if separator == "," else _with_points(found)
-
-
-def _with_points(rows: list[Row]) -> list[Row]:
-    """Replace decimal commas by points, unless some numbers have points already."""
-    fields = [field for _, row in rows for field in row]
-    if any("." in field and _number(field) is not None for field in fields):
-        return rows  # a comma may then separate thousands
+    every = chain.from_iterable(row for _, row in found)
+    # Beside numbers with a point a comma may separate thousands.
+    if separator == "," or any("." in field and _number(field) is not None for field in every):
+        return found
     return [
-        (line, [f.replace(",", ".") if _COMMA.fullmatch(f) else f for f in row])
-        for line, row in rows
+        (number, [f.replace(",", ".") if _COMMA.fullmatch(f) else f for f in row])
+        for number, row in found
     ]
 
 
@@ -237,14 +230,10 @@ def read_test(
     missing = units or (length, force)
     length, force = length or missing[0], force or missing[1]
     sizes = _size(path, length, "length"), _size(path, force, "force")
-    target = units or _system(length, force)
-    wanted = _size(path, target[0], "length"), _size(path, target[1], "force")
-    return Test(
-        indentation * (sizes[0] / wanted[0]),
-        load * (sizes[1] / wanted[1]),
-        {"length": target[0], "force": target[1]},
-        (length, force),
-    )
+    target = dict(zip(("length", "force"), units or _system(length, force), strict=True))
+    wanted = [_size(path, unit, dimension) for dimension, unit in target.items()]
+    indentation, load = indentation * (sizes[0] / wanted[0]), load * (sizes[1] / wanted[1])
+    return Test(indentation, load, target, (length, force))
 
 
 def _place(table: Table, name: str, column: str) -> int:
@@ -272,12 +261,10 @@ def _size(path: Path, unit: str, dimension: str) -> float:
     """Return the size of a unit in m or N."""
     sizes = LENGTHS if dimension == "length" else FORCES
     folded = [name for name in sizes if name.casefold() == unit.casefold()]
-    if unit in sizes:
-        return sizes[unit]
-    if len(folded) == 1:
-        return sizes[folded[0]]
-    known = ", ".join(sizes)
-    raise StudyError(f"{path}: unknown unit of {dimension} `{unit}`; known units: {known}")
+    if unit not in sizes and len(folded) != 1:
+        known = ", ".join(sizes)
+        raise StudyError(f"{path}: unknown unit of {dimension} `{unit}`; known units: {known}")
+    return sizes[unit if unit in sizes else folded[0]]
 
 
 def _system(length: str, force: str) -> tuple[str, str]:

@@ -85,9 +85,8 @@ def trigonometry(degrees: ArrayLike) -> tuple[Floats, Floats]:
     rest = np.deg2rad(angle - 90.0 * quarter)
     cos, sin = np.cos(rest), np.sin(rest)
     turn = np.mod(quarter, 4.0).astype(int)
-    along = np.choose(turn, [cos, -sin, -cos, sin]) + 0.0
-    across = np.choose(turn, [sin, cos, -sin, -cos]) + 0.0
-    return along, across
+    along, across = [cos, -sin, -cos, sin], [sin, cos, -sin, -cos]
+    return np.choose(turn, along) + 0.0, np.choose(turn, across) + 0.0
 
 
 def gradients(degrees: ArrayLike) -> tuple[Floats, Floats, Floats]:
@@ -218,8 +217,10 @@ def graded_modes(stiffness: Floats, inertia: Floats) -> tuple[Floats, Floats]:
     turn = np.eye(order.shape[1])[order]  # permutation, by rows
     back = turn.transpose(0, 2, 1)
     try:
-        root = np.linalg.cholesky(turn @ stiffness @ back / _outer(of_k)).transpose(0, 2, 1)
-        mass = np.linalg.cholesky(turn @ inertia @ back / _outer(of_m))
+        root, mass = (
+            np.linalg.cholesky(turn @ matrix @ back / (scale[:, :, None] * scale[:, None]))
+            for matrix, scale in ((stiffness, of_k), (inertia, of_m))
+        )
     except np.linalg.LinAlgError:
         raise StudyError(BEYOND) from None
     inverse = np.linalg.inv(mass).transpose(0, 2, 1)
@@ -227,13 +228,8 @@ def graded_modes(stiffness: Floats, inertia: Floats) -> tuple[Floats, Floats]:
     # The singular values of this product are the frequencies.  Apart from the column factor `rise`
     # it is well conditioned, because its ratios are at most 1.
     ratios = np.triu(rise[:, :, None] / rise[:, None])
-    values, right = _singular_values(root @ (inverse * ratios) * rise[:, None])
+    values, right = _singular_values(root.transpose(0, 2, 1) @ (inverse * ratios) * rise[:, None])
     return values, back @ ((inverse / of_m[:, :, None]) @ right)
-
-
-def _outer(scale: Floats) -> Floats:
-    """Products of all pairs of scales, (n, m, m)."""
-    return scale[:, :, None] * scale[:, None]
 
 
 def _singular_values(matrices: Floats) -> tuple[Floats, Floats]:
@@ -277,21 +273,53 @@ SURE, FINEST = 0.8, 1e-9
 
 _ORDERS = np.array(list(permutations(range(5))))
 
+# Names of the fronts, by their dominant component: u_n, u_t, phi_n, phi_t, w.
+FRONTS = ("extension", "in_plane_shear", "bending", "twisting", "transverse_shear")
+
 
 @frozen
-class Sheets:
-    """Solutions for a series of normals, in descending order of velocity."""
+class Fronts:
+    """The five fronts for a series of normals, in the order of :data:`FRONTS`.
+
+    As sheets they are in descending order of velocity.
+    """
 
     normal: Floats  # angles, (n,), degrees
-    velocity: Floats  # c_n, (n, 5), length/time
+    velocity: Floats  # normal velocity c_n, (n, 5), length/time
     slope: Floats  # its derivative with respect to the normal's angle (radian), (n, 5)
     curvature: Floats  # its second derivative, (n, 5)
+    share: Floats  # of u_n, u_t, phi_n, phi_t, w (last axis) in the kinetic energy, (n, 5, 5)
     # Modes as columns, (n, 5, 5), orthonormal after scaling by the inertia's Cholesky factor.
     mode: Floats
-    share: Floats  # of the components (last axis) in the kinetic energy of the modes, (n, 5, 5)
+
+    @property
+    def ray(self) -> Floats:
+        """Ray velocity of equation 2-84, (n, 5, 2): x and y, length/time."""
+        cos, sin = (part[:, None] for part in trigonometry(self.normal))
+        c, s = self.velocity, self.slope
+        return np.stack([c * cos - s * sin, c * sin + s * cos], axis=-1)
+
+    @property
+    def ray_angle(self) -> Floats:
+        """Direction of the rays, (n, 5), degrees in (-180, 180]."""
+        ray = self.ray
+        angle = np.rad2deg(np.arctan2(ray[..., 1], ray[..., 0]))
+        return np.asarray(np.where(angle <= -180.0 + 1e-9, angle + 360.0, angle))
+
+    def positions(self, time: float, radius: float) -> Floats:
+        """Positions, (n, 5, 2), of fronts that start as a circle, equations 2-85 to 2-87.
+
+        The report's radius of the circle (length) is the laminate's thickness.
+        """
+        start = radius * np.stack(trigonometry(self.normal), axis=-1)
+        return np.asarray(start[:, None] + time * self.ray)
+
+    def growth(self, time: float, radius: float) -> Floats:
+        """Length of the front per radian of the normal, (n, 5); zero at a cusp, then negative."""
+        return radius + time * (self.velocity + self.curvature)
 
 
-def sheets(medium: Medium, normal: Floats) -> Sheets:
+def sheets(medium: Medium, normal: Floats) -> Fronts:
     """Solve L(n) a = c_n^2 M a, with derivatives by perturbation, for normals in degrees, (n,)."""
     with np.errstate(all="ignore"):
         root = np.linalg.inv(np.linalg.cholesky(medium.inertia))
@@ -310,7 +338,7 @@ def sheets(medium: Medium, normal: Floats) -> Sheets:
         if not np.isfinite(curvature).all():
             raise StudyError(BEYOND)
     share = shares(medium.inertia, root.T @ basis)
-    return Sheets(normal, velocity, slope, curvature, basis, share)
+    return Fronts(normal, velocity, slope, curvature, share, basis)
 
 
 def match_modes(before: Floats, after: Floats) -> tuple[Indices, Floats]:
@@ -331,27 +359,17 @@ def track_branch(medium: Medium, first: float, last: float) -> Indices:
     Sheets that approach each other without crossing exchange their modes within a small angle;
     sheets that cross keep them.
     """
-    before, after = sheets(medium, np.array([first, last])).mode
-    place, likeness = match_modes(before[None], after[None])
-    found: Indices = place[0]
-    if likeness[0] <= SURE and last - first >= FINEST:
+    mode = sheets(medium, np.array([first, last])).mode
+    (found,), (likeness,) = match_modes(mode[:1], mode[1:])
+    if likeness <= SURE and last - first >= FINEST:
         middle = (first + last) / 2.0
         found = track_branch(medium, middle, last)[track_branch(medium, first, middle)]
-    return found
+    return np.asarray(found)
 
 
-def assigned(share: Floats) -> Indices:
-    """Assign a mode to each component, (5,), so that the sum of the shares is largest.
-
-    The components are the columns of `share`, the modes its rows.
-    """
-    scores = share[_ORDERS, np.arange(5)].sum(axis=1)
-    return np.asarray(_ORDERS[best(scores[None])[0]])
-
-
-def _stiffness(medium: Medium, normal: Floats) -> tuple[Floats, Floats, Floats]:
-    """L(n) and its first and second derivative with respect to the angle, each (n, 5, 5)."""
-    both = [np.zeros((len(normal), 6, 4)) for _ in range(3)]
+def _stiffness(medium: Medium, normal: Floats) -> Floats:
+    """L(n) and its first and second derivative with respect to the angle, (3, n, 5, 5)."""
+    both = np.zeros((3, len(normal), 6, 4))
     for matrix, part in zip(both, gradients(normal), strict=True):
         matrix[:, :3, :2] = matrix[:, 3:, 2:] = part
     strain, first, second = both
@@ -362,17 +380,12 @@ def _stiffness(medium: Medium, normal: Floats) -> tuple[Floats, Floats, Floats]:
 
     shear = in_normal_axes(medium.laminate.shear, normal)
     nn, nt, tt = shear[:, 0, 0], shear[:, 0, 1], shear[:, 1, 1]
-    found = []
-    for plane, transverse in (
-        (product(strain, strain), nn),
-        (2.0 * product(strain, first), 2.0 * nt),
-        (2.0 * product(strain, second) + 2.0 * product(first, first), 2.0 * (tt - nn)),
-    ):
-        matrix = np.zeros((len(normal), 5, 5))
-        matrix[:, :4, :4] = plane
-        matrix[:, 4, 4] = transverse
-        found.append(matrix)
-    return found[0], found[1], found[2]
+    found = np.zeros((3, len(normal), 5, 5))
+    found[0, :, :4, :4] = product(strain, strain)
+    found[1, :, :4, :4] = 2.0 * product(strain, first)
+    found[2, :, :4, :4] = 2.0 * product(strain, second) + 2.0 * product(first, first)
+    found[:, :, 4, 4] = nn, 2.0 * nt, 2.0 * (tt - nn)
+    return found
 
 
 def _solved(operator: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
@@ -392,10 +405,8 @@ def _solved(operator: Floats, first: Floats, second: Floats) -> tuple[Floats, Fl
             basis[row] = _kept_apart(square[row], basis[row], part[1:, row], limit[row])
         values[:, block], vectors[:, block, block] = square, basis
     order = np.argsort(-values, axis=1, kind="stable")
-    return (
-        np.take_along_axis(values, order, axis=1),
-        np.take_along_axis(vectors, order[:, None], axis=2),
-    )
+    values = np.take_along_axis(values, order, axis=1)
+    return values, np.take_along_axis(vectors, order[:, None], axis=2)
 
 
 def _kept_apart(values: Floats, vectors: Floats, derivatives: Floats, limit: float) -> Floats:
@@ -442,47 +453,7 @@ def _split(basis: Floats, operators: Sequence[Floats], limit: float) -> list[Flo
 # angle, computed by perturbation of the eigenvalue problem: with the slowness p = n/c_n, equation
 # 2-84 is the ray velocity V = c_n n + c_n' t, and V' = (c_n + c_n'') t.
 
-# Names of the fronts, by their dominant component: u_n, u_t, phi_n, phi_t, w.
-FRONTS = ("extension", "in_plane_shear", "bending", "twisting", "transverse_shear")
-
 STEPS = 10  # steps per degree for tracking sheets and searching cusps
-
-
-@frozen
-class Fronts:
-    """The five fronts for a series of normals, in the order of :data:`FRONTS`."""
-
-    normal: Floats  # angles, (n,), degrees
-    velocity: Floats  # normal velocity c_n, (n, 5), length/time
-    slope: Floats  # its derivative with respect to the normal's angle (radian), (n, 5)
-    curvature: Floats  # its second derivative, (n, 5)
-    share: Floats  # of u_n, u_t, phi_n, phi_t, w (last axis) in the kinetic energy, (n, 5, 5)
-
-    @property
-    def ray(self) -> Floats:
-        """Ray velocity of equation 2-84, (n, 5, 2): x and y, length/time."""
-        cos, sin = (part[:, None] for part in trigonometry(self.normal))
-        c, s = self.velocity, self.slope
-        return np.stack([c * cos - s * sin, c * sin + s * cos], axis=-1)
-
-    @property
-    def ray_angle(self) -> Floats:
-        """Direction of the rays, (n, 5), degrees in (-180, 180]."""
-        ray = self.ray
-        angle = np.rad2deg(np.arctan2(ray[..., 1], ray[..., 0]))
-        return np.asarray(np.where(angle <= -180.0 + 1e-9, angle + 360.0, angle))
-
-    def positions(self, time: float, radius: float) -> Floats:
-        """Positions, (n, 5, 2), of fronts that start as a circle, equations 2-85 to 2-87.
-
-        The report's radius of the circle (length) is the laminate's thickness.
-        """
-        start = radius * np.stack(trigonometry(self.normal), axis=-1)
-        return np.asarray(start[:, None] + time * self.ray)
-
-    def growth(self, time: float, radius: float) -> Floats:
-        """Length of the front per radian of the normal, (n, 5); zero at a cusp, then negative."""
-        return radius + time * (self.velocity + self.curvature)
 
 
 @frozen
@@ -520,7 +491,9 @@ class WaveSurfaces:
         mean = np.take_along_axis(around.velocity, place, axis=1).mean(axis=0)
         place = place[:, np.argsort(-mean, kind="stable")]
         share = np.take_along_axis(around.share, place[:, :, None], axis=1).mean(axis=0)
-        self._place = place[:, assigned(share)]
+        # To each name the mode that makes the sum of the shares largest.
+        scores = share[_ORDERS, np.arange(5)].sum(axis=1)
+        self._place = place[:, _ORDERS[best(scores[None])[0]]]
 
     def fronts(self, normals: ArrayLike) -> Fronts:
         """The five fronts at normals, (n,), in degrees."""
@@ -532,12 +505,12 @@ class WaveSurfaces:
         # In close steps the velocities identify the sheets, not the modes.
         step = np.minimum(turn.astype(np.intp), 360 * STEPS - 1)
         place = np.where(self._close[step, None], self._place[step], place)
-        velocity, slope, curvature = (
-            np.take_along_axis(values, place, axis=1)
-            for values in (found.velocity, found.slope, found.curvature)
-        )
-        share = np.take_along_axis(found.share, place[:, :, None], axis=1)
-        return Fronts(found.normal, velocity, slope, curvature, share)
+        rows = np.arange(len(place))[:, None]
+        return Fronts(
+            found.normal, found.velocity[rows, place], found.slope[rows, place],
+            found.curvature[rows, place], found.share[rows, place],
+            np.take_along_axis(found.mode, place[:, None], axis=2),
+        )  # fmt: skip
 
     def cusps(self, time: float, radius: float) -> list[Cusp]:
         """Cusps of the fronts that start as a circle, by mode, then by the normal's angle.

@@ -100,19 +100,16 @@ def line(peaks: Floats, permanents: Floats, covariance: Floats) -> Line | None:
 
     The covariance is that of all peaks alpha_m, then all permanent indentations alpha_0.
     """
-    covariance = covariance + np.eye(len(covariance)) * (ROUNDING * peaks.max()) ** 2
     order = np.argsort(peaks)
-    best: tuple[float, Line] | None = None
+    fits: list[tuple[float, Line]] = []
     for count in range(len(peaks) - 1):
-        elastic, beyond = order[:count], order[count:]
-        found = _split(peaks, permanents, covariance, elastic)
+        found = _split(peaks, permanents, covariance, order[:count])
         if found is None:
             continue
-        chi, candidate = found
-        between = not count or peaks[elastic[-1]] <= candidate.alpha_p.value < peaks[beyond[0]]
-        if between and (best is None or chi < best[0]):
-            best = chi, candidate
-    return None if best is None else best[1]
+        start = found[1].alpha_p.value
+        if not count or peaks[order[count - 1]] <= start < peaks[order[count]]:
+            fits.append(found)
+    return min(fits, key=lambda fit: fit[0])[1] if fits else None
 
 
 def _split(
@@ -169,7 +166,6 @@ def critical(peaks: Floats, permanents: Floats, covariance: Floats) -> Critical:
     Parameters are those of :func:`line`.  A cycle below alpha_cr has no permanent indentation and
     only bounds alpha_cr: such cycles are excluded if there are others.
     """
-    covariance = covariance + np.eye(len(covariance)) * (ROUNDING * peaks.max()) ** 2
     own = (peaks - permanents) ** ACR_POWER / peaks**LOADING_POWER
     by_peak = own * (ACR_POWER / (peaks - permanents) - LOADING_POWER / peaks)
     by_permanent = -own * ACR_POWER / (peaks - permanents)
@@ -262,6 +258,8 @@ def fit(
     peaks = [at.corners[n] for n in division.peaks]
     places = peaks + at.permanents
     covariance = solution.covariance[np.ix_(places, places)]
+    if places:
+        covariance = covariance + np.eye(len(places)) * (ROUNDING * p[peaks].max()) ** 2
     found = p[peaks], p[at.permanents], covariance
     cycles = tuple(_cycle(solution, n) for n in range(len(peaks)))
     straight = line(*found) if not acr and len(cycles) > 1 else None
@@ -275,7 +273,7 @@ def fit(
         cycles=cycles,
         line=straight,
         critical=critical(*found) if acr and cycles else None,
-        r_squared={**of_curves, "permanent": _explained(straight, found[0], found[1])},
+        r_squared={**of_curves, "permanent": _explained(straight, *found[:2])},
         scatter=float(np.sqrt(np.mean((fitted - measured) ** 2))),
         solution=solution,
     )
@@ -395,9 +393,8 @@ def _format(estimate: Estimate | None) -> str:
     """Format a value and its error."""
     if estimate is None:
         return "-"
-    if not estimate.error:
-        return f"{estimate.value:.5g}"
-    return f"{estimate.value:.5g} ± {estimate.error:.2g}"
+    error = f" ± {estimate.error:.2g}" if estimate.error else ""
+    return f"{estimate.value:.5g}{error}"
 
 
 def _share(value: float | None) -> str:
@@ -432,13 +429,10 @@ def lines(fit: Fit) -> list[str]:
 
 def _table(cycles: tuple[Cycle, ...]) -> list[str]:
     rows: list[tuple[str, ...]] = [("cycle", "alpha_m", "alpha_0", "k_1", "k_1 of the reloading")]
-    rows += [
-        (str(n), *map(_format, (c.alpha_m, c.alpha_0, c.k_1, c.k_1_measured)))
-        for n, c in enumerate(cycles, start=1)
-    ]
-    if all(c.k_1_measured is None for c in cycles):
-        rows = [row[:-1] for row in rows]
-    return aligned(rows)
+    for n, c in enumerate(cycles, start=1):
+        rows.append((str(n), *map(_format, (c.alpha_m, c.alpha_0, c.k_1, c.k_1_measured))))
+    width = 4 if all(c.k_1_measured is None for c in cycles) else 5
+    return aligned([row[:width] for row in rows])
 
 
 def plain(fit: Fit) -> dict[str, Any]:

@@ -67,8 +67,7 @@ def smoothed(indentation: Floats) -> Path:
     step = float(np.abs(np.diff(rough)).sum()) / (n - 1)
     if noise <= NEGLIGIBLE * step:
         return Path(indentation, 0.0, 0)
-    reach = max(1, round((4.0 * noise / step) ** (2.0 / 3.0) / 2.0))
-    reach = min(reach, n // 50 + 1)
+    reach = min(max(1, round((4.0 * noise / step) ** (2.0 / 3.0) / 2.0)), n // 50 + 1)
     return Path(_moving_mean(indentation, reach), noise / math.sqrt(2 * reach + 1), reach)
 
 
@@ -140,9 +139,10 @@ class Division:
         """Corners that are peaks, one per cycle."""
         return [n for n, corner in enumerate(self.corners) if corner.is_peak]
 
-    def rows(self, kind: str) -> Ints:
-        """Return the points of all stretches of a kind."""
-        parts = [s.rows for s in self.stretches if s.kind == kind]
+    def rows(self, kind: str, cycle: int | None = None) -> Ints:
+        """Return the points of all stretches of a kind, or of those of a cycle."""
+        own = [s for s in self.stretches if s.kind == kind]
+        parts = [s.rows for s in own if cycle is None or s.cycle == cycle]
         return np.concatenate([np.empty(0, dtype=np.int64), *parts])
 
 
@@ -308,8 +308,7 @@ class Curves:
             return np.asarray(power_curve(p[at.K], 0.0, 1.0, LOADING_POWER, a))
         if s.kind == RISING:
             return self._rising(p, number, s.cycle, a)
-        corner = self.division.corners[s.begin]
-        top = p[at.corners[s.begin]]
+        corner, top = self.division.corners[s.begin], p[at.corners[s.begin]]
         if corner.is_peak:
             begin = self.peak_force(p, s.cycle)
         else:
@@ -326,11 +325,8 @@ class Curves:
 
     def numbers(self, *kinds: str) -> list[int]:
         """Return the numbers of the stretches of some kinds with enough points."""
-        return [
-            n
-            for n, s in enumerate(self.division.stretches)
-            if s.kind in kinds and (s.kind != RISING or len(s.rows) >= FEWEST)
-        ]
+        own = [(n, s) for n, s in enumerate(self.division.stretches) if s.kind in kinds]
+        return [n for n, s in own if s.kind != RISING or len(s.rows) >= FEWEST]
 
     def of(self, p: Floats, *kinds: str) -> tuple[Floats, Floats]:
         """Return fitted and measured forces of the stretches of some kinds."""
@@ -350,8 +346,7 @@ def scaled(division: Division, indentation: Floats, force: Floats) -> Curves:
     if np.count_nonzero(curves.a[loading] > 0.0) < FEWEST:
         raise StudyError(f"the first loading has fewer than {FEWEST} points")
     for cycle in range(len(division.peaks)):
-        falls = [s for s in division.stretches if s.kind == FALLING and s.cycle == cycle]
-        if sum(len(s.rows) for s in falls) < FEWEST:
+        if len(division.rows(FALLING, cycle)) < FEWEST:
             raise StudyError(f"cycle {cycle + 1} has fewer than {FEWEST} points of unloading")
     return curves
 
@@ -391,12 +386,9 @@ def solve(curves: Curves, q: float | None = None) -> Solution:
     origin below the turn.
     """
     solution = _held_or_not(curves, q)
-    errors = np.sqrt(np.diag(solution.covariance))
-    tied = frozenset(
-        n
-        for n, place in curves.layout.origins.items()
-        if solution.values[place] - SURE * errors[place] > curves.division.stretches[n].turn
-    )
+    lowest = solution.values - SURE * np.sqrt(np.diag(solution.covariance))
+    turns = {n: curves.division.stretches[n].turn for n in curves.layout.origins}
+    tied = frozenset(n for n, at in curves.layout.origins.items() if lowest[at] > turns[n])
     if not tied:
         return solution
     return _held_or_not(replace(curves, layout=layout_of(curves.division, tied)), q)
@@ -407,12 +399,8 @@ def _held_or_not(curves: Curves, q: float | None) -> Solution:
     held: frozenset[int] = frozenset()
     while True:
         solution = _solve(curves, q, held)
-        errors = np.sqrt(np.diag(solution.covariance))
-        vague = {
-            n
-            for n, place in enumerate(curves.layout.corners)
-            if not errors[place] < VAGUE * solution.values[place]
-        }
+        known = np.sqrt(np.diag(solution.covariance)) < VAGUE * solution.values
+        vague = {n for n, place in enumerate(curves.layout.corners) if not known[place]}
         if not vague:
             return solution
         held |= vague
@@ -462,14 +450,12 @@ def _start(curves: Curves, q: float | None) -> tuple[Floats, Floats, Floats]:
     def origin(
         place: int, rows: Ints, cycle: int, power: float, limits: tuple[float, float]
     ) -> None:
-        peak = p[at.corners[division.peaks[cycle]]]
-        low[place], high[place] = limits[0] * peak, limits[1] * peak
+        low[place], high[place] = np.array(limits) * p[at.corners[division.peaks[cycle]]]
         guess = _origin(curves.a[rows], curves.f[rows], power)
         p[place] = min(max(guess, 0.9 * low[place]), 0.9 * high[place])
 
     for cycle, place in enumerate(at.permanents):
-        falls = [s.rows for s in division.stretches if s.kind == FALLING and s.cycle == cycle]
-        origin(place, np.concatenate(falls), cycle, p[at.Q], LIMITS_PERMANENT)
+        origin(place, division.rows(FALLING, cycle), cycle, p[at.Q], LIMITS_PERMANENT)
     for number, place in at.origins.items():
         s = division.stretches[number]
         origin(place, s.rows, s.cycle, LOADING_POWER, LIMITS_ORIGIN)

@@ -65,9 +65,8 @@ class Filter:
 
     def __call__(self, time: Floats, values: Floats) -> Floats:
         """Filter values, (rows,) or (rows, columns), at increasing times."""
-        columns = values.reshape(len(time), -1)
         kinds = {FIRST_ORDER: self._first_order, MOVING_AVERAGE: self._moving_average}
-        apply = kinds.get(self.kind, self._cfc)
+        apply, columns = kinds.get(self.kind, self._cfc), values.reshape(len(time), -1)
         filtered = np.column_stack([apply(time, column) for column in columns.T])
         return np.asarray(filtered.reshape(values.shape))
 
@@ -234,7 +233,6 @@ def calibrate(
     Raises StudyError if there are fewer than three points, V_a or V_F is constant, or a sum
     overflows.
     """
-    parameters = 1 if through_origin else 2
     if len(v_f) < 3:
         raise StudyError(f"at least 3 points are required; there are {len(v_f)}")
     for name, values in (("V_a", v_a), ("V_F", v_f)):
@@ -246,20 +244,16 @@ def calibrate(
         xx, yy = float(x @ x), float(y @ y)
         slope = float(x @ y) / xx
         rest = y - slope * x
-        variance = float(rest @ rest) / (len(x) - parameters)
+        variance = float(rest @ rest) / (len(x) - (1 if through_origin else 2))
         slope_error = float(np.sqrt(variance / xx))
         share = 0.0 if through_origin else 1.0 / len(x) + middle_a**2 / xx
         factor = c_a / mass
     found = Calibration(
-        points=len(x),
-        slope=slope,
-        slope_error=slope_error,
-        offset=float(middle_f - slope * middle_a),
-        offset_error=float(np.sqrt(variance * share)),
+        len(x), slope, slope_error,
+        offset=float(middle_f - slope * middle_a), offset_error=float(np.sqrt(variance * share)),
         r_squared=1.0 - float(rest @ rest) / yy,
-        sensitivity=factor * slope,
-        sensitivity_error=abs(factor) * slope_error,
-    )
+        sensitivity=factor * slope, sensitivity_error=abs(factor) * slope_error,
+    )  # fmt: skip
     if not np.isfinite(list(vars(found).values())).all():
         raise StudyError("the sums overflow: check the numbers and their units")
     return found

@@ -39,29 +39,26 @@ def gauss_pulse(peak: float, tau: float, b: float) -> Pulse:
     It starts at t = 0 with a jump of F0 exp(-tau^2 / 4 b^2), and has fallen to 1/500 of its peak at
     the end of the test.
     """
-
-    def force(time: Floats) -> Floats:
-        return np.asarray(peak * np.exp(-(((time - tau) / (2.0 * b)) ** 2)))
-
-    return Pulse(force, max(0.0, tau) + 10.0 * b)
+    return Pulse(
+        lambda time: np.asarray(peak * np.exp(-(((time - tau) / (2.0 * b)) ** 2))),
+        max(0.0, tau) + 10.0 * b,
+    )
 
 
 def sine_pulse(peak: float, b: float) -> Pulse:
     """Half wave F0 sin(pi t / b), equation 4-6; the rod rings for b/2 after it."""
-
-    def force(time: Floats) -> Floats:
-        return np.where((time >= 0.0) & (time < b), peak * np.sin(np.pi * time / b), 0.0)
-
-    return Pulse(force, 1.5 * b)
+    return Pulse(
+        lambda time: np.where((time >= 0.0) & (time < b), peak * np.sin(np.pi * time / b), 0.0),
+        1.5 * b,
+    )
 
 
 def table_pulse(times: Floats, forces: Floats) -> Pulse:
     """Table of forces, linear between rows, and zero before the first and after the last."""
-
-    def force(time: Floats) -> Floats:
-        return np.asarray(np.interp(time, times, forces, left=0.0, right=0.0))
-
-    return Pulse(force, float(times[-1]))
+    return Pulse(
+        lambda time: np.asarray(np.interp(time, times, forces, left=0.0, right=0.0)),
+        float(times[-1]),
+    )
 
 
 def pulse_of(text: str) -> Pulse:
@@ -182,62 +179,45 @@ def _march(
     """Return forces at the stations and accelerations, (rows, stations + 3)."""
     m = rod.mass()
     step = STEPS[integrator](rod.stiffness(), m, dt)
-    load = np.zeros(step.n)
+    at_rest, load = np.zeros((2, step.n))
     load[0] = applied[0]
-    at_rest = np.zeros(step.n)
     start = np.linalg.solve(m if m.ndim == 2 else np.diag(m), load)
     state = RodState.of(at_rest, at_rest, np.asarray(start, dtype=np.float64))
     strain = np.array([force_row(rod, x) for x in stations]).reshape(-1, step.n)
     middle = np.array([displacement_row(rod, part * rod.length) for part in (0.0, 0.5, 1.0)])
     history = np.empty((len(applied), len(strain) + len(middle)))
-
-    def record(row: int) -> None:
+    forces = (1.0 - step.theta) * applied[:-1] + step.theta * applied[1:]
+    for row, force in enumerate([0.0, *forces.tolist()]):
+        if row:
+            state = step.advance(state, force)
         history[row, : len(strain)] = strain @ state.deformation
         history[row, len(strain) :] = middle @ state.acceleration
-
-    record(0)
-    forces = (1.0 - step.theta) * applied[:-1] + step.theta * applied[1:]
-    for row, force in enumerate(forces.tolist(), start=1):
-        state = step.advance(state, force)
-        record(row)
     return history
 
 
-def _place(rod: Rod, x: float) -> tuple[int, float]:
-    """Return the element at x (the farther of two) and the local coordinate, from 0 to 1."""
+def _place(rod: Rod, x: float) -> tuple[int, float, float, Floats]:
+    """Element at x (the farther of two), local coordinate, from 0 to 1, length, and a zero row."""
     along = x / rod.length * rod.elements
     node = round(along)
     if abs(along - node) < 1e-9 * rod.elements:
         along = float(node)
     element = min(int(along), rod.elements - 1)
-    return element, along - element
+    return element, along - element, rod.element_length, np.zeros(2 * rod.elements + 2)
 
 
 def force_row(rod: Rod, x: float) -> Floats:
     """Return the row (n,) that maps the dofs to the force at x, -E A du/dx."""
-    element, s = _place(rod, x)
-    L = rod.length / rod.elements
-    row = np.zeros(2 * rod.elements + 2)
-    row[2 * element : 2 * element + 4] = [
-        6.0 * (s**2 - s) / L,
-        1.0 - 4.0 * s + 3.0 * s**2,
-        6.0 * (s - s**2) / L,
-        3.0 * s**2 - 2.0 * s,
-    ]
+    element, s, L, row = _place(rod, x)
+    slopes = 6.0 * (s**2 - s) / L, 1.0 - 4.0 * s + 3.0 * s**2, 6.0 * (s - s**2) / L
+    row[2 * element : 2 * element + 4] = *slopes, 3.0 * s**2 - 2.0 * s
     return -rod.modulus * float(rod.areas[element]) * row
 
 
 def displacement_row(rod: Rod, x: float) -> Floats:
     """Return the row (n,) that maps the dofs to the displacement at x, equation 4-19."""
-    element, s = _place(rod, x)
-    L = rod.length / rod.elements
-    row = np.zeros(2 * rod.elements + 2)
-    row[2 * element : 2 * element + 4] = [
-        (1.0 - s) ** 2 * (1.0 + 2.0 * s),
-        L * s * (1.0 - s) ** 2,
-        s**2 * (3.0 - 2.0 * s),
-        L * s**2 * (s - 1.0),
-    ]
+    element, s, L, row = _place(rod, x)
+    begin = (1.0 - s) ** 2 * (1.0 + 2.0 * s), L * s * (1.0 - s) ** 2
+    row[2 * element : 2 * element + 4] = *begin, s**2 * (3.0 - 2.0 * s), L * s**2 * (s - 1.0)
     return row
 
 
