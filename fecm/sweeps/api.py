@@ -82,17 +82,11 @@ def _check_sendable(spawned: bool, **functions: object) -> None:
 
 
 def carry_out(
-    problem: Problem,
-    made: Plan,
-    *,
-    workers: int = 1,
-    scheduler: object = None,
-    executor: Executor | None = None,
-    parts: schedule.PartialResults | None = None,
-    done: schedule.Done = lambda task, outcome: None,
-    idle: schedule.Idle = lambda: None,
+    problem: Problem, made: Plan, *, workers: int = 1, scheduler: object = None,
+    executor: Executor | None = None, parts: schedule.PartialResults | None = None,
+    done: schedule.Done = lambda task, outcome: None, idle: schedule.Idle = lambda: None,
     note: Callable[[str], None] = warn,
-) -> SweepResult:
+) -> SweepResult:  # fmt: skip
     """Run the tasks of a plan in this process, on an executor, a scheduler or several workers.
 
     Tasks that `parts` has stored are not run again; with it, the result has no forces.  `done` is
@@ -103,8 +97,10 @@ def carry_out(
     outcomes: list[Outcome] = []
     left: list[Task] = []
 
-    def take(task: Task, outcome: Outcome) -> None:
+    def keep(task: Task, outcome: Outcome, *, new: bool = True) -> None:
         if parts is not None:
+            if new and not schedule.lost(outcome):
+                parts.put(task, outcome)
             outcome.force = None
         outcomes.append(outcome)
         done(task, outcome)
@@ -118,13 +114,7 @@ def carry_out(
         if before is None:
             left.append(task)
         else:
-            take(task, before)
-
-    def keep(task: Task, outcome: Outcome) -> None:
-        if parts is not None and not schedule.lost(outcome):
-            parts.put(task, outcome)
-        take(task, outcome)
-
+            keep(task, before, new=False)
     if executor is not None:
         schedule.on_executor(left, executor, keep, idle)
     elif scheduler is not None:
@@ -277,10 +267,8 @@ def sweep(
         if not (function is None or callable(function)):
             raise CasesError(f"{name} is {function!r}, not a function")
     free = build is not None
-    if cases is None:
-        made = inputs.combined({} if vary is None else vary, free=free)
-    else:
-        made = inputs.checked(cases, free=free)
+    grid = {} if vary is None else vary
+    made = inputs.combined(grid, free=free) if cases is None else inputs.checked(cases, free=free)
     drawn = None
     if random is not None:
         laws = {name: inputs.parse_law(name, law, free=free) for name, law in random.items()}
@@ -317,17 +305,16 @@ def sweep(
     here = workers if executor is None else getattr(executor, "_max_workers", 0)
     plans.check_memory(problem, planned, 0 if scheduler is not None else here)
     finished = 0
-    first: tuple[int, list[str]] | None = None
+    returned: dict[str, int] = {}  # the first case with some names
 
     def done(task: Task, outcome: Outcome) -> None:
-        nonlocal finished, first
+        nonlocal finished
         if own is not None and outcome.status[0] in RUN:
-            case, names = task.numbers[0], sorted(outcome.measured)
-            first = first or (case, names)
-            if names != first[1]:
-                found = f"{', '.join(names)} for case {case}, and {', '.join(first[1])}"
+            returned.setdefault(", ".join(sorted(outcome.measured)), task.numbers[0])
+            if len(returned) > 1:
+                first, other = (f"{names} for case {case}" for names, case in returned.items())
                 hint = "return the same names, NaN where there is no value"
-                raise CasesError(f"measure returns {found} for case {first[0]}; {hint}")
+                raise CasesError(f"measure returns {other}, and {first}; {hint}")
         finished += len(task.numbers)
         if progress is not None:
             progress(finished, len(made))

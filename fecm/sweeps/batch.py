@@ -231,8 +231,7 @@ class Plate(NamedTuple):
 
 def _plate(checked: Problem, extra: Sequence[str]) -> Plate:
     setup = build_model(checked)
-    if setup.impact is None:
-        raise ValueError("the deck has no impact")
+    assert setup.impact is not None  # the program has impact steps
     load, steps = setup.impact.contact.load, checked.work.steps
     dt = next(macro.value for macro in flat(checked.program) if macro.word == "DT")
     dt = dt or taken_time_step(checked.critical_time_step)
@@ -247,11 +246,7 @@ def _plate(checked: Problem, extra: Sequence[str]) -> Plate:
 def _together(
     checked: Problem, plate: Plate, extra: Sequence[str], history: bool, decks: Decks, judged: bool
 ) -> Outcome:
-    """Run cases that share a plate by its response to a unit force.
-
-    The outcome has the contact forces if `history` is set.  Cases with doubtful energies are run in
-    full if they are judged.
-    """
+    """Run cases by the response of their plate; if judged, those with doubtful energies in full."""
     steps, dt, numbers = len(plate.response), plate.dt, list(decks)
     rods = [build_projectile(deck) for deck in decks.values()]
     # All rigid masses are one kind: a unit mass under the force over the mass.
@@ -298,7 +293,6 @@ def _known(largest: Floats, last: Floats, force: Floats) -> Floats:
 
 
 def _extra(extra: Sequence[str], result: Result) -> dict[str, NDArray[Any]]:
-    """Columns measured of a full run."""
     peaks: dict[str, Floats] = {}
     if plan.DEFLECTION in extra:
         peaks[plan.DEFLECTION] = result["history/plate_w"]
@@ -320,8 +314,7 @@ def _alone(
     """Run one case in full, without storing fields unless it is measured."""
     sink = MemorySink()
     try:
-        stored = checked if measure else plan.without_output(checked, extra)
-        simulation = simulate(stored, sink)
+        simulation = simulate(checked if measure else plan.without_output(checked, extra), sink)
     except (DivergenceError, ArithmeticError) as error:
         return Outcome.failed({number: str(error)})
     force, depth, times = (
@@ -344,14 +337,11 @@ def _alone(
     return outcome
 
 
-# Range of velocities relative to the deck's, and the last relative error.
-RANGE, ERROR = 100.0, 1e-6
+RANGE, ERROR = 100.0, 1e-6  # of velocities relative to the deck's, and the last relative error
 
 
 def search(
-    starts: Mapping[int, float],
-    force: float,
-    peaks: Callable[[list[tuple[int, float]]], Floats],
+    starts: Mapping[int, float], force: float, peaks: Callable[[list[tuple[int, float]]], Floats]
 ) -> dict[int, float | str]:
     """Find the lowest velocity of each case at which the contact force reaches a value.
 

@@ -23,9 +23,8 @@ from fecm.studies.tables import read_rows
 
 Value = float | int | str
 Case = dict[str, Value]
-# A limit of a quantity whose probability of exceedance is asked for: a number, or this.
-THRESHOLD = "threshold"
-Limit = tuple[str, float | str]
+THRESHOLD = "threshold"  # instead of a number: the delamination threshold
+Limit = tuple[str, float | str]  # of a quantity whose probability of exceedance is asked for
 
 # Names that change the projectile, its velocity or the contact law; where the force acts, which
 # needs another response of the plate; and the plate or its time steps.
@@ -40,8 +39,7 @@ LAMINATE = (
 PLATE = (*LOAD, *LAMINATE, "size", "support", "dt", "duration")
 NAMES = (*CONTACT, *PLATE)
 REFINE = "refine"  # factor of a refinement study, which varies nothing else
-# Of each of these names only one can vary.
-EXCLUDING = (
+EXCLUDING = (  # names of which only one can vary
     ("velocity", "energy"), ("k", "radius"), ("mass", "rod_mass", "rod_density"),
     ("at", "impact_node"), ("at", "x0"), ("at", "y0"),
 )  # fmt: skip
@@ -62,8 +60,7 @@ LAWS: dict[str, tuple[str, str, Callable[..., bool]]] = {
 DesignKind = Literal["lhs", "sobol", "mc"]
 DESIGNS: tuple[DesignKind, ...] = get_args(DesignKind)
 FEWEST = 16  # fewest draws
-# Unit samples are kept this far from 0 and 1: half the resolution of a Sobol' sequence.
-MARGIN = 2.0**-31
+MARGIN = 2.0**-31  # from unit samples to 0 and 1: half the resolution of a Sobol' sequence
 REMEDY = "lognormal, uniform and triangular can be kept to possible values"
 
 
@@ -242,7 +239,6 @@ def name_fault(name: object) -> str:
 
 
 def _given(name: str, value: Any, where: str, free: bool) -> Value:
-    """Validate a value given in Python."""
     if isinstance(value, np.generic):
         value = value.item()
     if free:
@@ -442,8 +438,7 @@ def random_cases(design: Design, varied: Sequence[Case]) -> list[Case]:
 
 def cost(cases: Sequence[Case], design: Design, *, shared: bool) -> str:
     """Say how many plates a random sweep needs, and which names cause them."""
-    more = "" if len(cases) == design.draws else f"{len(cases)} cases of "
-    given = f"{more}{design.draws} draws"
+    given = f"{'' if len(cases) == design.draws else f'{len(cases)} cases of '}{design.draws} draws"
     if not shared:
         return f"{given} are run in full, one by one"
     plates = len({frozenset(plate_values(case).items()) for case in cases})

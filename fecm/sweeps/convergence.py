@@ -114,8 +114,7 @@ class MeshError:
     refined_peak_force: float
     elements: int
     refined_elements: int
-    # Elements up to this distance from the load are bisected: a bending wave of the contact.
-    distance: float
+    distance: float  # of bisected elements from the load: a bending wave of the contact
 
     @property
     def change(self) -> float:

@@ -25,8 +25,7 @@ from fecm.sweeps.batch import Runs, runs_of
 from fecm.sweeps.plan import RUN, shares_plate
 from fecm.sweeps.vary import apply_case
 
-# Delay of the measurement: its time at which the approach of the projectile ends in a contact.
-DELAY = "delay"
+DELAY = "delay"  # measured time at which the approach of the projectile ends in a contact
 CARDS: dict[str, type[Impact | Indentation | Projectile]] = {
     **dict.fromkeys(("velocity", "energy"), Impact),
     **dict.fromkeys(("k", "alpha_p", "s_p", "q"), Indentation),
@@ -35,8 +34,7 @@ CARDS: dict[str, type[Impact | Indentation | Projectile]] = {
 FREE = (*CARDS, DELAY)
 STEP = 1e-3  # half of the step of central differences, in the scaled parameters
 BOUND = 1e3  # factor between the parameters of the deck and their bounds
-# Factor between measured and computed peak or duration beyond which a unit must be wrong.
-OFF = 20.0
+OFF = 20.0  # factor between measured and computed peak or duration: a unit must be wrong
 POINTS, TOP_POINTS = 10, 3  # fewest measured points, and fewest above half of the peak
 # Smallest singular value of the Jacobian with unit columns, and smallest column (rms over peak).
 SINGULAR, NO_EFFECT = 1e-3, 1e-6
@@ -44,8 +42,7 @@ SHARE = 0.1  # share of a parameter in a singular vector above which the vector 
 # A finding reports a larger correlation: of two parameters, and of neighbouring residuals where the
 # force exceeds a share of its peak.
 CORRELATED, COLOURED, FAINT = 0.99, 0.5, 1e-3
-# The fit ends with a step below this share of a standard error.
-SETTLED = 0.01
+SETTLED = 0.01  # share of a standard error: the fit ends with a step below it
 MOST_EVALUATIONS = 60
 
 
@@ -198,8 +195,7 @@ class _Model:
     def at(self, time: Floats, trials: Sequence[Mapping[str, float]]) -> Floats:
         """Forces at measured times, (times, trials)."""
         clock, forces = self.histories(trials)
-        shifts = [trial.get(DELAY, 0.0) for trial in trials]
-        columns = zip(shifts, forces.T, strict=True)
+        columns = zip((trial.get(DELAY, 0.0) for trial in trials), forces.T, strict=True)
         return np.column_stack([np.interp(time - d, clock, force) for d, force in columns])
 
 
@@ -234,8 +230,7 @@ def fit(
     start = {name: first if name == DELAY else _start(deck, name) for name in free}
     # A value is start exp(x), or start + size x; x is between low and high.
     depth = (own.max() / deck.require(Indentation).k) ** (2.0 / 3.0)
-    scales = [_scale(n, value, width, depth) for n, value in start.items()]
-    size, low, high = np.array(scales).T
+    size, low, high = np.array([_scale(n, v, width, depth) for n, v in start.items()]).T
     middle = np.array(list(start.values()))
     inside = np.abs(measured.time - start.get(DELAY, 0.0)) <= clock[-1] * (1.0 + 1e-9)
     time, force = measured.time[inside], measured.force[inside]
@@ -276,12 +271,10 @@ def fit(
 
 
 def _fitted(deck: Deck, values: Mapping[str, float]) -> Deck:
-    """The deck with these values."""
     return apply_case(deck, {name: value for name, value in values.items() if name != DELAY})
 
 
 def _start(deck: Deck, name: str) -> float:
-    """Value of a parameter in a deck."""
     rod = build_projectile(deck)
     if name == "mass":
         return rod.total_mass
@@ -382,7 +375,6 @@ def _listed(names: Sequence[str]) -> str:
 def _notes(
     found: Identification, measured: Measurement, active: Any, model: _Model
 ) -> Iterator[str]:
-    """Reasons to doubt fitted values."""
     if not found.converged:
         yield "the fit has not converged; start from better values in the deck"
     if out := len(measured.time) - len(found.time):
@@ -395,11 +387,8 @@ def _notes(
         text = f"{names[i]} and {names[j]} have the correlation {found.correlation[i, j]:.4f}"
         yield f"{text}: their values can hardly be told apart"
     e = found.residual
-    near = float(e[1:] @ e[:-1] / (e @ e)) if e.any() else 0.0
-    if near > COLOURED and found.share > FAINT:
-        text = "the model does not describe the measurement down to its noise"
-        text += ", and the standard errors are too small"
-        yield f"neighbouring residuals have the correlation {near:.2f}: {text}"
-    status = model.runs({0: found.deck}, True).status[0]
-    if status not in RUN:
+    if found.share > FAINT and (near := float(e[1:] @ e[:-1] / (e @ e))) > COLOURED:
+        text = "the model does not describe the measurement down to its noise, and the standard"
+        yield f"neighbouring residuals have the correlation {near:.2f}: {text} errors are too small"
+    if (status := model.runs({0: found.deck}, True).status[0]) not in RUN:
         yield f"the run of the fitted deck fails: {status}"

@@ -7,7 +7,7 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -32,13 +32,11 @@ from fecm.sweeps.vary import Clock, apply_case, check_deck, clock_of
 Build = Callable[[dict[str, Any]], Deck]
 Measure = Callable[[Result], Mapping[str, float]]
 TOGETHER = 2048  # cases advanced together
-# Bytes per step and case advanced together: above the measured value.
-ADVANCED = 34 if LIBRARY is None else 12
+ADVANCED = 34 if LIBRARY is None else 12  # bytes per step and case, above the measured value
 COUNT = 25  # velocities of the first round of a search
 # Names of columns that are measured on request.
 DEFLECTION, GAGES, FAILURE = MEASURES = ("max_deflection", "gages", "failure")
-# Numbers of cases, and their contact forces, (cases, steps).
-Forces = tuple[Sequence[int], Floats | None]
+Forces = tuple[Sequence[int], Floats | None]  # numbers of cases, and theirs, (cases, steps)
 RUN = FINE, STILL = "ok", "still in contact"  # status of a case whose run has ended
 ABOUT = ("status", "dt", "steps", "unsettled")  # columns that describe the run of a case
 
@@ -51,8 +49,7 @@ class Plan:
     cases: tuple[Case, ...]  # values of every case
     history: bool = False  # whether contact forces are stored
     clock: Clock | None = None  # None if the deck's time step applies to every plate
-    # Peak force whose velocity is searched in every case: a number, or ``"threshold"``.
-    until: float | str | None = None
+    until: float | str | None = None  # peak force whose velocity is searched, or "threshold"
     build: Build | None = None  # makes the deck of a case; `deck` is that of one of the cases
     measure: Measure | None = None  # computes more columns from the result of a case
     extra: tuple[str, ...] = ()  # more columns, of :data:`MEASURES`
@@ -91,16 +88,14 @@ def check_limits(limits: Sequence[Limit], known: Sequence[str], *, threshold: bo
 def plan(checked: Problem, cases: Sequence[Case], **options: Any) -> Plan:
     """Create the plan of a sweep; the options are fields of :class:`Plan`.
 
-    Raises CasesError if the deck has no impact, there are no cases, names exclude each other, or
-    the deck lacks what is searched or measured.
+    Raises CasesError if the deck has no impact, names exclude each other, or the deck lacks what is
+    searched or measured.
     """
     made = Plan(checked.deck, tuple(cases), **options)
     deck, until, extra = made.deck, made.until, made.extra
     words = {macro.word for macro in deck.macros}
     if "RODP" not in words:
         raise CasesError("the deck has no impact step (RODP); there is nothing to sweep")
-    if not cases:
-        raise CasesError("a sweep needs at least one case")
     if made.build is None:
         inputs.check_names(cases[0])
     if unknown := sorted({*extra} - {*MEASURES}):
@@ -126,12 +121,8 @@ def plan(checked: Problem, cases: Sequence[Case], **options: Any) -> Plan:
         if extra:
             known += [name for name, _ in made.limits if name in COLUMNS or name.startswith(GAGE)]
         check_limits(made.limits, [*known, *(LIMITED if limited else ())], threshold=limited)
-    same = {
-        *inputs.LOAD,
-        *inputs.CONTACT,
-        "duration",
-    }  # names of cases that keep the critical time step
-    own = made.build is None and "dt" not in cases[0] and not same.issuperset(cases[0])
+    keeping = {*inputs.LOAD, *inputs.CONTACT, "duration"}  # the critical time step
+    own = made.build is None and "dt" not in cases[0] and not keeping.issuperset(cases[0])
     chosen = tuple(name for name in MEASURES if name in extra)
     return replace(made, clock=clock_of(checked) if own else None, extra=chosen)
 
@@ -140,13 +131,9 @@ def shares_plate(checked: Problem) -> bool:
     """Whether a program has only impact steps of one size, and the plate no other loads."""
     words = [macro.word for macro in flat(checked.program)]
     sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
-    return (
-        "RODP" in words
-        and len(sizes) == 1
-        and words.index("DT") < words.index("RODP")
-        and not {"EXCD", "TANG", "FORM", "SOLV"}.intersection(words)
-        and not checked.mesh.forces.any()
-    )
+    if "RODP" not in words or len(sizes) != 1 or words.index("DT") > words.index("RODP"):
+        return False
+    return {"EXCD", "TANG", "FORM", "SOLV"}.isdisjoint(words) and not checked.mesh.forces.any()
 
 
 def _together(checked: Problem, made: Plan) -> int:
@@ -180,14 +167,12 @@ class Outcome:
     # ``"still in contact"``, or the reason for the failure; ``dt``, ``steps``; ``unsettled`` counts
     # the steps whose contact iteration did not converge.
     columns: dict[str, NDArray[Any]]
-    # (cases, steps) or None: contact force after every step.
-    force: Floats | None = field(default=None, repr=False)
+    force: Floats | None = None  # (cases, steps): contact force after every step
 
     @property
     def status(self) -> list[str]:
         """Status of each case."""
-        texts: list[str] = self.columns["status"].tolist()
-        return texts
+        return list(map(str, self.columns["status"]))
 
     @property
     def measured(self) -> list[str]:
@@ -283,8 +268,7 @@ def check_memory(checked: Problem, made: Plan, workers: int, *, streamed: bool =
     steps, cases = checked.work.steps, len(made.cases)
     at_once = min(workers, len(tasks(checked, made)))
     plate = checked if made.measure else without_output(checked, made.extra)
-    held = min(cases, TOGETHER) if streamed else cases
-    kept = KEPT * steps * held if made.history else 0
+    kept = KEPT * steps * (min(cases, TOGETHER) if streamed else cases) if made.history else 0
 
     def needed(exact: bool) -> int:
         if not at_once:

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 FEW = 0.01  # share of failed draws above which the results are doubtful
-# Most quantities and combinations that are printed, and the quantities in their order.
-PRINTED = 4
+PRINTED = 4  # most quantities, of these, and combinations that are printed
 MAIN = ("found_velocity", "found_energy", "peak_force", "max_indentation", "contact_time",
         "energy_absorbed")  # fmt: skip
 FORCE = "threshold_force"
@@ -194,7 +193,6 @@ def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
 def _index_lines(
     design: Design, name: str, found: Indices, place: tuple[int, ...]
 ) -> Iterator[str]:
-    """Table of the indices of a quantity."""
     width = max(12, *map(len, (name, *design.laws)))
     yield f"{name:{width}}{'first-order index (95 %)':>29}{'total index (95 %)':>29}"
     columns = [values[place].tolist() for values in found]
@@ -233,11 +231,8 @@ def attributes(random: RandomResult) -> dict[str, dict[str, Any]]:
         f"random/{name}": {"law": law.kind, "parameters": np.array(law.parameters)}
         for name, law in design.laws.items()
     }
-    texts = {name: {"description": text} for name, text in GROUPS.items()}
-    if not random.sensitivity:
-        del texts["sensitivity"]
-    if not len(random.exceedance.quantity):
-        del texts["exceedance"]
+    some = {"sensitivity": random.sensitivity, "exceedance": random.exceedance.quantity.size}
+    texts = {n: {"description": text} for n, text in GROUPS.items() if some.get(n, True)}
     return {**texts, "design": {**texts["design"], **about, "notes": random.notes}, **laws}
 
 
@@ -292,11 +287,8 @@ def random_of(
 
 
 QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
-# Resamples of the bootstrap, and counts of them in memory at once.
-RESAMPLES = 1000
-COUNTS = 2_000_000
-# Ends of a 95 % interval.
-ENDS = (0.025, 0.975)
+RESAMPLES, COUNTS = 1000, 2_000_000  # of the bootstrap, and counts of them in memory at once
+ENDS = (0.025, 0.975)  # of a 95 % interval
 Z = 1.959963984540054  # the standard normal distribution is 0.975 there
 ROUNDING = 1e-12  # variation relative to the largest value below which a quantity is constant
 
@@ -332,8 +324,7 @@ def indices(values: Floats, seed: int) -> Indices:
     d = rows - 2
     flat = values.reshape(m, -1)
     with np.errstate(invalid="ignore"):
-        size = np.abs(flat).max(axis=1)
-        varies = np.ptp(flat[:, : 2 * n], axis=1) > ROUNDING * size
+        varies = np.ptp(flat[:, : 2 * n], axis=1) > ROUNDING * np.abs(flat).max(axis=1)
     centred = values - values[:, :2].mean(axis=(1, 2), keepdims=True)
     f_a, f_b, f_ab = centred[:, :1], centred[:, 1:2], centred[:, 2:]
     # Means of these columns make the indices: those of f, f^2, and the products, (m, 2 + 2 d, n).

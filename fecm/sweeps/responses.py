@@ -33,10 +33,8 @@ BLOCK = 64  # steps of a block
 # on the rest of the next larger one by a matrix product, and so on; complete largest blocks act on
 # later ones by Fourier transforms.
 NEAR, FAR = 8, 256
-# Cases of a matrix product: all have the same size, so that no case depends on the others.
-TILE = 16
-# Multiplications of a matrix product small enough for BLAS to use one thread.
-SMALL = BLOCK**3
+TILE = 16  # cases of every matrix product, so that no case depends on the others
+SMALL = BLOCK**3  # multiplications of a matrix product small enough for BLAS to use one thread
 NO_FORCE = HystereticLaw(LinearPermanent(0.0, 0.0, 0.0, 1.0))
 
 
@@ -91,8 +89,7 @@ def largest_sums(response: Floats, force: Floats) -> tuple[Floats, Floats]:
 def _product(a: Floats, b: Floats) -> Floats:
     """Matrix product in pieces small enough for BLAS to use one thread."""
     columns = max(1, SMALL // a.size)
-    pieces = [a @ b[:, i : i + columns] for i in range(0, b.shape[1], columns)]
-    return np.hstack(pieces)
+    return np.hstack([a @ b[:, i : i + columns] for i in range(0, b.shape[1], columns)])
 
 
 class Convolution:
@@ -248,8 +245,7 @@ class TipSteps:
         )
 
 
-# Rows of the results of the kernel.
-FOUND = (
+FOUND = (  # rows of the results of the kernel
     "deepest", "indentation", "permanent", "highest", "w", "largest_ddw", "lost", "initial",
     "unconverged",
 )  # fmt: skip

@@ -118,8 +118,7 @@ STEPS = {
     "steps": ("number of steps of every case", ""),
     "unsettled_steps": ("steps whose contact iteration did not converge", ""),
 }
-# Groups of the file.
-GROUPS = {
+GROUPS = {  # of the file
     "cases": "values of what varies",
     "summary": "what came out of every case",
     "history": "time steps of every case, and its contact force if asked for",
@@ -168,8 +167,7 @@ class SweepResult:
         return len(self.dt)
 
     def __repr__(self) -> str:
-        varied = ", ".join(self.cases)
-        return f"<fecm sweep {self.title!r} over {varied}: {verdict(self)}>"
+        return f"<fecm sweep {self.title!r} over {', '.join(self.cases)}: {verdict(self)}>"
 
     def _repr_html_(self) -> str:
         """Table of the summary, for notebooks."""

@@ -3,9 +3,8 @@
 Tasks are independent, and their outcomes do not depend on where they run.  Each outcome is reported
 as soon as it is available, so that an interrupted sweep loses only the tasks in progress.
 
-Partial results are in a folder beside the result, one file per task.  It is written under a
-temporary name, synchronised and renamed, so that an interrupted sweep leaves only complete files.
-A checksum at its end reveals damage.
+Partial results are in a folder beside the result: one file per task, which is only there when it
+is complete, with a checksum at its end that reveals damage.
 """
 
 from __future__ import annotations
@@ -35,13 +34,10 @@ from fecm.sweeps.batch import run, told
 from fecm.sweeps.plan import Forces, Outcome, Task
 
 Done = Callable[[Task, Outcome], None]
-# Called regularly while workers run, to handle signals.
-Idle = Callable[[], None]
-# Deaths of workers without a finished task after which the remaining tasks count as lost.
-DEATHS = 3
+Idle = Callable[[], None]  # called regularly while workers run, to handle signals
+DEATHS = 3  # of workers without a finished task, after which the remaining tasks count as lost
 LOOK = 0.5  # polling interval in seconds
-# Timeout for the scheduler.
-PATIENCE = "5s"
+PATIENCE = "5s"  # timeout for the scheduler
 LOST = "lost with its worker"
 
 
@@ -238,8 +234,7 @@ class PartialResults:
             if arrays["numbers"].tolist() != list(task.numbers):
                 raise DamagedPartError(f"{path} holds other cases")
             columns = dict(arrays)
-            force = columns.pop("force", None)
-            return Outcome(columns.pop("numbers").tolist(), columns, force)
+        return Outcome(columns.pop("numbers").tolist(), columns, columns.pop("force", None))
 
     def put(self, task: Task, outcome: Outcome) -> None:
         """Store the outcome of a task."""

@@ -356,8 +356,7 @@ def with_time_step(
 def _duration(macros: Sequence[Macro], taken: float) -> tuple[float, float]:
     """Time of all steps of a program, and its largest time step."""
     steps = [(passes, now) for macro, _, passes, now in _walk(macros, taken) if macro.word in STEPS]
-    total = sum(passes * now for passes, now in steps)
-    return total, max((now for _, now in steps), default=0.0)
+    return sum(passes * now for passes, now in steps), max((now for _, now in steps), default=0.0)
 
 
 def _walk(
