@@ -359,10 +359,7 @@ def _curve(
 def follow(
     law: Law, corners: Sequence[float], points: int = 1
 ) -> Iterator[tuple[ContactPoint, int]]:
-    """Points and branches of one case along a path from zero that turns at some indentations.
-
-    The start comes first, then a number of points per section.
-    """
+    """Points and branches of one case: of the start, then `points` per section to each corner."""
     memory, last, begin = law.start(), ContactPoint(0.0, 0.0), 0.0
     yield last, VIRGIN
     for corner in corners:

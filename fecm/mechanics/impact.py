@@ -27,10 +27,7 @@ TOLERANCE = 1.0e-6
 
 @dataclass(slots=True)
 class ContactState:
-    """State of projectile and contact after a step.
-
-    Values are floats, or arrays with one entry per case.
-    """
+    """State of projectile and contact after a step: floats, or arrays with an entry per case."""
 
     rod: Any  # the projectile: RodState or TipState
     memory: Any  # memory of the contact law
@@ -81,10 +78,7 @@ class ImpactSystem:
         self.first_dt: float | None = None  # time step of the rod's constants
 
     def start(self, plate: PlateState | None = None) -> ImpactState:
-        """State before the first step, with the projectile just touching the plate.
-
-        The plate's state is shared with the caller; it is at rest by default.
-        """
+        """State before the first step: projectile and plate, by default at rest, just touch."""
         contact, state = self.contact, self.motion.start() if plate is None else plate
         rod = rigid_approach(
             self.rod, contact.velocity, derivatives_too=contact.strains_start_moving
@@ -128,10 +122,7 @@ class ImpactSystem:
 
 
 def couple_step(step: TipStep, law: Law, state: ContactState, w: Number) -> None:
-    """Iterate contact force and tip acceleration, then advance the projectile under that force.
-
-    Changes the state; w is the plate's displacement at the contact, an array for many cases.
-    """
+    """Iterate contact force and tip acceleration for the plate's w; change the state."""
     last = state.contact
     motion, base, drift, acceleration = step.begin(state.rod)
     carried = (1.0 - step.theta) * last.force

@@ -84,10 +84,7 @@ class Modes:
         return RodState(y, tip)
 
     def step(self, integrator: RodIntegrator) -> tuple[Floats, Floats]:
-        """Matrices (9, modes) of a step and motion per force on the tip (3, modes).
-
-        Those of :class:`~fecm.mechanics.projectile.RodIntegrator`, mode by mode.
-        """
+        """Matrices (9, modes) and motion per tip force (3, modes) of a step, as an integrator's."""
         theta, r, dt = integrator.theta, integrator.inverse_beta, integrator.dt
         a0, a2 = r / (theta * dt) ** 2, r / (theta * dt)
         a4 = a0 / theta

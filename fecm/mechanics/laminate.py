@@ -76,10 +76,7 @@ class Laminate:
         return bool(np.abs(self.B).max() > ROUNDING * scale)
 
     def without_small_entries(self) -> Laminate:
-        """Set the entries of A, B and D below 1e-6 to 0, as the listing's CNPD does.
-
-        Rounding errors of entries that vanish by symmetry are kept.
-        """
+        """Set entries of A, B, D below 1e-6, but not rounding errors, to 0: the listing's CNPD."""
         scale = ROUNDING * np.abs(self.A).max()
 
         def cut(matrix: Floats, power: int) -> Floats:
@@ -113,10 +110,9 @@ def transformed_stiffness(q: Floats, angle: float) -> Floats:
 
 
 def transformed_shear(g13: float, g23: float, angle: float) -> Floats:
-    """Transform a ply's transverse shear stiffness to the laminate's axes, equation 2-5.
+    """Transform a ply's transverse shear stiffness to the laminate's axes, (2, 2), order xz, yz.
 
-    (2, 2), order xz, yz.  The sign of Q45 follows from the rotation; equation 2-5 of the report has
-    the opposite sign.
+    The sign of Q45 follows from the rotation; equation 2-5 of the report has the opposite sign.
     """
     m, n = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
     coupling = (g13 - g23) * m * n
@@ -129,18 +125,10 @@ def laminate(
     thicknesses: Sequence[float],
     total: float | None = None,
 ) -> Laminate:
-    """Stack plies, equations 2-18, 2-19 and 2-24.
+    """Stack plies of equal constants, equations 2-18, 2-19 and 2-24.
 
-    Parameters
-    ----------
-    ply : PlyConstants
-        Constants of every layer.
-    angles : sequence of float
-        Fibre angles in degrees, starting at the struck face, z = -h/2.
-    thicknesses : sequence of float
-        Layer thicknesses.
-    total : float, optional
-        Thickness for the inertia; the sum of the layers by default.
+    Fibre angles, in degrees, and thicknesses start at the struck face, z = -h/2.  The inertia is of
+    the `total` thickness; by default, of the sum of the layers.
     """
     faces = np.concatenate(([0.0], np.cumsum(thicknesses)))
     faces -= faces[-1] / 2.0

@@ -113,10 +113,7 @@ def element_blocks(elements: Ints, coordinates: Floats) -> list[ElementBlock]:
 
 
 def shape_of(present: Bools) -> ElementShape:
-    """Shape of an element by its last node present (NEL of the listing): up to 3, 9 or 12.
-
-    Raises ValueError if a node follows the twelfth.
-    """
+    """Shape of an element by its last node present (NEL of the listing); ValueError beyond 12."""
     last = int(np.flatnonzero(present).max(initial=-1)) + 1
     for shape in SHAPES:
         if last <= shape.nodes:

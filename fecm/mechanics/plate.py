@@ -148,10 +148,7 @@ class PlateModel:
         return sum(float(area.sum()) for area in areas)
 
     def profile(self) -> int:
-        """Number of entries of K in the listing's profile storage, from the first of each column.
-
-        The listing's JDIAG(NEQ).
-        """
+        """Number of entries of K from the first of each column: the listing's JDIAG(NEQ)."""
         first = np.arange(self.neq)
         for family in self.families:
             dofs = self._dofs(family)

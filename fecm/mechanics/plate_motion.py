@@ -87,11 +87,9 @@ class PlateState:
 
 
 class Sums(NamedTuple):
-    """Inner products that give the energies.
+    """Inner products that give the energies."""
 
-    d is the increment, u the displacement, P the nodal loads and s the scaled internal force.
-    """
-
+    # Of increment d, displacement u, nodal loads P and scaled internal force s.
     inertia: float  # d M d
     power: float  # d K u
     strain: float  # u K u
@@ -211,10 +209,7 @@ class PlateMotion:
         return PlateState(np.zeros(self.product.size), np.zeros(count), np.zeros(count))
 
     def load(self, distribution: Floats) -> Load:
-        """Prepare a unit force with shares of all dofs, (numnp, 5).
-
-        Raises ValueError if it acts on restrained dofs only.
-        """
+        """Prepare a unit force with shares of all dofs, (numnp, 5); ValueError if all are held."""
         shares = self._reduction.gather(distribution)
         (equations,) = np.nonzero(shares)
         if not len(equations):
@@ -349,9 +344,7 @@ class PlateMotion:
         return 0.5 * (inertia / dt2 + work + 0.25 * force) / damped**2
 
     def central_difference(self, state: PlateState, dt: float, factor: float) -> None:
-        """Take one step of the central differences, from rest or from the last step.
-
-        The velocity belongs to the middle of a step: the first step from rest accelerates for half
-        a step, and a change of the time step for the mean of both.
-        """
+        """Take one step of the central differences, from rest or from the last step."""
+        # The velocity belongs to the middle of a step: the first step from rest accelerates for
+        # half a step, and a change of the time step for the mean of both.
         self.advance(state, dt, factor, velocity_dt=0.5 * (state.dt + dt))

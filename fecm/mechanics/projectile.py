@@ -22,8 +22,7 @@ REPORT_DIAMETER = 0.625
 REPORT_ELEMENTS = 20
 REPORT_LENGTH = 1.0
 REPORT_MODULUS = 30.0e6
-REPORT_DENSITY = 0.0006875
-LISTING_DENSITY = 0.0003225
+REPORT_DENSITY, LISTING_DENSITY = 0.0006875, 0.0003225
 
 # The report's program uses the lumped mass, its text the consistent one (equation 4-24).
 MassMatrix = Literal["lumped", "consistent"]
@@ -38,10 +37,7 @@ INTEGRATORS = (WILSON, AVERAGE)
 
 @frozen
 class RodMethod:
-    """Mass matrix and integration method of a rod; the defaults are the report program's.
-
-    Raises ValueError if mass or integrator is unknown.
-    """
+    """Mass matrix and integrator, the report program's by default; ValueError if unknown."""
 
     mass: str = LUMPED  # one of `MASSES`
     integrator: str = WILSON  # one of `INTEGRATORS`
@@ -196,10 +192,7 @@ class Transducer:
 
 @dataclass(slots=True)
 class RodState:
-    """State of a rod.
-
-    Displacements are relative to the tip, so that a long flight does not cancel the strains.
-    """
+    """State of a rod; displacements relative to the tip keep the strains of a long flight."""
 
     # (3, n, ...): displacement relative to the tip, velocity and acceleration of every dof; the
     # first displacement is the tip's increment of the last step.
@@ -357,10 +350,7 @@ def report_rod(density: float = REPORT_DENSITY) -> Rod:
 
 
 def rigid_approach(rod: Projectile, velocity: float, *, derivatives_too: bool = False) -> RodState:
-    """Initial state of a projectile that approaches the plate as a rigid body.
-
-    With `derivatives_too` du/dx start at the same velocity (the slip ``rod-start``).
-    """
+    """Initial state of a rigid approach; `derivatives_too` moves du/dx too (``rod-start``)."""
     motion = np.zeros((3, len(rod.mass())))
     motion[1, :: 1 if derivatives_too else 2] = -velocity
     return RodState(motion)

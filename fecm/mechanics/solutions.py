@@ -29,10 +29,7 @@ class SingularStiffnessError(FecmError, ArithmeticError):
 
 
 class Tangent:
-    """The factorised stiffness.
-
-    Raises SingularStiffnessError if the factorisation fails.
-    """
+    """The factorised stiffness; raises SingularStiffnessError if that fails."""
 
     def __init__(self, plate: PlateModel) -> None:
         from scipy.sparse.linalg import MatrixRankWarning, splu  # slow to import
@@ -51,10 +48,7 @@ class Tangent:
             raise SingularStiffnessError(f"the stiffness is singular ({error})") from None
 
     def solve(self, residual: Floats) -> Floats:
-        """Displacement under a load, (neq,).
-
-        Raises SingularStiffnessError if the solution does not balance the load.
-        """
+        """Displacement under a load, (neq,); SingularStiffnessError if they do not balance."""
         change = self._factors.solve(residual)
         left = np.abs(self._stiffness @ change - residual).max()
         if not left <= SINGULAR * np.abs(residual).max():
@@ -63,10 +57,7 @@ class Tangent:
 
 
 def reactions(plate: PlateModel, field: Floats, factor: float) -> Floats:
-    """Internal minus applied force of every dof, (numnp, 5), under a displacement field.
-
-    The support force where a dof is restrained; the residual where it is free.
-    """
+    """Internal minus applied forces, (numnp, 5): those of supports, and elsewhere the residual."""
     internal = plate.internal_forces(field)
     free = plate.mesh.equations > 0
     internal[free] -= factor * plate.mesh.forces[free]

@@ -100,12 +100,9 @@ Group = tuple[Floats, Indices]
 
 
 class _Domain:
-    """Some elements: gather, small matrix products, scatter.
+    """Some elements: gather, small matrix products, scatter."""
 
-    `count` is the number of independent dofs, `size` that of a padded vector's entries; `scratch`,
-    (2, entries), has room for nodal values and forces, and is shared by the domains of a thread.
-    """
-
+    # Nodal values and forces are in `scratch`, (2, entries), which the domains of a thread share.
     def __init__(self, groups: Sequence[Group], count: int, size: int, scratch: Floats) -> None:
         moving: list[Group] = []
         for K, dof_indices in groups:

@@ -114,20 +114,14 @@ def in_normal_axes(tensor: Floats, degrees: ArrayLike) -> Floats:
 
 
 def shares(inertia: Floats, vectors: Floats) -> Floats:
-    """Share of every component in the kinetic energy of modes, (..., modes, 5).
-
-    The modes are the columns of `vectors`, (..., 5, modes).
-    """
+    """Share of every component in the energy of modes, (..., modes, 5), columns of `vectors`."""
     energy = vectors * (inertia @ vectors)
     return np.asarray(np.swapaxes(energy / energy.sum(axis=-2, keepdims=True), -1, -2))
 
 
 def best(scores: Floats) -> Indices:
-    """Index of the largest score of every row; the first of those equal up to rounding.
-
-    The scores, (n, choices), are sums of shares, of the order of 1.
-    """
-    equal = scores > scores.max(axis=-1, keepdims=True) - 1e-9
+    """Index of the largest score of every row; the first of those equal up to rounding."""
+    equal = scores > scores.max(axis=-1, keepdims=True) - 1e-9  # sums of shares, of order 1
     return np.asarray(equal.argmax(axis=-1))
 
 
@@ -178,12 +172,10 @@ def dispersion(medium: Medium, angle: float, wavelengths: ArrayLike) -> Dispersi
 
 
 def _problem(medium: Medium, angle: float, k: Floats) -> tuple[Floats, Floats, Floats]:
-    """Stiffness, inertia, and transformation to the components u_n ... w, each (n, 5, 5).
-
-    With w a quarter of a period ahead of the others all matrices are real: 2-32 without i.  In long
-    flexural waves phi_n nearly cancels k w; the variable phi_n + tau k w replaces phi_n to avoid
-    the cancellation.  In short waves tau vanishes.
-    """
+    """Stiffness, inertia, and transformation to the components u_n ... w, each (n, 5, 5)."""
+    # With w a quarter of a period ahead of the others all matrices are real: 2-32 without i.  In
+    # long flexural waves phi_n nearly cancels k w; the variable phi_n + tau k w replaces phi_n to
+    # avoid the cancellation.  In short waves tau vanishes.
     laminate = medium.laminate
     beyond = k**2 * laminate.rotary_inertia / laminate.mass  # rotary over translatory inertia
     tau = 1.0 / (1.0 + beyond)
@@ -233,14 +225,12 @@ def graded_modes(stiffness: Floats, inertia: Floats) -> tuple[Floats, Floats]:
 
 
 def _singular_values(matrices: Floats) -> tuple[Floats, Floats]:
-    """Singular values, descending, and right singular vectors as columns of matrices (n, m, m).
-
-    LAPACK's Jacobi method keeps small singular values of column-scaled matrices accurate.
-    """
+    """Singular values, descending, and right singular vectors as columns of matrices (n, m, m)."""
     if not np.isfinite(matrices).all():
         raise StudyError(BEYOND)
     values, vectors = np.empty(matrices.shape[:2]), np.empty(matrices.shape)
     for n, matrix in enumerate(matrices):
+        # The Jacobi method keeps small singular values of column-scaled matrices accurate.
         scaled, _, vectors[n], scale, _, info = dgejsv(matrix, joba=0)
         if info:
             raise StudyError(BEYOND)
@@ -267,8 +257,7 @@ def _in_order(share: Floats) -> Indices:
 # normal they form sheets; sheets that cross are identified by their modes.
 
 EQUAL = 1e-10  # relative tolerance of equal squared velocities
-# Squared scalar product above which one mode continues another; smallest step of the normal
-# (degrees).
+# Squared scalar product above which one mode continues another; smallest step of the normal.
 SURE, FINEST = 0.8, 1e-9
 
 _ORDERS = np.array(list(permutations(range(5))))
@@ -389,10 +378,8 @@ def _stiffness(medium: Medium, normal: Floats) -> Floats:
 
 
 def _solved(operator: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues, descending, and eigenvectors; those of equal eigenvalues follow the sheets.
-
-    Uncoupled in-plane and flexural components are solved separately.
-    """
+    """Eigenvalues, descending, and eigenvectors; those of equal eigenvalues follow the sheets."""
+    # Uncoupled in-plane and flexural components are solved separately.
     coupled = operator[:, :2, 2:4].any()
     values = np.empty(operator.shape[:2])
     vectors = np.zeros(operator.shape)
@@ -537,10 +524,7 @@ class WaveSurfaces:
         return sorted(found, key=lambda cusp: (FRONTS.index(cusp.mode), cusp.normal))
 
     def misnamed(self) -> dict[str, list[tuple[float, float]]]:
-        """Intervals of the normal (degrees) where another component than the name's dominates.
-
-        They are listed by front; fronts without one are left out.
-        """
+        """Intervals of the normal (degrees), by front, where another component dominates."""
         normals = np.arange(360 * STEPS + 1) / STEPS
         share = self.fronts(normals).share
         runs: dict[str, list[tuple[float, float]]] = {}

@@ -55,14 +55,10 @@ def free_power(curves: Curves) -> FreePower:
     rows = curves.division.rows(LOADING)
     everywhere = np.maximum(curves.a[rows], 0.0), curves.f[rows]
     a, f = (values[everywhere[0] > 0.0] for values in everywhere)
-    log = np.log(a)
-    found = least_squares(
-        lambda p: f - p[0] * a ** p[1], [1.0, LOADING_POWER], xtol=1e-12, ftol=1e-12
-    )
-    c, n = found.x
+    start = [1.0, LOADING_POWER]
+    c, n = least_squares(lambda p: f - p[0] * a ** p[1], start, xtol=1e-12, ftol=1e-12).x
     fitted = c * a**n
-    jacobian = np.stack([a**n, fitted * log], axis=1)
-    _, of_points = influence(jacobian, f - fitted)
+    _, of_points = influence(np.stack([a**n, fitted * np.log(a)], axis=1), f - fitted)
     covariance = of_points @ of_points.T
     k = c * curves.force / curves.length**n
     by = np.array([k / c, -k * np.log(curves.length)])
@@ -79,8 +75,7 @@ def free_power(curves: Curves) -> FreePower:
 # other cycles; the fit is by generalised least squares with the complete covariance.
 
 ROUNDS = 20  # iterations of the weights, which depend on the slope
-# Probability below which the scatter about the line exceeds the noise of the points.
-UNLIKELY = 0.01
+UNLIKELY = 0.01  # probability below which the scatter exceeds the noise of the points
 # Smallest error of a coordinate relative to the largest indentation, for tests without noise.
 ROUNDING = 1e-9
 
@@ -130,19 +125,16 @@ def _split(
         if not np.all(np.isfinite(normal)) or np.linalg.matrix_rank(normal) < 2:
             return None
         slope, level = np.linalg.solve(normal, design.T @ weight @ permanents)
+    if slope == 0.0:
+        return None
     errors = np.linalg.inv(normal)
     left = permanents - design @ [slope, level]
     chi = float(left @ weight @ left)
     scatter = _scatter(chi, n - 2)
-    if slope == 0.0:
-        return None
     by = np.array([level / slope**2, -1.0 / slope])
-    return chi, Line(
-        Estimate(float(slope), scatter * float(errors[0, 0] ** 0.5)),
-        Estimate(float(-level / slope), scatter * float((by @ errors @ by) ** 0.5)),
-        tuple(int(i) for i in elastic),
-        scatter,
-    )
+    s_p = Estimate(float(slope), scatter * float(errors[0, 0] ** 0.5))
+    alpha_p = Estimate(float(-level / slope), scatter * float((by @ errors @ by) ** 0.5))
+    return chi, Line(s_p, alpha_p, tuple(elastic.tolist()), scatter)
 
 
 def _scatter(chi: float, freedom: int) -> float:

@@ -53,12 +53,10 @@ class Path:
 
 
 def smoothed(indentation: Floats) -> Path:
-    """Estimate the noise of a path, and smooth it only as much as needed to find its turns.
-
-    Third differences of a path without noise are almost zero; their median gives the noise.  A
-    moving mean over w points divides the noise by sqrt(w) and cuts off about w/4 steps at a turn; w
-    balances both.
-    """
+    """Estimate the noise of a path, and smooth it only as much as needed to find its turns."""
+    # Third differences of a path without noise are almost zero; their median gives the noise.  A
+    # moving mean over w points divides the noise by sqrt(w) and cuts off about w/4 steps at a turn;
+    # w balances both.
     n = len(indentation)
     if n < 5:
         return Path(indentation, 0.0, 0)
@@ -229,10 +227,7 @@ def r_squared(fitted: Floats, measured: Floats) -> float | None:
 
 
 def influence(jacobian: Floats, residual: Floats) -> tuple[Floats, Floats]:
-    """Return the pseudo-inverse, and the influence of every point on the fitted parameters.
-
-    Residuals are divided by the square root of 1 minus the leverage of the point.
-    """
+    """Return the pseudo-inverse, and the influence of every point on the fitted parameters."""
     inverse = np.asarray(np.linalg.pinv(jacobian), dtype=np.float64)
     leverage = np.clip(np.einsum("ij,ji->i", jacobian, inverse), 0.0, 0.999)
     return inverse, inverse * (residual / np.sqrt(1.0 - leverage))
@@ -292,9 +287,8 @@ class Curves:
     @property
     def units(self) -> Floats:
         """Unit of every parameter."""
-        units = np.full(self.layout.size, self.length)
-        units[[ParameterLayout.K, ParameterLayout.Q]] = self.force / self.length**LOADING_POWER, 1.0
-        return units
+        of_k = self.force / self.length**LOADING_POWER
+        return np.array([of_k, 1.0, *[self.length] * (self.layout.size - 2)])
 
     def peak_force(self, p: Floats, cycle: int) -> float:
         """Return the force at the peak of a cycle, equation 3-1."""
@@ -472,28 +466,23 @@ def _origin(a: Floats, f: Floats, power: float) -> float:
 
 
 def _covariance(curves: Curves, p: Floats, free: Bools) -> Floats:
-    """Return the covariance of the scaled parameters; zero for parameters that are not free.
-
-    It is the sum over the points of the squares of their influence.  Points of the first loading
-    affect k and, through k, all other parameters.
-    """
+    """Return the covariance of the scaled parameters; zero for parameters that are not free."""
+    # The sum over the points of the squares of their influence.  Points of the first loading affect
+    # k and, through k, all other parameters.
     rows = curves.division.rows(LOADING)
     x = np.maximum(curves.a[rows], 0.0) ** LOADING_POWER
     share = x / float(x @ x)
-    residual = (curves.f[rows] - p[ParameterLayout.K] * x) / np.sqrt(1.0 - x * share)
-    on_k = share * residual
-    covariance = np.zeros((len(p), len(p)))
-    by_k = np.zeros(len(p))
+    on_k = share * ((curves.f[rows] - p[ParameterLayout.K] * x) / np.sqrt(1.0 - x * share))
+    covariance, by_k = np.zeros((len(p), len(p))), np.zeros(len(p))
     by_k[ParameterLayout.K] = 1.0
     if free.any():
         jacobian = _derivatives(lambda x: curves.of(x, FALLING, RISING)[0], p)
         fitted, measured = curves.of(p, FALLING, RISING)
         inverse, of_points = influence(jacobian[:, free], measured - fitted)
         by_k[free] = -inverse @ jacobian[:, ParameterLayout.K]
-        count = np.count_nonzero(free)
         block = of_points @ of_points.T
-        if np.linalg.matrix_rank(jacobian[:, free], tol=1e-9 * len(fitted)) < count:
-            block += np.diag(np.full(count, np.inf))
+        if np.linalg.matrix_rank(jacobian[:, free], tol=1e-9 * len(fitted)) < len(block):
+            block += np.diag(np.full(len(block), np.inf))
         covariance[np.ix_(free, free)] = block
     return covariance + np.outer(by_k, by_k) * float(on_k @ on_k)
 
