@@ -20,7 +20,7 @@ from fecm.studies.estimate import (
     static_stiffness,
 )
 from fecm.verification.decks import result_of
-from fecm.verification.impacts import struck_square
+from fecm.verification.plates import struck_square
 from tests.builders import report_plate, table
 from tests.calls import call
 from tests.decks import small

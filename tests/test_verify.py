@@ -16,8 +16,8 @@ from fecm.mechanics import element_matrices
 from fecm.mechanics import laminate as laminates
 from fecm.mechanics.contact_law import LinearPermanent
 from fecm.problem.generate import generate
-from fecm.verification import CASES, carry_out, chosen, table
-from fecm.verification.case import Case, Check, Row
+from fecm.verification import CASES, carry_out, chosen
+from fecm.verification.case import HEAD, Case, Check, Row, cells, page
 from fecm.verification.decks import report_impact
 from tests import closed_forms
 from tests.builders import table as reference
@@ -53,7 +53,7 @@ def test_the_page_is_made_from_the_cases(rows: list[Row]) -> None:
         lines = [line.split(" | ") for line in text.splitlines()]
         return [cells[:3] + cells[5:] if len(cells) == 8 else cells for cells in lines]
 
-    assert fixed(PAGE.read_text()) == fixed(table.page(rows))
+    assert fixed(PAGE.read_text()) == fixed(page(rows))
     assert "**" not in PAGE.read_text().partition("## ")[2]  # no row of it has failed
 
 
@@ -62,7 +62,7 @@ def test_some_cases_are_computed_and_told_in_a_table() -> None:
     assert done.exit_code == 0
     assert done.stderr == ""
     head, *body, last = done.stdout.splitlines()
-    assert head.split() == list(table.HEAD)
+    assert head.split() == list(HEAD)
     assert [line.split()[0] for line in body] == ["cross-ply"] * 8 + ["time-step"] * 2
     assert all(line.endswith("independent  ok") for line in body)
     assert {line.index("independent") for line in body} == {head.index("label")}
@@ -130,7 +130,7 @@ def test_numbers_that_are_missing_or_not_finite_are_never_within() -> None:
     for given in ([], [math.nan], [math.inf], [1.0, 1.0]):
         (row,) = carry_out(Case("made", "", (check,), lambda given=given: given))  # type: ignore[misc]
         assert not row.within
-        assert table.cells(row)[-1] == "FAILED"
+        assert cells(row)[-1] == "FAILED"
 
 
 def test_of_a_field_the_value_farthest_from_the_expected_one_counts() -> None:

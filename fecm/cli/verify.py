@@ -8,7 +8,8 @@ from collections.abc import Iterator, Sequence
 import click
 
 from fecm.cli.common import FORMAT_OPTION, CheckFailedError, RefusedError
-from fecm.verification import Case, Row, carry_out, chosen, table
+from fecm.verification import Case, Row, carry_out, chosen
+from fecm.verification.case import fields, page, table
 
 
 @click.command()
@@ -58,12 +59,12 @@ def _printed(cases: Sequence[Case], form: str, markdown: bool) -> list[Row]:
                 yield row
 
     if markdown:
-        click.echo(table.page(rows()), nl=False)
+        click.echo(page(rows()), nl=False)
     elif form == "json":
-        values = [table.values(row) for row in rows()]
+        values = [fields(row) for row in rows()]
         fine = all(row.within for row in found)
         click.echo(json.dumps({"ok": fine, "rows": values}, ensure_ascii=False, allow_nan=False))
     else:
-        for line in table.lines(cases, rows()):
+        for line in table(cases, rows()):
             click.echo(line)
     return found

@@ -38,16 +38,15 @@ def require(result: Result, name: str, *paths: str) -> list[Array]:
     for path in paths:
         if path not in result:
             raise PlotError(f"{name} has no {path}{remedy(path)}")
-    found = [result[path] for path in paths]
-    for path, values in zip(paths, found, strict=True):
-        if not values.size:
+    for path in paths:
+        if not result[path].size:
             raise PlotError(f"{name} has no rows of {path}")
-        if not (np.abs(values) <= LARGEST).all():
+        if not (np.abs(result[path]) <= LARGEST).all():
             raise PlotError(
                 f"{path} of {name} holds numbers beyond ±{LARGEST:g}, infinities or NaN, which "
                 "can't be drawn"
             )
-    return found
+    return [result[path] for path in paths]
 
 
 def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:
@@ -106,8 +105,8 @@ def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -
     """Rows of tape3 nearest to the given times; by default `count` rows at equal distances."""
     (stored,) = require(result, name, "tape3/time")
     if not times:
-        ends = np.arange(1, min(count, len(stored)) + 1) / min(count, len(stored))
-        return (ends * len(stored)).round().astype(np.intp) - 1
+        count = min(count, len(stored))
+        return (np.arange(1, count + 1) / count * len(stored)).round().astype(np.intp) - 1
     try:
         return rows_at(stored, times, "displacements")
     except NotStoredError as error:
@@ -146,13 +145,8 @@ def patches(result: Result, cuts: int, name: str = "the result") -> Patches:
     eta, xi = (places.ravel() for places in np.meshgrid(ticks, ticks, indexing="ij"))
     grid = Quadrature(xi, eta, np.zeros(len(xi)))  # points only; nothing is integrated
     number = np.arange(len(xi)).reshape(cuts + 1, cuts + 1)
-    quad = np.stack(
-        [a.ravel() for a in (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1])],
-        axis=1,
-    )
-    around = np.concatenate(
-        [number[0, :-1], number[:-1, -1], number[-1, :0:-1], number[:0:-1, 0], number[0, :1]]
-    )
+    quad = number[:-1, :-1].reshape(-1, 1) + np.array([0, 1, cuts + 2, cuts + 1])
+    around = np.concatenate([*(np.rot90(number, turn)[0, :-1] for turn in range(4)), [0]])
     points, quads, edges, parts, start = [], [], [], [], 0
     for family in element_blocks(elements, coordinates):
         N = local_shape_functions(family, grid)[0]

@@ -113,9 +113,11 @@ def choose(
     """
     rows = case_rows(sweep, name, where)
     varying = [n for n, values in sweep.cases.items() if len(np.unique(values[rows])) > 1]
-    axes = [_parameter(sweep, parameter, rows) for parameter in _over(sweep, name, varying, over)]
+    axes = [axis_of(sweep, n, sweep[n][rows]) for n in _over(sweep, name, varying, over)]
     others = [parameter for parameter in varying if parameter not in [axis.name for axis in axes]]
-    other = _parameter(sweep, others[0], rows) if others and len(axes) == 1 else None
+    other = None
+    if others and len(axes) == 1:
+        other = axis_of(sweep, others[0], sweep[others[0]][rows])
     if others:  # refuse them if cases would hide one another
         vary = f"{_listed(others)} {'varies' if len(others) == 1 else 'vary'} too"
         selects = f"--where {others[0]}=VALUE selects some of"
@@ -233,23 +235,18 @@ def quantity_of(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axi
         warn(f"{open_ends}{gaps}")
     if lacking := int((np.isnan(values) & run & ~still).sum()):
         warn(f"{lacking} cases of {name} without contact have no {quantity}")
-    return numbers(sweep, quantity, values)
+    return axis_of(sweep, quantity, values)
 
 
-def _parameter(sweep: SweepResult, name: str, rows: Ints) -> Axis:
-    """Axis of a parameter."""
-    values = sweep[name][rows]
-    if values.dtype.kind != "U":
-        return numbers(sweep, name, values)
-    ticks = tuple(dict.fromkeys(values.tolist()))
-    places = {text: place for place, text in enumerate(ticks)}
-    return Axis(name, style.Scale(1.0, ""), np.array([places[v] for v in values.tolist()]), ticks)
-
-
-def numbers(sweep: SweepResult, name: str, values: Array) -> Axis:
-    """Axis of numbers; counts are not scaled."""
+def axis_of(sweep: SweepResult, name: str, values: Array) -> Axis:
+    """Axis of a parameter or quantity; counts are not scaled."""
+    plain = style.Scale(1.0, "")
+    if values.dtype.kind == "U":
+        ticks = tuple(dict.fromkeys(values.tolist()))
+        places = {text: place for place, text in enumerate(ticks)}
+        return Axis(name, plain, np.array([places[text] for text in values.tolist()]), ticks)
     if name in INTEGERS:
-        return Axis(name, style.Scale(1.0, ""), values)
+        return Axis(name, plain, values)
     return Axis(name, style.scale(style.peak(values), sweep.unit(name)), values)
 
 

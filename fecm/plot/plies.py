@@ -26,7 +26,7 @@ from fecm.mechanics.points import locate
 from fecm.plot import style
 from fecm.plot.data import Array, circle, deck_of, mesh_of, on_plate, require, struck
 from fecm.plot.kinds import Picture, PlotError
-from fecm.plot.plate import mark_impact
+from fecm.plot.plate import aspect, mark_impact
 from fecm.problem.build import rules
 from fecm.results.plies import Plies, places, rows_at
 from fecm.results.result import Result
@@ -49,6 +49,12 @@ MARKS: tuple[dict[str, Any], ...] = tuple(
 MANY = 5000  # maps of more cells are drawn as pixels in PDF and SVG
 NAMED = 12  # elements under the load that a note names; the others it counts
 TICKS = 16  # numbers on the axis of the plies at most
+LARGE_RESIDUAL = 0.1  # over the largest interlaminar stress: a note says so
+# A parabola through the lower, middle and upper value of a ply, at some parts of its thickness.
+_PARTS = np.linspace(0.0, 1.0, 9)
+_PARABOLA = np.stack(
+    [(1 - _PARTS) * (1 - 2 * _PARTS), 4 * _PARTS * (1 - _PARTS), _PARTS * (2 * _PARTS - 1)]
+)
 
 
 @frozen
@@ -75,7 +81,17 @@ def failure(results: Mapping[str, Result], *, quantity: str = "", width: str = "
     found = _exposures(result, name, quantity)
     corners = _cells(result, name, found.under_load.shape[1])
     place = style.scale_of(results, "length", [corners])
-    figure, plate, bars = _axes(corners, max(map(len, found.over_plies.values())), width)
+    inches, high = style.WIDTHS[width], aspect(corners.reshape(-1, 2))
+    most = max(map(len, found.over_plies.values()))
+    beside = float(np.clip(0.8 + 0.07 * most, 1.4, 4.0))  # height of the bars
+    if width == "column":
+        above = 0.85 * inches * high + 1.5
+        ratio, heights = (above + beside) / (inches * 2), (above, beside)
+        figure, axes = style.panels(width, 2, 1, ratio=ratio, height_ratios=heights)
+    else:
+        ratio = max(0.54 * inches * high + 1.5, beside + 0.4) * 2 / inches
+        figure, axes = style.panels(width, 1, 2, ratio=ratio, width_ratios=(5.0, 3.0))
+    plate, bars = axes
     _map(plate, corners, found)
     mark_impact(plate, result, name)
     worst = found.worst
@@ -86,9 +102,16 @@ def failure(results: Mapping[str, Result], *, quantity: str = "", width: str = "
     )
     place.name(plate.xaxis, "$x$")
     place.name(plate.yaxis, "$y$")
-    _bars(bars, found)
-    _legend(figure, found)
-    _note(found.under_load, name)
+    _bars(figure, bars, found)
+    if len(elements := 1 + np.flatnonzero(found.under_load.any(axis=1))):
+        texts = ", ".join(map(str, elements[:NAMED]))
+        more = f" and {len(elements) - NAMED} more" if len(elements) > NAMED else ""
+        points = np.count_nonzero(found.under_load)
+        warn(
+            f"exposures of {name} under the load, where plate theory does not hold, are left out: "
+            f"{points} {'point' if points == 1 else 'points'} of "
+            f"{'element' if len(elements) == 1 else 'elements'} {texts}{more}"
+        )
     return Picture(figure)
 
 
@@ -98,6 +121,7 @@ def _exposures(result: Result, name: str, quantity: str) -> Exposures:
         raise PlotError(f"there is no criterion {quantity!r}; there are {', '.join(NAMES)}")
     (near,) = require(result, name, "failure/under_load")
     under = near != 0
+    whole = np.broadcast_to(under.any(axis=1)[:, None], under.shape)  # elements
     over_plies, fields = {}, []
     for criterion in (quantity,) if quantity else NAMES:
         path = f"failure/{criterion}/exposure"
@@ -105,23 +129,20 @@ def _exposures(result: Result, name: str, quantity: str) -> Exposures:
             continue  # a single ply
         (values,) = require(result, name, path)
         if criterion == BETWEEN:
-            left_out = np.broadcast_to(under.any(axis=1)[:, None], under.shape)
-            field = np.broadcast_to(values.max(axis=1)[:, None], under.shape)
-            outside = values[~left_out[:, 0]]
+            field, outside = values.max(axis=1)[:, None], values[~whole[:, 0]]
         else:
-            left_out, field = under, values.max(axis=(2, 3))
-            outside = values[~under].max(axis=2)
+            field, outside = values.max(axis=(2, 3)), values[~under].max(axis=2)
         if len(outside):
             over_plies[criterion] = outside.max(axis=0)
         if quantity or criterion != BETWEEN:
-            fields.append((left_out, field))
+            fields.append(np.broadcast_to(field, under.shape))
     names = set(over_plies) - (set() if quantity else {BETWEEN})
     largest = [one for one in largest_exposures(result) if one.criterion in names]
     if not largest:
         raise PlotError(f"the load is over all elements of {name}: no exposure is left to show")
     worst = max(largest, key=lambda one: one.exposure)
-    over_plate = np.max([field for _, field in fields], axis=0)
-    return Exposures(fields[0][0], over_plate, over_plies, worst)
+    left_out = whole if quantity == BETWEEN else under
+    return Exposures(left_out, np.max(fields, axis=0), over_plies, worst)
 
 
 def _cells(result: Result, name: str, count: int) -> Floats:
@@ -147,32 +168,9 @@ def outline(cells: Floats) -> Floats:
         return sides
     # An offset keeps coordinates of regular meshes off the borders between integers.
     whole = np.floor(sides / (1e-6 * np.ptp(sides, axis=(0, 1)).max()) + 0.377)
-    first, second = whole[:, 0], whole[:, 1]
-    turned = first[:, 1] > second[:, 1]
-    back = (first[:, 0] > second[:, 0]) | ((first[:, 0] == second[:, 0]) & turned)
-    whole[back] = whole[back][:, ::-1]
-    ends = whole.reshape(-1, 4)
+    ends = np.sort(whole @ [1.0, 1.0j], axis=1)  # by x, then by y
     _, index, times = np.unique(ends, axis=0, return_index=True, return_counts=True)
     return np.asarray(sides[index[times == 1]])
-
-
-def _axes(corners: Floats, plies: int, width: str) -> tuple[Figure, Axes, Axes]:
-    """Axes of the map and of the bars: side by side on a page, one above the other in a column."""
-    wide, high = np.ptp(corners.reshape(-1, 2), axis=0)
-    aspect = float(np.clip(high / wide, 0.3, 2.0))
-    inches = style.WIDTHS[width]
-    bars = float(np.clip(0.8 + 0.07 * plies, 1.4, 4.0))
-    if width == "column":
-        plate = 0.85 * inches * aspect + 1.5
-        total, rows, columns = plate + bars, 2, 1
-        parts: dict[str, Any] = {"height_ratios": (plate, bars)}
-    else:
-        total, rows, columns = max(0.54 * inches * aspect + 1.5, bars + 0.4), 1, 2
-        parts = {"width_ratios": (5.0, 3.0)}
-    figure, (first, second) = style.panels(
-        width, rows, columns, ratio=total * columns / (inches * rows), **parts
-    )
-    return figure, first, second
 
 
 def _map(axes: Axes, cells: Floats, found: Exposures) -> None:
@@ -191,80 +189,44 @@ def _map(axes: Axes, cells: Floats, found: Exposures) -> None:
     low, high = cells.min(axis=(0, 1, 2)), cells.max(axis=(0, 1, 2))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     what = "the interfaces" if found.worst.criterion == BETWEEN else "the plies"
-    label = f"Largest exposure of {what}"
-    bar = style.colour_bar(axes, drawn, style.Scale(1.0, ""), label, MaxNLocator(5))
+    scale, label = style.Scale(1.0, ""), f"Largest exposure of {what}"
+    bar = style.colour_bar(axes, drawn, scale, label, MaxNLocator(5))
     if peak >= 1.0:
         bar.ax.axvline(1.0, **LIMIT)
 
 
-def _bars(axes: Axes, found: Exposures) -> None:
-    """A bar per ply, the struck face at the top, and one per interface between them."""
+def _bars(figure: Figure, axes: Axes, found: Exposures) -> None:
+    """A bar per ply, the struck face at the top, one per interface between them, and the legend."""
     plies = {name: values for name, values in found.over_plies.items() if name != BETWEEN}
     between = found.over_plies.get(BETWEEN)
+    entries: dict[str, Any] = {}
     if plies:
         largest = np.max(list(plies.values()), axis=0)
         number = np.arange(1, len(largest) + 1)
-        alone = len(plies) == 1
-        colour = COLOUR_OF[next(iter(plies))] if alone else "0.85"
-        axes.barh(number, largest, height=0.8, color=colour)
-        for (name, values), mark in zip(plies.items(), MARKS, strict=False):
-            if not alone:
-                axes.plot(values, number, color=COLOUR_OF[name], **mark)
+        alone = next(iter(plies)) if len(plies) == 1 else ""
+        axes.barh(number, largest, height=0.8, color=COLOUR_OF[alone] if alone else "0.85")
+        if alone:
+            entries[alone.replace("_", " ")] = Patch(color=COLOUR_OF[alone])
+        else:
+            for (name, values), mark in zip(plies.items(), MARKS, strict=False):
+                (drawn,) = axes.plot(values, number, color=COLOUR_OF[name], **mark)
+                entries[name.replace("_", " ")] = drawn
     if between is not None:
         place = np.arange(len(between)) + (1.5 if plies else 1.0)
         height = 0.35 if plies else 0.8
         axes.barh(place, between, height=height, color=COLOUR_OF[BETWEEN], zorder=3)
-    axes.axvline(1.0, zorder=4, **LIMIT)
+        entries[BETWEEN] = Patch(color=COLOUR_OF[BETWEEN])
+    entries["exposure 1"] = axes.axvline(1.0, zorder=4, **LIMIT)
+    entries["largest"] = Line2D([], [], **LARGEST)
+    if found.under_load.any():
+        entries["under the load"] = Patch(linewidth=0.0, **HATCH)
+    style.legend(figure, list(entries.values()), list(entries))
     count = max(map(len, found.over_plies.values()))
     axes.set_ylim(count + 0.6, 0.4)
     axes.set_xlim(0.0, 1.05 * max(1.0, *(values.max() for values in found.over_plies.values())))
     axes.yaxis.set_major_locator(MaxNLocator(TICKS, integer=True, min_n_ticks=1))
     axes.set_ylabel("Ply (1: struck face)" if plies else "Interface below ply (1: struck face)")
     axes.set_xlabel("Largest exposure")
-
-
-def _legend(figure: Figure, found: Exposures) -> None:
-    """Legend of bars, marks and hatching, and the largest exposure above it."""
-    plies = [name for name in found.over_plies if name != BETWEEN]
-    entries: list[tuple[str, Any]] = []
-    for name, mark in zip(plies, MARKS, strict=False):
-        handle = Line2D([], [], color=COLOUR_OF[name], **mark)
-        entries.append((name.replace("_", " "), handle))
-    if len(plies) == 1:
-        entries = [(entries[0][0], Patch(color=COLOUR_OF[plies[0]]))]
-    if BETWEEN in found.over_plies:
-        entries.append((BETWEEN, Patch(color=COLOUR_OF[BETWEEN])))
-    entries += ("exposure 1", Line2D([], [], **LIMIT)), ("largest", Line2D([], [], **LARGEST))
-    if found.under_load.any():
-        entries.append(("under the load", Patch(linewidth=0.0, **HATCH)))
-    labels, handles = zip(*entries, strict=True)
-    style.legend(figure, handles, labels)
-
-
-def _note(under_load: Bools, name: str) -> None:
-    """Name the elements with points under the load."""
-    elements = 1 + np.flatnonzero(under_load.any(axis=1))
-    if not len(elements):
-        return
-    texts = ", ".join(map(str, elements[:NAMED]))
-    more = f" and {len(elements) - NAMED} more" if len(elements) > NAMED else ""
-    points = np.count_nonzero(under_load)
-    warn(
-        f"exposures of {name} under the load, where plate theory does not hold, are left out: "
-        f"{points} {'point' if points == 1 else 'points'} of "
-        f"{'element' if len(elements) == 1 else 'elements'} {texts}{more}"
-    )
-
-
-# Stresses through the thickness -------------------------------------------------------------------
-
-STRESS = "force/length^2"
-LARGE_RESIDUAL = 0.1  # over the largest interlaminar stress: a note says so
-# A parabola through the lower, middle and upper value of a ply, at some parts of its thickness.
-_PARTS = np.linspace(0.0, 1.0, 9)
-_PARABOLA = np.stack(
-    [(1 - _PARTS) * (1 - 2 * _PARTS), 4 * _PARTS * (1 - _PARTS), _PARTS * (2 * _PARTS - 1)]
-)
 
 
 def thickness(
@@ -286,25 +248,20 @@ def thickness(
     ((name, result),) = results.items()
     plies, point = _chosen(result, name, at, times)
     z = plies.z
-    drawn = {
-        label: (z[:, ::2], values[0, 0, point])
-        for label, values in (
-            (r"$\sigma_1$", plies.sigma_1), (r"$\sigma_2$", plies.sigma_2),
-            (r"$\tau_{12}$", plies.tau_12),
-        )
-    }  # fmt: skip
+    in_plane = (plies.sigma_1, plies.sigma_2, plies.tau_12)
+    names = (r"$\sigma_1$", r"$\sigma_2$", r"$\tau_{12}$")
+    drawn = {n: (z[:, ::2], values[0, 0, point]) for n, values in zip(names, in_plane, strict=True)}
     xz, yz, depth = (values @ _PARABOLA for values in (plies.tau_xz[0, 0], plies.tau_yz[0, 0], z))
     if np.isfinite([xz, yz]).all():
         drawn[r"$\tau_{xz}$"], drawn[r"$\tau_{yz}$"] = (depth, xz), (depth, yz)
         drawn[r"$(\tau_{xz}^2 + \tau_{yz}^2)^{1/2}$"] = depth, np.hypot(xz, yz)
     _warn(result, name, plies, point)
     columns = 2 if width == "column" else 3
-    figure, axes = style.panels(
-        width, math.ceil(len(drawn) / columns), columns, sharey=True, ratio=1.8 / columns
-    )
+    lines = math.ceil(len(drawn) / columns)
+    figure, axes = style.panels(width, lines, columns, sharey=True, ratio=1.8 / columns)
     place = style.scale_of(results, "length", [z])
     for ax, (label, (levels, values)) in zip(axes, drawn.items(), strict=False):
-        stress = style.scale_of(results, STRESS, [values])
+        stress = style.scale_of(results, "force/length^2", [values])
         for face in np.unique(z[:, ::2]):
             ax.axhline(face, color="0.6", lw=0.4, ls=":")
         ax.axvline(0.0, color="0.6", lw=0.4)
@@ -318,10 +275,8 @@ def thickness(
     clock = style.scale_of(results, "time", [plies.time])
     x, y = plies.x[0, point], plies.y[0, point]
     where = f"{x:.4g}, {y:.4g} {style.literal(result.unit('length'))}".rstrip()
-    figure.suptitle(
-        f"element {plies.element[0]} at {where}, time {clock.show(float(plies.time[0]))}",
-        fontsize=8.0,
-    )
+    time = clock.show(float(plies.time[0]))
+    figure.suptitle(f"element {plies.element[0]} at {where}, time {time}", fontsize=8.0)
     return Picture(figure)
 
 
@@ -336,10 +291,9 @@ def _chosen(
     try:
         rows = rows_at(stored, times, "ply stresses") if times else np.arange(len(stored))
         largest = np.abs(sigma[rows]).max(axis=(3, 4))  # (rows, elements, points)
-        member = (
-            _nearest_element(mesh, numbers, np.array(at[0]), name)
-            if at else int(largest.max(axis=(0, 2)).argmax())
-        )  # fmt: skip
+        member = int(largest.max(axis=(0, 2)).argmax())
+        if at:
+            member = _nearest_element(mesh, numbers, np.array(at[0]), name)
         row, point = np.unravel_index(largest[:, member].argmax(), largest[:, member].shape)
         plies = result.plies(float(stored[rows[row]]), int(numbers[member]))
     except NotStoredError as error:
@@ -377,11 +331,10 @@ def _warn(result: Result, name: str, plies: Plies, point: int) -> None:
     if plies.under_load[0] or (distance < reach).any():
         warn(f"{element} is within {reach:.3g} of the load, where plate theory does not hold")
     tau = np.abs([plies.tau_xz, plies.tau_yz]).max()
+    residual = np.abs(plies.residual).max()
     if np.isnan(tau):
         warn(f"{element} does not have nine nodes: it has no interlaminar stresses")
-        return
-    residual = np.abs(plies.residual).max()
-    if residual > LARGE_RESIDUAL * tau:
+    elif residual > LARGE_RESIDUAL * tau:
         warn(
             f"at z = h/2 of {element} equilibrium leaves {residual / tau:.0%} of the largest "
             "interlaminar stress, which is removed linearly in z: in-plane supports act there, or "

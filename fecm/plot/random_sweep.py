@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from fecm.plot.kinds import Picture, PlotError
-from fecm.plot.maps import LEVEL, Axis, Ints, case_rows, quantity_of
-from fecm.plot.maps import numbers as axis_of
+from fecm.plot.maps import LEVEL, Ints, axis_of, case_rows, quantity_of
 from fecm.plot.style import WIDTHS, colours, legend, limit_count, lines_legend, panels
 from fecm.sweeps.random_result import Indices, RandomResult, wilson
 from fecm.sweeps.result import SweepResult
@@ -21,32 +20,30 @@ PAIR, AROUND = 0.3, 0.75  # height of a pair of bars, and of what is around them
 
 def _random(
     results: Sweeps, where: Mapping[str, Any] | None
-) -> tuple[str, SweepResult, RandomResult, list[int]]:
-    """The sweep, its random result, and the combinations of varied values to show."""
+) -> tuple[str, SweepResult, RandomResult, dict[int, Ints]]:
+    """The sweep, its random result, and the cases drawn of the combinations of varied values."""
     where = where or {}
     ((name, sweep),) = results.items()
     if sweep.random is None:
         raise PlotError(f"{name} has no random values; `fecm sweep --random` makes such a sweep")
-    if wrong := [one for one in where if one in sweep.random.design.laws]:
+    design = sweep.random.design
+    if wrong := [one for one in where if one in design.laws]:
         raise PlotError(f"{wrong[0]} is random; where selects values that are varied")
-    rows = case_rows(sweep, name, where)
-    firsts = np.arange(0, len(sweep), sweep.random.design.rows)
-    return name, sweep, sweep.random, np.flatnonzero(np.isin(firsts, rows)).tolist()
+    firsts = np.arange(0, len(sweep), design.rows)
+    chosen = np.flatnonzero(np.isin(firsts, case_rows(sweep, name, where))).tolist()
+    if not chosen:
+        raise PlotError(f"{name} has no draws")
+    return name, sweep, sweep.random, {n: firsts[n] + np.arange(design.draws) for n in chosen}
 
 
-def _one(random: RandomResult, name: str, chosen: Sequence[int]) -> int:
-    """The only combination."""
+def _one(random: RandomResult, name: str, chosen: dict[int, Ints]) -> tuple[int, Ints]:
+    """The only combination, and its draws."""
     if len(chosen) > 1:
         raise PlotError(
             f"{name} has {len(chosen)} combinations of varied values; select one of them with "
             f"--where {next(iter(random.combinations))}=VALUE"
         )
-    return chosen[0]
-
-
-def _draws(random: RandomResult, combination: int) -> Ints:
-    """Numbers of the cases of a combination that are independent draws."""
-    return combination * random.design.rows + np.arange(random.design.draws)
+    return next(iter(chosen.items()))
 
 
 def _limits(random: RandomResult, quantity: str, level: Sequence[float]) -> list[float]:
@@ -74,30 +71,28 @@ def exceedance(
     limit_count(len(chosen), "curves")
     figure, (axes,) = panels(width)
     notes: list[str] = []
-    shown: Axis | None = None
-    for place, colour in zip(chosen, colours(), strict=False):
-        shown = quantity_of(sweep, name, _draws(random, place), quantity)
+    every = [quantity_of(sweep, name, rows, quantity) for rows in chosen.values()]
+    limits = _limits(random, every[0].name, level)
+    for place, shown, colour in zip(chosen, every, colours(), strict=False):
         values = np.sort(shown.values[np.isfinite(shown.values)])
         count = len(values)
-        above = (count - np.arange(count) - 0.5) / count
         label = random.label(place)
+        above = (count - np.arange(count) - 0.5) / count
         axes.plot(values, above, color=colour, label=label or "_")
-        for limit in _limits(random, shown.name, level):
+        for limit in limits:
             hits = np.array((values > limit).sum())
             low, high = wilson(hits, np.array(count))
             p = float(hits) / count
-            bar: Any = {"color": colour, "capsize": 2.0, "markersize": 3.0, "linewidth": 0.9}
+            bar: Any = {"color": colour, "capsize": 2.0, "ms": 3.0, "lw": 0.9}
             axes.errorbar(limit, p, [[p - low], [high - p]], fmt="o", **bar)
             case = f", {label}" if label else ""
             notes.append(f"P({shown.name} > {limit:g}) = {p:.5g} ({low:.5g} to {high:.5g}){case}")
-    if shown is None:
-        raise PlotError(f"{name} has no draws")
-    for limit in _limits(random, shown.name, level):
+    for limit in limits:
         axes.axvline(limit, zorder=0, **LEVEL)
     axes.set_yscale("log")
     axes.set_ylim(top=1.15)
     axes.set_ylabel("Probability of exceedance")
-    shown.scale.name(axes.xaxis, shown.label)
+    every[-1].scale.name(axes.xaxis, every[-1].label)
     if len(chosen) > 1:
         lines_legend(figure, axes)
     return Picture(figure, notes=notes)
@@ -117,8 +112,8 @@ def sensitivity(
     name, sweep, random, chosen = _random(results, where)
     if not random.sensitivity:
         raise PlotError(f"{name} has no indices; run the sweep with --sensitivity")
-    place = _one(random, name, chosen)
-    shown = quantity_of(sweep, name, _draws(random, place), quantity)
+    place, draws = _one(random, name, chosen)
+    shown = quantity_of(sweep, name, draws, quantity)
     found = random.sensitivity[shown.name]
     if random.combinations:
         found = Indices(*(values[place] for values in found))
@@ -127,13 +122,13 @@ def sensitivity(
     names = [axis_of(sweep, law, sweep[law][:1]).label for law in random.design.laws]
     figure, (axes,) = panels(width, ratio=(AROUND + PAIR * len(names)) / WIDTHS[width])
     rows = np.arange(len(names))
+    look: Any = {"error_kw": {"elinewidth": 0.8, "capsize": 2.0, "ecolor": "0.2"}}
     for part, interval, offset, colour, label in (
         (found.first, found.first_interval, -0.19, colours()[0], "first order"),
         (found.total, found.total_interval, 0.19, colours()[1], "total"),
     ):
         ends = np.abs(interval.T - part)
-        style: Any = {"error_kw": {"elinewidth": 0.8, "capsize": 2.0, "ecolor": "0.2"}}
-        axes.barh(rows + offset, part, 0.36, xerr=ends, color=colour, label=label, **style)
+        axes.barh(rows + offset, part, 0.36, xerr=ends, color=colour, label=label, **look)
     axes.set_yticks(rows, names)
     axes.invert_yaxis()
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
@@ -157,21 +152,18 @@ def scatter(
     `exceedance`.
     """
     name, sweep, random, chosen = _random(results, where)
-    rows = _draws(random, _one(random, name, chosen))
+    _, rows = _one(random, name, chosen)
     shown = quantity_of(sweep, name, rows, quantity)
-    laws = list(random.design.laws)
+    laws = random.design.laws
     columns = min(len(laws), BESIDE[width])
     lines = -(-len(laws) // columns)
     figure, every = panels(width, lines, columns, ratio=0.85, sharey=True)
-    for place, axes in enumerate(every):
-        if place >= len(laws):
-            axes.set_visible(False)
-            continue
-        over = axis_of(sweep, laws[place], sweep[laws[place]][rows])
-        axes.plot(
-            over.values, shown.values, ".", color=colours()[0], markersize=1.5, alpha=0.5,
-            markeredgewidth=0.0, rasterized=True,
-        )  # fmt: skip
+    look: Any = {"color": colours()[0], "ms": 1.5, "alpha": 0.5, "mew": 0.0, "rasterized": True}
+    for axes in every[len(laws) :]:
+        axes.set_visible(False)
+    for place, (axes, law) in enumerate(zip(every, laws, strict=False)):
+        over = axis_of(sweep, law, sweep[law][rows])
+        axes.plot(over.values, shown.values, ".", **look)
         for limit in _limits(random, shown.name, level):
             axes.axhline(limit, **LEVEL)
         over.scale.name(axes.xaxis, over.label)

@@ -187,5 +187,7 @@ def calibration_picture(
     a_scale.name(other.yaxis, "$V_a$")
     a_scale.name(right.xaxis, "$V_a$")
     labels = ["$V_F$", "$V_a$", "measured", f"slope {found.slope:.4g} ± {found.slope_error:.2g}"]
-    style.legend(figure, handles, labels, mathematics=True)
+    style.legend(figure, handles, labels)
+    for text in figure.legends[0].get_texts():
+        text.set_parse_math(True)
     return Picture(figure)

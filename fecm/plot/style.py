@@ -128,10 +128,8 @@ class Scale:
 
     def show(self, value: float) -> str:
         """A value with its unit, to four significant digits."""
-        number = f"{self.factor * value:.4g}"
-        if self.unit.startswith("10"):
-            return f"{number} × {literal(self.unit)}"
-        return f"{number} {literal(self.unit)}".rstrip()
+        times = " ×" if self.unit.startswith("10") else ""
+        return f"{self.factor * value:.4g}{times} {literal(self.unit)}".rstrip()
 
 
 def scale(peak: float, unit: str) -> Scale:
@@ -152,10 +150,7 @@ def scale(peak: float, unit: str) -> Scale:
 
 
 def scale_of(results: Mapping[str, Result], dimension: str, arrays: Iterable[Any]) -> Scale:
-    """Scale for arrays of one dimension, in the results' unit if all name it.
-
-    Refuse different units.
-    """
+    """Scale for arrays of one dimension, in the results' unit if all name it; units must agree."""
     units = {name: result.unit(dimension) for name, result in results.items()}
     named = {unit: name for name, unit in units.items() if unit}
     if len(named) > 1:
@@ -204,10 +199,7 @@ def panels(
     width: str, rows: int = 1, columns: int = 1, *, ratio: float = 0.0, tall: float = 1.0,
     **options: Any,
 ) -> tuple[Figure, list[Axes]]:  # fmt: skip
-    """Figure with equal axes, row by row.
-
-    The height over the width of each is `ratio`, by default `tall` times that of a graph.
-    """
+    """Figure with equal axes by rows: height over width is `ratio`, or `tall` times a graph's."""
     inches, target, ratio = WIDTHS[width], TARGET.get(), ratio or tall * RATIO[width]
     solid = "subplot_kw" in options and options["subplot_kw"].get("projection") == "3d"
     if isinstance(target, Axes):
@@ -252,18 +244,8 @@ def colour_bar(
     return bar
 
 
-def legend(
-    figure: Figure,
-    handles: Sequence[Any],
-    labels: Sequence[str],
-    title: str = "",
-    *,
-    mathematics: bool = False,
-) -> None:
-    """Draw a legend above the axes, or in the axes if they are given.
-
-    Labels are shown literally, or as mathematics.
-    """
+def legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str], title: str = "") -> None:
+    """Draw a legend with literal labels above the axes, or in the axes if they are given."""
     target = TARGET.get()
     if isinstance(target, Axes):
         drawn = target.legend(handles, labels, title=title or None)
@@ -275,7 +257,7 @@ def legend(
             handles, labels, loc="outside upper center", ncols=columns, title=title or None
         )
     for text in drawn.get_texts():
-        text.set_parse_math(mathematics)
+        text.set_parse_math(False)
 
 
 def lines_legend(figure: Figure, axes: Axes, title: str = "") -> None:

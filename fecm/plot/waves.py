@@ -42,18 +42,15 @@ def dispersion_picture(medium: Medium, curves: Sequence[Dispersion]) -> Picture:
     colours = [Line2D([], [], color=colour) for colour in COLOURS[: len(curves)]]
     figure.legend(colours, angles, loc="outside upper left", ncols=4)
     modes = [Line2D([], [], color="0.3", ls=dashes) for dashes in DASHES]
-    figure.legend(
-        modes, [WORDS[mode] for mode in MODES], loc="outside upper right", ncols=5,
-        handlelength=2.6,
-    )  # fmt: skip
+    words = [WORDS[mode] for mode in MODES]
+    figure.legend(modes, words, loc="outside upper right", ncols=5, handlelength=2.6)
     longest = max(float(curve.wavelength[-1]) for curve in curves)
-    tops = (
-        1.15 * max(float(values[:, 3:].max()) for values in velocities),
-        2.6 * max(float(values[-1, 1:3].max()) for values in frequencies),
-    )
-    names = ("Phase velocity $c/c_s$", "Frequency $\\omega h/c_s$")
-    for ax, top, name in zip(axes, tops, names, strict=True):
-        ax.set(xlim=(0.0, longest), ylim=(0.0, top), xlabel="Wavelength $\\lambda/h$", ylabel=name)
+    for ax in axes:
+        ax.set(xlim=(0.0, longest), xlabel="Wavelength $\\lambda/h$")
+    top = 1.15 * max(float(values[:, 3:].max()) for values in velocities)
+    axes[0].set(ylim=(0.0, top), ylabel="Phase velocity $c/c_s$")
+    top = 2.6 * max(float(values[-1, 1:3].max()) for values in frequencies)
+    axes[1].set(ylim=(0.0, top), ylabel="Frequency $\\omega h/c_s$")
     return Picture(figure)
 
 
@@ -65,9 +62,9 @@ def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
     figure, axes = panels("full", 1, 2, ratio=1.16, subplot_kw={"projection": "polar"})
     figure.set_layout_engine("constrained")
     graphs: Any = axes  # polar axes have additional methods
-    for place, colour in enumerate(COLOURS[: len(FRONTS)]):
+    for place, (front, colour) in enumerate(zip(FRONTS, COLOURS, strict=False)):
         curve = np.deg2rad(fronts.normal), fronts.velocity[:, place]
-        graphs[0 if place < 2 else 1].plot(*curve, color=colour, label=WORDS[FRONTS[place]])
+        graphs[0 if place < 2 else 1].plot(*curve, color=colour, label=WORDS[front])
     for ax, title in zip(graphs, ("In-plane fronts", "Flexural fronts"), strict=True):
         ax.set_title(speed.label(f"{title}: normal velocity"))
         ax.set_rlim(0.0, 1.06 * float(fronts.velocity.max()))

@@ -1,4 +1,4 @@
-"""Plates: fields that every mesh must reproduce, and simply supported plates against series."""
+"""Plates: fields that every mesh must reproduce, plates against series, and impacts on plates."""
 
 from __future__ import annotations
 
@@ -9,24 +9,34 @@ from dataclasses import replace
 import numpy as np
 
 from fecm._typing import Floats
+from fecm.api import load_deck
 from fecm.deck import model
 from fecm.deck.catalogue import MATERIALS
-from fecm.deck.grid import Grid, Section, lines, uniform
-from fecm.deck.model import Deck, Patch, Segment
+from fecm.deck.grid import Grid, Section, lines, refined, uniform
+from fecm.deck.model import Deck, Impact, Patch, Projectile, Segment
 from fecm.deck.records import Gage, LoadTable, Macro, NodeCodes, NodeValues, Ply
-from fecm.mechanics.time_step import critical_time_step
+from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.build import build_plate
 from fecm.problem.generate import generate
 from fecm.results.result import Result
+from fecm.studies.estimate import infinite_plate, static_plate, static_stiffness
+from fecm.sweeps.api import carry_out, problem_of
+from fecm.sweeps.plan import plan
 from fecm.verification import decks
 from fecm.verification.case import Value, case
 from fecm.verification.parts import FIBRES, THICK
 
-# Constant strains and resultants; the mode of one dof --------------------------------------------
-
+ELEMENTS = 8  # of 16 a side
+FEWER = 6  # of 12 a side
+H = 0.1
+SIDES = (6.0, 4.0)  # of rectangles
+V = 100.0  # of projectiles
+ONE = decks.isotropic(1.0, 0.3, 1.0)
+STIFF = Ply(1.0, 0.25, 25.0, 1.0, 0.5, 0.5, 0.2)  # Pagano's
+CROSS = (0.0, 90.0, 0.0)
+DEFLECTION = decks.program("TANG FORM SOLV DISP")
 STRESSES = decks.program("TANG FORM SOLV STRE")
 IN_PLANE = "eps_xx eps_yy gamma_xy kappa_x kappa_y kappa_xy"
-
 # Corners of the four elements of the patch: no side is parallel to another or to an axis.
 CORNERS = np.array([
     [(0.0, 0.0), (1.1, -0.1), (2.0, 0.1)],
@@ -108,7 +118,7 @@ def _tape8() -> Sequence[Value]:
     field = decks.constant_strains(x, y, (0.4, -0.5, 0.6), shear=(0.02, -0.03))
     field[struck - 1, 2] = 0.0
     codes = [NodeCodes(n, 0, (1, 1, int(n != struck), 1, 1)) for n in range(1, grid.nodes + 1)]
-    hit = (model.Projectile(0, 0, 1e-6), model.Impact(struck, 3, 1e-12), decks.elastic(1.0))
+    hit = (Projectile(0, 0, 1e-6), Impact(struck, 3, 1e-12), decks.elastic(1.0))
     plate = decks.material(FIBRES, (0.0, 90.0), 0.01)
     segments = (model.Boundary(tuple(codes)), decks.forces(field), *hit, plate)
     found = decks.result_of(decks.deck(grid, segments, decks.impact_program(1e-7, 1)))
@@ -129,16 +139,9 @@ def _time_step() -> Sequence[Value]:
     return found
 
 
-# Statics, frequencies, motion --------------------------------------------------------------------
-
-DEFLECTION = decks.program("TANG FORM SOLV DISP")
-ELEMENTS = 8  # of 16 a side
-ONE = decks.isotropic(1.0, 0.3, 1.0)
-
-
 @case
 def _static_bending() -> Sequence[Value]:
-    """Transverse shear integrated by order 2 does not lock; by order 3 it does."""
+    """Transverse shear is integrated by order 2, which does not lock, and by order 3."""
 
     def w(thickness: float, factor: float = 1.0, shear_order: int = 2) -> Floats:
         ply = decks.isotropic(1.0, 0.3, 1.0, factor)
@@ -170,12 +173,6 @@ def _frequencies() -> Sequence[Value]:
     shear = math.sqrt(float(ones @ (free.stiffness @ ones)) / float(free.mass @ ones))
     # Modes 11, 13 and 31, 33 with the lumped mass, then with the consistent mass.
     return [scaled[0], scaled[1], scaled[4], scaled[7], shear]
-
-
-# Coupled laminates -------------------------------------------------------------------------------
-
-FEWER = 6  # of 12 a side
-H = 0.1
 
 
 def two_layers(angles: Sequence[float], codes: str, mode: int, node: int) -> Sequence[Value]:
@@ -214,14 +211,6 @@ def _forced_plate() -> Sequence[Value]:
     return [found.tape3.w[-1, 0], found.gages.strain[-1, 0]]
 
 
-# Contact patches and shear -----------------------------------------------------------------------
-
-SIDES = (6.0, 4.0)
-# Pagano's ply.
-STIFF = Ply(1.0, 0.25, 25.0, 1.0, 0.5, 0.5, 0.2)
-CROSS = (0.0, 90.0, 0.0)
-
-
 def rectangle(along: int, patch: Patch, macros: Sequence[Macro], *others: Segment) -> Deck:
     """Build a simply supported [0/90]5s of the report's ply with MITC, pressed on a patch."""
     grid = Grid(uniform(SIDES[0], along), uniform(SIDES[1], along * 2 // 3))
@@ -256,9 +245,6 @@ def _equilibrium_shear() -> Sequence[Value]:
         return build_plate(made, generate(made)).laminate.shear.diagonal()
 
     return [shear(ONE, [0.0])[0] / ONE.g13, *shear(STIFF, CROSS)]
-
-
-# Stresses of plies -------------------------------------------------------------------------------
 
 
 def bent(
@@ -305,3 +291,116 @@ def _failure() -> Sequence[Value]:
     assert strengths is not None
     found = bent(named.ply, (0.0, 90.0, 90.0, 0.0), 0.01, "FAIL", strengths)
     return [1.0 / found[f"failure/{name}/exposure"].max() for name in ("max_stress", "tsai_wu")]
+
+
+def peak(found: Result) -> list[float]:
+    """Largest force, and its time."""
+    return [found.force.max(), found.time[found.force.argmax()]]
+
+
+@case
+def _rigid_target() -> Sequence[Value]:
+    """A plate of extreme stiffness and density."""
+    grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
+    ply = Ply(1.48e6, 0.3, 1.75e16, 1.75e16, 5e15, 5e15, 5e15)
+    plate, mass = decks.material(ply, (0.0, 90.0), 0.053), Projectile(0, 0, 2.0e-4)
+    law = decks.elastic(1.0e6)
+    found = decks.result_of(decks.struck_plate(grid, plate, mass, V, law, 2e-8, 9000))
+    touching = found.time[found.force > 0.0]
+    return [found.indentation.max(), found.force.max(), touching[-1], found.velocity[-1]]
+
+
+@case
+def _infinite_plate() -> Sequence[Value]:
+    """A thin plate of 12 x 12 in, stiff in shear; no reflection returns within 200 us."""
+    grid = Grid(uniform(12.0, 48), uniform(12.0, 48))
+    plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4, 13.0), [0.0], 0.1)
+    mass, law = Projectile(0, 0, 2.0e-5), decks.elastic(5.0e4)
+    found = decks.result_of(decks.struck_plate(grid, plate, mass, V, law, 5e-8, 4000))
+    return [*peak(found), found.velocity[-1]]
+
+
+@case
+def _supported_plate() -> Sequence[Value]:
+    """A quarter of the plate, with a quarter of mass and contact coefficient."""
+    plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.03)
+    hit = (Projectile(0, 0, 5.0e-6 / 4.0), Impact(1, 3, V), decks.elastic(1.0e5 / 4.0))
+    macros = decks.impact_program(8e-8, 2500)
+    found = decks.result_of(decks.quarter_plate(8, plate, macros, others=hit))
+    force, time = peak(found)
+    return [4.0 * force, time, found.plate_w.max(), found.velocity[-1]]
+
+
+@case
+def _report_impact() -> Sequence[Value]:
+    found = decks.result_of(decks.report_impact())
+    energy = found.energy
+    balance = float(np.abs(energy.balance_error).max()) / float(energy.attributes["initial"])
+    first = int(found.force[found.time < 500e-6].argmax())
+    return [
+        balance, _at(found, "force", 42e-6), _at(found, "force", 642e-6),
+        _at(found, "transducer", 642e-6), found.force[first], found.time[first], *peak(found),
+    ]  # fmt: skip
+
+
+def _at(result: Result, name: str, time: float) -> float:
+    """Value of a history at the step nearest to a time."""
+    values: Floats = result[f"history/{name}"]
+    return float(values[int(np.abs(result.time - time).argmin())])
+
+
+@case
+def _listing_impact() -> Sequence[Value]:
+    found = decks.result_of(decks.report_impact(500), "listing")
+    end = found.time[found.force > 0.0][-1]
+    return [_at(found, "force", 46e-6), _at(found, "transducer", 46e-6), end]
+
+
+@case
+def _convolution() -> Sequence[Value]:
+    made = decks.report_impact(1000)
+    problem = problem_of(made)
+    swept = carry_out(problem, plan(problem, [{"velocity": 60.0}], history=True)).force
+    if swept is None:
+        raise ValueError("the sweep has kept no forces")
+    slower = tuple(replace(s, velocity=60.0) if isinstance(s, Impact) else s for s in made.segments)
+    full = decks.result_of(replace(made, segments=slower)).force
+    return [np.abs(swept[0] - full).max() / full.max()]
+
+
+@case
+def _patch_impact() -> Sequence[Value]:
+    patch = Patch("DISC", 0.125, SIDES[0] / 2.0, SIDES[1] / 2.0)
+    middle = 97 * 32 + 49  # of 97 by 65 nodes
+    hit = (Projectile(0, 0, 0.000181), Impact(middle, 3, 115.0), decks.elastic(1.912e6))
+    return peak(decks.result_of(rectangle(48, patch, decks.impact_program(1.0e-7, 1250), *hit)))
+
+
+def struck_square(mass: float, end: float) -> Deck:
+    """Build a simply supported square of 0.256 kg, hit in the middle at 1 m/s, until a time."""
+    side, radius = 0.2, 0.002
+    sections = refined(side, 12, side / 2.0, 4.0, radius)
+    grid = Grid(sections, sections)
+    middle = grid.nearest(side / 2.0, side / 2.0)[0]
+    segments = (
+        decks.supports(grid, decks.SUPPORTED), Projectile(0, 0, mass), Impact(middle, 3, 1.0),
+        Patch("DISC", radius), decks.elastic(8.2641942e9), decks.MITC,
+        decks.material(decks.isotropic(240e9, 0.3, 1600.0), [0.0], 0.004),
+    )  # fmt: skip
+    made = decks.deck(grid, segments, ())
+    dt = rounded_time_step(critical_time_step(build_plate(made, generate(made))))
+    return replace(made, macros=decks.impact_program(dt, round(end / dt)))
+
+
+@case
+def _small_mass() -> Sequence[Value]:
+    model = infinite_plate(1.0, 1.0, 1.0, 1.0)
+    return [model.peak, model.time, decks.result_of(struck_square(0.0128, 3e-5)).force.max()]
+
+
+@case
+def _large_mass() -> Sequence[Value]:
+    (problem,) = load_deck(struck_square(1.0, 1e-6).to_text()).problems
+    assert problem.contact is not None
+    stiffness = static_stiffness(problem.moving_plate, problem.contact)
+    return [stiffness, static_plate(5.5, 2.0, 1e9, 2.5e6).peak]
