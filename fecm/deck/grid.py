@@ -6,7 +6,8 @@ import math
 import re
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import accumulate, pairwise
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,14 +74,8 @@ def graded(length: float, elements: int, centre: float, ratio: float) -> list[Se
         left = min(range(1, elements), key=unlike)
         steps = _series(centre, left, ratio)[::-1]
         steps += _series(length - centre, elements - left, ratio)
-    sections: list[Section] = []
-    start = total = 0.0
-    for number, step in enumerate(steps, start=1):
-        total += step
-        end = length if number == len(steps) else round_to(total, length)
-        sections.append(Section(start, end, 1))
-        start = end
-    return sections
+    inner = [round_to(total, length) for total in accumulate(steps[:-1])]
+    return [Section(start, end, 1) for start, end in pairwise([0.0, *inner, length])]
 
 
 def longest_at(sections: Sequence[Section], place: float) -> float:
@@ -145,13 +140,6 @@ def lines(sections: Sequence[Section]) -> list[float]:
     return [*found, sections[-1].end]
 
 
-def _edges(sections: Sequence[Section], side: float) -> tuple[int, int]:
-    """Numbers of the lines of nodes nearest to the edges of a window in the middle."""
-    places, length = np.array(lines(sections)), sections[-1].end
-    first, last = (np.abs(places - (length + d) / 2.0).argmin() for d in (-side, side))
-    return int(first), int(last)
-
-
 @frozen
 class Grid:
     """A grid of 9-node elements; node numbers run along x first."""
@@ -159,6 +147,7 @@ class Grid:
     # Sections along x and along y.
     columns: list[Section]
     rows: list[Section]
+    most_nodes: ClassVar[int] = 9  # nodes per element
 
     @property
     def across(self) -> int:
@@ -179,11 +168,6 @@ class Grid:
     def elements(self) -> int:
         """Number of elements."""
         return (self.across // 2) * (self.up // 2)
-
-    @property
-    def most_nodes(self) -> int:
-        """Nodes per element."""
-        return 9
 
     @property
     def extent(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -252,7 +236,11 @@ class Grid:
         for name, code in edges.items():
             np.maximum(parts[name], code, out=parts[name])
         if window is not None:
-            (left, right), (low, high) = map(_edges, (self.columns, self.rows), window)
+            left, right, low, high = (  # the lines of nodes nearest to the edges
+                int(np.abs(np.array(lines(part)) - (part[-1].end + distance) / 2.0).argmin())
+                for part, side in zip((self.columns, self.rows), window, strict=True)
+                for distance in (-side, side)
+            )
             across, up = slice(left, right + 1), slice(low, high + 1)
             for place in ((up, [left, right]), ([low, high], across)):
                 codes[place] = np.maximum(codes[place], HELD)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from fecm._frozen import frozen
 from fecm.deck.card import parse_real
@@ -18,8 +19,7 @@ NESTING = 64
 MOST_MACROS = 10**9  # a program of more macros would run for days
 
 
-@frozen
-class Word:
+class Word(NamedTuple):
     """A word of the macro language."""
 
     name: str  # up to four letters
@@ -109,14 +109,19 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
     for macro in macros:
         if findings.closed:
             return ()
-        known = WORDS.get(macro.word)
-        word = known or _unknown(macro, findings)
-        if word is None:
+        if (word := WORDS.get(macro.word)) is not None:
+            _check_unused(word, macro, findings)
+        elif (word := _closest(macro, findings)) is None:
             continue
-        if known is not None:
-            _check_unused(known, macro, findings)
         _check_value(word, macro, findings)
-        _check_order(word, macro, done, findings)
+        for require in word.needs:  # each missing word is reported once
+            choices = require.split("|")
+            if not done.intersection(choices):
+                names = " or ".join(choices)
+                message = f"{names} must come before {word.name}."
+                findings.add("E504", message, macro.place("macro"), f"put {names} before it")
+                done.add(choices[0])
+        done.add(word.name)
         if word.inside and not open_loops:
             message = f"{word.name} is outside any loop."
             findings.add("E513", message, macro.place("macro"), "put it between LOOP and NEXT")
@@ -143,12 +148,11 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
         findings.add("E502", message, head.place("macro"), hint)
     if open_loops:
         return ()
-    program = tuple(body)
-    _warn_of_stopped_clock(program, findings)
-    return program
+    _warn_of_stopped_clock(tuple(body), findings)
+    return tuple(body)
 
 
-def _unknown(macro: Macro, findings: Findings) -> Word | None:
+def _closest(macro: Macro, findings: Findings) -> Word | None:
     """Report an unknown word; return the closest known one, so that loops stay complete."""
     import difflib
 
@@ -157,18 +161,6 @@ def _unknown(macro: Macro, findings: Findings) -> Word | None:
     hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(WORDS)}, END"
     findings.add("E501", message, macro.place("macro"), hint)
     return WORDS[near[0]] if near else None
-
-
-def _check_order(word: Word, macro: Macro, done: set[str], findings: Findings) -> None:
-    """Report each missing word that must come before this one, once."""
-    for require in word.needs:
-        choices = require.split("|")
-        if not done.intersection(choices):
-            names = " or ".join(choices)
-            message = f"{names} must come before {word.name}."
-            findings.add("E504", message, macro.place("macro"), f"put {names} before it")
-            done.add(choices[0])
-    done.add(word.name)
 
 
 def _check_unused(word: Word, macro: Macro, findings: Findings) -> None:
@@ -219,11 +211,7 @@ def _warn_of_stopped_clock(body: Body, findings: Findings) -> None:
 
 def flat(body: Body) -> Iterator[Macro]:
     """Every macro once, in the order of the cards, without LOOP and NEXT."""
-    for item in body:
-        if isinstance(item, Loop):
-            yield from flat(item.body)
-        else:
-            yield item
+    return (macro for macro, *_ in _executed(body) if macro.word != "LOOP")
 
 
 def hits(body: Body) -> bool:
@@ -255,7 +243,15 @@ def estimate_work(body: Body) -> WorkEstimate:
     Exact, except that `contact_rows` is an upper bound where RODP cards differ in their number or
     are mixed with EXCD.
     """
-    macros, passes, steps = _entry(body, 1)
+    macros, passes, steps = 0, Counter[str](), Counter[int]()  # steps by RODP's number, 0 for EXCD
+    for macro, count, outer in _executed(body):
+        macros += count * outer
+        if macro.word in ("DISP", "STRE", "PLYS", "FAIL"):
+            passes[macro.word] += count // every(macro) * outer
+        elif macro.word in ("REAC", "EIGE"):
+            passes[macro.word] += count * outer * every(macro)
+        elif macro.word in STEPS:
+            steps[every(macro) if macro.word == "RODP" else 0] += count * outer
     total = sum(steps.values())
     impact = {n: count for n, count in steps.items() if n}
     if len(steps) == 1 and impact:
@@ -265,26 +261,11 @@ def estimate_work(body: Body) -> WorkEstimate:
     return WorkEstimate(macros, total, contact, passes)
 
 
-def _entry(body: Body, count: int) -> tuple[int, Counter[str], Counter[int]]:
-    """Macros, stored rows by word, and steps by RODP's number, of `count` consecutive passes.
-
-    Steps of EXCD count under 0.
-    """
-    macros, passes, steps = 0, Counter[str](), Counter[int]()
+def _executed(body: Body, count: int = 1, outer: int = 1) -> Iterator[tuple[Macro, int, int]]:
+    """Macros, passes of their loop, and of those around it together; LOOP stands for its NEXT."""
     for item in body:
         if isinstance(item, Loop):
-            inner, rows, taken = _entry(item.body, item.count)
-            macros += count * (inner + item.count)
-            passes.update({word: count * more for word, more in rows.items()})
-            steps.update({n: count * more for n, more in taken.items()})
-            continue
-        macros += count
-        if item.word in ("DISP", "STRE", "PLYS", "FAIL"):
-            passes[item.word] += count // every(item)
-        elif item.word == "REAC":
-            passes["REAC"] += count
-        elif item.word == "EIGE":
-            passes["EIGE"] += count * every(item)
-        elif item.word in STEPS:
-            steps[every(item) if item.word == "RODP" else 0] += count
-    return macros, passes, steps
+            yield from _executed(item.body, item.count, outer * count)
+            yield item.macro, item.count, outer * count
+        else:
+            yield item, count, outer

@@ -8,9 +8,9 @@ and elements between them.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from textwrap import shorten
-from typing import ClassVar, Self, TypeVar
+from typing import ClassVar, Generic, Self, TypeVar
 
 from fecm._frozen import frozen
 from fecm._tables import html_table
@@ -35,6 +35,7 @@ TITLE = "FECM"
 STOP = "STOP"
 # First fields of a card of a node.
 NODE = ("I5 node", "I5 increment|incr")
+_R = TypeVar("_R", bound=Record)
 _S = TypeVar("_S", bound="Segment")
 
 
@@ -55,10 +56,10 @@ class Segment(Record):
 
 
 @frozen
-class NumberedSegment(Segment):
+class NumberedSegment(Segment, Generic[_R]):
     """A segment of any number of cards, ended by a blank one."""
 
-    records: tuple[Record, ...]
+    records: tuple[_R, ...]
     record: ClassVar[type[Record]]
 
     def __init_subclass__(cls, keyword: str, record: type[Record]) -> None:
@@ -68,6 +69,17 @@ class NumberedSegment(Segment):
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
         """Fields of a card."""
+        match cls.keyword:
+            case "COOR":
+                axes = AXES[: control.ndm]
+                return layout(*NODE, *(f"F10 {axis}-coordinate|{axis}" for axis in axes))
+            case "ELEM":
+                nodes = (f"I5 node {i + 1}|n{i + 1}" for i in range(control.nen))
+                return layout("I5 element|elm", *nodes, "I5 increment|incr")
+            case "BOUN":
+                return layout(*NODE, *(f"I5 code {i + 1}|c{i + 1}" for i in range(control.ndf)))
+            case "FORC":
+                return layout(*NODE, *(f"F10 value {i + 1}" for i in range(control.ndf)))
         return cls.record.fields
 
     def cards(self, control: Control) -> Iterator[str]:
@@ -80,52 +92,23 @@ class NumberedSegment(Segment):
 
 
 @frozen
-class Coordinates(NumberedSegment, keyword="COOR", record=NodeValues):
+class Coordinates(NumberedSegment[NodeValues], keyword="COOR", record=NodeValues):
     """COOR: (2I5,7F10.0); coordinates of the nodes (length), of which NDM are used."""
 
-    records: tuple[NodeValues, ...]
-
-    @classmethod
-    def card_fields(cls, control: Control) -> Fields:
-        """Fields of a card."""
-        return layout(*NODE, *(f"F10 {axis}-coordinate|{axis}" for axis in AXES[: control.ndm]))
-
 
 @frozen
-class Elements(NumberedSegment, keyword="ELEM", record=ElementNodes):
+class Elements(NumberedSegment[ElementNodes], keyword="ELEM", record=ElementNodes):
     """ELEM: (16I5); nodes of the elements; the increment follows the last of the NEN nodes."""
 
-    records: tuple[ElementNodes, ...]
-
-    @classmethod
-    def card_fields(cls, control: Control) -> Fields:
-        """Fields of a card."""
-        nodes = (f"I5 node {i + 1}|n{i + 1}" for i in range(control.nen))
-        return layout("I5 element|elm", *nodes, "I5 increment|incr")
-
 
 @frozen
-class Boundary(NumberedSegment, keyword="BOUN", record=NodeCodes):
+class Boundary(NumberedSegment[NodeCodes], keyword="BOUN", record=NodeCodes):
     """BOUN: (16I5); restraint codes of the nodes; a dof with a code other than 0 is restrained."""
 
-    records: tuple[NodeCodes, ...]
-
-    @classmethod
-    def card_fields(cls, control: Control) -> Fields:
-        """Fields of a card."""
-        return layout(*NODE, *(f"I5 code {i + 1}|c{i + 1}" for i in range(control.ndf)))
-
 
 @frozen
-class Forces(NumberedSegment, keyword="FORC", record=NodeValues):
+class Forces(NumberedSegment[NodeValues], keyword="FORC", record=NodeValues):
     """FORC: (2I5,7F10.0); nodal forces, or displacements where the dof is restrained."""
-
-    records: tuple[NodeValues, ...]
-
-    @classmethod
-    def card_fields(cls, control: Control) -> Fields:
-        """Fields of a card."""
-        return layout(*NODE, *(f"F10 value {i + 1}" for i in range(control.ndf)))
 
 
 @frozen
@@ -244,15 +227,6 @@ class Patch(Segment, keyword="PATC"):
         "F10 static load|load",
     )  # fmt: skip
 
-    @classmethod
-    def from_row(cls, values: Sequence[Value], source: Source) -> Self:
-        """Build the segment from the card's values."""
-        return super().from_row([str(values[0]).upper(), *values[1:]], source)
-
-    def row(self) -> list[Value]:
-        """Values in the card's order; None is a blank."""
-        return ["" if value is None else value for value in super().row()]
-
 
 @frozen
 class Shear(Segment, keyword="SHEA"):
@@ -303,19 +277,12 @@ class Allowables(Segment, keyword="ALLO"):
     constants: ClassVar[Fields] = layout("F10? F12*", "F10? p+", "F10? p-")
 
     @classmethod
-    def from_row(cls, values: Sequence[Value], source: Source) -> Self:
-        """Build the segment from its first card."""
-        *given, s12, s13, s23 = values
+    def from_row(cls, values: Sequence[Value], source: Source | None) -> Self:
+        """Build the segment from its first card or from both."""
+        *given, s12, s13, s23 = values[:7]
         s13 = s12 if s13 == "" else s13
         s23 = s13 if s23 == "" else s23
-        return cls(*map(float, (*given, s12, s13, s23)), source=source)
-
-    def with_constants(self, values: Sequence[Value]) -> Self:
-        """Return the segment with the values of its second card; a blank keeps the default."""
-        defaults = (self.f12, self.p_plus, self.p_minus)
-        read = zip(values, defaults, strict=True)
-        f12, p_plus, p_minus = (old if value == "" else float(value) for value, old in read)
-        return replace(self, f12=f12, p_plus=p_plus, p_minus=p_minus)
+        return super().from_row([*given, s12, s13, s23, *values[7:]], source)
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
@@ -345,10 +312,8 @@ class Damping(Segment, keyword="DAMP"):
 
 
 @frozen
-class Gages(NumberedSegment, keyword="GAGE", record=Gage):
+class Gages(NumberedSegment[Gage], keyword="GAGE", record=Gage):
     """GAGE: strain gages, read at every step (not in the report's program)."""
-
-    records: tuple[Gage, ...]
 
 
 @frozen
@@ -445,8 +410,7 @@ class Deck(Record):
         LookupError
             If the deck has none.
         """
-        segment = self.last(kind)
-        if segment is None:
+        if (segment := self.last(kind)) is None:
             raise LookupError(f"the deck has no {kind.keyword} segment")
         return segment
 

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import BinaryIO, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 from fecm._memory import NotEnoughMemoryError, available, format_bytes, require
 from fecm.deck import model, records
@@ -368,7 +368,7 @@ class Reader(Stream):
             self.findings.add("E007", message, (following or head).place, hint)
         return tuple(found)
 
-    def _numbered(self, head: Card, kind: type[model.NumberedSegment]) -> Segment:
+    def _numbered(self, head: Card, kind: type[model.NumberedSegment[Any]]) -> Segment:
         cards = self._records(head, kind.record, kind.card_fields(self._control))
         return kind(cards, source=Source(head, ()))
 
@@ -389,7 +389,8 @@ class Reader(Stream):
         card = self.peek()
         if card is not None and card.keyword not in (*READERS, END):
             self.take()
-            return self.record(card, model.Patch)
+            patch = self.record(card, model.Patch)
+            return patch and replace(patch, shape=patch.shape.upper())
         message = "A card of PATC is missing."
         hint = "a blank card takes a disc of 0.327 times the thickness at the node of ROD"
         self.findings.add("E008", message, (card or head).place, hint)
@@ -399,9 +400,9 @@ class Reader(Stream):
         strengths = self._single(head, model.Allowables)
         card = self.take_data()
         row = None if card is None else self.row(card, model.Allowables.constants)
-        if strengths is None or (card is not None and row is None):
-            return None
-        return strengths if row is None else strengths.with_constants(row[0])
+        if card is None or row is None or strengths is None:
+            return strengths if card is None else None
+        return model.Allowables.from_row([*strengths.row()[:7], *row[0]], strengths.source)
 
     def _shear(self, head: Card) -> Segment | None:
         words = head.data.replace(",", " ").upper().split()[1:]

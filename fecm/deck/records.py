@@ -43,7 +43,7 @@ class Record:
     optional: ClassVar[int] = 0  # number of last values that are not written where they are 0
 
     @classmethod
-    def from_row(cls, values: Sequence[Value], source: Source) -> Self:
+    def from_row(cls, values: Sequence[Value], source: Source | None) -> Self:
         """Build the record from a card's values; ``""`` takes the attribute's default."""
         arguments: list[Any] = list(values)
         if cls.packed is not None:
@@ -55,11 +55,11 @@ class Record:
         return cls(**given, source=source)
 
     def row(self) -> list[Value]:
-        """Values in the card's order."""
+        """Values in the card's order; None is a blank."""
         row: list[Value] = []
         for attribute in dataclasses.fields(self)[1:]:  # the first is the source
             value = getattr(self, attribute.name)
-            row += value if isinstance(value, tuple) else (value,)
+            row += value if isinstance(value, tuple) else ("" if value is None else value,)
         return row
 
     def to_card(self, fields: Fields | None = None) -> str:

@@ -27,9 +27,7 @@ DENSITY = "force*time^2/length^4"
 def unit_names(deck: Deck) -> dict[str, str]:
     """Names of the units of length, force and time; empty where the deck gives none."""
     units = deck.last(Units)
-    if units is None:
-        return {}
-    return {"length": units.length, "force": units.force, "time": units.time}
+    return {} if units is None else {name: getattr(units, name) for name in Units.NAMES}
 
 
 def unit_of(dimension: str, names: dict[str, str]) -> str:
