@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import field
+from itertools import compress
 from textwrap import shorten
 from typing import ClassVar, Generic, Self, TypeVar
 
@@ -244,10 +245,13 @@ class Shear(Segment, keyword="SHEA"):
     fields: ClassVar[Fields] = layout("F10 shear correction factor|factor")
     WORDS: ClassVar[tuple[str, ...]] = ("MITC", "EQUI")
 
+    def words(self) -> list[str]:
+        """Words of the keyword card."""
+        return list(compress(self.WORDS, (self.assumed, self.equilibrium)))
+
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards; with a word the factor's card may be missing."""
-        given = (self.assumed, self.equilibrium)
-        words = [word for word, used in zip(self.WORDS, given, strict=True) if used]
+        words = self.words()
         yield " ".join([self.keyword, *words])
         if not words or self.factor != 1.0:
             yield write_card(self.fields, [self.factor])

@@ -131,18 +131,36 @@ class Problem:
 
     @cached_property
     def patch(self) -> ContactPatch | None:
-        """Contact patch; None without a PATC segment."""
-        return contact_patch(self.deck, self.mesh)
+        """Contact patch of a sound mesh; None without a PATC segment.
+
+        Raises PatchError if the patch is not entirely on the plate.
+        """
+        card = self.deck.last(model.Patch)
+        if card is None:
+            return None
+        radius = card.radius
+        if radius is None:
+            thickness = self.deck.require(model.Material).integration.thickness
+            radius = RADIUS_PER_THICKNESS[card.shape] * thickness
+        x, y = (card.x, card.y) if card.x is not None and card.y is not None else self._struck
+        weights = patch_weights(self.mesh, card.shape, radius, x, y)
+        images = half_turn_images(self.mesh.coordinates)
+        if images is not None and np.allclose(weights, weights[images], 0.0, 1e-12):
+            weights = (weights + weights[images]) / 2.0  # exactly symmetric
+        free = np.where(self.mesh.codes[:, W] == 0, weights, 0.0)
+        return ContactPatch(card.shape, radius, x, y, free)
+
+    @property
+    def _struck(self) -> tuple[float, float]:
+        x, y = self.mesh.coordinates[self.deck.require(model.Impact).node - 1].tolist()
+        return x, y
 
     @cached_property
     def load_place(self) -> tuple[float, float] | None:
         """Centre of the patch, or the impact node; None without either."""
         if self.patch is not None:
             return self.patch.x, self.patch.y
-        if not self.has_impact:
-            return None
-        x, y = self.mesh.coordinates[self.deck.require(model.Impact).node - 1].tolist()
-        return x, y
+        return self._struck if self.has_impact else None
 
     @cached_property
     def distances(self) -> Floats:
@@ -197,34 +215,22 @@ class Problem:
         """Number of macros, steps and stored rows."""
         return estimate_work(self.program)
 
-    @property
-    def _ply_values(self) -> int:
-        """Number of values that PLYS stores at a time."""
-        cards = [macro for macro in flat(self.program) if macro.word == "PLYS"]
-        count = (int(cards[0].second) if cards else 0) or self.deck.control.numel
-        layers = len(self.deck.require(model.Material).layers)
-        return count * (layers * (6 * len(self.rules[2].xi) + 6) + 2)
-
-    @property
-    def _failure_states(self) -> int:
-        """Number of points, plies and faces at which FAIL keeps exposures."""
-        layers = len(self.deck.require(model.Material).layers)
-        return self.deck.control.numel * len(self.rules[2].xi) * layers * 2
-
     @cached_property
     def output_bytes(self) -> int:
         """Size of the result's large datasets."""
         control, work = self.deck.control, self.work
-        points = control.numel * len(self.rules[2].xi)
-        segment = self.deck.last(model.Gages)
-        gages = 0 if segment is None else len(segment.records)
-        field = control.numnp * control.ndf
+        an_element = len(self.rules[2].xi)
+        points, field = control.numel * an_element, control.numnp * control.ndf
+        gages = len(segment.records) if (segment := self.deck.last(model.Gages)) else 0
+        layers = len(self.deck.require(model.Material).layers)
+        chosen = next((int(m.second) for m in flat(self.program) if m.word == "PLYS"), 0)
+        plies = (chosen or control.numel) * (layers * (6 * an_element + 6) + 2)
         return 8 * (
             work.passes["DISP"] * (field + control.numnp)
             + work.passes["STRE"] * points * 16
             + (work.passes["REAC"] + work.passes["EIGE"]) * field
-            + work.passes["PLYS"] * self._ply_values
-            + min(1, work.passes["FAIL"]) * 9 * self._failure_states
+            + work.passes["PLYS"] * plies
+            + min(1, work.passes["FAIL"]) * 9 * points * layers * 2  # both faces of a ply
             + work.contact_rows * (points * 5 + 8)
             + work.steps * (18 + gages + bool(self.damping))
         )
@@ -260,29 +266,6 @@ def rules(material: model.Material) -> tuple[Quadrature, Quadrature, Quadrature]
     bending, shear = (min(HIGHEST_ORDER, max(1, n)) for n in (card.bending, card.shear))
     points = gauss(card.points) if card.points > 0 else nodal(-card.points)
     return gauss(bending), gauss(shear), points
-
-
-def contact_patch(deck: Deck, mesh: Mesh) -> ContactPatch | None:
-    """Return the contact patch of a deck on a sound mesh; None without a PATC segment.
-
-    Raises PatchError if the patch is not entirely on the plate.
-    """
-    card = deck.last(model.Patch)
-    if card is None:
-        return None
-    radius = card.radius
-    if radius is None:
-        thickness = deck.require(model.Material).integration.thickness
-        radius = RADIUS_PER_THICKNESS[card.shape] * thickness
-    if card.x is None or card.y is None:
-        x, y = mesh.coordinates[deck.require(model.Impact).node - 1].tolist()
-    else:
-        x, y = card.x, card.y
-    weights = patch_weights(mesh, card.shape, radius, x, y)
-    images = half_turn_images(mesh.coordinates)
-    if images is not None and np.allclose(weights, weights[images], 0.0, 1e-12):
-        weights = (weights + weights[images]) / 2.0  # exactly symmetric
-    return ContactPatch(card.shape, radius, x, y, np.where(mesh.codes[:, W] == 0, weights, 0.0))
 
 
 def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> PlateModel:
@@ -348,32 +331,12 @@ def build_law(deck: Deck, slips: frozenset[str] = frozenset()) -> HystereticLaw 
     return ListingLaw(constants) if "reload" in slips else HystereticLaw(constants)
 
 
-def build_plies(problem: Problem, plate: PlateModel) -> PlyStresses | None:
-    """Build the elements whose ply stresses PLYS stores: the M nearest to the load, or all."""
-    card = next((macro for macro in flat(problem.program) if macro.word == "PLYS"), None)
-    if card is None:
-        return None
-    nearest = np.sort(problem.by_distance[: int(card.second) or None])
-    return PlyStresses(problem.mesh, plate.laminate, problem.rules[2], nearest)
-
-
-def build_failure(
-    problem: Problem, plate: PlateModel, kind: type[FailureMonitor] = FailureMonitor
-) -> FailureMonitor | None:
-    """Build the failure criteria of FAIL, of all elements."""
-    if all(macro.word != "FAIL" for macro in flat(problem.program)):
-        return None
-    stresses = PlyStresses(problem.mesh, plate.laminate, problem.rules[2])
-    return kind(stresses, plate.laminate, problem.deck.require(model.Allowables))
-
-
 def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactModel:
     """Build the model of a checked problem, with its own plate unless a slip changes that."""
     chosen = options or RunOptions()
     deck, slips, method = problem.deck, chosen.slips, chosen.rod_method
     rod = build_projectile(deck, slips).with_mass(method.mass)
-    contact, share = problem.contact, 1.0
-    mesh = problem.mesh
+    contact, share, mesh = problem.contact, 1.0, problem.mesh
     if contact is not None and "rod-force" in slips:
         card = deck.require(model.Impact)
         hit = card.node - 1, card.dof - 1
@@ -406,8 +369,15 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         impact = ImpactSystem(motion, rod, law, conditions, STEPS[method.integrator])
     compiled = motion.solver == KERNELS
     stress_points = plate.strain_field(problem.rules[2])
-    plies = build_plies(problem, plate)
-    failure = build_failure(problem, plate, CompiledMonitor if compiled else FailureMonitor)
+    plies = failure = None
+    words = {macro.word: macro for macro in flat(problem.program)}
+    of_plate = problem.mesh, plate.laminate, problem.rules[2]
+    if "PLYS" in words:  # the M elements nearest to the load, or all
+        nearest = problem.by_distance[: int(words["PLYS"].second) or None]
+        plies = PlyStresses(*of_plate, np.sort(nearest))
+    if "FAIL" in words:
+        kind = CompiledMonitor if compiled else FailureMonitor
+        failure = kind(PlyStresses(*of_plate), plate.laminate, deck.require(model.Allowables))
     places = stress_points.places(mesh.coordinates) if plies or failure else None
     cards, transposed = deck.last(model.Gages), plate.rules.transposed_jacobian
     read = None if cards is None else gages(mesh, cards.records, transposed_jacobian=transposed)

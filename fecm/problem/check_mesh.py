@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from fecm.deck import model
 from fecm.deck.findings import Findings, Place
-from fecm.deck.records import Integration
 from fecm.mechanics import assumed_shear, interpolation
 from fecm.mechanics.elements import CUBIC, HIGHEST_ORDER, TRIANGLE
 from fecm.mechanics.mesh import ElementBlock, Mesh, distinct, element_blocks, holds_the_plane
@@ -194,16 +193,6 @@ def check_support(deck: model.Deck, mesh: Mesh, findings: Findings) -> None:
         findings.add("W319", message, None if segment is None else segment.place(), hint)
 
 
-def _loads_a_node(deck: model.Deck, mesh: Mesh, *, supported: bool) -> bool:
-    """Whether a force on single nodes excites their checkerboard: an impact's, or FORC's.
-
-    A supported plate is excited by the short waves of an impact only.
-    """
-    words = {macro.word for macro in deck.macros}
-    loaded = int(np.count_nonzero(mesh.forces[:, W]))
-    return "RODP" in words or (not supported and "EXCD" in words and 0 < loaded <= FEW_LOADED)
-
-
 def _check_shapes(deck: model.Deck, mesh: Mesh, findings: Findings, *, listing: bool) -> None:
     """Check Jacobians at every quadrature point, lumped masses and zero-energy modes."""
     material = deck.last(model.Material)
@@ -239,22 +228,19 @@ def _check_shapes(deck: model.Deck, mesh: Mesh, findings: Findings, *, listing: 
         message = f"Under the bending order L1 = {card.bending} nodes of {nodes} have no mass."
         hint = "elements with mid-side nodes take L1 = 2 or more"
         findings.add("E315", message, card.place("bending order L1"), hint)
-    supported = bool((mesh.equations[:, W] == 0).any())
     if not listing:
-        nodal = _loads_a_node(deck, mesh, supported=supported)
-        _check_shear(material, families, supported, nodal, has_assumed_shear(deck), findings)
+        _check_shear(deck, mesh, families, findings)
 
 
-def _check_shear(
-    material: model.Material,
-    families: Blocks,
-    supported: bool,
-    nodal: bool,
-    assumed: bool,
-    findings: Findings,
-) -> None:
+def _check_shear(deck: model.Deck, mesh: Mesh, families: Blocks, findings: Findings) -> None:
     """Find zero-energy modes of the transverse shear's quadrature, and elements that lock."""
+    material = deck.require(model.Material)
     card, order = material.integration, math.isqrt(len(rules(material)[1].xi))
+    assumed, supported = has_assumed_shear(deck), bool((mesh.equations[:, W] == 0).any())
+    # An impact's force on single nodes excites their checkerboard, FORC's only a free plate's.
+    words = {macro.word for macro in deck.macros}
+    few = 0 < np.count_nonzero(mesh.forces[:, W]) <= FEW_LOADED
+    nodal = "RODP" in words or (not supported and "EXCD" in words and few)
     weak: dict[int, list[str]] = {}
     for family in families:
         name, free, held = _orders_without_motions(family)
@@ -264,7 +250,15 @@ def _check_shear(
             hint = "use L2 = 1 and support the plate, or elements with mid-side nodes"
             findings.add("W320", message, card.place("shear order L2"), hint)
         if name == NINE_NODES and held <= order < free and nodal:
-            _report_hourglass(card, supported, findings)
+            what = f"Under the shear order L2 = {card.shear} a force on single nodes excites"
+            what = f"{what} a checkerboard motion of the 9-node elements, which"
+            place, hint = card.place("shear order L2"), "take L2 = 3"
+            if supported:
+                findings.add("W322", f"{what} only the supports resist.", place, hint)
+            else:
+                message = f"{what} nothing resists in a plate without supports."
+                hint += "; --force runs the deck nevertheless"
+                findings.add(HOURGLASS, message, place, hint)
         elif order < (held if supported else free):
             weak.setdefault(free, []).append(name)
     if weak:
@@ -273,19 +267,6 @@ def _check_shear(
         named = " and ".join(names)
         message = f"The shear order L2 = {card.shear} leaves {named} motions without energy{rest}"
         findings.add("W316", message, card.place("shear order L2"), f"take L2 = {max(weak)}")
-
-
-def _report_hourglass(card: Integration, supported: bool, findings: Findings) -> None:
-    message = (
-        f"Under the shear order L2 = {card.shear} a force on single nodes excites a checkerboard "
-        "motion of the 9-node elements, which "
-    )
-    place = card.place("shear order L2")
-    if supported:
-        findings.add("W322", f"{message}only the supports resist.", place, "take L2 = 3")
-    else:
-        message += "nothing resists in a plate without supports."
-        findings.add(HOURGLASS, message, place, "take L2 = 3; --force runs the deck nevertheless")
 
 
 def _orders_without_motions(family: ElementBlock) -> tuple[str, int, int]:
@@ -315,11 +296,9 @@ def check_listing(deck: model.Deck, mesh: Mesh, findings: Findings) -> None:
     other = np.flatnonzero((present != present[:1]).any(axis=1))
     if len(other):
         number = int(other[0]) + 1
-        message = (
-            f"Element {number} has other nodes than element 1 ({present[number - 1].sum()} against "
-            f"{present[0].sum()}): the printed program takes element 1's node list for the mass of "
-            "every element."
-        )
+        counts = f"{present[number - 1].sum()} against {present[0].sum()}"
+        why = "the printed program takes element 1's node list for the mass of every element"
+        message = f"Element {number} has other nodes than element 1 ({counts}): {why}."
         findings.add("E601", message, place_of_element(deck, number), ANOTHER_MODE)
     material = deck.require(model.Material)
     if len(material.layers) > LISTING_LAYERS:
@@ -332,8 +311,6 @@ def check_listing(deck: model.Deck, mesh: Mesh, findings: Findings) -> None:
         if (segment := deck.last(kind)) is not None:
             words.append((kind.keyword, segment.place()))
     if (shear := deck.last(model.Shear)) is not None:
-        given = (shear.assumed, shear.equilibrium)
-        used = [word for word, is_given in zip(model.Shear.WORDS, given, strict=True) if is_given]
-        words += [(f"SHEA {word}", shear.place()) for word in used]
+        words += [(f"SHEA {word}", shear.place()) for word in shear.words()]
     for word, place in words:
         findings.add("E603", f"The printed program has no {word}.", place, ANOTHER_MODE)

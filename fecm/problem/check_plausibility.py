@@ -7,13 +7,14 @@ time step of plate and contact is found here.
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 
 import numpy as np
 
 from fecm._frozen import frozen
 from fecm.deck import model
 from fecm.deck.findings import Findings, Place
-from fecm.deck.records import Layer, Ply, Record
+from fecm.deck.records import Record
 from fecm.deck.units import in_si, unit_names
 from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.mesh import Mesh, distinct
@@ -45,17 +46,10 @@ REAL = {
 }
 
 
-# Kind in REAL, card, name and value of a field.
-Value = tuple[str, Record, str, float]
-
-
 def check_plausibility(problem: Problem, findings: Findings) -> None:
     """Warn of values that no real plate or impact has."""
     deck, mesh, hits = problem.deck, problem.mesh, problem.has_impact
-    material = deck.require(model.Material)
-    _check_ply(material.ply, findings)
-    _check_angles(material.layers, findings)
-    _check_thickness(material, mesh, findings)
+    _check_material(deck.require(model.Material), mesh, findings)
     _check_units(deck, findings, hits=hits)
     if hits:
         _check_law(deck, findings)
@@ -63,7 +57,8 @@ def check_plausibility(problem: Problem, findings: Findings) -> None:
         _check_projectile(deck, problem.plate, findings)
 
 
-def _check_ply(ply: Ply, findings: Findings) -> None:
+def _check_material(material: model.Material, mesh: Mesh, findings: Findings) -> None:
+    ply = material.ply
     ratio = ply.e1 / ply.e2
     if ratio < 0.5:
         why = "E1 is the modulus along the fibres"
@@ -78,31 +73,20 @@ def _check_ply(ply: Ply, findings: Findings) -> None:
         message = f"Poisson's ratio NU12 = {nu:g} looks like NU21: {why}."
         hint = "NU12 is the contraction across the fibres under a stress along them"
         findings.add("W434", message, place, hint)
-
-
-def _check_angles(layers: tuple[Layer, ...], findings: Findings) -> None:
-    for layer in layers:
+    for layer in material.layers:
         if abs(layer.angle) > 180.0:
             message = f"The fibre angle {layer.angle:g} is beyond 180 degrees."
             hint = "angles are in degrees, counter-clockwise from the x-axis"
             findings.add("W431", message, layer.place("fibre angle"), hint)
-    turned = [layer for layer in layers if layer.angle]
-    if turned and all(_is_radian(layer.angle) for layer in turned):
-        shown = ", ".join(
-            f"{angle:g} is {math.degrees(angle):.0f} degrees"
-            for angle in dict.fromkeys(layer.angle for layer in turned[:8])
-        )
+    turned = [layer for layer in material.layers if layer.angle]
+    angles = np.abs([layer.angle for layer in turned])
+    fives = np.degrees(angles) / 5.0  # of multiples of 5 degrees up to 90 in radians
+    like_radians = (angles > 0.08) & (angles <= 1.6) & (np.abs(fives - np.rint(fives)) < 0.08)
+    if turned and like_radians.all():
+        known = dict.fromkeys(layer.angle for layer in turned[:8])
+        shown = ", ".join(f"{angle:g} is {math.degrees(angle):.0f} degrees" for angle in known)
         message = f"The fibre angles look like radians: {shown}."
         findings.add("W432", message, turned[0].place("fibre angle"), "angles are in degrees")
-
-
-def _is_radian(angle: float) -> bool:
-    """Whether an angle is a multiple of 5 degrees up to 90 in radians."""
-    multiple = math.degrees(abs(angle)) / 5.0
-    return 0.08 < abs(angle) <= 1.6 and abs(multiple - round(multiple)) < 0.08
-
-
-def _check_thickness(material: model.Material, mesh: Mesh, findings: Findings) -> None:
     thickness = material.integration.thickness
     side = float(np.ptp(mesh.coordinates, axis=0).max())
     if not THINNEST * side <= thickness <= THICKEST * side:
@@ -165,11 +149,12 @@ def _check_projectile(deck: model.Deck, plate: PlateModel, findings: Findings) -
         findings.add("W440", message, impact.place("impact velocity"), hint)
 
 
-def _values(deck: model.Deck, *, hits: bool) -> list[Value]:
-    """Values that :data:`REAL` has a range for."""
+def _check_units(deck: model.Deck, findings: Findings, *, hits: bool) -> None:
+    """Warn in one finding of values that no real material has in the units of UNIT."""
     material = deck.require(model.Material)
     ply, layer = material.ply, max(material.layers, key=lambda layer: layer.thickness)
-    values: list[Value] = [
+    # Kind in REAL, card, name and value of a field.
+    values: list[tuple[str, Record, str, float]] = [
         ("density", ply, "mass density", ply.density),
         ("fibre modulus", ply, "Young's modulus E1", ply.e1),
         ("matrix modulus", ply, "Young's modulus E2", ply.e2),
@@ -178,24 +163,17 @@ def _values(deck: model.Deck, *, hits: bool) -> list[Value]:
         ("matrix modulus", ply, "shear modulus G23", ply.g23),
         ("ply thickness", layer, "layer thickness", layer.thickness),
     ]
-    if not hits:
-        return values
-    impact, law = deck.require(model.Impact), deck.require(model.Indentation)
-    card = deck.last(model.Projectile)
-    if impact.velocity > 0.0:
-        values.append(("velocity", impact, "impact velocity", impact.velocity))
-    values.append(("contact coefficient", law, law.names()[0], law.k))
-    if card is not None and card.elements:
-        values.append(("rod modulus", card, "rod's Young's modulus", card.modulus))
-        values.append(("density", card, "rod's density", card.density))
-    return values
-
-
-def _check_units(deck: model.Deck, findings: Findings, *, hits: bool) -> None:
-    """Warn in one finding of values that no real material has in the units of UNIT."""
+    if hits:
+        impact, law = deck.require(model.Impact), deck.require(model.Indentation)
+        if impact.velocity > 0.0:
+            values.append(("velocity", impact, "impact velocity", impact.velocity))
+        values.append(("contact coefficient", law, law.names()[0], law.k))
+        if (card := deck.last(model.Projectile)) is not None and card.elements:
+            values.append(("rod modulus", card, "rod's Young's modulus", card.modulus))
+            values.append(("density", card, "rod's density", card.density))
     names = unit_names(deck)
     wrong: list[tuple[Place | None, str]] = []
-    for kind, record, name, value in _values(deck, hits=hits):
+    for kind, record, name, value in values:
         dimension, least, greatest, unit = REAL[kind]
         factor = in_si(dimension, names)
         if factor is not None and not least <= value * factor <= greatest:
@@ -338,8 +316,7 @@ def contact_step(
     step = dt or SAFE * bound
     if step < iterated and (step / bound) ** 2 + step**2 * stiffness / (4.0 * at_node) < 1.0:
         return ContactStep(stiffness, mass, math.inf)
-    try:
-        critical = critical_time_step(plate, (weights, stiffness))
-    except UnsoundPlateError:  # the contact's stiffness is out of range
-        critical = iterated
-    return ContactStep(stiffness, mass, min(iterated, critical))
+    limit = iterated
+    with suppress(UnsoundPlateError):  # the contact's stiffness is out of range
+        limit = min(iterated, critical_time_step(plate, (weights, stiffness)))
+    return ContactStep(stiffness, mass, limit)

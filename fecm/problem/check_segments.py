@@ -6,12 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecm._frozen import frozen
 from fecm.deck import model
 from fecm.deck.findings import Findings
-from fecm.deck.records import Integration, Ply
 from fecm.deck.units import KNOWN, in_si, unit_names
 from fecm.mechanics.contact_law import ACR_POWER
 from fecm.mechanics.elements import HIGHEST_ORDER
@@ -100,21 +98,18 @@ def check_projectile(projectile: model.Projectile, findings: Findings) -> None:
         if not record.diameter > 0.0:
             what = f"The diameter of rod element {record.element} is {record.diameter:g}"
             findings.add("E422", f"{what}; it must be positive.", record.place("diameter"))
-    if findings.error_count == before and not _is_computable(projectile, diameters):
-        message = "The rod's mass or stiffness is beyond the range of numbers."
-        hint = "check the units of length, diameters, modulus and density"
-        findings.add("E429", message, projectile.place("length or mass"), hint)
-
-
-def _is_computable(projectile: model.Projectile, diameters: NDArray[np.float64]) -> bool:
-    """Whether mass and stiffness of every dof of a rod are positive and finite."""
+    if findings.error_count > before:
+        return
     rod = Rod(projectile.size, tuple(diameters.tolist()), projectile.modulus, projectile.density)
     try:
         with np.errstate(all="ignore"):
             values = np.concatenate([rod.lumped_mass(), rod.stiffness().diagonal()])
     except OverflowError:
-        return False
-    return bool(((values > 0.0) & np.isfinite(values)).all())
+        values = np.array([np.inf])
+    if not ((values > 0.0) & np.isfinite(values)).all():
+        message = "The rod's mass or stiffness is beyond the range of numbers."
+        hint = "check the units of length, diameters, modulus and density"
+        findings.add("E429", message, projectile.place("length or mass"), hint)
 
 
 def check_gages(segment: model.Gages, mesh: Mesh, deck: model.Deck, findings: Findings) -> None:
@@ -136,9 +131,8 @@ def check_gages(segment: model.Gages, mesh: Mesh, deck: model.Deck, findings: Fi
         if not any(len(locate(family, point)[0]) for family in families):
             message = f"Gage {record.number} at ({record.x:g}, {record.y:g}) is not on the plate."
             findings.add("E424", message, record.place("gage's x"))
-        material = deck.last(model.Material)
-        half = 0.0 if material is None else material.integration.thickness / 2.0
-        if material is not None and abs(record.z) > half * (1.0 + 1e-9):
+        half = deck.require(model.Material).integration.thickness / 2.0
+        if abs(record.z) > half * (1.0 + 1e-9):
             what = f"Gage {record.number} at z = {record.z:g} is outside the laminate"
             message = f"{what}, whose faces are at {half:g} from the mid-plane."
             findings.add("W426", message, record.place("gage's z"))
@@ -188,20 +182,20 @@ def warn_of_the_reports_rod(deck: model.Deck, findings: Findings) -> None:
 
 def check_law(law: model.Indentation, findings: Findings) -> None:
     """Check an EXPE segment."""
-    rules = [(law.k > 0.0, "positive")]
+    rules = (
+        (law.k > 0.0, "positive"),
+        (law.alpha_p >= 0.0, "0 or more"),
+        (0.0 <= law.s_p < 1.0, "at least 0 and below 1"),
+        (law.q > 0.0, "positive"),
+    )
     if law.word == model.Indentation.ACR:
         power = law.q in (0.0, ACR_POWER)
-        rules += [
+        rules = (
+            rules[0],
             (law.alpha_p > 0.0, "positive"),
             (law.s_p == 0.0, "blank or 0 with ACR, whose equation 3-7 has no such constant"),
             (power, "blank or 2.5 with ACR, as equation 3-7 holds for no other"),
-        ]
-    else:
-        rules += [
-            (law.alpha_p >= 0.0, "0 or more"),
-            (0.0 <= law.s_p < 1.0, "at least 0 and below 1"),
-            (law.q > 0.0, "positive"),
-        ]
+        )
     for name, value, (valid, rule) in zip(law.names(), law.values(), rules, strict=True):
         if not valid:
             findings.add("E412", f"The {name} is {value:g}; it must be {rule}.", law.place(name))
@@ -295,9 +289,42 @@ def check_resolution(problem: Problem, findings: Findings) -> None:
 
 def check_material(material: model.Material, findings: Findings) -> None:
     """Check a MATE segment."""
-    _check_orders(material.integration, findings)
-    _check_ply(material.ply, findings)
-    _check_layers(material, findings)
+    card, ply = material.integration, material.ply
+    for name, order in (("bending order L1", card.bending), ("shear order L2", card.shear)):
+        if not 1 <= order <= HIGHEST_ORDER:
+            used = min(HIGHEST_ORDER, max(1, order))
+            message = f"The {name} is {order} ; {used} is used instead."
+            findings.add("W401", message, card.place(name))
+    if not 1 <= abs(card.points) <= HIGHEST_ORDER:
+        must = "1 to 4 (Gauss points) or -1 to -4 (nodal points)"
+        message = f"The stress-point order K is {card.points}; it must be {must}."
+        findings.add("E402", message, card.place("stress-point order K"))
+    values = dict(zip((field.name for field in ply.fields), ply.row(), strict=True))
+    nu12 = float(values.pop("Poisson's ratio NU12"))
+    wrong = {name: float(value) for name, value in values.items() if float(value) <= 0.0}
+    for name, value in wrong.items():
+        findings.add("E403", f"The {name} is {value:g}; it must be positive.", ply.place(name))
+    # The square of nu12 against E1/E2, written so that no number overflows.
+    if not wrong and abs(nu12) >= (ply.e1 / ply.e2) ** 0.5:
+        why = f"its square must stay below E1/E2 = {ply.e1 / ply.e2:g}"
+        message = f"Poisson's ratio NU12 = {nu12:g} is too large: {why}."
+        findings.add("E404", message, ply.place("Poisson's ratio NU12"))
+    for position, layer in enumerate(material.layers, start=1):
+        if layer.thickness <= 0.0:
+            what = f"Layer {position} has the thickness {layer.thickness:g}"
+            findings.add("E405", f"{what}; it must be positive.", layer.place("layer thickness"))
+        if layer.number != position:
+            why = "layers are stacked in the order of their cards, whatever their numbers"
+            message = f"Layer {position} has the number {layer.number}: {why}."
+            findings.add("W408", message, layer.place("layer"))
+    thicknesses, given = [layer.thickness for layer in material.layers], card.thickness
+    total, place = sum(thicknesses), card.place("total thickness")
+    if given <= 0.0:
+        findings.add("E406", f"The total thickness is {given:g}; it must be positive.", place)
+    elif all(h > 0.0 for h in thicknesses) and abs(total - given) > THICKNESS_TOLERANCE * given:
+        message = f"The layers are {total:g} thick together, the MATE card says {given:g}."
+        hint = "stiffness follows the layers, inertia the card: they must agree"
+        findings.add("E407", message, place, hint)
 
 
 def check_allowables(card: model.Allowables, findings: Findings) -> None:
@@ -333,60 +360,6 @@ def check_damping(card: model.Damping, findings: Findings) -> None:
         message = f"The damping a is {card.coefficient:g}; it must not be negative."
         hint = "the amplitude of a free plate decays as exp(-a t/2)"
         findings.add("E459", message, card.place("a"), hint)
-
-
-def _check_orders(card: Integration, findings: Findings) -> None:
-    for name, order in (("bending order L1", card.bending), ("shear order L2", card.shear)):
-        if not 1 <= order <= HIGHEST_ORDER:
-            used = min(HIGHEST_ORDER, max(1, order))
-            message = f"The {name} is {order} ; {used} is used instead."
-            findings.add("W401", message, card.place(name))
-    if not 1 <= abs(card.points) <= HIGHEST_ORDER:
-        must = "1 to 4 (Gauss points) or -1 to -4 (nodal points)"
-        message = f"The stress-point order K is {card.points}; it must be {must}."
-        findings.add("E402", message, card.place("stress-point order K"))
-
-
-def _check_ply(ply: Ply, findings: Findings) -> None:
-    valid = True
-    for name, value in (
-        ("mass density", ply.density),
-        ("Young's modulus E1", ply.e1),
-        ("Young's modulus E2", ply.e2),
-        ("shear modulus G12", ply.g12),
-        ("shear modulus G13", ply.g13),
-        ("shear modulus G23", ply.g23),
-    ):
-        if value <= 0.0:
-            valid = False
-            findings.add("E403", f"The {name} is {value:g}; it must be positive.", ply.place(name))
-    # The square of nu12 against E1/E2, written so that no number overflows.
-    if valid and abs(ply.nu12) >= (ply.e1 / ply.e2) ** 0.5:
-        why = f"its square must stay below E1/E2 = {ply.e1 / ply.e2:g}"
-        message = f"Poisson's ratio NU12 = {ply.nu12:g} is too large: {why}."
-        findings.add("E404", message, ply.place("Poisson's ratio NU12"))
-
-
-def _check_layers(material: model.Material, findings: Findings) -> None:
-    thick = True
-    for position, layer in enumerate(material.layers, start=1):
-        if layer.thickness <= 0.0:
-            thick = False
-            what = f"Layer {position} has the thickness {layer.thickness:g}"
-            findings.add("E405", f"{what}; it must be positive.", layer.place("layer thickness"))
-        if layer.number != position:
-            why = "layers are stacked in the order of their cards, whatever their numbers"
-            message = f"Layer {position} has the number {layer.number}: {why}."
-            findings.add("W408", message, layer.place("layer"))
-    total = sum(layer.thickness for layer in material.layers)
-    given = material.integration.thickness
-    place = material.integration.place("total thickness")
-    if given <= 0.0:
-        findings.add("E406", f"The total thickness is {given:g}; it must be positive.", place)
-    elif thick and abs(total - given) > THICKNESS_TOLERANCE * given:
-        message = f"The layers are {total:g} thick together, the MATE card says {given:g}."
-        hint = "stiffness follows the layers, inertia the card: they must agree"
-        findings.add("E407", message, place, hint)
 
 
 def check_patch(problem: Problem, findings: Findings) -> None:
@@ -435,7 +408,11 @@ def check_patch(problem: Problem, findings: Findings) -> None:
         return
     # The default radius belongs to plate theory; few meshes resolve it, and only stresses need it.
     needed = card.radius is not None or any(macro.word == "PLYS" for macro in deck.macros)
-    side = _side(mesh, patch)
+    longest = longest_sides(mesh.elements, mesh.coordinates)
+    at = np.array([[patch.x, patch.y]])
+    blocks = element_blocks(mesh.elements, mesh.coordinates)
+    here = np.concatenate([block.rows[locate(block, at)[0]] for block in blocks])
+    side = float(longest[here].max(initial=0.0))
     if needed and patch.radius < side * (1.0 - 1e-9):
         message = (
             f"The radius of the patch, {patch.radius:.4g}, is smaller than the side of its "
@@ -472,19 +449,10 @@ def _held(mesh: Mesh, patch: ContactPatch) -> str:
     return ""
 
 
-def _side(mesh: Mesh, patch: ContactPatch) -> float:
-    """Longest side of the elements that contain the centre of a patch."""
-    longest = longest_sides(mesh.elements, mesh.coordinates)
-    at = np.array([[patch.x, patch.y]])
-    blocks = element_blocks(mesh.elements, mesh.coordinates)
-    return max(
-        float(longest[block.rows[locate(block, at)[0]]].max(initial=0.0)) for block in blocks
-    )
-
-
 # Checks of a segment by itself.
 CHECKS: tuple[tuple[type[model.Segment], Callable[[Any, Findings], None]], ...] = (
-    (model.Indentation, check_law), (model.Allowables, check_allowables),
-    (model.Delamination, check_delamination), (model.Damping, check_damping),
-    (model.Projectile, check_projectile), (model.Shear, check_shear_correction),
+    (model.Material, check_material), (model.Indentation, check_law),
+    (model.Allowables, check_allowables), (model.Delamination, check_delamination),
+    (model.Damping, check_damping), (model.Projectile, check_projectile),
+    (model.Shear, check_shear_correction),
 )  # fmt: skip

@@ -51,8 +51,7 @@ def generate(deck: Deck, findings: Findings | None = None, *, unit_force: bool =
     control = deck.control
     coordinates = np.full((control.numnp, control.ndm), np.nan)
     elements = np.zeros((control.numel, control.nen), dtype=np.int32)
-    boundaries = [segment for segment in deck.segments if isinstance(segment, Boundary)]
-    codes = restraint_codes(boundaries, control.numnp, control.ndf, noted)
+    codes = restraint_codes(deck.all(Boundary), control.numnp, control.ndf, noted)
     forces = np.zeros((control.numnp, control.ndf))
     budget = _Budget(control.numnp, noted)
     for segment in deck.segments:
@@ -109,8 +108,7 @@ def _existing(
 ) -> list[_R]:
     """Records whose node or element exists; the others are reported together."""
     number = operator.attrgetter(what)
-    outside = [record for record in records if not 1 <= number(record) <= count]
-    if outside:
+    if outside := [record for record in records if not 1 <= number(record) <= count]:
         more = f" (and {len(outside) - 1} more)" if len(outside) > 1 else ""
         first = f"{what.capitalize()} {number(outside[0])}{more}"
         message = f"{first} does not exist; the control card defines the {what}s 1 to {count}."
@@ -169,9 +167,8 @@ def _carry(codes: Ints, records: Sequence[NodeCodes], findings: Findings, budget
 
 def _step(elements: Ints, records: Sequence[ElementNodes], findings: Findings) -> None:
     """Set elements; those between two cards add the earlier card's increment (PMESH)."""
-    numel = len(elements)
     last: ElementNodes | None = None
-    for record in _existing(records, "element", numel, "E303", findings):
+    for record in _existing(records, "element", len(elements), "E303", findings):
         number, previous = record.element, 0 if last is None else last.element
         if number <= previous:
             message = f"Element {number} follows element {previous}; elements must ascend."
@@ -185,20 +182,18 @@ def _step(elements: Ints, records: Sequence[ElementNodes], findings: Findings) -
         elements[number - 1] = record.nodes
         last = record
     if last is not None:
-        _fill(elements, last, numel + 1)
+        _fill(elements, last, len(elements) + 1)
 
 
 def _fill(elements: Ints, record: ElementNodes, end: int) -> None:
     """Generate the elements between a card's own and number `end`."""
-    count = end - record.element - 1
-    if count > 0:
-        nodes = np.asarray(record.nodes, dtype=np.int64)
-        steps = np.arange(1, count + 1)[:, None] * (record.increment or 1)
-        generated = np.where(nodes == 0, 0, nodes + steps)
-        # Nodes that become 0 or exceed the integers are invalid; the checks report them.
-        generated = np.where((nodes != 0) & (generated == 0), -1, generated)
-        limits = np.iinfo(np.int32)
-        elements[record.element : end - 1] = np.clip(generated, limits.min, limits.max)
+    nodes = np.asarray(record.nodes, dtype=np.int64)
+    steps = np.arange(1, end - record.element)[:, None] * (record.increment or 1)
+    # Nodes that become 0 or exceed the integers are invalid; the checks report them.
+    generated = np.where(nodes + steps == 0, -1, nodes + steps)
+    limits = np.iinfo(np.int32)
+    generated = np.where(nodes == 0, 0, np.clip(generated, limits.min, limits.max))
+    elements[record.element : end - 1] = generated
 
 
 def place_of_element(deck: Deck, number: int) -> Place | None:

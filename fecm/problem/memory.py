@@ -54,7 +54,13 @@ def needed_bytes(
         total += ASSEMBLED * model.entries
     if solver != CSR:
         total += _product(model, exact=exact)
-    total += _factors(model, words) + _modes(checked)
+    total += _factors(model, words)
+    n = checked.mesh.number_of_equations
+    if modes := max(
+        (min(n, every(m)) for m in flat(checked.program) if m.word == "EIGE"), default=0
+    ):
+        # EIGE's matrices are dense where it looks for many modes.
+        total += 8 * n * (5 * n if n < DENSE or modes >= n // 2 else 6 * modes + 60)
     card = checked.deck.last(Projectile)
     rod_elements = REPORT_ELEMENTS if card is None else card.elements
     total += 8 * 6 * (2 * rod_elements + 2) ** 2
@@ -98,12 +104,3 @@ def _factors(model: PlateModel, words: set[str]) -> int:
     total += SHIFTED * n**1.5 if "EIGE" in words else 0.0
     # With coupling all 5 x 5 dofs of two nodes interact, instead of 2 x 2 and 3 x 3.
     return int(total * (25 / 13 if model.laminate.is_coupled else 1.0))
-
-
-def _modes(checked: Problem) -> int:
-    """Matrices of EIGE, dense where it looks for many modes."""
-    n = checked.mesh.number_of_equations
-    most = max((min(n, every(m)) for m in flat(checked.program) if m.word == "EIGE"), default=0)
-    if not most:
-        return 0
-    return 8 * n * (5 * n if n < DENSE or most >= n // 2 else 6 * most + 60)

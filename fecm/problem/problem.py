@@ -15,7 +15,6 @@ from fecm.deck import model
 from fecm.deck.findings import Findings
 from fecm.deck.macros import MOST_MACROS, STEPS, compile_program, every, flat
 from fecm.deck.reader import ParsedProblem
-from fecm.deck.records import Macro
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.ply_stresses import is_complete
 from fecm.problem import check_mesh, check_plausibility, check_segments
@@ -49,8 +48,6 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
         valid = check_mesh.check_elements(deck, mesh, findings)
         if valid and complete and deck.has(model.Coordinates):
             check_mesh.check_mesh(deck, mesh, findings, listing=listing)
-    if (material := deck.last(model.Material)) is not None:
-        check_segments.check_material(material, findings)
     if (impact := deck.last(model.Impact)) is not None:
         check_segments.check_impact(impact, deck, mesh, findings)
     for kind, check_segment in check_segments.CHECKS:
@@ -154,11 +151,17 @@ def check_program(problem: Problem, findings: Findings) -> None:
 
 
 def _check_ply_stresses(problem: Problem, findings: Findings) -> None:
-    """Check the PLYS cards of a program."""
+    """Check the PLYS cards of a program; warn of stresses that depend on the mesh or are NaN."""
     cards = [macro for macro in flat(problem.program) if macro.word in ("PLYS", "FAIL")]
-    if not cards:
-        return
-    _check_stresses_under_load(problem, cards[0], findings)
+    if cards and problem.has_impact and problem.patch is None:
+        message = "Ply stresses under a point force grow without bound as the mesh is refined."
+        hint = "a PATC segment gives the contact force an area"
+        findings.add("W449", message, cards[0].place("macro"), hint)
+    others = np.flatnonzero(~is_complete(problem.mesh.elements))
+    if cards and len(others):
+        what = f"Interlaminar stresses of {len(others)} elements without nine nodes"
+        message = f"{what} are not computed (element {others[0] + 1} first): they are NaN."
+        findings.add("W450", message, cards[0].place("macro"))
     cards = [macro for macro in cards if macro.word == "PLYS"]
     numel = problem.deck.control.numel
     for card in cards:
@@ -175,21 +178,8 @@ def _check_ply_stresses(problem: Problem, findings: Findings) -> None:
         findings.add("E448", message, cards[0].place("second value"), hint)
 
 
-def _check_stresses_under_load(problem: Problem, card: Macro, findings: Findings) -> None:
-    """Warn of ply stresses that depend on the mesh or are not computed."""
-    if problem.has_impact and problem.patch is None:
-        message = "Ply stresses under a point force grow without bound as the mesh is refined."
-        hint = "a PATC segment gives the contact force an area"
-        findings.add("W449", message, card.place("macro"), hint)
-    others = np.flatnonzero(~is_complete(problem.mesh.elements))
-    if len(others):
-        what = f"Interlaminar stresses of {len(others)} elements without nine nodes"
-        message = f"{what} are not computed (element {others[0] + 1} first): they are NaN."
-        findings.add("W450", message, card.place("macro"))
-
-
 def check_time_step(problem: Problem, findings: Findings) -> None:
-    """Compare every DT with the plate's critical time step if the program takes steps."""
+    """Compare every DT with the plate's critical time step, and with the rate of the damping."""
     deck = problem.deck
     steps = [macro for macro in deck.macros if macro.word == "DT"]
     if not steps or not STEPS.intersection(macro.word for macro in deck.macros):
@@ -202,7 +192,12 @@ def check_time_step(problem: Problem, findings: Findings) -> None:
                 message = f"{what} (about {safe:.4g}) that the motion is lost by rounding."
                 hint = "check the unit of time; DT without a number takes 0.9 of the critical step"
                 findings.add("E515", message, macro.place("value"), hint)
-        _check_damping(problem, max(m.value or safe for m in steps), findings)
+        dt, card = max(m.value or safe for m in steps), deck.last(model.Damping)
+        if card is not None and (error := (card.coefficient * dt) ** 2 / 12.0) > 0.01:
+            why = f"its rate is off by (a DT)^2/12 = {error:.2g}"
+            what = f"The damping a = {card.coefficient:g} is resolved badly by DT = {dt:.4g}"
+            hint = "check the unit of time, or take a smaller DT"
+            findings.add("W460", f"{what}: {why}.", card.place("a"), hint)
         if min(m.value for m in steps) > 0.0 and max(m.value for m in steps) < safe:
             return
         critical = problem.critical_time_step
@@ -217,13 +212,3 @@ def check_time_step(problem: Problem, findings: Findings) -> None:
             message = f"{what} {critical:.4g}: the motion would grow without bound."
             hint = f"take {0.95 * critical:.2g} or less; --force runs the deck nevertheless"
             findings.add(UNSTABLE, message, macro.place("value"), hint)
-
-
-def _check_damping(problem: Problem, dt: float, findings: Findings) -> None:
-    """Report a damping whose rate the time step does not resolve, by (a dt)^2/12."""
-    card = problem.deck.last(model.Damping)
-    if card is not None and (error := (card.coefficient * dt) ** 2 / 12.0) > 0.01:
-        why = f"its rate is off by (a DT)^2/12 = {error:.2g}"
-        message = f"The damping a = {card.coefficient:g} is resolved badly by DT = {dt:.4g}: {why}."
-        hint = "check the unit of time, or take a smaller DT"
-        findings.add("W460", message, card.place("a"), hint)

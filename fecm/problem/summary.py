@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 from fecm._memory import format_bytes
@@ -33,10 +35,6 @@ class ProblemSummary:
 
     def __init__(self, problem: Problem) -> None:
         deck, plate, laminate = problem.deck, problem.plate, problem.laminate
-        try:
-            critical = problem.critical_time_step
-        except UnsoundPlateError:  # the check reports it if the program takes steps
-            critical = float("nan")
         resolved = resolution(problem) if problem.has_impact else None
         self.title = deck.title
         self.nodes = deck.control.numnp
@@ -47,7 +45,9 @@ class ProblemSummary:
         self.A, self.B, self.D, self.shear = laminate.A, laminate.B, laminate.D, laminate.shear
         self.plate_mass = plate.area() * laminate.mass
         self.projectile_mass = build_projectile(deck).total_mass  # even without impact
-        self.critical_time_step = critical
+        self.critical_time_step = float("nan")
+        with suppress(UnsoundPlateError):  # the check reports it if the program takes steps
+            self.critical_time_step = problem.critical_time_step
         self.time_steps = [m.value for m in flat(problem.program) if m.word == "DT"]
         self.output_bytes = problem.output_bytes  # approximate size of the result
         # Elements at the impact node per bending wave of the contact, and the estimated mesh error
@@ -67,13 +67,9 @@ class ProblemSummary:
         def quantity(value: float, dimension: str) -> str:
             return f"{value:.4g} {unit_of(dimension, self.units)}".rstrip()
 
-        lines = [
-            self.title or "(no title)",
-            f"  nodes               {self.nodes}",
-            f"  elements            {self.elements}",
-            f"  equations           {self.equations}",
-            f"  layers              {self.layers}",
-        ]
+        lines = [self.title or "(no title)"]
+        counts = ("nodes", "elements", "equations", "layers")
+        lines += [f"  {name:20}{getattr(self, name)}" for name in counts]
         for name, dimension in (("A", "force/length"), ("B", "force"), ("D", "force*length")):
             lines += _matrix(name, getattr(self, name), unit_of(dimension, self.units))
         lines += _matrix("shear xz, yz", self.shear, unit_of("force/length", self.units))
@@ -98,18 +94,12 @@ class ProblemSummary:
         if self.elements_per_wave is not None:
             error = "" if self.mesh_error is None else f" ({said_error(self.mesh_error)})"
             lines.append(f"  elements per wave   {self.elements_per_wave:.1f}{error}")
-        lines += [
-            f"  impact steps        {self.steps}",
-            f"  output              {format_bytes(self.output_bytes)}",
-        ]
-        return lines
+        size = format_bytes(self.output_bytes)
+        return [*lines, f"  impact steps        {self.steps}", f"  output              {size}"]
 
 
 def _matrix(name: str, values: Floats, unit: str) -> list[str]:
     """A matrix, its rounding errors shown as zeros."""
     shown = np.where(np.abs(values) < 1e-12 * max(1.0, np.abs(values).max()), 0.0, values)
-    rows = [" ".join(f"{value:12.5g}" for value in row) for row in shown]
-    heads = [f"  {name:18}"] + [" " * 20] * (len(rows) - 1)
-    lines = [f"{head}{row}" for head, row in zip(heads, rows, strict=True)]
-    lines[0] = f"{lines[0]}  {unit}".rstrip()
-    return lines
+    first, *rest = (" ".join(f"{value:12.5g}" for value in row) for row in shown)
+    return [f"  {name:18}{first}  {unit}".rstrip(), *(f"{'':20}{row}" for row in rest)]
