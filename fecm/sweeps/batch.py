@@ -85,8 +85,7 @@ def _prepared(
     extra: tuple[str, ...], history: bool,
 ) -> tuple[Problem, Runs]:  # fmt: skip
     """The problem of a plate, given by values of names, and what runs its cases."""
-    case = dict(plate)
-    checked = _timed(apply_case(deck, case), clock, case)
+    checked = _timed(deck, clock, dict(plate))
     return checked, runs_of(checked, extra, history=history)
 
 
@@ -94,7 +93,7 @@ def _in_full(task: plan.Task, number: int, case: Case) -> Outcome:
     """Run a case whose deck the caller builds, or whose result the caller measures."""
     try:
         if task.build is None:
-            checked = _timed(apply_case(task.deck, case), task.clock, case)
+            checked = _timed(task.deck, task.clock, case)
         else:
             (checked,) = built(task.build, case).problems
             if unit_names(checked.deck) != unit_names(task.deck):
@@ -196,12 +195,12 @@ def _found(decks: Decks, force: float, runs: Runs) -> Outcome:
 
 def deck_of(planned: plan.Plan, case: int) -> Deck:
     """Return the deck of a case with its time step; CasesError if the case cannot be run."""
-    values = planned.cases[case]
-    return _timed(apply_case(planned.deck, values), planned.clock, values).deck
+    return _timed(planned.deck, planned.clock, planned.cases[case]).deck
 
 
-def _timed(deck: Deck, clock: Clock | None, case: Case) -> Problem:
-    """Check the deck of a case, with the time step of its plate."""
+def _timed(base: Deck, clock: Clock | None, case: Case) -> Problem:
+    """Apply a case to a deck, with the time step of its plate, and check it."""
+    deck = apply_case(base, case)
     if clock is None:
         return check_deck(deck)
     own, rule = clock

@@ -69,10 +69,7 @@ class CasesError(FecmError, ValueError):
 
 
 def parse_vary(text: str) -> tuple[str, list[Value]]:
-    """Read ``NAME=FROM:TO:N`` (N values, both ends included) or ``NAME=a,b,c``.
-
-    Raises CasesError if the text has neither form, or the name is unknown.
-    """
+    """Read ``NAME=FROM:TO:N`` (N values with both ends) or ``NAME=a,b,c``; else CasesError."""
     name, equals, text_of_values = (part.strip() for part in text.partition("="))
     _known(name, text)
     if not equals or not text_of_values:
@@ -131,10 +128,7 @@ def plate_values(case: Case) -> Case:
 
 
 def grid(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
-    """Return every combination of the values; the last name varies fastest.
-
-    Raises CasesError if a name is repeated, or there are too many cases.
-    """
+    """Every combination of the values, the last name fastest; CasesError if there are too many."""
     names = [name for name, _ in varied]
     for name in names:
         if names.count(name) > 1:
@@ -147,11 +141,7 @@ def grid(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
 
 
 def read_cases(path: Path) -> list[Case]:
-    """Read a CSV table with a header of names and one row per case.
-
-    Raises CasesError if the table is invalid; the message states the line.  Raises OSError if the
-    file cannot be read.
-    """
+    """Read a CSV table, a header of names and one row per case; CasesError states a line."""
     try:
         rows = [(line, row) for line, row in read_rows(path) if any(row)]
     except StudyError as error:
@@ -177,10 +167,9 @@ def read_cases(path: Path) -> list[Case]:
 
 
 def combined(vary: Mapping[str, Iterable[Any]], *, free: bool = False) -> list[Case]:
-    """Return every combination of lists of values, given by name; see :func:`grid`.
+    """Return every combination of lists of values, given by name; with `free` both are any.
 
-    With `free`, names and values are any.  Raises CasesError if a name is unknown, a value is
-    invalid, or values are not in a list.
+    Raises CasesError if a name is unknown, a value is invalid, or values are not in a list.
     """
     if not isinstance(vary, Mapping):
         raise CasesError(f'vary is {vary!r}; write a mapping such as {{"velocity": [50.0, 115.0]}}')
@@ -204,8 +193,7 @@ def checked(
     """Validate cases given as mappings, which must all have the same names.
 
     With `free`, the names are any but those of results, and a value is a number or a text.  Raises
-    CasesError if the cases are invalid; the message states the source, or else the number of the
-    case.
+    CasesError if a case is invalid; the message states the source, or else the case's number.
     """
     made: list[Case] = []
     remedy = 'write a list of mappings such as [{"velocity": 50.0}]'
@@ -242,11 +230,9 @@ def _given(name: str, value: Any, where: str, free: bool) -> Value:
     if isinstance(value, np.generic):
         value = value.item()
     if free:
-        if not (
-            isinstance(value, str) or (isinstance(value, float | int) and math.isfinite(value))
-        ):
-            raise CasesError(f"{where}: {name} is {value!r}, not a finite number or a text")
-        return value
+        if isinstance(value, str) or (isinstance(value, float | int) and math.isfinite(value)):
+            return value
+        raise CasesError(f"{where}: {name} is {value!r}, not a finite number or a text")
     if name in TEXTS and isinstance(value, Iterable) and not isinstance(value, str):
         value = {"at": ",", "size": "x"}.get(name, "/").join(map(str, value))
     try:
@@ -423,10 +409,7 @@ def matrix(design: Design) -> Floats:
 
 
 def random_cases(design: Design, varied: Sequence[Case]) -> list[Case]:
-    """Return the cases of a design for every combination of varied values.
-
-    Raises CasesError if a name is varied too, or there are too many cases.
-    """
+    """Cases of a design for each of some varied values; CasesError if there are too many."""
     for name in design.laws:
         if name in varied[0]:
             raise CasesError(f"{name} is both varied and random")

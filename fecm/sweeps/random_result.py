@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 
 Array = NDArray[Any]
+Columns = Mapping[str, Array]
 FEW = 0.01  # share of failed draws above which the results are doubtful
 PRINTED = 4  # most quantities, of these, and combinations that are printed
 MAIN = ("found_velocity", "found_energy", "peak_force", "max_indentation", "contact_time",
@@ -99,10 +100,7 @@ class RandomResult:
 
 
 def evaluate(
-    design: Design,
-    cases: Mapping[str, Array],
-    summary: Mapping[str, Array],
-    limits: Sequence[Limit],
+    design: Design, cases: Columns, summary: Columns, limits: Sequence[Limit]
 ) -> RandomResult:
     """Evaluate the cases of a random sweep, (combinations * rows,) each."""
     fine = np.isin(summary["status"], RUN)
@@ -132,12 +130,12 @@ def evaluate(
     )  # fmt: skip
 
 
-def combinations(design: Design, cases: Mapping[str, Array]) -> dict[str, Array]:
+def combinations(design: Design, cases: Columns) -> dict[str, Array]:
     """Varied values of every combination."""
     return {n: values[:: design.rows] for n, values in cases.items() if n not in design.laws}
 
 
-def _exceedance(draws: Mapping[str, Array], limits: Sequence[Limit]) -> Exceedance:
+def _exceedance(draws: Columns, limits: Sequence[Limit]) -> Exceedance:
     """Probabilities that quantities (..., draws) exceed limits."""
     thresholds = draws.get(FORCE, np.full(1, np.nan))
     known = thresholds[np.isfinite(thresholds)]
@@ -237,7 +235,7 @@ def attributes(random: RandomResult) -> dict[str, dict[str, Any]]:
 
 
 def random_of(
-    contents: Contents, cases: Mapping[str, Array], quantities: Iterable[str], count: int
+    contents: Contents, cases: Columns, quantities: Iterable[str], count: int
 ) -> RandomResult | None:
     """Results of a random sweep, None if it is none; ResultFileError if they are incomplete."""
     if "design" not in contents.groups:

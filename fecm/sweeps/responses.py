@@ -198,8 +198,7 @@ class TipSteps:
         before = np.vstack([np.zeros_like(r[:1]), r[:-1]])
         # Acceleration per contact force 1 to `count` steps earlier, (count, kinds).
         self.responses: Floats = self.theta * r + (1.0 - self.theta) * before
-        # Sums over the contact forces before the next step, (cases,).
-        self.sums: Floats = np.zeros(len(kinds))
+        self.sums: Floats = np.zeros(len(kinds))  # over the contact forces before the next step
 
     def motions(self, kind: int, speed: Floats, force: Floats) -> Iterator[Floats]:
         """Motion of complete projectiles of a kind after every block of steps and after the last.
@@ -272,13 +271,10 @@ class Impacts(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Work of the contact forces of many cases (force*length)."""
+    """Work of the contact forces of many cases on plate and indentation (force*length)."""
 
-    # (blocks, cases): on plate and indentation, after every block of steps and after the last step.
-    done: Floats
-    # (cases,): largest dt^2/8 m a^2 of the impact node: its share of the difference between the
-    # plate's energy and the work done on it.
-    excess: Floats
+    done: Floats  # (blocks, cases): after every block of steps and after the last step
+    excess: Floats  # (cases,): largest dt^2/8 m a^2 of the impact node; see :func:`balance_errors`
 
 
 def impacts(response: Floats, dt: float, node_mass: float, hits: Hits) -> Impacts:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import csv
-import itertools
 import math
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import repeat
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Literal
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fecm.results.hdf5_reader import Contents
-    from fecm.results.hdf5_writer import FileSink
 
 
 Array = NDArray[Any]
@@ -112,12 +112,6 @@ DIMENSIONS = {
     **dict.fromkeys(("e1", "e2", "g12", "g13", "g23", "rod_modulus"), "force/length^2"),
     **dict.fromkeys(("dt", "duration"), "time"),
 }  # fmt: skip
-# Description and dimension of what the file has of the steps of every case.
-STEPS = {
-    "dt": ("time step of every case", "time"),
-    "steps": ("number of steps of every case", ""),
-    "unsettled_steps": ("steps whose contact iteration did not converge", ""),
-}
 GROUPS = {  # of the file
     "cases": "values of what varies",
     "summary": "what came out of every case",
@@ -189,12 +183,6 @@ class SweepResult:
         return np.asarray(self.summary["status"] == STILL)
 
     @property
-    def _steps(self) -> dict[str, Array]:
-        """Time step, number of steps and unconverged steps of every case, (n,) each."""
-        columns = zip(STEPS, (self.dt, self.steps, self.unconverged_steps), strict=True)
-        return {name: values for name, values in columns if values is not None}
-
-    @property
     def convergence(self) -> dict[str, Convergence]:
         """Order and limit of every quantity of a refinement study; empty for other sweeps."""
         return convergence(self.cases, self.summary)
@@ -244,23 +232,21 @@ class SweepResult:
         except ImportError:
             raise ImportError("a Dataset needs xarray: pip install 'fecm[xarray]'") from None
         levels, rows = _grid(self.cases, len(self))
-        axes = list(levels or ["case"])
-        shape = tuple(map(len, levels.values())) or (len(self),)
+        coordinates = levels or {"case": np.arange(len(self))}
+        axes, shape = [*coordinates, "step"], [len(values) for values in coordinates.values()]
 
-        def variable(name: str, values: Array) -> tuple[list[str], Array, dict[str, str]]:
+        def about(name: str) -> dict[str, str]:
             texts = {"long_name": COLUMNS.get(name, ("",))[0], "units": self.unit(name)}
-            named = {key: text for key, text in texts.items() if text}
-            made = values[rows].reshape(*shape, *values.shape[1:])
-            return [*axes, "step"][: made.ndim], made, named
+            return {key: text for key, text in texts.items() if text}
 
-        columns = {**self.cases, **self.summary, **self._steps}
-        if self.force is not None:
-            columns["force"] = self.force
+        columns = {**self.cases, **self.summary, "dt": self.dt, "steps": self.steps}
+        added = {"unsettled_steps": self.unconverged_steps, "force": self.force}
+        columns |= {name: values for name, values in added.items() if values is not None}
         found = xarray.Dataset(
-            {name: variable(name, values) for name, values in columns.items()
-             if name not in levels},
-            {name: (name, values, {"units": unit} if (unit := self.unit(name)) else {})
-             for name, values in (levels or {"case": np.arange(len(self))}).items()},
+            {name: (axes[: len(shape) + v.ndim - 1], v[rows].reshape(*shape, *v.shape[1:]),
+                    about(name))
+             for name, v in columns.items() if name not in levels},
+            {name: (name, values, about(name)) for name, values in coordinates.items()},
             {"title": self.title},
         )  # fmt: skip
         if self.force is not None:
@@ -389,31 +375,29 @@ def save(
         for name, values in result.summary.items():
             text = STATUS if name == "status" else described(name)
             put(f"summary/{name}", values, text, COLUMNS.get(name, ("", ""))[1])
-        for name, values in result._steps.items():
-            put(f"history/{name}", values, *STEPS[name])
+        put("history/dt", result.dt, "time step of every case", "time")
+        put("history/steps", result.steps, "number of steps of every case", "")
+        if result.unconverged_steps is not None:
+            text = "steps whose contact iteration did not converge"
+            put("history/unsettled_steps", result.unconverged_steps, text, "")
         if forces is not None and len(result):
             longest = int(result.steps.max())
             text = "contact force after every step"
             made = schema.Dataset(FORCE, ("cases", "steps"), text, "force")
             sink.create(made, (len(result), longest))
             for numbers, force in forces:
-                _write_forces(sink, numbers, force, longest)
+                rows = np.full((len(numbers), longest), np.nan)
+                if force is not None:
+                    rows[:, : force.shape[1]] = force
+                ends = np.flatnonzero(np.diff(numbers) != 1) + 1
+                for start, some in zip([0, *ends.tolist()], np.split(rows, ends), strict=True):
+                    sink.write(FORCE, numbers[start], some)
         for row in () if result.random is None else stored(result.random):
             put(*row)
         for group, text in GROUPS.items():
             sink.attributes(group, {"description": text})
         for name, one in result.convergence.items():
             sink.attributes(f"convergence/{name}", vars(one))
-
-
-def _write_forces(sink: FileSink, numbers: Sequence[int], force: Any, longest: int) -> None:
-    """Write the forces of some cases, NaN after the last step of each."""
-    rows = np.full((len(numbers), longest), np.nan)
-    if force is not None:
-        rows[:, : force.shape[1]] = force
-    ends = np.flatnonzero(np.diff(numbers) != 1) + 1
-    for start, some in zip([0, *ends.tolist()], np.split(rows, ends), strict=True):
-        sink.write(FORCE, numbers[start], some)
 
 
 def load(path: Path) -> SweepResult:
@@ -470,7 +454,7 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     )  # fmt: skip
 
 
-FORMULA = ("=", "+", "-", "@")  # first characters of a formula
+FORMULA = re.compile(r"[=+@\x00-\x1f-]")  # how a formula begins
 CASES, HISTORY = "cases", "history"  # tables of the CSV export
 
 
@@ -480,22 +464,25 @@ def csv_lines(sweep: SweepResult, name: str = CASES) -> Iterator[str]:
     ``"cases"`` has the values and results of every case, ``"history"`` the contact force after
     every step of every case that was run.  Cases count from 0, steps from 1.  Numbers are written
     as Python's repr, which preserves every bit.  An apostrophe precedes texts that a spreadsheet
-    would read as formulas.  Raises ExportError if the table is unknown, or the sweep has no stored
-    forces.
+    would read as formulas.  Raises ExportError if there is no such table.
     """
     if name not in (CASES, HISTORY):
         raise schema.ExportError(f"unknown table {name}; a sweep has {CASES} and {HISTORY}")
     if name == HISTORY and sweep.force is None:
         raise schema.ExportError("the sweep has no stored forces; run it again with --history")
-    rows = _step_rows(sweep)
-    if name == CASES:
-        columns = {**sweep.cases, **sweep.summary}
-        columns |= {"dt": sweep.dt, "steps": sweep.steps, "status": columns.pop("status")}
-        values = [range(len(sweep)), *(column.tolist() for column in columns.values())]
-        rows = itertools.chain([("case", *columns)], zip(*values, strict=True))
     echo: Any = SimpleNamespace(write=str)  # writerow returns what write returns
     writer = csv.writer(echo, lineterminator="\n")
-    return (writer.writerow(map(_cell, row)) for row in rows)
+    return (
+        writer.writerow([f"'{v}" if isinstance(v, str) and FORMULA.match(v) else v for v in row])
+        for row in (_case_rows(sweep) if name == CASES else _step_rows(sweep))
+    )
+
+
+def _case_rows(sweep: SweepResult) -> Iterator[Iterable[Any]]:
+    columns = {**sweep.cases, **sweep.summary}
+    columns |= {"dt": sweep.dt, "steps": sweep.steps, "status": columns.pop("status")}
+    yield ("case", *columns)
+    yield from zip(range(len(sweep)), *(v.tolist() for v in columns.values()), strict=True)
 
 
 def _step_rows(sweep: SweepResult) -> Iterator[Iterable[Any]]:
@@ -505,10 +492,4 @@ def _step_rows(sweep: SweepResult) -> Iterator[Iterable[Any]]:
         count = int(sweep.steps[case])
         times = np.add.accumulate(np.full(count, sweep.dt[case])).tolist()
         forces = sweep.force[case, :count].tolist()
-        for step, (time, force) in enumerate(zip(times, forces, strict=True), start=1):
-            yield case, step, time, force
-
-
-def _cell(value: Any) -> Any:
-    is_formula = isinstance(value, str) and value and (value[0] in FORMULA or value[0] < " ")
-    return f"'{value}" if is_formula else value
+        yield from zip(repeat(case), range(1, count + 1), times, forces, strict=False)

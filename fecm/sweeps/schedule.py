@@ -151,8 +151,7 @@ def _client(scheduler: Any) -> Any:
 def on_dask(tasks: Sequence[Task], scheduler: Any, done: Done, idle: Idle) -> None:
     """Run tasks on a Dask cluster, given by address, client or cluster object.
 
-    It reruns the tasks of a dead worker.  Raises SchedulerError if dask.distributed is missing, or
-    nothing answers at the address.
+    It reruns the tasks of a dead worker.  Raises SchedulerError if there is no Dask or no answer.
     """
     with _client(scheduler) as client:
         if getattr(client, "status", "running") != "running":
@@ -161,10 +160,7 @@ def on_dask(tasks: Sequence[Task], scheduler: Any, done: Done, idle: Idle) -> No
 
 
 def on_executor(tasks: Sequence[Task], executor: futures.Executor, done: Done, idle: Idle) -> None:
-    """Run tasks on any executor; those that it loses become failed cases.
-
-    Raises SchedulerError if the executor takes no tasks.
-    """
+    """Run tasks on any executor; those that it loses become failed cases."""
     for task, future in _run_on(executor, tasks, idle):
         try:
             outcome = future.result()
@@ -182,7 +178,6 @@ def address_in(file: Path) -> str:
         raise SchedulerError(message) from None
 
 
-MARK = "sweep.json"
 CHECKSUM = hashlib.sha256().digest_size  # bytes of the checksum after the arrays of a file
 
 
@@ -197,13 +192,12 @@ class DamagedPartError(FecmError, ValueError):
 class PartialResults:
     """Outcomes of finished tasks of the sweep with a fingerprint, for its result file.
 
-    `restart` deletes the outcomes of another sweep.  Raises OtherSweepError if the folder holds
-    another sweep's outcomes.  Raises OSError if the folder cannot be created.
+    `restart` deletes the outcomes of another sweep, for which OtherSweepError is raised otherwise.
     """
 
     def __init__(self, result: Path, fingerprint: str, *, restart: bool = False) -> None:
         self.folder = result.with_name(f".{result.name}.parts")
-        mark, found = self.folder / MARK, ""
+        mark, found = self.folder / "sweep.json", ""
         with suppress(OSError, ValueError, KeyError, TypeError):
             found = str(json.loads(mark.read_text())["fingerprint"])
         if self.folder.exists() and found != fingerprint:

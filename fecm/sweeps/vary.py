@@ -90,15 +90,10 @@ def stable_time_step(deck: model.Deck) -> float:
     return taken_time_step(check_deck(with_time_step(deck, 0.0)).critical_time_step)
 
 
-@lru_cache(maxsize=8)
-def _holds_the_plane(boundaries: tuple[model.Boundary, ...], nodes: int, dofs: int) -> bool:
-    return holds_the_plane(restraint_codes(boundaries, nodes, dofs))
-
-
 def _free_in_plane(deck: model.Deck) -> model.Deck:
     """Restrain u and v only where w is, if the deck restrains them at every node."""
     boundaries = tuple(deck.all(model.Boundary))
-    if not _holds_the_plane(boundaries, deck.control.numnp, deck.control.ndf):
+    if not holds_the_plane(restraint_codes(boundaries, deck.control.numnp, deck.control.ndf)):
         return deck
 
     # Codes are generated for each dof independently, so that copies of the codes of w act like w's.
