@@ -13,6 +13,7 @@ from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.projectile import RodState
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -280,3 +281,10 @@ def mixed(nx: int, ny: int, kind: int) -> tuple[Floats, Ints]:
     coordinates, elements = without_some_nodes(*distorted_square(nx, ny, kind))
     assert len(np.unique(elements > 0, axis=0)) > 5
     return coordinates, elements
+
+
+def displacement(state: RodState) -> Floats:
+    """Displacement of every dof."""
+    found = state.deformation
+    found[::2] += state.tip
+    return found

@@ -189,14 +189,12 @@ class Law(Protocol):
         The last point is that at the end of the last step.  An indentation is a length, negative
         where the bodies are apart.
         """
-        ...
 
     def accept(self, memory: Any, last: ContactPoint, indentation: Number) -> Any:
         """Memory after a step that ends at an indentation."""
 
     def permanent(self, memory: Any, last: ContactPoint) -> Number:
         """Permanent indentation after unloading from the last point (length)."""
-        ...
 
 
 @frozen

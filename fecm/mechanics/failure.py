@@ -23,7 +23,6 @@ MODES = (
     "none", "fibre tension", "fibre compression", "matrix tension", "matrix compression", "shear",
     "interactive", "inter-fibre A", "inter-fibre B", "inter-fibre C", "interlaminar shear",
 )  # fmt: skip
-_CODE = {name: code for code, name in enumerate(MODES)}
 
 Codes = NDArray[np.int8]
 # Values of a criterion by mode; the exposure is the largest.
@@ -51,7 +50,7 @@ class Strengths(Protocol):
 def modes_of(candidates: Candidates, where: Indices | None = None) -> Codes:
     """Mode of the largest candidate, the first one of equals, at all or some flat indices."""
     values = np.stack([v if where is None else v.ravel()[where] for _, v in candidates])
-    codes = np.array([_CODE[mode] for mode, _ in candidates], np.int8)
+    codes = np.array([MODES.index(mode) for mode, _ in candidates], np.int8)
     return np.where(values.max(axis=0) > 0.0, codes[values.argmax(axis=0)], 0).astype(np.int8)
 
 

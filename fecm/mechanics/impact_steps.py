@@ -139,9 +139,8 @@ class ImpactSteps:
         self._product = product = cast(CompiledProduct, system.motion.product)
         self._plate = product.plate
         self._modes = Modes.of(system.rod_stiffness, system.rod_mass)
-        shapes = self._modes.shapes
-        self._tip_shape = np.ascontiguousarray(shapes[0])
-        self._station = shapes[station].copy()
+        self._tip_shape = np.ascontiguousarray(self._modes.shapes[0])
+        self._station = self._modes.shapes[station].copy()
         self._station[0] = 0.0
         load, position = system.contact.load, self._plate.position
         if isinstance(load, PointLoad):
@@ -215,11 +214,9 @@ class ImpactSteps:
     def _enter(self, state: PlateState, dt: float) -> None:
         """Copy a state into the vectors of the kernels."""
         plate = self._plate
-        for vector, values in (
-            (plate.u, state.displacement), (plate.d, state.increment),
-            (plate.s, state.scaled_internal_force),
-        ):  # fmt: skip
-            vector[plate.position] = values
+        plate.u[plate.position] = state.displacement
+        plate.d[plate.position] = state.increment
+        plate.s[plate.position] = state.scaled_internal_force
         plate.set_scale(state.dt2)
         plate.structure.damping = 0.5 * self._system.motion.damping * dt
 

@@ -76,11 +76,6 @@ class PlateState:
         return self.padded[: len(self.increment)]
 
     @property
-    def velocity(self) -> Floats:
-        """Velocity in the middle of the last step, (n,)."""
-        return self.increment / self.dt if self.dt else np.zeros_like(self.increment)
-
-    @property
     def strain_energy(self) -> float:
         """Strain energy, half the product of displacement and internal force (force*length)."""
         return 0.5 * self.sums.strain

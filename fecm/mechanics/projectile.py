@@ -214,13 +214,6 @@ class RodState:
         return np.asarray(deformation)
 
     @property
-    def displacement(self) -> Floats:
-        """Displacement of every dof, (n, ...)."""
-        displacement = self.deformation
-        displacement[::2] += self.tip
-        return displacement
-
-    @property
     def velocity(self) -> Floats:
         """Velocity of every dof, (n, ...)."""
         return np.asarray(self.motion[1])

@@ -181,8 +181,7 @@ class ElementProduct(StiffnessOperator):
         self._total = np.empty(count)
         self._pieces = pieces(count)
         # np.bincount sums few forces faster, a sparse matrix many.
-        self._small = len(self._domains) == 1
-        if not self._small:
+        if len(self._domains) > 1:
             for domain in self._domains:
                 domain.prepare_sums()
 
@@ -191,7 +190,8 @@ class ElementProduct(StiffnessOperator):
         count = self._count
         if self._signed:
             np.negative(padded[:count], out=padded[count:-1])
-        total = self._sum(padded) if self._small else self._sum_of_domains(padded)
+        small = len(self._domains) == 1
+        total = self._sum(padded) if small else self._sum_of_domains(padded)
         if len(self._pieces) == 1:
             return [use(0, total)]
         return [use(number, total[piece]) for number, piece in enumerate(self._pieces)]

@@ -397,11 +397,9 @@ def _solved(operator: Floats, first: Floats, second: Floats) -> tuple[Floats, Fl
 
 
 def _kept_apart(values: Floats, vectors: Floats, derivatives: Floats, limit: float) -> Floats:
-    """Eigenvectors that are continuous in the normal where sheets meet.
-
-    Among equal eigenvalues they diagonalise the first, then the second derivative of the operator;
-    for identical sheets they separate the components.
-    """
+    """Eigenvectors that are continuous in the normal where sheets meet."""
+    # Among equal eigenvalues they diagonalise the first, then the second derivative of the
+    # operator; for identical sheets they separate the components.
     parts: list[Floats] = []
     first, second = derivatives
     for group in _runs(values, limit):
