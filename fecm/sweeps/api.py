@@ -91,8 +91,7 @@ def carry_out(
 
     Tasks that `parts` has stored are not run again; with it, the result has no forces.  `done` is
     called with each task and its outcome, including tasks finished earlier, `idle` regularly,
-    `note` with messages for the user.  The executor is not shut down.  Raises SchedulerError if the
-    scheduler cannot be used.
+    `note` with messages for the user.  Raises SchedulerError if the scheduler cannot be used.
     """
     outcomes: list[Outcome] = []
     left: list[Task] = []

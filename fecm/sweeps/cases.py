@@ -8,9 +8,8 @@ import re
 import warnings
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -204,10 +203,7 @@ def checked(
         if not isinstance(case, Mapping):
             raise CasesError(f"{where} is {case!r}, not a mapping of names to values; {remedy}")
         for name in case:
-            if not free:
-                _known(name, where)
-            elif fault := name_fault(name):
-                raise CasesError(f"{where}: {fault}")
+            _known(name, where, free)
         if made and case.keys() != made[0].keys():
             raise CasesError(f"{where} has other names than case 0")
         made.append({name: _given(name, v, where, free) for name, v in case.items()})
@@ -242,8 +238,10 @@ def _given(name: str, value: Any, where: str, free: bool) -> Value:
         raise CasesError(f"{where}: {text}") from None
 
 
-def _known(name: str, where: str) -> None:
-    if name not in NAMES:
+def _known(name: str, where: str, free: bool = False) -> None:
+    if fault := name_fault(name) if free else "":
+        raise CasesError(f"{where}: {fault}")
+    if not free and name not in NAMES:
         raise CasesError(f"{where}: `{name}` cannot be varied; the names are {', '.join(NAMES)}")
 
 
@@ -269,8 +267,7 @@ def _value(name: str, text: str) -> Value:
     return int(value)
 
 
-@dataclass(frozen=True)
-class Law:
+class Law(NamedTuple):
     """Distribution of a value: one of `LAWS` with its parameters."""
 
     kind: str
@@ -299,9 +296,9 @@ class Law:
 def parse_law(name: str, text: str, *, free: bool = False) -> Law:
     """Read ``LAW:PARAMETERS`` of a name (any with `free`); CasesError if one of them is invalid."""
     numbers = [known for known in NAMES if known not in (*TEXTS, *INTEGERS)]
-    if fault := name_fault(name) if free else "":
-        raise CasesError(f"random: {fault}")
-    if not free and name not in numbers:
+    if free:
+        _known(name, "random", free)
+    elif name not in numbers:
         raise CasesError(f"`{name}` cannot be random; the names are {', '.join(numbers)}")
     kind, _, given = (part.strip() for part in str(text).partition(":"))
     if kind not in LAWS:
@@ -326,8 +323,7 @@ def parse_random(text: str) -> tuple[str, Law]:
     return name, parse_law(name, law)
 
 
-@dataclass(frozen=True)
-class Design:
+class Design(NamedTuple):
     """Design of a random sweep."""
 
     laws: dict[str, Law]  # by the names of the random values

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -175,8 +175,7 @@ def identify(
     return found
 
 
-@dataclass(frozen=True)
-class _Model:
+class _Model(NamedTuple):
     """Contact forces of a deck with trial values, all from one response of the plate."""
 
     deck: Deck

@@ -163,6 +163,16 @@ class Convolution:
             self._block[tile] = irfft(total, axis=1)[:, :FAR]
 
 
+class Hits(NamedTuple):
+    """Projectiles, contact laws and velocities of cases."""
+
+    rods: Sequence[Projectile]  # the kinds of projectiles
+    kind: NDArray[np.intp]  # (cases,), ascending
+    scale: Floats  # (cases,): factor of the mass and stiffness of the kind
+    law: HystereticLaw  # with arrays of constants
+    speed: Floats  # (cases,): approach velocity
+
+
 class TipState(NamedTuple):
     """Motion of the tips of projectiles, (cases,) each."""
 
@@ -172,45 +182,36 @@ class TipState(NamedTuple):
 
 
 class TipSteps:
-    """Time steps of many projectiles that compute only the motion of the tips.
+    """Steps of size `dt` of the projectiles of hits that compute only the motion of the tips.
 
-    `steps` has one integrator per kind of projectile, all with the same time step and method;
-    `kinds` (cases,) is the kind of each case, with cases of a kind adjacent; `count` is the number
-    of steps.  The stiffness and mass of a case are those of its kind times `scale` (cases,).
+    The stiffness and mass of a case are those of its kind times its scale.  `count` is the number
+    of steps.
     """
 
-    def __init__(
-        self,
-        steps: Sequence[RodIntegrator],
-        kinds: NDArray[np.intp],
-        count: int,
-        scale: Floats | float = 1.0,
-    ) -> None:
-        first = steps[0]
-        self._steps, self.kinds = steps, kinds
-        self.theta, self.weight, self.dt = first.theta, first.weight, first.dt
-        self._begin = first.weights[0]
-        self.scale = np.broadcast_to(scale, kinds.shape)
-        self.gain: Floats = np.array([step.gain for step in steps])[kinds] / self.scale
+    def __init__(self, hits: Hits, dt: float, count: int) -> None:
+        self.hits, self.dt = hits, dt
+        self._steps = [WilsonStep(rod.stiffness(), rod.mass(), dt) for rod in hits.rods]
+        self.theta, self.weight = self._steps[0].theta, self._steps[0].weight
+        self._begin = self._steps[0].weights[0]
+        self.gain: Floats = np.array([step.gain for step in self._steps])[hits.kind] / hits.scale
         # `end` adds r_1 = gain; the sum over earlier forces starts with r_2.  The force of a step
         # is that at t + theta dt.
-        r = np.column_stack([tip_response(step, count + 1)[1:] for step in steps])
+        r = np.column_stack([tip_response(step, count + 1)[1:] for step in self._steps])
         before = np.vstack([np.zeros_like(r[:1]), r[:-1]])
         # Acceleration per contact force 1 to `count` steps earlier, (count, kinds).
         self.responses: Floats = self.theta * r + (1.0 - self.theta) * before
-        self.sums: Floats = np.zeros(len(kinds))  # over the contact forces before the next step
+        self.sums: Floats = np.zeros(len(hits.kind))  # over the contact forces before the next step
 
-    def motions(self, kind: int, speed: Floats, force: Floats) -> Iterator[Floats]:
+    def motions(self, kind: int, force: Floats) -> Iterator[Floats]:
         """Motion of complete projectiles of a kind after every block of steps and after the last.
 
-        `speed` (cases,) and `force` (steps, cases) are the impact velocities and contact forces of
-        the cases of all kinds; yields arrays (3 n, cases of the kind) as in
+        `force` (steps, cases) are the contact forces of all kinds; yields (3 n, own cases) as in
         :class:`~fecm.mechanics.projectile.RodState`.
         """
-        step, cases = self._steps[kind], np.flatnonzero(self.kinds == kind)
+        step, cases = self._steps[kind], np.flatnonzero(self.hits.kind == kind)
         before = np.zeros((1, len(cases)))
         motion = np.zeros((3 * step.n, len(cases)))
-        motion[step.n : 2 * step.n : 2] = -speed[cases]
+        motion[step.n : 2 * step.n : 2] = -self.hits.speed[cases]
         # T^1, T^2, T^4, ...; column j of `reach` is the effect of a unit force after j steps.
         powers, reach = [step.T], step.h[:, None]
         while reach.shape[1] < BLOCK:
@@ -219,7 +220,7 @@ class TipSteps:
         for start in range(0, len(force), BLOCK):
             forces = force[start : start + BLOCK, cases]
             earlier = np.vstack([before, forces[:-1]])
-            part = (self.theta * forces + (1.0 - self.theta) * earlier) / self.scale[cases]
+            part = (self.theta * forces + (1.0 - self.theta) * earlier) / self.hits.scale[cases]
             before, count = forces[-1:], len(part)
             for bit, power in enumerate(powers):
                 if count >> bit & 1:
@@ -229,7 +230,7 @@ class TipSteps:
 
     def begin(self, state: TipState) -> tuple[Floats, Floats, Floats, Floats]:
         """Return the free acceleration (twice), the drift and the previous acceleration."""
-        base = self.sums / self.scale
+        base = self.sums / self.hits.scale
         drift = state.tip + self.dt * state.velocity + self._begin * state.acceleration
         return base, base, drift, state.acceleration
 
@@ -248,16 +249,6 @@ FOUND = (  # rows of the results of the kernel
     "deepest", "indentation", "permanent", "highest", "w", "largest_ddw", "lost", "initial",
     "unconverged",
 )  # fmt: skip
-
-
-class Hits(NamedTuple):
-    """Projectiles, contact laws and velocities of cases."""
-
-    rods: Sequence[Projectile]  # the kinds of projectiles
-    kind: NDArray[np.intp]  # (cases,), ascending
-    scale: Floats  # (cases,): factor of the mass and stiffness of the kind
-    law: HystereticLaw  # with arrays of constants
-    speed: Floats  # (cases,): approach velocity
 
 
 class Impacts(NamedTuple):
@@ -285,20 +276,16 @@ def impacts(response: Floats, dt: float, node_mass: float, hits: Hits) -> Impact
     """
     if kernels.LIBRARY is not None and type(hits.law.constants) in CRITICAL:
         return _by_kernels(response, dt, node_mass, hits)
-    rods = [WilsonStep(rod.stiffness(), rod.mass(), dt) for rod in hits.rods]
-    tips = TipSteps(rods, hits.kind, len(response), hits.scale)
-    return by_numpy(response, node_mass, hits, tips)[0]
+    return by_numpy(response, node_mass, TipSteps(hits, dt, len(response)))[0]
 
 
-def by_numpy(
-    response: Floats, node_mass: float, hits: Hits, tips: TipSteps
-) -> tuple[Impacts, Work]:
+def by_numpy(response: Floats, node_mass: float, tips: TipSteps) -> tuple[Impacts, Work]:
     """Compute impacts step by step, all cases together; see :func:`impacts`."""
-    law, speed = hits.law, hits.speed
+    law, speed = tips.hits.law, tips.hits.speed
     steps, cases = len(response), len(speed)
     none = np.zeros(cases)
     of_plate = np.broadcast_to(response[:, None], tips.responses.shape)
-    sums = Convolution(np.stack([of_plate, tips.responses]), tips.kinds)
+    sums = Convolution(np.stack([of_plate, tips.responses]), tips.hits.kind)
     state = ContactState(
         TipState(none, -speed, none), law.start(), ContactPoint(none, none), none,
         unconverged_steps=np.zeros(cases, dtype=np.int64),
@@ -327,12 +314,12 @@ def by_numpy(
         Indentation(deepest, state.contact.indentation, permanent),
         state.unconverged_steps,
         (highest, state.plate_w),
-        balance_errors(force, work, hits, tips),
+        balance_errors(force, work, tips),
     )
     return found, work
 
 
-def balance_errors(force: Floats, work: Work, hits: Hits, tips: TipSteps) -> Floats:
+def balance_errors(force: Floats, work: Work, tips: TipSteps) -> Floats:
     """Estimate the error of the energy balance of cases relative to the initial energy, (cases,).
 
     The energy of the projectile and the work done on plate and indentation must add up to the
@@ -343,13 +330,13 @@ def balance_errors(force: Floats, work: Work, hits: Hits, tips: TipSteps) -> Flo
 
     The error is 0 if the initial energy is 0, and not finite if the motion is not finite.
     """
-    worst = np.zeros(len(hits.speed))
+    hits, worst = tips.hits, np.zeros(force.shape[1])
     for number, rod in enumerate(hits.rods):
         cases = np.flatnonzero(hits.kind == number)
         scale = hits.scale[cases]
         initial = 0.5 * rod.total_mass * scale * hits.speed[cases] ** 2
         lost = np.zeros(len(cases))
-        for done, motion in zip(work.done, tips.motions(number, hits.speed, force), strict=True):
+        for done, motion in zip(work.done, tips.motions(number, force), strict=True):
             deformation, velocity, _ = motion.reshape(3, -1, len(cases)).swapaxes(1, 2)
             deformation[:, 0] = 0.0
             held = rod.kinetic_energy(velocity) + rod.strain_energy(deformation)
@@ -366,9 +353,7 @@ def _modes(rod: Projectile) -> Modes:
 def _by_kernels(response: Floats, dt: float, node_mass: float, hits: Hits) -> Impacts:
     """Compute impacts by the compiled kernels, and projectiles by their modes."""
     steps, cases, c = len(response), len(hits.speed), hits.law.constants
-    given = np.empty((6, cases))
-    given[0], given[1], given[4], given[5] = c.k, c.q, hits.speed, hits.scale
-    given[2], given[3] = CRITICAL[type(c)](c)
+    given = np.stack(np.broadcast_arrays(c.k, c.q, *CRITICAL[type(c)](c), hits.speed, hits.scale))
     force, found = np.empty((cases, steps)), np.empty((len(FOUND), cases))
     starts = np.searchsorted(hits.kind, np.arange(len(hits.rods) + 1)).tolist()
     for rod, first, last in zip(hits.rods, starts[:-1], starts[1:], strict=True):

@@ -62,7 +62,8 @@ def apply_case(deck: model.Deck, case: Case) -> model.Deck:
     if dt == 0.0:
         dt = stable_time_step(made)
     if dt is not None or duration is not None:
-        made = with_time_step(made, dt, _taken_time_step(deck), duration)
+        given = all(macro.value for macro in deck.macros if macro.word == "DT")
+        made = with_time_step(made, dt, 0.0 if given else stable_time_step(deck), duration)
     return replace(made, text="")
 
 
@@ -84,6 +85,7 @@ def raise_first(findings: Findings) -> None:
         raise CasesError(f"{first.message}{remedy}")
 
 
+@lru_cache(maxsize=8)
 def stable_time_step(deck: model.Deck) -> float:
     """Time step that DT 0 would mean in a deck."""
     # DT 0 is below the critical time step of any plate.
@@ -258,14 +260,6 @@ def _material(deck: model.Deck, name: str, value: Value) -> model.Deck:
     return replace(_swap(deck, old, new), control=control)
 
 
-@lru_cache(maxsize=8)
-def _taken_time_step(deck: model.Deck) -> float:
-    """Time step that DT 0 means in a deck; 0 if no DT is 0."""
-    if all(macro.value for macro in deck.macros if macro.word == "DT"):
-        return 0.0
-    return taken_time_step(check_deck(deck).critical_time_step)
-
-
 def _refined(deck: model.Deck, name: str, value: Value) -> model.Deck:
     """Divide the sides of all elements by a power of two."""
     try:
@@ -288,12 +282,8 @@ _SETTERS: dict[str, Callable[[model.Deck, str, Value], model.Deck]] = {
     **dict.fromkeys(("rod_length", "rod_modulus", "rod_density", *MASS), _rod),
     "energy": _energy,
 }
-
-
 LONGEST = 1e15  # longest loop; the checks reject much shorter programs
 STORING = ("RODP", "DISP", "STRE", "PLYS")  # macros that store every N-th step or pass
-
-
 # Time step of the deck, and the rule that gives that of a plate from its critical time step.
 Clock = tuple[float, Callable[[float], float]]
 
