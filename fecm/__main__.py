@@ -25,27 +25,20 @@ def _refuse(message: str) -> NoReturn:
     os._exit(2)
 
 
-def _address_space() -> int | None:
-    """Limit of the address space in bytes (``ulimit -v``); None without a limit."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return None
-    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    return None if limit == resource.RLIM_INFINITY else limit
-
-
 def main() -> NoReturn:
     """Run the command line and exit with its status."""
     with contextlib.suppress(ValueError):  # only in the main thread
         signal.signal(signal.SIGINT, _leave)
         signal.signal(signal.SIGTERM, _leave)
-    space = _address_space()
-    if space is not None and space < LEAST_SPACE:
-        _refuse(
-            f"the process may have {space / 1e6:.0f} MB of address space (ulimit -v), and "
-            f"{LEAST_SPACE / 1e6:.0f} MB are needed"
-        )
+    with contextlib.suppress(ImportError):  # Windows has no such limits
+        import resource
+
+        space = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if space < LEAST_SPACE and space != resource.RLIM_INFINITY:
+            _refuse(
+                f"the process may have {space / 1e6:.0f} MB of address space (ulimit -v), and "
+                f"{LEAST_SPACE / 1e6:.0f} MB are needed"
+            )
     # Matrix products are small; the threads of OpenBLAS would only wait for work, and busily.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     gc.set_threshold(100_000)  # modules and arrays make little garbage in cycles

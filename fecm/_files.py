@@ -49,7 +49,18 @@ def check_outputs(
             raise OutputError(f"{path} is the name of two outputs; give them different names")
         taken |= keys
     for path in paths:
-        _check(path, overwrite)
+        mode = _mode(path)
+        _refuse_special(path, mode)
+        target = final(path)
+        if not target.parent.is_dir():
+            raise OutputError(f"{path}: there is no folder {target.parent}")
+        if mode is not None and not overwrite:
+            raise OutputError(f"{path} exists already; --overwrite replaces it")
+        if path.is_symlink() and not overwrite:
+            message = f"{path} is a link to {target}, which does not exist; --overwrite creates it"
+            raise OutputError(message)
+        if not _discard(partial_of(target)):
+            raise OutputError(f"{path} is being written by another process")
 
 
 def _keys(path: Path) -> set[object]:
@@ -59,22 +70,6 @@ def _keys(path: Path) -> set[object]:
         found = path.stat()
         keys.add((found.st_dev, found.st_ino))
     return keys
-
-
-def _check(path: Path, overwrite: bool) -> None:
-    """Refuse one output."""
-    mode = _mode(path)
-    _refuse_special(path, mode)
-    target = final(path)
-    if not target.parent.is_dir():
-        raise OutputError(f"{path}: there is no folder {target.parent}")
-    if mode is not None and not overwrite:
-        raise OutputError(f"{path} exists already; --overwrite replaces it")
-    if path.is_symlink() and not overwrite:
-        message = f"{path} is a link to {target}, which does not exist; --overwrite creates it"
-        raise OutputError(message)
-    if not _discard(partial_of(target)):
-        raise OutputError(f"{path} is being written by another process")
 
 
 def _mode(path: Path) -> int | None:
@@ -87,10 +82,8 @@ def _mode(path: Path) -> int | None:
 
 def _refuse_special(path: Path, mode: int | None) -> None:
     """Refuse to replace folders, devices, FIFOs and sockets."""
-    if mode is not None and stat.S_ISDIR(mode):
-        raise OutputError(f"{path} is a folder")
     if mode is not None and not stat.S_ISREG(mode):
-        raise OutputError(f"{path} is not a regular file")
+        raise OutputError(f"{path} is {'a folder' if stat.S_ISDIR(mode) else 'not a regular file'}")
 
 
 def final(path: Path) -> Path:
@@ -179,28 +172,24 @@ def _discard(partial: Path) -> bool:
         partial.unlink(missing_ok=True)  # a link
         return True
     try:
-        if not _lock(handle):
-            return False
-        if _is(handle, partial):
+        free = _lock(handle)
+        if free and _is(handle, partial):
             partial.unlink(missing_ok=True)
-        return True
+        return free
     finally:
         os.close(handle)
 
 
 def _lock(handle: int, *, wait: bool = False) -> bool:
-    """Lock a file; return False if another process holds the lock.
-
-    Some file systems have no locks.
-    """
+    """Lock a file; return False if another process holds the lock."""
     try:
         import fcntl
 
         fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
     except BlockingIOError:
         return False
-    except (ImportError, OSError):
-        return True
+    except (ImportError, OSError):  # Windows, and some file systems, have no locks
+        pass
     return True
 
 
@@ -224,7 +213,11 @@ def _finish(handle: int, partial: Path, target: Path, overwrite: bool) -> None:
             os.close(handle)  # Windows renames no open file
         partial.replace(target)
     else:
-        _rename_exclusively(partial, target)
+        try:
+            _rename_exclusively(partial, target)
+        except FileExistsError:
+            message = f"{target} was created by another program meanwhile and is not replaced"
+            raise OutputError(message) from None
     with contextlib.suppress(OSError):  # not every system opens or syncs folders
         folder = os.open(target.parent, os.O_RDONLY)
         try:
@@ -256,16 +249,12 @@ def _keep_permissions(handle: int, old: os.stat_result) -> None:
 def _rename_exclusively(partial: Path, target: Path) -> None:
     """Rename a file without replacing an existing one."""
     try:
-        try:
-            os.link(partial, target)
-        except OSError as error:
-            if error.errno not in NO_LINKS:
-                raise
-            os.close(os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL | NO_FOLLOW))
-            partial.replace(target)
-    except FileExistsError:
-        message = f"{target} was created by another program meanwhile and is not replaced"
-        raise OutputError(message) from None
+        os.link(partial, target)
+    except OSError as error:
+        if error.errno not in NO_LINKS:
+            raise
+        os.close(os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL | NO_FOLLOW))
+        partial.replace(target)
 
 
 def open_ordinary(path: Path, flags: int = os.O_RDONLY) -> BinaryIO:

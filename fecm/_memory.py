@@ -31,13 +31,8 @@ def available() -> int | None:
 
 def require(count: int, what: str) -> None:
     """Refuse to allocate more memory than is free."""
-    if count < UNNOTICED:
-        return
-    free = available()
-    if free is not None and count > free:
-        raise NotEnoughMemoryError(
-            f"{what} takes about {format_bytes(count)} of memory, and {format_bytes(free)} are free"
-        )
+    if count >= UNNOTICED and (free := available()) is not None and count > free:
+        raise NotEnoughMemoryError(_shortage(what, count, free))
 
 
 def check(what: str, needed: Callable[[bool], int], remedy: Callable[[int], str]) -> None:
@@ -47,14 +42,13 @@ def check(what: str, needed: Callable[[bool], int], remedy: Callable[[int], str]
     for a number of free bytes.
     """
     free = available()
-    if free is None:
-        return
-    if needed(False) <= free or (count := needed(True)) <= free:
-        return
-    raise NotEnoughMemoryError(
-        f"{what} takes about {format_bytes(count)} of memory, and {format_bytes(free)} are free; "
-        f"{remedy(free)}"
-    )
+    if free is not None and needed(False) > free and (count := needed(True)) > free:
+        raise NotEnoughMemoryError(f"{_shortage(what, count, free)}; {remedy(free)}")
+
+
+def _shortage(what: str, count: int, free: int) -> str:
+    needed, left = format_bytes(count), format_bytes(free)
+    return f"{what} takes about {needed} of memory, and {left} are free"
 
 
 def _of_machine() -> int | None:

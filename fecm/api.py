@@ -20,7 +20,7 @@ from fecm.problem.memory import check_memory
 from fecm.problem.options import ENERGY_LIMIT, RunOptions
 from fecm.problem.problem import UNSTABLE, Problem, check
 from fecm.problem.slips import LISTING, REPORT, active_slips
-from fecm.results.result import Result
+from fecm.results.result import Result, load
 from fecm.results.sinks import MemorySink
 from fecm.simulation.run import simulate
 from fecm.simulation.simulation import Simulation
@@ -58,8 +58,8 @@ def load_deck(path_or_text: str | Path | BinaryIO | Deck, mode: str = REPORT) ->
         text, source = path_or_text.to_text(), "<deck>"
     else:
         text, source = load_text(path_or_text)
-    reader = Reader(text, blanks_are_zeros=mode == LISTING)
     listing = mode == LISTING
+    reader = Reader(text, blanks_are_zeros=listing)
     problems: list[Problem] = []
     for read in reader.problems():
         if reader.findings.closed:
@@ -249,7 +249,6 @@ def _run_one(
         report(simulate(problem, memory, choices, [report]))
         return Result(memory.arrays, memory.texts, memory.groups)
     from fecm.results.hdf5_writer import writing
-    from fecm.results.result import load
 
     with writing(path) as sink:
         report(simulate(problem, sink, choices, [report]))

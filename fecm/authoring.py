@@ -9,20 +9,12 @@ from dataclasses import replace
 from functools import partial
 from typing import Literal
 
+from fecm import objects
 from fecm._errors import FecmWarning
 from fecm._frozen import frozen
 from fecm.api import load_deck
-from fecm.deck import model
-from fecm.deck.catalogue import (
-    CONTACTS,
-    MATERIALS,
-    NU23,
-    STRENGTHS,
-    SYSTEM,
-    SYSTEMS,
-    NamedContact,
-    NamedPly,
-)
+from fecm.deck import catalogue, model
+from fecm.deck.catalogue import MATERIALS, SYSTEM, SYSTEMS, NamedContact, NamedPly
 from fecm.deck.findings import DeckError
 from fecm.deck.grid import Grid
 from fecm.deck.records import Control, Gage, Integration, Layer, Macro, Ply
@@ -30,18 +22,7 @@ from fecm.mechanics.laminate import laminate as stiffness_of
 from fecm.mechanics.points import HERTZ
 from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
-from fecm.objects import (
-    STANDARD,
-    Contact,
-    Laminate,
-    ObjectError,
-    Plate,
-    Sphere,
-    check_positive,
-    grid_of,
-    pair,
-    parse_patch,
-)
+from fecm.objects import STANDARD, Contact, Laminate, ObjectError, Plate, Sphere, check_positive
 from fecm.problem.build import build_plate, build_projectile, projectile_segment
 from fecm.problem.generate import generate
 from fecm.problem.plate_mesh import PlateMesh
@@ -166,24 +147,12 @@ def impact(
 
 
 def author(
-    plate: Plate,
-    laminate: Laminate,
-    projectile: Rod | RigidMass | model.Projectile | None,
-    contact: model.Indentation | NamedContact | Sphere | str | None,
-    *,
-    velocity: float | None,
-    energy: float | None,
-    at: tuple[float, float] | None,
-    duration: float | None,
-    dt: float | None,
-    every: int | None,
-    units: str | None,
-    patch: str | model.Patch | None,
-    shear: str,
-    gages: Iterable[tuple[float, float, float, float]],
-    damage: bool,
-    title: str,
-) -> Authored:
+    plate: Plate, laminate: Laminate, projectile: Rod | RigidMass | model.Projectile | None,
+    contact: model.Indentation | NamedContact | Sphere | str | None, *, velocity: float | None,
+    energy: float | None, at: tuple[float, float] | None, duration: float | None, dt: float | None,
+    every: int | None, units: str | None, patch: str | model.Patch | None, shear: str,
+    gages: Iterable[tuple[float, float, float, float]], damage: bool, title: str,
+) -> Authored:  # fmt: skip
     """Make the deck of :func:`impact` without checking it."""
     for name, value, kinds in (
         ("plate", plate, Plate), ("laminate", laminate, Laminate),
@@ -225,7 +194,7 @@ def author(
     if patch == AUTO:
         patch = model.Patch() if test is None else model.Patch(HERTZ)
     elif isinstance(patch, str):
-        patch = parse_patch(patch)
+        patch = objects.parse_patch(patch)
     given = laminate.ply
     if isinstance(given, str):
         if given not in MATERIALS:
@@ -252,12 +221,8 @@ def author(
             f"k = {law.k:g} is estimated from the ply's constants (fecm indent estimate) for an "
             "elastic law; a measured one is better"
         )
-    damages: tuple[model.Segment, ...] = ()
-    if damage:
-        damages, more = _damage(named, system)
-        notes += more
-    mesh, node, patch, moved = _placed(plate, at, patch)
-    doubts += moved
+    damages = _damages(named, system, notes) if damage else []
+    mesh, node, patch = _placed(plate, at, patch, doubts)
     angles = laminate.angles
     layers = tuple(Layer(n, a, laminate.ply_thickness) for n, a in enumerate(angles, start=1))
     coupled = stiffness_of(ply, angles, [laminate.ply_thickness] * len(angles)).is_coupled
@@ -310,22 +275,20 @@ def _law(
     if isinstance(contact, model.Indentation):
         return model.Indentation(*contact.values(), contact.word), ""
     if isinstance(contact, Sphere):
-        return contact.law(laminate, ply, named.nu23 if named else NU23, system)
+        return contact.law(laminate, ply, named.nu23 if named else catalogue.NU23, system)
     if contact is None:
-        raise ObjectError(f"give `contact`, a law or one of {', '.join(CONTACTS)}")
+        raise ObjectError(f"give `contact`, a law or one of {', '.join(catalogue.CONTACTS)}")
     if system is None:
         raise ObjectError("a named `contact` with constants of a `ply` needs `units`, theirs")
     return contact.converted(system), ""
 
 
-def _damage(
-    named: NamedPly | None, system: str | None
-) -> tuple[tuple[model.Segment, ...], list[str]]:
-    """Strengths and toughness of a named ply, and notes about what it does not have."""
+def _damages(named: NamedPly | None, system: str | None, notes: list[str]) -> list[model.Segment]:
+    """Strengths and toughness of a named ply; notes say what it does not have."""
     if named is None or system is None:
         raise ObjectError("`damage` needs a named ply with strengths or toughness")
     parts = {
-        " and ".join(key for key in STRENGTHS if key not in named.values): (
+        " and ".join(key for key in catalogue.STRENGTHS if key not in named.values): (
             named.allowables(system), "no failure exposures (ALLO, FAIL)"
         ),
         "GIIc": (named.delamination(system), "no delamination threshold (DELA)"),
@@ -333,17 +296,16 @@ def _damage(
     missing = [f"no {key}, so {what}" for key, (part, what) in parts.items() if part is None]
     if len(missing) == len(parts):
         raise ObjectError(f"`damage`: {named.name} has {'; '.join(missing)}")
-    notes = [f"{named.name} has {text}" for text in missing]
-    return tuple(part for part, _ in parts.values() if part is not None), notes
+    notes += [f"{named.name} has {text}" for text in missing]
+    return [part for part, _ in parts.values() if part is not None]
 
 
 def _placed(
-    plate: Plate, at: Sequence[float] | None, patch: model.Patch | None
-) -> tuple[Grid | PlateMesh, int, model.Patch | None, list[str]]:
-    """Mesh, node that is hit, patch, and how they differ from what was asked."""
-    doubts: list[str] = []
-    place = None if at is None else pair("at", at)
-    mesh = plate.imported or grid_of(plate, place, None if patch is None else patch.radius)
+    plate: Plate, at: Sequence[float] | None, patch: model.Patch | None, doubts: list[str]
+) -> tuple[Grid | PlateMesh, int, model.Patch | None]:
+    """Mesh, node that is hit, and patch; doubts say how they differ from what was asked."""
+    place = None if at is None else objects.pair("at", at)
+    mesh = plate.imported or objects.grid_of(plate, place, None if patch is None else patch.radius)
     low, high = mesh.extent
     x, y = place or ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0)
     if not (low[0] <= x <= high[0] and low[1] <= y <= high[1]):
@@ -371,7 +333,7 @@ def _placed(
                 f"the mesh has {new} elements instead of {old}: their sides at the patch are at "
                 f"most its radius {patch.radius:g}"
             )
-    return mesh, node, patch, doubts
+    return mesh, node, patch
 
 
 def _with_energy(deck: model.Deck, energy: float) -> model.Deck:
@@ -386,13 +348,10 @@ def _with_energy(deck: model.Deck, energy: float) -> model.Deck:
 
 
 def _duration(deck: model.Deck) -> float:
-    """Simulated time: longer than half a period of projectile and static plate.
-
-    That of a deck with errors, which is refused later, is 1.
-    """
+    """Simulated time: longer than half a period of projectile and static plate."""
     loaded = load_deck(deck)
     if loaded.errors():
-        return 1.0
+        return 1.0  # the deck is refused later
     (problem,) = loaded.problems
     assert problem.contact is not None
     stiffness = static_stiffness(problem.moving_plate, problem.contact)

@@ -14,33 +14,17 @@ from numpy.typing import ArrayLike
 
 from fecm._errors import FecmError
 from fecm._frozen import frozen
+from fecm.deck import grid as grids
 from fecm.deck.catalogue import CONTACTS, NamedContact, NamedPly, convert
-from fecm.deck.grid import (
-    EDGES,
-    SUPPORTS,
-    Grid,
-    Section,
-    framed,
-    graded,
-    listed,
-    longest_at,
-    refined,
-    uniform,
-)
+from fecm.deck.grid import EDGES, SUPPORTS, Grid, Section
 from fecm.deck.layup import parse_layup
 from fecm.deck.model import Indentation, Patch
 from fecm.deck.records import Ply
 from fecm.deck.units import MODULUS
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.mechanics.points import DISC, HERTZ
-from fecm.problem.plate_mesh import (
-    BOUNDARY,
-    MeshLike,
-    PlateMesh,
-    from_meshio,
-    plate_mesh,
-    read_mesh,
-)
+from fecm.problem import plate_mesh
+from fecm.problem.plate_mesh import BOUNDARY, MeshLike, PlateMesh
 from fecm.studies import StudyError
 from fecm.studies.indentation_test.modulus import effective_stiffness, indentation_modulus
 
@@ -199,14 +183,18 @@ class Plate:
             if size or mesh or grading != 1.0:
                 raise ObjectError("`columns` and `rows` replace `size`, `mesh` and `grading`")
             try:
-                return cls(supports, None, None, 1.0, tuple(listed(columns)), tuple(listed(rows)))
+                x_sections, y_sections = grids.listed(columns), grids.listed(rows)
+                return cls(supports, columns=tuple(x_sections), rows=tuple(y_sections))
             except ValueError as error:
                 raise ObjectError(f"`columns` and `rows`: {error}") from None
         if columns or rows or size is None or mesh is None:
             raise ObjectError("give `size` and `mesh`, or `columns` and `rows`")
         x, y = pair("size", size)
         check_positive(size=min(x, y))
-        return cls(supports, (x, y), _counts(mesh), float(grading))
+        nx, ny = pair("mesh", mesh)
+        if not all(1 <= n <= MOST and n == int(n) for n in (nx, ny)):
+            raise ObjectError(f"`mesh` is {mesh!r}, not two numbers of elements from 1 to {MOST}")
+        return cls(supports, (x, y), (int(nx), int(ny)), float(grading))
 
     @classmethod
     def on_fixture(
@@ -276,13 +264,13 @@ class Plate:
         {'boundary': 'clamped'}
         """
         if isinstance(mesh, tuple):
-            found = plate_mesh(mesh[0], mesh[1], groups or {})
+            found = plate_mesh.plate_mesh(mesh[0], mesh[1], groups or {})
         elif groups is not None:
             raise ObjectError("`groups` are for arrays; a mesh has its own")
         elif isinstance(mesh, str | Path):
-            found = read_mesh(mesh)
+            found = plate_mesh.read_mesh(mesh)
         else:
-            found = from_meshio(mesh)
+            found = plate_mesh.from_meshio(mesh)
         wanted = {BOUNDARY: support} if isinstance(support, str) else support or {}
         if not isinstance(wanted, Mapping):
             raise ObjectError(f"`support` is {support!r}, not a dictionary of groups")
@@ -452,14 +440,6 @@ def pair(name: str, value: Sequence[float]) -> tuple[float, float]:
     return x, y
 
 
-def _counts(mesh: Sequence[int]) -> tuple[int, int]:
-    """Two numbers of elements."""
-    x, y = pair("mesh", mesh)
-    if not all(1 <= n <= MOST and n == int(n) for n in (x, y)):
-        raise ObjectError(f"`mesh` is {mesh!r}, not two numbers of elements from 1 to {MOST}")
-    return int(x), int(y)
-
-
 def grid_of(plate: Plate, at: tuple[float, float] | None, radius: float | None) -> Grid:
     """Grid of a rectangular plate, refined to the radius of a patch.
 
@@ -468,15 +448,13 @@ def grid_of(plate: Plate, at: tuple[float, float] | None, radius: float | None) 
     columns, rows = list(plate.columns), list(plate.rows)
     if plate.size and plate.mesh:
         whole = plate.fixture.size if plate.fixture else plate.size
-        rims = [(length - side) / 2.0 for length, side in zip(whole, plate.size, strict=True)]
         place = at or (whole[0] / 2.0, whole[1] / 2.0)
-        centre = (x - rim for x, rim in zip(place, rims, strict=True))
         columns, rows = (
-            _sections(length, count, middle, plate.grading, radius)
-            for length, count, middle in zip(plate.size, plate.mesh, centre, strict=True)
+            _sections(side, count, x - (length - side) / 2.0, plate.grading, radius)
+            for side, count, x, length in zip(plate.size, plate.mesh, place, whole, strict=True)
         )
         if plate.fixture:
-            columns, rows = framed(columns, whole[0]), framed(rows, whole[1])
+            columns, rows = grids.framed(columns, whole[0]), grids.framed(rows, whole[1])
     grid = Grid(columns, rows)
     if max(grid.across, grid.up) // 2 > MOST or grid.elements > MOST_ELEMENTS:
         raise ObjectError(
@@ -490,12 +468,14 @@ def _sections(
     length: float, count: int, centre: float, grading: float, radius: float | None
 ) -> list[Section]:
     """Elements in one direction."""
-    made = graded(length, count, centre, grading) if grading > 1.0 else uniform(length, count)
-    if radius is None or longest_at(made, centre) <= radius:
+    made = grids.uniform(length, count)
+    if grading > 1.0:
+        made = grids.graded(length, count, centre, grading)
+    if radius is None or grids.longest_at(made, centre) <= radius:
         return made
     if radius < LEAST_RADIUS * length:
         raise ObjectError(
             f"the mesh is not refined to a radius of {radius:g}, less than {LEAST_RADIUS:g} times "
             f"the plate's side of {length:g}; give `columns` and `rows`"
         )
-    return refined(length, count, centre, grading, radius)
+    return grids.refined(length, count, centre, grading, radius)

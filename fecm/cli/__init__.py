@@ -10,14 +10,13 @@ from __future__ import annotations
 import errno
 from collections.abc import Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
 import click
 
 from fecm._errors import FecmError
-from fecm._frozen import frozen
 from fecm._version import __version__
-from fecm.cli import isolation, streams
+from fecm.cli import common, isolation
 from fecm.cli.common import INTERRUPTED, SIGNALLED, UNUSABLE, echo, signals
 from fecm.results.schema import printable
 
@@ -25,8 +24,7 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 
-@frozen
-class LazyCommand:
+class LazyCommand(NamedTuple):
     """A command that is imported when it is called."""
 
     module: str  # in which it has its name
@@ -65,12 +63,12 @@ class LazyGroup(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import a command; an isolated one in a child process."""
-        if (command := COMMANDS.get(cmd_name)) is None:
-            return None
-        if command.isolated and not ctx.resilient_parsing:
-            isolation.fork()
-        found: click.Command = getattr(import_module(command.module), cmd_name)
-        return found
+        if (command := COMMANDS.get(cmd_name)) is not None:
+            if command.isolated and not ctx.resilient_parsing:
+                isolation.fork()
+            found: click.Command = getattr(import_module(command.module), cmd_name)
+            return found
+        return None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands with their summaries."""
@@ -100,10 +98,10 @@ def cli() -> None:
 def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoReturn:
     """Run the command line and leave with its exit status."""
     signals.install()
-    streams.prepare()
+    common.guard_streams()
     isolation.switch.on = arguments is None
     status = _status(arguments, prog_name)
-    if (error := streams.failure()) is not None and status not in SIGNALLED:
+    if (error := common.output_error()) is not None and status not in SIGNALLED:
         status = UNUSABLE
         if error.errno != errno.EPIPE:  # a reader who has left needs no message
             echo(f"fecm: error: standard output: {error.strerror}", err=True)
@@ -132,7 +130,7 @@ def _status(arguments: Sequence[str] | None, prog_name: str) -> int:
 
 def _report(error: Exception) -> int:
     """Print an error; return the exit status after it."""
-    if error is not streams.failure():
+    if error is not common.output_error():
         echo(f"fecm: error: {_message(error)}", err=True)
     return error.exit_code if isinstance(error, FecmError) else UNUSABLE
 

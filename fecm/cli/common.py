@@ -1,8 +1,15 @@
-"""Exit statuses, options, output and signals of all commands."""
+"""Exit statuses, options, output, standard streams and signals of all commands.
+
+Nothing that happens to standard error disturbs a command.  Standard output raises its first error,
+remembers it, and drops what follows: the command's exit status then says that something was not
+printed.  Characters that an encoding lacks are escaped.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import io
+import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -25,8 +32,9 @@ SIGNALS = tuple(
 )
 SIGNALLED = tuple(128 + number for number in SIGNALS)  # exit status after each of them
 
+STANDARD_OUTPUT = Path("-")
 DECK_PATH = click.Path(exists=True, dir_okay=False, path_type=Path)
-FILE_PATH = click.Path(path_type=Path)
+FILE_PATH = click.Path(path_type=Path, allow_dash=True)
 
 MODE_OPTION = click.option("--mode", type=click.Choice(MODES), default=REPORT, show_default=True,
                            help="Follow the report's text, or its printed program slip by "
@@ -62,17 +70,10 @@ def echo_json(value: Any) -> None:
     click.echo(json.dumps(jsonable(value)))
 
 
-def note(text: object) -> None:
-    """Print a note on standard error."""
-    echo(f"fecm: note: {text}", err=True)
-
-
-def echo_file(text: str) -> None:
-    """Print a file as it is, or on a terminal with control characters escaped."""
-    if sys.stdout.isatty():
-        echo(text.removesuffix("\n"))
-    else:
-        click.echo(text, nl=False)
+def note(*texts: object) -> None:
+    """Print notes on standard error."""
+    for text in texts:
+        echo(f"fecm: note: {text}", err=True)
 
 
 @contextlib.contextmanager
@@ -103,9 +104,88 @@ def writing(path: Path, *, overwrite: bool) -> Iterator[TextIO]:
 
 
 def write_text(path: Path, text: str, *, overwrite: bool) -> None:
-    """Write a complete text file, or leave an existing one untouched."""
-    with writing(path, overwrite=overwrite) as file:
-        file.write(text)
+    """Write a complete text file, or print it, on a terminal with control characters escaped."""
+    if path != STANDARD_OUTPUT:
+        with writing(path, overwrite=overwrite) as file:
+            file.write(text)
+    elif sys.stdout.isatty():
+        echo(text.removesuffix("\n"))
+    else:
+        click.echo(text, nl=False)
+
+
+# Standard streams --------------------------------------------------------------------------------
+
+
+class _Guarded(io.FileIO):
+    """A stream that remembers its first error of writing and drops what follows."""
+
+    error: OSError | None = None
+
+    def __init__(self, number: int, *, raises: bool) -> None:
+        super().__init__(number, "w", closefd=False)
+        self._raises = raises
+
+    def write(self, data: object) -> int:
+        """Write bytes; return their number."""
+        view = memoryview(data)  # type: ignore[arg-type]
+        if self.error is None:
+            try:
+                return super().write(view)
+            except OSError as error:
+                self.error = error
+                if self._raises:
+                    raise
+        return view.nbytes
+
+
+_guarded: list[_Guarded] = []  # the standard output, once it is guarded
+
+
+def guard_streams() -> None:
+    """Guard the standard streams of this process; streams that a caller has put there stay."""
+    # In order, as each takes the lowest free number.  No other file may get such a number, or what
+    # is printed would go there.  A write to what is open for reading fails.
+    for number, flags in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, flags)
+    if _is_own(sys.stdout, 1):
+        _guarded[:] = [_Guarded(1, raises=True)]
+        sys.stdout = _text(_guarded[0], sys.stdout)
+    if _is_own(sys.stderr, 2):
+        sys.stderr = standard_error(2, sys.stderr)
+
+
+def standard_error(number: int, like: TextIO | None) -> TextIO:
+    """A guarded text stream to an open file, in the encoding of another stream."""
+    return _text(_Guarded(number, raises=False), like, line_buffering=True)
+
+
+def _is_own(stream: TextIO | None, number: int) -> bool:
+    """Whether a stream is the process's own, or was closed before the process began."""
+    try:
+        return stream is None or (
+            isinstance(stream, io.TextIOWrapper) and stream.fileno() == number
+        )
+    except (OSError, ValueError):
+        return False
+
+
+def _text(raw: _Guarded, like: TextIO | None, *, line_buffering: bool = False) -> TextIO:
+    encoding = "utf-8" if like is None else like.encoding
+    through = isinstance(like, io.TextIOWrapper) and (like.line_buffering or like.write_through)
+    buffer = io.BufferedWriter(raw)
+    lines = line_buffering or through
+    return io.TextIOWrapper(buffer, encoding, "backslashreplace", line_buffering=lines)
+
+
+def output_error() -> OSError | None:
+    """Print what is still buffered; the first error of standard output, if there was one."""
+    with contextlib.suppress(OSError, ValueError):
+        sys.stdout.flush()
+    return _guarded[0].error if _guarded else None
 
 
 class Signals:
@@ -116,7 +196,7 @@ class Signals:
     once.
     """
 
-    _received = 0
+    received = 0  # number of the signal that came
     _deferred = _installed = False
 
     def install(self) -> None:
@@ -135,7 +215,7 @@ class Signals:
                 signal.signal(number, signal.SIG_IGN)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
-        again, self._received = bool(self._received), number
+        again, self.received = bool(self.received), number
         if again or not self._deferred:
             self.heed()
 
@@ -149,21 +229,12 @@ class Signals:
             self._deferred = False
         self.heed()
 
-    def came(self) -> bool:
-        """Whether a signal was received."""
-        return bool(self._received)
-
-    @property
-    def status(self) -> int:
-        """Exit status after the signal."""
-        return 128 + self._received
-
     def heed(self) -> None:
         """End the program if a signal came."""
-        if self._received == signal.SIGINT:
+        if self.received == signal.SIGINT:
             raise KeyboardInterrupt
-        if self._received:
-            raise SystemExit(self.status)
+        if self.received:
+            raise SystemExit(128 + self.received)
 
 
 signals = Signals()

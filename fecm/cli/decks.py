@@ -17,16 +17,9 @@ from fecm._errors import FecmError
 from fecm._files import check_outputs
 from fecm._version import __version__
 from fecm.api import LoadedDeck, load_deck
-from fecm.cli.common import (
-    MODE_OPTION,
-    CheckFailedError,
-    RefusedError,
-    echo,
-    echo_file,
-    echo_json,
-    progress,
-    write_text,
-)
+from fecm.cli import common
+from fecm.cli.common import FILE_PATH, CheckFailedError, RefusedError, echo, echo_json
+from fecm.cli.types import option
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.format import format_deck
 from fecm.deck.reader import load_text
@@ -45,14 +38,9 @@ def count_findings(findings: Sequence[Finding]) -> str:
 
 
 def load_valid(
-    deck: Path,
-    otherwise: str = "",
-    mode: str = REPORT,
-    *,
-    force: bool = True,
-    warnings: bool = True,
-) -> LoadedDeck:
-    """Load a deck and print its findings on standard error; without `warnings` only errors.
+    deck: Path, otherwise: str = "", mode: str = REPORT, force: bool = True, warnings: bool = True
+) -> list[Problem]:
+    """Problems of a deck, whose findings go to standard error; without `warnings` only errors.
 
     Errors that `--force` permits are permitted if `force`.  Raises RefusedError, whose message ends
     with `otherwise`, if the deck has other errors.
@@ -63,60 +51,48 @@ def load_valid(
         echo(finding.render(loaded.source), err=True)
     if errors:
         raise RefusedError(count_findings(errors) + otherwise)
-    return loaded
+    return loaded.problems
 
 
 def load_single(deck: Path, command: str) -> Problem:
     """The problem of a deck, for a command that takes one; raises as :func:`load_valid`."""
-    problems = load_valid(deck).problems
+    problems = load_valid(deck)
     if len(problems) != 1:
         raise RefusedError(f"{deck} has {len(problems)} problems; {command} takes one")
     return problems[0]
 
 
-DECKS = click.argument(
-    "decks", nargs=-1, required=True, metavar="DECK...",
-    type=click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path),
-)  # fmt: skip
+DECK_OR_DASH = click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path)
+DECKS = click.argument("decks", nargs=-1, required=True, metavar="DECK...", type=DECK_OR_DASH)
 
 
 def _input(deck: Path) -> Path | BinaryIO:
     """What to read: a file, or standard input for ``-``."""
-    if str(deck) != "-":
-        return deck
-    buffer: BinaryIO = getattr(sys.stdin, "buffer", None) or io.BytesIO()
-    return buffer
+    piped = getattr(sys.stdin, "buffer", None) or io.BytesIO()
+    return piped if deck == common.STANDARD_OUTPUT else deck
 
 
-def _each(
-    decks: Sequence[Path],
-    work: Callable[[Path], None],
-    report: Callable[[list[Exception]], None] = lambda failed: None,
-) -> None:
-    """Do the work on every deck, report what failed, and end with the worst exit status."""
+def _failures(decks: Sequence[Path], work: Callable[[Path], None]) -> list[Exception]:
+    """Do the work on every deck; return the errors, whose worst exit status is the command's."""
     failed: list[Exception] = []
     for deck in dict.fromkeys(decks):
         try:
             work(deck)
         except (FecmError, OSError) as error:
             failed.append(error)
-    report(failed)
-    if len(failed) == 1:
-        raise failed[0]
-    if failed:
-        raise ExceptionGroup("errors of several decks", failed)
+    return failed
 
 
 @click.command(short_help="Check decks without running them, and summarise them.")
 @DECKS
-@MODE_OPTION
-@click.option("--format", "form", type=click.Choice(["text", "json", "sarif"]), default="text",
-              show_default=True, help="Text for people, JSON for programs, or SARIF for code "
-                                      "hosts.")  # fmt: skip
-@click.option("--strict", is_flag=True, help="Exit with 1 for warnings too.")
-@click.option("--mesh-error", is_flag=True,
-              help="Run DECK twice, with its elements and with those around the load bisected, and "
-                   "compare the peak forces.")  # fmt: skip
+@common.MODE_OPTION
+@option("--format", "form", type=click.Choice(["text", "json", "sarif"]), default="text",
+        show_default=True,
+        help="Text for people, JSON for programs, or SARIF for code hosts.")  # fmt: skip
+@option("--strict", is_flag=True, help="Exit with 1 for warnings too.")
+@option("--mesh-error", is_flag=True,
+        help="Run DECK twice, with its elements and with those around the load bisected, and "
+             "compare the peak forces.")  # fmt: skip
 def check(decks: tuple[Path, ...], mode: str, form: str, strict: bool, mesh_error: bool) -> None:
     """Check decks without running them; print their findings and a summary.
 
@@ -140,22 +116,22 @@ def check(decks: tuple[Path, ...], mode: str, form: str, strict: bool, mesh_erro
         if mesh_error:
             _compare_meshes(prepared, mode, form)
 
-    def report(failed: list[Exception]) -> None:
-        if form == "sarif":
-            unread = [str(error) for error in failed if not isinstance(error, CheckFailedError)]
-            echo_json(_sarif(checked, unread))
-
-    _each(decks, one, report)
+    failed = _failures(decks, one)
+    if form == "sarif":
+        unread = [str(error) for error in failed if not isinstance(error, CheckFailedError)]
+        echo_json(_sarif(checked, unread))
+    if failed:
+        raise ExceptionGroup("errors of decks", failed)
 
 
 def _print(prepared: LoadedDeck, form: str, *, brief: bool, passes: bool) -> None:
     """Print findings and, if there are no errors, a summary, or one line of a deck that passes."""
     views = [] if prepared.errors() else [ProblemSummary(problem) for problem in prepared.problems]
     if form == "json":
-        lines = [finding.to_dict(prepared.source) for finding in prepared.findings]
-        about = {"kind": "summary", "file": prepared.source}
-        for line in (*lines, *({**about, **view.to_dict()} for view in views)):
-            echo_json(line)
+        for finding in prepared.findings:
+            echo_json(finding.to_dict(prepared.source))
+        for view in views:
+            echo_json({"kind": "summary", "file": prepared.source, **view.to_dict()})
     elif form == "text":
         for finding in prepared.findings:
             echo(finding.render(prepared.source))
@@ -175,12 +151,12 @@ def _compare_meshes(prepared: LoadedDeck, mode: str, form: str) -> None:
         units = unit_names(problem.deck)
         force, length = (unit_of(name, units) for name in ("force", "length"))
         fine = bisected(problem)
-        with progress("fecm", problem.work.steps + fine.work.steps) as advance:
+        with common.progress("fecm", problem.work.steps + fine.work.steps) as advance:
             found = mesh_error(problem, fine, RunOptions(active_slips(mode, ())), advance)
         if form == "json":
             changes = {"change": found.change, "relative_change": found.relative_change}
             head = {"kind": "mesh_error", "file": prepared.source}
-            echo_json({**head, **found.__dict__, **changes, "units": units})
+            echo_json({**head, **vars(found), **changes, "units": units})
             continue
         share = found.relative_change
         about = "no contact" if share is None else f"{share:+.2%}"
@@ -211,24 +187,20 @@ def _sarif(checked: Mapping[Path, Sequence[Finding]], failures: Sequence[str]) -
     ]  # fmt: skip
     driver = {"name": "fecm", "version": __version__, "informationUri": HOME, "rules": rules}
     notifications = [{"level": "error", "message": {"text": text}} for text in failures]
+    called = {"executionSuccessful": not failures, "toolExecutionNotifications": notifications}
+    results = [
+        {
+            "ruleId": f.code, "ruleIndex": codes.index(f.code), "level": f.severity,
+            "message": {"text": f.message + (f.hint and f" Hint: {f.hint}.")},
+            "locations": [{"physicalLocation": _location(deck, f)}],
+        }
+        for deck, findings in checked.items()
+        for f in findings
+    ]  # fmt: skip
     run = {
-        "tool": {"driver": driver},
-        "columnKind": "unicodeCodePoints",
-        "invocations": [
-            {"executionSuccessful": not failures, "toolExecutionNotifications": notifications}
-        ],
-        "results": [
-            {
-                "ruleId": finding.code,
-                "ruleIndex": codes.index(finding.code),
-                "level": finding.severity,
-                "message": {"text": finding.message + (finding.hint and f" Hint: {finding.hint}.")},
-                "locations": [{"physicalLocation": _location(deck, finding)}],
-            }
-            for deck, findings in checked.items()
-            for finding in findings
-        ],
-    }
+        "tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "invocations": [called],
+        "results": results,
+    }  # fmt: skip
     return {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
 
 
@@ -238,21 +210,19 @@ def _location(deck: Path, finding: Finding) -> dict[str, Any]:
     region: dict[str, Any] = {"startLine": 1}
     if place := finding.place:
         region = {
-            "startLine": place.line,
-            "startColumn": place.first,
-            "endColumn": max(place.first, place.last) + 1,
-            "snippet": {"text": place.text},
-        }
+            "startLine": place.line, "startColumn": place.first,
+            "endColumn": max(place.first, place.last) + 1, "snippet": {"text": place.text},
+        }  # fmt: skip
     return {"artifactLocation": {"uri": uri}, "region": region}
 
 
 @click.command(short_help="Align the columns of decks.")
 @DECKS
-@click.option("-o", "--output", type=click.Path(path_type=Path, allow_dash=True), metavar="FILE",
-              help="File to write; - is standard output.  [default: DECK itself]")  # fmt: skip
-@click.option("--check", "only_check", is_flag=True,
-              help="Write nothing; exit with 1 if a deck would change.")  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace an existing FILE other than DECK.")
+@option("-o", "--output", type=FILE_PATH, metavar="FILE",
+        help="File to write; - is standard output.  [default: DECK itself]")  # fmt: skip
+@option("--check", "only_check", is_flag=True,
+        help="Write nothing; exit with 1 if a deck would change.")  # fmt: skip
+@option("--overwrite", is_flag=True, help="Replace an existing FILE other than DECK.")
 def fmt(decks: tuple[Path, ...], output: Path | None, only_check: bool, overwrite: bool) -> None:
     """Align the columns of decks and put a ruler above each kind of card.
 
@@ -265,7 +235,7 @@ def fmt(decks: tuple[Path, ...], output: Path | None, only_check: bool, overwrit
     def one(deck: Path) -> None:
         in_place = output is None or (output.exists() and deck.exists() and output.samefile(deck))
         target = deck if output is None or in_place else output
-        if not only_check and str(target) != "-":
+        if not only_check and target != common.STANDARD_OUTPUT:
             check_outputs([target], overwrite or in_place, [] if in_place else [deck])
         before, source = load_text(_input(deck))
         try:
@@ -277,9 +247,8 @@ def fmt(decks: tuple[Path, ...], output: Path | None, only_check: bool, overwrit
         if only_check:
             if after != before:
                 raise CheckFailedError(f"{source} would change")
-        elif str(target) == "-":
-            echo_file(after)
-        elif after != before or not in_place:
-            write_text(target, after, overwrite=overwrite or in_place)
+        elif after != before or not in_place or target == common.STANDARD_OUTPUT:
+            common.write_text(target, after, overwrite=overwrite or in_place)
 
-    _each(decks, one)
+    if failed := _failures(decks, one):
+        raise ExceptionGroup("errors of decks", failed)

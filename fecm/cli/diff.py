@@ -11,7 +11,7 @@ import click
 
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, echo_json
 from fecm.cli.isolation import reads
-from fecm.cli.types import NOT_NEGATIVE, Parsed, assignment, file_of
+from fecm.cli.types import NOT_NEGATIVE, Parsed, assignment, file_of, option
 from fecm.results.diff import SCALE_NAMES, Comparison, Difference, difference
 from fecm.results.schema import printable, shown_apart
 
@@ -45,47 +45,38 @@ def _tolerances(text: str) -> dict[str, Any]:
         raise ValueError("exclude is not a list of texts")
     if not isinstance(own, dict):
         raise ValueError('tol is not a table; begin it with [tol], and give "NAME" = RTOL')
-    return {
-        **{name: _tolerance(name, [given.get(name, 0.0)])[0] for name in ("rtol", "atol")},
-        "exclude": exclude,
-        "own": [(name, _tolerance(name, values)) for name, values in own.items()],
-    }
+    rtol, atol = (_tolerance(name, [given.get(name, 0.0)])[0] for name in ("rtol", "atol"))
+    tolerances = [(name, _tolerance(name, values)) for name, values in own.items()]
+    return {"rtol": rtol, "atol": atol, "exclude": exclude, "own": tolerances}
 
 
 @click.command()
 @click.argument("a", type=FILE_PATH)
 @click.argument("b", type=FILE_PATH)
-@click.option("--rtol", type=NOT_NEGATIVE, metavar="R",
-              help="Relative tolerance, of the dataset's largest absolute value.  "
-                   "[default: 0]")  # fmt: skip
-@click.option("--atol", type=NOT_NEGATIVE, metavar="T",
-              help="Absolute tolerance, in the dataset's unit.  [default: 0]")  # fmt: skip
-@click.option("--only", multiple=True, metavar="PATTERN",
-              help="Compare only this dataset (tape9/force), group (tape9) or pattern "
-                   "('tape?/force'); may be repeated.")  # fmt: skip
-@click.option("--exclude", multiple=True, metavar="PATTERN",
-              help="Leave out a dataset, group or pattern; may be repeated.")  # fmt: skip
-@click.option("--tol", "own", type=Parsed(_own), multiple=True, metavar="PATTERN=R[,T]",
-              help="Tolerances of a dataset, group or pattern instead of --rtol and --atol; may be "
-                   "repeated, and the last that matches holds.")  # fmt: skip
-@click.option("--tol-file", "file", type=file_of(_tolerances), metavar="FILE.toml",
-              help="File of these tolerances, with the keys rtol, atol, exclude and tol; options "
-                   "go before it.")  # fmt: skip
-@click.option("--brief", is_flag=True, help="Print only names of differences and the verdict.")
+@option("--rtol", type=NOT_NEGATIVE, metavar="R",
+        help="Relative tolerance, of the dataset's largest absolute value.  [default: "
+             "0]")  # fmt: skip
+@option("--atol", type=NOT_NEGATIVE, metavar="T",
+        help="Absolute tolerance, in the dataset's unit.  [default: 0]")  # fmt: skip
+@option("--only", multiple=True, metavar="PATTERN",
+        help="Compare only this dataset (tape9/force), group (tape9) or pattern ('tape?/force'); "
+             "may be repeated.")  # fmt: skip
+@option("--exclude", multiple=True, metavar="PATTERN",
+        help="Leave out a dataset, group or pattern; may be repeated.")  # fmt: skip
+@option("--tol", "own", type=Parsed(_own, "PATTERN=R[,T]"), multiple=True,
+        help="Tolerances of a dataset, group or pattern instead of --rtol and --atol; may be "
+             "repeated, and the last that matches holds.")  # fmt: skip
+@option("--tol-file", "file", type=file_of(_tolerances),
+        help="File of these tolerances, with the keys rtol, atol, exclude and tol; options go "
+             "before it.")  # fmt: skip
+@option("--brief", is_flag=True, help="Print only names of differences and the verdict.")
 @FORMAT_OPTION
 @reads("a", "b")
 def diff(
-    a: Path,
-    b: Path,
-    rtol: float | None,
-    atol: float | None,
-    only: tuple[str, ...],
-    exclude: tuple[str, ...],
-    own: tuple[tuple[str, tuple[float, ...]], ...],
-    file: dict[str, Any] | None,
-    brief: bool,
-    form: str,
-) -> None:
+    a: Path, b: Path, rtol: float | None, atol: float | None, only: tuple[str, ...],
+    exclude: tuple[str, ...], own: tuple[tuple[str, tuple[float, ...]], ...],
+    file: dict[str, Any] | None, brief: bool, form: str,
+) -> None:  # fmt: skip
     """Compare two results dataset by dataset.
 
     A and B are result files or folders of tapes, or both results of sweeps.
@@ -108,36 +99,28 @@ def diff(
     atol = file["atol"] if atol is None else atol
     exclude, own = (*file["exclude"], *exclude), (*file["own"], *own)
     found = difference(a, b, rtol, atol, only, exclude, own)
+    different = [c.path for c in found.compared if not c.same] + [*found.only[0], *found.only[1]]
     if form == "json":
-        about = {
+        echo_json({
             "verdict": "same" if found.same else "different",
             "a": printable(str(a)), "b": printable(str(b)),
             "rtol": rtol, "atol": atol, "tol": dict(own),
             "datasets": [_entry(c) for c in found.compared if not (brief and c.same)],
             "only_in_a": found.only[0], "only_in_b": found.only[1],
             "excluded": found.excluded, "listed": found.listed,
-        }  # fmt: skip
-        echo_json(about)
+        })  # fmt: skip
     else:
-        lines = list(map(printable, sorted(_different(found)))) if brief else _lines(found)
+        lines = list(map(printable, sorted(different))) if brief else _lines(found)
+        count = len(found.compared) + len(found.only[0]) + len(found.only[1])
+        compared = f"{count} dataset{'s' * (count != 1)}"
         within = f"rtol {rtol:g}, atol {atol:g}" + ", --tol" * bool(own)
-        click.echo("\n".join([*lines, _verdict(found, within)]))
+        within += f"; {len(found.excluded)} excluded" if found.excluded else ""
+        verdict = f"different: {len(different)} of {compared} at {within}"
+        click.echo(
+            "\n".join([*lines, f"same: {compared} within {within}" if found.same else verdict])
+        )
     if not found.same:
         raise SystemExit(NO)
-
-
-def _different(found: Difference) -> list[str]:
-    """Datasets that differ or are missing."""
-    return [*(c.path for c in found.compared if not c.same), *found.only[0], *found.only[1]]
-
-
-def _verdict(found: Difference, within: str) -> str:
-    """The last line."""
-    count = len(found.compared) + sum(map(len, found.only))
-    within += f"; {len(found.excluded)} excluded" if found.excluded else ""
-    if found.same:
-        return f"same: {count} dataset{'s' * (count != 1)} within {within}"
-    return f"different: {len(_different(found))} of {count} dataset{'s' * (count != 1)} at {within}"
 
 
 def _lines(found: Difference) -> list[str]:
@@ -150,18 +133,28 @@ def _lines(found: Difference) -> list[str]:
         f"{word:10} {printable(name):{width}}  {text}".rstrip()
         for name, (word, text) in sorted(rows.items())
     ]
-    return [*lines, *map(_listed, found.listed)]
+    for item in found.listed:
+        values = item["a"], item["b"]
+        left, right = (
+            "nothing" if value is None else f"`{text}`"
+            for value, text in zip(values, shown_apart(*values), strict=True)
+        )
+        line = f" line {item['line']}" if item["line"] else ""
+        lines.append(f"listed     {printable(item['name'])}{line}: {left} against {right}")
+    return lines
 
 
 def _describe(found: Comparison) -> str:
     """Shapes and types that differ, largest difference, number of differences and first one."""
     parts: list[str] = []
     if found.shapes[0] != found.shapes[1]:
-        parts.append(f"shape {_shape(found.shapes[0])} against {_shape(found.shapes[1])}")
+        left, right = ("x".join(map(str, shape)) or "single" for shape in found.shapes)
+        parts.append(f"shape {left} against {right}")
     if found.types[0] != found.types[1]:
         parts.append(f"type {found.types[0]} against {found.types[1]}")
     if found.at and found.values:
-        left, right = _values(found.values)
+        quote = "`" if found.holds_texts else ""
+        left, right = (f"{quote}{value}{quote}" for value in shown_apart(*found.values))
         text = f"{left} against {right}{_where(found.at)}"
         if math.isfinite(found.largest):
             name = SCALE_NAMES.get(found.path, "") if found.scale != found.maximum else ""
@@ -174,18 +167,6 @@ def _describe(found: Comparison) -> str:
     if found.first:
         parts.append(f"first{_where(found.first)}")
     return "; ".join(parts)
-
-
-def _values(values: tuple[float, float] | tuple[str, str]) -> list[str]:
-    """Two different values, in as many digits as show it."""
-    if any(isinstance(value, str) for value in values):
-        return [f"`{text}`" for text in shown_apart(*values)]
-    short = [f"{value:.6g}" for value in values]
-    return short if short[0] != short[1] else list(map(repr, values))
-
-
-def _shape(shape: tuple[int, ...]) -> str:
-    return "x".join(map(str, shape)) or "single"
 
 
 def _where(place: dict[str, Any]) -> str:
@@ -201,25 +182,13 @@ def _where(place: dict[str, Any]) -> str:
     return f" at {', '.join(words)}" if words else ""
 
 
-def _listed(item: dict[str, Any]) -> str:
-    """Line of an attribute or text that differs."""
-    values = item["a"], item["b"]
-    left, right = (
-        "nothing" if value is None else f"`{text}`"
-        for value, text in zip(values, shown_apart(*values), strict=True)
-    )
-    line = f" line {item['line']}" if item["line"] else ""
-    return f"listed     {printable(item['name'])}{line}: {left} against {right}"
-
-
 def _entry(found: Comparison) -> dict[str, Any]:
     """JSON of one dataset."""
     numbers = found.comparable and not found.holds_texts
     finite = numbers and math.isfinite(found.largest)
     values = found.values or (None, None)
     return {
-        "name": found.path,
-        "same": found.same,
+        "name": found.path, "same": found.same,
         "shape_a": list(found.shapes[0]), "shape_b": list(found.shapes[1]),
         "dtype_a": found.types[0], "dtype_b": found.types[1],
         "largest_difference": found.largest if finite else None,
@@ -228,6 +197,5 @@ def _entry(found: Comparison) -> dict[str, Any]:
         "scale": found.scale if numbers else None,
         "tolerance": found.tolerance if numbers else None,
         "differing": found.differing if found.comparable else None,
-        "at": found.at, "a": values[0], "b": values[1],
-        "first": found.first,
+        "at": found.at, "a": values[0], "b": values[1], "first": found.first,
     }  # fmt: skip

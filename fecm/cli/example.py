@@ -8,8 +8,7 @@ import click
 
 from fecm import examples
 from fecm._files import check_outputs
-from fecm.cli.common import FILE_PATH, echo, echo_file, write_text
-from fecm.cli.outputs import STANDARD_OUTPUT
+from fecm.cli.common import FILE_PATH, STANDARD_OUTPUT, echo, write_text
 
 
 @click.command(short_help="List the example decks and tables, or write one.")
@@ -29,11 +28,9 @@ def example(name: str | None, output: Path | None, overwrite: bool) -> None:
         source = examples.path(name)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
-    text = source.read_text(encoding="utf-8")
     target = output or Path(source.name)
-    if target == STANDARD_OUTPUT:
-        echo_file(text)
-        return
-    check_outputs([target], overwrite, [source])
-    write_text(target, text, overwrite=overwrite)
-    echo(target)
+    if target != STANDARD_OUTPUT:
+        check_outputs([target], overwrite, [source])
+    write_text(target, source.read_text(encoding="utf-8"), overwrite=overwrite)
+    if target != STANDARD_OUTPUT:
+        echo(target)

@@ -7,9 +7,9 @@ from pathlib import Path
 import click
 
 from fecm._files import check_outputs
-from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, note
+from fecm.cli.common import DECK_PATH, FILE_PATH, STANDARD_OUTPUT, RefusedError, echo, note
 from fecm.cli.isolation import reads
-from fecm.cli.outputs import STANDARD_OUTPUT, write_lines
+from fecm.cli.outputs import write_lines
 from fecm.results import csv
 from fecm.results.hdf5_reader import read
 from fecm.results.result import load, result_of
@@ -39,7 +39,7 @@ def tapes(result: Path, directory: Path, overwrite: bool) -> None:
 @click.argument("result", type=DECK_PATH)
 @click.option("--to", "target", type=click.Choice(["vtkhdf", "csv"]), required=True,
               help="vtkhdf for ParaView and VTK, csv for spreadsheets.")  # fmt: skip
-@click.option("-o", "--output", type=click.Path(path_type=Path, allow_dash=True), metavar="PATH",
+@click.option("-o", "--output", type=FILE_PATH, metavar="PATH",
               help="File to write; - is standard output, of csv only.  [default: RESULT's name "
                    "with .vtkhdf or -DATASET.csv, in this folder]")  # fmt: skip
 @click.option("--dataset", metavar="NAME",

@@ -14,29 +14,14 @@ import numpy as np
 from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError, echo, note
 from fecm.cli.laminate_options import laminate_options, ply_of_options
 from fecm.cli.outputs import OutputPaths, outputs
-from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, ListOf, stacked
-from fecm.deck.catalogue import (
-    ALPHA_CR,
-    ALPHA_P,
-    CONTACTS,
-    NU23,
-    S_P,
-    SYSTEM,
-    SYSTEMS,
-    NamedPly,
-    convert,
-)
+from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, list_of, option, stacked
+from fecm.deck import catalogue
+from fecm.deck.catalogue import CONTACTS, SYSTEM, SYSTEMS, NamedPly
 from fecm.deck.model import Deck, Indentation
 from fecm.deck.reader import Reader, load_text
 from fecm.deck.units import unit_names
-from fecm.mechanics.contact_law import (
-    ACR_POWER,
-    HystereticLaw,
-    LinearPermanent,
-    YangSunPermanent,
-    follow,
-    hertz_coefficient,
-)
+from fecm.mechanics import contact_law
+from fecm.mechanics.contact_law import LinearPermanent, YangSunPermanent, hertz_coefficient
 from fecm.problem.build import build_constants
 from fecm.problem.check_segments import check_law
 from fecm.studies import StudyError
@@ -44,7 +29,7 @@ from fecm.studies.indentation_test.constants import card, lines, notes, plain
 from fecm.studies.indentation_test.constants import fit as fitted
 from fecm.studies.indentation_test.curves import LIMITS_Q
 from fecm.studies.indentation_test.modulus import effective_stiffness, indentation_modulus
-from fecm.studies.tables import Test, read_test
+from fecm.studies.tables import read_test
 
 
 @click.group()
@@ -52,38 +37,27 @@ def indent() -> None:
     """Indentation tests and the law of contact (the report's chapter 3)."""
 
 
-# fit ---------------------------------------------------------------------------------------------
-
-
 @indent.command()
 @click.argument("test", type=DECK_PATH, metavar="TEST.csv")
-@click.option("--acr", is_flag=True,
-              help="Fit alpha_cr of the law with one unloading rigidity (q = 5/2) instead of s_p "
-                   "and alpha_p.")  # fmt: skip
-@click.option("--q", type=Finite(*LIMITS_Q), help="Prescribed unloading power; fitted by default.")
-@click.option("--turn", type=POSITIVE, metavar="LENGTH",
-              help="Decrease of the indentation that counts as a turn.  [default: 2 % of its "
-                   "range, or 8 standard deviations of its noise]")  # fmt: skip
-@click.option("--columns", type=ListOf("INDENTATION,FORCE", click.STRING, [2]),
-              metavar="INDENTATION,FORCE",
-              help="Names or numbers (from 1) of the two columns.  [default: indentation, "
-                   "displacement, extension, stroke or depth; force or load]")  # fmt: skip
-@click.option("--unit", "units", type=ListOf("LENGTH,FORCE", click.STRING, [2]),
-              metavar="LENGTH,FORCE",
-              help="Units of the card, to which a file that names its units is converted.  "
-                   "[default: in,lbf or mm,N or m,N, as the file's]")  # fmt: skip
+@option("--acr", is_flag=True,
+        help="Fit alpha_cr of the law with one unloading rigidity (q = 5/2) instead of s_p and "
+             "alpha_p.")  # fmt: skip
+@option("--q", type=Finite(*LIMITS_Q), help="Prescribed unloading power; fitted by default.")
+@option("--turn", type=POSITIVE, metavar="LENGTH",
+        help="Decrease of the indentation that counts as a turn.  [default: 2 % of its range, or 8 "
+             "standard deviations of its noise]")  # fmt: skip
+@option("--columns", type=list_of("INDENTATION,FORCE", click.STRING, [2]),
+        help="Names or numbers (from 1) of the two columns.  [default: indentation, displacement, "
+             "extension, stroke or depth; force or load]")  # fmt: skip
+@option("--unit", "units", type=list_of("LENGTH,FORCE", click.STRING, [2]),
+        help="Units of the card, to which a file that names its units is converted.  [default: "
+             "in,lbf or mm,N or m,N, as the file's]")  # fmt: skip
 @outputs("test", table=False)
 @FORMAT_OPTION
 def fit(
-    test: Path,
-    acr: bool,
-    q: float | None,
-    turn: float | None,
-    columns: tuple[str, str] | None,
-    units: tuple[str, str] | None,
-    targets: OutputPaths,
-    form: str,
-) -> None:
+    test: Path, acr: bool, q: float | None, turn: float | None, columns: tuple[str, str] | None,
+    units: tuple[str, str] | None, targets: OutputPaths, form: str,
+) -> None:  # fmt: skip
     """Fit the indentation law to a test, and print its parameters and EXPE card.
 
     TEST.csv has the columns indentation and force, with rows in the order of measurement: first
@@ -99,26 +73,16 @@ def fit(
         raise RefusedError(f"{test}: {error}") from None
     names = {**read.units, "time": "s"} if read.units else {}
     targets.draw("studies:fit_picture", read.indentation, read.force, found, names)
-    for text in notes(found):
-        note(text)
+    note(*notes(found))
     if form == "json":
         click.echo(json.dumps({"file": str(test), "units": read.units or None, **plain(found)}))
         return
-    click.echo("\n".join([*lines(found), _units_line(read)]))
-    if text := card(found):
-        click.echo(text)
-
-
-def _units_line(read: Test) -> str:
-    """Units of all values and of the card."""
-    if not read.units:
-        return "units           those of the test, which names none"
     own = tuple(read.units.values())
     stated = "" if read.stated in (("", ""), own) else f" (the test: {', '.join(read.stated)})"
-    return f"units           {', '.join(own)}{stated}"
-
-
-# curve -------------------------------------------------------------------------------------------
+    about = f"{', '.join(own)}{stated}" if own else "those of the test, which names none"
+    click.echo("\n".join([*lines(found), f"units           {about}"]))
+    if text := card(found):
+        click.echo(text)
 
 
 def _law(deck: Path) -> tuple[Deck, Indentation]:
@@ -139,31 +103,26 @@ def _law(deck: Path) -> tuple[Deck, Indentation]:
 
 @indent.command()
 @click.argument("deck", type=DECK_PATH)
-@click.option("--path", type=ListOf("A,B,C,...", Finite()), metavar="A,B,C,...",
-              help="Indentations at which the path turns, from 0; with --rigidity the range "
-                   "FROM,TO of alpha_m.")  # fmt: skip
-@click.option("--points", type=click.IntRange(min=1, max=100_000), default=100, show_default=True,
-              help="Points between two turns.")  # fmt: skip
-@click.option("--rigidity", is_flag=True,
-              help="Tabulate the unloading rigidity s over alpha_m by equations 3-9 and 3-7 "
-                   "instead.")  # fmt: skip
-@click.option("--q", type=POSITIVE,
-              help="With --rigidity: power of 3-9.  [default: the deck's]")  # fmt: skip
-@click.option("--alpha-cr", type=POSITIVE,
-              help="With --rigidity: alpha_cr of 3-7.  [default: the deck's, or the report's]",
-              )  # fmt: skip
-@click.option("--line", type=ListOf("ALPHA_P,S_P", NOT_NEGATIVE, [2]), metavar="ALPHA_P,S_P",
-              help="With --rigidity: parameters of 3-8.  [default: the deck's, or the report's]",
-              )  # fmt: skip
+@option("--path", type=list_of("A,B,C,...", Finite()),
+        help="Indentations at which the path turns, from 0; with --rigidity the range FROM,TO of "
+             "alpha_m.")  # fmt: skip
+@option("--points", type=click.IntRange(min=1, max=100_000), default=100, show_default=True,
+        help="Points between two turns.")  # fmt: skip
+@option("--rigidity", is_flag=True,
+        help="Tabulate the unloading rigidity s over alpha_m by equations 3-9 and 3-7 "
+             "instead.")  # fmt: skip
+@option("--q", type=POSITIVE, help="With --rigidity: power of 3-9.  [default: the deck's]")
+@option("--alpha-cr", type=POSITIVE,
+        help="With --rigidity: alpha_cr of 3-7.  [default: the deck's, or the "
+             "report's]")  # fmt: skip
+@option("--line", type=list_of("ALPHA_P,S_P", NOT_NEGATIVE, [2]),
+        help="With --rigidity: parameters of 3-8.  [default: the deck's, or the "
+             "report's]")  # fmt: skip
 @outputs("deck")
 def curve(
-    deck: Path,
-    path: tuple[float, ...] | None,
-    points: int,
-    rigidity: bool,
-    targets: OutputPaths,
+    deck: Path, path: tuple[float, ...] | None, points: int, rigidity: bool, targets: OutputPaths,
     **parameters: Any,
-) -> None:
+) -> None:  # fmt: skip
     """Write the force along an indentation path, by the law of DECK, as CSV.
 
     The columns are indentation, force and the branch of the law; with --rigidity alpha_m, s_3_9 and
@@ -182,9 +141,9 @@ def curve(
 def _forces(deck: Path, path: Sequence[float], points: int, targets: OutputPaths) -> None:
     """Write indentation, force and branch along a path."""
     problem, card = _law(deck)
-    law = HystereticLaw(build_constants(card))
+    law = contact_law.HystereticLaw(build_constants(card))
     try:
-        walk = list(follow(law, path, points))
+        walk = list(contact_law.follow(law, path, points))
     except OverflowError:
         walk = []
     if not walk or not all(math.isfinite(point.force) for point, _ in walk):
@@ -197,15 +156,9 @@ def _forces(deck: Path, path: Sequence[float], points: int, targets: OutputPaths
 
 
 def _rigidities(
-    deck: Path,
-    path: Sequence[float] | None,
-    points: int,
-    targets: OutputPaths,
-    *,
-    q: float | None,
-    alpha_cr: float | None,
-    line: tuple[float, float] | None,
-) -> None:
+    deck: Path, path: Sequence[float] | None, points: int, targets: OutputPaths, *, q: float | None,
+    alpha_cr: float | None, line: tuple[float, float] | None,
+) -> None:  # fmt: skip
     """Write largest indentations and rigidities by both equations."""
     if path and (len(path) != 2 or not 0.0 <= path[0] < path[1]):
         raise click.BadParameter("with --rigidity the range FROM,TO", param_hint="--path")
@@ -215,13 +168,15 @@ def _rigidities(
     own = build_constants(card)
     if line is None and isinstance(own, LinearPermanent):
         line = float(own.alpha_p), float(own.s_p)
+    elif line is None:
+        line = _report_length(problem, catalogue.ALPHA_P, "alpha_p", "--line"), catalogue.S_P
     if alpha_cr is None and isinstance(own, YangSunPermanent):
         alpha_cr = float(own.alpha_cr)
-    alpha_p, s_p = line or (_report_length(problem, ALPHA_P, "alpha_p", "--line"), S_P)
-    alpha_cr = alpha_cr or _report_length(problem, ALPHA_CR, "alpha_cr", "--alpha-cr")
+    elif alpha_cr is None:
+        alpha_cr = _report_length(problem, catalogue.ALPHA_CR, "alpha_cr", "--alpha-cr")
     critical = YangSunPermanent(card.k, alpha_cr)
-    slope = LinearPermanent(card.k, alpha_p, s_p, own.q if q is None else q)
-    if slope.q != ACR_POWER:
+    slope = LinearPermanent(card.k, *line, own.q if q is None else q)
+    if slope.q != contact_law.ACR_POWER:
         units = f"s of 3-9 is force/length^{slope.q:g} here, that of 3-7 force/length^2.5"
         if targets.picture:
             raise RefusedError(f"{units}: they can't share axes; --q 2.5 makes them comparable")
@@ -246,31 +201,28 @@ def _report_length(deck: Deck, value: float, name: str, option: str) -> float:
         message = f"the report's {name} is in inches and the deck's in {unit}: give {option}"
         raise RefusedError(message)
     note(f"{name} is the report's {value:g} in; {option} replaces it")
-    return convert(value, "length", SYSTEM, system)
-
-
-# hertz and contacts ------------------------------------------------------------------------------
+    return catalogue.convert(value, "length", SYSTEM, system)
 
 
 SPHERE = stacked(
-    click.option("--radius", type=float, required=True, help="Radius of the sphere."),
-    click.option("--es", "e_s", type=float, required=True, help="Young's modulus of the sphere."),
-    click.option("--nus", "nu_s", type=float, required=True, help="Poisson's ratio of the sphere."),
+    option("--radius", type=float, required=True, help="Radius of the sphere."),
+    option("--es", "e_s", type=float, required=True, help="Young's modulus of the sphere."),
+    option("--nus", "nu_s", type=float, required=True, help="Poisson's ratio of the sphere."),
 )
 CARD = stacked(
-    click.option("--alpha-p", type=NOT_NEGATIVE, default=0.0, show_default=True,
-                 help="Critical indentation for the card."),
-    click.option("--s-p", type=Finite(0.0, 1.0, max_open=True), default=0.0, show_default=True,
-                 help="Slope of permanent indentation for the card."),
-    click.option("--q", type=POSITIVE, default=1.5, show_default=True,
-                 help="Unloading power for the card; 1.5 is elastic."),
+    option("--alpha-p", type=NOT_NEGATIVE, default=0.0, show_default=True,
+           help="Critical indentation for the card."),
+    option("--s-p", type=Finite(0.0, 1.0, max_open=True), default=0.0, show_default=True,
+           help="Slope of permanent indentation for the card."),
+    option("--q", type=POSITIVE, default=1.5, show_default=True,
+           help="Unloading power for the card; 1.5 is elastic."),
 )  # fmt: skip
 
 
 @indent.command()
 @SPHERE
-@click.option("--et", "e_t", type=float, required=True,
-              help="Young's modulus of the laminate through its thickness.")  # fmt: skip
+@option("--et", "e_t", type=float, required=True,
+        help="Young's modulus of the laminate through its thickness.")  # fmt: skip
 @CARD
 @FORMAT_OPTION
 def hertz(radius: float, e_s: float, nu_s: float, e_t: float, form: str, **card: Any) -> None:
@@ -295,24 +247,17 @@ def _print_law(k: float, card: dict[str, Any], form: str, **others: float) -> No
 
 @indent.command()
 @laminate_options(required=True)
-@click.option("--nu23", type=Finite(), help="Poisson's ratio of the ply across the fibres.  "
-                                            "[default: the named ply's, or 0.4]")  # fmt: skip
+@option("--nu23", type=Finite(),
+        help="Poisson's ratio of the ply across the fibres.  [default: the named ply's, or "
+             "0.4]")  # fmt: skip
 @SPHERE
 @CARD
 @FORMAT_OPTION
 def estimate(
-    layup: Sequence[float],
-    ply_thickness: float,
-    ply: Sequence[float] | None,
-    material: NamedPly | None,
-    units: str | None,
-    nu23: float | None,
-    radius: float,
-    e_s: float,
-    nu_s: float,
-    form: str,
-    **card: Any,
-) -> None:
+    layup: Sequence[float], ply_thickness: float, ply: Sequence[float] | None,
+    material: NamedPly | None, units: str | None, nu23: float | None, radius: float, e_s: float,
+    nu_s: float, form: str, **card: Any,
+) -> None:  # fmt: skip
     """Estimate k of a laminate from its elastic constants, and print its EXPE card.
 
     By the indentation modulus M of the laminate's effective solid, and by its E2 for comparison.
@@ -321,7 +266,7 @@ def estimate(
     """
     constants = ply_of_options(ply, material, units)
     if nu23 is None:
-        nu23 = material.nu23 if material else NU23
+        nu23 = material.nu23 if material else catalogue.NU23
     stiffness = effective_stiffness(constants, layup, [ply_thickness] * len(layup), nu23)
     modulus = indentation_modulus(stiffness)
     try:
@@ -337,8 +282,8 @@ def estimate(
 
 @indent.command()
 @click.argument("name", type=click.Choice(list(CONTACTS)), metavar="[NAME]", required=False)
-@click.option("--units", type=click.Choice(list(SYSTEMS)), default=SYSTEM, show_default=True,
-              help="Units of the parameters.")  # fmt: skip
+@option("--units", type=click.Choice(list(SYSTEMS)), default=SYSTEM, show_default=True,
+        help="Units of the parameters.")  # fmt: skip
 @FORMAT_OPTION
 def contacts(name: str | None, units: str, form: str) -> None:
     """List the named laws of `fecm new --contact`, or print the EXPE card of one."""
@@ -346,10 +291,8 @@ def contacts(name: str | None, units: str, form: str) -> None:
         law = contact.converted(units)
         if form == "json":
             values = {field: getattr(law, field) for field in ("k", "alpha_p", "s_p", "q", "word")}
-            click.echo(json.dumps(
-                {"name": contact.name, **values, "units": units, "source": contact.source,
-                 "card": law.text()}
-            ))  # fmt: skip
+            about = {"units": units, "source": contact.source, "card": law.text()}
+            click.echo(json.dumps({"name": contact.name, **values, **about}))
         elif name:
             click.echo(law.text())
         else:

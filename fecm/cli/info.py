@@ -73,7 +73,16 @@ def info(result: Path, form: str) -> None:
 def _about(contents: Contents) -> dict[str, Any]:
     """What is shown, under the keys of the JSON output."""
     is_sweep = contents.form == SWEEP
-    extent = _of_sweep(contents) if is_sweep else about_run(result_of(contents))
+    if is_sweep:
+        from fecm.sweeps.random_result import tables
+        from fecm.sweeps.result import summary, sweep_of
+
+        sweep = sweep_of(contents, history=False)
+        random = [] if sweep.random is None else tables(sweep.random, sweep.unit)
+        failed = len(sweep) - int(sweep.fine.sum())
+        extent = {"cases": len(sweep), "failed": failed, "summary": [*summary(sweep), *random]}
+    else:
+        extent = about_run(result_of(contents))
     if extent.get("still_in_contact") and PERMANENT in contents.groups["history"]:
         contents.groups["history"][PERMANENT] = math.nan  # unknown before the end of the contact
     attributes, lines = contents.attributes, extent.pop("summary")
@@ -88,17 +97,6 @@ def _about(contents: Contents) -> dict[str, Any]:
         "groups": describe_groups(contents),
         "texts": {n: {"lines": len(text.splitlines())} for n, text in contents.texts.items()},
     }
-
-
-def _of_sweep(contents: Contents) -> dict[str, Any]:
-    """Cases, failed cases and summary of a sweep."""
-    from fecm.sweeps.random_result import tables
-    from fecm.sweeps.result import summary, sweep_of
-
-    result = sweep_of(contents, history=False)
-    failed = len(result) - int(result.fine.sum())
-    lines = [] if result.random is None else tables(result.random, result.unit)
-    return {"cases": len(result), "failed": failed, "summary": [*summary(result), *lines]}
 
 
 def _page(about: Mapping[str, Any]) -> list[str]:
@@ -137,8 +135,7 @@ def _page(about: Mapping[str, Any]) -> list[str]:
 def _group(group: Mapping[str, Any]) -> list[str]:
     """A group, with one line for each of its datasets."""
     head = printable(group["name"]) or "/"
-    if group["description"]:
-        head += f": {printable(group['description'])}"
+    head += f": {printable(group['description'])}" if group["description"] else ""
     if group["rows"] is not None:
         head += f"; {group['rows']} row{'s' * (group['rows'] != 1)}"
     attributes = [f"{printable(name)} = {shown(v)}" for name, v in group["attributes"].items()]

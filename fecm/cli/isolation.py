@@ -29,16 +29,13 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from types import FrameType, SimpleNamespace
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NamedTuple, NoReturn, TypeVar
 
 from fecm._files import clear_partials
-from fecm._frozen import frozen
 from fecm._memory import available, format_bytes
-from fecm.cli import streams
-from fecm.cli.common import SIGNALLED, SIGNALS, RefusedError, echo
+from fecm.cli.common import SIGNALLED, SIGNALS, RefusedError, echo, standard_error
 from fecm.results.schema import printable
 
 GB = 10**9
@@ -58,8 +55,7 @@ Command = TypeVar("Command", bound=Callable[..., None])
 switch = SimpleNamespace(on=False, pipe=None)
 
 
-@frozen
-class Limits:
+class Limits(NamedTuple):
     """Limits of a child."""
 
     memory: int  # bytes
@@ -69,21 +65,17 @@ class Limits:
 
 def limits_for(size: int, free: int | None) -> Limits:
     """Limits of a command that reads `size` bytes of files; `free` is the free memory, if known."""
+    text = os.environ.get("FECM_PATIENCE") or str(PATIENCE)
+    try:
+        patience = float(text)
+    except ValueError:
+        patience = math.nan
+    if not 0.0 < patience < 1e6:
+        raise RefusedError(f"FECM_PATIENCE is `{printable(text)}`; it must be a number of seconds")
     memory = ROOM + ROOM_A_BYTE * size
     if free is not None:
         memory = min(memory, int(FREE_SHARE * free))
-    return Limits(memory, _patience() + size / SPEED, TOTAL + size / TOTAL_SPEED)
-
-
-def _patience() -> float:
-    text = os.environ.get("FECM_PATIENCE", "")
-    try:
-        seconds = float(text) if text else PATIENCE
-    except ValueError:
-        seconds = math.nan
-    if not 0.0 < seconds < 1e6:
-        raise RefusedError(f"FECM_PATIENCE is `{printable(text)}`; it must be a number of seconds")
-    return seconds
+    return Limits(memory, patience + size / SPEED, TOTAL + size / TOTAL_SPEED)
 
 
 def fork() -> None:
@@ -98,7 +90,12 @@ def fork() -> None:
         os.close(writing)
         _wait(child, reading)
     os.close(reading)
-    _die_with_parent(parent)
+    if sys.platform == "linux":  # it kills this process when its parent ends
+        import ctypes
+
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != parent:  # which may have happened since the fork
+            os.kill(os.getpid(), signal.SIGKILL)
     switch.pipe = writing
 
 
@@ -114,13 +111,16 @@ def reads(*names: str) -> Callable[[Command], Command]:
             if switch.pipe is None:
                 function(**values)
                 return
+            import json
+
             given = (values[name] for name in names)
             files = [f for value in given for f in (value if isinstance(value, tuple) else [value])]
             limits = limits_for(sum(map(_size, files)), available())
             label = printable(" or ".join(map(str, dict.fromkeys(files))))
-            job = {"files": label, "folders": _folders(values), **asdict(limits)}
-            import json
-
+            named = [values.get(name) for name in ("output", "directory")]  # it may write there
+            own = [path for path in named if isinstance(path, Path)]
+            folders = sorted({str(path) for path in (Path(), *own, *(path.parent for path in own))})
+            job = {"files": label, "folders": folders, **limits._asdict()}
             os.write(switch.pipe, json.dumps(job).encode() + b"\n")
             _confine(limits, switch.pipe)
             try:
@@ -146,24 +146,7 @@ def _size(path: Path) -> int:
         return 0
 
 
-def _folders(values: dict[str, Any]) -> list[str]:
-    """Folders that a command may write to."""
-    named = [values[name] for name in ("output", "directory") if isinstance(values.get(name), Path)]
-    return sorted({str(path) for path in (Path(), *named, *(path.parent for path in named))})
-
-
 # The child --------------------------------------------------------------------------------------
-
-
-def _die_with_parent(parent: int) -> None:
-    """Have Linux kill this process when its parent ends, which may have happened since the fork."""
-    if sys.platform != "linux":
-        return
-    import ctypes
-
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
-        os.kill(os.getpid(), signal.SIGKILL)
 
 
 def _confine(limits: Limits, pipe: int) -> None:
@@ -179,7 +162,13 @@ def _confine(limits: Limits, pipe: int) -> None:
     limit(resource.RLIMIT_CORE, 0)
     limit(resource.RLIMIT_DATA, limits.memory)
     limit(resource.RLIMIT_CPU, math.ceil(limits.total))
-    _quieten()
+    # Standard error is left to Python: C libraries write there when they crash.
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        number = sys.stderr.fileno()
+        sys.stderr = standard_error(os.dup(number), sys.stderr)
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, number)
+        os.close(nowhere)
     os.set_blocking(pipe, False)
 
     def beat(number: int, frame: FrameType | None) -> None:
@@ -192,17 +181,6 @@ def _confine(limits: Limits, pipe: int) -> None:
     every = min(1.0, limits.call / 8.0)
     signal.setitimer(signal.ITIMER_REAL, every, every)
     atexit.register(signal.setitimer, signal.ITIMER_REAL, 0.0)
-
-
-def _quieten() -> None:
-    """Leave standard error to Python: C libraries write there when they crash."""
-    with contextlib.suppress(OSError, ValueError, AttributeError):
-        old = sys.stderr
-        own = os.dup(old.fileno())
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, old.fileno())
-        os.close(nowhere)
-        sys.stderr = streams.standard_error(own, old)
 
 
 # The parent -------------------------------------------------------------------------------------

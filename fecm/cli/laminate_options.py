@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import click
 
-from fecm.cli.types import POSITIVE, Decorated, Finite, ListOf, Parsed, file_of, stacked
+from fecm.cli.types import POSITIVE, Decorated, Finite, Parsed, file_of, list_of, option, stacked
 from fecm.deck.catalogue import MATERIALS, SYSTEMS, NamedPly, read_plies
 from fecm.deck.findings import Findings
 from fecm.deck.layup import parse_layup
@@ -25,26 +25,21 @@ PLIES = file_of(read_plies)
 def laminate_options(*, required: bool) -> Callable[[Decorated], Decorated]:
     """Add ``--layup``, ``--ply-thickness``, ``--ply``, ``--material`` and ``--units``."""
     return stacked(
-        click.option("--layup", type=Parsed(parse_layup), required=required, metavar="LAYUP",
-                     help='Layup from the struck face, as in "[0/45/0/-45/0]2s".'),
-        click.option("--ply-thickness", type=POSITIVE, required=required, metavar="T",
-                     help="Thickness of a ply."),
-        click.option("--ply", type=ListOf("RHO,NU12,E1,E2,G12,G13,G23", Finite(), [7]),
-                     metavar="RHO,NU12,E1,E2,G12,G13,G23", help="Density and moduli of a ply."),
-        click.option("--material", callback=_named, metavar="NAME",
-                     help="Named ply, instead of --ply; `fecm materials` lists them."),
-        click.option("--materials", "file", type=PLIES, is_eager=True, expose_value=False,
-                     callback=_own, metavar="FILE.toml",
-                     help="Named plies of your own; `fecm materials FILE.toml` checks them."),
-        click.option("--units", type=click.Choice(list(SYSTEMS)), metavar="SYSTEM",
-                     help="in-lbf-s, m-N-s or mm-N-s: names the units, and converts a named ply "
-                          "to them.  [default for a named ply: its source's]"),
+        option("--layup", type=Parsed(parse_layup, "LAYUP"), required=required,
+               help='Layup from the struck face, as in "[0/45/0/-45/0]2s".'),
+        option("--ply-thickness", type=POSITIVE, required=required, metavar="T",
+               help="Thickness of a ply."),
+        option("--ply", type=list_of("RHO,NU12,E1,E2,G12,G13,G23", Finite(), [7]),
+               help="Density and moduli of a ply."),
+        option("--material", callback=_named, metavar="NAME",
+               help="Named ply, instead of --ply; `fecm materials` lists them."),
+        option("--materials", "file", type=PLIES, is_eager=True, expose_value=False,
+               callback=lambda context, _, plies: context.meta.update({_META: plies or {}}),
+               help="Named plies of your own; `fecm materials FILE.toml` checks them."),
+        option("--units", type=click.Choice(list(SYSTEMS)), metavar="SYSTEM",
+               help="in-lbf-s, m-N-s or mm-N-s: names the units, and converts a named ply to "
+                    "them.  [default for a named ply: its source's]"),
     )  # fmt: skip
-
-
-def _own(context: click.Context, _: click.Parameter, plies: dict[str, NamedPly] | None) -> None:
-    """Callback of --materials, before that of --material."""
-    context.meta[_META] = plies or {}
 
 
 def _named(context: click.Context, parameter: click.Parameter, name: str | None) -> NamedPly | None:
@@ -75,12 +70,9 @@ def ply_of_options(
 
 
 def laminate_of_options(
-    layup: Sequence[float],
-    ply_thickness: float | None,
-    ply: Sequence[float] | None,
-    material: NamedPly | None,
-    units: str | None,
-) -> tuple[Laminate, dict[str, str]]:
+    layup: Sequence[float], ply_thickness: float | None, ply: Sequence[float] | None,
+    material: NamedPly | None, units: str | None,
+) -> tuple[Laminate, dict[str, str]]:  # fmt: skip
     """Laminate of these options, checked as in a deck, and the names of its units."""
     if ply_thickness is None:
         raise click.UsageError("--layup needs --ply-thickness")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +13,9 @@ from click.core import ParameterSource
 from fecm._files import check_outputs
 from fecm.api import load_deck
 from fecm.authoring import AUTO, FULL, MITC, Authored, author
-from fecm.cli.common import RefusedError, echo, echo_file, note, write_text
+from fecm.cli.common import FILE_PATH, STANDARD_OUTPUT, RefusedError, echo, note, write_text
 from fecm.cli.laminate_options import PLIES, laminate_options, one_ply
-from fecm.cli.outputs import STANDARD_OUTPUT
-from fecm.cli.types import POSITIVE, Finite, ListOf, Parsed, assignment
+from fecm.cli.types import POSITIVE, Finite, Parsed, assignment, list_of, option
 from fecm.deck.catalogue import CONTACTS, MATERIALS, STRENGTHS, NamedContact, NamedPly
 from fecm.deck.format import format_deck
 from fecm.deck.grid import SUPPORTS
@@ -27,7 +26,7 @@ from fecm.objects import CUSTOM, FIXTURES, MOST, Laminate, ObjectError, Plate, S
 from fecm.problem.plate_mesh import BOUNDARY
 
 ESTIMATE = "estimate:RADIUS[,ES,NUS]"
-RECTANGLE = ("size", "mesh", "grading", "columns", "rows")  # options that describe one
+RECTANGLE = ("size", "grading", "columns", "rows")  # besides the mesh
 FIXED = ("size", "columns", "rows", "support", "edges")  # options that a fixture sets
 
 # Constants of a named ply, as `fecm materials` lists them.
@@ -36,24 +35,25 @@ LINES = (
     (*STRENGTHS, "S13", "S23"), ("GIc", "GIIc"),
 )  # fmt: skip
 
-PROJECTILES = {"mass": "M", "rod": "LENGTH,DIAMETER,E,DENSITY"}
+PROJECTILES: dict[str, tuple[str, Callable[..., Rod | RigidMass]]] = {
+    "mass": ("M", RigidMass), "rod": ("LENGTH,DIAMETER,E,DENSITY", Rod.cylinder),
+}  # fmt: skip
 
 
 def _projectile(text: str) -> Rod | RigidMass:
     """Read a rigid mass or a cylindrical rod."""
     kind, _, values = text.partition(":")
     if kind not in PROJECTILES:
-        raise ValueError(f"{text!r} is not mass:M or rod:{PROJECTILES['rod']}")
-    form = PROJECTILES[kind]
-    numbers = ListOf(f"{kind}:{form}", Finite(), [form.count(",") + 1])(values)
-    return RigidMass(*numbers) if kind == "mass" else Rod.cylinder(*numbers)
+        raise ValueError(f"{text!r} is not mass:M or rod:LENGTH,DIAMETER,E,DENSITY")
+    form, made_of = PROJECTILES[kind]
+    return made_of(*list_of(f"{kind}:{form}", Finite(), [form.count(",") + 1])(values))
 
 
 def _contact(text: str) -> NamedContact | Sphere:
     """Named contact, or a sphere whose k is estimated."""
     word, _, values = text.partition(":")
     if word == "estimate":
-        return Sphere(*(ListOf(ESTIMATE, POSITIVE, [1, 3])(values) if values else ()))
+        return Sphere(*(list_of(ESTIMATE, POSITIVE, [1, 3])(values) if values else ()))
     if text not in CONTACTS:
         raise ValueError(f"{text!r} is none of {', '.join(CONTACTS)}, {ESTIMATE}")
     return CONTACTS[text]
@@ -62,7 +62,7 @@ def _contact(text: str) -> NamedContact | Sphere:
 def _mesh(text: str) -> tuple[int, int] | Path:
     """Numbers of elements, or the file of a mesh."""
     if re.fullmatch(r"[\s\d.+-]+[xX×][\s\d.+-]+", text):
-        counts = ListOf("14x10", click.IntRange(1, MOST), [2], "[xX×]")(text)
+        counts = list_of("14x10", click.IntRange(1, MOST), [2], "[xX×]")(text)
         return counts[0], counts[1]
     path = Path(text)
     if not path.suffix and not path.exists():
@@ -71,60 +71,58 @@ def _mesh(text: str) -> tuple[int, int] | Path:
 
 
 @click.command(short_help="Write a deck from plate, layup, supports and impact.")
-@click.argument("output", type=click.Path(path_type=Path, allow_dash=True), metavar="DECK")
-@click.option("--title", default="", help="Title of the deck.")
-@click.option("--size", type=ListOf("6x4", POSITIVE, [2], "[xX×]"), metavar="LXxLY",
-              help="Size of the plate, as in 6x4.")  # fmt: skip
-@click.option("--mesh", type=Parsed(_mesh), metavar="NXxNY|FILE",
-              help="Elements along x and y, as in 14x10; or a mesh, Gmsh's .msh or another that "
-                   "meshio reads, with groups of lines for --edge.")  # fmt: skip
-@click.option("--grading", type=Finite(min=1.0), default=1.0, metavar="RATIO",
-              help="Largest over smallest element; the smallest at the impact point.")  # fmt: skip
-@click.option("--columns", default="", metavar="LIST",
-              help="Elements along x one by one, as in 3*0.5,8*0.375,3*0.5, instead of --size and "
-                   "--mesh.")  # fmt: skip
-@click.option("--rows", default="", metavar="LIST", help="The same along y.")
+@click.argument("output", type=FILE_PATH, metavar="DECK")
+@option("--title", default="", help="Title of the deck.")
+@option("--size", type=list_of("6x4", POSITIVE, [2], "[xX×]"), metavar="LXxLY",
+        help="Size of the plate, as in 6x4.")  # fmt: skip
+@option("--mesh", type=Parsed(_mesh, "NXxNY|FILE"),
+        help="Elements along x and y, as in 14x10; or a mesh, Gmsh's .msh or another that meshio "
+             "reads, with groups of lines for --edge.")  # fmt: skip
+@option("--grading", type=Finite(min=1.0), default=1.0, metavar="RATIO",
+        help="Largest over smallest element; the smallest at the impact point.")  # fmt: skip
+@option("--columns", default="", metavar="LIST",
+        help="Elements along x one by one, as in 3*0.5,8*0.375,3*0.5, instead of --size and "
+             "--mesh.")  # fmt: skip
+@option("--rows", default="", metavar="LIST", help="The same along y.")
 @laminate_options(required=True)
-@click.option("--damage", is_flag=True,
-              help="Add strengths and toughness of a named ply: failure exposures (ALLO, FAIL) and "
-                   "the delamination threshold (DELA).")  # fmt: skip
-@click.option("--support", type=click.Choice(SUPPORTS), default="free", show_default=True,
-              help="Support of all edges.")  # fmt: skip
-@click.option("--edge", "edges", type=Parsed(assignment), multiple=True, metavar="EDGE=SUPPORT",
-              help="Support of one edge: left, right, bottom or top, or a group of the mesh; may "
-                   "be repeated.")  # fmt: skip
-@click.option("--fixture", metavar="NAME",
-              help=f"Fixture of a drop-weight test: {', '.join(FIXTURES)} or {CUSTOM}, a plate on "
-                   "the edges of a window; --mesh then counts the window's elements.")  # fmt: skip
-@click.option("--at", type=ListOf("X,Y", Finite(), [2]), metavar="X,Y",
-              help="Impact point.  [default: the plate's centre]")  # fmt: skip
-@click.option("--velocity", type=Finite(), help="Approach velocity.")
-@click.option("--energy", type=POSITIVE,
-              help="Impact energy in the deck's units (mJ in mm-N-s), instead of "
-                   "--velocity.")  # fmt: skip
-@click.option("--law", type=ListOf("K,ALPHA_P,S_P,Q", Finite(), [4]), metavar="K,ALPHA_P,S_P,Q",
-              help="Parameters of the indentation law.")  # fmt: skip
-@click.option("--contact", type=Parsed(_contact), metavar="NAME",
-              help="Named law, instead of --law; `fecm indent contacts` lists them.  "
-                   f"{ESTIMATE} estimates the k of a sphere (default: steel) as `fecm indent "
-                   "estimate` does.")  # fmt: skip
-@click.option("--projectile", type=Parsed(_projectile), metavar="PROJECTILE",
-              help="mass:M, or rod:LENGTH,DIAMETER,E,DENSITY.  [default in lbf, in and s: the "
-                   "report's rod]")  # fmt: skip
-@click.option("--patch", type=Parsed(parse_patch), default="disc", show_default=True,
-              metavar="PATCH",
-              help="Area of the contact force: disc or hertz, with :RADIUS, to which a "
-                   "rectangle's mesh is then refined; or none, a point force.  D7136 takes "
-                   "hertz.")  # fmt: skip
-@click.option("--shear", type=click.Choice([MITC, FULL]), default=MITC, show_default=True,
-              help="Transverse shear: assumed strains, or full quadrature.")  # fmt: skip
-@click.option("--duration", type=POSITIVE,
-              help="Simulated time.  [default with --fixture: 1.25 times half a period of the "
-                   "projectile on the plate]")  # fmt: skip
-@click.option("--dt", type=POSITIVE, help="Time step.  [default: 0.9 of the critical one]")
-@click.option("--every", type=click.IntRange(min=1),
-              help="Steps between stored rows.  [default: for about 200 rows]")  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace an existing deck.")
+@option("--damage", is_flag=True,
+        help="Add strengths and toughness of a named ply: failure exposures (ALLO, FAIL) and the "
+             "delamination threshold (DELA).")  # fmt: skip
+@option("--support", type=click.Choice(SUPPORTS), default="free", show_default=True,
+        help="Support of all edges.")  # fmt: skip
+@option("--edge", "edges", type=Parsed(assignment, "EDGE=SUPPORT"), multiple=True,
+        help="Support of one edge: left, right, bottom or top, or a group of the mesh; may be "
+             "repeated.")  # fmt: skip
+@option("--fixture", metavar="NAME",
+        help=f"Fixture of a drop-weight test: {', '.join(FIXTURES)} or {CUSTOM}, a plate on the "
+             "edges of a window; --mesh then counts the window's elements.")  # fmt: skip
+@option("--at", type=list_of("X,Y", Finite(), [2]),
+        help="Impact point.  [default: the plate's centre]")  # fmt: skip
+@option("--velocity", type=Finite(), help="Approach velocity.")
+@option("--energy", type=POSITIVE,
+        help="Impact energy in the deck's units (mJ in mm-N-s), instead of "
+             "--velocity.")  # fmt: skip
+@option("--law", type=list_of("K,ALPHA_P,S_P,Q", Finite(), [4]),
+        help="Parameters of the indentation law.")  # fmt: skip
+@option("--contact", type=Parsed(_contact, "NAME"),
+        help=f"Named law, instead of --law; `fecm indent contacts` lists them.  {ESTIMATE} "
+             "estimates the k of a sphere (default: steel) as `fecm indent estimate` "
+             "does.")  # fmt: skip
+@option("--projectile", type=Parsed(_projectile, "PROJECTILE"),
+        help="mass:M, or rod:LENGTH,DIAMETER,E,DENSITY.  [default in lbf, in and s: the report's "
+             "rod]")  # fmt: skip
+@option("--patch", type=Parsed(parse_patch, "PATCH"), default="disc", show_default=True,
+        help="Area of the contact force: disc or hertz, with :RADIUS, to which a rectangle's mesh "
+             "is then refined; or none, a point force.  D7136 takes hertz.")  # fmt: skip
+@option("--shear", type=click.Choice([MITC, FULL]), default=MITC, show_default=True,
+        help="Transverse shear: assumed strains, or full quadrature.")  # fmt: skip
+@option("--duration", type=POSITIVE,
+        help="Simulated time.  [default with --fixture: 1.25 times half a period of the projectile "
+             "on the plate]")  # fmt: skip
+@option("--dt", type=POSITIVE, help="Time step.  [default: 0.9 of the critical one]")
+@option("--every", type=click.IntRange(min=1),
+        help="Steps between stored rows.  [default: for about 200 rows]")  # fmt: skip
+@option("--overwrite", is_flag=True, help="Replace an existing deck.")
 def new(output: Path, overwrite: bool, **options: Any) -> None:
     """Write a deck that is ready to run from plate, layup, supports and impact.
 
@@ -148,15 +146,12 @@ def new(output: Path, overwrite: bool, **options: Any) -> None:
         for finding in errors:
             echo(finding.render("the new deck"), err=True)
         raise RefusedError("these options do not give a valid deck; nothing was written")
-    for line in notes:
-        note(line)
+    note(*notes)
     for finding in prepared.findings:
         echo(finding.render(str(output) if to_file else "the new deck"), err=True)
+    write_text(output, text, overwrite=overwrite)
     if to_file:
-        write_text(output, text, overwrite=overwrite)
         echo(output)
-    else:
-        echo_file(text)
 
 
 @click.command()
@@ -181,29 +176,16 @@ def _as_options(message: str, options: Collection[str]) -> str:
 
 
 def _author(
-    given: Collection[str],
-    *,
-    size: tuple[float, float] | None,
-    mesh: tuple[int, int] | Path | None,
-    grading: float,
-    columns: str,
-    rows: str,
-    layup: Sequence[float],
-    ply_thickness: float,
-    ply: Sequence[float] | None,
-    material: NamedPly | None,
-    support: Any,
-    edges: Sequence[tuple[str, Any]],
-    fixture: str | None,
-    law: tuple[float, float, float, float] | None,
-    contact: NamedContact | Sphere | None,
-    patch: Patch | None,
-    **options: Any,
-) -> Authored:
+    given: Collection[str], *, size: tuple[float, float] | None,
+    mesh: tuple[int, int] | Path | None, grading: float, columns: str, rows: str,
+    layup: Sequence[float], ply_thickness: float, ply: Sequence[float] | None,
+    material: NamedPly | None, support: Any, edges: Sequence[tuple[str, Any]], fixture: str | None,
+    law: tuple[float, float, float, float] | None, contact: NamedContact | Sphere | None,
+    patch: Patch | None, **options: Any,
+) -> Authored:  # fmt: skip
     """Deck of the options of ``fecm new``; `given` are those on the command line."""
-    replaced = FIXED if fixture else RECTANGLE if isinstance(mesh, Path) else ()
-    for name in replaced:
-        if name in given and name != "mesh":
+    for name in FIXED if fixture else RECTANGLE if isinstance(mesh, Path) else ():
+        if name in given:
             what = "fixture` has its own plate and supports" if fixture else "mesh` is a file"
             raise ObjectError(f"`{what}; leave out `{name}`")
     if fixture:
@@ -221,26 +203,20 @@ def _author(
     prescribed = plate.fixture is not None and plate.fixture.test is not None
     if (law is None) == (contact is None) and (law is not None or not prescribed):
         raise ObjectError("give either `law` or `contact`")
-    return author(
-        plate,
-        Laminate(layup, one_ply(ply, material), ply_thickness),
-        contact=contact if law is None else Indentation(*law),
-        patch=patch if "patch" in given else AUTO,
-        gages=(),
-        **options,
-    )
+    laminate = Laminate(layup, one_ply(ply, material), ply_thickness)
+    options["contact"] = contact if law is None else Indentation(*law)
+    options["patch"] = patch if "patch" in given else AUTO
+    return author(plate, laminate, gages=(), **options)
 
 
 def _additions(deck: Deck) -> str:
     """Say what a deck has besides the cards of the report's program."""
-    parts: list[str] = []
+    parts = ["assumed shear strains (SHEA MITC)"] if deck.has(Shear) else []
     if (patch := deck.last(Patch)) is not None:
         share = RADIUS_PER_THICKNESS[patch.shape]
         thickness = deck.require(Material).integration.thickness
         radius = patch.radius or share * thickness
         about = "" if patch.radius else f" ({share:g} of the thickness)"
         pressure = "a uniform pressure" if patch.shape == DISC else "Hertz's pressure"
-        parts.append(f"{pressure} of radius {radius:.4g}{about} instead of a point force (PATC)")
-    if deck.has(Shear):
-        parts.append("assumed shear strains (SHEA MITC)")
+        parts.insert(0, f"{pressure} of radius {radius:.4g}{about} instead of a point force (PATC)")
     return f"the deck has {' and '.join(parts)}; --patch none and --shear full leave them out"

@@ -12,15 +12,12 @@ from typing import Any
 import click
 
 from fecm._files import check_outputs
-from fecm.cli.common import FILE_PATH, RefusedError, note, writing
+from fecm.cli.common import FILE_PATH, STANDARD_OUTPUT, RefusedError, note, writing
 from fecm.cli.types import Decorated, stacked
 from fecm.plot.kinds import SUFFIXES
 from fecm.plot.pictures import imported, require_matplotlib, save
 
-STANDARD_OUTPUT = Path("-")
-
-_OUTPUT = click.option("-o", "--output", type=click.Path(path_type=Path, allow_dash=True),
-                       metavar="FILE", default=STANDARD_OUTPUT,
+_OUTPUT = click.option("-o", "--output", type=FILE_PATH, metavar="FILE", default=STANDARD_OUTPUT,
                        help="CSV file to write.  [default: standard output]")  # fmt: skip
 _PLOT = click.option("--plot", "picture", type=FILE_PATH, metavar="FILE",
                      help="Also draw a picture: .png, .svg or .pdf.")  # fmt: skip

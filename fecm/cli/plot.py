@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,10 +13,10 @@ from fecm._errors import FecmWarning
 from fecm._files import check_outputs
 from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, note, progress
 from fecm.cli.isolation import reads
-from fecm.cli.types import Finite, ListOf, Parsed, assignment
+from fecm.cli.types import Finite, Parsed, assignment, list_of, option
 from fecm.plot.kinds import KINDS, Picture
 from fecm.plot.pictures import check_options, check_suffix, draw, options_of, save
-from fecm.results.hdf5_reader import Contents, read
+from fecm.results.hdf5_reader import read
 from fecm.results.result import Result, result_of
 from fecm.results.schema import FORMAT, SWEEP, printable
 
@@ -26,9 +26,7 @@ if TYPE_CHECKING:
 _KIND_HELP = "; ".join(f"{name}: {kind.summary}" for name, kind in KINDS.items())
 
 
-def _by_name(
-    context: click.Context, option: click.Parameter, pairs: tuple[tuple[str, str], ...]
-) -> dict[str, str]:
+def _by_name(_: Any, __: Any, pairs: tuple[tuple[str, str], ...]) -> dict[str, str]:
     """Values by name."""
     values = dict(pairs)
     if len(values) < len(pairs):
@@ -38,54 +36,46 @@ def _by_name(
 
 @click.command(short_help="Draw the report's figures, or the map of a sweep.")
 @click.argument("results", type=DECK_PATH, nargs=-1, required=True, metavar="RESULT...")
-@click.option("--kind", "kinds", type=click.Choice(list(KINDS)), multiple=True,
-              metavar="KIND",
-              help=f"Picture to draw; may be repeated.  {_KIND_HELP}.  [default: force; map of a "
-                   "sweep, exceedance of a random one]")  # fmt: skip
-@click.option("-o", "--output", type=FILE_PATH, metavar="PATH",
-              help="Picture (.png, .svg, .pdf; .gif for animation), or folder for several.  "
-                   "[default: RESULT-KIND.png in this folder]")  # fmt: skip
-@click.option("--at", type=ListOf("X,Y", Finite(), [2]), multiple=True, metavar="X,Y",
-              help="Point of strain (may be repeated), thickness or mesh.  [default of strain: the "
-                   "contact patch, or the nearest point at least the thickness away from a point "
-                   "force; of thickness: where |sigma_1| is largest]")  # fmt: skip
-@click.option("--gage", "gages", type=ListOf("DEGREES,...", Finite()), metavar="DEGREES,...",
-              help="Directions of strain, from the x-axis.  [default: 0,90]")  # fmt: skip
-@click.option("--face", type=click.Choice(["far", "struck", "curvature"]),
-              help="Face of the strain, or curvature instead.  [default: far]")  # fmt: skip
-@click.option("--times", "--time", "times", type=ListOf("T,T,...", Finite()), metavar="T,T,...",
-              help="Times, in the deck's unit; the nearest stored rows are drawn.")  # fmt: skip
-@click.option("--against", type=click.Choice(["indentation", "deflection", "displacement"]),
-              help="Horizontal axis of loop: indentation, displacement of the plate under the "
-                   "load, or of the projectile (the sum).  [default: indentation]")  # fmt: skip
-@click.option("--overlay", type=DECK_PATH, metavar="FILE.csv",
-              help="Measured force to draw over that of the kind force: columns time and force (or "
-                   "transducer) in the deck's units.  Notes compare both.")  # fmt: skip
-@click.option("--along", type=click.Choice(["x", "y"]),
-              help="Direction of line.  [default: x]")  # fmt: skip
-@click.option("--width", type=click.Choice(["column", "full"]),
-              help="3.5 in, or 7.2 in.  [default: column]")  # fmt: skip
-@click.option("--quantity", metavar="NAME",
-              help="Quantity of a sweep: a name of its summary; of failure: a criterion.  "
-                   "[default: peak_force, found_velocity; the largest of all]")  # fmt: skip
-@click.option("--over", type=ListOf("NAME or NAME,NAME", click.STRING, [1, 2]),
-              metavar="NAME[,NAME]",
-              help="Parameters on the axes of map.  [default: those that vary]")  # fmt: skip
-@click.option("--where", type=Parsed(assignment), callback=_by_name, multiple=True,
-              metavar="NAME=VALUE",
-              help="Show of a sweep only the cases nearest to this value; may be "
-                   "repeated.")  # fmt: skip
-@click.option("--level", type=ListOf("VALUE,...", Finite()), metavar="VALUE,...",
-              help="Values of the quantity to mark, in the deck's unit.")  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace existing pictures.")
+@option("--kind", "kinds", type=click.Choice(list(KINDS)), multiple=True, metavar="KIND",
+        help=f"Picture to draw; may be repeated.  {_KIND_HELP}.  [default: force; map of a sweep, "
+             "exceedance of a random one]")  # fmt: skip
+@option("-o", "--output", type=FILE_PATH, metavar="PATH",
+        help="Picture (.png, .svg, .pdf; .gif for animation), or folder for several.  [default: "
+             "RESULT-KIND.png in this folder]")  # fmt: skip
+@option("--at", type=list_of("X,Y", Finite(), [2]), multiple=True,
+        help="Point of strain (may be repeated), thickness or mesh.  [default of strain: the "
+             "contact patch, or the nearest point at least the thickness away from a point force; "
+             "of thickness: where |sigma_1| is largest]")  # fmt: skip
+@option("--gage", "gages", type=list_of("DEGREES,...", Finite()),
+        help="Directions of strain, from the x-axis.  [default: 0,90]")  # fmt: skip
+@option("--face", type=click.Choice(["far", "struck", "curvature"]),
+        help="Face of the strain, or curvature instead.  [default: far]")  # fmt: skip
+@option("--times", "--time", "times", type=list_of("T,T,...", Finite()),
+        help="Times, in the deck's unit; the nearest stored rows are drawn.")  # fmt: skip
+@option("--against", type=click.Choice(["indentation", "deflection", "displacement"]),
+        help="Horizontal axis of loop: indentation, displacement of the plate under the load, or "
+             "of the projectile (the sum).  [default: indentation]")  # fmt: skip
+@option("--overlay", type=DECK_PATH, metavar="FILE.csv",
+        help="Measured force to draw over that of the kind force: columns time and force (or "
+             "transducer) in the deck's units.  Notes compare both.")  # fmt: skip
+@option("--along", type=click.Choice(["x", "y"]), help="Direction of line.  [default: x]")
+@option("--width", type=click.Choice(["column", "full"]),
+        help="3.5 in, or 7.2 in.  [default: column]")  # fmt: skip
+@option("--quantity", metavar="NAME",
+        help="Quantity of a sweep: a name of its summary; of failure: a criterion.  [default: "
+             "peak_force, found_velocity; the largest of all]")  # fmt: skip
+@option("--over", type=list_of("NAME or NAME,NAME", click.STRING, [1, 2]), metavar="NAME[,NAME]",
+        help="Parameters on the axes of map.  [default: those that vary]")  # fmt: skip
+@option("--where", type=Parsed(assignment, "NAME=VALUE"), callback=_by_name, multiple=True,
+        help="Show of a sweep only the cases nearest to this value; may be repeated.")  # fmt: skip
+@option("--level", type=list_of("VALUE,...", Finite()),
+        help="Values of the quantity to mark, in the deck's unit.")  # fmt: skip
+@option("--overwrite", is_flag=True, help="Replace existing pictures.")
 @reads("results")
 def plot(
-    results: tuple[Path, ...],
-    kinds: tuple[str, ...],
-    output: Path | None,
-    overwrite: bool,
+    results: tuple[Path, ...], kinds: tuple[str, ...], output: Path | None, overwrite: bool,
     **asked: Any,
-) -> None:
+) -> None:  # fmt: skip
     """Draw the report's figures from one or more RESULTs, or the map of a sweep."""
     options = {name: value for name, value in asked.items() if value}
     named = _named(results)
@@ -97,8 +87,7 @@ def plot(
     folder = output if output is not None and output not in paths.values() else None
     if folder is None or folder.is_dir():
         check_outputs(list(paths.values()), overwrite, results)
-    with progress("fecm", len(chosen)) as advance:
-        pictures = _draw(named, chosen, options, advance)
+    pictures = _draw(named, chosen, options)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
     for kind, path in paths.items():
@@ -126,35 +115,30 @@ def _named(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:
         names = [printable(str(path)) for path in paths]
     if len(set(names)) < len(names):
         raise RefusedError("a result is given twice")
-    opened = (read(path, FORMAT, SWEEP) for path in paths)
-    return {name: _result(contents) for name, contents in zip(names, opened, strict=True)}
+    found: dict[str, Result | SweepResult] = {}
+    for name, path in zip(names, paths, strict=True):
+        contents = read(path, FORMAT, SWEEP)
+        if contents.form == SWEEP:
+            from fecm.sweeps.result import sweep_of
 
-
-def _result(contents: Contents) -> Result | SweepResult:
-    """Result of a run or of a sweep."""
-    if contents.form != SWEEP:
-        return result_of(contents)
-    from fecm.sweeps.result import sweep_of
-
-    return sweep_of(contents, history=False)
+            found[name] = sweep_of(contents, history=False)
+        else:
+            found[name] = result_of(contents)
+    return found
 
 
 def _draw(
-    results: dict[str, Result | SweepResult],
-    kinds: list[str],
-    options: Mapping[str, Any],
-    advance: Callable[[int], object],
+    results: dict[str, Result | SweepResult], kinds: list[str], options: Mapping[str, Any]
 ) -> dict[str, Picture]:
     """Draw all pictures before writing any."""
-    with warnings.catch_warnings(record=True) as caught:
+    pictures = {}
+    with progress("fecm", len(kinds)) as advance, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        pictures = {}
         for kind in kinds:
             own = options_of(kind)
             pictures[kind] = draw(kind, results, **{n: v for n, v in options.items() if n in own})
             advance(1)
     notes = [str(one.message) for one in caught if issubclass(one.category, FecmWarning)]
     notes += [text for picture in pictures.values() for text in picture.notes]
-    for text in dict.fromkeys(notes):
-        note(text)
+    note(*dict.fromkeys(notes))
     return pictures

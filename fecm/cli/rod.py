@@ -10,10 +10,10 @@ from typing import Any
 import click
 import numpy as np
 
-from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError
+from fecm.cli.common import DECK_PATH, FORMAT_OPTION, STANDARD_OUTPUT, RefusedError
 from fecm.cli.decks import load_valid
-from fecm.cli.outputs import STANDARD_OUTPUT, OutputPaths, outputs
-from fecm.cli.types import POSITIVE, Finite, Parsed
+from fecm.cli.outputs import OutputPaths, outputs
+from fecm.cli.types import POSITIVE, Finite, Parsed, option
 from fecm.deck.catalogue import SYSTEMS
 from fecm.deck.units import unit_names
 from fecm.mechanics.projectile import (
@@ -27,16 +27,10 @@ from fecm.mechanics.projectile import (
 )
 from fecm.problem.build import build_projectile, build_station
 from fecm.studies import StudyError
-from fecm.studies.rod_test.filters import Calibration, Filter, filter_of, recorded
+from fecm.studies.rod_test import pulse_test
+from fecm.studies.rod_test.filters import Filter, filter_of, recorded
 from fecm.studies.rod_test.filters import calibrate as fit_sensitivity
-from fecm.studies.rod_test.pulse_test import (
-    Pulse,
-    RodHistory,
-    default_time_step,
-    pulse_of,
-    simulate_pulse,
-    table,
-)
+from fecm.studies.rod_test.pulse_test import Pulse, RodHistory
 from fecm.studies.tables import read_table
 
 FILTER_HELP = ("first-order:RISE or moving-average:RISE, with the time RISE from 10 to 90 % of the "
@@ -63,52 +57,51 @@ def rod() -> None:
 
 @rod.command()
 @click.argument("deck", type=DECK_PATH, required=False)
-@click.option("--pulse", "applied", type=Parsed(pulse_of), required=True, metavar="PULSE",
-              help="gauss:F0,TAU,B (F0 exp(-(t-TAU)²/4B²)), sine:F0,B (F0 sin(πt/B), zero after "
-                   "B), or a CSV of time and force, linear between its rows.")  # fmt: skip
-@click.option("--length", type=POSITIVE, help="Length of the rod, without a deck.")
-@click.option("--modulus", type=POSITIVE, help="Young's modulus, without a deck.")
-@click.option("--density", type=POSITIVE, help="Mass per volume, without a deck.")
-@click.option("--diameter", type=POSITIVE, help="Diameter, without a deck.")
-@click.option("--elements", type=click.IntRange(1, 1000), metavar="N",
-              help="Number of elements, without a deck.  [default: 20]")  # fmt: skip
-@click.option("--units", type=click.Choice(list(SYSTEMS)), metavar="SYSTEM",
-              help="in-lbf-s, m-N-s or mm-N-s: names the units on the picture, without a "
-                   "deck.")  # fmt: skip
-@click.option("--dt", type=POSITIVE,
-              help="Time step.  [default: the deck's DT, or 0.8 of the travel time of a wave "
-                   "through an element]")  # fmt: skip
-@click.option("--duration", type=POSITIVE,
-              help="Simulated time.  [default: TAU + 10 B, 1.5 B, or the table's]")  # fmt: skip
-@click.option("--station", "stations", type=Finite(), multiple=True, metavar="X",
-              help="Distance from the struck end at which to compute the force; may be repeated.  "
-                   "[default: the middle]")  # fmt: skip
-@click.option("--filter", "transducer", type=Parsed(filter_of), metavar="FILTER",
-              help=f"Also filter these forces as a transducer does: {FILTER_HELP}")  # fmt: skip
-@click.option("--mass-matrix", type=click.Choice(MASSES), default=LUMPED, show_default=True,
-              help="Mass matrix; the report's program lumps it.")  # fmt: skip
-@click.option("--integrator", type=click.Choice(INTEGRATORS), default=WILSON, show_default=True,
-              help="Time integration; the report's is Wilson's.")  # fmt: skip
+@option("--pulse", "applied", type=Parsed(pulse_test.pulse_of, "PULSE"), required=True,
+        help="gauss:F0,TAU,B (F0 exp(-(t-TAU)²/4B²)), sine:F0,B (F0 sin(πt/B), zero after B), or a "
+             "CSV of time and force, linear between its rows.")  # fmt: skip
+@option("--length", type=POSITIVE, help="Length of the rod, without a deck.")
+@option("--modulus", type=POSITIVE, help="Young's modulus, without a deck.")
+@option("--density", type=POSITIVE, help="Mass per volume, without a deck.")
+@option("--diameter", type=POSITIVE, help="Diameter, without a deck.")
+@option("--elements", type=click.IntRange(1, 1000), metavar="N",
+        help="Number of elements, without a deck.  [default: 20]")  # fmt: skip
+@option("--units", type=click.Choice(list(SYSTEMS)), metavar="SYSTEM",
+        help="in-lbf-s, m-N-s or mm-N-s: names the units on the picture, without a "
+             "deck.")  # fmt: skip
+@option("--dt", type=POSITIVE,
+        help="Time step.  [default: the deck's DT, or 0.8 of the travel time of a wave through an "
+             "element]")  # fmt: skip
+@option("--duration", type=POSITIVE,
+        help="Simulated time.  [default: TAU + 10 B, 1.5 B, or the table's]")  # fmt: skip
+@option("--station", "stations", type=Finite(), multiple=True, metavar="X",
+        help="Distance from the struck end at which to compute the force; may be repeated.  "
+             "[default: the middle]")  # fmt: skip
+@option("--filter", "transducer", type=Parsed(filter_of, "FILTER"),
+        help=f"Also filter these forces as a transducer does: {FILTER_HELP}")  # fmt: skip
+@option("--mass-matrix", type=click.Choice(MASSES), default=LUMPED, show_default=True,
+        help="Mass matrix; the report's program lumps it.")  # fmt: skip
+@option("--integrator", type=click.Choice(INTEGRATORS), default=WILSON, show_default=True,
+        help="Time integration; the report's is Wilson's.")  # fmt: skip
 @outputs()
 def pulse(
-    deck: Path | None,
-    applied: Pulse,
-    dt: float | None,
-    duration: float | None,
-    stations: tuple[float, ...],
-    transducer: Filter | None,
-    mass_matrix: str,
-    integrator: str,
-    targets: OutputPaths,
-    **shape: Any,
-) -> None:
+    deck: Path | None, applied: Pulse, dt: float | None, duration: float | None,
+    stations: tuple[float, ...], transducer: Filter | None, mass_matrix: str, integrator: str,
+    targets: OutputPaths, **shape: Any,
+) -> None:  # fmt: skip
     """Compute forces and accelerations of a free rod under a pulse on one end, as CSV.
 
     The rod is the projectile of DECK, or uniform by --length, --modulus, --density and --diameter.
     Force is positive in compression.
     """
     system = shape.pop("units")
-    _check_shape(deck, shape | ({"units": system} if system and deck else {}))
+    given = [name for name, value in shape.items() if value is not None]
+    given += ["units"] if system and deck else []
+    missing = [f"--{name}" for name in shape if name not in (*given, "elements")]
+    if deck is not None and given:
+        raise click.UsageError(f"--{given[0]} is for a rod without a deck; {deck} has one")
+    if deck is None and missing:
+        raise click.UsageError(f"the rod lacks {', '.join(missing)}; or name a deck with a rod")
     units: Mapping[str, str] = SYSTEMS[system] if system else {}
     deck_dt = None
     if deck is None:
@@ -118,34 +111,24 @@ def pulse(
     else:
         struck, station, deck_dt, units = _of_deck(deck)
     struck = struck.with_mass(mass_matrix)
-    step, end = dt or deck_dt or default_time_step(struck), duration or applied.duration
+    step, end = dt or deck_dt or pulse_test.default_time_step(struck), duration or applied.duration
     places = tuple(dict.fromkeys(stations)) or (station,)
-    history = simulate_pulse(struck, applied, step, end, places, integrator)
+    history = pulse_test.simulate_pulse(struck, applied, step, end, places, integrator)
     filtered = None
     if transducer is not None:
         filtered = transducer.in_unit(units.get("time", ""))(history.time, history.forces)
     targets.draw("studies:pulse_picture", history, filtered, units)
-    targets.write(*table(history, filtered))
+    targets.write(*pulse_test.table(history, filtered))
     if targets.table != STANDARD_OUTPUT:
-        click.echo("\n".join(_summary(struck, history)))
-
-
-def _check_shape(deck: Path | None, shape: Mapping[str, Any]) -> None:
-    """Refuse a rod that is defined twice or incompletely."""
-    given = [name for name, value in shape.items() if value is not None]
-    missing = [f"--{name}" for name in shape if name not in (*given, "elements")]
-    if deck is not None and given:
-        raise click.UsageError(f"--{given[0]} is for a rod without a deck; {deck} has one")
-    if deck is None and missing:
-        raise click.UsageError(f"the rod lacks {', '.join(missing)}; or name a deck with a rod")
+        _summarise(struck, history)
 
 
 def _of_deck(deck: Path) -> tuple[Rod, float, float | None, Mapping[str, str]]:
     """Projectile of a deck's first problem, x of its transducer, its first DT, and its units."""
-    prepared = load_valid(deck)
-    if not prepared.problems:
+    problems = load_valid(deck)
+    if not problems:
         raise RefusedError(f"{deck} contains no problem")
-    first = prepared.problems[0].deck
+    first = problems[0].deck
     steps = [macro.value for macro in first.macros if macro.word == "DT" and macro.value > 0.0]
     projectile = build_projectile(first)
     if isinstance(projectile, RigidMass):
@@ -155,32 +138,25 @@ def _of_deck(deck: Path) -> tuple[Rod, float, float | None, Mapping[str, str]]:
     return projectile, x, steps[0] if steps else None, unit_names(first)
 
 
-def _summary(struck: Rod, history: RodHistory) -> list[str]:
-    """Lines of the summary."""
-    dt, peak = history.time[1], abs(history.applied).argmax()
-    lines = [
-        f"rod               {struck.elements} elements, length {struck.length:g}, "
-        f"mass {struck.total_mass:.5g}",
-        f"steps             {len(history.time) - 1} of {dt:g}",
-        f"applied           peak {history.applied[peak]:.6g} at time {history.time[peak]:.6g}",
-    ]
-    columns = history.stations, history.forces.T, history.mean_ratios
-    for x, force, ratio in zip(*columns, strict=True):
+def _summarise(struck: Rod, history: RodHistory) -> None:
+    """Print a summary."""
+    size = f"length {struck.length:g}, mass {struck.total_mass:.5g}"
+    click.echo(f"rod               {struck.elements} elements, {size}")
+    click.echo(f"steps             {len(history.time) - 1} of {history.time[1]:g}")
+    names = ["applied          ", *(f"force at {x:<8.4g}" for x in history.stations)]
+    ratios = ["", *(f"; mean ratio to the applied {ratio:.3f}" for ratio in history.mean_ratios)]
+    forces = [history.applied, *history.forces.T]
+    for name, force, ratio in zip(names, forces, ratios, strict=True):
         row = abs(force).argmax()
-        lines.append(
-            f"force at {x:<8.4g} peak {force[row]:.6g} at time {history.time[row]:.6g}; "
-            f"mean ratio to the applied {ratio:.3f}"
-        )
-    return lines
+        click.echo(f"{name} peak {force[row]:.6g} at time {history.time[row]:.6g}{ratio}")
 
 
 @rod.command("filter")
 @click.argument("history", type=DECK_PATH, metavar="RESULT")
-@click.option("--filter", "transducer", type=Parsed(filter_of), required=True, metavar="FILTER",
-              help=FILTER_HELP)  # fmt: skip
-@click.option("--column", metavar="NAME",
-              help="Column of a result's history, or of a CSV, to filter.  [default: transducer; "
-                   "of a CSV without one, the second]")  # fmt: skip
+@option("--filter", "transducer", type=Parsed(filter_of, "FILTER"), required=True, help=FILTER_HELP)
+@option("--column", metavar="NAME",
+        help="Column of a result's history, or of a CSV, to filter.  [default: transducer; of a "
+             "CSV without one, the second]")  # fmt: skip
 @outputs("history")
 def filter_(history: Path, transducer: Filter, column: str | None, targets: OutputPaths) -> None:
     """Filter a history as a transducer with a rise time does, or by a channel frequency class.
@@ -198,10 +174,10 @@ def filter_(history: Path, transducer: Filter, column: str | None, targets: Outp
 
 @rod.command()
 @click.argument("test", type=DECK_PATH, metavar="TEST.csv")
-@click.option("--mass", type=POSITIVE, required=True, help="Mass of the target.")
-@click.option("--c-a", type=POSITIVE, required=True,
-              help="Sensitivity of the accelerometer, V_a per acceleration.")  # fmt: skip
-@click.option("--through-origin", is_flag=True, help="Fit a line without an offset.")
+@option("--mass", type=POSITIVE, required=True, help="Mass of the target.")
+@option("--c-a", type=POSITIVE, required=True,
+        help="Sensitivity of the accelerometer, V_a per acceleration.")  # fmt: skip
+@option("--through-origin", is_flag=True, help="Fit a line without an offset.")
 @FORMAT_OPTION
 @outputs("test", table=False)
 def calibrate(
@@ -221,15 +197,11 @@ def calibrate(
     names = dict(zip(map(str.casefold, measured.names), measured.units, strict=True))
     units = [names.get(name, "") for name in ("time", "v_f", "v_a")]
     targets.draw("studies:calibration_picture", time, v_f, v_a, found, units)
-    click.echo(json.dumps(vars(found)) if form == "json" else "\n".join(_lines(found)))
-
-
-def _lines(found: Calibration) -> list[str]:
-    """Lines of a calibration."""
-    return [
-        f"points            {found.points}",
-        f"slope V_F/V_a     {found.slope:.6g} ± {found.slope_error:.2g}",
-        f"offset of V_F     {found.offset:.6g} ± {found.offset_error:.2g}",
-        f"R²                {found.r_squared:.6f}",
-        f"sensitivity c_F   {found.sensitivity:.6g} ± {found.sensitivity_error:.2g}",
-    ]
+    if form == "json":
+        click.echo(json.dumps(vars(found)))
+        return
+    click.echo(f"points            {found.points}")
+    click.echo(f"slope V_F/V_a     {found.slope:.6g} ± {found.slope_error:.2g}")
+    click.echo(f"offset of V_F     {found.offset:.6g} ± {found.offset_error:.2g}")
+    click.echo(f"R²                {found.r_squared:.6f}")
+    click.echo(f"sensitivity c_F   {found.sensitivity:.6g} ± {found.sensitivity_error:.2g}")

@@ -11,22 +11,10 @@ import click
 from fecm._files import check_outputs
 from fecm._memory import format_bytes
 from fecm.api import numbered
-from fecm.cli.common import (
-    DECK_PATH,
-    FILE_PATH,
-    FORMAT_OPTION,
-    MODE_OPTION,
-    CheckFailedError,
-    RefusedError,
-    echo,
-    echo_json,
-    note,
-    progress,
-    signals,
-    writing,
-)
+from fecm.cli import common
+from fecm.cli.common import CheckFailedError, RefusedError, echo, note, signals
 from fecm.cli.decks import load_valid
-from fecm.cli.types import POSITIVE, Finite
+from fecm.cli.types import POSITIVE, Finite, option
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.projectile import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
 from fecm.mechanics.solutions import SingularStiffnessError
@@ -41,71 +29,51 @@ from fecm.results.hdf5_reader import read
 from fecm.results.result import Result, result_of
 from fecm.results.schema import declared_units
 from fecm.results.summary import about_run, largest_exposures
-from fecm.simulation.checkpoint import (
-    Checkpointer,
-    CheckpointError,
-    checkpoint_of,
-    spool_of,
-)
+from fecm.simulation.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
 from fecm.simulation.printout import Printer
 from fecm.simulation.run import run as simulate_run
 from fecm.simulation.simulation import Simulation
 
 
 @click.command()
-@click.argument("deck", type=DECK_PATH)
-@click.option("-o", "--output", type=FILE_PATH, metavar="OUT.h5",
-              help="Result file.  [default: the deck's name with .h5, in this folder]")  # fmt: skip
-@MODE_OPTION
-@click.option("--slip", "slips", type=click.Choice(NAMES), multiple=True, metavar="NAME",
-              help=f"Add a single slip of the program to report mode; may be repeated.  Names: "
-                   f"{', '.join(NAMES)}.")  # fmt: skip
-@click.option("--overwrite", is_flag=True,
-              help="Replace existing results and the checkpoints of interrupted runs.")  # fmt: skip
-@click.option("--solver", type=click.Choice(SOLVERS), default=AUTO, show_default=True,
-              help="Computation of K·u: by compiled kernels where there are any, else by NumPy; by "
-                   "one of them; or by a sparse matrix.")  # fmt: skip
-@click.option("--threads", type=click.IntRange(0, 1024), default=0, metavar="N",
-              help="Threads that share the work of a step; 0 uses every core for a large mesh.  "
-                   "[default: 0]")  # fmt: skip
-@click.option("--rod-mass", type=click.Choice(MASSES), default=LUMPED, show_default=True,
-              help="The projectile's mass matrix; the report's program lumps it.")  # fmt: skip
-@click.option("--rod-integrator", type=click.Choice(INTEGRATORS), default=WILSON,
-              show_default=True,
-              help="The projectile's integration; the report's is Wilson's.")  # fmt: skip
-@click.option("--checkpoint", "every", type=Finite(min=0.0), metavar="SECONDS",
-              help="Write a checkpoint beside the output at this interval.")  # fmt: skip
-@click.option("--resume", is_flag=True,
-              help="Resume from the checkpoint of an interrupted run.")  # fmt: skip
-@click.option("--energy-limit", type=POSITIVE, default=ENERGY_LIMIT,
-              show_default=True, metavar="RATIO",
-              help="Relative energy error that ends a run without slips.")  # fmt: skip
-@click.option("--fail-limit", type=POSITIVE, metavar="EXPOSURE",
-              help="Exit with status 1 if an exposure of FAIL exceeds this value.")  # fmt: skip
-@click.option("--force", is_flag=True,
-              help="Run despite a time step above the critical one (E508) or L2 = 2 in a free "
-                   "plate (E321).")  # fmt: skip
-@click.option("--print", "printed", type=FILE_PATH, metavar="OUT.txt",
-              help="Also write the printed output of the original program.")  # fmt: skip
-@FORMAT_OPTION
+@click.argument("deck", type=common.DECK_PATH)
+@option("-o", "--output", type=common.FILE_PATH, metavar="OUT.h5",
+        help="Result file.  [default: the deck's name with .h5, in this folder]")  # fmt: skip
+@common.MODE_OPTION
+@option("--slip", "slips", type=click.Choice(NAMES), multiple=True, metavar="NAME",
+        help="Add a single slip of the program to report mode; may be repeated.  Names: "
+             f"{', '.join(NAMES)}.")  # fmt: skip
+@option("--overwrite", is_flag=True,
+        help="Replace existing results and the checkpoints of interrupted runs.")  # fmt: skip
+@option("--solver", type=click.Choice(SOLVERS), default=AUTO, show_default=True,
+        help="Computation of K·u: by compiled kernels where there are any, else by NumPy; by one "
+             "of them; or by a sparse matrix.")  # fmt: skip
+@option("--threads", type=click.IntRange(0, 1024), default=0, metavar="N",
+        help="Threads that share the work of a step; 0 uses every core for a large mesh.  "
+             "[default: 0]")  # fmt: skip
+@option("--rod-mass", type=click.Choice(MASSES), default=LUMPED, show_default=True,
+        help="The projectile's mass matrix; the report's program lumps it.")  # fmt: skip
+@option("--rod-integrator", type=click.Choice(INTEGRATORS), default=WILSON, show_default=True,
+        help="The projectile's integration; the report's is Wilson's.")  # fmt: skip
+@option("--checkpoint", "every", type=Finite(min=0.0), metavar="SECONDS",
+        help="Write a checkpoint beside the output at this interval.")  # fmt: skip
+@option("--resume", is_flag=True, help="Resume from the checkpoint of an interrupted run.")
+@option("--energy-limit", type=POSITIVE, default=ENERGY_LIMIT, show_default=True, metavar="RATIO",
+        help="Relative energy error that ends a run without slips.")  # fmt: skip
+@option("--fail-limit", type=POSITIVE, metavar="EXPOSURE",
+        help="Exit with status 1 if an exposure of FAIL exceeds this value.")  # fmt: skip
+@option("--force", is_flag=True,
+        help="Run despite a time step above the critical one (E508) or L2 = 2 in a free plate "
+             "(E321).")  # fmt: skip
+@option("--print", "printed", type=common.FILE_PATH, metavar="OUT.txt",
+        help="Also write the printed output of the original program.")  # fmt: skip
+@common.FORMAT_OPTION
 def run(
-    deck: Path,
-    output: Path | None,
-    mode: str,
-    slips: tuple[str, ...],
-    overwrite: bool,
-    force: bool,
-    printed: Path | None,
-    resume: bool,
-    rod_mass: str,
-    rod_integrator: str,
-    solver: str,
-    threads: int,
-    every: float | None,
-    energy_limit: float,
-    fail_limit: float | None,
+    deck: Path, output: Path | None, mode: str, slips: tuple[str, ...], overwrite: bool,
+    force: bool, printed: Path | None, resume: bool, rod_mass: str, rod_integrator: str,
+    solver: str, threads: int, every: float | None, energy_limit: float, fail_limit: float | None,
     form: str,
-) -> None:
+) -> None:  # fmt: skip
     """Run every problem in DECK and write its result.
 
     The result of a second problem goes to OUT-2.h5, and so on.  An interrupted run leaves a
@@ -115,7 +83,7 @@ def run(
         active = active_slips(mode, slips)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
-    problems = load_valid(deck, "; nothing was run", mode, force=force).problems
+    problems = load_valid(deck, "; nothing was run", mode, force)
     first = output or Path(f"{deck.stem}.h5")
     paths = [numbered(first, n) for n in range(1, len(problems) + 1)]
     prints = [numbered(printed, n) if printed else None for n in range(1, len(problems) + 1)]
@@ -162,18 +130,16 @@ def _interrupted(paths: Sequence[Path], *, resume: bool, overwrite: bool) -> int
 
 
 def _run_one(
-    problem: Problem,
-    path: Path,
-    printed: Path | None,
-    choices: RunOptions,
-    every: float | None,
-    *,
-    resumes: bool,
-    overwrite: bool,
-    form: str,
-) -> Result:
+    problem: Problem, path: Path, printed: Path | None, choices: RunOptions, every: float | None, *,
+    resumes: bool, overwrite: bool, form: str,
+) -> Result:  # fmt: skip
     """Run one problem of a deck into a file, print what came out and return its result."""
-    _check_room(path, problem.output_bytes)
+    import shutil
+
+    if problem.output_bytes > (free := shutil.disk_usage(path.parent).free):
+        size = format_bytes(problem.output_bytes)
+        left = f"the disk has {format_bytes(free)} left"
+        raise RefusedError(f"{path}: the result takes about {size}, and {left}")
     check_memory(problem, solver=choices.solver)
     with contextlib.ExitStack() as stack:
         stack.enter_context(signals.deferred())
@@ -182,8 +148,8 @@ def _run_one(
         checkpointer = Checkpointer(path, sink)
         printer = Printer()
         if printed is not None:
-            printer = Printer(stack.enter_context(writing(printed, overwrite=overwrite)))
-        advance = stack.enter_context(progress("fecm", problem.work.steps))
+            printer = Printer(stack.enter_context(common.writing(printed, overwrite=overwrite)))
+        advance = stack.enter_context(common.progress("fecm", problem.work.steps))
         on_step, on_macro = _observers(checkpointer, every, advance)
         simulation = Simulation(problem, sink, choices, printer, (on_step,), on_macro)
         if resumes:
@@ -195,11 +161,10 @@ def _run_one(
     result = result_of(contents, problem.deck)
     with contents.held():
         about = about_run(result)
-    for text in (*simulation.state.notes, *result.notes):
-        note(text)
+    note(*simulation.state.notes, *result.notes)
     if form == "json":
         named = {"title": problem.deck.title, "result": str(path), "printed": printed}
-        echo_json({**named, "units": declared_units(result.attributes), **about})
+        common.echo_json({**named, "units": declared_units(result.attributes), **about})
         return result
     echo(problem.deck.title or "(no title)")
     for line in (*about["summary"], *larger_steps(problem)):
@@ -228,10 +193,9 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
         message = f"{error}; --overwrite without --resume discards the checkpoint and starts over"
         raise RefusedError(message) from None
     except _StoppedError as stopped:
-        step = stopped.args[0]
         more = f"the same command with --resume continues {path}"
-        echo(f"fecm: stopped after step {step}; {more}", err=True)
-        raise SystemExit(signals.status) from None
+        echo(f"fecm: stopped after step {stopped}; {more}", err=True)
+        raise SystemExit(128 + signals.received) from None
     except Exception as error:
         # h5py's own errors are OSErrors without a number.
         of_disk = isinstance(error, OSError) and (error.errno or type(error) is not OSError)
@@ -259,7 +223,7 @@ def _observers(
     shown = 0
 
     def on_macro(simulation: Simulation) -> None:
-        if signals.came():
+        if signals.received:
             checkpointer.write(simulation)
             raise _StoppedError(simulation.state.plate.step)
 
@@ -273,15 +237,3 @@ def _observers(
             checkpointer.write(simulation)
 
     return on_step, on_macro
-
-
-def _check_room(path: Path, size: int) -> None:
-    """Refuse a result that does not fit on the disk."""
-    import shutil
-
-    free = shutil.disk_usage(path.parent).free
-    if size > free:
-        raise RefusedError(
-            f"{path}: the result takes about {format_bytes(size)}, and the disk has "
-            f"{format_bytes(free)} left"
-        )

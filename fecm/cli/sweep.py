@@ -11,7 +11,7 @@ from fecm._files import check_outputs
 from fecm.api import load_deck
 from fecm.cli.common import DECK_PATH, FILE_PATH, NO, RefusedError, echo, note, progress, signals
 from fecm.cli.decks import count_findings
-from fecm.cli.types import ListOf, Parsed
+from fecm.cli.types import Parsed, list_of, option
 from fecm.deck.findings import DeckError
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
@@ -20,7 +20,6 @@ from fecm.sweeps import cases as inputs
 from fecm.sweeps import plan as plans
 from fecm.sweeps.api import carry_out, check_draws, problem_of
 from fecm.sweeps.batch import deck_of
-from fecm.sweeps.cases import NAMES, CasesError, Limit, Value
 from fecm.sweeps.convergence import refined_cases
 from fecm.sweeps.convergence import table as table_of
 from fecm.sweeps.random_result import tables
@@ -30,77 +29,57 @@ from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_i
 
 @click.command()
 @click.argument("deck", type=DECK_PATH)
-@click.option("--vary", "varied", type=Parsed(inputs.parse_vary), multiple=True,
-              metavar="NAME=VALUES", help="FROM:TO:N or A,B,C; may be repeated, for a full grid.  "
-                                          f"Names: {', '.join(NAMES)}.")  # fmt: skip
-@click.option("--cases", "table", type=DECK_PATH, metavar="CASES.csv",
-              help="A table instead of --vary: a header of names, one row per case.")  # fmt: skip
-@click.option("--refine", "factors", type=ListOf("FACTOR,...", click.IntRange(1, 8)),
-              metavar="1,2,4",
-              help="Instead: divide the sides of all elements and DT by factors; order "
-                   "and limit of every quantity.")  # fmt: skip
-@click.option("--random", "laws", type=Parsed(inputs.parse_random), multiple=True,
-              metavar="NAME=LAW",
-              help="Random value: normal:MEAN,SD, lognormal:MEDIAN,SIGMA, uniform:A,B or "
-                   "triangular:A,MODE,B; may be repeated, together with --vary.")  # fmt: skip
-@click.option("--samples", type=int, metavar="N", help="Number of samples of --random.")
-@click.option("--seed", type=int, metavar="S", help="Seed of --random.  [default: 0]")
-@click.option("--design", "kind", type=click.Choice(inputs.DESIGNS),
-              help="Design of --random: Latin hypercube, Sobol' sequence, or independent draws "
-                   "(Monte Carlo).  [default: lhs]")  # fmt: skip
-@click.option("--sensitivity", is_flag=True,
-              help="Sobol' indices of the random values, from N times (their number + 2) "
-                   "cases.")  # fmt: skip
-@click.option("--exceed", "limits", type=Parsed(inputs.parse_exceed), multiple=True,
-              metavar="QUANTITY=VALUE",
-              help="Probability that a quantity of the summary exceeds a value; of peak_force also "
-                   "threshold, that of DELA.  May be repeated.")  # fmt: skip
-@click.option("--find", type=click.Choice(["velocity"]),
-              help="Search in every case for the velocity at which --until holds.")  # fmt: skip
-@click.option("--until", type=Parsed(inputs.parse_until), metavar="peak_force=VALUE",
-              help="Peak force to reach: a number, or threshold, that of DELA.")  # fmt: skip
-@click.option("-o", "--output", type=FILE_PATH, metavar="SWEEP.h5",
-              help="Result file.  [default: the deck's name with -sweep.h5, in this "
-                   "folder]")  # fmt: skip
-@click.option("--history", is_flag=True, help="Also store the contact force of every step.")
-@click.option("--measure", "extra", type=ListOf("NAME,...", click.Choice(plans.MEASURES)),
-              default=(), metavar="NAME,...",
-              help=f"Also store {', '.join(plans.MEASURES)}: the largest deflection, strains of "
-                   "gages (GAGE), exposures (FAIL).")  # fmt: skip
-@click.option("--full", type=ListOf("CASE,...", click.IntRange(min=0)), metavar="CASE,...",
-              help="Also run these cases in full, into SWEEP-CASE.h5; cases count from "
-                   "0.")  # fmt: skip
-@click.option("--workers", type=click.IntRange(1, 1024), default=1, show_default=True, metavar="N",
-              help="Worker processes on this machine.")  # fmt: skip
-@click.option("--scheduler", metavar="ADDRESS",
-              help="Running Dask scheduler, as in tcp://host:8786, to use instead.")  # fmt: skip
-@click.option("--scheduler-file", type=DECK_PATH, metavar="FILE",
-              help="File of `dask scheduler --scheduler-file` instead of its address.")  # fmt: skip
-@click.option("--allow-failed", is_flag=True, help="Exit with 0 even if cases failed.")
-@click.option("--overwrite", is_flag=True, help="Replace existing results.")
+@option("--vary", "varied", type=Parsed(inputs.parse_vary, "NAME=VALUES"), multiple=True,
+        help="FROM:TO:N or A,B,C; may be repeated, for a full grid.  Names: "
+             f"{', '.join(inputs.NAMES)}.")  # fmt: skip
+@option("--cases", "table", type=DECK_PATH, metavar="CASES.csv",
+        help="A table instead of --vary: a header of names, one row per case.")  # fmt: skip
+@option("--refine", "factors", type=list_of("FACTOR,...", click.IntRange(1, 8)), metavar="1,2,4",
+        help="Instead: divide the sides of all elements and DT by factors; order and limit of "
+             "every quantity.")  # fmt: skip
+@option("--random", "laws", type=Parsed(inputs.parse_random, "NAME=LAW"), multiple=True,
+        help="Random value: normal:MEAN,SD, lognormal:MEDIAN,SIGMA, uniform:A,B or "
+             "triangular:A,MODE,B; may be repeated, together with --vary.")  # fmt: skip
+@option("--samples", type=int, metavar="N", help="Number of samples of --random.")
+@option("--seed", type=int, metavar="S", help="Seed of --random.  [default: 0]")
+@option("--design", "kind", type=click.Choice(inputs.DESIGNS),
+        help="Design of --random: Latin hypercube, Sobol' sequence, or independent draws (Monte "
+             "Carlo).  [default: lhs]")  # fmt: skip
+@option("--sensitivity", is_flag=True,
+        help="Sobol' indices of the random values, from N times (their number + 2) "
+             "cases.")  # fmt: skip
+@option("--exceed", "limits", type=Parsed(inputs.parse_exceed, "QUANTITY=VALUE"), multiple=True,
+        help="Probability that a quantity of the summary exceeds a value; of peak_force also "
+             "threshold, that of DELA.  May be repeated.")  # fmt: skip
+@option("--find", type=click.Choice(["velocity"]),
+        help="Search in every case for the velocity at which --until holds.")  # fmt: skip
+@option("--until", type=Parsed(inputs.parse_until, "peak_force=VALUE"),
+        help="Peak force to reach: a number, or threshold, that of DELA.")  # fmt: skip
+@option("-o", "--output", type=FILE_PATH, metavar="SWEEP.h5",
+        help="Result file.  [default: the deck's name with -sweep.h5, in this folder]")  # fmt: skip
+@option("--history", is_flag=True, help="Also store the contact force of every step.")
+@option("--measure", "extra", type=list_of("NAME,...", click.Choice(plans.MEASURES)), default=(),
+        help=f"Also store {', '.join(plans.MEASURES)}: the largest deflection, strains of gages "
+             "(GAGE), exposures (FAIL).")  # fmt: skip
+@option("--full", type=list_of("CASE,...", click.IntRange(min=0)),
+        help="Also run these cases in full, into SWEEP-CASE.h5; cases count from 0.")  # fmt: skip
+@option("--workers", type=click.IntRange(1, 1024), default=1, show_default=True, metavar="N",
+        help="Worker processes on this machine.")  # fmt: skip
+@option("--scheduler", metavar="ADDRESS",
+        help="Running Dask scheduler, as in tcp://host:8786, to use instead.")  # fmt: skip
+@option("--scheduler-file", type=DECK_PATH, metavar="FILE",
+        help="File of `dask scheduler --scheduler-file` instead of its address.")  # fmt: skip
+@option("--allow-failed", is_flag=True, help="Exit with 0 even if cases failed.")
+@option("--overwrite", is_flag=True, help="Replace existing results.")
 def sweep(
-    deck: Path,
-    varied: tuple[tuple[str, list[Value]], ...],
-    table: Path | None,
-    factors: tuple[int, ...] | None,
-    laws: tuple[tuple[str, inputs.Law], ...],
-    samples: int | None,
-    seed: int | None,
-    kind: inputs.DesignKind | None,
-    sensitivity: bool,
-    limits: tuple[Limit, ...],
-    find: str | None,
-    until: float | str | None,
-    output: Path | None,
-    history: bool,
-    extra: tuple[str, ...],
-    full: tuple[int, ...] | None,
-    workers: int,
-    scheduler: str | None,
-    scheduler_file: Path | None,
-    allow_failed: bool,
+    deck: Path, varied: tuple[tuple[str, list[inputs.Value]], ...], table: Path | None,
+    factors: tuple[int, ...] | None, laws: tuple[tuple[str, inputs.Law], ...],
+    samples: int | None, seed: int | None, kind: inputs.DesignKind | None, sensitivity: bool,
+    limits: tuple[inputs.Limit, ...], find: str | None, until: float | str | None,
+    output: Path | None, history: bool, extra: tuple[str, ...], full: tuple[int, ...] | None,
+    workers: int, scheduler: str | None, scheduler_file: Path | None, allow_failed: bool,
     overwrite: bool,
-) -> None:
+) -> None:  # fmt: skip
     """Run DECK many times with varied parameters.
 
     Cases that differ only in the projectile, its velocity or the indentation law share one run of
@@ -116,12 +95,12 @@ def sweep(
     if laws and table is not None:
         raise click.UsageError("--random goes with --vary, not with --cases")
     asked = {"--samples": samples, "--seed": seed, "--design": kind, "--exceed": limits}
-    for option, value in {**asked, "--sensitivity": sensitivity}.items():
+    for name, value in {**asked, "--sensitivity": sensitivity}.items():
         if not laws and value not in (None, (), False):
-            raise click.UsageError(f"{option} needs --random NAME=LAW")
+            raise click.UsageError(f"{name} needs --random NAME=LAW")
     if laws and samples is None:
         raise click.UsageError("--random needs --samples N")
-    if len({name for name, _ in laws}) < len(laws):
+    if len(dict(laws)) < len(laws):
         raise click.UsageError("--random: a name is given twice")
     if (find is None) != (until is None):
         raise click.UsageError("--find velocity and --until peak_force=VALUE belong together")
@@ -129,7 +108,12 @@ def sweep(
         raise click.UsageError("give only one of --workers, --scheduler and --scheduler-file")
     if full and find:
         raise click.UsageError("--full runs given velocities: --vary velocity=FOUND --full 0")
-    problem = _problem(deck)
+    try:
+        problem = problem_of(deck)
+    except DeckError as error:
+        echo(error, err=True)
+        errors = [finding for finding in error.findings if finding.severity == "error"]
+        raise RefusedError(f"{count_findings(errors)}; nothing was run") from None
     cases = inputs.grid(varied) if table is None else inputs.read_cases(table)
     if factors:
         cases, extra = refined_cases(problem, factors), (plans.DEFLECTION,)
@@ -151,9 +135,8 @@ def sweep(
     check_draws(planned)
     if design is not None:
         shared = plans.shares_plate(problem) and not planned.alone
-        for text in (inputs.doubt(design), inputs.cost(cases, design, shared=shared)):
-            if text:
-                note(text)
+        cost = inputs.cost(cases, design, shared=shared)
+        note(*filter(None, (inputs.doubt(design), cost)))
     plans.check_memory(problem, planned, 0 if scheduler is not None else workers, streamed=True)
     if count := plans.freed(plans.tasks(problem, planned)):
         note(
@@ -175,21 +158,10 @@ def sweep(
         echo(f"  {line}".rstrip())
     echo(f"  result            {path}")
     _run_in_full(planned, fulls, overwrite=overwrite)
-    for text in () if result.random is None else result.random.notes:
-        note(text)
+    note(*(() if result.random is None else result.random.notes))
     echo(verdict(result))
     if not (allow_failed or result.fine.all()):
         raise SystemExit(NO)
-
-
-def _problem(deck: Path) -> Problem:
-
-    try:
-        return problem_of(deck)
-    except DeckError as error:
-        echo(error, err=True)
-        errors = [finding for finding in error.findings if finding.severity == "error"]
-        raise RefusedError(f"{count_findings(errors)}; nothing was run") from None
 
 
 def _carry_out(
@@ -232,10 +204,10 @@ def _run_in_full(planned: plans.Plan, fulls: dict[int, Path], *, overwrite: bool
         try:
             prepared = load_deck(deck_of(planned, case))
             if errors := prepared.errors(force=True):
-                raise CasesError(errors[0].message)
+                raise inputs.CasesError(errors[0].message)
             with hdf5_writer.writing(path, overwrite=overwrite) as sink:
                 simulate(prepared.problems[0], sink)
-        except (CasesError, ArithmeticError) as error:
+        except (inputs.CasesError, ArithmeticError) as error:
             note(f"case {case} was not run in full: {error}")
             continue
         echo(f"  case {case:<12} {path}")

@@ -1,4 +1,4 @@
-"""Numbers and lists among the options of commands."""
+"""Numbers, lists and files among the options of commands."""
 
 from __future__ import annotations
 
@@ -12,13 +12,17 @@ import click
 
 Decorated = Callable[..., None]
 
+MOST = 1_000_000  # bytes of a file whose contents are the value of an option
+
+option = click.option
+
 
 def stacked(*options: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
     """Add several options to a command, in this order on its help page."""
 
     def decorate(function: Decorated) -> Decorated:
-        for option in reversed(options):
-            function = option(function)
+        for one in reversed(options):
+            function = one(function)
         return function
 
     return decorate
@@ -29,9 +33,7 @@ class Finite(click.FloatRange):
 
     name = "number"
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
+    def convert(self, value: Any, param: Any, ctx: Any) -> float:
         """Read a number."""
         number = float(super().convert(value, param, ctx))
         if not math.isfinite(number):
@@ -47,46 +49,22 @@ POSITIVE = Finite(min=0.0, min_open=True)
 NOT_NEGATIVE = Finite(min=0.0)
 
 
-class ListOf(click.ParamType):  # type: ignore[type-arg]
-    """A tuple of values of a type, in any number but 0 or in one of the admissible `counts`.
-
-    The form, as in ``X,Y``, is for messages; the separator is a regular expression.
-    """
-
-    name = "list"
-
-    def __init__(
-        self, form: str, item: Any, counts: Sequence[int] = (), separator: str = ","
-    ) -> None:
-        self._form = form
-        self._item = item
-        self._counts = counts
-        self._separator = separator
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[Any, ...]:
-        """Read the values."""
-        if isinstance(value, tuple):
-            return value
-        parts = [part.strip() for part in re.split(self._separator, value)]
-        if not all(parts) or (self._counts and len(parts) not in self._counts):
-            self.fail(f"{value!r} is not of the form {self._form}.", param, ctx)
-        try:
-            return tuple(self._item(part, param, ctx) for part in parts)
-        except click.BadParameter as error:
-            self.fail(f"{value!r} is not of the form {self._form}: {error.message}", param, ctx)
-
-
 class Parsed(click.ParamType):  # type: ignore[type-arg]
-    """Result of a function of the text, whose ValueError is the message of the option."""
+    """Result of a function of the text, whose ValueError is the message of the option.
+
+    The form, as in ``X,Y``, is for help pages.
+    """
 
     name = "text"
 
-    def __init__(self, function: Callable[[str], Any]) -> None:
-        self._function = function
+    def __init__(self, function: Callable[[Any], Any], form: str) -> None:
+        self._function, self._form = function, form
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+    def get_metavar(self, *_: Any, **__: Any) -> str:
+        """Form of the value."""
+        return self._form
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
         """Read the text."""
         try:
             return self._function(value)
@@ -94,7 +72,24 @@ class Parsed(click.ParamType):  # type: ignore[type-arg]
             self.fail(str(error), param, ctx)
 
 
-MOST = 1_000_000  # bytes of a file whose contents are the value of an option
+def list_of(form: str, item: Any, counts: Sequence[int] = (), separator: str = ",") -> Parsed:
+    """Type of a tuple of values of a type, in any number but 0 or in one of the `counts`.
+
+    The separator is a regular expression.
+    """
+
+    def read(text: Any) -> tuple[Any, ...]:
+        if isinstance(text, tuple):
+            return text
+        parts = [part.strip() for part in re.split(separator, text)]
+        if not all(parts) or (counts and len(parts) not in counts):
+            raise ValueError(f"{text!r} is not of the form {form}.")
+        try:
+            return tuple(map(item, parts))
+        except click.BadParameter as error:
+            raise ValueError(f"{text!r} is not of the form {form}: {error.message}") from None
+
+    return Parsed(read, form)
 
 
 def file_of(parse: Callable[[str], Any]) -> Parsed:
@@ -109,7 +104,7 @@ def file_of(parse: Callable[[str], Any]) -> Parsed:
         except (ValueError, RecursionError) as error:
             raise ValueError(f"{path}: {error}") from None
 
-    return Parsed(read)
+    return Parsed(read, "FILE.toml")
 
 
 def assignment(text: str) -> tuple[str, str]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from itertools import chain, tee
 
 import click
 
 from fecm.cli.common import FORMAT_OPTION, CheckFailedError, RefusedError
-from fecm.verification import Case, Row, carry_out, chosen
+from fecm.verification import carry_out, chosen
 from fecm.verification.case import fields, page, table
 
 
@@ -25,46 +25,29 @@ def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: str) -> 
     if markdown and (listing or form == "json"):
         raise RefusedError("--markdown goes with neither --list nor --format json")
     wanted = chosen(cases)
-    if listing:
-        _name(wanted, form)
+    if listing and form == "json":
+        listed = [{"case": c.name, "title": c.title, "rows": len(c.checks)} for c in wanted]
+        click.echo(json.dumps({"cases": listed}, ensure_ascii=False))
         return
-    rows = _printed(wanted, form, markdown)
-    bad = sum(not row.within for row in rows)
-    count = f"{len(rows)} row{'s' * (len(rows) != 1)}"
+    if listing:
+        width = max(len(one.name) for one in wanted)
+        for one in wanted:
+            click.echo(f"{one.name.ljust(width)}  {one.title}")
+        return
+    rows, kept = tee(chain.from_iterable(map(carry_out, wanted)))
+    if markdown:
+        click.echo(page(rows), nl=False)
+    elif form == "json":
+        found = list(rows)
+        values = [fields(row) for row in found]
+        told = {"ok": all(row.within for row in found), "rows": values}
+        click.echo(json.dumps(told, ensure_ascii=False, allow_nan=False))
+    else:
+        for line in table(wanted, rows):  # the table grows while the rows are computed
+            click.echo(line)
+    fine = [row.within for row in kept]
+    bad, count = fine.count(False), f"{len(fine)} row{'s' * (len(fine) != 1)}"
     if bad:
         raise CheckFailedError(f"{bad} of {count} {'is' if bad == 1 else 'are'} beyond tolerance")
     if form == "text" and not markdown:
         click.echo(f"{count}, all within tolerance")
-
-
-def _name(cases: Sequence[Case], form: str) -> None:
-    """List the cases."""
-    if form == "json":
-        listed = [{"case": c.name, "title": c.title, "rows": len(c.checks)} for c in cases]
-        click.echo(json.dumps({"cases": listed}, ensure_ascii=False))
-        return
-    width = max(len(one.name) for one in cases)
-    for one in cases:
-        click.echo(f"{one.name.ljust(width)}  {one.title}")
-
-
-def _printed(cases: Sequence[Case], form: str, markdown: bool) -> list[Row]:
-    """Compute cases and print their rows; a table grows while they are computed."""
-    found: list[Row] = []
-
-    def rows() -> Iterator[Row]:
-        for one in cases:
-            for row in carry_out(one):
-                found.append(row)
-                yield row
-
-    if markdown:
-        click.echo(page(rows()), nl=False)
-    elif form == "json":
-        values = [fields(row) for row in rows()]
-        fine = all(row.within for row in found)
-        click.echo(json.dumps({"ok": fine, "rows": values}, ensure_ascii=False, allow_nan=False))
-    else:
-        for line in table(cases, rows()):
-            click.echo(line)
-    return found

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -16,16 +15,13 @@ from fecm.cli.common import DECK_PATH, RefusedError, note
 from fecm.cli.decks import load_valid
 from fecm.cli.laminate_options import laminate_of_options, laminate_options
 from fecm.cli.outputs import OutputPaths, outputs
-from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, ListOf, Parsed, stacked
+from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, Parsed, list_of, option, stacked
 from fecm.deck.units import unit_names
 from fecm.problem.build import laminate_of_deck
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces
 from fecm.studies.waves import dispersion as compute
 
 MOST = 1_000_000  # rows of a table; more are certainly a typo
-
-
-# Options -----------------------------------------------------------------------------------------
 
 
 def _wavelengths(text: str) -> tuple[float, ...]:
@@ -42,13 +38,10 @@ def _wavelengths(text: str) -> tuple[float, ...]:
         raise ValueError(f"{text}: FROM = TO is required for N = 1, and excluded for more")
     if count > MOST // 5:
         raise ValueError(f"{text}: at most {MOST // 5} wavelengths are allowed")
-    step = (last - first) / max(1, count - 1)
-    return (*(first + n * step for n in range(count - 1)), last)
+    return tuple(np.linspace(first, last, count).tolist())
 
 
-def _joined(
-    context: click.Context, option: click.Parameter, lists: tuple[tuple[Any, ...], ...]
-) -> tuple[Any, ...]:
+def _joined(_: Any, __: Any, lists: tuple[tuple[Any, ...], ...]) -> tuple[Any, ...]:
     """Callback of a repeated option of lists: join them, without repeated values."""
     return tuple(dict.fromkeys(chain(*lists)))
 
@@ -57,28 +50,22 @@ class _ListCommand(click.Command):
     """A command whose repeated options also take several values: ``--time 2e-6 4e-6``."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Repeat the options before click reads them."""
+        """Put the option before every further number that follows one of these options."""
         options = [param for param in self.params if isinstance(param, click.Option)]
-        names = {name for option in options if option.multiple for name in option.opts}
-        return super().parse_args(ctx, _repeat_options(args, names))
-
-
-def _repeat_options(args: Sequence[str], names: set[str]) -> list[str]:
-    """Put the option before every further number that follows one of the named options."""
-    repeated: list[str] = []
-    option, waits = "", False
-    for place, argument in enumerate(args):
-        if argument == "--":
-            return [*repeated, *args[place:]]
-        if option and not waits and _is_number(argument):
-            repeated.append(option)
-        elif waits:
-            waits = False
-        else:
-            name = argument.partition("=")[0]
-            option, waits = (name, argument == name) if name in names else ("", False)
-        repeated.append(argument)
-    return repeated
+        names = {name for one in options if one.multiple for name in one.opts}
+        end = args.index("--") if "--" in args else len(args)
+        repeated: list[str] = []
+        last, waits = "", False
+        for argument in args[:end]:
+            if last and not waits and _is_number(argument):
+                repeated.append(last)
+            elif waits:
+                waits = False
+            else:
+                name = argument.partition("=")[0]
+                last, waits = (name, argument == name) if name in names else ("", False)
+            repeated.append(argument)
+        return super().parse_args(ctx, repeated + args[end:])
 
 
 def _is_number(text: str) -> bool:
@@ -94,14 +81,14 @@ def _is_number(text: str) -> bool:
 _SHARED = stacked(
     click.argument("deck", type=DECK_PATH, required=False),
     laminate_options(required=False),
-    click.option("--shear-factor", type=POSITIVE, default=1.0, metavar="F", show_default=True,
-                 help="Factor of the transverse shear stiffness, in addition to a deck's SHEA; "
-                      "with pi^2/12 = 0.822467 the cut-off frequencies are exact."),
+    option("--shear-factor", type=POSITIVE, default=1.0, metavar="F", show_default=True,
+           help="Factor of the transverse shear stiffness, in addition to a deck's SHEA; with "
+                "pi^2/12 = 0.822467 the cut-off frequencies are exact."),
     outputs("deck"),
 )  # fmt: skip
 
-STEP = click.option("--step", type=POSITIVE, default=5.0, show_default=True, metavar="DEG",
-                    help="Angle between two normals, degrees.")  # fmt: skip
+STEP = option("--step", type=POSITIVE, default=5.0, show_default=True, metavar="DEG",
+              help="Angle between two normals, degrees.")  # fmt: skip
 
 
 def _medium(
@@ -116,9 +103,9 @@ def _medium(
     else:
         for name, value in options.items():
             if value is not None:
-                option = name.replace("_", "-")
-                raise click.UsageError(f"--{option} describes a laminate; {deck} has one already")
-        problems = load_valid(deck, "; no waves were computed", warnings=False).problems
+                given = name.replace("_", "-")
+                raise click.UsageError(f"--{given} describes a laminate; {deck} has one already")
+        problems = load_valid(deck, "; no waves were computed", warnings=False)
         if len(problems) > 1:
             note(f"{deck} has {len(problems)} problems; the laminate of the first is used")
         laminate, units = laminate_of_deck(problems[0].deck), unit_names(problems[0].deck)
@@ -131,21 +118,18 @@ def _normals(step: float) -> list[float]:
     return [n * step for n in range(count)] + [min(360.0, count * step)]
 
 
-# Commands ----------------------------------------------------------------------------------------
-
-
 @click.group()
 def waves() -> None:
     """Waves in the laminate of a DECK, or of a layup: the report's chapter 2, for any laminate."""
 
 
 @waves.command(cls=_ListCommand)
-@click.option("--angle", "angles", type=ListOf("A,B,...", Finite()), multiple=True,
-              callback=_joined, default=("0", "45", "90"), show_default=True, metavar="A ...",
-              help="Directions of propagation, degrees; one or several.")  # fmt: skip
-@click.option("--wavelengths", type=Parsed(_wavelengths), default="0.1:20:200",
-              show_default=True, metavar="FROM:TO:N",
-              help="N wavelengths at equal distances, in thicknesses.")  # fmt: skip
+@option("--angle", "angles", type=list_of("A,B,...", Finite()), multiple=True, callback=_joined,
+        default=("0", "45", "90"), show_default=True, metavar="A ...",
+        help="Directions of propagation, degrees; one or several.")  # fmt: skip
+@option("--wavelengths", type=Parsed(_wavelengths, "FROM:TO:N"), default="0.1:20:200",
+        show_default=True,
+        help="N wavelengths at equal distances, in thicknesses.")  # fmt: skip
 @_SHARED
 def dispersion(
     angles: tuple[float, ...], wavelengths: tuple[float, ...], targets: OutputPaths, **shared: Any
@@ -183,12 +167,11 @@ def speeds(step: float, targets: OutputPaths, **shared: Any) -> None:
 
 
 @waves.command(cls=_ListCommand)
-@click.option("--time", "times", type=ListOf("T,T,...", NOT_NEGATIVE), multiple=True,
-              callback=_joined, required=True, metavar="T ...",
-              help="Times; one or several.")  # fmt: skip
-@click.option("--radius", type=NOT_NEGATIVE, metavar="R",
-              help="Radius of the circular fronts at time 0.  [default: the thickness]",
-              )  # fmt: skip
+@option("--time", "times", type=list_of("T,T,...", NOT_NEGATIVE), multiple=True, callback=_joined,
+        required=True, metavar="T ...",
+        help="Times; one or several.")  # fmt: skip
+@option("--radius", type=NOT_NEGATIVE, metavar="R",
+        help="Radius of the circular fronts at time 0.  [default: the thickness]")  # fmt: skip
 @STEP
 @_SHARED
 def fronts(
