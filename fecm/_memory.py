@@ -38,8 +38,7 @@ def require(count: int, what: str) -> None:
 def check(what: str, needed: Callable[[bool], int], remedy: Callable[[int], str]) -> None:
     """Refuse a computation that needs more memory than is free.
 
-    `needed` returns the bytes: a quick bound for False, the best estimate for True; `remedy` advice
-    for a number of free bytes.
+    `needed` gives the bytes: a quick bound for False, the best estimate for True; `remedy` advice.
     """
     free = available()
     if free is not None and needed(False) > free and (count := needed(True)) > free:

@@ -87,8 +87,7 @@ def impact(
         Impact point; the middle of the plate by default.  The nearest node is hit; on an imported
         mesh a patch is centred at the point itself.
     duration : float
-        Simulated time; with a fixture by default 1.25 times half a period of the projectile on the
-        plate.
+        Simulated time; with a fixture by default 1.25 half periods of the projectile on the plate.
     dt : float, optional
         Time step; 0.9 of the critical one by default.
     every : int, optional

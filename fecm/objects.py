@@ -155,8 +155,7 @@ class Plate:
         grading : float
             Largest over smallest element; the smallest is at the impact point.
         columns, rows : str
-            Elements along x and y one by one, as in ``"3*0.5,8*0.375,3*0.5"``, instead of `size`
-            and `mesh`.
+            Elements along x and y one by one, as in ``"3*0.5,8*0.375"``, instead of `size`, `mesh`.
 
         Raises
         ------

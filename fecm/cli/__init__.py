@@ -116,7 +116,13 @@ def _status(arguments: Sequence[str] | None, prog_name: str) -> int:
     except SystemExit as left:
         return left.code if isinstance(left.code, int) else 0
     except click.ClickException as error:
-        echo(_refusal(error), err=True)
+        context = error.ctx if isinstance(error, click.UsageError) else None
+        if context is not None and error.message == context.get_help():
+            echo(error.message, err=True)  # the name of a command is missing
+        else:
+            line = " ".join(error.format_message().split()).rstrip(".")
+            see = "" if context is None else f"; see {context.command_path} --help"
+            echo(f"fecm: error: {line}{see}", err=True)
         return error.exit_code
     except (KeyboardInterrupt, click.Abort):
         echo("fecm: interrupted", err=True)
@@ -133,16 +139,6 @@ def _report(error: Exception) -> int:
     if error is not common.output_error():
         echo(f"fecm: error: {_message(error)}", err=True)
     return error.exit_code if isinstance(error, FecmError) else UNUSABLE
-
-
-def _refusal(error: click.ClickException) -> str:
-    """One line about a wrong call; the help page if the name of a command is missing."""
-    context = error.ctx if isinstance(error, click.UsageError) else None
-    if context is not None and error.message == context.get_help():
-        return error.message
-    line = " ".join(error.format_message().split()).rstrip(".")
-    see = "" if context is None else f"; see {context.command_path} --help"
-    return f"fecm: error: {line}{see}"
 
 
 def _message(error: Exception) -> str:

@@ -27,9 +27,7 @@ from fecm.results.schema import jsonable, printable
 NO, UNUSABLE, INTERRUPTED = 1, 2, 130
 
 # Signals that end a run in good order; Windows has no SIGHUP.
-SIGNALS = tuple(
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
-)
+SIGNALS = tuple(n for n in signal.Signals if n.name in ("SIGINT", "SIGTERM", "SIGHUP"))
 SIGNALLED = tuple(128 + number for number in SIGNALS)  # exit status after each of them
 
 STANDARD_OUTPUT = Path("-")
@@ -165,10 +163,10 @@ def standard_error(number: int, like: TextIO | None) -> TextIO:
 
 def _is_own(stream: TextIO | None, number: int) -> bool:
     """Whether a stream is the process's own, or was closed before the process began."""
+    if stream is None:
+        return True
     try:
-        return stream is None or (
-            isinstance(stream, io.TextIOWrapper) and stream.fileno() == number
-        )
+        return isinstance(stream, io.TextIOWrapper) and stream.fileno() == number
     except (OSError, ValueError):
         return False
 
@@ -192,8 +190,7 @@ class Signals:
     """Ends the program at SIGINT, SIGTERM and SIGHUP.
 
     A run looks for a signal between two macros and ends in good order; an exception that a handler
-    raised in the middle of it could be lost in a finaliser.  A second signal ends the program at
-    once.
+    raised in the middle of it could be lost in a finaliser.  A second signal ends it at once.
     """
 
     received = 0  # number of the signal that came

@@ -139,9 +139,8 @@ def reads(*names: str) -> Callable[[Command], Command]:
 def _size(path: Path) -> int:
     """Bytes of a file or of a folder's files; 0 if it can't be read, which is reported later."""
     try:
-        if path.is_dir():
-            return sum(member.stat().st_size for member in path.iterdir())
-        return path.stat().st_size
+        files = path.iterdir() if path.is_dir() else [path]
+        return sum(file.stat().st_size for file in files)
     except OSError:
         return 0
 

@@ -217,8 +217,7 @@ def _observers(
 ) -> tuple[Callable[[Simulation], None], Callable[[Simulation], None]]:
     """Functions that are called after a step and after a macro.
 
-    They show the progress, write a checkpoint when `every` seconds have passed since the last one,
-    and stop the run after a signal.
+    They show the progress, write a checkpoint every so many seconds, and heed signals.
     """
     shown = 0
 

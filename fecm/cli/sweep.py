@@ -165,12 +165,9 @@ def sweep(
 
 
 def _carry_out(
-    problem: Problem,
-    planned: plans.Plan,
-    parts: PartialResults,
-    workers: int,
+    problem: Problem, planned: plans.Plan, parts: PartialResults, workers: int,
     scheduler: str | None,
-) -> SweepResult:
+) -> SweepResult:  # fmt: skip
     """Run the plan with a progress bar; finished cases survive any interruption."""
     begin, finished = time.monotonic(), 0
 
