@@ -30,7 +30,7 @@ NO, UNUSABLE, INTERRUPTED = 1, 2, 130
 SIGNALS = tuple(n for n in signal.Signals if n.name in ("SIGINT", "SIGTERM", "SIGHUP"))
 SIGNALLED = tuple(128 + number for number in SIGNALS)  # exit status after each of them
 
-STANDARD_OUTPUT = Path("-")
+DASH = Path("-")  # standard input or output
 DECK_PATH = click.Path(exists=True, dir_okay=False, path_type=Path)
 FILE_PATH = click.Path(path_type=Path, allow_dash=True)
 
@@ -103,7 +103,7 @@ def writing(path: Path, *, overwrite: bool) -> Iterator[TextIO]:
 
 def write_text(path: Path, text: str, *, overwrite: bool) -> None:
     """Write a complete text file, or print it, on a terminal with control characters escaped."""
-    if path != STANDARD_OUTPUT:
+    if path != DASH:
         with writing(path, overwrite=overwrite) as file:
             file.write(text)
     elif sys.stdout.isatty():

@@ -18,7 +18,7 @@ from fecm._files import check_outputs
 from fecm._version import __version__
 from fecm.api import LoadedDeck, load_deck
 from fecm.cli import common
-from fecm.cli.common import FILE_PATH, CheckFailedError, RefusedError, echo, echo_json
+from fecm.cli.common import DASH, FILE_PATH, CheckFailedError, RefusedError, echo, echo_json
 from fecm.cli.types import option
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.format import format_deck
@@ -69,7 +69,7 @@ DECKS = click.argument("decks", nargs=-1, required=True, metavar="DECK...", type
 def _input(deck: Path) -> Path | BinaryIO:
     """What to read: a file, or standard input for ``-``."""
     piped = getattr(sys.stdin, "buffer", None) or io.BytesIO()
-    return piped if deck == common.STANDARD_OUTPUT else deck
+    return piped if deck == DASH else deck
 
 
 def _failures(decks: Sequence[Path], work: Callable[[Path], None]) -> list[Exception]:
@@ -235,7 +235,7 @@ def fmt(decks: tuple[Path, ...], output: Path | None, only_check: bool, overwrit
     def one(deck: Path) -> None:
         in_place = output is None or (output.exists() and deck.exists() and output.samefile(deck))
         target = deck if output is None or in_place else output
-        if not only_check and target != common.STANDARD_OUTPUT:
+        if not only_check and target != DASH:
             check_outputs([target], overwrite or in_place, [] if in_place else [deck])
         before, source = load_text(_input(deck))
         try:
@@ -247,7 +247,7 @@ def fmt(decks: tuple[Path, ...], output: Path | None, only_check: bool, overwrit
         if only_check:
             if after != before:
                 raise CheckFailedError(f"{source} would change")
-        elif after != before or not in_place or target == common.STANDARD_OUTPUT:
+        elif after != before or not in_place or target == DASH:
             common.write_text(target, after, overwrite=overwrite or in_place)
 
     if failed := _failures(decks, one):

@@ -8,7 +8,7 @@ import click
 
 from fecm import examples
 from fecm._files import check_outputs
-from fecm.cli.common import FILE_PATH, STANDARD_OUTPUT, echo, write_text
+from fecm.cli.common import DASH, FILE_PATH, echo, write_text
 
 
 @click.command(short_help="List the example decks and tables, or write one.")
@@ -29,8 +29,8 @@ def example(name: str | None, output: Path | None, overwrite: bool) -> None:
     except ValueError as error:
         raise click.UsageError(str(error)) from None
     target = output or Path(source.name)
-    if target != STANDARD_OUTPUT:
+    if target != DASH:
         check_outputs([target], overwrite, [source])
     write_text(target, source.read_text(encoding="utf-8"), overwrite=overwrite)
-    if target != STANDARD_OUTPUT:
+    if target != DASH:
         echo(target)

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from fecm._files import check_outputs
-from fecm.cli.common import DECK_PATH, FILE_PATH, STANDARD_OUTPUT, RefusedError, echo, note
+from fecm.cli.common import DASH, DECK_PATH, FILE_PATH, RefusedError, echo, note
 from fecm.cli.isolation import reads
 from fecm.cli.outputs import write_lines
 from fecm.results import csv
@@ -58,7 +58,7 @@ def export(
     """
     if target == "vtkhdf" and dataset is not None:
         raise click.UsageError("--dataset is for --to csv; vtkhdf holds all fields")
-    if target == "vtkhdf" and output == STANDARD_OUTPUT:
+    if target == "vtkhdf" and output == DASH:
         raise click.UsageError("vtkhdf can't go to standard output")
 
     contents = read(result, FORMAT, SWEEP)
@@ -66,7 +66,7 @@ def export(
     name = (dataset or ("cases" if is_sweep else "history")).strip("/")
     ending = ".vtkhdf" if target == "vtkhdf" else f"-{name.replace('/', '-')}.csv"
     path = output or Path(f"{result.stem}{ending}")
-    if path != STANDARD_OUTPUT:
+    if path != DASH:
         check_outputs([path], overwrite, [result])
     try:
         if target == "csv" and is_sweep:
@@ -82,5 +82,5 @@ def export(
             write_vtkhdf(result_of(contents), path, note, overwrite=overwrite)
     except ExportError as error:
         raise RefusedError(f"{result}: {error}") from None
-    if path != STANDARD_OUTPUT:
+    if path != DASH:
         echo(path)

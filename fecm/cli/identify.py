@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from fecm.cli.common import DECK_PATH, FILE_PATH, FORMAT_OPTION, NO, echo, echo_json, note
+from fecm.cli.common import DASH, DECK_PATH, FILE_PATH, FORMAT_OPTION, NO, echo, echo_json, note
 from fecm.cli.decks import load_single
 from fecm.cli.outputs import OutputPaths, write_lines
 from fecm.cli.rod import FILTER_HELP
@@ -42,7 +42,7 @@ def identify(
     unless delay is fitted.  The deck's values are the start of the fit.  The exit status is 1 if
     the measurement does not determine the parameters, or the fit does not converge.
     """
-    targets = OutputPaths(output or Path("-"), picture, overwrite, deck, measured)
+    targets = OutputPaths(output or DASH, picture, overwrite, deck, measured)
     problem = load_single(deck, "identify")
     units = unit_names(problem.deck)
     found = fit(problem.deck, measurement_of(measured, units), free, sensor)

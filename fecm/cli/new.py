@@ -13,7 +13,7 @@ from click.core import ParameterSource
 from fecm._files import check_outputs
 from fecm.api import load_deck
 from fecm.authoring import AUTO, FULL, MITC, Authored, author
-from fecm.cli.common import FILE_PATH, STANDARD_OUTPUT, RefusedError, echo, note, write_text
+from fecm.cli.common import DASH, FILE_PATH, RefusedError, echo, note, write_text
 from fecm.cli.laminate_options import PLIES, laminate_options, one_ply
 from fecm.cli.types import POSITIVE, Finite, Parsed, assignment, list_of, option
 from fecm.deck.catalogue import CONTACTS, MATERIALS, STRENGTHS, NamedContact, NamedPly
@@ -128,7 +128,7 @@ def new(output: Path, overwrite: bool, **options: Any) -> None:
 
     DECK is the file to write; - is standard output.
     """
-    to_file = output != STANDARD_OUTPUT
+    to_file = output != DASH
     if to_file:
         check_outputs([output], overwrite)
     source = click.get_current_context().get_parameter_source

@@ -12,12 +12,12 @@ from typing import Any
 import click
 
 from fecm._files import check_outputs
-from fecm.cli.common import FILE_PATH, STANDARD_OUTPUT, RefusedError, note, writing
+from fecm.cli.common import DASH, FILE_PATH, RefusedError, note, writing
 from fecm.cli.types import Decorated, stacked
 from fecm.plot.kinds import SUFFIXES
 from fecm.plot.pictures import imported, require_matplotlib, save
 
-_OUTPUT = click.option("-o", "--output", type=FILE_PATH, metavar="FILE", default=STANDARD_OUTPUT,
+_OUTPUT = click.option("-o", "--output", type=FILE_PATH, metavar="FILE", default=DASH,
                        help="CSV file to write.  [default: standard output]")  # fmt: skip
 _PLOT = click.option("--plot", "picture", type=FILE_PATH, metavar="FILE",
                      help="Also draw a picture: .png, .svg or .pdf.")  # fmt: skip
@@ -33,7 +33,7 @@ def outputs(source: str = "", *, table: bool = True) -> Callable[[Decorated], De
     def decorate(function: Decorated) -> Decorated:
         @functools.wraps(function)
         def command(
-            picture: Path | None, overwrite: bool, output: Path = STANDARD_OUTPUT, **values: Any
+            picture: Path | None, overwrite: bool, output: Path = DASH, **values: Any
         ) -> None:
             function(**values, targets=OutputPaths(output, picture, overwrite, values.get(source)))
 
@@ -53,7 +53,7 @@ class OutputPaths:
                 raise RefusedError(f"{picture}: pictures are written as {', '.join(SUFFIXES)}")
             require_matplotlib()
         self.table, self.picture, self._overwrite = table, picture, overwrite
-        files = [path for path in (table, picture) if path and path != STANDARD_OUTPUT]
+        files = [path for path in (table, picture) if path and path != DASH]
         check_outputs(files, overwrite, [source for source in sources if source])
 
     def draw(self, place: str, *data: Any) -> None:
@@ -66,13 +66,13 @@ class OutputPaths:
         """Write the table as CSV."""
         lines = (",".join(map(str, row)) + "\n" for row in chain([[header]], rows))
         write_lines(lines, self.table, overwrite=self._overwrite)
-        if self.table != STANDARD_OUTPUT:
+        if self.table != DASH:
             note(f"wrote {self.table}")
 
 
 def write_lines(lines: Iterable[str], path: Path, *, overwrite: bool) -> None:
     """Write lines with line ends to a file, or to standard output."""
-    if path == STANDARD_OUTPUT:
+    if path == DASH:
         sys.stdout.writelines(lines)
         return
     with writing(path, overwrite=overwrite) as file:

@@ -10,7 +10,7 @@ from typing import Any
 import click
 import numpy as np
 
-from fecm.cli.common import DECK_PATH, FORMAT_OPTION, STANDARD_OUTPUT, RefusedError
+from fecm.cli.common import DASH, DECK_PATH, FORMAT_OPTION, RefusedError
 from fecm.cli.decks import load_valid
 from fecm.cli.outputs import OutputPaths, outputs
 from fecm.cli.types import POSITIVE, Finite, Parsed, option
@@ -119,7 +119,7 @@ def pulse(
         filtered = transducer.in_unit(units.get("time", ""))(history.time, history.forces)
     targets.draw("studies:pulse_picture", history, filtered, units)
     targets.write(*pulse_test.table(history, filtered))
-    if targets.table != STANDARD_OUTPUT:
+    if targets.table != DASH:
         _summarise(struck, history)
 
 
