@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.results.result import Result, still_in_contact
+from fecm.results.result import Result
 from fecm.results.summary import summary
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, small
@@ -31,7 +31,8 @@ def run(deck: str) -> Result:
 def test_a_contact_is_open_where_the_last_force_is_above_zero(
     force: list[float], still: bool
 ) -> None:
-    assert still_in_contact(np.array(force)) is still
+    result = Result({"history/force": np.array(force)}, {}, {})
+    assert result.still_in_contact is still
 
 
 def test_a_summary_shows_no_end_of_a_contact_that_has_none() -> None:

@@ -8,16 +8,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fecm._typing import Array
 from fecm.results import schema
 from fecm.results.plies import IN_PLANE, INTERLAMINAR
 from fecm.results.result import Result
-
-Array = NDArray[Any]
 
 CLOCK = ("step", "time", "number")  # key columns of rows: the instant, or the number of a mode
 # Axes with named positions become columns.
@@ -47,7 +44,8 @@ def lines(result: Result, name: str = "history") -> Iterator[str]:
     The first is the header.  Raises ExportError if there is no such dataset or group, or the
     group's datasets differ in shape.
     """
-    members = _members(result, name.strip("/"))
+    plain = name.strip("/")
+    members = _members(result, plain)
     group = members[0].rpartition("/")[0]
     beside = [f"{group}/{column}" for column in CLOCK]
     clock = [path for path in beside if path in result and _in_rows(path)]
@@ -56,28 +54,34 @@ def lines(result: Result, name: str = "history") -> Iterator[str]:
         clock = []
     elif clock:
         values = list(filter(_in_rows, values))  # the others do not change
-    if name.strip("/") == "tape3":
+    if plain == "tape3":
         values = ["tape3/displacement"]  # w is one of its columns
     instants = [result[path] for path in clock]
     if not values:  # only step or time
         return _lines(_names(clock), zip(*(times.tolist() for times in instants), strict=True))
     values = [path for path in values if path not in LABELS.values()] or values
     arrays = [result[path] for path in values]
-    if name.strip("/") == "plies" and len(values) > len(PLIES):
-        arrays, values = _at_faces(result), list(PLIES)
+    if plain == "plies" and len(values) > len(PLIES):
+        values = list(PLIES)
+        *in_plane, xz, yz = (result[path] for path in values)
+        # Interlaminar stresses are the same at every point of an element.
+        whole = [np.broadcast_to(t[:, :, None, :, ::2], in_plane[0].shape) for t in (xz, yz)]
+        arrays = in_plane + whole
     shape = arrays[0].shape
     if any(array.shape != shape for array in arrays):
-        choice = f"{', '.join(values[:-1])} or {values[-1]}"
-        message = f"the datasets of {name} do not fit into one table; choose {choice}"
-        raise schema.ExportError(message)
+        choice = f"choose {', '.join(values[:-1])} or {values[-1]}"
+        raise schema.ExportError(f"the datasets of {name} do not fit into one table; {choice}")
     known = schema.DATASETS[values[0]].shape if values[0] in schema.DATASETS else shape
     axes = list(zip(known, shape, strict=True))[bool(clock) :]
     columns = _names(values)
     if len(values) == 1 and axes and len(names := NAMED.get(axes[-1][0], ())) >= axes[-1][1]:
         columns = names[: axes.pop()[1]]
     keys = tuple(KEYS.get(str(size), "row") for size, _ in axes)
-    rows = _rows(arrays, instants, [_labels(result, *axis) for axis in axes])
-    return _lines((*_names(clock), *keys, *columns), rows)
+    numbers: list[Sequence[int]] = []  # along each axis: those that are stored, else from 1
+    for size, length in axes:
+        path = LABELS.get(str(size), "")
+        numbers.append(result[path].tolist() if path in result else range(1, length + 1))
+    return _lines((*_names(clock), *keys, *columns), _rows(arrays, instants, numbers))
 
 
 def _lines(header: Sequence[str], rows: Iterator[tuple[float, ...]]) -> Iterator[str]:
@@ -90,8 +94,7 @@ def _members(result: Result, name: str) -> list[str]:
     """Paths of a dataset, or of a group's datasets in the schema's order."""
     if name in result:
         return [name]
-    members = [path for path in result if path.startswith(f"{name}/")]
-    if members:
+    if members := [path for path in result if path.startswith(f"{name}/")]:
         known = list(schema.DATASETS)
         return sorted(members, key=lambda path: known.index(path) if path in known else len(known))
     group = name.partition("/")[0]
@@ -108,21 +111,6 @@ def _names(paths: Sequence[str]) -> tuple[str, ...]:
 def _in_rows(path: str) -> bool:
     """Whether the rows of a dataset in a group with step and time are instants."""
     return path not in schema.DATASETS or schema.DATASETS[path].shape[0] == "rows"
-
-
-def _at_faces(result: Result) -> list[Array]:
-    """Ply stresses at both faces; interlaminar ones are the same at every point of an element."""
-    *in_plane, tau_xz, tau_yz = (result[path] for path in PLIES)
-    shape = in_plane[0].shape
-    return [
-        *in_plane, *(np.broadcast_to(tau[:, :, None, :, ::2], shape) for tau in (tau_xz, tau_yz))
-    ]  # fmt: skip
-
-
-def _labels(result: Result, size: str | int, length: int) -> Sequence[int]:
-    """Numbers along an axis: those of gages, elements or nodes that are stored, else from 1."""
-    path = LABELS.get(str(size), "")
-    return result[path].tolist() if path in result else range(1, length + 1)
 
 
 def _rows(

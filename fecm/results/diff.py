@@ -14,22 +14,20 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecm._errors import FecmError
+from fecm._typing import Array
 from fecm.deck.records import DOF_NAMES
 from fecm.results.hdf5_reader import Contents, read
 from fecm.results.schema import CONTACT, DATASETS, FORMAT, SCALES, SWEEP, row_blocks, suggestion
 from fecm.results.tapes import CURVATURES, SHEARS, TAPES, TapeText, W, read_tapes
-
-Array = NDArray[Any]
 
 ON_TAPE = {
     W, *(f"tape8/{name}" for name in (*CURVATURES, *SHEARS["tape8"])),
@@ -41,8 +39,6 @@ LINES = (("line", 1), ("column", 1))  # those of tape3 without a known number of
 SOURCE_NAMES = {
     FORMAT: "the result of a run", SWEEP: "the result of a sweep", TAPES: "a folder of tapes"
 }  # fmt: skip
-# Names of the indices along each size of a dataset; rows are named by their step and time.
-AXES = {size: name for size, (name, _) in SCALES.items()}
 # Datasets of a resultant or strain that is zero in bending, and those of its bending counterpart.
 MEMBRANE = {"N": ("N_x", "N_y", "N_xy"), "eps": ("eps_xx", "eps_yy", "gamma_xy")}
 BENDING = {"N": ("M_x", "M_y", "M_xy"), "eps": ("kappa_x", "kappa_y", "kappa_xy")}
@@ -101,13 +97,12 @@ class Comparison:
     @property
     def comparable(self) -> bool:
         """Whether the shapes are equal, and both hold numbers or both texts."""
-        left, right = self.types
-        return self.shapes[0] == self.shapes[1] and (left == "text") == (right == "text")
+        return len(set(self.shapes)) == 1 and self.types.count("text") != 1
 
     @property
     def same(self) -> bool:
         """Whether shape, type and all values are equal."""
-        return self.comparable and self.types[0] == self.types[1] and not self.differing
+        return self.comparable and len(set(self.types)) == 1 and not self.differing
 
     @property
     def relative(self) -> float:
@@ -201,11 +196,8 @@ def _chosen(names: set[str], patterns: Sequence[str], known: Collection[str] = (
     chosen: set[str] = set()
     for asked in patterns:
         plain = asked.strip("/")
-        found = {
-            name
-            for name in names.union(known)
-            if fnmatchcase(name, plain) or name.startswith(f"{plain}/")
-        }
+        every = names.union(known)
+        found = {n for n in every if fnmatchcase(n, plain) or n.startswith(f"{plain}/")}
         if not found:
             raise IncomparableError(f"there is no `{asked}` to compare{suggestion(plain, names)}")
         chosen |= found & names
@@ -213,7 +205,7 @@ def _chosen(names: set[str], patterns: Sequence[str], known: Collection[str] = (
 
 
 def _listed(a: Source, b: Source) -> list[dict[str, Any]]:
-    """Attributes and texts that differ between two files; tapes have none."""
+    """Attributes, and first lines of texts, that differ between two files; tapes have none."""
     if isinstance(a, TapeText) or isinstance(b, TapeText):
         return []
     left, right = _attributes(a), _attributes(b)
@@ -223,8 +215,14 @@ def _listed(a: Source, b: Source) -> list[dict[str, Any]]:
         if repr(left.get(name)) != repr(right.get(name))
     ]
     for name in dict.fromkeys((*a.texts, *b.texts)):
-        if a.texts.get(name) != b.texts.get(name):
-            listed.append({"name": name, **_first_line(a.texts.get(name), b.texts.get(name))})
+        one, other = a.texts.get(name), b.texts.get(name)
+        if one is None or other is None:
+            there = {"a": one and "a text", "b": other and "a text", "line": None}
+            listed.append({"name": name, **there})
+        elif one != other:
+            pairs = itertools.zip_longest(one.split("\n"), other.split("\n"))
+            line, (x, y) = next((n, (x, y)) for n, (x, y) in enumerate(pairs, 1) if x != y)
+            listed.append({"name": name, "a": x, "b": y, "line": line})
     return listed
 
 
@@ -238,31 +236,18 @@ def _attributes(source: Contents) -> dict[str, Any]:
     }
 
 
-def _first_line(a: str | None, b: str | None) -> dict[str, Any]:
-    """First differing line of two texts, and its number."""
-    if a is None or b is None:
-        return {"a": a and "a text", "b": b and "a text", "line": None}
-    pairs = itertools.zip_longest(a.split("\n"), b.split("\n"))
-    line, (x, y) = next((n, (x, y)) for n, (x, y) in enumerate(pairs, 1) if x != y)
-    return {"a": x, "b": y, "line": line}
-
-
 def _compare(sources: tuple[Source, Source], path: str, rtol: float, atol: float) -> Comparison:
     """Compare a dataset that both sources have."""
     found = Comparison(path, sources)
-    if not found.comparable:
-        return found
-    if found.holds_texts:
+    if found.comparable and found.holds_texts:
         _compare_texts(found)
-        return found
-    index, any_infinite = _measure(found)
-    integers = all(source.dtypes[path].kind in "biu" for source in sources)
-    found.scale = _scale(found)
-    found.tolerance = 0.0 if integers else atol + rtol * found.scale
-    if index is not None:
-        found.at = _place(found, index)
-    if any_infinite or found.largest > found.tolerance:
-        _count(found)
+    elif found.comparable:
+        infinite = _measure(found)
+        integers = all(source.dtypes[path].kind in "biu" for source in sources)
+        found.scale = _scale(found)
+        found.tolerance = 0.0 if integers else atol + rtol * found.scale
+        if infinite or found.largest > found.tolerance:
+            _count(found)
     return found
 
 
@@ -270,20 +255,23 @@ def _scale(found: Comparison) -> float:
     """Scale of the differences of a dataset; by default its maximum."""
 
     def largest(path: str, low: float = -np.inf) -> float:
-        blocks = (
-            source.rows(path, *rows)
-            for source in found.sources
-            if path in source.shapes and source.dtypes[path].kind != "O"
-            for rows in row_blocks(source.shapes[path])
-        )
-        values = (block[np.isfinite(block) & (block > low)] for block in blocks)
-        return max((float(np.abs(block).max(initial=0.0)) for block in values), default=0.0)
+        size = 0.0
+        for source in found.sources:
+            if path in source.shapes and source.dtypes[path].kind != "O":
+                for rows in row_blocks(source.shapes[path]):
+                    block = source.rows(path, *rows)
+                    counted = np.abs(block[np.isfinite(block) & (block > low)])
+                    size = max(size, float(counted.max(initial=0.0)))
+        return size
 
     if found.path not in SCALE_NAMES:
         return found.maximum
     group, _, name = found.path.partition("/")
     if found.path == "energy/balance_error":
-        scale = max(map(_initial_energy, found.sources)) + largest("energy/external_work")
+        files = (source for source in found.sources if isinstance(source, Contents))
+        initial = (file.groups.get("energy", {}).get("initial") for file in files)
+        known = (abs(e) for e in initial if isinstance(e, int | float) and np.isfinite(e))
+        scale = max(known, default=0.0) + largest("energy/external_work")
     elif found.path == "plies/residual":
         scale = max(largest("plies/tau_xz"), largest("plies/tau_yz"))
     elif found.path == "laminate/B":
@@ -291,10 +279,8 @@ def _scale(found: Comparison) -> float:
         scale = (largest("laminate/A") * largest("laminate/D")) ** 0.5
     elif group == "stresses":
         kind = "N" if name in MEMBRANE["N"] else "eps"
-        membrane, bending = (
-            max(largest(f"stresses/{name}") for name in names[kind])
-            for names in (MEMBRANE, BENDING)
-        )
+        membrane = max(largest(f"stresses/{name}") for name in MEMBRANE[kind])
+        bending = max(largest(f"stresses/{name}") for name in BENDING[kind])
         # sqrt(A/D) is of the order of 1/h.
         ratio = (largest("laminate/A") / (largest("laminate/D") or np.inf)) ** 0.5
         scale = max(membrane, bending * ratio if kind == "N" else ratio and bending / ratio)
@@ -305,27 +291,20 @@ def _scale(found: Comparison) -> float:
     return scale or found.maximum
 
 
-def _initial_energy(source: Source) -> float:
-    """Initial energy of a result; 0 if it does not say."""
-    initial = source.groups.get("energy", {}).get("initial") if isinstance(source, Contents) else 0
-    return abs(float(initial)) if isinstance(initial, int | float) and np.isfinite(initial) else 0.0
-
-
 def _compare_texts(found: Comparison) -> None:
     """Count the texts that differ, and find the first."""
     left, right = (s.rows(found.path, 0, s.shapes[found.path][0]) for s in found.sources)
     rows = np.flatnonzero(left != right)
     found.differing = len(rows)
     if len(rows):
-        row = int(rows[0])
-        found.largest = float("inf")
-        found.at = _place(found, (row,))
-        found.values = str(left[row]), str(right[row])
+        found.largest = np.inf
+        found.at = _place(found, (int(rows[0]),))
+        found.values = str(left[rows[0]]), str(right[rows[0]])
 
 
-def _measure(found: Comparison) -> tuple[tuple[int, ...] | None, bool]:
-    """Find maximum, largest difference and its index; also whether it is infinite."""
-    place: tuple[int, ...] | None = None
+def _measure(found: Comparison) -> bool:
+    """Find maximum, largest difference and its place; return whether it is infinite."""
+    place: tuple[int, ...] = ()
     infinite = False
     for start, left, right in found.blocks():
         for values in (left, right):
@@ -338,17 +317,17 @@ def _measure(found: Comparison) -> tuple[tuple[int, ...] | None, bool]:
         index = np.unravel_index(here, apart.shape)
         if strange.any() or apart[index] > found.largest:
             infinite = bool(strange.any())
-            found.largest = float("inf") if infinite else float(apart[index])
+            found.largest = np.inf if infinite else float(apart[index])
             found.values = float(left[index]), float(right[index])
             place = (start + int(index[0]), *map(int, index[1:]))
-    return place, infinite
+    if place:
+        found.at = _place(found, place)
+    return infinite
 
 
 def _count(found: Comparison) -> None:
     """Count the differences beyond the tolerance, and find the first row that has one."""
-    instants = bool(found.shapes[0]) and (
-        _clock(found) is not None or found.path.startswith("tape")
-    )
+    instants = found.shapes[0] and (_clock(found) or found.path.startswith("tape"))
     for start, left, right in found.blocks():
         apart, strange = _differences(left, right)
         wrong = strange | (apart > found.tolerance)
@@ -376,47 +355,36 @@ def _differences(left: Array, right: Array) -> tuple[Array, Array]:
 def _clock(found: Comparison) -> tuple[Source, str] | None:
     """Source and group whose step and time belong to the rows of a dataset."""
     group = found.path.rpartition("/")[0]
-    clock = (f"{group}/step", f"{group}/time")
     for source in found.sources:
-        if all(name in source.shapes for name in clock):
-            rows = source.shapes[found.path][:1]
-            kinds = [source.dtypes[name].kind for name in clock]
-            if rows and kinds == ["i", "f"] and all(source.shapes[name] == rows for name in clock):
-                return source, group
+        rows = source.shapes[found.path][:1]
+        clock = [n for n in (f"{group}/step", f"{group}/time") if source.shapes.get(n) == rows]
+        if rows and [source.dtypes[name].kind for name in clock] == ["i", "f"]:
+            return source, group
     return None
 
 
 def _place(found: Comparison, index: tuple[int, ...]) -> dict[str, Any]:
-    """Index, step, time and names of the indices of a place."""
+    """Index, step and time of a place, and its other indices, from 1, by the names of the axes."""
     place: dict[str, Any] = {"index": list(index), "step": None, "time": None}
-    if clock := _clock(found):
+    clock = _clock(found)
+    if clock is not None:
         source, group = clock
-        row = index[0]
-        place["step"] = int(source.rows(f"{group}/step", row, row + 1)[0])
-        place["time"] = float(source.rows(f"{group}/time", row, row + 1)[0])
-    return {**place, **_index_names(found, index, has_clock=bool(clock))}
-
-
-def _index_names(
-    found: Comparison, index: tuple[int, ...], *, has_clock: bool
-) -> Mapping[str, int | str]:
-    """Numbers of a place by the names of its axes, from 1; a row with a clock needs none."""
+        for name, kind in (("step", int), ("time", float)):
+            place[name] = kind(source.rows(f"{group}/{name}", index[0], index[0] + 1)[0])
     path, source = found.path, found.sources[0]
     lines = isinstance(source, TapeText) and source.lines and path == W
     of_cases = source.form == SWEEP and path.startswith(("cases/", "summary/", "history/"))
     if axes := CASES if of_cases else LINES if lines else ():
-        return {name: first + i for (name, first), i in zip(axes, index, strict=False)}
-    dataset = DATASETS.get(path)
-    names: dict[str, int | str] = {}
-    if not has_clock and path.startswith("tape"):
-        names["row"] = index[0] + 1
-    if dataset is None or len(dataset.shape) != len(source.shapes[path]):
-        return names
-    for axis, (size, i) in enumerate(zip(dataset.shape, index, strict=False)):
-        if size == "ndf" and i < len(DOF_NAMES):
-            names["unknown"] = DOF_NAMES[i]
-        elif isinstance(size, int):
-            names["column" if axis else "row"] = i + 1
-        elif size in AXES:
-            names[AXES[size]] = i + 1
-    return names
+        return place | {name: first + i for (name, first), i in zip(axes, index, strict=False)}
+    if clock is None and path.startswith("tape"):
+        place["row"] = index[0] + 1
+    shape = DATASETS[path].shape if path in DATASETS else ()
+    if len(shape) == len(source.shapes[path]):
+        for axis, (size, i) in enumerate(zip(shape, index, strict=False)):
+            if size == "ndf" and i < len(DOF_NAMES):
+                place["unknown"] = DOF_NAMES[i]
+            elif isinstance(size, int):
+                place["column" if axis else "row"] = i + 1
+            elif size in SCALES:
+                place[SCALES[size][0]] = i + 1
+    return place

@@ -17,11 +17,10 @@ from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
+from fecm._typing import Array
 from fecm.results.schema import FORMAT, FORMAT_VERSION, SWEEP, NotStoredError, ResultFileError
 
-Array = NDArray[Any]
 ELEMENTS, COORDINATES = "mesh/elements", "mesh/coordinates"
 
 RESULT_OF = {FORMAT: "a run", SWEEP: "a sweep"}  # source of each form of file
@@ -48,13 +47,12 @@ class Contents(Mapping[str, Array]):
     def held(self) -> Iterator[None]:
         """Keep the file open for many reads; each of them opens it otherwise."""
         with _troubles(self.path):
-            file = h5py.File(self.path)
-        with file:
-            self._held = file
-            try:
+            self._held = h5py.File(self.path)
+        try:
+            with self._held:
                 yield
-            finally:
-                self._held = None
+        finally:
+            self._held = None
 
     @contextlib.contextmanager
     def _file(self) -> Iterator[h5py.File]:
@@ -91,10 +89,9 @@ class Contents(Mapping[str, Array]):
         if path in self.lists:
             return np.array(self.lists[path][start:stop], dtype=object)
         with self._file() as file:
-            dataset = file[path]
-            if not dataset.shape:
-                return np.asarray(dataset[()]).reshape(1)[start:stop]
-            return np.asarray(dataset[start:stop])
+            if self.shapes[path]:
+                return np.asarray(file[path][start:stop])
+            return np.asarray(file[path][()]).reshape(1)[start:stop]
 
     def attributes_of(self, path: str) -> dict[str, Any]:
         """Read the attributes of a dataset or group."""
@@ -135,25 +132,20 @@ def read(path: Path, *forms: str) -> Contents:
     with path.open("rb"):
         pass  # raises the error of a missing or forbidden file
     with _troubles(path), h5py.File(path) as file:
-        attributes = _attributes(file)
-        _check_form(path, attributes, forms or (FORMAT,))
+        attributes, forms = _attributes(file), forms or (FORMAT,)
+        form, version = attributes.get("format"), attributes.get("format_version")
+        if form not in forms:
+            what = "not a result of fecm"
+            if form in (FORMAT, SWEEP):
+                wanted = " or ".join(RESULT_OF[one] for one in forms)
+                what = f"the result of {RESULT_OF[form]}, not of {wanted}"
+            raise ResultFileError(f"{path}: this HDF5 file is {what}")
+        if version != FORMAT_VERSION:
+            raise ResultFileError(f"{path}: format version {version} is not {FORMAT_VERSION}")
         _check_links(path, file)
         contents = Contents(path, attributes)
         file.visititems(partial(_list, contents, path.stat().st_size))
     return contents
-
-
-def _check_form(path: Path, attributes: Mapping[str, Any], forms: tuple[str, ...]) -> None:
-    """Refuse a file of another form or version."""
-    form, version = attributes.get("format"), attributes.get("format_version")
-    if form not in forms:
-        wanted = " or ".join(RESULT_OF[one] for one in forms)
-        what = "not a result of fecm"
-        if form in (FORMAT, SWEEP):
-            what = f"the result of {RESULT_OF[form]}, not of {wanted}"
-        raise ResultFileError(f"{path}: this HDF5 file is {what}")
-    if version != FORMAT_VERSION:
-        raise ResultFileError(f"{path}: format version {version} is not {FORMAT_VERSION}")
 
 
 # Kinds of links that are refused, by HDF5's number.
@@ -174,21 +166,6 @@ def _check_links(path: Path, file: h5py.File) -> None:
         raise ResultFileError(f"{path}: {link[0]} is {what}; links are not followed")
 
 
-def _check_storage(path: Path, name: str, item: h5py.Dataset) -> None:
-    """Refuse a dataset whose numbers are in other files; its shape is not read."""
-    created = item.id.get_create_plist()
-    if created.get_layout() == h5py.h5d.VIRTUAL:
-        raise ResultFileError(
-            f"{path}: {name} is a virtual dataset, whose numbers are in other datasets or files; "
-            "they are not read"
-        )
-    if created.get_external_count():
-        raise ResultFileError(
-            f"{path}: {name} has external storage: its numbers are in another file, which is not "
-            "read"
-        )
-
-
 def _list(contents: Contents, file_size: int, name: str, item: h5py.HLObject) -> None:
     """Add a group or dataset of a file to its contents."""
     path = contents.path
@@ -196,7 +173,13 @@ def _list(contents: Contents, file_size: int, name: str, item: h5py.HLObject) ->
         contents.groups[name] = _attributes(item)
     if not isinstance(item, h5py.Dataset):
         return  # a named type
-    _check_storage(path, name, item)
+    created = item.id.get_create_plist()  # the shape of numbers elsewhere is not read
+    if created.get_layout() == h5py.h5d.VIRTUAL:
+        what = "is a virtual dataset, whose numbers are in other datasets or files"
+        raise ResultFileError(f"{path}: {name} {what}; they are not read")
+    if created.get_external_count():
+        what = "has external storage: its numbers are in another file, which is not read"
+        raise ResultFileError(f"{path}: {name} {what}")
     is_text = h5py.check_string_dtype(item.dtype) is not None
     if "/" not in name and item.is_scale:
         return  # a scale numbers an axis
@@ -213,10 +196,10 @@ def _list(contents: Contents, file_size: int, name: str, item: h5py.HLObject) ->
             message = f"{path}: {name} has the shape {shape}, which is more than the file holds"
             raise ResultFileError(message)
         contents.shapes[name], contents.dtypes[name] = shape, item.dtype.newbyteorder("=")
-    elif h5py.check_ref_dtype(item.dtype) is not None:
-        raise ResultFileError(f"{path}: {name} holds references; they are not followed")
     else:
-        raise ResultFileError(f"{path}: {name} holds neither numbers nor a text")
+        references = h5py.check_ref_dtype(item.dtype) is not None
+        what = "references; they are not followed" if references else "neither numbers nor a text"
+        raise ResultFileError(f"{path}: {name} holds {what}")
 
 
 def _attributes(item: h5py.HLObject) -> dict[str, Any]:

@@ -10,13 +10,12 @@ from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
 from fecm._files import beside
+from fecm._typing import Array
 from fecm.deck.units import unit_of
 from fecm.results import schema
 
-Array = NDArray[Any]
 TIME = "time"
 TEXT = h5py.string_dtype()
 TEXT_TYPE, SCALAR = h5py.h5t.py_create(TEXT, logical=True), h5py.h5s.create(h5py.h5s.SCALAR)
@@ -44,8 +43,8 @@ class FileSink:
         if name not in self._groups:
             new = name not in self._file
             group = self._groups[name] = self._file.require_group(name)
-            if new and name in schema.GROUP_DESCRIPTIONS:
-                _set_text(group, schema.GROUP_DESCRIPTIONS[name], "description")
+            if new and name in schema.GROUPS:
+                _set_text(group, schema.GROUPS[name][1], "description")
         return self._groups[name]
 
     def attributes(self, group: str, values: Mapping[str, Any]) -> None:
@@ -73,11 +72,11 @@ class FileSink:
         self._made.append(dataset)
 
     def label_axes(self) -> None:
-        """Attach dimension scales to the axes of datasets, for xarray.
+        """Attach dimension scales (of the HDF5 specification) to the axes of datasets, for xarray.
 
-        HDF5 Dimension Scales Specification.  The scale of rows is the group's time; those of nodes,
-        elements, points and dofs belong to the file, because a netCDF reader looks for dimensions
-        in a group and its parents.  It needs all axes of a dataset labelled, or none.
+        The scale of rows is the group's time; those of nodes, elements, points and dofs belong to
+        the file, because a netCDF reader looks for dimensions in a group and its parents.  It needs
+        all axes of a dataset labelled, or none.
         """
         made_of = [(d, self.arrays[d.path]) for d in self._made if d.path in self.arrays]
         clocks = {d.group: made for d, made in made_of if d.name == TIME and d.shape[0] == "rows"}
@@ -87,18 +86,15 @@ class FileSink:
             clock = clocks.get(dataset.group)
             if made == clock or not {*dataset.shape} <= {"rows", *schema.SCALES}:
                 continue
-            for axis, size in enumerate(dataset.shape):
-                rows = size == "rows"
-                scale = clock if rows else self._scale(str(size), made.shape[axis])
-                made.dims[axis].attach_scale(scale)
+            for axis, (size, length) in enumerate(zip(dataset.shape, made.shape, strict=True)):
+                made.dims[axis].attach_scale(clock if size == "rows" else self._scale(size, length))
 
-    def _scale(self, size: str, length: int) -> h5py.Dataset:
+    def _scale(self, size: Any, length: int) -> h5py.Dataset:
         """Scale of an axis, created on first use."""
         name, description = schema.SCALES[size]
         if name not in self._file:
-            if size in self.axis_names:
-                texts = self.axis_names[size][:length]
-                made = self._file.create_dataset(name, data=texts, dtype=TEXT)
+            if texts := self.axis_names.get(size):
+                made = self._file.create_dataset(name, data=texts[:length], dtype=TEXT)
             else:
                 numbers = np.arange(length, dtype="i4") + (size not in schema.FROM_0)
                 made = self._file.create_dataset(name, data=numbers)
@@ -110,8 +106,8 @@ class FileSink:
         """Store rows of a dataset.  Raises OSError if this or an earlier write failed."""
         self._note("write", path=path, start=start, rows=len(rows))
         self.check()
-        # Low-level interface: slices of h5py take four times as long for a short block.
         dataset = self.arrays[path]
+        # Low-level interface: slices of h5py take four times as long for a short block.
         values = np.ascontiguousarray(rows, dataset.dtype)
         place = dataset.id.get_space()
         place.select_hyperslab((start, *[0] * (values.ndim - 1)), values.shape)
@@ -125,25 +121,18 @@ class FileSink:
     def trim(self, path: str, rows: int) -> None:
         """Truncate a dataset to its first rows; delete it, or an empty group, without any."""
         old = self.arrays.pop(path)
-        group, name = old.parent, path.rpartition("/")[2]
-        attributes = dict(old.attrs)
-        kept = old[:rows]
-        del group[name]
+        group, attributes, kept = old.parent, dict(old.attrs), old[:rows]
+        del self._file[path]
         if rows:
-            made = group.create_dataset(name, data=kept)
+            self.arrays[path] = made = self._file.create_dataset(path, data=kept)
             made.attrs.update(attributes)
-            self.arrays[path] = made
         elif not len(group):
             empty = path.rpartition("/")[0]
             del self._file[empty]
             self._groups.pop(empty, None)
 
     def text(
-        self,
-        path: str,
-        value: str | list[str],
-        description: str,
-        axes: tuple[str, ...] = ("cases",),
+        self, path: str, value: str | list[str], description: str, axes: tuple[str, ...] = ()
     ) -> None:
         """Store a text, or texts along an axis."""
         self._note("text", path=path, value=value, description=description)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecm._typing import Floats
 from fecm.mechanics.failure import CRITERIA
@@ -64,8 +63,9 @@ def described(name: str) -> str:
     return COLUMNS.get(name, ("measured by the caller",))[0]
 
 
-# Peaks: valid even if the run ends in contact, unless they occur at the end.
+# Valid even if the run ends in contact, unless they occur at the end.
 PEAKS = ("peak_force", "time_of_peak", "max_indentation")
+PART = 16  # cases whose forces stay in the cache
 
 
 class Indentation(NamedTuple):
@@ -74,14 +74,6 @@ class Indentation(NamedTuple):
     largest: Floats
     last: Floats
     permanent: Floats
-
-
-PART = 16  # cases whose forces stay in the cache
-
-
-def _total(weights: Floats, values: NDArray[Any]) -> Floats:
-    """Weighted sums over the steps, the same for a case with any others."""
-    return np.asarray((weights * values).sum(axis=1))
 
 
 def summarise(
@@ -105,8 +97,7 @@ def summarise(
     mass, velocity = (np.broadcast_to(v, cases) for v in (mass, velocity))
     if cases > PART:
         parts = []
-        for start in range(0, cases, PART):
-            some = slice(start, start + PART)
+        for some in (slice(start, start + PART) for start in range(0, cases, PART)):
             depths = Indentation(*(values[some] for values in indentation))
             given = force[:, some], times, depths, mass[some], velocity[some], threshold
             parts.append(summarise(*given))
@@ -119,15 +110,15 @@ def summarise(
     last = len(times) - 1 - np.argmax(touching[:, ::-1], axis=1)
     peak = np.argmax(force, axis=1)
     met = touching.any(axis=1)
-    # The force is linear between steps, and 0 before the first.
-    weights = 0.5 * (dt + np.append(dt[1:], 0.0))
-    impulse = _total(weights, force)
+    # The force is linear between steps, and 0 before the first.  These sums are the same for a case
+    # with any others.
+    impulse = (0.5 * (dt + np.append(dt[1:], 0.0)) * force).sum(axis=1)
     rebound = impulse / mass - velocity
     found = {
         "peak_force": force.max(axis=1),
         "time_of_peak": np.where(met, times[peak], np.nan),
         "contacts": begins.sum(axis=1).astype(float),
-        "contact_time": _total(dt, touching),
+        "contact_time": (dt * touching).sum(axis=1),
         "last_contact": np.where(met, times[last], np.nan),
         "max_indentation": indentation.largest,
         "permanent_indentation": indentation.permanent,
@@ -143,7 +134,7 @@ def summarise(
         found["threshold_force"] = np.full(len(force), threshold)
         found["threshold_margin"] = 1.0 - found["peak_force"] / threshold
         found["threshold_time"] = np.where(above.any(axis=1), first, np.nan)
-        found["time_above"] = _total(dt, above)
+        found["time_above"] = (dt * above).sum(axis=1)
         unknown["threshold_margin"] = unknown["peak_force"]
         unknown |= dict.fromkeys(("threshold_force", "threshold_time"), np.zeros_like(still))
     unknown["max_indentation"] = still & (indentation.last >= indentation.largest)

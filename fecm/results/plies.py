@@ -5,13 +5,12 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecm._frozen import frozen
-from fecm._typing import Bools, Floats
+from fecm._typing import Array, Bools, Floats, Indices
 from fecm.deck.model import Deck, Material
 from fecm.deck.reader import Reader
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
@@ -21,9 +20,6 @@ from fecm.results.schema import NotStoredError, ResultFileError, remedy
 
 if TYPE_CHECKING:
     from fecm.results.result import Result
-
-Array = NDArray[Any]
-Ints = NDArray[np.intp]
 
 IN_PLANE = ("sigma_1", "sigma_2", "tau_12")
 INTERLAMINAR = ("tau_xz", "tau_yz")
@@ -74,7 +70,14 @@ def plies_of(
         rows = rows_at(times, np.atleast_1d(time), "ply stresses")
     members = np.arange(len(numbers))
     if elements is not None:
-        members = _members(numbers, np.atleast_1d(elements))
+        place = {int(number): position for position, number in enumerate(numbers)}
+        for number in np.atleast_1d(elements):
+            if int(number) not in place:
+                raise NotStoredError(
+                    f"no ply stresses of element {number}: they are stored for {len(numbers)} "
+                    f"elements from {min(place)} to {max(place)}"
+                )
+        members = np.array([place[int(n)] for n in np.atleast_1d(elements)], dtype=np.intp)
     chosen = {name: values[np.ix_(rows, members)] for name, values in stored.items()}
     material = model_of(result).last(Material)
     if material is None or len(material.layers) != len(z):
@@ -83,8 +86,8 @@ def plies_of(
     if "g12" in result.slips and ply.e1 == ply.e2:
         g12 = ply.e1 / (2.0 * (1.0 + ply.nu12))
     one, two, shear = (chosen[name] for name in IN_PLANE)
-    place = points_of(result, numbers[members], one.shape[2], material.integration.points < 0)
-    x, y = np.moveaxis(place, -1, 0)
+    at_nodes = material.integration.points < 0
+    x, y = np.moveaxis(points_of(result, numbers[members], one.shape[2], at_nodes), -1, 0)
     return Plies(
         step=result["plies/step"][rows], time=times[rows], element=numbers[members], x=x, y=y, z=z,
         angles=np.array([layer.angle for layer in material.layers]),
@@ -135,7 +138,7 @@ def places(elements: Array, coordinates: Floats, rule: Quadrature) -> Floats:
     return found
 
 
-def rows_at(stored: Floats, times: Sequence[float] | Floats, what: str) -> Ints:
+def rows_at(stored: Floats, times: Sequence[float] | Floats, what: str) -> Indices:
     """Rows nearest to the given times.  Raises NotStoredError if a time is outside of the rows."""
     spacing = float(np.diff(stored).max()) if len(stored) > 1 else float(stored[0])
     for time in times:
@@ -143,15 +146,3 @@ def rows_at(stored: Floats, times: Sequence[float] | Floats, what: str) -> Ints:
             message = f"no {what} at time {time:g}: the rows cover {stored[0]:g} to {stored[-1]:g}"
             raise NotStoredError(message)
     return np.array([np.abs(stored - time).argmin() for time in times], dtype=np.intp)
-
-
-def _members(numbers: Array, wanted: Array) -> Ints:
-    """Positions of elements among those with ply stresses."""
-    place = {int(number): position for position, number in enumerate(numbers)}
-    for number in wanted:
-        if int(number) not in place:
-            raise NotStoredError(
-                f"no ply stresses of element {number}: they are stored for {len(numbers)} elements "
-                f"from {min(place)} to {max(place)}"
-            )
-    return np.array([place[int(number)] for number in wanted], dtype=np.intp)

@@ -9,24 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecm._tables import html_table
-from fecm._typing import Floats
+from fecm._typing import Array, Floats
 from fecm.deck.model import Deck, Impact
+from fecm.deck.records import AXES, DOF_NAMES
 from fecm.deck.units import unit_of
 from fecm.results import schema
 from fecm.results.metrics import INTEGERS, METRICS, Indentation, summarise
-from fecm.results.schema import (
-    AXIS_NAMES,
-    DATASETS,
-    SCALES,
-    Dataset,
-    NotStoredError,
-    ResultFileError,
-    declared_units,
-    shape_error,
-)
+from fecm.results.schema import DATASETS, Dataset, NotStoredError, ResultFileError, declared_units
 
 if TYPE_CHECKING:
     import pandas
@@ -40,7 +31,6 @@ if TYPE_CHECKING:
     from fecm.results.plies import Plies
     from fecm.studies.comparison import Comparison
 
-Array = NDArray[Any]
 HISTORY = "history"
 
 
@@ -58,19 +48,10 @@ class PlyGroup(schema.PlyRows):
     ) -> Plies:
         """Stresses and strains ply by ply.
 
-        Parameters
-        ----------
-        time : float or sequence of float, optional
-            Times, for which the nearest stored rows are taken; all rows by default.
-        elements : int or sequence of int, optional
-            Numbers of elements; by default all with ply stresses.
-
-        Raises
-        ------
-        NotStoredError
-            If the result has no ply stresses, or not at such a time or of such an element.
-        ResultFileError
-            If the result's deck can't be read or does not fit its ply stresses.
+        Of the stored rows nearest to the times, by default all, and of the elements with these
+        numbers, by default all with ply stresses.  Raises NotStoredError if the result has no ply
+        stresses, or not at such a time or of such an element.  Raises ResultFileError if the
+        result's deck can't be read or does not fit them.
 
         Examples
         --------
@@ -89,14 +70,8 @@ class Result(schema.Contact):
     history (``time``, ``force``, ``indentation``, ``transducer``, ``displacement``, ``velocity``,
     ``acceleration``, ``plate_w``, ``step``) also as ``result.force``.  Units are those of the deck.
 
-    Parameters
-    ----------
-    arrays : mapping of str to ndarray
-        Datasets by path.
-    texts : mapping of str to str
-        Texts by path.
-    groups : mapping of str to mapping
-        Attributes of the groups; those of the result itself under ``""``.
+    It is made of datasets, texts and attributes of groups by path; the attributes of the result
+    itself are under ``""``.
 
     Attributes
     ----------
@@ -181,7 +156,7 @@ class Result(schema.Contact):
     @property
     def still_in_contact(self) -> bool:
         """Whether the run ended in contact, so that its final values are not known."""
-        return f"{HISTORY}/force" in self and still_in_contact(self[f"{HISTORY}/force"])
+        return f"{HISTORY}/force" in self and bool((self[f"{HISTORY}/force"][-1:] > 0.0).any())
 
     @property
     def threshold(self) -> Mapping[str, Any]:
@@ -203,14 +178,12 @@ class Result(schema.Contact):
         with contextlib.suppress(ResultFileError):
             if (card := model_of(self).last(Impact)) is not None and card.velocity:
                 velocity = np.float64(card.velocity)
-        force, time, indentation, w = (
-            self[f"{HISTORY}/{name}"] for name in ("force", "time", "indentation", "plate_w")
-        )
-        permanent = _number(self._groups.get(HISTORY, {}).get("permanent_indentation"))
-        initial = _number(self._groups.get("energy", {}).get("initial"))
-        depths = Indentation(
-            indentation.max(keepdims=True, initial=0.0), indentation[-1:], np.array([permanent])
-        )
+        names = "force", "time", "indentation", "plate_w"
+        force, time, indentation, w = (self[f"{HISTORY}/{name}"] for name in names)
+        permanent = _number(self.attributes_of(HISTORY).get("permanent_indentation"))
+        initial = _number(self.attributes_of("energy").get("initial"))
+        largest = indentation.max(keepdims=True, initial=0.0)
+        depths = Indentation(largest, indentation[-1:], np.array([permanent]))
         threshold = _number(self.threshold.get("force")) if self.threshold else None
         with np.errstate(all="ignore"):
             mass = 2.0 * initial / velocity**2
@@ -223,19 +196,12 @@ class Result(schema.Contact):
     def rows(self, path: str, start: int, stop: int) -> Array:
         """Rows of a dataset; those of a file are not kept in memory."""
         read = getattr(self._arrays, "rows", None)
-        return np.asarray(
-            self._arrays[path][start:stop] if read is None else read(path, start, stop)
-        )
+        return self[path][start:stop] if read is None else np.asarray(read(path, start, stop))
 
     def to_dataframe(self) -> pandas.DataFrame:
         """The history as a pandas DataFrame: one row per step, indexed by time.
 
-        Raises
-        ------
-        ImportError
-            If pandas is not installed.
-        KeyError
-            If the run has no impact step.
+        Raises ImportError if pandas is not installed, KeyError if the run has no impact step.
         """
         try:
             import pandas
@@ -269,8 +235,9 @@ class Result(schema.Contact):
             values = self[path]
             known = DATASETS.get(path, Dataset(path, values.shape, ""))
             texts = {"long_name": known.description, "units": self.unit(known.dimension)}
+            names = {"rows": ("time", ""), **schema.SCALES}
             axes = [
-                "time" if size == "rows" else SCALES.get(str(size), (f"{known.name}_{n}",))[0]
+                names.get(str(size), (f"{known.name}_{n}",))[0]
                 for n, size in enumerate(known.shape)
             ]
             attributes = {name: text for name, text in texts.items() if text}
@@ -278,28 +245,21 @@ class Result(schema.Contact):
         units = {"units": unit} if (unit := self.unit("length")) else {}
         places = {
             axis: ("node", values, units)
-            for axis, values in zip(AXIS_NAMES["ndm"], self["mesh/coordinates"].T, strict=False)
+            for axis, values in zip(AXES, self["mesh/coordinates"].T, strict=False)
         }
-        unknowns = {"unknown": list(AXIS_NAMES["ndf"][: self["mesh/equations"].shape[1]])}
+        unknowns = {"unknown": list(DOF_NAMES[: self["mesh/equations"].shape[1]])}
         tree = {"/": xarray.Dataset(coords=unknowns, attrs=self.attributes)}
         for name, variables in groups.items():
             at_nodes = any("node" in axes for axes, _, _ in variables.values())
-            coordinates = places if at_nodes else {}
-            tree[name] = xarray.Dataset(variables, coordinates, self.attributes_of(name))
+            own = self.attributes_of(name)
+            tree[name] = xarray.Dataset(variables, places if at_nodes else {}, own)
         return xarray.DataTree.from_dict(tree)
 
     def to_pyvista(self, time: float | None = None) -> pyvista.UnstructuredGrid:
         """The plate with its displacements, w and rotations as point data; needs PyVista.
 
-        Parameters
-        ----------
-        time : float, optional
-            The nearest stored row is taken; by default the last.
-
-        Raises
-        ------
-        NotStoredError
-            If the result has no displacements, or none at this time.
+        The stored row nearest to the time is taken; by default the last.  Raises NotStoredError if
+        the result has no displacements, or none at this time.
         """
         try:
             import pyvista
@@ -325,10 +285,7 @@ class Result(schema.Contact):
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the result as a file, such as one of a run in memory.
 
-        Raises
-        ------
-        OSError
-            If the file exists and may not be replaced, or can't be written.
+        Raises OSError if the file exists and may not be replaced, or can't be written.
         """
         from fecm._files import check_outputs
         from fecm.results.hdf5_writer import writing
@@ -359,8 +316,10 @@ class Result(schema.Contact):
     ) -> Axes:
         """Draw a picture on a new figure of pyplot, on given axes, or in a file.
 
-        The axes hold the result's numbers in the deck's units; the labels of their ticks are
-        scaled.  The user's settings of matplotlib hold, except in files.
+        Returns the picture's first axes, which hold the result's numbers in the deck's units; the
+        labels of their ticks are scaled.  The user's settings of matplotlib hold, except in files.
+        Raises PlotError if the result lacks the data, the options are invalid, or `ax` is given and
+        the picture has several axes.  Raises ImportError if matplotlib is not installed.
 
         Parameters
         ----------
@@ -375,19 +334,6 @@ class Result(schema.Contact):
         **options
             Options of the kind, such as ``times`` or ``overlay``; see docs/pictures.md.
 
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The picture's first axes.
-
-        Raises
-        ------
-        PlotError
-            If the result lacks the data, the options are invalid, or `ax` is given and the picture
-            has several axes.
-        ImportError
-            If matplotlib is not installed.
-
         Examples
         --------
         >>> ax = result.plot("force", width="full")  # doctest: +SKIP
@@ -400,22 +346,10 @@ class Result(schema.Contact):
     def compare(self, measured: str | Path | tuple[Any, Any]) -> Comparison:
         """Compare the contact force, or the transducer, with a measured one.
 
-        Parameters
-        ----------
-        measured : str, Path or tuple
-            CSV file with the columns time and force (or transducer), or times and forces, in the
-            deck's units.
-
-        Returns
-        -------
-        Comparison
-            Peaks, impulses, rms of the difference and correlation; ``str()`` says them in words.
-
-        Raises
-        ------
-        StudyError
-            If the file is invalid or in other units, the numbers are invalid, or no two of the
-            times are within those of the result.
+        The measured one is a CSV file with the columns time and force (or transducer), or times and
+        forces, in the deck's units.  Returns peaks, impulses, rms of the difference and
+        correlation; ``str()`` says them in words.  Raises StudyError if the file is invalid or in
+        other units, the numbers are invalid, or no two of the times are within those of the result.
 
         Examples
         --------
@@ -465,19 +399,10 @@ class Result(schema.Contact):
 
 
 def load(path: str | Path) -> Result:
-    """Open a result file; datasets are read on demand.
+    """Open a file that ``fecm run`` wrote; datasets are read on demand.
 
-    Parameters
-    ----------
-    path : str or Path
-        A file that ``fecm run`` wrote.
-
-    Raises
-    ------
-    ResultFileError
-        If the file is not a result, or a dataset has the wrong shape or type.
-    OSError
-        If it can't be opened.
+    Raises ResultFileError if the file is not a result, or a dataset has the wrong shape or type.
+    Raises OSError if it can't be opened.
 
     Examples
     --------
@@ -496,7 +421,7 @@ def result_of(contents: Contents, model: Deck | None = None) -> Result:
     Raises ResultFileError if a dataset has the wrong shape or type.
     """
     kinds = {name: dtype.kind for name, dtype in contents.dtypes.items()}
-    if found := shape_error(contents.shapes, kinds):
+    if found := schema.shape_error(contents.shapes, kinds):
         raise ResultFileError(f"{contents.path}: {found}")
     attributes = {"": contents.attributes, **contents.groups}
     return Result(contents, contents.texts, attributes, model)
@@ -505,21 +430,3 @@ def result_of(contents: Contents, model: Deck | None = None) -> Result:
 def _number(value: Any) -> float:
     """A number of a file's attribute; NaN for anything else."""
     return float(value) if isinstance(value, int | float) else math.nan
-
-
-def still_in_contact(force: Array) -> bool:
-    """Whether a history of the contact force, (steps,), ends in contact.
-
-    End of contact, permanent indentation and final energies are then not known.
-    """
-    return bool(len(force) and force[-1] > 0.0)
-
-
-def contact_intervals(force: Array, time: Array) -> list[tuple[float, float]]:
-    """First and last time of every interval with a contact force."""
-    touching = np.concatenate(([0], np.asarray(force) > 0.0, [0])).astype(int)
-    edges = np.flatnonzero(np.diff(touching))
-    return [
-        (float(time[begin]), float(time[end - 1]))
-        for begin, end in zip(edges[::2], edges[1::2], strict=True)
-    ]

@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from fecm._errors import FecmError
 from fecm._frozen import frozen
 from fecm._tables import html_table
-from fecm._typing import Floats
+from fecm._typing import Array, Floats
 from fecm.deck.records import AXES, DOF_NAMES
 
-Array = NDArray[Any]
 Ints = NDArray[np.int64]
 Int32s = NDArray[np.int32]
 Int8s = NDArray[np.int8]
@@ -76,17 +75,15 @@ def suggestion(asked: str, paths: Iterable[str]) -> str:
 
 def jsonable(value: Any) -> Any:
     """Convert to a value that :func:`json.dumps` writes as valid JSON."""
-    if value is None or isinstance(value, bool | int):
-        return value
-    if isinstance(value, float):
-        if math.isfinite(value):
-            return value
-        return "NaN" if math.isnan(value) else ("Infinity" if value > 0 else "-Infinity")
+    import json
+
     if isinstance(value, Mapping):
         return {str(key): jsonable(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [jsonable(item) for item in value]
-    return str(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return json.dumps(value)
+    return value if value is None or isinstance(value, bool | int | float) else str(value)
 
 
 BLOCK = 4_000_000  # bytes of a block of rows
@@ -100,8 +97,7 @@ def row_blocks(shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
         yield start, min(start + step, rows)
 
 
-FORMAT = "fecm"
-SWEEP = "fecm-sweep"  # format of a sweep's result
+FORMAT, SWEEP = "fecm", "fecm-sweep"  # formats of a run's and of a sweep's result
 FORMAT_VERSION = 1
 
 
@@ -142,6 +138,14 @@ class Dataset:
 
 
 # Groups: each column has its type, sizes, description and, if it has one, dimension.
+_Energy = Annotated[Floats, "rows"]
+_Strain = Annotated[Floats, "rows numel npt"]
+_Stress = Annotated[Floats, "rows numel nps"]
+_InPlane = Annotated[Floats, "rows members npp layers faces"]
+_Interlaminar = Annotated[
+    Floats, "rows members layers levels", "interlaminar shear stress at the element's centre",
+    "force/length^2",
+]  # fmt: skip
 
 
 class Group:
@@ -242,9 +246,6 @@ class Tape3(Rows):
     ]  # fmt: skip
 
 
-_Strain = Annotated[Floats, "rows numel npt"]
-
-
 class Tape8(Rows):
     """Strains of the elements, stored by RODP."""
 
@@ -265,9 +266,6 @@ class History(Contact, Rows):
     plate_w: Annotated[
         Floats, "rows", "displacement of the impact node that the contact law sees", "length"
     ]
-
-
-_Energy = Annotated[Floats, "rows"]
 
 
 class Energy(Rows):
@@ -294,9 +292,6 @@ class GageGroup(Rows):
 
     number: Annotated[Int32s, "gages", "number of every gage"]
     strain: Annotated[Floats, "rows gages", "normal strain of every gage in its direction"]
-
-
-_Stress = Annotated[Floats, "rows numel nps"]
 
 
 class Stresses(Rows):
@@ -329,13 +324,6 @@ class PatchGroup(Group):
     weight: Annotated[Floats, "patch_nodes", "share of every node in the contact force"]
 
 
-_InPlane = Annotated[Floats, "rows members npp layers faces"]
-_Interlaminar = Annotated[
-    Floats, "rows members layers levels", "interlaminar shear stress at the element's centre",
-    "force/length^2",
-]  # fmt: skip
-
-
 class PlyRows(Rows):
     """Stresses ply by ply, stored by PLYS."""
 
@@ -357,9 +345,8 @@ class PlyRows(Rows):
 
 
 class Exposure(Group):
-    """Largest exposures of a criterion, with their times and modes."""
+    """Largest exposures of a criterion, with their times and modes; `Failure` names the sizes."""
 
-    # Sizes are those that `Failure` names.
     exposure: Annotated[Floats, "", "largest exposure over time"]
     time: Annotated[Floats, "", "its time", "time"]
     mode: Annotated[Int8s, "", "its mode: index into the attribute modes"]
@@ -405,19 +392,36 @@ class Modes(Rows):
     shape: Annotated[Floats, "rows numnp ndf", "mode of unit modal mass: every unknown"]
 
 
-GROUPS: dict[str, type[Group]] = {
-    "mesh": Mesh, "laminate": LaminateStiffness, "tape3": Tape3, "tape8": Tape8, "tape9": Tape9,
-    "history": History, "energy": Energy, "gages": GageGroup, "stresses": Stresses,
-    "patch": PatchGroup, "plies": PlyRows, "failure": Failure, "reactions": Reactions,
-    "modes": Modes,
+# Class, description and, if it is one, the macro that stores each group.
+GROUPS: dict[str, tuple[type[Group], str, str]] = {
+    "mesh": (Mesh, "the finite element mesh", ""),
+    "laminate": (LaminateStiffness, "stiffness of the laminate per area", ""),
+    "tape3": (Tape3, "nodal displacements, stored by DISP", "DISP"),
+    "tape8": (Tape8, "element strains, stored by RODP", "RODP"),
+    "tape9": (Tape9, "contact and the projectile, stored by RODP", "RODP"),
+    "history": (
+        History, "contact and the projectile at every step; row n is the state after step n", "RODP"
+    ),
+    "energy": (Energy, "energies at every step", "RODP"),
+    "gages": (GageGroup, "strain gages, read at every step", "RODP or EXCD"),
+    "stresses": (Stresses, "strains and stress resultants, stored by STRE", "STRE"),
+    "patch": (PatchGroup, "nodal weights of the contact force", ""),
+    "plies": (PlyRows, "stresses ply by ply, stored by PLYS", "PLYS"),
+    "threshold": (
+        Group, "delamination threshold: force, time of its first crossing, margin of the peak", ""
+    ),
+    "failure": (Failure, "largest exposures over time, found by FAIL", "FAIL"),
+    "reactions": (Reactions, "forces of the supports, stored by REAC", "REAC"),
+    "modes": (Modes, "natural modes, found by EIGE", "EIGE"),
 }  # fmt: skip
+STORED_BY = {name: word for name, (_, _, word) in GROUPS.items() if word}
 
 
 def group(
     name: str, arrays: Mapping[str, Array], attributes: Mapping[str, Mapping[str, Any]]
 ) -> Group:
     """Return a group of a result by its path."""
-    kind = Exposure if name.startswith("failure/") else GROUPS.get(name, Group)
+    kind, *_ = (Exposure,) if name.startswith("failure/") else GROUPS.get(name, (Group,))
     return kind(name, arrays, attributes)
 
 
@@ -434,7 +438,7 @@ def _datasets(group: str, kind: type[Group], outer: str = "") -> Iterator[Datase
                 yield Dataset(path, shape, description, dimension, DTYPES[column.__origin__])
 
 
-DATASETS = {d.path: d for name, kind in GROUPS.items() for d in _datasets(name, kind)}
+DATASETS = {d.path: d for name, (kind, _, _) in GROUPS.items() for d in _datasets(name, kind)}
 
 FIXED = {"faces": 2, "levels": 3, "directions": 2}  # sizes of axes that every result has
 # Dimension scales: name and description by size.
@@ -478,6 +482,7 @@ def shape_error(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str])
 
     Both are by path; kinds are NumPy's letters: ``"f"``, ``"i"``, ``"u"`` or ``"b"``.
     """
+    sizes: dict[str | int, tuple[int, str]]
     sizes = {name: (size, "every result") for name, size in FIXED.items()}
     for path, shape in shapes.items():
         if (dataset := DATASETS.get(path)) is None:
@@ -487,11 +492,9 @@ def shape_error(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str])
         if len(shape) != len(dataset.shape):
             return f"{path} has the shape {shape}, not ({', '.join(map(str, dataset.shape))})"
         for name, size in zip(dataset.shape, shape, strict=True):
-            if isinstance(name, int):
-                expected, source = name, "every result"
-            else:
-                key = f"{dataset.group} {name}" if name == "rows" else name
-                expected, source = sizes.setdefault(key, (size, path))
+            known = (name, "every result") if isinstance(name, int) else (size, path)
+            key = f"{dataset.group} {name}" if name == "rows" else name
+            expected, source = sizes.setdefault(key, known)
             if size != expected:
                 return f"{path} has the shape {shape}, but {name} is {expected} in {source}"
     return ""
@@ -501,32 +504,6 @@ def declared_units(attributes: Mapping[str, Any]) -> dict[str, str]:
     """Names of the units of length, force and time; empty if the deck names none."""
     names = {n: str(attributes.get(f"unit_{n}", "")) for n in ("length", "force", "time")}
     return names if all(names.values()) else {}
-
-
-GROUP_DESCRIPTIONS = {
-    "mesh": "the finite element mesh",
-    "laminate": "stiffness of the laminate per area",
-    "tape3": "nodal displacements, stored by DISP",
-    "tape8": "element strains, stored by RODP",
-    "tape9": "contact and the projectile, stored by RODP",
-    "history": "contact and the projectile at every step; row n is the state after step n",
-    "energy": "energies at every step",
-    "gages": "strain gages, read at every step",
-    "stresses": "strains and stress resultants, stored by STRE",
-    "patch": "nodal weights of the contact force",
-    "plies": "stresses ply by ply, stored by PLYS",
-    "threshold": "delamination threshold: force, time of its first crossing, margin of the peak",
-    "failure": "largest exposures over time, found by FAIL",
-    "reactions": "forces of the supports, stored by REAC",
-    "modes": "natural modes, found by EIGE",
-}
-
-# Macro that stores each group.
-STORED_BY = {
-    "tape3": "DISP", "tape8": "RODP", "tape9": "RODP", "history": "RODP", "energy": "RODP",
-    "gages": "RODP or EXCD",
-    "stresses": "STRE", "plies": "PLYS", "failure": "FAIL", "reactions": "REAC", "modes": "EIGE",
-}  # fmt: skip
 
 
 def remedy(path: str) -> str:

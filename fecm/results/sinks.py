@@ -11,14 +11,12 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fecm._typing import Array
 from fecm.results.schema import Dataset
 
 if TYPE_CHECKING:
     from fecm.results.hdf5_writer import FileSink
-
-Array = NDArray[Any]
 
 
 class MemorySink:
@@ -69,11 +67,11 @@ class RowBuffer:
         self._sink = sink
         row_bytes = 8 * max(1, sum(math.prod(shape[1:]) for shape in shapes))
         rows = min(shapes[0][0], max(1, self.BYTES // row_bytes))
+        self._paths = {d.name: d.path for d in datasets}
         self._blocks = {
             d.name: np.empty((rows, *shape[1:]), dtype=d.dtype)
             for d, shape in zip(datasets, shapes, strict=True)
         }
-        self._paths = {d.name: d.path for d in datasets}
         self._room = rows
         self._filled = 0
         self.stored = 0

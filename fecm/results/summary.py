@@ -11,8 +11,8 @@ import numpy as np
 
 from fecm._frozen import frozen
 from fecm.mechanics.failure import CRITERIA
-from fecm.results.result import Result, contact_intervals
-from fecm.results.schema import DATASETS, GROUP_DESCRIPTIONS, row_blocks
+from fecm.results.result import Result
+from fecm.results.schema import DATASETS, GROUPS, row_blocks
 
 if TYPE_CHECKING:
     from fecm.results.hdf5_reader import Contents
@@ -26,17 +26,24 @@ OPEN_END = (
 
 def summary(result: Result) -> list[str]:
     """Summarise a result, in the deck's units."""
+    quantity = partial(_quantity, result)
     lines: list[str] = []
+    clock = "history/time" if "history/force" in result else "energy/time"
+    if clock in result:
+        time = result[clock]
+        lines.append(f"steps             {len(time)}, up to time {quantity(time[-1], 'time')}")
     if "history/force" in result:
         lines += _impact(result)
-    elif "energy/time" in result:
-        time = result["energy/time"]
-        lines.append(
-            f"steps             {len(time)}, up to time {_quantity(result, time[-1], 'time')}"
-        )
-    if "history/force" not in result and "tape3/w" in result:
-        lines += _deflection(result)
-    lines += _threshold(result)
+    elif "tape3/w" in result and (w := result["tape3/w"]).any():
+        row, node = np.unravel_index(int(np.abs(w).argmax()), w.shape)
+        lines.append(f"largest w         {quantity(w[row, node], 'length')} at node {node + 1}")
+    elif "tape3/w" in result:
+        lines.append("largest w         0: nothing moved the plate")
+    if known := result.threshold:
+        force, crossing = quantity(float(known["force"]), "force"), float(known["time"])
+        missed = f"not reached: the peak is {float(known['margin']):.1%} below"
+        reached = f"reached at time {quantity(crossing, 'time')}"
+        lines.append(f"delamination      {force} {missed if math.isnan(crossing) else reached}")
     lines += [exposure.line(result) for exposure in largest_exposures(result)]
     if "failure/x" in result and (count := np.count_nonzero(result["failure/under_load"])):
         lines.append(f"under the load    {count} points are left out of these exposures")
@@ -46,18 +53,6 @@ def summary(result: Result) -> list[str]:
         more = f" and {len(found) - LISTED} more" if len(found) > LISTED else ""
         lines.append(f"frequencies       {texts}{more} {result.unit('1/time')}".rstrip())
     return lines or ["nothing was stored"]
-
-
-def _threshold(result: Result) -> list[str]:
-    """Line about the delamination threshold; empty without one."""
-    values = result.threshold
-    if not values:
-        return []
-    time, margin = float(values["time"]), float(values["margin"])
-    force = _quantity(result, float(values["force"]), "force")
-    if math.isnan(time):
-        return [f"delamination      {force} not reached: the peak is {margin:.1%} below"]
-    return [f"delamination      {force} reached at time {_quantity(result, time, 'time')}"]
 
 
 @frozen
@@ -107,20 +102,9 @@ def largest_exposures(result: Result) -> list[LargestExposure]:
         at, ply = (place[:2], place[2]) if exposure.ndim > 2 else (place[:1], place[1])
         mode = modes[int(result[f"failure/{name}/mode"][place])]
         time = float(result[f"failure/{name}/time"][place])
-        centre = float(x[at].mean()), float(y[at].mean())
-        found.append(
-            LargestExposure(name, float(exposure[place]), mode, int(ply) + 1, *centre, time)
-        )
+        where = int(ply) + 1, float(x[at].mean()), float(y[at].mean())
+        found.append(LargestExposure(name, float(exposure[place]), mode, *where, time))
     return found
-
-
-def _deflection(result: Result) -> list[str]:
-    """Line about the largest deflection of a run without impact."""
-    w = result["tape3/w"]
-    if not w.any():
-        return ["largest w         0: nothing moved the plate"]
-    row, node = np.unravel_index(int(np.abs(w).argmax()), w.shape)
-    return [f"largest w         {_quantity(result, w[row, node], 'length')} at node {node + 1}"]
 
 
 def _quantity(result: Result, value: float, dimension: str) -> str:
@@ -132,15 +116,11 @@ def _impact(result: Result) -> list[str]:
     quantity = partial(_quantity, result)
     force, time = result["history/force"], result["history/time"]
     peak = int(np.argmax(force))
-    lines = [f"steps             {len(time)}, up to time {quantity(time[-1], 'time')}"]
-    if force[peak] > 0.0:
-        lines.append(
-            f"peak force        {quantity(force[peak], 'force')} at time "
-            f"{quantity(time[peak], 'time')} (step {peak + 1})"
-        )
-    else:
-        lines.append("peak force        0: there was no contact")
-    intervals = contact_intervals(force, time)
+    at = f"{quantity(force[peak], 'force')} at time {quantity(time[peak], 'time')}"
+    text = f"{at} (step {peak + 1})" if force[peak] > 0.0 else "0: there was no contact"
+    lines = [f"peak force        {text}"]
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], force > 0.0, [0])).astype(int)))
+    intervals = list(zip(time[edges[::2]], time[edges[1::2] - 1], strict=True))  # in contact
     texts = [f"{begin:.6g} to {quantity(end, 'time')}" for begin, end in intervals[:LISTED]]
     if len(intervals) > LISTED:
         texts.append(f"and {len(intervals) - LISTED} more")
@@ -149,20 +129,16 @@ def _impact(result: Result) -> list[str]:
             texts[-1] = f"from {quantity(intervals[-1][0], 'time')}"
         texts[-1] += ", still in contact at the end"
     if texts:
-        lines.append(f"contact           {', '.join(texts)}")
-        indentation = result["history/indentation"]
-        deepest = int(np.argmax(indentation))
+        indentation, w = result["history/indentation"], result["history/plate_w"]
+        deepest, last = (quantity(time[v.argmax()], "time") for v in (indentation, w))
         permanent = float(result.history.attributes["permanent_indentation"])
         left = "open" if result.still_in_contact else quantity(permanent, "length")
-        lines.append(
-            f"largest indent    {quantity(indentation[deepest], 'length')} at time "
-            f"{quantity(time[deepest], 'time')}, permanent {left}"
-        )
-        w = result["history/plate_w"]
-        lines.append(
-            f"largest w         {quantity(w.max(), 'length')} under the load at time "
-            f"{quantity(time[np.argmax(w)], 'time')}"
-        )
+        alpha, bent = (quantity(values.max(), "length") for values in (indentation, w))
+        lines += [
+            f"contact           {', '.join(texts)}",
+            f"largest indent    {alpha} at time {deepest}, permanent {left}",
+            f"largest w         {bent} under the load at time {last}",
+        ]
         metrics = result.metrics
         if not (result.still_in_contact or math.isnan(metrics["rebound_velocity"])):
             lines.append(
@@ -190,9 +166,7 @@ def describe_groups(contents: Contents) -> list[dict[str, Any]]:
     for path in sorted(contents, key=lambda path: _order(DATASETS, path)):
         members.setdefault(path.rpartition("/")[0], []).append(_describe(contents, path))
     groups: list[dict[str, Any]] = []
-    for name in sorted(members, key=lambda name: _order(GROUP_DESCRIPTIONS, name)):
-        if not name and not members[name]:
-            continue
+    for name in sorted(members, key=lambda name: _order(GROUPS, name)):
         attributes = dict(contents.groups.get(name, {})) if name else {}
         description = str(attributes.pop("description", ""))
         rows, *_ = contents.shapes.get(f"{name}/step") or (None,)
@@ -209,8 +183,7 @@ def _order(known: Mapping[str, Any], name: str) -> tuple[int, str]:
 
 def _describe(contents: Contents, path: str) -> dict[str, Any]:
     """Shape, type, attributes and range of one dataset."""
-    attributes = contents.attributes_of(path)
-    texts = contents.lists.get(path)
+    attributes, texts = contents.attributes_of(path), contents.lists.get(path)
     minimum, maximum, not_finite = (None, None, 0) if texts is not None else _range(contents, path)
     return {
         "name": path,

@@ -13,20 +13,17 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecm._files import beside
 from fecm._frozen import frozen
-from fecm._typing import Floats
+from fecm._typing import Array, Floats
 from fecm.results.result import Result
 from fecm.results.schema import CONTACT, ResultFileError
-
-Array = NDArray[Any]
 
 TAPES = "tapes"  # form of a folder of tapes, as `Contents.form` of a file
 NAMES = ("tape3", "tape8", "tape9")
@@ -46,14 +43,14 @@ def fortran_e(value: float) -> str:
     """Write a number in the format E12.4: ``  0.2322E+01``."""
     if not np.isfinite(value):
         text = "NaN" if np.isnan(value) else ("-Infinity" if value < 0 else "Infinity")
-        return text.rjust(12)
+        return text.rjust(WIDTH)
     mantissa, _, power = f"{value:.3e}".partition("e")
     sign = "-" if mantissa.startswith("-") else ""
     digits = mantissa.lstrip("-").replace(".", "")
     exponent = int(power) + (digits != "0000")
     # A three-digit exponent has no letter.
     mark = f"E{exponent:+03d}" if abs(exponent) < 100 else f"{exponent:+04d}"
-    return f"{sign}0.{digits}{mark}".rjust(12)
+    return f"{sign}0.{digits}{mark}".rjust(WIDTH)
 
 
 def _lines(table: Floats) -> Iterator[str]:
@@ -75,24 +72,22 @@ def _strain_lines(columns: Sequence[Array]) -> Iterator[str]:
 def tape_texts(result: Result) -> dict[str, Iterator[str]]:
     """Lines of every tape that the run stored, by name."""
     strains, contact = ("tape9", "tape8") if result.has_listing_tapes else ("tape8", "tape9")
+
+    def columns(group: str, names: Iterable[str]) -> list[Array]:
+        paths = [f"{group}/{name}" for name in names]
+        for path in paths:
+            if path not in result:
+                raise ResultFileError(f"the result lacks {path}, which a tape needs")
+        return [result[path] for path in paths]
+
     texts: dict[str, Iterator[str]] = {}
-    if "tape3/w" in result:
-        texts["tape3"] = _lines(result["tape3/w"])
+    if W in result:
+        texts["tape3"] = _lines(result[W])
     if "tape8/kappa_x" in result:
-        columns = _columns(result, "tape8", (*CURVATURES, *SHEARS[strains]))
-        texts[strains] = _strain_lines(columns)
+        texts[strains] = _strain_lines(columns("tape8", (*CURVATURES, *SHEARS[strains])))
     if "tape9/force" in result:
-        texts[contact] = _lines(np.stack(_columns(result, "tape9", CONTACT), axis=-1))
+        texts[contact] = _lines(np.stack(columns("tape9", CONTACT), axis=-1))
     return dict(sorted(texts.items()))
-
-
-def _columns(result: Result, group: str, names: Iterable[str]) -> list[Array]:
-    """Datasets of a tape, all of which it needs."""
-    paths = [f"{group}/{name}" for name in names]
-    for path in paths:
-        if path not in result:
-            raise ResultFileError(f"the result lacks {path}, which a tape needs")
-    return [result[path] for path in paths]
 
 
 def write_tapes(result: Result, folder: Path, *, overwrite: bool = True) -> list[Path]:
@@ -114,11 +109,10 @@ def write_tapes(result: Result, folder: Path, *, overwrite: bool = True) -> list
 class TapeText:
     """Contents of a folder of tapes."""
 
-    # Datasets by their paths in a result: ``tape3/w`` (rows, nodes), ``tape8/kappa_x`` etc. (rows,
-    # elements, points), ``tape9/force`` etc. (rows,).
+    # By path: ``tape3/w`` (rows, nodes), ``tape8/kappa_x`` etc. (rows, elements, points),
+    # ``tape9/force`` etc. (rows,).
     arrays: Mapping[str, Array]
-    # Whether ``tape3/w`` has the shape (lines, 6), because the number of nodes is not known.
-    lines: bool = False
+    lines: bool = False  # of ``tape3/w``, (lines, 6), as the number of nodes is not known
     form = TAPES
 
     @property
@@ -162,13 +156,14 @@ def read_tapes(folder: Path) -> TapeText:
             arrays[W], lines = _displacements(text)
             continue
         if text.labelled:
-            read = _named("tape8", (*CURVATURES, *SHEARS[name]), _strains(text))
+            kind, group, names = "strains", "tape8", [*CURVATURES, *SHEARS[name]]
+            table = _strains(text)
         else:
-            read = _named("tape9", CONTACT, text.table(0, len(CONTACT), "contact"))
-        if twice := arrays.keys() & read.keys():
-            kind = "strains" if "tape8/kappa_x" in twice else "contact"
+            kind, group, names = "contact", "tape9", [*CONTACT]
+            table = text.table(0, len(names), kind)
+        if any(path.startswith(group) for path in arrays):
             raise ResultFileError(f"{folder}: tape8 and tape9 both hold {kind}")
-        arrays.update(read)
+        arrays |= {f"{group}/{one}": table[..., i].copy() for i, one in enumerate(names)}
     if not arrays:
         message = f"{folder}: no tape3, tape8 or tape9 in this folder, with or without .txt"
         raise ResultFileError(message)
@@ -188,58 +183,50 @@ class _Lines:
         first = self.lines[0] if self.lines else b""
         self.labelled = all(_LABELS.fullmatch(label) for label in (first[:6], first[6:12]))
 
-    def refuse(self, wrong: NDArray[np.bool_], message: Callable[[int], str]) -> None:
-        """Raise an error about the first wrong line, if any; the message gets its index."""
+    def refuse(self, wrong: Array, message: str, *values: Array) -> None:
+        """Raise an error about the first wrong line, if any, with its values in the message."""
         if wrong.any():
-            index = int(wrong.argmax())
-            raise ResultFileError(f"{self.path}:{index + 1}: {message(index)}")
+            n = int(wrong.argmax())
+            text = message.format(*(value[n] for value in values))
+            raise ResultFileError(f"{self.path}:{n + 1}: {text}")
 
-    def counts(self, lead: int) -> NDArray[np.int64]:
+    def counts(self, lead: int) -> Array:
         """Numbers of every line, (lines,), after `lead` characters of labels."""
-        lengths = np.fromiter(map(len, self.lines), dtype=np.int64, count=len(self.lines)) - lead
-        counts, rest = np.divmod(lengths, WIDTH)
-        self.refuse(
-            (rest != 0) | (counts < 1) | (counts > PER_LINE),
-            lambda n: (
-                f"a line of {lengths[n] + lead} characters does not consist of columns of {WIDTH}"
-            ),
-        )
+        lengths = np.fromiter(map(len, self.lines), dtype=np.int64)
+        counts, rest = np.divmod(lengths - lead, WIDTH)
+        message = f"a line of {{}} characters does not consist of columns of {WIDTH}"
+        self.refuse((rest != 0) | (counts < 1) | (counts > PER_LINE), message, lengths)
         return counts
 
     def table(self, lead: int, width: int, what: str) -> Floats:
         """Numbers of lines of equal length, (lines, width)."""
         counts = self.counts(lead)
-        self.refuse(
-            counts != width, lambda n: f"a line of {what} has {width} numbers, not {counts[n]}"
-        )
+        self.refuse(counts != width, f"a line of {what} has {width} numbers, not {{}}", counts)
         return self.numbers(lead).reshape(-1, width)
 
     def numbers(self, lead: int) -> Floats:
         """All numbers of all lines, in order."""
         text = b"".join(line[lead:] for line in self.lines)
-        fields = np.frombuffer(text, dtype=f"S{WIDTH}")
         if not _FOREIGN.search(text):
-            try:
-                values = fields.astype(np.float64)
-            except ValueError:
-                pass  # an exponent without letter, or not a number
-            else:
+            # Fails at an exponent without letter, and what is not a number.
+            with contextlib.suppress(ValueError):
+                values = np.frombuffer(text, dtype=f"S{WIDTH}").astype(np.float64)
                 if not np.isinf(values).any():
                     return values
-        return self._slowly(lead)
-
-    def _slowly(self, lead: int) -> Floats:
-        """Read number by number; report the first that is invalid."""
-        values: list[float] = []
+        found: list[float] = []
         for index, line in enumerate(self.lines):
             for start in range(lead, len(line), WIDTH):
                 field = line[start : start + WIDTH]
-                value = fortran_number(field)
-                if value is None:
-                    text = ascii(field.decode("latin-1"))[1:-1]
-                    raise ResultFileError(f"{self.path}:{index + 1}: `{text}` is not a number")
-                values.append(value)
-        return np.array(values)
+                if (value := fortran_number(field)) is None:
+                    wrong = ascii(field.decode("latin-1"))[1:-1]
+                    raise ResultFileError(f"{self.path}:{index + 1}: `{wrong}` is not a number")
+                found.append(value)
+        return np.array(found)
+
+    def require_complete(self, complete: Any) -> None:
+        """Require that the last line ends a row."""
+        if not complete:
+            raise ResultFileError(f"{self.path}:{len(self.lines)}: the last row is not complete")
 
 
 def fortran_number(field: bytes) -> float | None:
@@ -251,8 +238,7 @@ def fortran_number(field: bytes) -> float | None:
     text = field.strip(b" ")
     if _SPECIAL.fullmatch(text):
         return float(text)
-    match = _NUMBER.fullmatch(text)
-    if match is None:
+    if (match := _NUMBER.fullmatch(text)) is None:
         return None
     value = float(match[1] + b"E" + (match[2] or match[3] or b"0"))
     return value if np.isfinite(value) else None
@@ -268,20 +254,9 @@ def _displacements(text: _Lines) -> tuple[Array, bool]:
     lengths = np.diff(ends, prepend=-1)
     wrong = np.zeros(len(counts), dtype=bool)
     wrong[ends] = (lengths != lengths[0]) | (counts[ends] != counts[ends[0]])
-    text.refuse(wrong, lambda n: "the row that ends here differs in length from the first")
-    _require_complete(text, ends[-1] == len(counts) - 1)
+    text.refuse(wrong, "the row that ends here differs in length from the first")
+    text.require_complete(ends[-1] == len(counts) - 1)
     return values.reshape(len(ends), -1), False
-
-
-def _require_complete(text: _Lines, complete: bool) -> None:
-    """Require that the last line ends a row."""
-    if not complete:
-        raise ResultFileError(f"{text.path}:{len(text.lines)}: the last row is not complete")
-
-
-def _named(group: str, names: Sequence[str], table: Floats) -> dict[str, Array]:
-    """Columns of a table by the paths of their datasets."""
-    return {f"{group}/{name}": table[..., i].copy() for i, name in enumerate(names)}
 
 
 def _strains(text: _Lines) -> Floats:
@@ -289,16 +264,12 @@ def _strains(text: _Lines) -> Floats:
     table = text.table(2 * PER_LINE, 5, "strains")
     pairs = [(line[:6], line[6:12]) for line in text.lines]
     unlabelled = [not all(map(_LABELS.fullmatch, pair)) for pair in pairs]
-    text.refuse(
-        np.array(unlabelled), lambda n: "a line of strains begins with its element and point"
-    )
-    labels = np.array([(int(element), int(point)) for element, point in pairs])
+    text.refuse(np.array(unlabelled), "a line of strains begins with its element and point")
+    labels = np.array(pairs).astype(int)
     numel, npt = (max(1, int(size)) for size in labels.max(axis=0))
     order = np.arange(len(labels)) % (numel * npt)
-    expected = np.stack(np.divmod(order, npt), axis=1) + 1
-    text.refuse(
-        (labels != expected).any(axis=1),
-        lambda n: f"expected element {expected[n, 0]}, point {expected[n, 1]}",
-    )
-    _require_complete(text, not len(labels) % (numel * npt))
+    element, point = (part + 1 for part in np.divmod(order, npt))
+    wrong = (labels[:, 0] != element) | (labels[:, 1] != point)
+    text.refuse(wrong, "expected element {}, point {}", element, point)
+    text.require_complete(not len(labels) % (numel * npt))
     return table.reshape(-1, numel, npt, 5)

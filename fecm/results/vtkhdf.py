@@ -15,13 +15,13 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._typing import Array
 from fecm.mechanics.strains import STRAINS
 from fecm.results.hdf5_writer import new_hdf5
 from fecm.results.plies import IN_PLANE, INTERLAMINAR
 from fecm.results.result import Result
-from fecm.results.schema import ExportError
+from fecm.results.schema import ExportError, remedy
 
-Array = NDArray[Any]
 Ints = NDArray[np.int64]
 Note = Callable[[str], None]
 
@@ -44,19 +44,15 @@ def write_vtkhdf(
     the result has no displacements.  Raises OSError if the file can't be written.
     """
     if "tape3/displacement" not in result:
-        raise ExportError(
-            "the result has no displacements (tape3), and hence no time step to export; "
-            "add DISP to the deck's program and run it again"
-        )
+        lack = "the result has no displacements (tape3), and hence no time step to export"
+        raise ExportError(f"{lack}{remedy('tape3')}")
     # A state stored twice is one time step.
     steps, rows = np.unique(result["tape3/step"], return_index=True)
-    cells = vtk_cells(result["mesh/elements"])
     with new_hdf5(path, overwrite=overwrite) as (file, _):
         root = file.create_group("VTKHDF")
         root.attrs["Version"] = np.array(VERSION, dtype="i8")
         root.attrs.create("Type", np.bytes_(b"UnstructuredGrid"))
-        _write_mesh(root, result["mesh/coordinates"], *cells)
-        _write_clock(root, np.asarray(result["tape3/time"])[rows])
+        _write_mesh(root, result, result["tape3/time"][rows])
         _write_displacements(root, result["tape3/displacement"], rows)
         _write_contact(root, result, steps)
         _write_strains(root, result, steps, note)
@@ -73,23 +69,18 @@ def vtk_cells(elements: Array) -> tuple[Ints, Ints, Ints]:
     return connectivity.astype("i8"), np.concatenate(([0], np.cumsum(used))), types
 
 
-def _write_mesh(
-    root: h5py.Group, coordinates: Array, connectivity: Ints, offsets: Ints, types: Ints
-) -> None:
+def _write_mesh(root: h5py.Group, result: Result, times: Array) -> None:
+    """The mesh, once, and the times at which it has fields."""
+    coordinates = result["mesh/coordinates"]
+    connectivity, offsets, types = vtk_cells(result["mesh/elements"])
     points = np.zeros((len(coordinates), 3))
     points[:, : coordinates.shape[1]] = coordinates
     root["Points"] = points
     root["Connectivity"], root["Offsets"] = connectivity, offsets.astype("i8")
     root["Types"] = types.astype("u1")
-    for name, size in (
-        ("NumberOfPoints", len(points)),
-        ("NumberOfCells", len(types)),
-        ("NumberOfConnectivityIds", len(connectivity)),
-    ):
-        root[name] = np.array([size], dtype="i8")
-
-
-def _write_clock(root: h5py.Group, times: Array) -> None:
+    sizes = {"Points": points, "Cells": types, "ConnectivityIds": connectivity}
+    for name, values in sizes.items():
+        root[f"NumberOf{name}"] = np.array([len(values)], dtype="i8")
     clock = root.create_group("Steps")
     clock.attrs["NSteps"] = np.int64(len(times))
     clock["Values"] = times.astype("f8")
@@ -101,9 +92,8 @@ def _write_clock(root: h5py.Group, times: Array) -> None:
 
 def _field(root: h5py.Group, kind: str, name: str, steps: int, shape: tuple[int, ...]) -> Any:
     """Create a field with an array of `shape` per step, concatenated."""
-    dataset = root.require_group(f"{kind}Data").create_dataset(
-        name, (steps * shape[0], *shape[1:]), "f8"
-    )
+    data = root.require_group(f"{kind}Data")
+    dataset = data.create_dataset(name, (steps * shape[0], *shape[1:]), "f8")
     offsets = np.arange(steps, dtype="i8") * shape[0]
     root.require_group(f"Steps/{kind}DataOffsets")[name] = offsets
     if kind == "Field":
@@ -115,23 +105,18 @@ def _field(root: h5py.Group, kind: str, name: str, steps: int, shape: tuple[int,
 def _write_displacements(root: h5py.Group, stored: Array, rows: Ints) -> None:
     """Point data: displacement (u, v, w), w alone, rotations (theta_x, theta_y)."""
     _, numnp, ndf = stored.shape
-    parts: dict[str, tuple[list[int], tuple[int, ...]]] = {
-        "displacement": ([0, 1, 2], (3,)),
-        "w": ([2], ()),
-        "rotation": (list(range(3, ndf)), (ndf - 3,)),
-    }
-    fields = {
-        name: _field(root, "Point", name, len(rows), (numnp, *width))
-        for name, (columns, width) in parts.items()
-        if columns
-    }
+    parts: dict[str, Any] = {"displacement": slice(3), "w": 2, "rotation": slice(3, ndf)}
+    one = np.empty((numnp, ndf))
+    fields = [
+        (_field(root, "Point", name, len(rows), one[:, columns].shape), columns)
+        for name, columns in parts.items()
+        if one[:, columns].size
+    ]
     block = max(1, BLOCK // (numnp * ndf))
     for start in range(0, len(rows), block):
         values = stored[rows[start : start + block]].reshape(-1, ndf)
-        for name, dataset in fields.items():
-            columns, width = parts[name]
-            part = values[:, columns].reshape(-1, *width)
-            dataset[start * numnp : start * numnp + len(part)] = part
+        for dataset, columns in fields:
+            dataset[start * numnp : start * numnp + len(values)] = values[:, columns]
 
 
 def _write_contact(root: h5py.Group, result: Result, steps: Ints) -> None:
@@ -158,12 +143,19 @@ def _write_strains(root: h5py.Group, result: Result, steps: Ints, note: Note) ->
     all_nodes = npt in NODAL_POINTS and not (elements[:, npt:] > 0).any()
     at_nodes = all_nodes and result.tape8.attributes.get("location") == "nodes"
     kind, length = ("Point", numnp) if at_nodes else ("Cell", len(elements))
+    there = elements[:, :npt] > 0
+    points = elements[:, :npt][there] - 1
+    shares = np.bincount(points, minlength=numnp)  # elements at each node
     for name in STRAINS:
         field = _field(root, kind, name, len(steps), (length,))
         values = result[f"tape8/{name}"]
         for number in range(len(steps)):
             row = values[at[number]] if shared[number] else np.full(values.shape[1:], np.nan)
-            step = _nodal_means(row, elements, numnp) if at_nodes else row.mean(axis=1)
+            if at_nodes:
+                own = row[:, : there.shape[1]][there]
+                step = np.bincount(points, weights=own, minlength=numnp) / shares
+            else:
+                step = row.mean(axis=1)
             field[number * length : (number + 1) * length] = step
 
 
@@ -177,10 +169,8 @@ def _rows_of(
     if not shared.any():
         note(f"{what} ({group}) and displacements (tape3) share no step; {what} are omitted")
     elif not shared.all():
-        note(
-            f"{what} ({group}) were stored at {shared.sum()} of {len(steps)} time steps; at the "
-            "others they are NaN"
-        )
+        were = f"were stored at {shared.sum()} of {len(steps)} time steps"
+        note(f"{what} ({group}) {were}; at the others they are NaN")
     return at, shared
 
 
@@ -214,12 +204,3 @@ def _largest(row: Array) -> Array:
     found = flat[np.arange(len(flat)), place]
     ply = place // (flat.shape[1] // values.shape[1]) + 1.0
     return np.stack([found, np.where(np.isnan(found), np.nan, ply)])
-
-
-def _nodal_means(row: Array, elements: Array, numnp: int) -> Array:
-    """Mean over the elements at each node, (numnp,)."""
-    width = min(row.shape[1], elements.shape[1])
-    nodes, values = elements[:, :width], row[:, :width]
-    there = nodes > 0
-    sums = np.bincount(nodes[there] - 1, weights=values[there], minlength=numnp)
-    return np.asarray(sums / np.bincount(nodes[there] - 1, minlength=numnp))
