@@ -1,10 +1,10 @@
 """Checkpoints: the complete state of a run, stored beside its result.
 
-There are two files.  The checkpoint holds the state; it is written under another name, synced and
-renamed.  The spool holds the operations on the result file so far, each a line of JSON, followed by
-the bytes of its rows if it has any; it only grows, and repeating them gives a file of the same
-bytes.  A checkpoint names its part of the spool by length and checksum, so that the last checkpoint
-is valid however a run ends.  A resumed run gives the same bytes as an uninterrupted one.
+The checkpoint holds the state; it is written under another name, synced and renamed.  The spool
+holds the operations on the result file so far, each a line of JSON, followed by the bytes of its
+rows if it has any; it only grows, and repeating them gives a file of the same bytes.  A checkpoint
+names its part of the spool by length and checksum, so that the last checkpoint is valid however a
+run ends.  A resumed run gives the same bytes as an uninterrupted one.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ import contextlib
 import os
 import time
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecm._errors import FecmError
 from fecm._files import beside, naming, open_ordinary, packed, sync
+from fecm._typing import Array
 from fecm._version import __version__
 from fecm.results.hdf5_writer import FileSink
 from fecm.results.schema import DATASETS
 from fecm.simulation.simulation import Simulation
 
-FORMAT = 2
+FORMAT = 3
 CHUNK = 1_000_000  # bytes read at once when a spool is checked
 
 
@@ -46,32 +46,22 @@ def spool_of(result: Path) -> Path:
 
 
 def identity(simulation: Simulation) -> dict[str, Any]:
-    """Properties that a run and its checkpoint must have in common."""
+    """Properties that a run and its checkpoint must have in common, by what differs otherwise."""
     import hashlib
 
     deck, options = simulation.problem.deck, simulation.options
     text = deck.text or deck.to_text()
     return {
-        "format": FORMAT,
-        "version": __version__,
-        "deck": hashlib.sha256(text.encode()).hexdigest(),
-        "slips": sorted(options.slips),
-        "solver": simulation.model.motion.solver,
-        "rod": [options.rod_method.mass, options.rod_method.integrator],
-        "printed": simulation.printer.is_on,
-    }
-
-
-# Messages if they differ.
-_NAMES = {
-    "format": "another kind of checkpoint",
-    "version": "another version of fecm",
-    "deck": "another deck",
-    "slips": "another mode or other slips",
-    "solver": "another solver",
-    "rod": "another mass matrix or integrator of the rod",
-    "printed": "a run with another choice of --print",
-}
+        "another kind of checkpoint": FORMAT,
+        "another version of fecm": __version__,
+        "another deck": hashlib.sha256(text.encode()).hexdigest(),
+        "another mode or other slips": sorted(options.slips),
+        "another solver": simulation.model.motion.solver,
+        "another mass matrix or integrator of the rod": [
+            options.rod_method.mass, options.rod_method.integrator
+        ],
+        "a run with another choice of --print": simulation.printer.is_on,
+    }  # fmt: skip
 
 
 class Checkpointer:
@@ -123,25 +113,26 @@ class Checkpointer:
 
         The next call overwrites them unless a checkpoint names them.
         """
+        import json
+
         self._sink.check()
         length, checksum = self._spooled
         file.truncate(length)
         file.seek(length)
         for entry in self._new:
-            for data in self._data(entry):
+            about, rows = entry, np.empty(0)
+            if entry["do"] == "write":
+                stop = entry["start"] + entry["rows"]
+                rows = np.ascontiguousarray(self._sink.arrays[entry["path"]][entry["start"] : stop])
+                about = {**entry, "dtype": rows.dtype.str, "shape": rows.shape}
+            # With NumPy's numbers and arrays as Python's.
+            line = json.dumps(about, default=lambda value: value.tolist()).encode() + b"\n"
+            for data in (line, rows.data):
                 file.write(data)
                 checksum = zlib.crc32(data, checksum)
         file.flush()
         sync(file.fileno())
         return file.tell(), checksum
-
-    def _data(self, entry: dict[str, Any]) -> list[bytes | memoryview]:
-        """Return the line of an operation and its rows, if any."""
-        if entry["do"] != "write":
-            return [_line(entry)]
-        stop = entry["start"] + entry["rows"]
-        rows = np.ascontiguousarray(self._sink.arrays[entry["path"]][entry["start"] : stop])
-        return [_line({**entry, "dtype": rows.dtype.str, "shape": rows.shape}), rows.data.cast("B")]
 
     def restore(self, simulation: Simulation) -> None:
         """Set a new simulation and its result to the state of the checkpoint.
@@ -151,11 +142,11 @@ class Checkpointer:
         """
         with self._reading():
             about, arrays = self._read()
-            theirs, ours = about["identity"], identity(simulation)
-            for name, value in ours.items():
-                if theirs.get(name) != value:
-                    which = f" ({theirs['version']}, not {value})" if name == "version" else ""
-                    raise CheckpointError(f"{self._checkpoint} belongs to {_NAMES[name]}{which}")
+            theirs = about["identity"]
+            for what, value in identity(simulation).items():
+                if theirs.get(what) != value:
+                    which = f" ({theirs[what]}, not {value})" if value == __version__ else ""
+                    raise CheckpointError(f"{self._checkpoint} belongs to {what}{which}")
             part = about["spool"]
             spooled = part["length"], part["checksum"]
         with naming(self._spool), open_ordinary(self._spool) as file:
@@ -165,7 +156,7 @@ class Checkpointer:
         with self._reading():
             simulation.restore({**about["values"], **arrays})
 
-    def _read(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    def _read(self) -> tuple[dict[str, Any], dict[str, Array]]:
         """JSON values and arrays of the checkpoint."""
         import json
         import zipfile
@@ -186,7 +177,11 @@ class Checkpointer:
         """Repeat the operations of the first part of a spool on the result."""
         import json
 
-        if _checksum(file, length) != checksum:
+        found, left = 0, length
+        while left > 0 and (data := file.read(min(left, CHUNK))):
+            found = zlib.crc32(data, found)
+            left -= len(data)
+        if found != checksum:
             raise CheckpointError(f"{self._spool} is damaged, or was written by another run")
         file.seek(0)
         while file.tell() < length:
@@ -227,19 +222,3 @@ class Checkpointer:
         """Delete the checkpoint."""
         self._checkpoint.unlink(missing_ok=True)
         self._spool.unlink(missing_ok=True)
-
-
-def _checksum(file: BinaryIO, length: int) -> int:
-    """CRC of the first `length` bytes, or of all if there are fewer."""
-    checksum = 0
-    while length > 0 and (data := file.read(min(length, CHUNK))):
-        checksum = zlib.crc32(data, checksum)
-        length -= len(data)
-    return checksum
-
-
-def _line(entry: Mapping[str, Any]) -> bytes:
-    """An operation in JSON, with NumPy's numbers and arrays as Python's."""
-    import json
-
-    return json.dumps(entry, default=lambda value: value.tolist()).encode() + b"\n"

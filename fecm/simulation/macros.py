@@ -21,8 +21,6 @@ from fecm.simulation.interpreter import Action, EndedError, Passes
 from fecm.simulation.recorder import Steps, Times
 from fecm.simulation.simulation import Simulation
 
-# Time and loads ----------------------------------------------------------------------------------
-
 
 def set_time_step(run: Simulation, dt: float) -> None:
     """DT; 0 takes a fraction of the critical time step."""
@@ -57,8 +55,6 @@ def proportional_load(run: Simulation, n: float) -> None:
 
 FIELDS = 4_000_000  # numbers of the displacement fields that one call of the kernels stores
 
-# Time steps --------------------------------------------------------------------------------------
-
 
 def impact_step(run: Simulation, n: int) -> None:
     """RODP: one impact step; contact and strains at every N-th."""
@@ -71,10 +67,9 @@ def impact_step(run: Simulation, n: int) -> None:
         state.prop_force = None  # the listing's first impact step begins with PROP = 0
     stores = not (plate.step + 1) % n
     if "counter" in slips:
-        state.steps_since_output += 1
-        stores = state.steps_since_output == n
-        if state.steps_since_output >= n:
-            state.steps_since_output = 0
+        steps = state.steps_since_output + 1
+        stores = steps == n
+        state.steps_since_output = steps if steps < n else 0
     if stores and "tapes" in slips:  # strains one step late
         recorder.strains([plate.step + 1], [plate.time], run.displacement_field()[None])
     system.advance(impact, state.dt, run.force_factor(), state.prop_force)
@@ -91,8 +86,8 @@ def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
     Returns False where a single step has to be taken: the first one, one with another DT, and that
     of the last pass.
     """
-    state, impact, steps = run.state, run.state.impact, run.model.steps
-    plate = state.plate
+    state, plate, steps = run.state, run.state.plate, run.model.steps
+    impact, recorder = state.impact, run.recorder
     if impact is None or steps is None or not plate.step:
         return False
     if plate.dt != state.dt or plate.dt2 != state.dt * state.dt:
@@ -114,15 +109,13 @@ def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
     found = steps.take(impact, state.dt, count, stored)
     if any(item.word == "TIME" for item in macros):
         state.clock = float(np.add.accumulate([state.clock, *[state.dt] * count])[-1])
-    recorder = run.recorder
-    recorder.steps.add(plate, found.columns, found.strains, stored[due["RODP"][stored]])
+    recorder.steps.add(plate, found.columns, found.strains, due["RODP"][:count])
     for word, at in due.items():
         chosen = at[stored]
         if chosen.any():
             fields = found.fields if chosen.all() else found.fields[chosen]
             at_steps = found.columns["step"][stored[chosen]].astype(int).tolist()
-            times = found.columns["time"][stored[chosen]].tolist()
-            STORING[word](run, at_steps, times, fields)
+            STORING[word](run, at_steps, found.columns["time"][stored[chosen]].tolist(), fields)
     run.interpreter.skip(count)
     run.observe()
     return True
@@ -138,9 +131,6 @@ def central_difference(run: Simulation) -> None:
     state.load_clock = state.clock
     run.recorder.steps.step(plate, state.impact, run.force_factor())
     run.observe()
-
-
-# Statics and modes -------------------------------------------------------------------------------
 
 
 def form_tangent(run: Simulation) -> None:
@@ -160,23 +150,13 @@ def solve(run: Simulation) -> None:
         return
     change = run.tangent.solve(state.residual)
     run.model.motion.displace(state.plate, change)
-    size = float(np.linalg.norm(state.plate.displacement))
-    state.converged = float(np.linalg.norm(change)) <= state.tolerance * size
+    limit = state.tolerance * float(np.linalg.norm(state.plate.displacement))
+    state.converged = float(np.linalg.norm(change)) <= limit
 
 
-def set_tolerance(run: Simulation, tolerance: float) -> None:
-    """TOL."""
-    run.state.tolerance = tolerance
-
-
-def leave_if_converged(run: Simulation) -> bool:
-    """CONV: leave the loop if the last SOLV met the tolerance."""
-    return run.state.converged
-
-
-def form_mass(run: Simulation, *, consistent: bool) -> None:
-    """LMAS and CMAS."""
-    run.state.consistent_mass = consistent
+def set_state(name: str, run: Simulation, value: object) -> None:
+    """LMAS, CMAS and TOL: set a field of the state."""
+    setattr(run.state, name, value)
 
 
 def find_modes(run: Simulation, n: int) -> None:
@@ -188,9 +168,6 @@ def find_modes(run: Simulation, n: int) -> None:
         columns = {"number": mode, "angular_frequency": omega, "shape": plate.field(shape, 0.0)}
         run.recorder.row("modes", state.plate.step, state.plate.time, columns)
     run.printer.modes(found.angular_frequency)
-
-
-# Output ------------------------------------------------------------------------------------------
 
 
 def _at_passes(word: str, run: Simulation, n: int) -> None:
@@ -245,8 +222,7 @@ def store_stresses(run: Simulation, n: int) -> None:
     plate, points = run.state.plate, run.model.stress_points
     values = strains_and_resultants(points, run.model.plate.laminate, run.displacement_field())
     run.recorder.row("stresses", plate.step, plate.time, values)
-    places = points.places(run.problem.mesh.coordinates)
-    run.printer.stresses(values, places, run.state.clock)
+    run.printer.stresses(values, points.places(run.problem.mesh.coordinates), run.state.clock)
 
 
 def check(run: Simulation) -> None:
@@ -263,13 +239,13 @@ ACTIONS: dict[str, Callable[..., bool | None]] = {
     "DT": set_time_step,
     "TIME": advance_clock,
     "PROP": proportional_load,
-    "LMAS": partial(form_mass, consistent=False),
-    "CMAS": partial(form_mass, consistent=True),
+    "LMAS": partial(set_state, "consistent_mass", value=False),
+    "CMAS": partial(set_state, "consistent_mass", value=True),
     "TANG": form_tangent,
     "FORM": form_residual,
     "SOLV": solve,
-    "TOL": set_tolerance,
-    "CONV": leave_if_converged,
+    "TOL": partial(set_state, "tolerance"),
+    "CONV": lambda run: run.state.converged,  # leaves the loop if the last SOLV met the tolerance
     "REAC": store_reactions,
     "EIGE": find_modes,
     "EXCD": central_difference,
@@ -284,19 +260,17 @@ def bind_loop(run: Simulation, body: Body) -> Passes | None:
     """Return what carries out passes of a loop together; None if its macros need single steps."""
     macros = [item for item in body if isinstance(item, Macro)]
     words = [macro.word for macro in macros]
-    if len(macros) < len(body) or words.count("RODP") != 1 or len(set(words)) < len(words):
+    if run.model.steps is None or run.options.slips or len(macros) < len(body):
+        return None
+    if words.count("RODP") != 1 or len(set(words)) < len(words):
         return None
     first = words.index("RODP")
-    if not {"TIME", *AT_PASSES}.issuperset(words[:first] + words[first + 1 :]):
-        return None
-    if run.model.steps is None or run.options.slips or set(AT_PASSES).intersection(words[:first]):
-        return None
-    return partial(impact_steps, run, macros)
+    if {*words[:first]} <= {"TIME"} and {*words[first + 1 :]} <= {"TIME", *AT_PASSES}:
+        return partial(impact_steps, run, macros)
+    return None
 
 
 def bind(run: Simulation, macro: Macro) -> Action:
     """Return the action of a macro."""
-    action = ACTIONS[macro.word]
-    if WORDS[macro.word].value:
-        return partial(action, run, number(macro))
-    return partial(action, run)
+    values = [number(macro)] if WORDS[macro.word].value else []
+    return partial(ACTIONS[macro.word], run, *values)

@@ -46,14 +46,11 @@ class Printer:
         if self._file is not None:
             self._file.flush()
             text = Path(self._file.name).read_text(encoding="utf-8")
-        return {
-            "title": self._title, "control": self._control, "pages": self._pages, "text": text
-        }  # fmt: skip
+        return {"head": (self._title, self._control, self._pages), "text": text}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Print again what was printed up to a :meth:`state`."""
-        self._title, self._control = state["title"], state["control"]
-        self._pages = state["pages"]
+        self._title, self._control, self._pages = state["head"]
         if self._file is not None:
             self._file.write(state["text"])
 
@@ -72,20 +69,17 @@ class Printer:
         """A table of right-aligned columns."""
         self._write(map(_row, itertools.chain([names], rows, [()])))
 
-    # Input ---------------------------------------------------------------------------------------
-
     def problem(self, deck: model.Deck, mesh: Mesh, plate: PlateModel) -> None:
         """Echo a problem: control, segments in the deck's order, equations, macro program."""
         if not self.is_on:
             return
         self._title = deck.title
-        names = (
-            "Nodes", "Elements", "Layers", "Dimensions of space", "Dofs per node",
-            "Largest number of nodes",
-        )  # fmt: skip
         c = deck.control
-        counts = (c.numnp, c.numel, c.layers, c.ndm, c.ndf, c.nen)
-        self._page("Control information", _values(dict(zip(names, counts, strict=True))))
+        counts = {
+            "Nodes": c.numnp, "Elements": c.numel, "Layers": c.layers,
+            "Dimensions of space": c.ndm, "Dofs per node": c.ndf, "Largest number of nodes": c.nen,
+        }  # fmt: skip
+        self._page("Control information", _values(counts))
         echo = True
         for segment in deck.segments:
             if isinstance(segment, model.PrintOption):
@@ -158,13 +152,11 @@ class Printer:
         for macro in deck.macros:
             depth -= macro.word == "NEXT"
             value = f"{macro.value:g}" if macro.value else ""
-            indent = "  " * max(0, depth)
+            word = "  " * max(0, depth) + macro.word
             meaning = WORDS[macro.word].meaning if macro.word in WORDS else ""
-            self._write([f"  {indent + macro.word:16}{value:>12}   {meaning}"])
+            self._write([f"  {word:16}{value:>12}   {meaning}"])
             depth += macro.word == "LOOP"
         self._write([""])
-
-    # Output --------------------------------------------------------------------------------------
 
     def displacements(self, field: Floats, time: float) -> None:
         """Displacements of every node."""
@@ -198,9 +190,9 @@ class Printer:
     def modes(self, angular_frequency: Floats) -> None:
         """Natural frequencies."""
         omega = angular_frequency
-        rows = _numbered(np.column_stack([omega**2, omega, omega / (2.0 * np.pi)]))
+        rows = np.column_stack([omega**2, omega, omega / (2.0 * np.pi)])
         self._page("Natural modes")
-        self._table(("mode", "eigenvalue", "angular", "frequency"), rows)
+        self._table(("mode", "eigenvalue", "angular", "frequency"), _numbered(rows))
 
     def check(self, plate: PlateModel, profile: int) -> None:
         """Mesh and storage."""

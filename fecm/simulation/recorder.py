@@ -10,9 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fecm._typing import Floats
+from fecm._typing import Array, Floats
 from fecm.deck.macros import WorkEstimate
 from fecm.mechanics.failure import CRITERIA, MODES
 from fecm.mechanics.impact import ImpactState
@@ -21,23 +20,21 @@ from fecm.mechanics.ply_stresses import FailureEnvelope
 from fecm.mechanics.projectile import Rod
 from fecm.mechanics.strains import STRAINS
 from fecm.problem.build import ImpactModel
-from fecm.results.schema import CONTACT, DATASETS, FIXED, INTERLAMINAR, Dataset
+from fecm.results.schema import CONTACT, DATASETS, FIXED, INTERLAMINAR, STORED_BY, Dataset
 from fecm.results.sinks import RowBuffer, Sink
 
-# Of rows.
-Steps = Sequence[int]
+Steps = Sequence[int]  # of rows
 Times = Sequence[float]
-
 FAILURE = ("failure", INTERLAMINAR, *(f"failure/{name}" for name in CRITERIA))
-DAMPING_WORK = "energy/damping_work"
 BUFFERED = ("tape3", "tape8", "stresses", "plies", "reactions", "modes")
 BLOCK = 1024
 SCALARS = (
     "step", "time", "plate_kinetic", "plate_strain", "external_work",
-    "force", "indentation", "plate_w", "contact_work", "displacement",
+    "force", "indentation", "plate_w", "contact_work", "displacement", "on_tape9",
 )  # fmt: skip
 # Those that follow from the motion of the projectile.
 PROJECTILE = ("velocity", "acceleration", "projectile_kinetic", "projectile_strain", "station")
+NAMES = (*SCALARS, *PROJECTILE)
 OnBlock = Callable[[Mapping[str, Floats], float], object]
 
 
@@ -52,33 +49,30 @@ class StepRecorder:
         self, sink: Sink, model: ImpactModel, all_contact: bool, on_block: OnBlock
     ) -> None:
         self._sink = sink
-        self._motion = model.motion
-        self._impact = impact = model.impact
+        self._motion, self._impact, self._station = model.motion, model.impact, model.station
         self._on_block = on_block
         self._all_contact = all_contact
-        self._table = np.zeros((len(SCALARS) + len(PROJECTILE), BLOCK))
-        # Rows of the table, and those whose projectile's columns are known.
-        self._count = self._known = 0
-        self._contact_rows: list[int] = []
-        self._stored = self._tape9_rows = 0
-        self._station = model.station
-        self._rod = np.empty((0, 3, 0))
-        if impact is not None:
-            self._rod = np.empty((BLOCK, 3, len(impact.rod_mass)))
         self._gages: DofSums | None = None
-        self._strains = np.empty((0, 0))
+        gages = 0
+        self.rows = {"energy": 0, "tape9": 0}  # stored so far in each group
+        if model.impact is not None:
+            self._rod = np.empty((BLOCK, 3, len(model.impact.rod_mass)))
+            self.rows["history"] = 0
         if model.gages is not None:
             self._gages = model.motion.dof_sums(model.gages.dof_indices, model.gages.weights)
-            self._strains = np.empty((BLOCK, len(model.gages.numbers)))
+            gages = len(model.gages.numbers)
+            self.rows["gages"] = 0
+        # The names, then the gages' strains, of the steps that are not stored yet.
+        self._table = np.zeros((len(NAMES) + gages, BLOCK))
+        self._count = self._known = 0  # of these steps, and those with the projectile's columns
         self.initial = 0.0
         self._damped = (0.0, 0.0, 0.0)  # last time, power and work of the damping
 
     def begin(self, plate: PlateState, impact: ImpactState | None) -> None:
         """Store the energy before the first step (force*length)."""
-        energy = plate.strain_energy
+        self.initial = float(plate.strain_energy)
         if self._impact is not None and impact is not None:
-            energy += float(self._impact.rod.kinetic_energy(impact.rod.velocity[None])[0])
-        self.initial = float(energy)
+            self.initial += float(self._impact.rod.kinetic_energy(impact.rod.velocity[None])[0])
         self._sink.attributes("energy", {"initial": self.initial})
 
     def step(
@@ -97,44 +91,33 @@ class StepRecorder:
         if self._impact is not None and impact is not None:
             applied = self._impact.applied(impact)
         kinetic = self._motion.kinetic_energy(plate, factor, applied)
-        strain = plate.strain_energy
-        own = (plate.step, plate.time, kinetic, strain, plate.external_work)
+        row: tuple[float, ...]
+        row = plate.step, plate.time, kinetic, plate.strain_energy, plate.external_work
         if self._gages is not None:
-            self._strains[self._count] = self._gages.evaluate(plate, factor)
-        if impact is None:
-            self._table[: len(own), self._count] = own
-        else:
+            self._table[len(NAMES) :, self._count] = self._gages.evaluate(plate, factor)
+        if impact is not None:
             self._rod[self._count] = impact.rod.motion
-            if contact_row or self._all_contact:
-                self._contact_rows.append(self._count)
             indentation, force = impact.contact
-            hit = (force, indentation, impact.plate_w, impact.contact_work, impact.rod.tip)
-            self._table[: len(SCALARS), self._count] = (*own, *hit)
+            row += (force, indentation, impact.plate_w, impact.contact_work, impact.rod.tip)
+            row += (contact_row or self._all_contact,)
+        self._table[: len(row), self._count] = row
         self._count += 1
         if self._count == BLOCK:
             self.flush()
 
     def add(
-        self,
-        plate: PlateState,
-        columns: Mapping[str, Floats],
-        strains: Floats,
-        contact_rows: NDArray[np.intp],
+        self, plate: PlateState, columns: Mapping[str, Floats], strains: Floats, on_tape9: Array
     ) -> None:
         """Add rows for many steps, and the contact of some of them to tape9."""
-        given = {**columns, "external_work": np.full(len(strains), plate.external_work)}
-        values = np.array([given[name] for name in (*SCALARS, *PROJECTILE)])
-        done = 0
-        while done < len(strains):
+        work = np.full(len(strains), plate.external_work)
+        given = {**columns, "external_work": work, "on_tape9": on_tape9}
+        values = np.vstack([*(given[name] for name in NAMES), strains.T])
+        while values.size:
             self._add_projectile()
-            count = min(BLOCK - self._count, len(strains) - done)
-            rows = slice(self._count, self._count + count)
-            self._table[:, rows] = values[:, done : done + count]
-            self._strains[rows] = strains[done : done + count] if self._gages is not None else 0.0
-            inside = contact_rows[(contact_rows >= done) & (contact_rows < done + count)]
-            self._contact_rows += (inside - done + self._count).tolist()
+            part, values = np.split(values, [BLOCK - self._count], axis=1)
+            rows = slice(self._count, self._count + part.shape[1])
+            self._table[:, rows] = part
             self._count = self._known = rows.stop
-            done += count
             if self._count == BLOCK:
                 self.flush()
 
@@ -142,22 +125,15 @@ class StepRecorder:
         """Rows that are not stored yet, and how many are."""
         self._add_projectile()
         return {
-            "rows": self._table[:, : self._count].copy(),
-            "contact": list(self._contact_rows),
-            "strains": self._strains[: self._count].copy(),
-            "stored": self._stored,
-            "tape9": self._tape9_rows,
-            "initial": self.initial,
-            "damped": self._damped,
-        }
+            "rows": self._table[:, : self._count].copy(), "stored": dict(self.rows),
+            "initial": self.initial, "damped": self._damped,
+        }  # fmt: skip
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from a :meth:`state`."""
         self._count = self._known = state["rows"].shape[1]
         self._table[:, : self._count] = state["rows"]
-        self._contact_rows = list(state["contact"])
-        self._strains[: self._count] = state["strains"]
-        self._stored, self._tape9_rows = state["stored"], state["tape9"]
+        self.rows.update(state["stored"])
         self.initial, self._damped = state["initial"], tuple(state["damped"])
 
     def flush(self) -> None:
@@ -167,7 +143,7 @@ class StepRecorder:
             return
         self._add_projectile()
         columns = self._table[:, :count].copy()
-        table = dict(zip((*SCALARS, *PROJECTILE), columns, strict=True))
+        table = dict(zip(NAMES, columns, strict=False))
         if self._impact is not None:
             table["transducer"] = self._transducer(table["force"], table["station"])
         table["held_energy"] = (
@@ -178,19 +154,17 @@ class StepRecorder:
         if self._motion.damping:
             self._add_damping(table)
         self._on_block(table, self.initial)
-        table["strain"] = self._strains[:count]
-        groups = self.rows.keys() - {"tape9"}
+        table["strain"] = columns[len(NAMES) :].T
         for dataset in DATASETS.values():
-            if dataset.group in groups and dataset.shape[0] == "rows" and dataset.name in table:
-                self._sink.write(dataset.path, self._stored, table[dataset.name])
-        rows = np.array(self._contact_rows, dtype=int)
-        if len(rows):
+            if dataset.group in self.rows.keys() - {"tape9"} and dataset.name in table:
+                self._sink.write(dataset.path, self.rows["energy"], table[dataset.name])
+        (on_tape9,) = np.nonzero(table["on_tape9"])
+        if len(on_tape9):
             for name in ("step", "time", *CONTACT):
-                self._sink.write(f"tape9/{name}", self._tape9_rows, table[name][rows])
-            self._tape9_rows += len(rows)
-        self._stored += count
+                self._sink.write(f"tape9/{name}", self.rows["tape9"], table[name][on_tape9])
+        for group in self.rows:
+            self.rows[group] += len(on_tape9) if group == "tape9" else count
         self._count = self._known = 0
-        self._contact_rows.clear()
 
     def _add_damping(self, table: dict[str, Floats]) -> None:
         """Add the work of damping: its power v C v is 2 a times the plate's kinetic energy."""
@@ -210,28 +184,17 @@ class StepRecorder:
         u, v, a = self._rod[rows].swapaxes(0, 1)
         u[:, 0] = 0.0  # displacements are relative to the tip
         rod = self._impact.rod
-        self._table[len(SCALARS) :, rows] = (
+        self._table[len(SCALARS) : len(NAMES), rows] = (
             v[:, 0], a[:, 0], rod.kinetic_energy(v), rod.strain_energy(u), u[:, self._station.dof],
         )  # fmt: skip
 
     def _transducer(self, force: Floats, deformation: Floats) -> Floats:
         """Force at the transducer: E A du/dx of its node; the contact force on a rigid mass."""
-        node, sign = self._station.node, self._station.sign
-        if self._impact is None or not isinstance(self._impact.rod, Rod):
+        sign, rod = self._station.sign, self._impact and self._impact.rod
+        if not isinstance(rod, Rod):
             return -sign * force
-        rod = self._impact.rod
-        area = float(rod.areas[min(node, rod.elements) - 1])
+        area = float(rod.areas[min(self._station.node, rod.elements) - 1])
         return sign * rod.modulus * area * deformation
-
-    @property
-    def rows(self) -> dict[str, int]:
-        """Rows stored in each group."""
-        rows = {"energy": self._stored, "tape9": self._tape9_rows}
-        if self._impact is not None:
-            rows["history"] = self._stored
-        if self._gages is not None:
-            rows["gages"] = self._stored
-        return rows
 
 
 class Recorder:
@@ -248,37 +211,30 @@ class Recorder:
         self._sink = sink
         self._model = model
         self.steps = StepRecorder(sink, model, all_contact, on_block)
-        self._room = self._rows_to_come(sizes, all_contact)
+        has_impact = model.impact is not None
+        self._room = {  # upper bound of the rows of each group
+            **{group: sizes.passes[STORED_BY[group]] for group in BUFFERED},
+            "tape8": has_impact * sizes.contact_rows,
+            "tape9": has_impact * (sizes.steps if all_contact else sizes.contact_rows),
+            "history": has_impact * sizes.steps,
+            "energy": sizes.steps,
+            "gages": (model.gages is not None) * sizes.steps,
+            **dict.fromkeys(FAILURE, int(model.failure is not None)),
+            "patch": int(model.patch is not None),
+        }
         self._datasets = [
             (dataset, self._shape(dataset))
             for dataset in DATASETS.values()
             if self._room.get(dataset.group) != 0
-            if dataset.path != DAMPING_WORK or model.motion.damping
+            and (dataset.path != "energy/damping_work" or model.motion.damping)
         ]
         self._buffers: dict[str, RowBuffer] = {}
+        self._parts: dict[str, StepRecorder | RowBuffer] = {"steps": self.steps}
         for group in BUFFERED:
             members = [p for p in self._datasets if p[0].group == group and p[0].shape[0] == "rows"]
             if members:
-                self._buffers[group] = RowBuffer(sink, *zip(*members, strict=True))
-
-    def _rows_to_come(self, sizes: WorkEstimate, all_contact: bool) -> dict[str, int]:
-        """Upper bound of the rows of each group."""
-        has_impact = self._model.impact is not None
-        contact_rows = sizes.steps if all_contact else sizes.contact_rows
-        return {
-            "tape3": sizes.passes["DISP"],
-            "tape8": sizes.contact_rows if has_impact else 0,
-            "tape9": contact_rows if has_impact else 0,
-            "history": sizes.steps if has_impact else 0,
-            "energy": sizes.steps,
-            "gages": sizes.steps if self._model.gages is not None else 0,
-            "stresses": sizes.passes["STRE"],
-            "plies": sizes.passes["PLYS"],
-            **dict.fromkeys(FAILURE, int(self._model.failure is not None)),
-            "patch": int(self._model.patch is not None),
-            "reactions": sizes.passes["REAC"],
-            "modes": sizes.passes["EIGE"],
-        }
+                buffer = RowBuffer(sink, *zip(*members, strict=True))
+                self._buffers[group] = self._parts[f"rows/{group}"] = buffer
 
     def _shape(self, dataset: Dataset) -> tuple[int, ...]:
         """Shape of a dataset with all its rows."""
@@ -308,7 +264,7 @@ class Recorder:
         model, mesh, laminate = self._model, self._model.plate.mesh, self._model.plate.laminate
         for dataset, shape in self._datasets:
             self._sink.create(dataset, shape)
-        constants: dict[str, NDArray[Any]] = {
+        constants: dict[str, Array] = {
             **{f"mesh/{n}": getattr(mesh, n) for n in ("coordinates", "elements", "equations")},
             **{f"laminate/{n}": getattr(laminate, n) for n in ("A", "B", "D", "shear")},
         }
@@ -342,9 +298,7 @@ class Recorder:
         rows = {name: np.asarray(value)[None] for name, value in columns.items()}
         self.rows(group, [step], [time], rows)
 
-    def rows(
-        self, group: str, steps: Steps, times: Times, columns: Mapping[str, NDArray[Any]]
-    ) -> None:
+    def rows(self, group: str, steps: Steps, times: Times, columns: Mapping[str, Array]) -> None:
         """Store rows of a group, the first axis of every array."""
         own = {"step": np.array(steps), "time": np.array(times)}
         self._buffers[group].put({**own, **columns})
@@ -356,25 +310,23 @@ class Recorder:
 
     def state(self) -> dict[str, Any]:
         """Rows that are not stored yet, for :meth:`restore`."""
-        state = {f"steps/{name}": value for name, value in self.steps.state().items()}
-        for group, buffer in self._buffers.items():
-            state |= {f"rows/{group}/{name}": value for name, value in buffer.state().items()}
-        return state
+        return {
+            f"{path}/{name}": value
+            for path, part in self._parts.items()
+            for name, value in part.state().items()
+        }
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from a :meth:`state`."""
-        self.steps.restore(subset(state, "steps/"))
-        for group, buffer in self._buffers.items():
-            buffer.restore(subset(state, f"rows/{group}/"))
+        for path, part in self._parts.items():
+            part.restore(subset(state, f"{path}/"))
 
     def failure(self, found: FailureEnvelope) -> None:
         """Store the largest exposures of FAIL."""
-        groups = [(f"failure/{name}", n) for n, name in enumerate(CRITERIA)]
         for part in ("exposure", "time", "mode"):
-            for group, n in groups:
-                values = getattr(found.plies, part)[n]
-                shape = self._shape(DATASETS[f"{group}/{part}"])
-                self._sink.write(f"{group}/{part}", 0, values.reshape(shape))
+            for name, values in zip(CRITERIA, getattr(found.plies, part), strict=True):
+                path = f"failure/{name}/{part}"
+                self._sink.write(path, 0, values.reshape(self._shape(DATASETS[path])))
             self._sink.write(f"{INTERLAMINAR}/{part}", 0, getattr(found.interfaces, part))
 
     def finish(self) -> None:

@@ -79,18 +79,15 @@ def run(simulation: Simulation) -> None:
 
 def _likely_cause(problem: Problem, model: ImpactModel, dt: float) -> str:
     """Explain a divergence, as far as the time step does."""
+    plate = model.motion.plate
     try:
-        plate = model.motion.plate
         critical = critical_time_step(plate)
         contact = contact_step(problem, plate, dt, critical)
     except UnsoundPlateError as error:
         return str(error)
-    above = dt > critical
-    cause = (
-        f"DT = {dt:.4g} is {'above' if above else 'below'} the plate's critical time step "
-        f"{critical:.4g}"
-    )
-    if above:
+    side = "above" if dt > critical else "below"
+    cause = f"DT = {dt:.4g} is {side} the plate's critical time step {critical:.4g}"
+    if dt > critical:
         return cause
     if contact is not None and dt >= contact.limit:
         return (
@@ -134,47 +131,36 @@ def _write_footer(simulation: Simulation) -> None:
     state, threshold = simulation.state, simulation.problem.threshold
     if threshold is not None:
         values = {
-            "force": threshold.force, "d_star": threshold.rigidity, "time": state.crossing,
-            "margin": 1.0 - state.peak_force / threshold.force,
+            "force": threshold.force, "d_star": threshold.rigidity, "time": state.verdict.crossing,
+            "margin": 1.0 - state.verdict.peak_force / threshold.force,
         }  # fmt: skip
         simulation.sink.attributes("threshold", values)
-    impact, system = simulation.state.impact, simulation.model.impact
-    if impact is None or system is None or not impact.plate.step:
-        return
-    values = {
-        "permanent_indentation": system.law.permanent(impact.memory, impact.contact),
-        "unsettled_steps": impact.unconverged_steps,
-    }
-    simulation.sink.attributes("history", values)
+    impact, system = state.impact, simulation.model.impact
+    if impact is not None and system is not None and impact.plate.step:
+        permanent = system.law.permanent(impact.memory, impact.contact)
+        values = {"permanent_indentation": permanent, "unsettled_steps": impact.unconverged_steps}
+        simulation.sink.attributes("history", values)
 
 
 def _judge(simulation: Simulation) -> None:
     """Store reasons to doubt the result, if there are any."""
     notes: list[str] = []
     state, enforced = simulation.state, not simulation.options.slips
-    error, step = state.balance.worst_error, state.balance.worst_step
+    error, step = state.verdict.worst_error, state.verdict.worst_step
     if error > ENERGY_WARNING:
-        why = "" if enforced else " (not a failure, as slips are active)"
-        notes.append(
-            f"the energy balance is off by {error:.2%} of the supplied energy, at step {step}{why}"
-        )
-    if state.impact is not None and state.impact.unconverged_steps and enforced:
-        notes.append(
-            f"the contact iteration did not converge in {state.impact.unconverged_steps} "
-            "steps; a smaller DT helps"
-        )
-    groups: dict[str, dict[str, Any]] = {
-        "": _units(simulation.problem.deck), "failure": {"modes": list(MODES)}
-    }  # fmt: skip
+        off = f"the energy balance is off by {error:.2%} of the supplied energy, at step {step}"
+        notes.append(off if enforced else f"{off} (not a failure, as slips are active)")
+    steps = state.impact.unconverged_steps if state.impact is not None else 0
+    if steps and enforced:
+        notes.append(f"the contact iteration did not converge in {steps} steps; a smaller DT helps")
+    units = _units(simulation.problem.deck)
+    groups: dict[str, dict[str, Any]] = {"": units, "failure": {"modes": list(MODES)}}
     result = Result(simulation.sink.arrays, {}, groups)
     notes += _warnings(simulation, result)
     if result.still_in_contact:
         notes.append(OPEN_END)
     if notes:
         simulation.sink.attributes("", {"notes": notes})
-
-
-# Assumptions of the theory ------------------------------------------------------------------------
 
 
 def _warnings(simulation: Simulation, result: Result) -> list[str]:
@@ -200,8 +186,7 @@ def _warnings(simulation: Simulation, result: Result) -> list[str]:
         for what, peaks, limit, shown, why in checks:
             value, time, x, y = max(peaks, default=(0.0, 0.0, 0.0, 0.0))
             if value > limit:
-                when = f"time {time:.6g} {clock}".rstrip()
-                at = f"at ({x:.6g}, {y:.6g}), {when}"
+                at = f"at ({x:.6g}, {y:.6g}), time {time:.6g} {clock}".rstrip()
                 found.append(f"the {what} reaches {shown(value)} {at}: beyond {why}")
     beyond = [e.criterion.replace("_", " ") for e in largest_exposures(result) if e.exposure > 1.0]
     if beyond:
@@ -226,11 +211,10 @@ def _rigid_deflections(mesh: Mesh) -> Floats:
     return np.linalg.qr(basis @ combined[:, resistance < 1e-9 * len(place)])[0]
 
 
-def _peak(values: Floats, times: Floats, x: Floats, y: Floats) -> Peak:
+def _peak(values: Floats, times: Floats, x: Any, y: Any) -> Peak:
     """The largest of values, (rows, ...), at places (...)."""
-    row, *place = np.unravel_index(int(values.argmax()), values.shape)
-    at = tuple(place)
-    return float(values[row, *at]), float(times[row]), float(x[at]), float(y[at])
+    row, *at = np.unravel_index(int(values.argmax()), values.shape)
+    return float(values[row, *at]), float(times[row]), float(x[*at]), float(y[*at])
 
 
 def _rows(result: Result, group: str, *names: str) -> Iterator[tuple[Floats, list[Floats]]]:
@@ -254,16 +238,23 @@ def _deflections(simulation: Simulation, result: Result, free: Floats) -> Iterat
             yield _peak(np.abs(w), times, *map(np.asarray, place))
 
 
+def _indentations(simulation: Simulation, result: Result) -> Iterator[Peak]:
+    """Peaks of the indentation in contact."""
+    place = simulation.problem.load_place
+    if place is not None:
+        for times, (force, alpha) in _rows(result, "history", "force", "indentation"):
+            yield _peak(np.where(force > 0.0, alpha, 0.0), times, *map(np.asarray, place))
+
+
 def _strains(simulation: Simulation, result: Result) -> Iterator[Peak]:
     """Peaks of the largest principal strain of both faces, away from the load, and of gages."""
     model, problem = simulation.model, simulation.problem
     half = model.plate.laminate.thickness / 2.0
     bending = ("kappa_x", "kappa_y", "kappa_xy")
-    for group, points, membrane in (
-        ("tape8", model.strains, ()),
-        ("stresses", model.stress_points, ("eps_xx", "eps_yy", "gamma_xy")),
-    ):
-        for times, values in _rows(result, group, *membrane, *bending):
+    both = ("eps_xx", "eps_yy", "gamma_xy", *bending)
+    stored = ("tape8", model.strains, bending), ("stresses", model.stress_points, both)
+    for group, points, names in stored:
+        for times, values in _rows(result, group, *names):
             sizes = [max(part.max(), -part.min()) for part in values]
             if sum(sizes[:-3]) + half * sum(sizes[-3:]) < STRAIN:
                 continue  # a bound, as few runs come near the limit
@@ -280,11 +271,3 @@ def _strains(simulation: Simulation, result: Result) -> Iterator[Peak]:
         x, y = np.array([(gage.x, gage.y) for gage in cards.records]).T
         for times, (strain,) in _rows(result, "gages", "strain"):
             yield _peak(np.abs(strain), times, x, y)
-
-
-def _indentations(simulation: Simulation, result: Result) -> Iterator[Peak]:
-    """Peaks of the indentation in contact."""
-    place = simulation.problem.load_place
-    if place is not None:
-        for times, (force, alpha) in _rows(result, "history", "force", "indentation"):
-            yield _peak(np.where(force > 0.0, alpha, 0.0), times, *map(np.asarray, place))

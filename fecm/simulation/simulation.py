@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
@@ -29,8 +29,8 @@ TOLERANCE = 1.0e-9  # relative change of the displacement below which CONV leave
 
 
 @dataclass
-class EnergyBalance:
-    """The energy balance of a run so far."""
+class Verdict:
+    """What the steps of a run say so far: energy balance, and contact force at the threshold."""
 
     # Largest and last work of the nodal forces, and its largest change in a step (force*length).
     largest_work: float = 0.0
@@ -38,22 +38,32 @@ class EnergyBalance:
     largest_jump: float = 0.0
     worst_error: float = 0.0  # largest error, relative to the supplied energy
     worst_step: int = 0  # its step
+    peak_force: float = 0.0  # largest contact force
+    crossing: float = math.nan  # when it first reached the delamination threshold
 
     def add(
-        self, block: Mapping[str, Floats], initial: float, *, limit: float | None = None
+        self,
+        block: Mapping[str, Floats],
+        initial: float,
+        limit: float | None,
+        threshold: Threshold | None,
     ) -> None:
-        """Add a block of steps; end the run if it diverges or exceeds the limit.
+        """Add a block of steps; `initial` is the energy before the first.
 
         The error is relative to the energy supplied up to the end of the block: in its first steps
         a load has done almost no work.  The work of one step is not counted as an error: the work
-        belongs to the step, the energies to its end.  `initial` is the energy before the first
-        step.  Without a limit only an energy that is not finite ends the run.  Raises
-        DivergenceError if the energy is not finite, or the error exceeds the limit.
+        belongs to the step, the energies to its end.  Raises DivergenceError if the energy is not
+        finite, or the error exceeds the limit, if there is one.
         """
         lost = ~np.isfinite(block["held_energy"])
         if lost.any():
             step = int(block["step"][np.flatnonzero(lost)[0]])
             raise DivergenceError(step, "the motion is no longer finite")
+        if threshold is not None:
+            self.peak_force = max(self.peak_force, float(block["force"].max()))
+            above = np.flatnonzero(block["force"] >= threshold.force)
+            if len(above) and math.isnan(self.crossing):
+                self.crossing = float(block["time"][above[0]])
         work = block["external_work"]
         self.largest_work = max(self.largest_work, float(np.abs(work).max()))
         jump = float(np.abs(np.diff(work, prepend=self.last_work)).max())
@@ -67,11 +77,11 @@ class EnergyBalance:
             self.worst_error, self.worst_step = float(error[row]), int(block["step"][row])
         if limit is not None and error[row] > limit:
             row = int(np.flatnonzero(error > limit)[0])
-            raise DivergenceError(
-                int(block["step"][row]),
+            reason = (
                 f"the energy balance is off by {error[row]:.2%} of the supplied energy, more than "
-                f"the limit of {limit:.3g}",
+                f"the limit of {limit:.3g}"
             )
+            raise DivergenceError(int(block["step"][row]), reason)
 
 
 @dataclass
@@ -82,45 +92,23 @@ class RunState:
     impact: ImpactState | None = None  # plate, projectile and contact; shares `plate`
     # The interpreter's position; empty before the first macro.
     position: list[tuple[int, int]] = field(default_factory=list)
-    # Time step, and the time that TIME advances.
-    dt: float = 0.0
-    clock: float = 0.0
+    dt: float = 0.0  # time step
+    clock: float = 0.0  # time that TIME advances
     load_clock: float = 0.0  # clock at the plate's last central difference
     constant_factor: float = 1.0  # load factor without a table
     table: int | None = None  # index of the current table of proportional loads
     tables_read: int = 0  # tables that PROP has read
     tolerance: float = TOLERANCE  # tolerance of CONV
     consistent_mass: bool = False  # whether CMAS came after LMAS
-    # Whether TANG was carried out; whether the last SOLV met the tolerance.
-    factorised: bool = False
-    converged: bool = False
+    factorised: bool = False  # whether TANG was carried out
+    converged: bool = False  # whether the last SOLV met the tolerance
     residual: Floats | None = None  # (neq,): load less internal force, formed by FORM
     steps_since_output: int = 0  # impact steps since the last output (the slip ``counter``)
-    # Value of PROP that replaces the contact force (the slip ``prop-contact``).
-    prop_force: float | None = None
+    prop_force: float | None = None  # instead of the contact force (the slip ``prop-contact``)
     first_dt: float | None = None  # time step of the rod's constants
-    balance: EnergyBalance = field(default_factory=EnergyBalance)  # energy balance so far
-    peak_force: float = 0.0  # largest contact force so far
-    # Time at which it first reached the delamination threshold; NaN before.
-    crossing: float = math.nan
+    verdict: Verdict = field(default_factory=Verdict)
     failure: FailureEnvelope | None = None  # largest exposures so far, of FAIL
     notes: list[str] = field(default_factory=list)  # remarks for the user
-
-    def judge(
-        self,
-        block: Mapping[str, Floats],
-        initial: float,
-        *,
-        limit: float | None,
-        threshold: Threshold | None,
-    ) -> None:
-        """Add a block of steps to the energy balance, and compare the force with the threshold."""
-        self.balance.add(block, initial, limit=limit)
-        if threshold is not None:
-            self.peak_force = max(self.peak_force, float(block["force"].max()))
-            above = np.flatnonzero(block["force"] >= threshold.force)
-            if len(above) and math.isnan(self.crossing):
-                self.crossing = float(block["time"][above[0]])
 
 
 Observer = Callable[["Simulation"], object]
@@ -142,7 +130,6 @@ class Simulation:
         problem, options = self.problem, self.options
         with np.errstate(all="ignore"):
             self.model = build_model(problem, options)
-        # The state that a checkpoint stores.
         self.state = state = RunState(self.model.motion.start())
         if self.model.impact is not None:
             state.impact = self.model.impact.start(state.plate)
@@ -155,14 +142,10 @@ class Simulation:
         most, work = (64, 100_000) if self.model.steps is None else (1024, 20_000_000)
         self.interval = max(1, min(most, work // self.model.plate.neq))
         limit = None if options.slips else options.energy_limit
-        self.recorder = Recorder(
-            self.sink,
-            self.model,
-            problem.work,
-            all_contact="tapes" in options.slips,
-            # Without a reference to the run, which would keep it alive.
-            on_block=partial(state.judge, limit=limit, threshold=problem.threshold),
-        )
+        # Without a reference to the run, which would keep it alive.
+        judge = partial(state.verdict.add, limit=limit, threshold=problem.threshold)
+        tapes = "tapes" in options.slips
+        self.recorder = Recorder(self.sink, self.model, problem.work, tapes, judge)
 
     @cached_property
     def tangent(self) -> Tangent:
@@ -200,25 +183,19 @@ class Simulation:
         if self.model.impact is not None:
             self.state.first_dt = self.model.impact.first_dt
         recorder = {f"recorder/{name}": value for name, value in self.recorder.state().items()}
-        return {
-            **save(self.state, "state"), **recorder, "printed": self.printer.state()
-        }  # fmt: skip
+        return {**save(self.state, "state"), **recorder, "printed": self.printer.state()}
 
     def restore(self, stored: dict[str, Any]) -> None:
-        """Continue from the saved state of another simulation of the same problem."""
+        """Continue from the saved state of another simulation of the same problem.
+
+        Raises KeyError if something is missing.  Raises ValueError if an array has another shape or
+        type.
+        """
         restore(self.state, "state", stored)
         if self.model.impact is not None:
             self.model.impact.first_dt = self.state.first_dt
         self.printer.restore(stored["printed"])
         self.recorder.restore(subset(stored, "recorder/"))
-
-
-# Values of a state --------------------------------------------------------------------------------
-
-
-def save(state: object, name: str) -> dict[str, Any]:
-    """Values and arrays of a dataclass and its members, by path; shared members only once."""
-    return dict(_leaves(state, name, set()))
 
 
 def _names(value: object) -> tuple[str, ...]:
@@ -228,40 +205,36 @@ def _names(value: object) -> tuple[str, ...]:
     return getattr(value, "_fields", ())
 
 
-def _leaves(value: Any, path: str, seen: set[int]) -> Iterator[tuple[str, Any]]:
-    names = _names(value)
+def save(value: object, path: str, seen: set[int] | None = None) -> dict[str, Any]:
+    """Values and arrays of a dataclass and its members, by path; shared members only once."""
+    names, seen = _names(value), set() if seen is None else seen
     if not names:
-        yield path, value.copy() if isinstance(value, np.ndarray) else value
-    elif id(value) not in seen:
-        seen.add(id(value))
-        for name in names:
-            yield from _leaves(getattr(value, name), f"{path}/{name}", seen)
+        return {path: value.copy() if isinstance(value, np.ndarray) else value}
+    if id(value) in seen:
+        return {}
+    seen.add(id(value))
+    members = (save(getattr(value, name), f"{path}/{name}", seen) for name in names)
+    return {name: one for member in members for name, one in member.items()}
 
 
-def restore(state: object, name: str, stored: Mapping[str, Any]) -> None:
+def restore(value: Any, path: str, stored: Mapping[str, Any], seen: set[int] | None = None) -> Any:
     """Set a dataclass to the state that :func:`save` returned for another of the same type.
 
-    Raises KeyError if something is missing.  Raises ValueError if an array has another shape or
-    type.
+    Returns the value; dataclasses and arrays are changed in place where they can be.
     """
-    _restored(state, name, stored, set())
-
-
-def _restored(value: Any, path: str, stored: Mapping[str, Any], seen: set[int]) -> Any:
-    """Return the stored value; dataclasses and arrays are changed in place where they can be."""
-    names = _names(value)
+    names, seen = _names(value), set() if seen is None else seen
     if not names:
         new = stored[path]
-        if isinstance(value, np.ndarray):
-            if new.shape != value.shape or new.dtype != value.dtype:
-                raise ValueError(f"{path} has another shape or type")
-            value[...] = new
-            return value
-        return new
+        if not isinstance(value, np.ndarray):
+            return new
+        if new.shape != value.shape or new.dtype != value.dtype:
+            raise ValueError(f"{path} has another shape or type")
+        value[...] = new
+        return value
     if id(value) in seen:
         return value
     seen.add(id(value))
-    new = {name: _restored(getattr(value, name), f"{path}/{name}", stored, seen) for name in names}
+    new = {name: restore(getattr(value, name), f"{path}/{name}", stored, seen) for name in names}
     if isinstance(value, tuple) or "__setattr__" in vars(type(value)):  # frozen
         return type(value)(**new)
     for name, one in new.items():
