@@ -3,9 +3,8 @@
 Two numbers are equal if |a - b| <= atol + rtol*scale.  The scale is the largest finite absolute
 value of the complete dataset in both results, so that a zero crossing of a history is judged by the
 size of the history.  Datasets that may hold nothing but rounding errors have another scale
-(`SCALE_NAMES`).
-Integers (steps, node and equation numbers) and texts must be equal.  NaN equals NaN, and an
-infinity the same infinity; either differs from anything else at any tolerance.
+(`SCALE_NAMES`).  Integers (steps, node and equation numbers) and texts must be equal.  NaN equals
+NaN, and an infinity the same infinity; either differs from anything else at any tolerance.
 
 Datasets are read in blocks of rows: memory does not grow with the results.
 """
@@ -240,7 +239,12 @@ def _compare(sources: tuple[Source, Source], path: str, rtol: float, atol: float
     """Compare a dataset that both sources have."""
     found = Comparison(path, sources)
     if found.comparable and found.holds_texts:
-        _compare_texts(found)
+        left, right = (source.rows(path, 0, source.shapes[path][0]) for source in sources)
+        rows = np.flatnonzero(left != right)
+        found.differing = len(rows)
+        if len(rows):
+            found.largest, found.at = np.inf, _place(found, (int(rows[0]),))
+            found.values = str(left[rows[0]]), str(right[rows[0]])
     elif found.comparable:
         infinite = _measure(found)
         integers = all(source.dtypes[path].kind in "biu" for source in sources)
@@ -289,17 +293,6 @@ def _scale(found: Comparison) -> float:
     else:
         scale = 0.0  # a tape has few digits of every number, also in free flight
     return scale or found.maximum
-
-
-def _compare_texts(found: Comparison) -> None:
-    """Count the texts that differ, and find the first."""
-    left, right = (s.rows(found.path, 0, s.shapes[found.path][0]) for s in found.sources)
-    rows = np.flatnonzero(left != right)
-    found.differing = len(rows)
-    if len(rows):
-        found.largest = np.inf
-        found.at = _place(found, (int(rows[0]),))
-        found.values = str(left[rows[0]]), str(right[rows[0]])
 
 
 def _measure(found: Comparison) -> bool:

@@ -24,6 +24,11 @@ from fecm.results.schema import FORMAT, FORMAT_VERSION, SWEEP, NotStoredError, R
 ELEMENTS, COORDINATES = "mesh/elements", "mesh/coordinates"
 
 RESULT_OF = {FORMAT: "a run", SWEEP: "a sweep"}  # source of each form of file
+# Kinds of links that are refused, by HDF5's number.
+LINKS = {
+    h5py.h5l.TYPE_SOFT: "a soft link to another object",
+    h5py.h5l.TYPE_EXTERNAL: "an external link to another file",
+}
 PACKED = 2000  # upper bound of the compression of HDF5's filters; deflate reaches 1032
 
 
@@ -146,13 +151,6 @@ def read(path: Path, *forms: str) -> Contents:
         contents = Contents(path, attributes)
         file.visititems(partial(_list, contents, path.stat().st_size))
     return contents
-
-
-# Kinds of links that are refused, by HDF5's number.
-LINKS = {
-    h5py.h5l.TYPE_SOFT: "a soft link to another object",
-    h5py.h5l.TYPE_EXTERNAL: "an external link to another file",
-}
 
 
 def _check_links(path: Path, file: h5py.File) -> None:

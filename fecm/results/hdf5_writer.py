@@ -16,7 +16,6 @@ from fecm._typing import Array
 from fecm.deck.units import unit_of
 from fecm.results import schema
 
-TIME = "time"
 TEXT = h5py.string_dtype()
 TEXT_TYPE, SCALAR = h5py.h5t.py_create(TEXT, logical=True), h5py.h5s.create(h5py.h5s.SCALAR)
 
@@ -79,9 +78,9 @@ class FileSink:
         all axes of a dataset labelled, or none.
         """
         made_of = [(d, self.arrays[d.path]) for d in self._made if d.path in self.arrays]
-        clocks = {d.group: made for d, made in made_of if d.name == TIME and d.shape[0] == "rows"}
+        clocks = {d.group: made for d, made in made_of if d.name == "time" and d.shape[0] == "rows"}
         for clock in clocks.values():
-            clock.make_scale(TIME)
+            clock.make_scale("time")
         for dataset, made in made_of:
             clock = clocks.get(dataset.group)
             if made == clock or not {*dataset.shape} <= {"rows", *schema.SCALES}:

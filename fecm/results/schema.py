@@ -482,8 +482,7 @@ def shape_error(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str])
 
     Both are by path; kinds are NumPy's letters: ``"f"``, ``"i"``, ``"u"`` or ``"b"``.
     """
-    sizes: dict[str | int, tuple[int, str]]
-    sizes = {name: (size, "every result") for name, size in FIXED.items()}
+    sizes: dict[str | int, tuple[int, str]] = {n: (s, "every result") for n, s in FIXED.items()}
     for path, shape in shapes.items():
         if (dataset := DATASETS.get(path)) is None:
             continue

@@ -56,22 +56,17 @@ Sink: TypeAlias = "MemorySink | FileSink"
 class RowBuffer:
     """Collects the rows of one group and writes them to a sink in blocks.
 
-    The shapes are the full shapes of the datasets, rows first; `stored` counts the rows written.
+    Its members are datasets with their full shapes, rows first; `stored` counts the rows written.
     """
 
     BYTES = 1_000_000  # of a block at most
 
-    def __init__(
-        self, sink: Sink, datasets: Sequence[Dataset], shapes: Sequence[tuple[int, ...]]
-    ) -> None:
+    def __init__(self, sink: Sink, members: Sequence[tuple[Dataset, tuple[int, ...]]]) -> None:
         self._sink = sink
-        row_bytes = 8 * max(1, sum(math.prod(shape[1:]) for shape in shapes))
-        rows = min(shapes[0][0], max(1, self.BYTES // row_bytes))
-        self._paths = {d.name: d.path for d in datasets}
-        self._blocks = {
-            d.name: np.empty((rows, *shape[1:]), dtype=d.dtype)
-            for d, shape in zip(datasets, shapes, strict=True)
-        }
+        row_bytes = 8 * max(1, sum(math.prod(shape[1:]) for _, shape in members))
+        rows = min(members[0][1][0], max(1, self.BYTES // row_bytes))
+        self._paths = {d.name: d.path for d, _ in members}
+        self._blocks = {d.name: np.empty((rows, *shape[1:]), d.dtype) for d, shape in members}
         self._room = rows
         self._filled = 0
         self.stored = 0

@@ -177,8 +177,7 @@ def describe_groups(contents: Contents) -> list[dict[str, Any]]:
 
 def _order(known: Mapping[str, Any], name: str) -> tuple[int, str]:
     """Sort key: known names in their order, then others by name."""
-    names = list(known)
-    return names.index(name) if name in known else len(names), name
+    return list(known).index(name) if name in known else len(known), name
 
 
 def _describe(contents: Contents, path: str) -> dict[str, Any]:

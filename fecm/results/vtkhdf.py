@@ -26,7 +26,7 @@ Ints = NDArray[np.int64]
 Note = Callable[[str], None]
 
 VERSION = (2, 2)
-CORNERS, TRIANGLE = 4, 3
+CORNERS = 4
 # VTK's cell types (vtkCellType.h) of elements with 3, 4, 8 or 9 nodes.
 TYPES = {3: 5, 4: 9, 8: 23, 9: 28}
 # Numbers of points that are the first nodes of an element (K = -2: corners, K = -3: nine).

@@ -1,10 +1,10 @@
 """Checkpoints: the complete state of a run, stored beside its result.
 
-The checkpoint holds the state; it is written under another name, synced and renamed.  The spool
-holds the operations on the result file so far, each a line of JSON, followed by the bytes of its
-rows if it has any; it only grows, and repeating them gives a file of the same bytes.  A checkpoint
-names its part of the spool by length and checksum, so that the last checkpoint is valid however a
-run ends.  A resumed run gives the same bytes as an uninterrupted one.
+There are two files.  The checkpoint holds the state; it is written under another name, synced and
+renamed.  The spool holds the operations on the result file so far, each a line of JSON, followed by
+the bytes of its rows if it has any; it only grows, and repeating them gives a file of the same
+bytes.  A checkpoint names its part of the spool by length and checksum, so that the last checkpoint
+is valid however a run ends.  A resumed run gives the same bytes as an uninterrupted one.
 """
 
 from __future__ import annotations

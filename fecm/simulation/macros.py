@@ -74,7 +74,7 @@ def impact_step(run: Simulation, n: int) -> None:
         recorder.strains([plate.step + 1], [plate.time], run.displacement_field()[None])
     system.advance(impact, state.dt, run.force_factor(), state.prop_force)
     state.prop_force = None
-    recorder.steps.step(plate, impact, run.force_factor(), contact_row=stores)
+    recorder.steps.step(plate, impact, run.force_factor(), on_tape9=stores)
     if stores and "tapes" not in slips:
         recorder.strains([plate.step], [plate.time], run.displacement_field()[None])
     run.observe()

@@ -91,7 +91,16 @@ class Printer:
         if echo:
             self._page("Equation numbers")
             self._nodes(mesh.equations)
-        self._program(deck)
+        self._page("Macro program")
+        depth = 0
+        for macro in deck.macros:
+            depth -= macro.word == "NEXT"
+            value = f"{macro.value:g}" if macro.value else ""
+            word = "  " * max(0, depth) + macro.word
+            meaning = WORDS[macro.word].meaning if macro.word in WORDS else ""
+            self._write([f"  {word:16}{value:>12}   {meaning}"])
+            depth += macro.word == "LOOP"
+        self._write([""])
 
     def _segment(self, segment: model.Segment, mesh: Mesh, plate: PlateModel, echo: bool) -> None:
         """Echo one segment; mesh data only while echoing is on."""
@@ -145,18 +154,6 @@ class Printer:
         self._table(("layer", "angle", "thickness"), layers)
         for name in ("A", "B", "D", "shear"):
             self._write([f"  {name}", *map(_row, getattr(laminate, name).tolist()), ""])
-
-    def _program(self, deck: model.Deck) -> None:
-        self._page("Macro program")
-        depth = 0
-        for macro in deck.macros:
-            depth -= macro.word == "NEXT"
-            value = f"{macro.value:g}" if macro.value else ""
-            word = "  " * max(0, depth) + macro.word
-            meaning = WORDS[macro.word].meaning if macro.word in WORDS else ""
-            self._write([f"  {word:16}{value:>12}   {meaning}"])
-            depth += macro.word == "LOOP"
-        self._write([""])
 
     def displacements(self, field: Floats, time: float) -> None:
         """Displacements of every node."""

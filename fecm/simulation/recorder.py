@@ -35,23 +35,22 @@ SCALARS = (
 # Those that follow from the motion of the projectile.
 PROJECTILE = ("velocity", "acceleration", "projectile_kinetic", "projectile_strain", "station")
 NAMES = (*SCALARS, *PROJECTILE)
-OnBlock = Callable[[Mapping[str, Floats], float], object]
+Columns = Mapping[str, Floats]  # of steps, by name
+OnBlock = Callable[[Columns, float], object]
 
 
 class StepRecorder:
     """Stores every step in a sink; of a plate alone energies and gages only.
 
-    `all_contact` stores contact on tape9 at every step instead of every N-th (the slip
-    ``tapes``); `on_block` is called with the columns of each block and the initial energy.
+    The slip `tapes` stores contact on tape9 at every step instead of every N-th; `on_block` is
+    called with the columns of each block and the initial energy.
     """
 
-    def __init__(
-        self, sink: Sink, model: ImpactModel, all_contact: bool, on_block: OnBlock
-    ) -> None:
+    def __init__(self, sink: Sink, model: ImpactModel, tapes: bool, on_block: OnBlock) -> None:
         self._sink = sink
         self._motion, self._impact, self._station = model.motion, model.impact, model.station
         self._on_block = on_block
-        self._all_contact = all_contact
+        self._tapes = tapes
         self._gages: DofSums | None = None
         gages = 0
         self.rows = {"energy": 0, "tape9": 0}  # stored so far in each group
@@ -76,38 +75,30 @@ class StepRecorder:
         self._sink.attributes("energy", {"initial": self.initial})
 
     def step(
-        self,
-        plate: PlateState,
-        impact: ImpactState | None,
-        factor: float,
-        *,
-        contact_row: bool = False,
+        self, plate: PlateState, impact: ImpactState | None, factor: float, on_tape9: bool = False
     ) -> None:
         """Add a row for the state after a step, with the load factor of the nodal forces.
 
-        `contact_row` stores the contact of the step on tape9.
+        Its contact is stored `on_tape9` if asked for.
         """
         applied = None
         if self._impact is not None and impact is not None:
             applied = self._impact.applied(impact)
         kinetic = self._motion.kinetic_energy(plate, factor, applied)
-        row: tuple[float, ...]
-        row = plate.step, plate.time, kinetic, plate.strain_energy, plate.external_work
+        row = [plate.step, plate.time, kinetic, plate.strain_energy, plate.external_work]
         if self._gages is not None:
             self._table[len(NAMES) :, self._count] = self._gages.evaluate(plate, factor)
         if impact is not None:
             self._rod[self._count] = impact.rod.motion
             indentation, force = impact.contact
-            row += (force, indentation, impact.plate_w, impact.contact_work, impact.rod.tip)
-            row += (contact_row or self._all_contact,)
+            row += [force, indentation, impact.plate_w, impact.contact_work, impact.rod.tip]
+            row.append(on_tape9 or self._tapes)
         self._table[: len(row), self._count] = row
         self._count += 1
         if self._count == BLOCK:
             self.flush()
 
-    def add(
-        self, plate: PlateState, columns: Mapping[str, Floats], strains: Floats, on_tape9: Array
-    ) -> None:
+    def add(self, plate: PlateState, columns: Columns, strains: Floats, on_tape9: Array) -> None:
         """Add rows for many steps, and the contact of some of them to tape9."""
         work = np.full(len(strains), plate.external_work)
         given = {**columns, "external_work": work, "on_tape9": on_tape9}
@@ -201,21 +192,16 @@ class Recorder:
     """Stores the rows of a run, of which `sizes` has upper bounds, in a sink."""
 
     def __init__(
-        self,
-        sink: Sink,
-        model: ImpactModel,
-        sizes: WorkEstimate,
-        all_contact: bool,
-        on_block: OnBlock,
+        self, sink: Sink, model: ImpactModel, sizes: WorkEstimate, tapes: bool, on_block: OnBlock
     ) -> None:
         self._sink = sink
         self._model = model
-        self.steps = StepRecorder(sink, model, all_contact, on_block)
+        self.steps = StepRecorder(sink, model, tapes, on_block)
         has_impact = model.impact is not None
         self._room = {  # upper bound of the rows of each group
             **{group: sizes.passes[STORED_BY[group]] for group in BUFFERED},
             "tape8": has_impact * sizes.contact_rows,
-            "tape9": has_impact * (sizes.steps if all_contact else sizes.contact_rows),
+            "tape9": has_impact * (sizes.steps if tapes else sizes.contact_rows),
             "history": has_impact * sizes.steps,
             "energy": sizes.steps,
             "gages": (model.gages is not None) * sizes.steps,
@@ -233,7 +219,7 @@ class Recorder:
         for group in BUFFERED:
             members = [p for p in self._datasets if p[0].group == group and p[0].shape[0] == "rows"]
             if members:
-                buffer = RowBuffer(sink, *zip(*members, strict=True))
+                buffer = RowBuffer(sink, members)
                 self._buffers[group] = self._parts[f"rows/{group}"] = buffer
 
     def _shape(self, dataset: Dataset) -> tuple[int, ...]:

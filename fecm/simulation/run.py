@@ -232,16 +232,14 @@ def _deflections(simulation: Simulation, result: Result, free: Floats) -> Iterat
     x, y = simulation.problem.mesh.coordinates[:, :2].T
     for times, (w,) in _rows(result, "tape3", "w"):
         yield _peak(np.abs(w - (w @ free) @ free.T), times, x, y)
-    place = simulation.problem.load_place
-    if place is not None and not free.size:
+    if (place := simulation.problem.load_place) is not None and not free.size:
         for times, (w,) in _rows(result, "history", "plate_w"):
             yield _peak(np.abs(w), times, *map(np.asarray, place))
 
 
 def _indentations(simulation: Simulation, result: Result) -> Iterator[Peak]:
     """Peaks of the indentation in contact."""
-    place = simulation.problem.load_place
-    if place is not None:
+    if (place := simulation.problem.load_place) is not None:
         for times, (force, alpha) in _rows(result, "history", "force", "indentation"):
             yield _peak(np.where(force > 0.0, alpha, 0.0), times, *map(np.asarray, place))
 
@@ -266,8 +264,7 @@ def _strains(simulation: Simulation, result: Result) -> Iterator[Peak]:
                 xx, yy, xy = (m + side * k for m, k in zip(middle, curvature, strict=True))
                 largest = 0.5 * (np.abs(xx + yy) + np.hypot(xx - yy, xy))
                 yield _peak(np.where(near | ~np.isfinite(largest), 0.0, largest), times, x, y)
-    cards = problem.deck.last(Gages)
-    if cards is not None:
+    if (cards := problem.deck.last(Gages)) is not None:
         x, y = np.array([(gage.x, gage.y) for gage in cards.records]).T
         for times, (strain,) in _rows(result, "gages", "strain"):
             yield _peak(np.abs(strain), times, x, y)

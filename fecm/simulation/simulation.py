@@ -23,7 +23,7 @@ from fecm.problem.problem import Problem
 from fecm.results.sinks import Sink
 from fecm.simulation.interpreter import Interpreter
 from fecm.simulation.printout import Printer
-from fecm.simulation.recorder import Recorder, subset
+from fecm.simulation.recorder import Columns, Recorder, subset
 
 TOLERANCE = 1.0e-9  # relative change of the displacement below which CONV leaves its loop
 
@@ -42,11 +42,7 @@ class Verdict:
     crossing: float = math.nan  # when it first reached the delamination threshold
 
     def add(
-        self,
-        block: Mapping[str, Floats],
-        initial: float,
-        limit: float | None,
-        threshold: Threshold | None,
+        self, block: Columns, initial: float, limit: float | None, threshold: Threshold | None
     ) -> None:
         """Add a block of steps; `initial` is the energy before the first.
 
@@ -77,10 +73,8 @@ class Verdict:
             self.worst_error, self.worst_step = float(error[row]), int(block["step"][row])
         if limit is not None and error[row] > limit:
             row = int(np.flatnonzero(error > limit)[0])
-            reason = (
-                f"the energy balance is off by {error[row]:.2%} of the supplied energy, more than "
-                f"the limit of {limit:.3g}"
-            )
+            off = f"the energy balance is off by {error[row]:.2%} of the supplied energy"
+            reason = f"{off}, more than the limit of {limit:.3g}"
             raise DivergenceError(int(block["step"][row]), reason)
 
 
