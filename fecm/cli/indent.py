@@ -130,16 +130,11 @@ def curve(
     """
     if rigidity:
         _rigidities(deck, path, points, targets, **parameters)
-    elif not path:
+        return
+    if not path:
         raise click.UsageError("--path is missing: indentations separated by commas")
-    elif any(value is not None for value in parameters.values()):
+    if any(value is not None for value in parameters.values()):
         raise click.UsageError("--q, --alpha-cr and --line require --rigidity")
-    else:
-        _forces(deck, path, points, targets)
-
-
-def _forces(deck: Path, path: Sequence[float], points: int, targets: OutputPaths) -> None:
-    """Write indentation, force and branch along a path."""
     problem, card = _law(deck)
     law = contact_law.HystereticLaw(build_constants(card))
     try:

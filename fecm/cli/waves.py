@@ -128,8 +128,7 @@ def waves() -> None:
         default=("0", "45", "90"), show_default=True, metavar="A ...",
         help="Directions of propagation, degrees; one or several.")  # fmt: skip
 @option("--wavelengths", type=Parsed(_wavelengths, "FROM:TO:N"), default="0.1:20:200",
-        show_default=True,
-        help="N wavelengths at equal distances, in thicknesses.")  # fmt: skip
+        show_default=True, help="N wavelengths at equal distances, in thicknesses.")  # fmt: skip
 @_SHARED
 def dispersion(
     angles: tuple[float, ...], wavelengths: tuple[float, ...], targets: OutputPaths, **shared: Any
@@ -168,8 +167,7 @@ def speeds(step: float, targets: OutputPaths, **shared: Any) -> None:
 
 @waves.command(cls=_ListCommand)
 @option("--time", "times", type=list_of("T,T,...", NOT_NEGATIVE), multiple=True, callback=_joined,
-        required=True, metavar="T ...",
-        help="Times; one or several.")  # fmt: skip
+        required=True, metavar="T ...", help="Times; one or several.")  # fmt: skip
 @option("--radius", type=NOT_NEGATIVE, metavar="R",
         help="Radius of the circular fronts at time 0.  [default: the thickness]")  # fmt: skip
 @STEP
@@ -196,7 +194,13 @@ def fronts(
     targets.draw("waves:fronts_picture", surfaces, times, start, units)
     _note_names(surfaces)
     for time in times:
-        _note_cusps(surfaces, time, start)
+        cusps = surfaces.cusps(time, start)
+        if not cusps:
+            note(f"no cusps at time {time:g}")
+        for mode in FRONTS:
+            if own := [cusp for cusp in cusps if cusp.mode == mode]:
+                texts = (f"normal {c.normal:.4f} deg at {c.x:.6g}, {c.y:.6g}" for c in own)
+                note(f"{mode} has {len(own)} cusps at time {time:g}: {'; '.join(texts)}")
     targets.write("mode,normal_deg,time,x,y,ray_deg", rows)
 
 
@@ -210,14 +214,3 @@ def _note_names(surfaces: WaveSurfaces) -> None:
     for front, runs in surfaces.misnamed().items():
         places = ", ".join(f"{first:g} to {last:g}" for first, last in runs)
         note(f"at normals {places} deg, another component dominates the front named {front}")
-
-
-def _note_cusps(surfaces: WaveSurfaces, time: float, radius: float) -> None:
-    """Note the cusps of each front."""
-    cusps = surfaces.cusps(time, radius)
-    if not cusps:
-        note(f"no cusps at time {time:g}")
-    for mode in FRONTS:
-        if own := [cusp for cusp in cusps if cusp.mode == mode]:
-            places = "; ".join(f"normal {c.normal:.4f} deg at {c.x:.6g}, {c.y:.6g}" for c in own)
-            note(f"{mode} has {len(own)} cusps at time {time:g}: {places}")
