@@ -327,7 +327,7 @@ def _curves(x: Axis, texts: Axis, choice: Choice, width: str) -> Axes:
     looks = zip(texts.ticks, style.colours(), MARKERS, strict=False)
     for here, (text, colour, marker) in zip(_runs(x, texts), looks, strict=True):
         values = choice.shown.values[here]
-        if not np.isnan(values).all():  # failed
+        if not np.isnan(values).all():  # else they have failed
             axes.plot(x.values[here], values, marker=marker, color=colour, ms=2.2, label=text)
     _finish(axes, x, choice.shown, choice)
     style.lines_legend(figure, axes)
