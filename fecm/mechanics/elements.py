@@ -112,11 +112,9 @@ class ElementShape:
 
 
 def _triangle(xi: Floats, eta: Floats, present: Bools) -> Floats:
-    """The 4-node quadrilateral with coincident corners 3 and 4 (the listing's SHAPE, NEL = 3).
-
-    The side eta = 1 of the square is collapsed to node 3, where the Jacobian is singular.  Strains
-    are constant: the shape functions are the area coordinates.
-    """
+    """The 4-node quadrilateral with coincident corners 3 and 4 (the listing's SHAPE, NEL = 3)."""
+    # The side eta = 1 of the square is collapsed to node 3, where the Jacobian is singular.
+    # Strains are constant: the shape functions are the area coordinates.
     zero, half = np.zeros_like(xi), np.full_like(xi, 0.5)
     values = [(1.0 - xi) * (1.0 - eta) / 4.0, (1.0 + xi) * (1.0 - eta) / 4.0, (1.0 + eta) / 2.0]
     along_xi = [-(1.0 - eta) / 4.0, (1.0 - eta) / 4.0, zero]

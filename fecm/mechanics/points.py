@@ -151,18 +151,14 @@ class GageArray:
 def gages(
     mesh: Mesh, records: Sequence[GagePlace], *, transposed_jacobian: bool = False
 ) -> GageArray:
-    """Express the gages' strains by the dofs of their elements.
-
-    Raises OutsideError if a gage is not on the plate.
-    """
+    """Express the gages' strains by dofs; raises OutsideError if one is not on the plate."""
     families = element_blocks(mesh.elements, mesh.coordinates)
     rows = [_functional(families, record, transposed_jacobian) for record in records]
     most = max(len(indices) for indices, _ in rows)
     dof_indices = np.zeros((len(rows), most), dtype=np.intp)
     weights = np.zeros((len(rows), most))
     for number, (indices, values) in enumerate(rows):
-        dof_indices[number, : len(indices)] = indices
-        weights[number, : len(values)] = values
+        dof_indices[number, : len(indices)], weights[number, : len(values)] = indices, values
     numbers = np.array([record.number for record in records], np.int32)
     return GageArray(numbers, dof_indices, weights)
 

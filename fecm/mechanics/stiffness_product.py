@@ -55,10 +55,7 @@ class Workers:
             self._pool = ThreadPoolExecutor(count - 1)
 
     def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
-        """Results of a function that releases the GIL, in the order of the items.
-
-        Each thread takes ceil(items / count) consecutive items.
-        """
+        """Results of a function that releases the GIL; a thread takes consecutive items."""
         if self._pool is None or len(items) < 2:
             return [function(item) for item in items]
         share = -(-len(items) // self.count)

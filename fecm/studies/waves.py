@@ -34,10 +34,7 @@ BEYOND = "the laminate's constants are too large or too far apart to compute wit
 
 @frozen
 class Medium:
-    """An infinite laminate that carries waves.
-
-    Raises StudyError if its stiffness or its inertia is not positive definite.
-    """
+    """An infinite laminate; raises StudyError if stiffness or inertia is not positive definite."""
 
     laminate: Laminate  # stiffness, mass P and rotary inertia I
     # R of equation 2-24, the first moment of the density about the midplane (mass/length); zero if

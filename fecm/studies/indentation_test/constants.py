@@ -297,13 +297,10 @@ def _cycle(solution: Solution, number: int) -> Cycle:
         return solution.estimate(k_1)
 
     own = [place for n, place in at.origins.items() if division.stretches[n].cycle == number]
-    return Cycle(
-        alpha_m=_parameter(solution, peak),
-        alpha_m_recorded=division.corners[corner].indentation,
-        alpha_0=_parameter(solution, permanent),
-        k_1=rigidity(permanent),
-        k_1_measured=rigidity(own[0]) if own else None,
-    )
+    measured = rigidity(own[0]) if own else None
+    recorded = division.corners[corner].indentation
+    alpha_m, alpha_0 = _parameter(solution, peak), _parameter(solution, permanent)
+    return Cycle(alpha_m, recorded, alpha_0, rigidity(permanent), measured)
 
 
 # Fits as text, as plain values and as an EXPE card ------------------------------------------------
@@ -329,8 +326,8 @@ def card(fit: Fit) -> str:
 def notes(fit: Fit) -> list[str]:
     """Return notes on the reliability of the fit."""
     found: list[str] = []
-    division = fit.solution.curves.division
-    held = [division.corners[n].cycle + 1 for n in fit.solution.held if division.corners[n].is_peak]
+    corners = [fit.solution.curves.division.corners[n] for n in fit.solution.held]
+    held = [corner.cycle + 1 for corner in corners if corner.is_peak]
     if not fit.cycles:
         found.append("the test has no unloading: it gives only k and n, and no card")
     elif fit.line is None and fit.critical is None:
