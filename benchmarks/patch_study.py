@@ -3,7 +3,7 @@
     python benchmarks/patch_study.py [PICTURE]
 
 The plate is hit by a rigid mass under an elastic law.  Each mesh is bisected by
-``fecm.problem.refine``; with a patch (disc of 0.327 h) it has assumed shear strains, with a point
+``fecm.problem.generate``; with a patch (disc of 0.327 h) it has assumed shear strains, with a point
 force L2 = 3.  Prints the table of docs/patch.md and draws its picture, docs/patch-mesh.png.
 """
 
@@ -22,8 +22,7 @@ from fecm.deck.records import Ply
 from fecm.plot import style
 from fecm.plot.kinds import Picture
 from fecm.plot.pictures import save
-from fecm.problem.generate import generate
-from fecm.problem.refine import refined
+from fecm.problem.generate import generate, refined
 from fecm.verification.decks import impact_program, material, result_of, struck_plate
 
 END = 8.0e-4

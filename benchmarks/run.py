@@ -39,9 +39,8 @@ from fecm.deck.model import Boundary, Coordinates, Elements, Impact, Material, P
 from fecm.deck.records import Control, NodeValues
 from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.stiffness_product import CSR, KERNELS, NUMPY
-from fecm.problem.build import build_model
+from fecm.problem.build import RunOptions, build_model
 from fecm.problem.generate import generate
-from fecm.problem.options import RunOptions
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
 from fecm.simulation.run import run

@@ -15,9 +15,9 @@ from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, load_text, read_deck
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.projectile import Integrator, MassMatrix, RodMethod
+from fecm.problem.build import ENERGY_LIMIT, RunOptions
 from fecm.problem.check_mesh import HOURGLASS, check_listing
 from fecm.problem.memory import check_memory
-from fecm.problem.options import ENERGY_LIMIT, RunOptions
 from fecm.problem.problem import UNSTABLE, Problem, check
 from fecm.problem.slips import LISTING, REPORT, active_slips
 from fecm.results.result import Result, load

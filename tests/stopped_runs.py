@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fecm.api import load_deck
-from fecm.problem.options import RunOptions
+from fecm.problem.build import RunOptions
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
 from fecm.simulation.checkpoint import Checkpointer

@@ -21,7 +21,7 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.problem.options import RunOptions
+from fecm.problem.build import RunOptions
 from fecm.problem.slips import active_slips
 from fecm.results.sinks import MemorySink
 from fecm.simulation.checkpoint import checkpoint_of

@@ -22,8 +22,7 @@ from fecm.mechanics.interpolation import NDOF
 from fecm.mechanics.kernels.plate import CompiledProduct
 from fecm.mechanics.projectile import Rod, RodState, WilsonStep
 from fecm.mechanics.stiffness_product import stiffness_operator
-from fecm.problem.build import build_model
-from fecm.problem.options import RunOptions
+from fecm.problem.build import RunOptions, build_model
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
 from fecm.results.result import Result
@@ -232,7 +231,7 @@ def test_without_kernels_numpy_runs_and_the_word_is_refused(
 ) -> None:
     wanted = fecm.run_one(small(), solver="numpy")
     monkeypatch.setattr(kernels, "LIBRARY", None)
-    monkeypatch.setattr("fecm.problem.options.LIBRARY", None)
+    monkeypatch.setattr("fecm.problem.build.LIBRARY", None)
     np.testing.assert_array_equal(fecm.run_one(small()).force, wanted.force)
     with pytest.raises(ValueError, match="no compiled kernels; take the solver numpy"):
         fecm.run_one(small(), solver="kernels")

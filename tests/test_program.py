@@ -15,7 +15,7 @@ from fecm.deck import Findings
 from fecm.deck.macros import compile_program, estimate_work
 from fecm.deck.records import Macro
 from fecm.mechanics.time_step import critical_time_step
-from fecm.problem.options import RunOptions
+from fecm.problem.build import RunOptions
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.simulation.interpreter import Action, Interpreter

@@ -13,8 +13,7 @@ from fecm.api import load_deck
 from fecm.mechanics import kernels
 from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
 from fecm.mechanics.projectile import RigidMass
-from fecm.problem.build import build_model
-from fecm.problem.options import RunOptions
+from fecm.problem.build import RunOptions, build_model
 from fecm.sweeps import batch, responses
 from fecm.sweeps.cases import Case
 from fecm.sweeps.responses import plate_response

@@ -24,7 +24,7 @@ from fecm.deck.findings import DeckError, Finding
 from fecm.deck.format import format_deck
 from fecm.deck.reader import load_text
 from fecm.deck.units import unit_names, unit_of
-from fecm.problem.options import RunOptions
+from fecm.problem.build import RunOptions
 from fecm.problem.problem import Problem
 from fecm.problem.slips import REPORT, active_slips
 from fecm.problem.summary import ProblemSummary

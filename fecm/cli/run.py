@@ -19,8 +19,8 @@ from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.projectile import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
 from fecm.mechanics.solutions import SingularStiffnessError
 from fecm.mechanics.stiffness_product import AUTO, SOLVERS
+from fecm.problem.build import ENERGY_LIMIT, RunOptions
 from fecm.problem.memory import check_memory
-from fecm.problem.options import ENERGY_LIMIT, RunOptions
 from fecm.problem.problem import Problem
 from fecm.problem.slips import NAMES, active_slips
 from fecm.problem.summary import larger_steps

@@ -29,10 +29,7 @@ _REAL = re.compile(
 
 
 def parse_integer(text: str) -> int | None:
-    """Read an I field without blanks; None if it is not an integer.
-
-    The caller limits the length to :data:`LONGEST` characters.
-    """
+    """Read an I field without blanks, of at most LONGEST characters; None if no integer."""
     return int(text) if _INTEGER.fullmatch(text) else None
 
 
@@ -43,8 +40,7 @@ def parse_real(text: str) -> float | None:
     range of double precision is infinite.  The caller limits the length to :data:`LONGEST`
     characters.
     """
-    match = _REAL.fullmatch(text)
-    if match is None:
+    if (match := _REAL.fullmatch(text)) is None:
         return None
     exponent = match["marked"] or match["bare"] or "0"
     return float(f"{match['mantissa']}e{exponent}")
@@ -246,11 +242,7 @@ def read_values(
 
 
 def _is_aligned(card: Card, fields: Fields, findings: Findings, *, cut_is_meant: bool) -> bool:
-    """Whether no text crosses the end of its field; report the first one that does.
-
-    Adjacent numbers may fill their fields.  With `cut_is_meant` a number may be cut in two, as the
-    report's machine did.
-    """
+    """Whether no text crosses the end of its field; numbers may with `cut_is_meant`."""
     data = card.data
 
     def refuse(code: str, message: str, run: tuple[int, int], width: int, hint: str) -> bool:
@@ -293,7 +285,6 @@ def _is_aligned(card: Card, fields: Fields, findings: Findings, *, cut_is_meant:
 
 
 def _is_joined(data: str, column: int) -> bool:
-    """Whether no blank separates a column from the next."""
     return len(data) > column and " " not in data[column - 1 : column + 1]
 
 
@@ -354,7 +345,15 @@ def _value(
     value = padded if zeros else plain
     if plain != padded:
         if not zeros or value is None:
-            _refuse_blank(field, text, padded, source, findings)
+            was = "no number" if padded is None else f"{padded:g}"
+            where = "inside" if " " in written else "after"
+            what = f"There is a blank {where} the number `{written}`"
+            read = f"the report's machine read it as a zero and the value as {was}"
+            line = source.card.data.ljust(field.last)
+            card = line[: field.first - 1] + squeezed.rjust(field.width) + line[field.last :]
+            hint = f"right-justified, the card is `{card.rstrip()}`"
+            hint = "remove the blank" if "," in line else hint
+            findings.add("E104", f"{what}; {read}.", source.place(field.name), hint)
             return None
         message = f"A blank inside `{text}` was read as a zero: the value is {value:g}."
         findings.add("W104", message, source.place(field.name))
@@ -362,21 +361,6 @@ def _value(
         findings.add("E107", f"`{written}` is too large a number.", source.place(field.name))
         return None
     return value
-
-
-def _refuse_blank(
-    field: Field, text: str, padded: float | None, source: Source, findings: Findings
-) -> None:
-    """Report a blank that would change a value, with the intended card."""
-    was = "no number" if padded is None else f"{padded:g}"
-    where = "inside" if " " in text.strip() else "after"
-    line = source.card.data.ljust(field.last)
-    justified = text.replace(" ", "").rjust(field.width)
-    meant = (line[: field.first - 1] + justified + line[field.last :]).rstrip()
-    read = f"read it as a zero and the value as {was}"
-    message = f"There is a blank {where} the number `{text.strip()}`; the report's machine {read}."
-    hint = "remove the blank" if "," in line else f"right-justified, the card is `{meant}`"
-    findings.add("E104", message, source.place(field.name), hint)
 
 
 def write_card(fields: Fields, values: Sequence[Value]) -> str:

@@ -112,7 +112,6 @@ def read_plies(text: str) -> dict[str, NamedPly]:
 
 
 def _ply(name: str, table: dict[str, Any]) -> NamedPly:
-    """Ply of a table, checked."""
     for key, value in table.items():
         if key in TEXTS:
             if not isinstance(value, str):
@@ -128,23 +127,20 @@ def _ply(name: str, table: dict[str, Any]) -> NamedPly:
     system = table["units"]
     if system not in SYSTEMS:
         raise ValueError(f"[{name}] units: {system!r} is none of {', '.join(SYSTEMS)}")
-    missing = [key for key in ELASTIC if key not in table]
-    if missing:
+    if missing := [key for key in ELASTIC if key not in table]:
         raise ValueError(f"[{name}] {' and '.join(missing)} missing")
     values = {key: float(table[key]) for key in KEYS if key in table}
     return NamedPly(name, values, system, table.get("source", ""), table.get("assumed", ""))
 
 
 def _text(file: str) -> str:
-    """Text of a file of this package."""
     return (resources.files("fecm.deck") / file).read_text("utf-8")
 
 
 MATERIALS = read_plies(_text("materials.toml"))
 # Constants of the report that are not the indenter's: alpha_p, s_p and reference 14's alpha_cr.
 ALPHA_P, S_P, ALPHA_CR = 6.564e-4, 0.094, 3.16e-3
-# System of units of the report.
-SYSTEM = "in-lbf-s"
+SYSTEM = "in-lbf-s"  # system of units of the report
 COEFFICIENT = "force/length^1.5"
 
 

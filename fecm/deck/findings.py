@@ -14,7 +14,6 @@ from fecm._frozen import frozen
 
 SEVERITIES = {"E": "error", "W": "warning", "N": "note"}  # severities by the first letter of a code
 MOST = 1000  # largest number of errors, and of warnings, that are kept
-TOO_MANY = "E000"  # the code of the error that ends too many of them
 # Characters of a card, and of a message, that are shown.
 WIDEST = 200
 LONGEST = 600
@@ -60,19 +59,13 @@ class Finding:
     def to_dict(self, source: str) -> dict[str, object]:
         """The finding as plain values, for JSON; `source` is the name of the deck's file."""
         place = self.place
+        line, column, end = (place.line, place.first, place.last) if place else (None, None, None)
         return {
-            "kind": "finding",
-            "severity": self.severity,
-            "code": self.code,
-            "message": self.message,
-            "file": source,
-            "line": place.line if place else None,
-            "column": place.first if place else None,
-            "end_column": place.last if place else None,
-            "field": place.field if place else "",
-            "card": place.text if place else "",
-            "hint": self.hint,
-        }
+            "kind": "finding", "severity": self.severity, "code": self.code,
+            "message": self.message, "file": source, "line": line, "column": column,
+            "end_column": end, "field": place.field if place else "",
+            "card": place.text if place else "", "hint": self.hint,
+        }  # fmt: skip
 
     def render(self, source: str) -> str:
         """Format the finding as text, with the card and a caret under the field.
@@ -124,7 +117,7 @@ class Findings:
         if self.error_count == MOST:
             self.closed = True
             message = f"There are {MOST} errors or more; the rest of the file is not checked."
-            self._all.append(Finding(TOO_MANY, message))
+            self._all.append(Finding("E000", message))
 
     def __iter__(self) -> Iterator[Finding]:
         """Iterate in the order of the deck; findings without a place come last."""

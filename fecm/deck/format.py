@@ -10,7 +10,7 @@ from fecm.deck.card import Card, Fields, Value, write_card
 from fecm.deck.findings import DeckError
 from fecm.deck.model import STOP
 from fecm.deck.reader import READERS, Reader
-from fecm.deck.records import Macro
+from fecm.deck.records import Macro, pointless
 
 RULER = "!:"
 
@@ -65,11 +65,10 @@ def _aligned(card: Card, fields: Fields, values: list[Value]) -> str:
         kept[:1] = [str(v).strip().upper() for v in kept[:1]]
         if fields == Macro.short_fields:
             kept[1:1] = [""]
-        return Macro.card(kept)
+        return write_card(Macro.fields[: len(kept)], pointless(kept))
     return write_card(fields[:count], kept) if count else ""
 
 
 def _with_comment(text: str, line: str) -> str:
-    """Text with the comment of its line."""
     _, mark, comment = line.partition("!")
     return f"{text}  !{comment.rstrip()}" if mark else text.rstrip()

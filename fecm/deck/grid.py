@@ -18,8 +18,7 @@ from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
 
 # Significant digits of coordinates, relative to the plate's size, so that they fit their columns.
 DIGITS = 6
-# Least number of elements between a window and an edge.
-LEAST_BESIDE = 2
+LEAST_BESIDE = 2  # least number of elements between a window and an edge
 # Restraints of an edge: nothing; w and, along x or y, the rotation along it; all out of the plane.
 SUPPORTS = ("free", "simple", "clamped")
 HELD, SIMPLE, CLAMPED = (1, 1, 1, 0, 0), ((1, 1, 1, 1, 0), (1, 1, 1, 0, 1)), (1, 1, 1, 1, 1)
@@ -30,8 +29,7 @@ EDGES = ("left", "right", "bottom", "top")
 class Section:
     """A run of equally long elements in one direction."""
 
-    # Coordinates of its ends (length).
-    start: float
+    start: float  # coordinates of its ends (length)
     end: float
     elements: int  # number of elements
 
@@ -99,22 +97,17 @@ def refined(
     def fits(count: int) -> bool:
         return longest_at(graded(length, count, centre, ratio), centre) <= side
 
-    more = bisect_left(counts, True, key=fits)
-    return graded(length, elements + more, centre, ratio)
+    return graded(length, elements + bisect_left(counts, True, key=fits), centre, ratio)
 
 
 def framed(inner: Sequence[Section], length: float) -> list[Section]:
-    """Elements of a window in the middle of a length, and beside it some like its outermost.
-
-    The window's edges become lines of nodes.
-    """
+    """Elements of a window in a length's middle, its edges lines of nodes; some like it beside."""
     start = (length - inner[-1].end) / 2.0
     ends = [round_to(start + section.end, length) for section in inner]
     starts = [round_to(start, length), *ends]
     sizes = [(section.end - section.start) / section.elements for section in inner]
     before, after = (max(LEAST_BESIDE, math.ceil(start / size)) for size in (sizes[0], sizes[-1]))
-    counts = (section.elements for section in inner)
-    middle = map(Section, starts, ends, counts)
+    middle = map(Section, starts, ends, (section.elements for section in inner))
     return [Section(0.0, starts[0], before), *middle, Section(ends[-1], length, after)]
 
 

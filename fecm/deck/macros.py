@@ -40,43 +40,30 @@ WORDS = {
         Word("NEXT", "Ends a loop."),
         Word("DT", "Sets the time step; 0 takes 0.9 of the critical one.", "time step"),
         Word("TIME", "Advances the clock by DT."),
-        Word(
-            "PROP",
-            "Reads a proportional load from a card after END, or evaluates it again.",
-            "count",
-        ),
+        Word("PROP", "Reads a proportional load from a card after END, or evaluates it again.",
+             "count"),
         Word("LMAS", "Forms the lumped mass."),
         Word("CMAS", "Forms the consistent mass."),
         Word("TANG", "Forms and factorises the stiffness."),
         Word("FORM", "Forms the residual: the loads less the internal forces."),
-        Word(
-            "SOLV", "Solves for the displacement that removes the residual.", "", ("TANG", "FORM")
-        ),
+        Word("SOLV", "Solves for the displacement that removes the residual.", "",
+             ("TANG", "FORM")),
         Word("TOL", "Sets the tolerance of CONV.", "tolerance"),
         Word("CONV", "Leaves the loop once the solution has converged.", "", ("SOLV",), True),
         Word("REAC", "Stores and prints the reactions.", "", ("SOLV|EXCD|RODP",)),
         Word("EIGE", "Finds the N lowest natural modes.", "every", ("LMAS|CMAS",)),
         Word("EXCD", "Takes one step of central differences.", "", ("LMAS", "DT")),
-        Word(
-            "RODP",
-            "Takes one impact step; stores contact and strains at every N-th step.",
-            "every",
-            ("LMAS", "DT"),
-        ),
+        Word("RODP", "Takes one impact step; stores contact and strains at every N-th step.",
+             "every", ("LMAS", "DT")),
         Word("DISP", "Stores displacements at every N-th pass of the loop.", "every"),
-        Word(
-            "STRE", "Stores and prints strains and stress resultants at every N-th pass.", "every"
-        ),
-        Word(
-            "PLYS",
-            "Stores ply stresses at every N-th pass, in the M elements nearest to the load or all.",
-            "every",
-            second=True,
-        ),
+        Word("STRE", "Stores and prints strains and stress resultants at every N-th pass.",
+             "every"),
+        Word("PLYS", "Stores ply stresses at every N-th pass, "
+             "in the M elements nearest to the load or all.", "every", second=True),
         Word("FAIL", "Evaluates the failure criteria at every N-th pass.", "every"),
         Word("CHEC", "Reports mesh and storage."),
     )
-}
+}  # fmt: skip
 
 
 @frozen
@@ -157,9 +144,8 @@ def _closest(macro: Macro, findings: Findings) -> Word | None:
     import difflib
 
     near = difflib.get_close_matches(macro.word, WORDS, 1, 0.5)
-    message = f"`{macro.word}` is not a macro."
     hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(WORDS)}, END"
-    findings.add("E501", message, macro.place("macro"), hint)
+    findings.add("E501", f"`{macro.word}` is not a macro.", macro.place("macro"), hint)
     return WORDS[near[0]] if near else None
 
 
@@ -167,8 +153,7 @@ def _check_unused(word: Word, macro: Macro, findings: Findings) -> None:
     """Report the first field that a word does not use and that is not blank."""
     if macro.option:
         is_number = word.value and not macro.value and parse_real(macro.option) is not None
-        example = f"{word.name},{macro.option}"
-        hint = f"the number is in columns 11-15 or after a comma: {example}"
+        hint = f"the number is in columns 11-15 or after a comma: {word.name},{macro.option}"
         message = f"{word.name} takes no second word; the card has `{macro.option}`."
         place = macro.place("second word")
         findings.add("E514", message, place, hint if is_number else "remove it")
@@ -197,7 +182,6 @@ def _check_value(word: Word, macro: Macro, findings: Findings) -> None:
 
 
 def _warn_of_stopped_clock(body: Body, findings: Findings) -> None:
-    """Warn of the loops that step without TIME."""
     for item in body:
         if isinstance(item, Loop):
             words = {m.word for m in flat(item.body)}

@@ -15,27 +15,13 @@ from typing import ClassVar, Generic, Self, TypeVar
 
 from fecm._frozen import frozen
 from fecm._tables import html_table
+from fecm.deck import records
 from fecm.deck.card import Fields, Source, Value, layout, write_card
-from fecm.deck.records import (
-    AXES,
-    Control,
-    ElementNodes,
-    Gage,
-    Integration,
-    Layer,
-    LoadTable,
-    Macro,
-    NodeCodes,
-    NodeValues,
-    Ply,
-    Record,
-    RodDiameter,
-)
+from fecm.deck.records import Control, Record
 
 TITLE = "FECM"
 STOP = "STOP"
-# First fields of a card of a node.
-NODE = ("I5 node", "I5 increment|incr")
+NODE = ("I5 node", "I5 increment|incr")  # first fields of a card of a node
 _R = TypeVar("_R", bound=Record)
 _S = TypeVar("_S", bound="Segment")
 
@@ -72,7 +58,7 @@ class NumberedSegment(Segment, Generic[_R]):
         """Fields of a card."""
         match cls.keyword:
             case "COOR":
-                axes = AXES[: control.ndm]
+                axes = records.AXES[: control.ndm]
                 return layout(*NODE, *(f"F10 {axis}-coordinate|{axis}" for axis in axes))
             case "ELEM":
                 nodes = (f"I5 node {i + 1}|n{i + 1}" for i in range(control.nen))
@@ -93,22 +79,22 @@ class NumberedSegment(Segment, Generic[_R]):
 
 
 @frozen
-class Coordinates(NumberedSegment[NodeValues], keyword="COOR", record=NodeValues):
+class Coordinates(NumberedSegment[records.NodeValues], keyword="COOR", record=records.NodeValues):
     """COOR: (2I5,7F10.0); coordinates of the nodes (length), of which NDM are used."""
 
 
 @frozen
-class Elements(NumberedSegment[ElementNodes], keyword="ELEM", record=ElementNodes):
+class Elements(NumberedSegment[records.ElementNodes], keyword="ELEM", record=records.ElementNodes):
     """ELEM: (16I5); nodes of the elements; the increment follows the last of the NEN nodes."""
 
 
 @frozen
-class Boundary(NumberedSegment[NodeCodes], keyword="BOUN", record=NodeCodes):
+class Boundary(NumberedSegment[records.NodeCodes], keyword="BOUN", record=records.NodeCodes):
     """BOUN: (16I5); restraint codes of the nodes; a dof with a code other than 0 is restrained."""
 
 
 @frozen
-class Forces(NumberedSegment[NodeValues], keyword="FORC", record=NodeValues):
+class Forces(NumberedSegment[records.NodeValues], keyword="FORC", record=records.NodeValues):
     """FORC: (2I5,7F10.0); nodal forces, or displacements where the dof is restrained."""
 
 
@@ -116,9 +102,9 @@ class Forces(NumberedSegment[NodeValues], keyword="FORC", record=NodeValues):
 class Material(Segment, keyword="MATE"):
     """MATE: integration orders, ply constants and layers, the first layer at z = -h/2."""
 
-    integration: Integration
-    ply: Ply
-    layers: tuple[Layer, ...]
+    integration: records.Integration
+    ply: records.Ply
+    layers: tuple[records.Layer, ...]
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
@@ -193,7 +179,7 @@ class Projectile(Segment, keyword="PROJ"):
     modulus: float = 0.0
     density: float = 0.0
     # From the impacted end on; those between two cards are interpolated.
-    diameters: tuple[RodDiameter, ...] = ()
+    diameters: tuple[records.RodDiameter, ...] = ()
 
     optional: ClassVar[int] = 2
     fields: ClassVar[Fields] = layout(
@@ -316,7 +302,7 @@ class Damping(Segment, keyword="DAMP"):
 
 
 @frozen
-class Gages(NumberedSegment[Gage], keyword="GAGE", record=Gage):
+class Gages(NumberedSegment[records.Gage], keyword="GAGE", record=records.Gage):
     """GAGE: strain gages, read at every step (not in the report's program)."""
 
 
@@ -378,8 +364,8 @@ class Deck(Record):
     title: str
     control: Control
     segments: tuple[Segment, ...]
-    macros: tuple[Macro, ...]
-    tables: tuple[LoadTable, ...] = ()
+    macros: tuple[records.Macro, ...]
+    tables: tuple[records.LoadTable, ...] = ()
     text: str = field(default="", compare=False, repr=False)
 
     def __repr__(self) -> str:

@@ -1,8 +1,4 @@
-"""The card reader: a deck's text in, models and findings out.
-
-It continues after an error, so that one run shows all errors of a deck, and draws no conclusions
-from unreadable cards.
-"""
+"""The card reader: a deck's text in, its models and all errors out, not just the first."""
 
 from __future__ import annotations
 
@@ -35,8 +31,7 @@ BYTES_A_BYTE, BYTES_A_LINE = 12, 1100
 # Line ends, see str.splitlines.  The last three are the last bytes of longer characters.
 LINE_ENDS = b"\n\r\x0b\x0c\x1c\x1d\x1e\x85\xa8\xa9"
 FIRST = 4096  # number of bytes that identify a binary file
-# Name of the deck on standard input.
-STDIN = "<stdin>"
+STDIN = "<stdin>"  # name of the deck on standard input
 HDF5 = b"\x89HDF\r\n\x1a\n"
 # First lines of other programs' files.
 OTHERS = {
@@ -178,7 +173,6 @@ class Reader(Stream):
         self.findings.closed = True
 
     def _problem(self, title: Card) -> ParsedProblem:
-        """Read one problem, from its FECM card on."""
         first = self.position - 1
         self._unsound = set()
         control = self._control_card(title)
@@ -193,25 +187,20 @@ class Reader(Stream):
         return ParsedProblem(deck, self._unsound)
 
     def _control_card(self, title: Card) -> records.Control | None:
-        """Read the control card; None if it is missing or invalid."""
-        card = self.take_data()
-        if card is None:
+        if (card := self.take_data()) is None:
             place = (self.peek() or title).place
             self.findings.add("E003", "The control card is missing.", place, CONTROL_CARD)
             return None
-        control = self.record(card, records.Control)
-        return control if control and self._is_sound(control) else None
-
-    def _is_sound(self, control: records.Control) -> bool:
-        """Whether counts and dimensions are valid; report those that are not."""
-        before = len(self.findings)
+        control, before = self.record(card, records.Control), len(self.findings)
+        if control is None:
+            return None
         if control.nen == 0:
             named = zip(records.Control.fields, control.row(), strict=True)
             missing = [field.name for field, value in named if not value]
             verb = "is" if len(missing) == 1 else "are"
             message = f"{', '.join(missing)} {verb} missing on the control card."
             self.findings.add("E201", message, control.place(missing[0]), CONTROL_CARD)
-            return False
+            return None
         low, high = records.NODES_AN_ELEMENT
         for name, value, least, most, hint in (
             ("NUMNP", control.numnp, 1, MOST, ""),
@@ -226,7 +215,7 @@ class Reader(Stream):
                 message = f"{name} is {value}; it must be {must}."
                 self.findings.add("E201", message, control.place(name), hint)
         if len(self.findings) > before:
-            return False
+            return None
         self._counted.update(NUMNP=control.numnp, NUMEL=control.numel)
         for name, count in self._counted.items():
             if count > MOST:
@@ -234,10 +223,9 @@ class Reader(Stream):
                 message = f"{where} {name} {count}; at most {MOST} is allowed."
                 hint = "put each problem in a separate file"
                 self.findings.add("E201", message, control.place(name), hint)
-        return len(self.findings) == before
+        return control if len(self.findings) == before else None
 
     def _mesh_and_data(self, title: Card, control: records.Control | None) -> list[Segment]:
-        """Read the segments up to their END."""
         segments: list[Segment] = []
         if control is not None:
             self._control = control
@@ -289,7 +277,6 @@ class Reader(Stream):
             self.skip_data()
 
     def _program(self, title: Card) -> list[records.Macro]:
-        """Read the macro program from its MACR card to its END."""
         while (card := self.take_filled()) is not None:
             if card.keyword == MACROS:
                 return self._macros(card)
@@ -391,9 +378,8 @@ class Reader(Stream):
             self.take()
             patch = self.record(card, model.Patch)
             return patch and replace(patch, shape=patch.shape.upper())
-        message = "A card of PATC is missing."
         hint = "a blank card takes a disc of 0.327 times the thickness at the node of ROD"
-        self.findings.add("E008", message, (card or head).place, hint)
+        self.findings.add("E008", "A card of PATC is missing.", (card or head).place, hint)
         return None
 
     def _allowables(self, head: Card) -> Segment | None:
@@ -408,9 +394,8 @@ class Reader(Stream):
         words = head.data.replace(",", " ").upper().split()[1:]
         for word in words:
             if word not in model.Shear.WORDS:
-                message = f"`{word}` after SHEA is unknown."
                 hint = "SHEA takes MITC (assumed strains) and EQUI (stiffness from equilibrium)"
-                self.findings.add("E446", message, head.place, hint)
+                self.findings.add("E446", f"`{word}` after SHEA is unknown.", head.place, hint)
         assumed, equilibrium = (word in words for word in model.Shear.WORDS)
         following = self.peek()
         if words and (following is None or following.is_keyword or following.is_blank):
@@ -422,8 +407,7 @@ class Reader(Stream):
         word = " ".join(head.data.replace(",", " ").split()[1:]).upper()
         if word and word != model.Indentation.ACR:
             message = f"`{word}` after EXPE is not read: the law is that of equation 3-8."
-            hint = "EXPE ACR takes the law of equation 3-7"
-            self.findings.add("W416", message, head.place, hint)
+            self.findings.add("W416", message, head.place, "EXPE ACR takes the law of equation 3-7")
             word = ""
         law = self._single(head, model.Indentation, model.Indentation.acr_fields if word else None)
         return law and replace(law, word=word)
@@ -464,8 +448,7 @@ class Reader(Stream):
             card = self.take_data()
             if card is None or card.is_blank:
                 message = f"MATE has {number} layer cards where the control card says {count}."
-                place = (card or self.peek() or head).place
-                self.findings.add("E202", message, place)
+                self.findings.add("E202", message, (card or self.peek() or head).place)
                 return None
             if (layer := self.record(card, records.Layer)) is not None:
                 layers.append(layer)
@@ -496,7 +479,6 @@ READERS: dict[str, Callable[[Reader, Card], Segment | None]] = {
 
 
 def _close(word: str, known: list[str]) -> list[str]:
-    """The closest known word, if any."""
     import difflib
 
     return difflib.get_close_matches(word, known, 1, 0.6)
@@ -513,11 +495,7 @@ def load_text(path_or_text: str | Path | BinaryIO) -> tuple[str, str]:
 
 
 def _text(file: BinaryIO, path: str) -> str:
-    """Text of a deck, which may be an endless pipe: UTF-8, or Latin-1 where it is not.
-
-    Raises NotEnoughMemoryError if its cards need more memory than is free.  Raises OSError if it
-    can't be read or is not text.
-    """
+    """Text of a deck, which may be an endless pipe: UTF-8, or Latin-1 where it is not."""
     free = available()
     most = LARGEST_FILE if free is None else min(LARGEST_FILE, free // BYTES_A_BYTE)
     begin = file.read(FIRST)

@@ -1,7 +1,4 @@
-"""Records: the values of one card as plain typed objects, and the fields of each card.
-
-The `source` of a record, its card, is ignored when records are compared.
-"""
+"""Records: values of one card as plain typed objects, compared without their card, and fields."""
 
 from __future__ import annotations
 
@@ -21,15 +18,19 @@ def load_factor(table: LoadTable, clock: float) -> float:
     if not table.begin <= clock <= table.end:
         return 0.0
     a1, a2, a3, a4, a5 = table.constants
-    wave = math.sin(a4 * clock + a5)
-    return a1 + a2 * clock + a3 * wave ** max(table.exponent, 1)
+    return a1 + a2 * clock + a3 * math.sin(a4 * clock + a5) ** max(table.exponent, 1)
 
 
 NODES_AN_ELEMENT = (3, 12)  # smallest and largest number of nodes per element
-# Floats represent every integer below this number.
-EXACT = 2**53
+EXACT = 2**53  # floats represent every integer below this number
 AXES = ("x", "y", "z")
 DOF_NAMES = ("u", "v", "w", "theta_x", "theta_y")
+
+
+def pointless(values: Sequence[Value]) -> list[Value]:
+    """Values of a card whose integers are written without a point."""
+    exact = (isinstance(v, float) and v.is_integer() and abs(v) < EXACT for v in values)
+    return [int(v) if whole else v for v, whole in zip(values, exact, strict=True)]
 
 
 @frozen
@@ -224,21 +225,11 @@ class Macro(Record):
     # With commas the second word may be left out where the value follows: LOOP,794.
     short_fields: ClassVar[Fields] = (fields[0], *fields[2:])
 
-    def to_card(self, fields: Fields | None = None) -> str:
-        """Text of the card; integers have no point, trailing zeros are left out."""
-        values = self.row()
-        while values and not values[-1]:
-            values.pop()
-        return self.card(values)
+    optional: ClassVar[int] = 3
 
-    @classmethod
-    def card(cls, values: Sequence[Value]) -> str:
-        """Text of the card's first values; integers have no point."""
-        plain = [
-            int(v) if isinstance(v, float) and v.is_integer() and abs(v) < EXACT else v
-            for v in values
-        ]
-        return write_card(cls.fields[: len(plain)], plain)
+    def row(self) -> list[Value]:
+        """Values in the card's order; integers have no point."""
+        return pointless(super().row())
 
 
 @frozen

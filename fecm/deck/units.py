@@ -31,10 +31,7 @@ def unit_names(deck: Deck) -> dict[str, str]:
 
 
 def unit_of(dimension: str, names: dict[str, str]) -> str:
-    """Unit of a physical dimension: ``force/length`` in lbf and in is ``lbf/in``.
-
-    Empty where the deck names no units or the dimension is none.
-    """
+    """Unit of a dimension: ``lbf/in`` of ``force/length``; empty without names or dimension."""
     if not names or not dimension:
         return ""
     return re.sub(r"length|force|time", lambda match: names[match[0]], dimension)
@@ -50,8 +47,7 @@ def in_si(dimension: str, names: dict[str, str]) -> float | None:
     for sign, product in zip((1.0, -1.0), dimension.split("/"), strict=False):
         for term in product.split("*"):
             word, _, power = term.partition("^")
-            unit = KNOWN[word].get(names.get(word, ""))
-            if unit is None:
+            if (unit := KNOWN[word].get(names.get(word, ""))) is None:
                 return None
             value *= unit ** (sign * float(power or 1))
     return value
@@ -59,8 +55,7 @@ def in_si(dimension: str, names: dict[str, str]) -> float | None:
 
 def mass_in_si(mass: float, names: dict[str, str]) -> str:
     """A mass in t where the deck's unit of mass is the tonne, otherwise in kg; may be empty."""
-    unit = in_si(MASS, names)
-    if unit is None:
+    if (unit := in_si(MASS, names)) is None:
         return ""
     tonnes = abs(unit / 1e3 - 1.0) < 1e-9
     return f"{mass:.4g} t" if tonnes else f"{mass * unit:.4g} kg"

@@ -1,16 +1,12 @@
-"""Build the parts of a run from a deck.
-
-The active slips become parameters of plate, projectile, contact law and transducer here.
-"""
+"""Build the parts of a run from a deck; the active slips become parameters of them here."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import field, replace
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
@@ -18,17 +14,12 @@ from fecm.deck import model
 from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, moves_only
 from fecm.deck.model import Deck
 from fecm.deck.records import RodDiameter
-from fecm.mechanics.contact_law import (
-    ContactParameters,
-    HystereticLaw,
-    LinearPermanent,
-    ListingLaw,
-    YangSunPermanent,
-)
+from fecm.mechanics import contact_law
 from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.impact_steps import ImpactSteps, supports
+from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.kernels.failure import CompiledMonitor
 from fecm.mechanics.kernels.strains import CompiledStrains
 from fecm.mechanics.laminate import Laminate, effective_rigidity, laminate, threshold_force
@@ -44,21 +35,49 @@ from fecm.mechanics.projectile import (
     Projectile,
     RigidMass,
     Rod,
+    RodMethod,
     Transducer,
     report_rod,
 )
-from fecm.mechanics.stiffness_product import CSR, KERNELS, Workers, available
+from fecm.mechanics.stiffness_product import AUTO, CSR, KERNELS, SOLVERS, Workers, available
 from fecm.mechanics.strains import StrainField
 from fecm.mechanics.symmetry import half_turn_images, restrain_resting_dofs, symmetry_reduction
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.problem.generate import generate, rod_diameters
-from fecm.problem.options import RunOptions
 
-# Dof w, from 0.
-W = 2
+W = 2  # dof w, from 0
+ENERGY_LIMIT = 0.1  # relative error of the energy balance that ends a run
 WORTH_SHARING = 100_000  # number of equations above which threads save more than they cost
 # Slips that change the plate or its loads.
 PLATE_SLIPS = {"g12", "small-stiffness", "shear-order", "tapes", "jacobian", "rod-force"}
+
+
+@frozen
+class RunOptions:
+    """Options of a run, by default the report's.  Raises ValueError if a value is not valid."""
+
+    # Slips of the printed program that are on: see :func:`~fecm.problem.slips.active_slips`.
+    slips: frozenset[str] = frozenset()
+    # Computation of K·u, one of ``SOLVERS``: compiled kernels where there are any, else NumPy; or
+    # one of them; or a sparse matrix.
+    solver: str = AUTO
+    # Threads that share the work of a step; 0 takes every core for a large mesh.  The result does
+    # not depend on it.
+    threads: int = 0
+    rod_method: RodMethod = field(default_factory=RodMethod)  # the rod's mass matrix and integrator
+    # Error of the energy balance, relative to the supplied energy, that ends a run without slips.
+    energy_limit: float = ENERGY_LIMIT
+    law: contact_law.Law | None = None  # contact law instead of the deck's
+
+    def __post_init__(self) -> None:
+        if self.solver not in SOLVERS:
+            raise ValueError(f"unknown solver {self.solver!r}; known are {', '.join(SOLVERS)}")
+        if self.solver == KERNELS and LIBRARY is None:
+            raise ValueError("this installation has no compiled kernels; take the solver numpy")
+        if self.threads < 0:
+            raise ValueError(f"threads is {self.threads}; it must be 0 or more")
+        if not self.energy_limit > 0.0:
+            raise ValueError(f"energy_limit is {self.energy_limit:g}; it must be positive")
 
 
 class Threshold(NamedTuple):
@@ -135,11 +154,9 @@ class Problem:
 
         Raises PatchError if the patch is not entirely on the plate.
         """
-        card = self.deck.last(model.Patch)
-        if card is None:
+        if (card := self.deck.last(model.Patch)) is None:
             return None
-        radius = card.radius
-        if radius is None:
+        if (radius := card.radius) is None:
             thickness = self.deck.require(model.Material).integration.thickness
             radius = RADIUS_PER_THICKNESS[card.shape] * thickness
         x, y = (card.x, card.y) if card.x is not None and card.y is not None else self._struck
@@ -178,11 +195,6 @@ class Problem:
         return np.asarray(np.hypot(x - self.load_place[0], y - self.load_place[1]) < reach)
 
     @cached_property
-    def by_distance(self) -> NDArray[np.intp]:
-        """Rows of the elements, those nearest to the load first."""
-        return np.argsort(self.distances.round(9), kind="stable")
-
-    @cached_property
     def contact(self) -> Floats | None:
         """Distribution of a unit contact force over the dofs, (numnp, 5); None without impact."""
         if not self.has_impact:
@@ -198,8 +210,7 @@ class Problem:
     @cached_property
     def threshold(self) -> Threshold | None:
         """Delamination threshold; None without a DELA segment."""
-        card = self.deck.last(model.Delamination)
-        if card is None:
+        if (card := self.deck.last(model.Delamination)) is None:
             return None
         rigidity = effective_rigidity(self.laminate)
         return Threshold(threshold_force(rigidity, card.toughness, int(card.number)), rigidity)
@@ -207,8 +218,7 @@ class Problem:
     @property
     def damping(self) -> float:
         """Mass-proportional damping a of the plate, 1/time; 0 without a DAMP segment."""
-        card = self.deck.last(model.Damping)
-        return 0.0 if card is None else card.coefficient
+        return card.coefficient if (card := self.deck.last(model.Damping)) else 0.0
 
     @cached_property
     def work(self) -> WorkEstimate:
@@ -270,8 +280,7 @@ def rules(material: model.Material) -> tuple[Quadrature, Quadrature, Quadrature]
 
 def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> PlateModel:
     """Build the plate of a deck with the active slips."""
-    material = deck.require(model.Material)
-    bending, shear, points = rules(material)
+    bending, shear, points = rules(deck.require(model.Material))
     laminate = laminate_of_deck(deck, isotropic_g12="g12" in slips)
     if "small-stiffness" in slips:
         laminate = laminate.without_small_entries()
@@ -287,13 +296,11 @@ def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> 
 
 def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> Projectile:
     """Build the projectile of a deck; without a PROJ segment the report's rod."""
-    card = deck.last(model.Projectile)
-    if card is None:
+    if (card := deck.last(model.Projectile)) is None:
         return report_rod(LISTING_DENSITY if "density" in slips else REPORT_DENSITY)
     if not card.elements:
         return RigidMass(card.size)
-    diameters = tuple(rod_diameters(card).tolist())
-    return Rod(card.size, diameters, card.modulus, card.density)
+    return Rod(card.size, tuple(rod_diameters(card).tolist()), card.modulus, card.density)
 
 
 def projectile_segment(rod: Projectile, transducer: int = 0) -> model.Projectile:
@@ -308,11 +315,11 @@ def projectile_segment(rod: Projectile, transducer: int = 0) -> model.Projectile
     )
 
 
-def build_constants(measured: model.Indentation) -> ContactParameters:
+def build_constants(measured: model.Indentation) -> contact_law.ContactParameters:
     """Build the contact parameters of an EXPE segment."""
     if measured.word == model.Indentation.ACR:
-        return YangSunPermanent(measured.k, measured.alpha_p)
-    return LinearPermanent(*measured.values())
+        return contact_law.YangSunPermanent(measured.k, measured.alpha_p)
+    return contact_law.LinearPermanent(*measured.values())
 
 
 def build_station(deck: Deck, projectile: Projectile, slips: frozenset[str]) -> Transducer:
@@ -325,10 +332,16 @@ def build_station(deck: Deck, projectile: Projectile, slips: frozenset[str]) -> 
     return Transducer(middle if card is None or not card.transducer else card.transducer, sign)
 
 
-def build_law(deck: Deck, slips: frozenset[str] = frozenset()) -> HystereticLaw | ListingLaw:
+def build_law(
+    deck: Deck, slips: frozenset[str] = frozenset()
+) -> contact_law.HystereticLaw | contact_law.ListingLaw:
     """Build the contact law of a deck with the active slips."""
     constants = build_constants(deck.require(model.Indentation))
-    return ListingLaw(constants) if "reload" in slips else HystereticLaw(constants)
+    return (
+        contact_law.ListingLaw(constants)
+        if "reload" in slips
+        else contact_law.HystereticLaw(constants)
+    )
 
 
 def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactModel:
@@ -373,8 +386,8 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     words = {macro.word: macro for macro in flat(problem.program)}
     of_plate = problem.mesh, plate.laminate, problem.rules[2]
     if "PLYS" in words:  # the M elements nearest to the load, or all
-        nearest = problem.by_distance[: int(words["PLYS"].second) or None]
-        plies = PlyStresses(*of_plate, np.sort(nearest))
+        nearest = np.argsort(problem.distances.round(9), kind="stable")
+        plies = PlyStresses(*of_plate, np.sort(nearest[: int(words["PLYS"].second) or None]))
     if "FAIL" in words:
         kind = CompiledMonitor if compiled else FailureMonitor
         failure = kind(PlyStresses(*of_plate), plate.laminate, deck.require(model.Allowables))
@@ -385,22 +398,12 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     if impact is not None and supports(impact):
         sums = None if read is None else motion.dof_sums(read.dof_indices, read.weights)
         steps = ImpactSteps(impact, sums, station.dof, workers.count)
+    strains = plate.strain_field(plate.rules.strains, CompiledStrains if compiled else StrainField)
+    under_load = places and problem.under_load(*places)
     return ImpactModel(
-        plate=plate,
-        motion=motion,
-        impact=impact,
-        steps=steps,
-        station=station,
-        strains=plate.strain_field(
-            plate.rules.strains, CompiledStrains if compiled else StrainField
-        ),
-        stress_points=stress_points,
-        gages=read,
-        patch=problem.patch,
-        plies=plies,
-        failure=failure,
-        under_load=places and problem.under_load(*places),
-    )
+        plate, motion, impact, steps, station, strains, stress_points, read, problem.patch, plies,
+        failure, under_load,
+    )  # fmt: skip
 
 
 def laminate_of(material: model.Material, *, isotropic_g12: bool = False) -> Laminate:
@@ -426,8 +429,7 @@ def laminate_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> Laminate:
 
 def has_assumed_shear(deck: Deck) -> bool:
     """Whether the transverse shear strains of a deck are assumed (``SHEA MITC``)."""
-    shear = deck.last(model.Shear)
-    return shear is not None and shear.assumed
+    return (deck.last(model.Shear) or model.Shear()).assumed
 
 
 @lru_cache(maxsize=256)

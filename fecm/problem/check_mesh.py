@@ -17,18 +17,14 @@ from fecm.mechanics.mesh import ElementBlock, Mesh, distinct, element_blocks, ho
 from fecm.problem.build import Problem, has_assumed_shear, rules
 from fecm.problem.generate import place_of_element
 
-# Findings of one kind about elements are grouped beyond this number of cards.
-SHOWN = 4
-# Largest number of runs of numbers in a message.
-RUNS = 8
-# Layers that the listing's arrays hold (CNPD: QBR(3,3,25), TH(25)).
-LISTING_LAYERS = 25
+SHOWN = 4  # findings of one kind about elements are grouped beyond this number of cards
+RUNS = 8  # largest number of runs of numbers in a message
+LISTING_LAYERS = 25  # layers that the listing's arrays hold (CNPD: QBR(3,3,25), TH(25))
 ANOTHER_MODE = "run the deck in report mode"
 CORNERS = TRIANGLE.corners
 Blocks = list[ElementBlock]
 W, THETA_X = 2, 3
-# Loaded nodes up to this number are single forces, more are a pressure.
-FEW_LOADED = 4
+FEW_LOADED = 4  # loaded nodes up to this number are single forces, more are a pressure
 # Distance of a mid-side node from its place along the side, over the side's length.
 OFF_PLACE = 0.05
 FOUR_NODES, NINE_NODES = "4-node elements", "9-node elements"
@@ -57,10 +53,7 @@ def describe_elements(rows: NDArray[np.intp]) -> str:
 def report_elements(
     findings: Findings, code: str, rows: NDArray[Any], deck: model.Deck, what: str, hint: str = ""
 ) -> None:
-    """Report an error of the elements in some rows, one finding per card that generates them.
-
-    Beyond :data:`SHOWN` cards a single finding covers all of them.
-    """
+    """Report an error of elements, one finding per card; one for all beyond SHOWN cards."""
     by_card: dict[Place | None, list[int]] = {}
     for row in rows[: 100 * SHOWN].tolist():
         by_card.setdefault(place_of_element(deck, row + 1), []).append(row + 1)
@@ -135,7 +128,6 @@ def check_assumed_shear(deck: model.Deck, mesh: Mesh, findings: Findings) -> Non
 
 
 def _check_coincidence(deck: model.Deck, mesh: Mesh, findings: Findings) -> None:
-    """Warn of nodes in the same place: the plate is cut there."""
     order = np.lexsort(mesh.coordinates.T)
     sorted_places = mesh.coordinates[order]
     same = (sorted_places[1:] == sorted_places[:-1]).all(axis=1)
@@ -262,19 +254,14 @@ def _check_shear(deck: model.Deck, mesh: Mesh, families: Blocks, findings: Findi
         elif order < (held if supported else free):
             weak.setdefault(free, []).append(name)
     if weak:
-        names = dict.fromkeys(name for kind in weak.values() for name in kind)
         rest = "." if supported else ", and nothing supports the plate's w."
-        named = " and ".join(names)
+        named = " and ".join(dict.fromkeys(name for kind in weak.values() for name in kind))
         message = f"The shear order L2 = {card.shear} leaves {named} motions without energy{rest}"
         findings.add("W316", message, card.place("shear order L2"), f"take L2 = {max(weak)}")
 
 
 def _orders_without_motions(family: ElementBlock) -> tuple[str, int, int]:
-    """Name of a block's elements, and the least shear orders without zero-energy modes.
-
-    The first order is for a plate whose w is free; the second, which may be lower, for a plate
-    whose supports prevent the modes.
-    """
+    """Name, and least shear orders without zero-energy modes: where w is free, and supported."""
     if family.shape is TRIANGLE:
         return "triangles", 1, 1
     if family.shape is CUBIC:

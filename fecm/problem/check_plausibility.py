@@ -1,7 +1,6 @@
 """Findings about valid values that no real impact has: wrong units, typing errors, wrong macros.
 
-All are warnings, except that a program which cannot move the plate is an error.  The largest stable
-time step of plate and contact is found here.
+All are warnings, except that a program which cannot move the plate is an error.
 """
 
 from __future__ import annotations
@@ -48,13 +47,10 @@ REAL = {
 
 def check_plausibility(problem: Problem, findings: Findings) -> None:
     """Warn of values that no real plate or impact has."""
-    deck, mesh, hits = problem.deck, problem.mesh, problem.has_impact
-    _check_material(deck.require(model.Material), mesh, findings)
-    _check_units(deck, findings, hits=hits)
-    if hits:
-        _check_law(deck, findings)
-        _check_neighbours(deck.require(model.Impact), mesh, findings)
-        _check_projectile(deck, problem.plate, findings)
+    _check_material(problem.deck.require(model.Material), problem.mesh, findings)
+    _check_units(problem.deck, findings, hits=problem.has_impact)
+    if problem.has_impact:
+        _check_impact(problem, findings)
 
 
 def _check_material(material: model.Material, mesh: Mesh, findings: Findings) -> None:
@@ -96,10 +92,12 @@ def _check_material(material: model.Material, mesh: Mesh, findings: Findings) ->
         findings.add("W430", message, material.integration.place("total thickness"), hint)
 
 
-def _check_law(deck: model.Deck, findings: Findings) -> None:
-    law = deck.require(model.Indentation)
-    thickness = deck.require(model.Material).integration.thickness
-    name = law.names()[1]
+def _check_impact(problem: Problem, findings: Findings) -> None:
+    deck, mesh, plate = problem.deck, problem.mesh, problem.plate
+    law, impact = deck.require(model.Indentation), deck.require(model.Impact)
+    card = deck.last(model.Projectile)
+    material, projectile = deck.require(model.Material), build_projectile(deck)
+    thickness, name = material.integration.thickness, law.names()[1]
     if law.alpha_p > thickness:
         what = f"The {name} = {law.alpha_p:g} is more than the plate's thickness {thickness:g}"
         message = f"{what}: no permanent indentation would occur."
@@ -108,10 +106,7 @@ def _check_law(deck: model.Deck, findings: Findings) -> None:
         limits = f"{LEAST_POWER:g} to {GREATEST_POWER:g}"
         message = f"The unloading power q = {law.q:g} is outside {limits}."
         findings.add("W437", message, law.place(law.names()[3]), "measured powers are 1.5 to 2.5")
-
-
-def _check_neighbours(impact: model.Impact, mesh: Mesh, findings: Findings) -> None:
-    """Warn if all neighbours of the impact node, inside the plate too, are restrained."""
+    # The neighbours of the impact node, if they are inside the plate too.
     touching = mesh.elements[(mesh.elements == impact.node).any(axis=1)]
     around = distinct(touching[(touching > 0) & (touching != impact.node)]) - 1
     places = mesh.coordinates
@@ -120,12 +115,6 @@ def _check_neighbours(impact: model.Impact, mesh: Mesh, findings: Findings) -> N
         where = f"the impact node {impact.node} is restrained in dof {impact.dof}"
         message = f"Every other node of the elements at {where}."
         findings.add("W441", message, impact.place("impact node"), "restrain the supports only")
-
-
-def _check_projectile(deck: model.Deck, plate: PlateModel, findings: Findings) -> None:
-    impact, card = deck.require(model.Impact), deck.last(model.Projectile)
-    ply = deck.require(model.Material).ply
-    projectile = build_projectile(deck)
     ratio = projectile.total_mass / (plate.area() * plate.laminate.mass)
     place = impact.place("impact node") if card is None else card.place("length or mass")
     if not LIGHTEST <= ratio <= HEAVIEST:
@@ -133,7 +122,7 @@ def _check_projectile(deck: model.Deck, plate: PlateModel, findings: Findings) -
         message = f"The projectile's mass {mass:.4g} is {ratio:.3g} times the plate's."
         hint = "mass is force time^2/length in the deck's units: t in mm, N and s"
         findings.add("W438", message, place, hint)
-    along_fibres = math.sqrt(ply.e1 / ply.density)
+    along_fibres = math.sqrt(material.ply.e1 / material.ply.density)
     if isinstance(projectile, Rod) and card is not None:
         speed = math.sqrt(projectile.modulus / projectile.density)
         if not SLOWEST <= speed / along_fibres <= FASTEST:

@@ -30,8 +30,7 @@ LEAST_PER_WAVE, ENOUGH_PER_WAVE = 4, 8
 # Mesh error of the peak that is warned of, and the largest that is estimated.
 WORTH_SAYING, MOST_ERROR = 0.03, 0.5
 THICKNESS_TOLERANCE = 1.0e-6  # difference of thicknesses that is rounding
-# Shear order at which 9-node elements have no zero-energy modes.
-FULL = 3
+FULL = 3  # shear order at which 9-node elements have no zero-energy modes
 
 
 def check_impact(impact: model.Impact, deck: model.Deck, mesh: Mesh, findings: Findings) -> None:
@@ -408,11 +407,10 @@ def check_patch(problem: Problem, findings: Findings) -> None:
         return
     # The default radius belongs to plate theory; few meshes resolve it, and only stresses need it.
     needed = card.radius is not None or any(macro.word == "PLYS" for macro in deck.macros)
-    longest = longest_sides(mesh.elements, mesh.coordinates)
     at = np.array([[patch.x, patch.y]])
     blocks = element_blocks(mesh.elements, mesh.coordinates)
     here = np.concatenate([block.rows[locate(block, at)[0]] for block in blocks])
-    side = float(longest[here].max(initial=0.0))
+    side = float(longest_sides(mesh.elements[here], mesh.coordinates).max(initial=0.0))
     if needed and patch.radius < side * (1.0 - 1e-9):
         message = (
             f"The radius of the patch, {patch.radius:.4g}, is smaller than the side of its "

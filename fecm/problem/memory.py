@@ -30,12 +30,10 @@ POINT = 250  # bytes per strain point of an element: Jacobians and strains
 # Bytes per entry of the element matrices that are kept; and of one under integration, for each row
 # of B and point.
 KEPT, INTEGRATED = 12, 24
-# Strains in B: six of the membrane and of bending, two of the transverse shear.
-ROWS = 8
+ROWS = 8  # strains in B: six of the membrane and of bending, two of the transverse shear
 # Bytes of factors of a plate without coupling: TANG's over n log2 n, EIGE's over n^1.5.
 TANGENT, SHIFTED = 300, 70
-# Bytes per step of the summary after a run.
-STEP = 80
+STEP = 80  # bytes per step of the summary after a run
 STATIC = {"TANG", "EIGE"}
 
 
@@ -91,9 +89,8 @@ def _product(model: PlateModel, *, exact: bool) -> int:
             sizes = np.bincount(congruence(family).group)
             shared = int((sizes >= WORTH_GROUPING).sum())
             alone = int(sizes[sizes < WORTH_GROUPING].sum())
-        at_once = max(shared, min(alone, BLOCK))
         total += (alone + shared) * n * n * KEPT + count * n * PLACE
-        total += at_once * points * ROWS * n * INTEGRATED
+        total += max(shared, min(alone, BLOCK)) * points * ROWS * n * INTEGRATED
     return total
 
 

@@ -27,8 +27,7 @@ BOUNDARY = "boundary"
 ELSEWHERE = (".xdmf", ".xmf")  # formats whose files name other files
 # Coordinates that differ by less, over the size of the mesh, are equal; and areas over its square.
 SAME, NO_AREA = 1e-9, 1e-12
-# Most elements named in a message.
-NAMED = 8
+NAMED = 8  # most elements named in a message
 
 
 class MeshError(FecmError, ValueError):
@@ -111,7 +110,6 @@ class PlateMesh:
         return boundary_cards(codes)
 
     def _group(self, name: str) -> Integers:
-        """Nodes of a group, or of the boundary."""
         if name in self.groups or name != BOUNDARY:
             return self.groups[name]
         sides, _, counts = _sides(self.cells)
@@ -262,10 +260,7 @@ def _turned(places: Floats, nodes: Integers, size: float, where: str) -> Integer
 def _quadrilaterals(
     places: Floats, nodes: Integers, groups: dict[str, Integers]
 ) -> tuple[Floats, Integers, int]:
-    """Points and cells with quadrilaterals of 4 or 9 nodes only, and the number of new mid-sides.
-
-    Mid-sides come after the old points; they join the groups of their sides.
-    """
+    """Quadrilaterals of 4 or 9 nodes, and how many mid-sides are new, after the old points."""
     count, new = nodes.shape[1], 0
     if count in (4, 9):
         return places, nodes, new
@@ -274,7 +269,7 @@ def _quadrilaterals(
         new = len(sides)
         for name, group in groups.items():
             middles = np.flatnonzero(_inside(sides, counts, group))
-            groups[name] = np.concatenate([group, len(places) + middles])
+            groups[name] = np.concatenate([group, len(places) + middles])  # those of its sides
         nodes = np.hstack([nodes, len(places) + number])
         places = np.vstack([places, places[sides].mean(axis=1)])
     # The element's own shape functions at its centre.

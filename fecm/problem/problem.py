@@ -92,7 +92,6 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
 
 
 def _element_errors(findings: Findings) -> int:
-    """Number of ELEM cards that generate no elements."""
     return sum(findings.counts[code] for code in ("E303", "E304", "E305"))
 
 

@@ -1,7 +1,4 @@
-"""Slips: differences between the report's printed program and its text or evident intent.
-
-:mod:`fecm.problem.build` turns slips into parameters.
-"""
+"""Slips: differences between the report's printed program and its text or evident intent."""
 
 from __future__ import annotations
 
@@ -10,8 +7,6 @@ from collections.abc import Iterable
 REPORT = "report"
 LISTING = "listing"
 MODES = (REPORT, LISTING)
-
-
 # Each has a row of the errata page, docs/errata.md.
 NAMES = (
     "target", "density", "rod-start", "reload", "jacobian", "station", "tapes", "g12",

@@ -17,9 +17,8 @@ from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.time_step import critical_time_step
-from fecm.problem.build import ImpactModel
+from fecm.problem.build import ImpactModel, RunOptions
 from fecm.problem.check_plausibility import contact_step
-from fecm.problem.options import RunOptions
 from fecm.problem.problem import Problem
 from fecm.problem.slips import mode_of
 from fecm.results.result import Result

@@ -17,8 +17,7 @@ from fecm.mechanics.impact import ImpactState
 from fecm.mechanics.plate_motion import DivergenceError, PlateState
 from fecm.mechanics.ply_stresses import FailureEnvelope
 from fecm.mechanics.solutions import Tangent
-from fecm.problem.build import Threshold, build_model
-from fecm.problem.options import RunOptions
+from fecm.problem.build import RunOptions, Threshold, build_model
 from fecm.problem.problem import Problem
 from fecm.results.sinks import Sink
 from fecm.simulation.interpreter import Interpreter

@@ -25,10 +25,9 @@ from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.time_step import rounded_time_step, taken_time_step
 from fecm.objects import E_S, NU_S, STANDARD
 from fecm.problem.build import build_projectile, is_coupled, projectile_segment
-from fecm.problem.generate import generate, restraint_codes
+from fecm.problem.generate import RefineError, generate, refined, restraint_codes
 from fecm.problem.plate_mesh import BOUNDARY, PlateMesh
 from fecm.problem.problem import UNSTABLE, Problem, check
-from fecm.problem.refine import RefineError, refined
 from fecm.studies.indentation_test.modulus import effective_stiffness, indentation_modulus
 from fecm.sweeps.cases import REFINE, Case, CasesError, Value, check_names, pair
 
