@@ -10,7 +10,7 @@ from fecm.deck.card import Card, Fields, Value, write_card
 from fecm.deck.findings import DeckError
 from fecm.deck.model import STOP
 from fecm.deck.reader import READERS, Reader
-from fecm.deck.records import Macro, pointless
+from fecm.deck.records import Macro, without_points
 
 RULER = "!:"
 
@@ -65,7 +65,7 @@ def _aligned(card: Card, fields: Fields, values: list[Value]) -> str:
         kept[:1] = [str(v).strip().upper() for v in kept[:1]]
         if fields == Macro.short_fields:
             kept[1:1] = [""]
-        return write_card(Macro.fields[: len(kept)], pointless(kept))
+        return write_card(Macro.fields[: len(kept)], without_points(kept))
     return write_card(fields[:count], kept) if count else ""
 
 

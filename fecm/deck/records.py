@@ -27,7 +27,7 @@ AXES = ("x", "y", "z")
 DOF_NAMES = ("u", "v", "w", "theta_x", "theta_y")
 
 
-def pointless(values: Sequence[Value]) -> list[Value]:
+def without_points(values: Sequence[Value]) -> list[Value]:
     """Values of a card whose integers are written without a point."""
     exact = (isinstance(v, float) and v.is_integer() and abs(v) < EXACT for v in values)
     return [int(v) if whole else v for v, whole in zip(values, exact, strict=True)]
@@ -229,7 +229,7 @@ class Macro(Record):
 
     def row(self) -> list[Value]:
         """Values in the card's order; integers have no point."""
-        return pointless(super().row())
+        return without_points(super().row())
 
 
 @frozen
