@@ -112,9 +112,6 @@ def write_text(path: Path, text: str, *, overwrite: bool) -> None:
         click.echo(text, nl=False)
 
 
-# Standard streams --------------------------------------------------------------------------------
-
-
 class _Guarded(io.FileIO):
     """A stream that remembers its first error of writing and drops what follows."""
 

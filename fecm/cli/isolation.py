@@ -145,9 +145,6 @@ def _size(path: Path) -> int:
         return 0
 
 
-# The child --------------------------------------------------------------------------------------
-
-
 def _confine(limits: Limits, pipe: int) -> None:
     """Put the limits on this process, and take the noise of libraries from standard error."""
     import resource
@@ -180,9 +177,6 @@ def _confine(limits: Limits, pipe: int) -> None:
     every = min(1.0, limits.call / 8.0)
     signal.setitimer(signal.ITIMER_REAL, every, every)
     atexit.register(signal.setitimer, signal.ITIMER_REAL, 0.0)
-
-
-# The parent -------------------------------------------------------------------------------------
 
 
 def _wait(child: int, pipe: int) -> NoReturn:

@@ -103,16 +103,25 @@ def pulse(
     if deck is None and missing:
         raise click.UsageError(f"the rod lacks {', '.join(missing)}; or name a deck with a rod")
     units: Mapping[str, str] = SYSTEMS[system] if system else {}
-    deck_dt = None
+    steps: list[float] = []
     if deck is None:
         diameters = (shape["diameter"],) * (shape["elements"] or REPORT_ELEMENTS)
         struck = Rod(shape["length"], diameters, shape["modulus"], shape["density"])
         station = struck.length / 2.0
     else:
-        struck, station, deck_dt, units = _of_deck(deck)
+        problems = load_valid(deck)
+        if not problems:
+            raise RefusedError(f"{deck} contains no problem")
+        first = problems[0].deck
+        steps = [macro.value for macro in first.macros if macro.word == "DT" and macro.value > 0.0]
+        projectile, units = build_projectile(first), unit_names(first)
+        if isinstance(projectile, RigidMass):
+            raise RefusedError(f"{deck}: the projectile is a rigid mass; a pulse needs a rod")
+        struck, node = projectile, build_station(first, projectile, frozenset()).node
+        station = (node - 1) * struck.length / struck.elements
     struck = struck.with_mass(mass_matrix)
-    step, end = dt or deck_dt or pulse_test.default_time_step(struck), duration or applied.duration
-    places = tuple(dict.fromkeys(stations)) or (station,)
+    step = dt or (steps[0] if steps else pulse_test.default_time_step(struck))
+    end, places = duration or applied.duration, tuple(dict.fromkeys(stations)) or (station,)
     history = pulse_test.simulate_pulse(struck, applied, step, end, places, integrator)
     filtered = None
     if transducer is not None:
@@ -121,21 +130,6 @@ def pulse(
     targets.write(*pulse_test.table(history, filtered))
     if targets.table != DASH:
         _summarise(struck, history)
-
-
-def _of_deck(deck: Path) -> tuple[Rod, float, float | None, Mapping[str, str]]:
-    """Projectile of a deck's first problem, x of its transducer, its first DT, and its units."""
-    problems = load_valid(deck)
-    if not problems:
-        raise RefusedError(f"{deck} contains no problem")
-    first = problems[0].deck
-    steps = [macro.value for macro in first.macros if macro.word == "DT" and macro.value > 0.0]
-    projectile = build_projectile(first)
-    if isinstance(projectile, RigidMass):
-        raise RefusedError(f"{deck}: the projectile is a rigid mass; a pulse needs a rod")
-    node = build_station(first, projectile, frozenset()).node
-    x = (node - 1) * projectile.length / projectile.elements
-    return projectile, x, steps[0] if steps else None, unit_names(first)
 
 
 def _summarise(struck: Rod, history: RodHistory) -> None:

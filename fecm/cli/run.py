@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import click
@@ -89,9 +89,16 @@ def run(
     prints = [numbered(printed, n) if printed else None for n in range(1, len(problems) + 1)]
     partial = [p for path in paths if path.name for p in (checkpoint_of(path), spool_of(path))]
     check_outputs([*paths, *filter(None, prints)], True, [deck], partial)
-    interrupted = _interrupted(paths, resume=resume, overwrite=overwrite)
+    left = [n for n, path in enumerate(paths) if checkpoint_of(path).exists()]  # interrupted runs
+    if resume and not left:
+        raise RefusedError(f"there is no checkpoint {checkpoint_of(paths[0])} to resume from")
+    if left and not (resume or overwrite):
+        raise RefusedError(
+            f"{checkpoint_of(paths[left[0]])} belongs to an interrupted run: --resume continues "
+            "it, --overwrite starts over"
+        )
     # Outputs up to the interrupted problem belong to the run that is resumed.
-    own = interrupted + 1 if resume else 0
+    own = left[0] + 1 if resume else 0
     check_outputs([*paths[own:], *filter(None, prints[own:])], overwrite)
     rod = RodMethod(rod_mass, rod_integrator)
     choices = RunOptions(active, solver, threads, rod, energy_limit)
@@ -114,19 +121,6 @@ def run(
             ]
     if exceeded:
         raise CheckFailedError(f"{'; '.join(exceeded)}: more than the limit of {fail_limit:g}")
-
-
-def _interrupted(paths: Sequence[Path], *, resume: bool, overwrite: bool) -> int:
-    """Number of the problem whose run was interrupted; 0 if none was."""
-    number = next((n for n, path in enumerate(paths) if checkpoint_of(path).exists()), None)
-    if number is None and resume:
-        raise RefusedError(f"there is no checkpoint {checkpoint_of(paths[0])} to resume from")
-    if number is not None and not (resume or overwrite):
-        raise RefusedError(
-            f"{checkpoint_of(paths[number])} belongs to an interrupted run: --resume continues it, "
-            "--overwrite starts over"
-        )
-    return number or 0
 
 
 def _run_one(
