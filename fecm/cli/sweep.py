@@ -145,7 +145,7 @@ def sweep(
         )
     parts = PartialResults(path, planned.fingerprint(), restart=overwrite)
     result = _carry_out(problem, planned, parts, workers, scheduler)
-    forces = parts.forces(plans.tasks(problem, planned)) if history else None
+    forces = parts.forces(plans.tasks(problem, planned)) if history else ()
     save(result, path, overwrite=overwrite, forces=forces)
     if lost := sum(status.startswith(LOST) for status in result["status"].tolist()):
         note(f"{lost} cases were lost with their workers; --overwrite runs them again")

@@ -98,8 +98,8 @@ def carry_out(
 
     def keep(task: Task, outcome: Outcome, *, new: bool = True) -> None:
         if parts is not None:
-            if new and not schedule.lost(outcome):
-                parts.put(task, outcome)
+            if new and not any(text.startswith(schedule.LOST) for text in outcome.status):
+                parts.put(task, outcome)  # cases that were lost with their worker may be run again
             outcome.force = None
         outcomes.append(outcome)
         done(task, outcome)
@@ -166,9 +166,8 @@ def sweep(
         Factors 1, 2, 4, 8 or a part of them, instead: the sides of all elements and DT are divided
         by each.  :attr:`SweepResult.convergence` has observed orders and limits.
     random : mapping of str to str, optional
-        Laws of random values by name: ``"normal:MEAN,SD"``, ``"lognormal:MEDIAN,SIGMA"``,
-        ``"uniform:A,B"`` or ``"triangular:A,MODE,B"``.  With `vary` all combinations get the same
-        draws.
+        Laws by name: ``"normal:MEAN,SD"``, ``"lognormal:MEDIAN,SIGMA"``, ``"uniform:A,B"`` or
+        ``"triangular:A,MODE,B"``.  With `vary` all combinations get the same draws.
     samples : int, optional
         Number of samples of the design; with `random`.
     seed : int

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
+from itertools import compress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,6 +44,7 @@ from fecm.sweeps.vary import Clock, apply_case, check_deck, raise_first, with_ti
 Decks = Mapping[int, Deck]  # by the numbers of their cases, ascending
 Runs = Callable[[Decks, bool], Outcome]  # runs decks; doubtful ones in full if they are judged
 UNIT = RigidMass(1.0)
+RANGE, ERROR = 100.0, 1e-6  # of velocities relative to the deck's, and the last relative error
 ROUGH = 1e-4  # relative difference of the peak force from the value searched, beyond which it jumps
 
 
@@ -278,11 +280,8 @@ def _together(
     if not (judged and doubtful.any()):
         return outcome
     # Cases near the limits of a run are run in full, which accepts or rejects them.
-    full = [
-        _alone(number, replace(checked, deck=deck), extra)
-        for (number, deck), is_doubtful in zip(decks.items(), doubtful, strict=True)
-        if is_doubtful
-    ]
+    some = compress(decks.items(), doubtful)
+    full = [_alone(number, replace(checked, deck=deck), extra) for number, deck in some]
     return merge([outcome.select(np.flatnonzero(~doubtful)), *full])
 
 
@@ -316,27 +315,20 @@ def _alone(
         simulation = simulate(checked if measure else plan.without_output(checked, extra), sink)
     except (DivergenceError, ArithmeticError) as error:
         return Outcome.failed({number: str(error)})
-    force, depth, times = (
-        sink.arrays[f"history/{name}"] for name in ("force", "indentation", "time")
-    )
-    about = sink.groups["history"]
+    force, depth, times = (sink.arrays[f"history/{n}"] for n in ("force", "indentation", "time"))
+    about, dt = sink.groups["history"], simulation.state.dt
     permanent = np.array([about.get("permanent_indentation", 0.0)])
     indentation = Indentation(np.maximum(depth.max(keepdims=True), 0.0), depth[-1:], permanent)
     mass = build_projectile(checked.deck).total_mass
     speed = checked.deck.require(Impact).velocity
     summary = summarise(force[:, None], times, indentation, mass, speed, _threshold(checked))
     unsettled = np.array([about.get("unsettled_steps", 0)])
-    outcome = outcome_of(
-        [number], summary, force[-1:], len(force), simulation.state.dt, unsettled, force[None]
-    )
+    outcome = outcome_of([number], summary, force[-1:], len(force), dt, unsettled, force[None])
     result = Result(sink.arrays, sink.texts, sink.groups)
     outcome.columns |= _extra(extra, result)
     if measure is not None:
         outcome.columns |= _measured(measure, result, case or {})
     return outcome
-
-
-RANGE, ERROR = 100.0, 1e-6  # of velocities relative to the deck's, and the last relative error
 
 
 def search(

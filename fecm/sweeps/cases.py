@@ -32,9 +32,7 @@ CONTACT = (
     "mass", "rod_mass", "rod_length", "rod_modulus", "rod_density",
 )  # fmt: skip
 LOAD = ("at", "impact_node", "patch", "x0", "y0")
-LAMINATE = (
-    "thickness", "density", "nu12", "e1", "e2", "g12", "g13", "g23", "layup", "angle",
-)  # fmt: skip
+LAMINATE = ("thickness", "density", "nu12", "e1", "e2", "g12", "g13", "g23", "layup", "angle")
 PLATE = (*LOAD, *LAMINATE, "size", "support", "dt", "duration")
 NAMES = (*CONTACT, *PLATE)
 REFINE = "refine"  # factor of a refinement study, which varies nothing else
@@ -387,8 +385,7 @@ def matrix(design: Design) -> Floats:
     """Return the random values of a design, (rows, names).
 
     With `sensitivity` the rows are the matrices A and B, the halves of the columns of one design,
-    and for each name A with the column of B (Saltelli et al., 2010).  Raises CasesError if a value
-    is beyond the range of numbers.
+    and for each name A with the column of B (Saltelli et al., 2010).  CasesError if one overflows.
     """
     count, halves = len(design.laws), 2 if design.sensitivity else 1
     unit = unit_samples(design.kind, design.samples, count * halves, design.seed)

@@ -159,13 +159,9 @@ def mesh_error(
     `advance` is called with numbers of steps that were taken.  Raises DivergenceError if a motion
     grows without bound.  Raises NotEnoughMemoryError if a run needs more memory than is free.
     """
-    return MeshError(
-        _peak_force(problem, options, advance),
-        _peak_force(fine, options, advance),
-        problem.deck.control.numel,
-        fine.deck.control.numel,
-        _distance(problem),
-    )
+    peak, refined_peak = (_peak_force(one, options, advance) for one in (problem, fine))
+    count, refined_count = problem.deck.control.numel, fine.deck.control.numel
+    return MeshError(peak, refined_peak, count, refined_count, _distance(problem))
 
 
 def _peak_force(problem: Problem, options: RunOptions, advance: Callable[[int], object]) -> float:

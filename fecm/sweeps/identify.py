@@ -371,13 +371,11 @@ def _listed(names: Sequence[str]) -> str:
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
-def _notes(
-    found: Identification, measured: Measurement, active: Any, model: _Model
-) -> Iterator[str]:
+def _notes(found: Identification, given: Measurement, active: Any, model: _Model) -> Iterator[str]:
     if not found.converged:
         yield "the fit has not converged; start from better values in the deck"
-    if out := len(measured.time) - len(found.time):
-        yield f"{out} of {len(measured.time)} points are outside the run of the deck and left out"
+    if out := len(given.time) - len(found.time):
+        yield f"{out} of {len(given.time)} points are outside the run of the deck and left out"
     for name, side in zip(found.values, active, strict=True):
         if side:
             yield f"{name} is at its bound {found.values[name]:.6g}; its standard error is void"

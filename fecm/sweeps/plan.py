@@ -33,6 +33,7 @@ Build = Callable[[dict[str, Any]], Deck]
 Measure = Callable[[Result], Mapping[str, float]]
 TOGETHER = 2048  # cases advanced together
 ADVANCED = 34 if LIBRARY is None else 12  # bytes per step and case, above the measured value
+KEPT = 24  # bytes per step and case whose history is stored: above the measured value
 COUNT = 25  # velocities of the first round of a search
 # Names of columns that are measured on request.
 DEFLECTION, GAGES, FAILURE = MEASURES = ("max_deflection", "gages", "failure")
@@ -252,9 +253,6 @@ def without_output(checked: Problem, extra: Sequence[str] = ()) -> Problem:
                 yield replace(item, value=1e9) if item.word == "RODP" else item
 
     return replace(checked, program=tuple(kept(checked.program)))
-
-
-KEPT = 24  # bytes per step and case whose history is stored: above the measured value
 
 
 def check_memory(checked: Problem, made: Plan, workers: int, *, streamed: bool = False) -> None:

@@ -18,10 +18,14 @@ from fecm.sweeps.plan import RUN, check_limits
 if TYPE_CHECKING:
     from fecm.results.hdf5_reader import Contents
 
-
 Array = NDArray[Any]
 Columns = Mapping[str, Array]
 FEW = 0.01  # share of failed draws above which the results are doubtful
+QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
+RESAMPLES, COUNTS = 1000, 2_000_000  # of the bootstrap, and counts of them in memory at once
+ENDS = (0.025, 0.975)  # of a 95 % interval
+Z = 1.959963984540054  # the standard normal distribution is 0.975 there
+ROUNDING = 1e-12  # variation relative to the largest value below which a quantity is constant
 PRINTED = 4  # most quantities, of these, and combinations that are printed
 MAIN = ("found_velocity", "found_energy", "peak_force", "max_indentation", "contact_time",
         "energy_absorbed")  # fmt: skip
@@ -104,7 +108,7 @@ def evaluate(
 ) -> RandomResult:
     """Evaluate the cases of a random sweep, (combinations * rows,) each."""
     fine = np.isin(summary["status"], RUN)
-    made = combinations(design, cases)
+    made = {n: v[:: design.rows] for n, v in cases.items() if n not in design.laws}
     shape = (-1, design.rows) if made else (design.rows,)
     numbers = {name: values for name, values in summary.items() if name != "status"}
     columns = {n: np.where(fine, values, np.nan).reshape(shape) for n, values in numbers.items()}
@@ -128,11 +132,6 @@ def evaluate(
         design, {name: statistics(values) for name, values in draws.items()}, found,
         _exceedance(draws, limits), made, tuple(notes),
     )  # fmt: skip
-
-
-def combinations(design: Design, cases: Columns) -> dict[str, Array]:
-    """Varied values of every combination."""
-    return {n: values[:: design.rows] for n, values in cases.items() if n not in design.laws}
 
 
 def _exceedance(draws: Columns, limits: Sequence[Limit]) -> Exceedance:
@@ -176,7 +175,7 @@ def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
             if any(row)
         ]
         if random.sensitivity:
-            lines += ["", *_index_lines(design, chosen[0], random.sensitivity[chosen[0]], place)]
+            lines += ["", *_index_lines(random, chosen[0], place)]
         for row, (name, limit) in enumerate(zip(found.quantity, found.limit, strict=True)):
             p, low, high, n = (values[(*place, row)] for values in found[2:])
             lacking = design.draws - n
@@ -188,13 +187,12 @@ def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
     return lines
 
 
-def _index_lines(
-    design: Design, name: str, found: Indices, place: tuple[int, ...]
-) -> Iterator[str]:
-    width = max(12, *map(len, (name, *design.laws)))
+def _index_lines(random: RandomResult, name: str, place: tuple[int, ...]) -> Iterator[str]:
+    laws = random.design.laws
+    width = max(12, *map(len, (name, *laws)))
     yield f"{name:{width}}{'first-order index (95 %)':>29}{'total index (95 %)':>29}"
-    columns = [values[place].tolist() for values in found]
-    for law, first, total, *intervals in zip(design.laws, *columns, strict=True):
+    columns = [values[place].tolist() for values in random.sensitivity[name]]
+    for law, first, total, *intervals in zip(laws, *columns, strict=True):
         texts = [
             f"{value:.4f} ({low:.4f} to {high:.4f})"
             for value, (low, high) in zip((first, total), intervals, strict=True)
@@ -223,15 +221,15 @@ def stored(random: RandomResult) -> Iterator[tuple[Any, ...]]:
 def attributes(random: RandomResult) -> dict[str, dict[str, Any]]:
     """Attributes of the groups of the file."""
     design = random.design
-    about: dict[str, Any] = {"kind": design.kind, "samples": design.samples, "seed": design.seed}
-    about |= {"sensitivity": design.sensitivity, "names": list(design.laws)}
-    laws = {
-        f"random/{name}": {"law": law.kind, "parameters": np.array(law.parameters)}
-        for name, law in design.laws.items()
-    }
     some = {"sensitivity": random.sensitivity, "exceedance": random.exceedance.quantity.size}
-    texts = {n: {"description": text} for n, text in GROUPS.items() if some.get(n, True)}
-    return {**texts, "design": {**texts["design"], **about, "notes": random.notes}, **laws}
+    made: dict[str, dict[str, Any]] = {
+        name: {"description": text} for name, text in GROUPS.items() if some.get(name, True)
+    }
+    about = {name: getattr(design, name) for name in ("kind", "samples", "seed", "sensitivity")}
+    made["design"] |= {**about, "names": list(design.laws), "notes": random.notes}
+    for name, law in design.laws.items():
+        made[f"random/{name}"] = {"law": law.kind, "parameters": np.array(law.parameters)}
+    return made
 
 
 def random_of(
@@ -247,7 +245,7 @@ def random_of(
         kind = DESIGNS[DESIGNS.index(about["kind"])]
         samples, seed = int(about["samples"]), int(about["seed"])
         design = Design(laws, samples, seed, kind, bool(about["sensitivity"]))
-        made = combinations(design, cases)
+        made = {n: v[:: design.rows] for n, v in cases.items() if n not in laws}
         first = (count // design.rows,) if made else ()
         sizes = {"laws": len(laws), "bounds": len(ENDS), "statistics": 3 + len(QUANTILES)}
 
@@ -282,13 +280,6 @@ def random_of(
     except (KeyError, ValueError, TypeError, AttributeError, ZeroDivisionError) as error:
         message = f"{contents.path}: the results of this random sweep are incomplete ({error})"
         raise ResultFileError(message) from None
-
-
-QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
-RESAMPLES, COUNTS = 1000, 2_000_000  # of the bootstrap, and counts of them in memory at once
-ENDS = (0.025, 0.975)  # of a 95 % interval
-Z = 1.959963984540054  # the standard normal distribution is 0.975 there
-ROUNDING = 1e-12  # variation relative to the largest value below which a quantity is constant
 
 
 class Indices(NamedTuple):
@@ -326,10 +317,8 @@ def indices(values: Floats, seed: int) -> Indices:
     centred = values - values[:, :2].mean(axis=(1, 2), keepdims=True)
     f_a, f_b, f_ab = centred[:, :1], centred[:, 1:2], centred[:, 2:]
     # Means of these columns make the indices: those of f, f^2, and the products, (m, 2 + 2 d, n).
-    columns = np.concatenate(
-        [(f_a + f_b) / 2.0, (f_a**2 + f_b**2) / 2.0, f_b * (f_ab - f_a), (f_a - f_ab) ** 2 / 2.0],
-        axis=1,
-    )
+    means = (f_a + f_b) / 2.0, (f_a**2 + f_b**2) / 2.0
+    columns = np.concatenate([*means, f_b * (f_ab - f_a), (f_a - f_ab) ** 2 / 2.0], axis=1)
     columns[~varies] = np.nan
 
     def ratios(means: Floats) -> Floats:

@@ -35,6 +35,10 @@ BLOCK = 64  # steps of a block
 NEAR, FAR = 8, 256
 TILE = 16  # cases of every matrix product, so that no case depends on the others
 SMALL = BLOCK**3  # multiplications of a matrix product small enough for BLAS to use one thread
+FOUND = (  # rows of the results of the kernel
+    "deepest", "indentation", "permanent", "highest", "w", "largest_ddw", "lost", "initial",
+    "unconverged",
+)  # fmt: skip
 NO_FORCE = HystereticLaw(LinearPermanent(0.0, 0.0, 0.0, 1.0))
 
 
@@ -106,9 +110,8 @@ class Convolution:
         tiles = -(-cases // TILE)  # of each kind; the last is filled up
         last, blocks = np.cumsum(tiles), -(-self._steps // FAR)
         self._cuts = [slice(end - n, end) for n, end in zip(tiles, last, strict=True)]
-        self._place = (
-            np.arange(len(kinds)) + (TILE * (last - tiles) - np.cumsum(cases) + cases)[kinds]
-        )
+        shifts = TILE * (last - tiles) - np.cumsum(cases) + cases
+        self._place = np.arange(len(kinds)) + shifts[kinds]
         known = np.zeros((count, sums, FAR * (blocks + 1)))
         known[:, :, : self._steps] = r.transpose(2, 0, 1)
         self._near = np.repeat(known[:, :, :NEAR, None], tiles, axis=0)
@@ -238,17 +241,8 @@ class TipSteps:
         """Return the state after a step under the forces at t + theta dt."""
         acceleration = motion + self.gain * force
         tip = state.tip + self.dt * state.velocity + self._begin * state.acceleration
-        return TipState(
-            tip + self.weight * acceleration,
-            state.velocity + self.dt / 2.0 * (state.acceleration + acceleration),
-            acceleration,
-        )
-
-
-FOUND = (  # rows of the results of the kernel
-    "deepest", "indentation", "permanent", "highest", "w", "largest_ddw", "lost", "initial",
-    "unconverged",
-)  # fmt: skip
+        velocity = state.velocity + self.dt / 2.0 * (state.acceleration + acceleration)
+        return TipState(tip + self.weight * acceleration, velocity, acceleration)
 
 
 class Impacts(NamedTuple):
@@ -308,15 +302,10 @@ def by_numpy(response: Floats, node_mass: float, tips: TipSteps) -> tuple[Impact
         if not (step + 1) % BLOCK or step + 1 == steps:
             done.append(state.contact_work + plate_work)
     permanent = law.permanent(state.memory, state.contact)
+    indentation = Indentation(deepest, state.contact.indentation, permanent)
     work = Work(np.array(done), node_mass * largest_ddw**2 / (8.0 * tips.dt**2))
-    found = Impacts(
-        force,
-        Indentation(deepest, state.contact.indentation, permanent),
-        state.unconverged_steps,
-        (highest, state.plate_w),
-        balance_errors(force, work, tips),
-    )
-    return found, work
+    error, w = balance_errors(force, work, tips), (highest, state.plate_w)
+    return Impacts(force, indentation, state.unconverged_steps, w, error), work
 
 
 def balance_errors(force: Floats, work: Work, tips: TipSteps) -> Floats:
@@ -369,10 +358,7 @@ def _by_kernels(response: Floats, dt: float, node_mass: float, hits: Hits) -> Im
             raise MemoryError
     at = dict(zip(FOUND, found, strict=True))
     lost = at["lost"] + node_mass * at["largest_ddw"] ** 2 / (8.0 * dt**2)
-    return Impacts(
-        force.T,
-        Indentation(at["deepest"], at["indentation"], at["permanent"]),
-        at["unconverged"].astype(np.int64),
-        (at["highest"], at["w"]),
-        lost / np.where(at["initial"] > 0.0, at["initial"], 1.0),
-    )
+    error = lost / np.where(at["initial"] > 0.0, at["initial"], 1.0)
+    indentation = Indentation(at["deepest"], at["indentation"], at["permanent"])
+    unconverged, w = at["unconverged"].astype(np.int64), (at["highest"], at["w"])
+    return Impacts(force.T, indentation, unconverged, w, error)

@@ -34,13 +34,28 @@ if TYPE_CHECKING:
 
     from fecm.results.hdf5_reader import Contents
 
-
 Array = NDArray[Any]
 WORDS = 18  # letters of the names in the lines of the summary
 SAME = 1e-9  # distance from the place given, relative to its coordinates, that is rounding
 FORCE = "history/force"
 LISTED = 5  # reasons of failure that the summary lists
 STATUS = "ok, still in contact, or why the case failed"
+DIMENSIONS = {  # of the values, and of the stored force
+    "velocity": "length/time", "energy": "force*length", "force": "force",
+    "k": "force/length^1.5", "thickness": "length",
+    **dict.fromkeys(("alpha_p", "radius", "rod_length", "patch", "x0", "y0"), "length"),
+    **dict.fromkeys(("mass", "rod_mass"), "force*time^2/length"),
+    **dict.fromkeys(("density", "rod_density"), "force*time^2/length^4"),
+    **dict.fromkeys(("e1", "e2", "g12", "g13", "g23", "rod_modulus"), "force/length^2"),
+    **dict.fromkeys(("dt", "duration"), "time"),
+}  # fmt: skip
+GROUPS = {  # of the file
+    "cases": "values of what varies",
+    "summary": "what came out of every case",
+    "history": "time steps of every case, and its contact force if asked for",
+}
+FORMULA = re.compile(r"[=+@\x00-\x1f-]")  # how a formula begins
+CASES, HISTORY = "cases", "history"  # tables of the CSV export
 
 
 def summary(result: SweepResult) -> list[str]:
@@ -100,23 +115,6 @@ def _counts(result: SweepResult) -> list[tuple[int, str]]:
         "failed": ~fine,
     }
     return [(int(some.sum()), what) for what, some in cases.items() if some.any()]
-
-
-# Physical dimensions of the values, and of the stored force.
-DIMENSIONS = {
-    "velocity": "length/time", "energy": "force*length", "force": "force",
-    "k": "force/length^1.5", "thickness": "length",
-    **dict.fromkeys(("alpha_p", "radius", "rod_length", "patch", "x0", "y0"), "length"),
-    **dict.fromkeys(("mass", "rod_mass"), "force*time^2/length"),
-    **dict.fromkeys(("density", "rod_density"), "force*time^2/length^4"),
-    **dict.fromkeys(("e1", "e2", "g12", "g13", "g23", "rod_modulus"), "force/length^2"),
-    **dict.fromkeys(("dt", "duration"), "time"),
-}  # fmt: skip
-GROUPS = {  # of the file
-    "cases": "values of what varies",
-    "summary": "what came out of every case",
-    "history": "time steps of every case, and its contact force if asked for",
-}
 
 
 @dataclass(repr=False)
@@ -272,8 +270,7 @@ class SweepResult:
         over : str or sequence of str
             One or two names of varied values; all varied values if empty.
         path : str or Path, optional
-            File to write instead, as ``fecm plot`` does; an existing one is replaced.  The suffix
-            selects the format.
+            File to write or replace instead, as ``fecm plot`` does, in the format of its suffix.
         kind : {"map", "exceedance", "sensitivity", "scatter"}
             Kind of picture; those but map are of random sweeps.
         ax : matplotlib.axes.Axes, optional
@@ -336,11 +333,7 @@ def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
 
 
 def save(
-    result: SweepResult,
-    path: Path,
-    *,
-    overwrite: bool = True,
-    forces: Iterable[Forces] | None = None,
+    result: SweepResult, path: Path, *, overwrite: bool = True, forces: Iterable[Forces] = ()
 ) -> None:
     """Write the result of a sweep.
 
@@ -380,7 +373,7 @@ def save(
         if result.unconverged_steps is not None:
             text = "steps whose contact iteration did not converge"
             put("history/unsettled_steps", result.unconverged_steps, text, "")
-        if forces is not None and len(result):
+        if forces and len(result):
             longest = int(result.steps.max())
             text = "contact force after every step"
             made = schema.Dataset(FORCE, ("cases", "steps"), text, "force")
@@ -452,10 +445,6 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
         schema.declared_units(contents.attributes),
         random_of(contents, cases, summary, count[0]),
     )  # fmt: skip
-
-
-FORMULA = re.compile(r"[=+@\x00-\x1f-]")  # how a formula begins
-CASES, HISTORY = "cases", "history"  # tables of the CSV export
 
 
 def csv_lines(sweep: SweepResult, name: str = CASES) -> Iterator[str]:

@@ -39,11 +39,7 @@ DEATHS = 3  # of workers without a finished task, after which the remaining task
 LOOK = 0.5  # polling interval in seconds
 PATIENCE = "5s"  # timeout for the scheduler
 LOST = "lost with its worker"
-
-
-def lost(outcome: Outcome) -> bool:
-    """Whether the worker of a task died; its cases may be run again."""
-    return any(text.startswith(LOST) for text in outcome.status)
+CHECKSUM = hashlib.sha256().digest_size  # bytes of the checksum after the arrays of a file
 
 
 class SchedulerError(FecmError, RuntimeError):
@@ -149,10 +145,7 @@ def _client(scheduler: Any) -> Any:
 
 
 def on_dask(tasks: Sequence[Task], scheduler: Any, done: Done, idle: Idle) -> None:
-    """Run tasks on a Dask cluster, given by address, client or cluster object.
-
-    It reruns the tasks of a dead worker.  Raises SchedulerError if there is no Dask or no answer.
-    """
+    """Run tasks on Dask, by address, client or object; it reruns those of a dead worker."""
     with _client(scheduler) as client:
         if getattr(client, "status", "running") != "running":
             raise SchedulerError(f"the Dask client is {client.status}; make a new one")
@@ -176,9 +169,6 @@ def address_in(file: Path) -> str:
     except (ValueError, KeyError, TypeError):
         message = f"{file} has no address; dask scheduler --scheduler-file writes such a file"
         raise SchedulerError(message) from None
-
-
-CHECKSUM = hashlib.sha256().digest_size  # bytes of the checksum after the arrays of a file
 
 
 class OtherSweepError(FecmError, ValueError):

@@ -71,8 +71,7 @@ def check_deck(deck: model.Deck) -> Problem:
     findings = Findings()
     checked = check(ParsedProblem(deck), findings)
     raise_first(findings)
-    if checked is None:
-        raise CasesError("the deck has no problem that can be run")
+    assert checked is not None  # the deck has a control card
     return checked
 
 
@@ -233,7 +232,7 @@ def _support(deck: model.Deck, name: str, value: Value) -> model.Deck:
 def _material(deck: model.Deck, name: str, value: Value) -> model.Deck:
     """Change all plies, or their number; a thickness is that of the laminate."""
     old, control = deck.require(model.Material), deck.control
-    ply, layers, total = old.ply, old.layers, sum(layer.thickness for layer in old.layers)
+    ply, layers, integration = old.ply, old.layers, old.integration
     if name == "layup":
         if len({layer.thickness for layer in layers}) > 1:
             raise CasesError("layup: the plies of the deck differ in thickness")
@@ -243,18 +242,17 @@ def _material(deck: model.Deck, name: str, value: Value) -> model.Deck:
             raise CasesError(f"layup: {error}") from None
         thickness = layers[0].thickness
         layers = tuple(Layer(n, angle, thickness) for n, angle in enumerate(angles, start=1))
-        control, total = replace(control, layers=len(layers), source=None), len(angles) * thickness
+        integration = replace(integration, thickness=len(angles) * thickness, source=None)
+        control = replace(control, layers=len(layers), source=None)
     elif name == "thickness":
-        factor, total = float(value) / total, float(value)
+        factor = float(value) / sum(layer.thickness for layer in layers)
         layers = tuple(replace(y, thickness=y.thickness * factor, source=None) for y in layers)
+        integration = replace(integration, thickness=float(value), source=None)
     elif name == "angle":
         layers = tuple(replace(y, angle=y.angle + float(value), source=None) for y in layers)
     else:
         changed: dict[str, Any] = {name: float(value), "source": None}
         ply = replace(ply, **changed)
-    integration = old.integration
-    if name in ("layup", "thickness"):
-        integration = replace(integration, thickness=total, source=None)
     new = replace(old, ply=ply, layers=layers, integration=integration)
     return replace(_swap(deck, old, new), control=control)
 
@@ -343,13 +341,11 @@ def _duration(macros: Sequence[Macro], taken: float) -> tuple[float, float]:
     return sum(passes * now for passes, now in steps), max((now for _, now in steps), default=0.0)
 
 
-def _walk(
-    macros: Sequence[Macro], taken: float
-) -> Iterator[tuple[Macro, int | None, float, float]]:
+def _walk(cards: Sequence[Macro], taken: float) -> Iterator[tuple[Macro, int | None, float, float]]:
     """Each macro, the place of the innermost LOOP around it, its passes and the time step."""
     loops: list[tuple[int, float]] = []  # place and passes of the open ones
     now = 0.0
-    for place, macro in enumerate(macros):
+    for place, macro in enumerate(cards):
         if macro.word == "NEXT" and loops:
             loops.pop()
         elif macro.word == "DT":
