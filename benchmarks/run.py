@@ -73,7 +73,7 @@ def refined(times: int, aside: int = 0) -> Deck:
     grid = Grid(columns, rows)
     boundary = grid.boundary((1, 1, 0, 0, 0), {})
     hit = Impact(grid.nearest(3.0, 2.0)[0] + aside, 3, 115.0)
-    mesh = [grid.coordinates(), grid.element_cards(), *([boundary] if boundary else [])]
+    mesh = [part for part in (grid.coordinates(), grid.element_cards(), boundary) if part]
     kept = [
         s for s in deck.segments if not isinstance(s, Coordinates | Elements | Boundary | Impact)
     ]
