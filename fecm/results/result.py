@@ -196,7 +196,9 @@ class Result(schema.Contact):
     def rows(self, path: str, start: int, stop: int) -> Array:
         """Rows of a dataset; those of a file are not kept in memory."""
         read = getattr(self._arrays, "rows", None)
-        return self[path][start:stop] if read is None else np.asarray(read(path, start, stop))
+        if read is None:
+            return np.asarray(self._arrays[path.strip("/")][start:stop])
+        return np.asarray(read(path, start, stop))
 
     def to_dataframe(self) -> pandas.DataFrame:
         """The history as a pandas DataFrame: one row per step, indexed by time.
