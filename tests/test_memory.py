@@ -9,6 +9,8 @@ import sys
 import threading
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
 
 import fecm
@@ -227,3 +229,16 @@ def test_free_memory_is_the_least_of_machine_and_control_groups(
     (job.parent / "memory.max").write_text("3000000\n")
     (job.parent / "memory.current").write_text("1000000\n")
     assert available() == 2_000_000
+
+
+def test_rows_of_a_file_are_read_without_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*arguments: object) -> None:
+        raise AssertionError("the whole dataset is read")
+
+    monkeypatch.setattr(h5py.Dataset, "read_direct", refuse)  # which numpy.asarray calls
+    with h5py.File(tmp_path / "rows.h5", "w") as file:
+        stored = {"tape3/w": file.create_dataset("w", data=np.arange(12.0).reshape(6, 2))}
+        rows = fecm.Result(stored, {}, {}).rows("tape3/w", 2, 4)
+    assert rows.tolist() == [[4.0, 5.0], [6.0, 7.0]]
