@@ -246,7 +246,10 @@ def estimate_work(body: Body) -> WorkEstimate:
 
 
 def _executed(body: Body, count: int = 1, outer: int = 1) -> Iterator[tuple[Macro, int, int]]:
-    """Macros, passes of their loop, and of those around it together; LOOP stands for its NEXT."""
+    """Each macro, the passes of its loop, and how often that loop is carried out.
+
+    LOOP comes after its body, where NEXT is.
+    """
     for item in body:
         if isinstance(item, Loop):
             yield from _executed(item.body, item.count, outer * count)

@@ -46,8 +46,10 @@ def _any(condition: Truth) -> bool:
 def hertz_coefficient(radius: float, e_s: float, nu_s: float, e_t: float) -> float:
     """Contact coefficient of a sphere (s) on a half-space (t), equation 3-2 (force/length^1.5).
 
-    Raises ValueError if radius or a modulus is not positive, or Poisson's ratio not between -1 and
-    0.5.
+    Raises
+    ------
+    ValueError
+        If radius or a modulus is not positive, or Poisson's ratio not between -1 and 0.5.
     """
     for name, value in (("radius", radius), ("E_s", e_s), ("E_t", e_t)):
         if not 0.0 < value < math.inf:

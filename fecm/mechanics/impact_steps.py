@@ -165,7 +165,8 @@ class ImpactSteps:
         integrator = system._rod_step(dt)
         T, h = self._modes.step(integrator)
         motion = self._modes.motion(state.rod)
-        c = cast(Any, system.law).constants
+        law: Any = system.law
+        c = law.constants
         rows = np.ascontiguousarray(stored, dtype=np.int64)
         records = np.empty((steps, len(COLUMNS)))
         strains = np.empty((steps, len(self._gage_entry)))
@@ -195,7 +196,8 @@ class ImpactSteps:
             raise DivergenceError(plate.step + taken + 1, "the motion is no longer finite")
         self._leave(plate)
         columns = dict(zip(COLUMNS, records.T, strict=True))
-        inertia, power, strain, internal = records[-1, 1:5].tolist()
+        names = ("inertia", "power", "strain", "internal")
+        inertia, power, strain, internal = (columns[name][-1].item() for name in names)
         plate.sums = Sums(inertia, power, strain, internal, 0.0, 0.0)
         plate.step, plate.time = plate.step + steps, impact.time
         tips = columns["displacement"]

@@ -125,10 +125,18 @@ def laminate(
     thicknesses: Sequence[float],
     total: float | None = None,
 ) -> Laminate:
-    """Stack plies of equal constants, equations 2-18, 2-19 and 2-24.
+    """Stack plies, equations 2-18, 2-19 and 2-24.
 
-    Fibre angles, in degrees, and thicknesses start at the struck face, z = -h/2.  The inertia is of
-    the `total` thickness; by default, of the sum of the layers.
+    Parameters
+    ----------
+    ply : PlyConstants
+        Constants of every layer.
+    angles : sequence of float
+        Fibre angles in degrees, starting at the struck face, z = -h/2.
+    thicknesses : sequence of float
+        Layer thicknesses.
+    total : float, optional
+        Thickness for the inertia; the sum of the layers by default.
     """
     faces = np.concatenate(([0.0], np.cumsum(thicknesses)))
     faces -= faces[-1] / 2.0

@@ -37,7 +37,15 @@ SHORT, NEAR = 2048, 8
 
 
 class DivergenceError(FecmError, ArithmeticError):
-    """The solution diverged at a `step`; the `reason` is the symptom."""
+    """The solution diverged.
+
+    Attributes
+    ----------
+    step : int
+        Step at which it diverged.
+    reason : str
+        Symptom.
+    """
 
     exit_code = 1
 

@@ -49,9 +49,15 @@ def interlaminar_stresses(laminate: Laminate) -> tuple[Floats, Floats]:
     """Shear stresses tau_xz, tau_yz from the equilibrium of the plies, without inertia.
 
     Integrated from the struck face: tau_xz,z = -sigma_x,x - tau_xy,y and
-    tau_yz,z = -sigma_y,y - tau_xy,x.  The stress left at z = h/2, (2, 2, 6), is removed linearly in
-    z, and the second result.  The first, (plies, 3, 2, 2, 6), has tau_xz and tau_yz at the lower,
-    middle and upper z of each ply, per unit of the derivatives by x and y of eps and kappa.
+    tau_yz,z = -sigma_y,y - tau_xy,x.  What is left at z = h/2 is removed linearly in z.
+
+    Returns
+    -------
+    stresses : ndarray (plies, 3, 2, 2, 6)
+        At the lower, middle and upper z of each ply; tau_xz and tau_yz per unit of the derivatives
+        with respect to x and y of the strains eps and kappa.
+    residual : ndarray (2, 2, 6)
+        The stress removed at z = h/2.
     """
     faces, z = laminate.plies.faces, laminate.plies.z
 
@@ -137,10 +143,14 @@ class PlyStresses:
         self._interlaminar, self._residual = interlaminar_stresses(laminate)
 
     def strains(self, field: Floats) -> tuple[Floats, Floats]:
-        """Strains of a displacement field, (numnp, 5), and their derivatives by x and y.
+        """Strains of a displacement field, (numnp, 5), and their derivatives.
 
-        eps_xx, eps_yy, gamma_xy, kappa_x, kappa_y, kappa_xy, (elements, points, 6); derivatives at
-        the centre, (elements, 2, 6), NaN in elements without 9 nodes.
+        Returns
+        -------
+        strains : ndarray (elements, points, 6)
+            eps_xx, eps_yy, gamma_xy, kappa_x, kappa_y, kappa_xy.
+        gradients : ndarray (elements, 2, 6)
+            Derivatives with respect to x and y at the centre; NaN in elements without 9 nodes.
         """
         count, points, _ = self.shape
         strains, gradients = np.empty((count, points, 6)), np.full((count, 2, 6), np.nan)
@@ -154,10 +164,13 @@ class PlyStresses:
         return strains, gradients
 
     def evaluate(self, field: Floats) -> dict[str, Floats]:
-        """Stresses of a displacement field, (numnp, 5), by name.
+        """Stresses of a displacement field, (numnp, 5).
 
-        sigma_1, sigma_2, tau_12 (elements, points, plies, 2); tau_xz, tau_yz (elements, plies, 3)
-        and residual (elements, 2), NaN in elements without 9 nodes.
+        Returns
+        -------
+        dict of ndarray
+            sigma_1, sigma_2, tau_12 (elements, points, plies, 2); tau_xz, tau_yz (elements, plies,
+            3) and residual (elements, 2), NaN in elements without 9 nodes.
         """
         strains, gradients = self.strains(field)
         stress = np.einsum("lfcs,eps->ceplf", self._in_plane, strains)

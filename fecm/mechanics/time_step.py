@@ -86,7 +86,8 @@ def _largest_eigenvalue(product: Callable[[Floats], Floats], start: Floats) -> f
     """Largest eigenvalue of a symmetric operator by Lanczos iteration."""
     # Without reorthogonalisation, whose lack only repeats converged eigenvalues.
     q, before, beta = start / _norm(start), np.zeros_like(start), 0.0
-    diagonal, beside = list[float](), list[float]()
+    diagonal: list[float] = []
+    beside: list[float] = []
     for step in range(1, MOST_STEPS + 1):
         z = product(q) - beta * before
         diagonal.append(float((q * z).sum()))

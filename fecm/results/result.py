@@ -48,10 +48,19 @@ class PlyGroup(schema.PlyRows):
     ) -> Plies:
         """Stresses and strains ply by ply.
 
-        Of the stored rows nearest to the times, by default all, and of the elements with these
-        numbers, by default all with ply stresses.  Raises NotStoredError if the result has no ply
-        stresses, or not at such a time or of such an element.  Raises ResultFileError if the
-        result's deck can't be read or does not fit them.
+        Parameters
+        ----------
+        time : float or sequence of float, optional
+            Times, for which the nearest stored rows are taken; all rows by default.
+        elements : int or sequence of int, optional
+            Numbers of elements; by default all with ply stresses.
+
+        Raises
+        ------
+        NotStoredError
+            If the result has no ply stresses, or not at such a time or of such an element.
+        ResultFileError
+            If the result's deck can't be read or does not fit its ply stresses.
 
         Examples
         --------
@@ -70,8 +79,14 @@ class Result(schema.Contact):
     history (``time``, ``force``, ``indentation``, ``transducer``, ``displacement``, ``velocity``,
     ``acceleration``, ``plate_w``, ``step``) also as ``result.force``.  Units are those of the deck.
 
-    It is made of datasets, texts and attributes of groups by path; the attributes of the result
-    itself are under ``""``.
+    Parameters
+    ----------
+    arrays : mapping of str to ndarray
+        Datasets by path.
+    texts : mapping of str to str
+        Texts by path.
+    groups : mapping of str to mapping
+        Attributes of the groups; those of the result itself under ``""``.
 
     Attributes
     ----------
@@ -203,7 +218,12 @@ class Result(schema.Contact):
     def to_dataframe(self) -> pandas.DataFrame:
         """The history as a pandas DataFrame: one row per step, indexed by time.
 
-        Raises ImportError if pandas is not installed, KeyError if the run has no impact step.
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        KeyError
+            If the run has no impact step.
         """
         try:
             import pandas
@@ -260,8 +280,15 @@ class Result(schema.Contact):
     def to_pyvista(self, time: float | None = None) -> pyvista.UnstructuredGrid:
         """The plate with its displacements, w and rotations as point data; needs PyVista.
 
-        The stored row nearest to the time is taken; by default the last.  Raises NotStoredError if
-        the result has no displacements, or none at this time.
+        Parameters
+        ----------
+        time : float, optional
+            The nearest stored row is taken; by default the last.
+
+        Raises
+        ------
+        NotStoredError
+            If the result has no displacements, or none at this time.
         """
         try:
             import pyvista
@@ -287,7 +314,10 @@ class Result(schema.Contact):
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the result as a file, such as one of a run in memory.
 
-        Raises OSError if the file exists and may not be replaced, or can't be written.
+        Raises
+        ------
+        OSError
+            If the file exists and may not be replaced, or can't be written.
         """
         from fecm._files import check_outputs
         from fecm.results.hdf5_writer import writing
@@ -318,10 +348,8 @@ class Result(schema.Contact):
     ) -> Axes:
         """Draw a picture on a new figure of pyplot, on given axes, or in a file.
 
-        Returns the picture's first axes, which hold the result's numbers in the deck's units; the
-        labels of their ticks are scaled.  The user's settings of matplotlib hold, except in files.
-        Raises PlotError if the result lacks the data, the options are invalid, or `ax` is given and
-        the picture has several axes.  Raises ImportError if matplotlib is not installed.
+        The axes hold the result's numbers in the deck's units; the labels of their ticks are
+        scaled.  The user's settings of matplotlib hold, except in files.
 
         Parameters
         ----------
@@ -336,6 +364,19 @@ class Result(schema.Contact):
         **options
             Options of the kind, such as ``times`` or ``overlay``; see docs/pictures.md.
 
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The picture's first axes.
+
+        Raises
+        ------
+        PlotError
+            If the result lacks the data, the options are invalid, or `ax` is given and the picture
+            has several axes.
+        ImportError
+            If matplotlib is not installed.
+
         Examples
         --------
         >>> ax = result.plot("force", width="full")  # doctest: +SKIP
@@ -348,10 +389,22 @@ class Result(schema.Contact):
     def compare(self, measured: str | Path | tuple[Any, Any]) -> Comparison:
         """Compare the contact force, or the transducer, with a measured one.
 
-        The measured one is a CSV file with the columns time and force (or transducer), or times and
-        forces, in the deck's units.  Returns peaks, impulses, rms of the difference and
-        correlation; ``str()`` says them in words.  Raises StudyError if the file is invalid or in
-        other units, the numbers are invalid, or no two of the times are within those of the result.
+        Parameters
+        ----------
+        measured : str, Path or tuple
+            CSV file with the columns time and force (or transducer), or times and forces, in the
+            deck's units.
+
+        Returns
+        -------
+        Comparison
+            Peaks, impulses, rms of the difference and correlation; ``str()`` says them in words.
+
+        Raises
+        ------
+        StudyError
+            If the file is invalid or in other units, the numbers are invalid, or no two of the
+            times are within those of the result.
 
         Examples
         --------
@@ -401,10 +454,19 @@ class Result(schema.Contact):
 
 
 def load(path: str | Path) -> Result:
-    """Open a file that ``fecm run`` wrote; datasets are read on demand.
+    """Open a result file; datasets are read on demand.
 
-    Raises ResultFileError if the file is not a result, or a dataset has the wrong shape or type.
-    Raises OSError if it can't be opened.
+    Parameters
+    ----------
+    path : str or Path
+        A file that ``fecm run`` wrote.
+
+    Raises
+    ------
+    ResultFileError
+        If the file is not a result, or a dataset has the wrong shape or type.
+    OSError
+        If it can't be opened.
 
     Examples
     --------

@@ -421,7 +421,8 @@ def group(
     name: str, arrays: Mapping[str, Array], attributes: Mapping[str, Mapping[str, Any]]
 ) -> Group:
     """Return a group of a result by its path."""
-    kind, *_ = (Exposure,) if name.startswith("failure/") else GROUPS.get(name, (Group,))
+    own = Exposure if name.startswith("failure/") else Group
+    kind = GROUPS[name][0] if name in GROUPS else own
     return kind(name, arrays, attributes)
 
 

@@ -154,9 +154,14 @@ def solve(run: Simulation) -> None:
     state.converged = float(np.linalg.norm(change)) <= limit
 
 
-def set_state(name: str, run: Simulation, value: object) -> None:
-    """LMAS, CMAS and TOL: set a field of the state."""
-    setattr(run.state, name, value)
+def form_mass(run: Simulation, *, consistent: bool) -> None:
+    """LMAS or CMAS."""
+    run.state.consistent_mass = consistent
+
+
+def set_tolerance(run: Simulation, tolerance: float) -> None:
+    """TOL."""
+    run.state.tolerance = tolerance
 
 
 def find_modes(run: Simulation, n: int) -> None:
@@ -239,12 +244,12 @@ ACTIONS: dict[str, Callable[..., bool | None]] = {
     "DT": set_time_step,
     "TIME": advance_clock,
     "PROP": proportional_load,
-    "LMAS": partial(set_state, "consistent_mass", value=False),
-    "CMAS": partial(set_state, "consistent_mass", value=True),
+    "LMAS": partial(form_mass, consistent=False),
+    "CMAS": partial(form_mass, consistent=True),
     "TANG": form_tangent,
     "FORM": form_residual,
     "SOLV": solve,
-    "TOL": partial(set_state, "tolerance"),
+    "TOL": set_tolerance,
     "CONV": lambda run: run.state.converged,  # leaves the loop if the last SOLV met the tolerance
     "REAC": store_reactions,
     "EIGE": find_modes,

@@ -146,8 +146,9 @@ class StepRecorder:
             self._add_damping(table)
         self._on_block(table, self.initial)
         table["strain"] = columns[len(NAMES) :].T
+        groups = self.rows.keys() - {"tape9"}
         for dataset in DATASETS.values():
-            if dataset.group in self.rows.keys() - {"tape9"} and dataset.name in table:
+            if dataset.group in groups and dataset.name in table:
                 self._sink.write(dataset.path, self.rows["energy"], table[dataset.name])
         (on_tape9,) = np.nonzero(table["on_tape9"])
         if len(on_tape9):
@@ -181,7 +182,7 @@ class StepRecorder:
 
     def _transducer(self, force: Floats, deformation: Floats) -> Floats:
         """Force at the transducer: E A du/dx of its node; the contact force on a rigid mass."""
-        sign, rod = self._station.sign, self._impact and self._impact.rod
+        sign, rod = self._station.sign, None if self._impact is None else self._impact.rod
         if not isinstance(rod, Rod):
             return -sign * force
         area = float(rod.areas[min(self._station.node, rod.elements) - 1])
@@ -215,12 +216,10 @@ class Recorder:
             and (dataset.path != "energy/damping_work" or model.motion.damping)
         ]
         self._buffers: dict[str, RowBuffer] = {}
-        self._parts: dict[str, StepRecorder | RowBuffer] = {"steps": self.steps}
         for group in BUFFERED:
             members = [p for p in self._datasets if p[0].group == group and p[0].shape[0] == "rows"]
             if members:
-                buffer = RowBuffer(sink, members)
-                self._buffers[group] = self._parts[f"rows/{group}"] = buffer
+                self._buffers[group] = RowBuffer(sink, members)
 
     def _shape(self, dataset: Dataset) -> tuple[int, ...]:
         """Shape of a dataset with all its rows."""
@@ -294,17 +293,21 @@ class Recorder:
         strains = self._model.strains.evaluate(fields)
         self.rows("tape8", steps, times, dict(zip(STRAINS, strains, strict=True)))
 
+    def _parts(self) -> dict[str, StepRecorder | RowBuffer]:
+        """What has rows that are not stored yet, by its path in a checkpoint."""
+        return {"steps": self.steps, **{f"rows/{name}": b for name, b in self._buffers.items()}}
+
     def state(self) -> dict[str, Any]:
         """Rows that are not stored yet, for :meth:`restore`."""
         return {
             f"{path}/{name}": value
-            for path, part in self._parts.items()
+            for path, part in self._parts().items()
             for name, value in part.state().items()
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from a :meth:`state`."""
-        for path, part in self._parts.items():
+        for path, part in self._parts().items():
             part.restore(subset(state, f"{path}/"))
 
     def failure(self, found: FailureEnvelope) -> None:

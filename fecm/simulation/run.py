@@ -130,8 +130,8 @@ def _write_footer(simulation: Simulation) -> None:
     state, threshold = simulation.state, simulation.problem.threshold
     if threshold is not None:
         values = {
-            "force": threshold.force, "d_star": threshold.rigidity, "time": state.verdict.crossing,
-            "margin": 1.0 - state.verdict.peak_force / threshold.force,
+            "force": threshold.force, "d_star": threshold.rigidity, "time": state.monitor.crossing,
+            "margin": 1.0 - state.monitor.peak_force / threshold.force,
         }  # fmt: skip
         simulation.sink.attributes("threshold", values)
     impact, system = state.impact, simulation.model.impact
@@ -145,7 +145,7 @@ def _judge(simulation: Simulation) -> None:
     """Store reasons to doubt the result, if there are any."""
     notes: list[str] = []
     state, enforced = simulation.state, not simulation.options.slips
-    error, step = state.verdict.worst_error, state.verdict.worst_step
+    error, step = state.monitor.worst_error, state.monitor.worst_step
     if error > ENERGY_WARNING:
         off = f"the energy balance is off by {error:.2%} of the supplied energy, at step {step}"
         notes.append(off if enforced else f"{off} (not a failure, as slips are active)")

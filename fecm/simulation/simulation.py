@@ -28,8 +28,8 @@ TOLERANCE = 1.0e-9  # relative change of the displacement below which CONV leave
 
 
 @dataclass
-class Verdict:
-    """What the steps of a run say so far: energy balance, and contact force at the threshold."""
+class Monitor:
+    """Energy balance and largest contact force of the steps so far."""
 
     # Largest and last work of the nodal forces, and its largest change in a step (force*length).
     largest_work: float = 0.0
@@ -99,7 +99,7 @@ class RunState:
     steps_since_output: int = 0  # impact steps since the last output (the slip ``counter``)
     prop_force: float | None = None  # instead of the contact force (the slip ``prop-contact``)
     first_dt: float | None = None  # time step of the rod's constants
-    verdict: Verdict = field(default_factory=Verdict)
+    monitor: Monitor = field(default_factory=Monitor)
     failure: FailureEnvelope | None = None  # largest exposures so far, of FAIL
     notes: list[str] = field(default_factory=list)  # remarks for the user
 
@@ -136,9 +136,9 @@ class Simulation:
         self.interval = max(1, min(most, work // self.model.plate.neq))
         limit = None if options.slips else options.energy_limit
         # Without a reference to the run, which would keep it alive.
-        judge = partial(state.verdict.add, limit=limit, threshold=problem.threshold)
+        on_block = partial(state.monitor.add, limit=limit, threshold=problem.threshold)
         tapes = "tapes" in options.slips
-        self.recorder = Recorder(self.sink, self.model, problem.work, tapes, judge)
+        self.recorder = Recorder(self.sink, self.model, problem.work, tapes, on_block)
 
     @cached_property
     def tangent(self) -> Tangent:
