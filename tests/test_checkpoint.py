@@ -219,7 +219,7 @@ def altered(path: Path, change: str) -> None:
         case "deep":
             text = "[" * 100_000
         case "stored":
-            about["values"]["recorder/steps/stored"]["energy"] = -1
+            about["values"]["recorder/rows/energy/stored"] = -1
         case "place":
             about["values"]["state/position"] = [[0, 1]]
         case "words":

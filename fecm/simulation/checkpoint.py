@@ -27,7 +27,7 @@ from fecm.results.hdf5_writer import FileSink
 from fecm.results.schema import DATASETS
 from fecm.simulation.simulation import Simulation
 
-FORMAT = 3
+FORMAT = 4
 CHUNK = 1_000_000  # bytes read at once when a spool is checked
 
 

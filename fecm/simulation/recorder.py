@@ -26,7 +26,8 @@ from fecm.results.sinks import RowBuffer, Sink
 Steps = Sequence[int]  # of rows
 Times = Sequence[float]
 FAILURE = ("failure", INTERLAMINAR, *(f"failure/{name}" for name in CRITERIA))
-BUFFERED = ("tape3", "tape8", "stresses", "plies", "reactions", "modes")
+AT_MACROS = ("tape3", "tape8", "stresses", "plies", "reactions", "modes")
+EVERY_STEP = ("energy", "history", "gages")
 BLOCK = 1024
 SCALARS = (
     "step", "time", "plate_kinetic", "plate_strain", "external_work",
@@ -40,27 +41,33 @@ OnBlock = Callable[[Columns, float], object]
 
 
 class StepRecorder:
-    """Stores every step in a sink; of a plate alone energies and gages only.
+    """Stores every step in `buffers`; of a plate alone energies and gages only.
 
     The slip `tapes` stores contact on tape9 at every step instead of every N-th; `on_block` is
     called with the columns of each block and the initial energy.
     """
 
-    def __init__(self, sink: Sink, model: ImpactModel, tapes: bool, on_block: OnBlock) -> None:
+    def __init__(
+        self,
+        sink: Sink,
+        buffers: Mapping[str, RowBuffer],
+        model: ImpactModel,
+        tapes: bool,
+        on_block: OnBlock,
+    ) -> None:
         self._sink = sink
+        self._buffers = {group: buffers[group] for group in EVERY_STEP if group in buffers}
+        self._tape9 = buffers.get("tape9")
         self._motion, self._impact, self._station = model.motion, model.impact, model.station
         self._on_block = on_block
         self._tapes = tapes
         self._gages: DofSums | None = None
         gages = 0
-        self.rows = {"energy": 0, "tape9": 0}  # stored so far in each group
         if model.impact is not None:
             self._rod = np.empty((BLOCK, 3, len(model.impact.rod_mass)))
-            self.rows["history"] = 0
         if model.gages is not None:
             self._gages = model.motion.dof_sums(model.gages.dof_indices, model.gages.weights)
             gages = len(model.gages.numbers)
-            self.rows["gages"] = 0
         # The names, then the gages' strains, of the steps that are not stored yet.
         self._table = np.zeros((len(NAMES) + gages, BLOCK))
         self._count = self._known = 0  # of these steps, and those with the projectile's columns
@@ -116,15 +123,14 @@ class StepRecorder:
         """Rows that are not stored yet, and how many are."""
         self._add_projectile()
         return {
-            "rows": self._table[:, : self._count].copy(), "stored": dict(self.rows),
-            "initial": self.initial, "damped": self._damped,
+            "rows": self._table[:, : self._count].copy(), "initial": self.initial,
+            "damped": self._damped,
         }  # fmt: skip
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from a :meth:`state`."""
         self._count = self._known = state["rows"].shape[1]
         self._table[:, : self._count] = state["rows"]
-        self.rows.update(state["stored"])
         self.initial, self._damped = state["initial"], tuple(state["damped"])
 
     def flush(self) -> None:
@@ -146,16 +152,12 @@ class StepRecorder:
             self._add_damping(table)
         self._on_block(table, self.initial)
         table["strain"] = columns[len(NAMES) :].T
-        groups = self.rows.keys() - {"tape9"}
-        for dataset in DATASETS.values():
-            if dataset.group in groups and dataset.name in table:
-                self._sink.write(dataset.path, self.rows["energy"], table[dataset.name])
-        (on_tape9,) = np.nonzero(table["on_tape9"])
-        if len(on_tape9):
-            for name in ("step", "time", *CONTACT):
-                self._sink.write(f"tape9/{name}", self.rows["tape9"], table[name][on_tape9])
-        for group in self.rows:
-            self.rows[group] += len(on_tape9) if group == "tape9" else count
+        for buffer in self._buffers.values():
+            buffer.put(table)
+        if self._tape9 is not None:
+            (on_tape9,) = np.nonzero(table["on_tape9"])
+            contact = {name: table[name][on_tape9] for name in ("step", "time", *CONTACT)}
+            self._tape9.put(contact)
         self._count = self._known = 0
 
     def _add_damping(self, table: dict[str, Floats]) -> None:
@@ -197,10 +199,9 @@ class Recorder:
     ) -> None:
         self._sink = sink
         self._model = model
-        self.steps = StepRecorder(sink, model, tapes, on_block)
         has_impact = model.impact is not None
         self._room = {  # upper bound of the rows of each group
-            **{group: sizes.passes[STORED_BY[group]] for group in BUFFERED},
+            **{group: sizes.passes[STORED_BY[group]] for group in AT_MACROS},
             "tape8": has_impact * sizes.contact_rows,
             "tape9": has_impact * (sizes.steps if tapes else sizes.contact_rows),
             "history": has_impact * sizes.steps,
@@ -216,10 +217,11 @@ class Recorder:
             and (dataset.path != "energy/damping_work" or model.motion.damping)
         ]
         self._buffers: dict[str, RowBuffer] = {}
-        for group in BUFFERED:
+        for group in (*EVERY_STEP, "tape9", *AT_MACROS):
             members = [p for p in self._datasets if p[0].group == group and p[0].shape[0] == "rows"]
             if members:
                 self._buffers[group] = RowBuffer(sink, members)
+        self.steps = StepRecorder(sink, self._buffers, model, tapes, on_block)
 
     def _shape(self, dataset: Dataset) -> tuple[int, ...]:
         """Shape of a dataset with all its rows."""
@@ -279,7 +281,7 @@ class Recorder:
             self._sink.write("stresses/y", 0, y)
 
     def row(self, group: str, step: int, time: float, columns: Mapping[str, Any]) -> None:
-        """Store a row of one of the groups :data:`BUFFERED`: a value or an array per dataset."""
+        """Store a row of one of the groups :data:`AT_MACROS`: a value or an array per dataset."""
         rows = {name: np.asarray(value)[None] for name, value in columns.items()}
         self.rows(group, [step], [time], rows)
 
@@ -321,10 +323,9 @@ class Recorder:
     def finish(self) -> None:
         """Store the remaining rows and trim each dataset to its rows."""
         self.steps.flush()
-        stored = dict(self.steps.rows)
-        for group, buffer in self._buffers.items():
+        for buffer in self._buffers.values():
             buffer.flush()
-            stored[group] = buffer.stored
+        stored = {group: buffer.stored for group, buffer in self._buffers.items()}
         for dataset, _ in self._datasets:
             room, rows = self._room.get(dataset.group, 0), stored.get(dataset.group, 0)
             if room > rows and dataset.shape[0] == "rows":
