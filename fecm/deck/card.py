@@ -29,7 +29,7 @@ _REAL = re.compile(
 
 
 def parse_integer(text: str) -> int | None:
-    """Read an I field without blanks, of at most LONGEST characters; None if no integer."""
+    """Read an I field without blanks; None if it is no integer.  The caller limits its length."""
     return int(text) if _INTEGER.fullmatch(text) else None
 
 
@@ -226,17 +226,21 @@ def read_values(
     if fixed and not _is_aligned(card, fields, findings, cut_is_meant=blanks_are_zeros):
         return None
     texts = [text for _, text in card.cut(fields)] + [""] * len(fields)
-    if more := card.data[fields[-1].last :].lstrip() if fixed else texts[len(fields)].lstrip(", "):
-        what = "is beyond the last field of the card and is not read."
-        if not fixed:
-            what = f"follows the last of the card's {len(fields)} values."
+    if fixed:
+        more = card.data[fields[-1].last :].lstrip()
+        code, what = "W106", "is beyond the last field of the card and is not read."
+    else:
+        more = texts[len(fields)].lstrip(", ")
+        code, what = "E106", f"follows the last of the card's {len(fields)} values."
+    if more:
         end = len(card.data)
         place = Place(card.line, end - len(more) + 1, end, card.text)
-        findings.add("W106" if fixed else "E106", f"`{more}` {what}", place)
+        findings.add(code, f"`{more}` {what}", place)
         if not fixed:
             return None
-    zeros, pairs = fixed and blanks_are_zeros, zip(fields, texts, strict=False)
-    values = [_value(f, text, source, findings, zeros) for f, text in pairs]
+    zeros = fixed and blanks_are_zeros
+    pairs = zip(fields, texts, strict=False)  # more texts than fields
+    values = [_value(field, text, source, findings, zeros) for field, text in pairs]
     valid = [value for value in values if value is not None]
     return valid if len(valid) == len(values) else None
 
@@ -350,9 +354,10 @@ def _value(
             what = f"There is a blank {where} the number `{written}`"
             read = f"the report's machine read it as a zero and the value as {was}"
             line = source.card.data.ljust(field.last)
-            card = line[: field.first - 1] + squeezed.rjust(field.width) + line[field.last :]
-            hint = f"right-justified, the card is `{card.rstrip()}`"
-            hint = "remove the blank" if "," in line else hint
+            meant = line[: field.first - 1] + squeezed.rjust(field.width) + line[field.last :]
+            hint = f"right-justified, the card is `{meant.rstrip()}`"
+            if "," in line:
+                hint = "remove the blank"
             findings.add("E104", f"{what}; {read}.", source.place(field.name), hint)
             return None
         message = f"A blank inside `{text}` was read as a zero: the value is {value:g}."
@@ -373,7 +378,8 @@ def write_card(fields: Fields, values: Sequence[Value]) -> str:
         text = format_real(float(value), field.width) if isinstance(value, float) else str(value)
         if text is None or len(text) > field.width:
             texts = [_free(value) for value in values]
-            texts += [""] * (len(texts) == 1)  # a comma makes the format free
+            if len(texts) == 1:
+                texts.append("")  # a comma makes the format free
             return (", " if all(texts) else ",").join(texts)
         line = line.ljust(field.first - 1)
         line += text.ljust(field.width) if field.kind == "A" else text.rjust(field.width)

@@ -101,7 +101,7 @@ def refined(
 
 
 def framed(inner: Sequence[Section], length: float) -> list[Section]:
-    """Elements of a window in a length's middle, its edges lines of nodes; some like it beside."""
+    """Elements of a centred window, with lines of nodes at its edges, and like ones beside it."""
     start = (length - inner[-1].end) / 2.0
     ends = [round_to(start + section.end, length) for section in inner]
     starts = [round_to(start, length), *ends]

@@ -130,8 +130,10 @@ class Stream:
 class Reader(Stream):
     """Reads the cards of a file, problem by problem; the options are those of :class:`Stream`."""
 
-    def __init__(self, text: str, **options: bool) -> None:
-        super().__init__(text, **options)
+    def __init__(
+        self, text: str, *, blanks_are_zeros: bool = False, keeps_values: bool = False
+    ) -> None:
+        super().__init__(text, blanks_are_zeros=blanks_are_zeros, keeps_values=keeps_values)
         self._control: records.Control  # of the problem that is read
         self._unsound: set[str] = set()  # keywords of its segments with unreadable cards
         self._segments = 0

@@ -1,4 +1,4 @@
-"""Records: values of one card as plain typed objects, compared without their card, and fields."""
+"""Records: the values of a card as plain typed objects, which compare without it; its fields."""
 
 from __future__ import annotations
 
@@ -28,9 +28,10 @@ DOF_NAMES = ("u", "v", "w", "theta_x", "theta_y")
 
 
 def without_points(values: Sequence[Value]) -> list[Value]:
-    """Values of a card whose integers are written without a point."""
-    exact = (isinstance(v, float) and v.is_integer() and abs(v) < EXACT for v in values)
-    return [int(v) if whole else v for v, whole in zip(values, exact, strict=True)]
+    """Values of a card, whole floats as integers, which are written without a point."""
+    return [
+        int(v) if isinstance(v, float) and v.is_integer() and abs(v) < EXACT else v for v in values
+    ]
 
 
 @frozen
@@ -56,7 +57,7 @@ class Record:
         return cls(**given, source=source)
 
     def row(self) -> list[Value]:
-        """Values in the card's order; None is a blank."""
+        """Values in the card's order; ``""`` for an attribute that is None, a blank."""
         row: list[Value] = []
         for attribute in dataclasses.fields(self)[1:]:  # the first is the source
             value = getattr(self, attribute.name)

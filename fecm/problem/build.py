@@ -1,4 +1,4 @@
-"""Build the parts of a run from a deck; the active slips become parameters of them here."""
+"""Build the parts of a run from a deck; active slips become parameters of these parts."""
 
 from __future__ import annotations
 
@@ -337,11 +337,9 @@ def build_law(
 ) -> contact_law.HystereticLaw | contact_law.ListingLaw:
     """Build the contact law of a deck with the active slips."""
     constants = build_constants(deck.require(model.Indentation))
-    return (
-        contact_law.ListingLaw(constants)
-        if "reload" in slips
-        else contact_law.HystereticLaw(constants)
-    )
+    if "reload" in slips:
+        return contact_law.ListingLaw(constants)
+    return contact_law.HystereticLaw(constants)
 
 
 def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactModel:
@@ -384,13 +382,15 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     stress_points = plate.strain_field(problem.rules[2])
     plies = failure = None
     words = {macro.word: macro for macro in flat(problem.program)}
-    of_plate = problem.mesh, plate.laminate, problem.rules[2]
+    points = problem.rules[2]
     if "PLYS" in words:  # the M elements nearest to the load, or all
         nearest = np.argsort(problem.distances.round(9), kind="stable")
-        plies = PlyStresses(*of_plate, np.sort(nearest[: int(words["PLYS"].second) or None]))
+        rows = np.sort(nearest[: int(words["PLYS"].second) or None])
+        plies = PlyStresses(problem.mesh, plate.laminate, points, rows)
     if "FAIL" in words:
         kind = CompiledMonitor if compiled else FailureMonitor
-        failure = kind(PlyStresses(*of_plate), plate.laminate, deck.require(model.Allowables))
+        stresses = PlyStresses(problem.mesh, plate.laminate, points)
+        failure = kind(stresses, plate.laminate, deck.require(model.Allowables))
     places = stress_points.places(mesh.coordinates) if plies or failure else None
     cards, transposed = deck.last(model.Gages), plate.rules.transposed_jacobian
     read = None if cards is None else gages(mesh, cards.records, transposed_jacobian=transposed)
@@ -401,8 +401,9 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     strains = plate.strain_field(plate.rules.strains, CompiledStrains if compiled else StrainField)
     under_load = places and problem.under_load(*places)
     return ImpactModel(
-        plate, motion, impact, steps, station, strains, stress_points, read, problem.patch, plies,
-        failure, under_load,
+        plate=plate, motion=motion, impact=impact, steps=steps, station=station, strains=strains,
+        stress_points=stress_points, gages=read, patch=problem.patch, plies=plies,
+        failure=failure, under_load=under_load,
     )  # fmt: skip
 
 

@@ -261,7 +261,7 @@ def _check_shear(deck: model.Deck, mesh: Mesh, families: Blocks, findings: Findi
 
 
 def _orders_without_motions(family: ElementBlock) -> tuple[str, int, int]:
-    """Name, and least shear orders without zero-energy modes: where w is free, and supported."""
+    """Name; least shear orders without zero-energy modes where w is free, and where it is held."""
     if family.shape is TRIANGLE:
         return "triangles", 1, 1
     if family.shape is CUBIC:

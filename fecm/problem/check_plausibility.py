@@ -76,8 +76,9 @@ def _check_material(material: model.Material, mesh: Mesh, findings: Findings) ->
             findings.add("W431", message, layer.place("fibre angle"), hint)
     turned = [layer for layer in material.layers if layer.angle]
     angles = np.abs([layer.angle for layer in turned])
-    fives = np.degrees(angles) / 5.0  # of multiples of 5 degrees up to 90 in radians
-    like_radians = (angles > 0.08) & (angles <= 1.6) & (np.abs(fives - np.rint(fives)) < 0.08)
+    multiples = np.degrees(angles) / 5.0  # whole where the angle is one of 5 degrees, in radians
+    off = np.abs(multiples - np.rint(multiples))
+    like_radians = (angles > 0.08) & (angles <= 1.6) & (off < 0.08)
     if turned and like_radians.all():
         known = dict.fromkeys(layer.angle for layer in turned[:8])
         shown = ", ".join(f"{angle:g} is {math.degrees(angle):.0f} degrees" for angle in known)

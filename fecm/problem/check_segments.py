@@ -181,20 +181,20 @@ def warn_of_the_reports_rod(deck: model.Deck, findings: Findings) -> None:
 
 def check_law(law: model.Indentation, findings: Findings) -> None:
     """Check an EXPE segment."""
-    rules = (
-        (law.k > 0.0, "positive"),
-        (law.alpha_p >= 0.0, "0 or more"),
-        (0.0 <= law.s_p < 1.0, "at least 0 and below 1"),
-        (law.q > 0.0, "positive"),
-    )
+    rules = [(law.k > 0.0, "positive")]
     if law.word == model.Indentation.ACR:
         power = law.q in (0.0, ACR_POWER)
-        rules = (
-            rules[0],
+        rules += [
             (law.alpha_p > 0.0, "positive"),
             (law.s_p == 0.0, "blank or 0 with ACR, whose equation 3-7 has no such constant"),
             (power, "blank or 2.5 with ACR, as equation 3-7 holds for no other"),
-        )
+        ]
+    else:
+        rules += [
+            (law.alpha_p >= 0.0, "0 or more"),
+            (0.0 <= law.s_p < 1.0, "at least 0 and below 1"),
+            (law.q > 0.0, "positive"),
+        ]
     for name, value, (valid, rule) in zip(law.names(), law.values(), rules, strict=True):
         if not valid:
             findings.add("E412", f"The {name} is {value:g}; it must be {rule}.", law.place(name))
@@ -298,16 +298,16 @@ def check_material(material: model.Material, findings: Findings) -> None:
         must = "1 to 4 (Gauss points) or -1 to -4 (nodal points)"
         message = f"The stress-point order K is {card.points}; it must be {must}."
         findings.add("E402", message, card.place("stress-point order K"))
-    values = dict(zip((field.name for field in ply.fields), ply.row(), strict=True))
-    nu12 = float(values.pop("Poisson's ratio NU12"))
-    wrong = {name: float(value) for name, value in values.items() if float(value) <= 0.0}
-    for name, value in wrong.items():
+    ratio = "Poisson's ratio NU12"
+    named = zip((field.name for field in ply.fields), map(float, ply.row()), strict=True)
+    wrong = [(name, value) for name, value in named if value <= 0.0 and name != ratio]
+    for name, value in wrong:
         findings.add("E403", f"The {name} is {value:g}; it must be positive.", ply.place(name))
     # The square of nu12 against E1/E2, written so that no number overflows.
-    if not wrong and abs(nu12) >= (ply.e1 / ply.e2) ** 0.5:
+    if not wrong and abs(ply.nu12) >= (ply.e1 / ply.e2) ** 0.5:
         why = f"its square must stay below E1/E2 = {ply.e1 / ply.e2:g}"
-        message = f"Poisson's ratio NU12 = {nu12:g} is too large: {why}."
-        findings.add("E404", message, ply.place("Poisson's ratio NU12"))
+        message = f"Poisson's ratio NU12 = {ply.nu12:g} is too large: {why}."
+        findings.add("E404", message, ply.place(ratio))
     for position, layer in enumerate(material.layers, start=1):
         if layer.thickness <= 0.0:
             what = f"Layer {position} has the thickness {layer.thickness:g}"
@@ -449,8 +449,7 @@ def _held(mesh: Mesh, patch: ContactPatch) -> str:
 
 # Checks of a segment by itself.
 CHECKS: tuple[tuple[type[model.Segment], Callable[[Any, Findings], None]], ...] = (
-    (model.Material, check_material), (model.Indentation, check_law),
-    (model.Allowables, check_allowables), (model.Delamination, check_delamination),
-    (model.Damping, check_damping), (model.Projectile, check_projectile),
-    (model.Shear, check_shear_correction),
+    (model.Indentation, check_law), (model.Allowables, check_allowables),
+    (model.Delamination, check_delamination), (model.Damping, check_damping),
+    (model.Projectile, check_projectile), (model.Shear, check_shear_correction),
 )  # fmt: skip

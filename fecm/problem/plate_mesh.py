@@ -260,7 +260,7 @@ def _turned(places: Floats, nodes: Integers, size: float, where: str) -> Integer
 def _quadrilaterals(
     places: Floats, nodes: Integers, groups: dict[str, Integers]
 ) -> tuple[Floats, Integers, int]:
-    """Quadrilaterals of 4 or 9 nodes, and how many mid-sides are new, after the old points."""
+    """Points, cells of 4 or 9 nodes, and the number of new mid-sides after the old points."""
     count, new = nodes.shape[1], 0
     if count in (4, 9):
         return places, nodes, new

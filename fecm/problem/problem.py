@@ -48,6 +48,8 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
         valid = check_mesh.check_elements(deck, mesh, findings)
         if valid and complete and deck.has(model.Coordinates):
             check_mesh.check_mesh(deck, mesh, findings, listing=listing)
+    if (material := deck.last(model.Material)) is not None:
+        check_segments.check_material(material, findings)
     if (impact := deck.last(model.Impact)) is not None:
         check_segments.check_impact(impact, deck, mesh, findings)
     for kind, check_segment in check_segments.CHECKS:
@@ -152,12 +154,14 @@ def check_program(problem: Problem, findings: Findings) -> None:
 def _check_ply_stresses(problem: Problem, findings: Findings) -> None:
     """Check the PLYS cards of a program; warn of stresses that depend on the mesh or are NaN."""
     cards = [macro for macro in flat(problem.program) if macro.word in ("PLYS", "FAIL")]
-    if cards and problem.has_impact and problem.patch is None:
+    if not cards:
+        return
+    if problem.has_impact and problem.patch is None:
         message = "Ply stresses under a point force grow without bound as the mesh is refined."
         hint = "a PATC segment gives the contact force an area"
         findings.add("W449", message, cards[0].place("macro"), hint)
     others = np.flatnonzero(~is_complete(problem.mesh.elements))
-    if cards and len(others):
+    if len(others):
         what = f"Interlaminar stresses of {len(others)} elements without nine nodes"
         message = f"{what} are not computed (element {others[0] + 1} first): they are NaN."
         findings.add("W450", message, cards[0].place("macro"))
