@@ -258,7 +258,7 @@ def _strains(
     points = data.strain_points(result, name)
     layers = data.deck_of(result, name).require(Material).layers
     thickness = sum(layer.thickness for layer in layers)
-    places: Sequence[Any] = at or [_default_place(result, name, points, thickness)]
+    places = [np.array(place) for place in at] or [_default_place(result, name, points, thickness)]
     height = {"far": thickness / 2.0, "curvature": 1.0}.get(face, -thickness / 2.0)
     if face != "curvature" and result["mesh/equations"][:, :2].any():
         warn(
@@ -267,7 +267,7 @@ def _strains(
         )
     found: dict[str, data.Array] = {}
     for place in places:
-        there = data.nearest(points, np.array(place), name)
+        there = data.nearest(points, place, name)
         x, y = points[there].mean(axis=0)
         kappa_x, kappa_y, kappa_xy = (column[:, there].mean(axis=1) for column in columns)
         for angle in gages:

@@ -289,9 +289,9 @@ def _draw(choice: Choice, width: str) -> tuple[Axes, Axis, Axis]:
     """Draw the values; the axes, and what lies along x and y."""
     shown, other, levels = choice.shown, choice.other, choice.levels
     x, y = choice.over if len(choice.over) > 1 else (choice.over[0], shown)
-    texts = other if y is shown else y
-    if x.ticks:
-        x, y, texts = y, x, None if y is shown else x
+    if x.ticks:  # texts lie along y
+        x, y = y, x
+    texts = None if x is shown else other if y is shown else y
     if texts and 0 < len(texts.ticks) <= CURVES:
         return _curves(x, texts, choice, width), x, shown
     if y.ticks:  # in rows, the first at the top

@@ -138,7 +138,8 @@ def profile(result: Result, name: str, along: str, rows: data.Array) -> tuple[Fl
     longest = longest_sides(result["mesh/elements"], coordinates).max()
     if sides <= 2.0 * longest and np.isclose(np.ptp(inside), np.ptp(position)):
         return inside, w[:, on]
-    points = [position, np.full(SAMPLES, level)][:: 1 - 2 * axis]
+    points = np.empty((2, SAMPLES))
+    points[axis], points[across] = position, level
     triangles = Triangulation(cut.points[:, 0], cut.points[:, 1], cut.triangles)
     values = [LinearTriInterpolator(triangles, cut.values(row))(*points) for row in w]
     return position, np.ma.filled(np.ma.stack(values), np.nan)

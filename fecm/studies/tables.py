@@ -55,7 +55,7 @@ class Table:
             raise StudyError(f"{self.path}: the table has fewer than two rows of numbers")
         values = np.array([self._values(row, names, own) for row in self.rows])
         columns = dict(zip(names, values.T, strict=True))
-        rises = {name: np.diff(column) > 0 for name, column in columns.items()}
+        rises = {name: column[1:] > column[:-1] for name, column in columns.items()}
         if increasing and not rises[increasing].all():
             row = int(rises[increasing].argmin())
             before, after = columns[increasing][row : row + 2]

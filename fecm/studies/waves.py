@@ -254,7 +254,8 @@ def _in_order(share: Floats) -> Indices:
 # normal they form sheets; sheets that cross are identified by their modes.
 
 EQUAL = 1e-10  # relative tolerance of equal squared velocities
-# Squared scalar product above which one mode continues another; smallest step of the normal.
+# Squared scalar product above which one mode continues another; smallest step of the normal
+# (degrees).
 SURE, FINEST = 0.8, 1e-9
 
 _ORDERS = np.array(list(permutations(range(5))))
@@ -265,18 +266,13 @@ FRONTS = ("extension", "in_plane_shear", "bending", "twisting", "transverse_shea
 
 @frozen
 class Fronts:
-    """The five fronts for a series of normals, in the order of :data:`FRONTS`.
-
-    As sheets they are in descending order of velocity.
-    """
+    """The five fronts for a series of normals, in the order of :data:`FRONTS`."""
 
     normal: Floats  # angles, (n,), degrees
     velocity: Floats  # normal velocity c_n, (n, 5), length/time
     slope: Floats  # its derivative with respect to the normal's angle (radian), (n, 5)
     curvature: Floats  # its second derivative, (n, 5)
     share: Floats  # of u_n, u_t, phi_n, phi_t, w (last axis) in the kinetic energy, (n, 5, 5)
-    # Modes as columns, (n, 5, 5), orthonormal after scaling by the inertia's Cholesky factor.
-    mode: Floats
 
     @property
     def ray(self) -> Floats:
@@ -305,7 +301,15 @@ class Fronts:
         return radius + time * (self.velocity + self.curvature)
 
 
-def sheets(medium: Medium, normal: Floats) -> Fronts:
+@frozen
+class Sheets(Fronts):
+    """The five solutions for a series of normals, in descending order of velocity."""
+
+    # Modes as columns, (n, 5, 5), orthonormal after scaling by the inertia's Cholesky factor.
+    mode: Floats
+
+
+def sheets(medium: Medium, normal: Floats) -> Sheets:
     """Solve L(n) a = c_n^2 M a, with derivatives by perturbation, for normals in degrees, (n,)."""
     with np.errstate(all="ignore"):
         root = np.linalg.inv(np.linalg.cholesky(medium.inertia))
@@ -324,7 +328,7 @@ def sheets(medium: Medium, normal: Floats) -> Fronts:
         if not np.isfinite(curvature).all():
             raise StudyError(BEYOND)
     share = shares(medium.inertia, root.T @ basis)
-    return Fronts(normal, velocity, slope, curvature, share, basis)
+    return Sheets(normal, velocity, slope, curvature, share, basis)
 
 
 def match_modes(before: Floats, after: Floats) -> tuple[Indices, Floats]:
@@ -491,7 +495,6 @@ class WaveSurfaces:
         return Fronts(
             found.normal, found.velocity[rows, place], found.slope[rows, place],
             found.curvature[rows, place], found.share[rows, place],
-            np.take_along_axis(found.mode, place[:, None], axis=2),
         )  # fmt: skip
 
     def cusps(self, time: float, radius: float) -> list[Cusp]:

@@ -394,8 +394,8 @@ def struck_square(mass: float, end: float) -> Deck:
 
 @case
 def _small_mass() -> Sequence[Value]:
-    model = infinite_plate(1.0, 1.0, 1.0, 1.0)
-    return [model.peak, model.time, decks.result_of(struck_square(0.0128, 3e-5)).force.max()]
+    dashpot = infinite_plate(1.0, 1.0, 1.0, 1.0)
+    return [dashpot.peak, dashpot.time, decks.result_of(struck_square(0.0128, 3e-5)).force.max()]
 
 
 @case

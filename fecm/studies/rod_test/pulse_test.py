@@ -186,38 +186,41 @@ def _march(
     strain = np.array([force_row(rod, x) for x in stations]).reshape(-1, step.n)
     middle = np.array([displacement_row(rod, part * rod.length) for part in (0.0, 0.5, 1.0)])
     history = np.empty((len(applied), len(strain) + len(middle)))
-    forces = (1.0 - step.theta) * applied[:-1] + step.theta * applied[1:]
-    for row, force in enumerate([0.0, *forces.tolist()]):
-        if row:
-            state = step.advance(state, force)
+    forces = ((1.0 - step.theta) * applied[:-1] + step.theta * applied[1:]).tolist()
+    for row in range(len(applied)):
+        if row > 0:
+            state = step.advance(state, forces[row - 1])
         history[row, : len(strain)] = strain @ state.deformation
         history[row, len(strain) :] = middle @ state.acceleration
     return history
 
 
-def _place(rod: Rod, x: float) -> tuple[int, float, float, Floats]:
-    """Element at x (the farther of two), local coordinate, from 0 to 1, length, and a zero row."""
+def _place(rod: Rod, x: float) -> tuple[int, float]:
+    """Element at x (the farther of two) and the local coordinate, from 0 to 1."""
     along = x / rod.length * rod.elements
     node = round(along)
     if abs(along - node) < 1e-9 * rod.elements:
         along = float(node)
     element = min(int(along), rod.elements - 1)
-    return element, along - element, rod.element_length, np.zeros(2 * rod.elements + 2)
+    return element, along - element
 
 
 def force_row(rod: Rod, x: float) -> Floats:
     """Return the row (n,) that maps the dofs to the force at x, -E A du/dx."""
-    element, s, L, row = _place(rod, x)
-    slopes = 6.0 * (s**2 - s) / L, 1.0 - 4.0 * s + 3.0 * s**2, 6.0 * (s - s**2) / L
-    row[2 * element : 2 * element + 4] = *slopes, 3.0 * s**2 - 2.0 * s
+    (element, s), L = _place(rod, x), rod.element_length
+    row = np.zeros(2 * rod.elements + 2)
+    row[2 * element : 2 * element + 4] = [
+        6.0 * (s**2 - s) / L, 1.0 - 4.0 * s + 3.0 * s**2, 6.0 * (s - s**2) / L, 3.0 * s**2 - 2.0 * s
+    ]  # fmt: skip
     return -rod.modulus * float(rod.areas[element]) * row
 
 
 def displacement_row(rod: Rod, x: float) -> Floats:
     """Return the row (n,) that maps the dofs to the displacement at x, equation 4-19."""
-    element, s, L, row = _place(rod, x)
-    begin = (1.0 - s) ** 2 * (1.0 + 2.0 * s), L * s * (1.0 - s) ** 2
-    row[2 * element : 2 * element + 4] = *begin, s**2 * (3.0 - 2.0 * s), L * s**2 * (s - 1.0)
+    (element, s), L = _place(rod, x), rod.element_length
+    row = np.zeros(2 * rod.elements + 2)
+    row[2 * element : 2 * element + 2] = (1.0 - s) ** 2 * (1.0 + 2.0 * s), L * s * (1.0 - s) ** 2
+    row[2 * element + 2 : 2 * element + 4] = s**2 * (3.0 - 2.0 * s), L * s**2 * (s - 1.0)
     return row
 
 
