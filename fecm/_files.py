@@ -110,7 +110,8 @@ def beside(path: Path, *, overwrite: bool = True, follow: bool = True) -> Iterat
     it keep the old contents.
 
     `overwrite` replaces an existing file, even one created during the block; `follow` the target of
-    a link instead of the link.  If the file can't be written, an OSError leaves an existing one.
+    a symbolic link instead of the link.  Raises OSError if the file can't be written; an existing
+    one is then unchanged.
     """
     target = final(path) if follow else path
     partial = partial_of(target)

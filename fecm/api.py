@@ -147,7 +147,8 @@ def run(
     slips : iterable of str
         Slips to add to report mode.
     output : str or Path, optional
-        Result file, which is overwritten; a second problem goes to ``-2.h5``.  None by default.
+        Result file, which is overwritten; a second problem goes to ``-2.h5``, and so on.  Nothing
+        is written by default.
     force : bool
         Run even if the time step is above the critical one, or with a checkerboard motion (E321).
     solver : str

@@ -283,7 +283,7 @@ def _law(
 
 
 def _damages(named: NamedPly | None, system: str | None, notes: list[str]) -> list[model.Segment]:
-    """Strengths and toughness of a named ply; notes say what it does not have."""
+    """Strengths and toughness of a named ply; adds what it does not have to `notes`."""
     if named is None or system is None:
         raise ObjectError("`damage` needs a named ply with strengths or toughness")
     parts = {
@@ -302,7 +302,7 @@ def _damages(named: NamedPly | None, system: str | None, notes: list[str]) -> li
 def _placed(
     plate: Plate, at: Sequence[float] | None, patch: model.Patch | None, doubts: list[str]
 ) -> tuple[Grid | PlateMesh, int, model.Patch | None]:
-    """Mesh, node that is hit, and patch; doubts say how they differ from what was asked."""
+    """Mesh, node that is hit, and patch; adds what was changed in them to `doubts`."""
     place = None if at is None else objects.pair("at", at)
     mesh = plate.imported or objects.grid_of(plate, place, None if patch is None else patch.radius)
     low, high = mesh.extent

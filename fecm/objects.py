@@ -467,9 +467,10 @@ def _sections(
     length: float, count: int, centre: float, grading: float, radius: float | None
 ) -> list[Section]:
     """Elements in one direction."""
-    made = grids.uniform(length, count)
     if grading > 1.0:
         made = grids.graded(length, count, centre, grading)
+    else:
+        made = grids.uniform(length, count)
     if radius is None or grids.longest_at(made, centre) <= radius:
         return made
     if radius < LEAST_RADIUS * length:

@@ -175,6 +175,12 @@ def test_elements_of_every_family_cover_the_plate_and_carry_linear_fields(kind: 
     np.testing.assert_allclose(shown, cut.points @ [3.0, -2.0], atol=1e-12)
 
 
+def test_places_of_strains_may_be_an_array(result: Result) -> None:
+    places = np.array([[1.1, 0.9], [0.1, 0.2]])
+    shown = legend_of(plot(result, "strain", gages=(0.0,), at=places))
+    assert shown == legend_of(plot(result, "strain", gages=(0.0,), at=places.tolist()))
+
+
 def test_strain_is_curvature_times_the_distance_of_the_face(result: Result) -> None:
     far = plot(result, "strain", gages=(0.0, 90.0, 45.0), at=((1.1, 0.9),))
     assert legend_of(far) == ["x at 1, 1", "y at 1, 1", "45° at 1, 1"]

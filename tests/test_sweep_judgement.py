@@ -157,6 +157,13 @@ def test_texts_that_spreadsheets_compute_are_exported_as_texts(tmp_path: Path) -
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("more", [(), ("--random", "k=normal:1e6,1e4", "--samples", "16")])
+def test_a_sweep_without_values_is_one_line(tmp_path: Path, more: tuple[str, ...]) -> None:
+    done = call("sweep", LONG, "--vary", "velocity=,", *more, "-o", tmp_path / "s.h5")
+    assert done.exit_code == 2
+    assert done.stderr.splitlines() == ["fecm: error: a sweep needs at least one case"]
+
+
 def test_a_range_beyond_all_numbers_is_one_line(tmp_path: Path) -> None:
     done = call("sweep", LONG, "--vary", "velocity=-1e308:1e308:3", "-o", tmp_path / "s.h5")
     assert done.exit_code == 2

@@ -63,12 +63,12 @@ class LazyGroup(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import a command; an isolated one in a child process."""
-        if (command := COMMANDS.get(cmd_name)) is not None:
-            if command.isolated and not ctx.resilient_parsing:
-                isolation.fork()
-            found: click.Command = getattr(import_module(command.module), cmd_name)
-            return found
-        return None
+        if (command := COMMANDS.get(cmd_name)) is None:
+            return None
+        if command.isolated and not ctx.resilient_parsing:
+            isolation.fork()
+        found: click.Command = getattr(import_module(command.module), cmd_name)
+        return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands with their summaries."""

@@ -12,6 +12,7 @@ from typing import Any, BinaryIO
 from urllib.parse import quote
 
 import click
+from click import option
 
 from fecm._errors import FecmError
 from fecm._files import check_outputs
@@ -19,7 +20,6 @@ from fecm._version import __version__
 from fecm.api import LoadedDeck, load_deck
 from fecm.cli import common
 from fecm.cli.common import DASH, FILE_PATH, CheckFailedError, RefusedError, echo, echo_json
-from fecm.cli.types import option
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.format import format_deck
 from fecm.deck.reader import load_text
@@ -38,8 +38,9 @@ def count_findings(findings: Sequence[Finding]) -> str:
 
 
 def load_valid(
-    deck: Path, otherwise: str = "", mode: str = REPORT, force: bool = True, warnings: bool = True
-) -> list[Problem]:
+    deck: Path, otherwise: str = "", mode: str = REPORT, *, force: bool = True,
+    warnings: bool = True,
+) -> list[Problem]:  # fmt: skip
     """Problems of a deck, whose findings go to standard error; without `warnings` only errors.
 
     Errors that `--force` permits are permitted if `force`.  Raises RefusedError, whose message ends
@@ -68,8 +69,10 @@ DECKS = click.argument("decks", nargs=-1, required=True, metavar="DECK...", type
 
 def _input(deck: Path) -> Path | BinaryIO:
     """What to read: a file, or standard input for ``-``."""
-    piped = getattr(sys.stdin, "buffer", None) or io.BytesIO()
-    return piped if deck == DASH else deck
+    if deck != DASH:
+        return deck
+    piped: BinaryIO = getattr(sys.stdin, "buffer", None) or io.BytesIO()
+    return piped
 
 
 def _failures(decks: Sequence[Path], work: Callable[[Path], None]) -> list[Exception]:

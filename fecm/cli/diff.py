@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click import option
 
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, echo_json
 from fecm.cli.isolation import reads
-from fecm.cli.types import NOT_NEGATIVE, Parsed, assignment, file_of, option
+from fecm.cli.types import NOT_NEGATIVE, Parsed, assignment, file_of
 from fecm.results.diff import SCALE_NAMES, Comparison, Difference, difference
 from fecm.results.schema import printable, shown_apart
 
@@ -116,9 +117,9 @@ def diff(
         within = f"rtol {rtol:g}, atol {atol:g}" + ", --tol" * bool(own)
         within += f"; {len(found.excluded)} excluded" if found.excluded else ""
         verdict = f"different: {len(different)} of {compared} at {within}"
-        click.echo(
-            "\n".join([*lines, f"same: {compared} within {within}" if found.same else verdict])
-        )
+        if found.same:
+            verdict = f"same: {compared} within {within}"
+        click.echo("\n".join([*lines, verdict]))
     if not found.same:
         raise SystemExit(NO)
 

@@ -44,10 +44,9 @@ def estimate(deck: Path, form: str) -> None:
         reached = carry_out(problem, plan(problem, [{}], until=threshold))
         velocity = float(reached["found_velocity"][0])
     peak, duration = (float(own[name][0]) for name in ("peak_force", "contact_time"))
-    rows = [
-        (*model, 0.5 * found.mass * model[-1] ** 2)
-        for model in (*models, ("run", peak, duration, threshold, velocity))
-    ]
+    models.append(("run", peak, duration, threshold, velocity))
+    # A model's name, peak, duration, threshold and velocity; then the energy.
+    rows = [(*model, 0.5 * found.mass * model[-1] ** 2) for model in models]
     w, h = found.models[-1].impact.peak / found.stiffness, problem.laminate.thickness
     if w > 0.5 * h:  # not of a free plate, whose stiffness is NaN
         note(f"the static plate deflects by {w / h:.3g} h: beyond h/2 a linear plate is too soft")

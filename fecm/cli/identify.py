@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from click import option
 
 from fecm.cli.common import DASH, DECK_PATH, FILE_PATH, FORMAT_OPTION, NO, echo, echo_json, note
 from fecm.cli.decks import load_single
 from fecm.cli.outputs import OutputPaths, write_lines
 from fecm.cli.rod import FILTER_HELP
-from fecm.cli.types import Parsed, list_of, option
+from fecm.cli.types import Parsed, list_of
 from fecm.deck.units import unit_names, unit_of
 from fecm.studies.comparison import measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of

@@ -10,11 +10,12 @@ from typing import Any
 
 import click
 import numpy as np
+from click import option
 
 from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError, echo, note
 from fecm.cli.laminate_options import laminate_options, ply_of_options
 from fecm.cli.outputs import OutputPaths, outputs
-from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, list_of, option, stacked
+from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, list_of, stacked
 from fecm.deck import catalogue
 from fecm.deck.catalogue import CONTACTS, SYSTEM, SYSTEMS, NamedPly
 from fecm.deck.model import Deck, Indentation
@@ -188,14 +189,14 @@ def _rigidities(
     targets.write("alpha_m,s_3_9,s_3_7", np.column_stack([peaks, *by]).tolist())
 
 
-def _report_length(deck: Deck, value: float, name: str, option: str) -> float:
+def _report_length(deck: Deck, value: float, name: str, flag: str) -> float:
     """Convert a length of the report to the deck's unit, by default inches, and note it."""
     unit = unit_names(deck).get("length", "in")
     system = {names["length"]: key for key, names in SYSTEMS.items()}.get(unit)
     if system is None:
-        message = f"the report's {name} is in inches and the deck's in {unit}: give {option}"
+        message = f"the report's {name} is in inches and the deck's in {unit}: give {flag}"
         raise RefusedError(message)
-    note(f"{name} is the report's {value:g} in; {option} replaces it")
+    note(f"{name} is the report's {value:g} in; {flag} replaces it")
     return catalogue.convert(value, "length", SYSTEM, system)
 
 

@@ -135,7 +135,8 @@ def _page(about: Mapping[str, Any]) -> list[str]:
 def _group(group: Mapping[str, Any]) -> list[str]:
     """A group, with one line for each of its datasets."""
     head = printable(group["name"]) or "/"
-    head += f": {printable(group['description'])}" if group["description"] else ""
+    if group["description"]:
+        head += f": {printable(group['description'])}"
     if group["rows"] is not None:
         head += f"; {group['rows']} row{'s' * (group['rows'] != 1)}"
     attributes = [f"{printable(name)} = {shown(v)}" for name, v in group["attributes"].items()]

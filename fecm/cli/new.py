@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click import option
 from click.core import ParameterSource
 
 from fecm._files import check_outputs
@@ -15,7 +16,7 @@ from fecm.api import load_deck
 from fecm.authoring import AUTO, FULL, MITC, Authored, author
 from fecm.cli.common import DASH, FILE_PATH, RefusedError, echo, note, write_text
 from fecm.cli.laminate_options import PLIES, laminate_options, one_ply
-from fecm.cli.types import POSITIVE, Finite, Parsed, assignment, list_of, option
+from fecm.cli.types import POSITIVE, Finite, Parsed, assignment, list_of
 from fecm.deck.catalogue import CONTACTS, MATERIALS, STRENGTHS, NamedContact, NamedPly
 from fecm.deck.format import format_deck
 from fecm.deck.grid import SUPPORTS
@@ -211,12 +212,14 @@ def _author(
 
 def _additions(deck: Deck) -> str:
     """Say what a deck has besides the cards of the report's program."""
-    parts = ["assumed shear strains (SHEA MITC)"] if deck.has(Shear) else []
+    parts: list[str] = []
     if (patch := deck.last(Patch)) is not None:
         share = RADIUS_PER_THICKNESS[patch.shape]
         thickness = deck.require(Material).integration.thickness
         radius = patch.radius or share * thickness
         about = "" if patch.radius else f" ({share:g} of the thickness)"
         pressure = "a uniform pressure" if patch.shape == DISC else "Hertz's pressure"
-        parts.insert(0, f"{pressure} of radius {radius:.4g}{about} instead of a point force (PATC)")
+        parts.append(f"{pressure} of radius {radius:.4g}{about} instead of a point force (PATC)")
+    if deck.has(Shear):
+        parts.append("assumed shear strains (SHEA MITC)")
     return f"the deck has {' and '.join(parts)}; --patch none and --shear full leave them out"

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click import option
 
 from fecm._errors import FecmWarning
 from fecm._files import check_outputs
 from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, note, progress
 from fecm.cli.isolation import reads
-from fecm.cli.types import Finite, Parsed, assignment, list_of, option
+from fecm.cli.types import Finite, Parsed, assignment, list_of
 from fecm.plot.kinds import KINDS, Picture
 from fecm.plot.pictures import check_options, check_suffix, draw, options_of, save
 from fecm.results.hdf5_reader import read

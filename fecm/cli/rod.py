@@ -9,11 +9,13 @@ from typing import Any
 
 import click
 import numpy as np
+from click import option
 
+from fecm._typing import Floats
 from fecm.cli.common import DASH, DECK_PATH, FORMAT_OPTION, RefusedError
 from fecm.cli.decks import load_valid
 from fecm.cli.outputs import OutputPaths, outputs
-from fecm.cli.types import POSITIVE, Finite, Parsed, option
+from fecm.cli.types import POSITIVE, Finite, Parsed
 from fecm.deck.catalogue import SYSTEMS
 from fecm.deck.units import unit_names
 from fecm.mechanics.projectile import (
@@ -137,12 +139,15 @@ def _summarise(struck: Rod, history: RodHistory) -> None:
     size = f"length {struck.length:g}, mass {struck.total_mass:.5g}"
     click.echo(f"rod               {struck.elements} elements, {size}")
     click.echo(f"steps             {len(history.time) - 1} of {history.time[1]:g}")
-    names = ["applied          ", *(f"force at {x:<8.4g}" for x in history.stations)]
-    ratios = ["", *(f"; mean ratio to the applied {ratio:.3f}" for ratio in history.mean_ratios)]
-    forces = [history.applied, *history.forces.T]
-    for name, force, ratio in zip(names, forces, ratios, strict=True):
+
+    def peak(force: Floats) -> str:
         row = abs(force).argmax()
-        click.echo(f"{name} peak {force[row]:.6g} at time {history.time[row]:.6g}{ratio}")
+        return f"peak {force[row]:.6g} at time {history.time[row]:.6g}"
+
+    click.echo(f"applied           {peak(history.applied)}")
+    columns = history.stations, history.forces.T, history.mean_ratios
+    for x, force, ratio in zip(*columns, strict=True):
+        click.echo(f"force at {x:<8.4g} {peak(force)}; mean ratio to the applied {ratio:.3f}")
 
 
 @rod.command("filter")

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import click
+from click import option
 
 from fecm._files import check_outputs
 from fecm._memory import format_bytes
@@ -14,7 +15,7 @@ from fecm.api import numbered
 from fecm.cli import common
 from fecm.cli.common import CheckFailedError, RefusedError, echo, note, signals
 from fecm.cli.decks import load_valid
-from fecm.cli.types import POSITIVE, Finite, option
+from fecm.cli.types import POSITIVE, Finite
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.projectile import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
 from fecm.mechanics.solutions import SingularStiffnessError
@@ -83,7 +84,7 @@ def run(
         active = active_slips(mode, slips)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
-    problems = load_valid(deck, "; nothing was run", mode, force)
+    problems = load_valid(deck, "; nothing was run", mode, force=force)
     first = output or Path(f"{deck.stem}.h5")
     paths = [numbered(first, n) for n in range(1, len(problems) + 1)]
     prints = [numbered(printed, n) if printed else None for n in range(1, len(problems) + 1)]
@@ -211,7 +212,8 @@ def _observers(
 ) -> tuple[Callable[[Simulation], None], Callable[[Simulation], None]]:
     """Functions that are called after a step and after a macro.
 
-    They show the progress, write a checkpoint every so many seconds, and heed signals.
+    They show the progress, write a checkpoint when `every` seconds have passed since the last one,
+    and stop the run after a signal.
     """
     shown = 0
 

@@ -6,12 +6,13 @@ import time
 from pathlib import Path
 
 import click
+from click import option
 
 from fecm._files import check_outputs
 from fecm.api import load_deck
 from fecm.cli.common import DECK_PATH, FILE_PATH, NO, RefusedError, echo, note, progress, signals
 from fecm.cli.decks import count_findings
-from fecm.cli.types import Parsed, list_of, option
+from fecm.cli.types import Parsed, list_of
 from fecm.deck.findings import DeckError
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer

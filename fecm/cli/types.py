@@ -14,15 +14,13 @@ Decorated = Callable[..., None]
 
 MOST = 1_000_000  # bytes of a file whose contents are the value of an option
 
-option = click.option
-
 
 def stacked(*options: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
     """Add several options to a command, in this order on its help page."""
 
     def decorate(function: Decorated) -> Decorated:
-        for one in reversed(options):
-            function = one(function)
+        for option in reversed(options):
+            function = option(function)
         return function
 
     return decorate

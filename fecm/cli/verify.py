@@ -34,6 +34,7 @@ def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: str) -> 
         for one in wanted:
             click.echo(f"{one.name.ljust(width)}  {one.title}")
         return
+    # The same rows twice: for the output as they are computed, and for the verdict.
     rows, kept = tee(chain.from_iterable(map(carry_out, wanted)))
     if markdown:
         click.echo(page(rows), nl=False)

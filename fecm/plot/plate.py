@@ -252,8 +252,9 @@ def _plates(
     ((name, result),) = results.items()
     cut, w = data.patches(result, 2, name), result["tape3/w"]
     place = style.scale_of(results, "length", [cut.points])
-    length = style.scale_of(results, "length", [w[rows]])
-    span = (float(w[rows].min()), float(w[rows].max()))
+    flat, stored = cut.points[cut.quads], w[rows]
+    length = style.scale_of(results, "length", [stored])
+    span = (float(stored.min()), float(stored.max()))
     columns = 1 if width == "column" else min(count, 2)
     lines = math.ceil(count / columns)
     figure, axes = style.panels(width, lines, columns, ratio=0.7, subplot_kw={"projection": "3d"})
@@ -262,7 +263,7 @@ def _plates(
 
     def show(collection: Any, title: Any, row: int) -> None:
         heights = cut.values(w[row])[cut.quads]
-        collection.set_verts(np.dstack([cut.points[cut.quads], heights]))
+        collection.set_verts(np.dstack([flat, heights]))
         collection.set_array(heights.mean(axis=1))
         title.set_text(f"time {clock.show(float(result['tape3/time'][row]))}")
 

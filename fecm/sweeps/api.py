@@ -166,8 +166,9 @@ def sweep(
         Factors 1, 2, 4, 8 or a part of them, instead: the sides of all elements and DT are divided
         by each.  :attr:`SweepResult.convergence` has observed orders and limits.
     random : mapping of str to str, optional
-        Laws by name: ``"normal:MEAN,SD"``, ``"lognormal:MEDIAN,SIGMA"``, ``"uniform:A,B"`` or
-        ``"triangular:A,MODE,B"``.  With `vary` all combinations get the same draws.
+        Laws of random values by name: ``"normal:MEAN,SD"``, ``"lognormal:MEDIAN,SIGMA"``,
+        ``"uniform:A,B"`` or ``"triangular:A,MODE,B"``.  With `vary` all combinations get the same
+        draws.
     samples : int, optional
         Number of samples of the design; with `random`.
     seed : int

@@ -36,6 +36,7 @@ LAMINATE = ("thickness", "density", "nu12", "e1", "e2", "g12", "g13", "g23", "la
 PLATE = (*LOAD, *LAMINATE, "size", "support", "dt", "duration")
 NAMES = (*CONTACT, *PLATE)
 REFINE = "refine"  # factor of a refinement study, which varies nothing else
+OF_PLATE = frozenset((*PLATE, REFINE))  # those that need another response of the plate
 EXCLUDING = (  # names of which only one can vary
     ("velocity", "energy"), ("k", "radius"), ("mass", "rod_mass", "rod_density"),
     ("at", "impact_node"), ("at", "x0"), ("at", "y0"),
@@ -52,7 +53,7 @@ LAWS: dict[str, tuple[str, str, Callable[..., bool]]] = {
     "lognormal": ("MEDIAN,SIGMA", "MEDIAN and SIGMA must be positive", lambda *v: min(v) > 0.0),
     "uniform": ("A,B", "A must be less than B", lambda a, b: a < b),
     "triangular": ("A,MODE,B", "MODE must be from A to B, and A less than B",
-                   lambda a, mode, b: a <= mode <= b > a),
+                   lambda a, mode, b: a < b and a <= mode <= b),
 }  # fmt: skip
 DesignKind = Literal["lhs", "sobol", "mc"]
 DESIGNS: tuple[DesignKind, ...] = get_args(DesignKind)
@@ -120,8 +121,8 @@ def pair(name: str, text: str) -> tuple[float, float]:
 
 
 def plate_values(case: Case) -> Case:
-    """The values of a case that need another response of the plate."""
-    return {name: value for name, value in case.items() if name in (*PLATE, REFINE)}
+    """The values of a case, of :data:`OF_PLATE`."""
+    return {name: value for name, value in case.items() if name in OF_PLATE}
 
 
 def grid(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
@@ -131,6 +132,8 @@ def grid(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
         if names.count(name) > 1:
             raise CasesError(f"{name} is varied twice")
     count = math.prod(len(values) for _, values in varied)
+    if not count:
+        raise CasesError("a sweep needs at least one case")
     if count > MOST:
         raise CasesError(f"{count} cases; at most {MOST} are allowed")
     combinations = itertools.product(*(values for _, values in varied))
@@ -414,7 +417,9 @@ def random_cases(design: Design, varied: Sequence[Case]) -> list[Case]:
 
 def cost(cases: Sequence[Case], design: Design, *, shared: bool) -> str:
     """Say how many plates a random sweep needs, and which names cause them."""
-    given = f"{'' if len(cases) == design.draws else f'{len(cases)} cases of '}{design.draws} draws"
+    given = f"{design.draws} draws"
+    if len(cases) != design.draws:
+        given = f"{len(cases)} cases of {given}"
     if not shared:
         return f"{given} are run in full, one by one"
     plates = len({frozenset(plate_values(case).items()) for case in cases})

@@ -53,11 +53,11 @@ def refined_cases(checked: Problem, factors: Sequence[int]) -> list[Case]:
     sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
     if len(sizes) != 1:
         raise CasesError("refine needs one DT in the program of the deck")
-    (dt,) = sizes
+    (dt,), numbers = sizes, list(map(int, factors))
     if not dt:
-        dt = min(f * stable_time_step(apply_case(checked.deck, {REFINE: f})) for f in factors)
+        dt = min(f * stable_time_step(apply_case(checked.deck, {REFINE: f})) for f in numbers)
     count = checked.deck.control.numel
-    return [{REFINE: f, "elements": count * f * f, "dt": dt / f} for f in map(int, factors)]
+    return [{REFINE: f, "elements": count * f * f, "dt": dt / f} for f in numbers]
 
 
 def convergence(
@@ -114,7 +114,7 @@ class MeshError:
     refined_peak_force: float
     elements: int
     refined_elements: int
-    distance: float  # of bisected elements from the load: a bending wave of the contact
+    distance: float  # elements up to here are bisected: a bending wave of the contact
 
     @property
     def change(self) -> float:

@@ -203,8 +203,9 @@ def _shared(deck: Deck) -> Runs:
     """The function that runs cases of a deck by one response of its plate."""
     problem = problem_of(deck)
     if not shares_plate(problem):
-        needed = "impact steps (RODP) of one size, and a plate without FORC, EXCD, TANG, FORM and"
-        raise StudyError(f"identify needs {needed} SOLV")
+        loads = "FORC, EXCD, TANG, FORM and SOLV"
+        needed = f"impact steps (RODP) of one size, and a plate without {loads}"
+        raise StudyError(f"identify needs {needed}")
     return runs_of(problem)
 
 
@@ -385,7 +386,8 @@ def _notes(found: Identification, given: Measurement, active: Any, model: _Model
         yield f"{text}: their values can hardly be told apart"
     e = found.residual
     if found.share > FAINT and (near := float(e[1:] @ e[:-1] / (e @ e))) > COLOURED:
-        text = "the model does not describe the measurement down to its noise, and the standard"
-        yield f"neighbouring residuals have the correlation {near:.2f}: {text} errors are too small"
+        text = "the model does not describe the measurement down to its noise"
+        text = f"{text}, and the standard errors are too small"
+        yield f"neighbouring residuals have the correlation {near:.2f}: {text}"
     if (status := model.runs({0: found.deck}, True).status[0]) not in RUN:
         yield f"the run of the fitted deck fails: {status}"

@@ -37,8 +37,11 @@ KEPT = 24  # bytes per step and case whose history is stored: above the measured
 COUNT = 25  # velocities of the first round of a search
 # Names of columns that are measured on request.
 DEFLECTION, GAGES, FAILURE = MEASURES = ("max_deflection", "gages", "failure")
-Forces = tuple[Sequence[int], Floats | None]  # numbers of cases, and theirs, (cases, steps)
-RUN = FINE, STILL = "ok", "still in contact"  # status of a case whose run has ended
+Forces = tuple[Sequence[int], Floats | None]  # of cases, with contact forces (cases, steps)
+RUN = FINE, STILL = (
+    "ok",
+    "still in contact",
+)  # of a case that was run; STILL: in contact at the end
 ABOUT = ("status", "dt", "steps", "unsettled")  # columns that describe the run of a case
 
 
@@ -86,18 +89,32 @@ def check_limits(limits: Sequence[Limit], known: Sequence[str], *, threshold: bo
             raise CasesError("the threshold needs a DELA segment, which the deck does not have")
 
 
-def plan(checked: Problem, cases: Sequence[Case], **options: Any) -> Plan:
+def plan(
+    checked: Problem,
+    cases: Sequence[Case],
+    *,
+    history: bool = False,
+    until: float | str | None = None,
+    build: Build | None = None,
+    measure: Measure | None = None,
+    extra: Sequence[str] = (),
+    design: Design | None = None,
+    limits: Sequence[Limit] = (),
+) -> Plan:
     """Create the plan of a sweep; the options are fields of :class:`Plan`.
 
     Raises CasesError if the deck has no impact, names exclude each other, or the deck lacks what is
     searched or measured.
     """
-    made = Plan(checked.deck, tuple(cases), **options)
-    deck, until, extra = made.deck, made.until, made.extra
+    deck = checked.deck
+    made = Plan(
+        deck, tuple(cases), history=history, until=until, build=build, measure=measure,
+        extra=tuple(extra), design=design, limits=tuple(limits),
+    )  # fmt: skip
     words = {macro.word for macro in deck.macros}
     if "RODP" not in words:
         raise CasesError("the deck has no impact step (RODP); there is nothing to sweep")
-    if made.build is None:
+    if build is None:
         inputs.check_names(cases[0])
     if unknown := sorted({*extra} - {*MEASURES}):
         raise CasesError(f"measure has {unknown[0]!r}; the names are {', '.join(MEASURES)}")
@@ -117,13 +134,13 @@ def plan(checked: Problem, cases: Sequence[Case], **options: Any) -> Plan:
             raise CasesError("the threshold needs a DELA segment, which the deck does not have")
         if until != THRESHOLD and not (isinstance(until, float | int) and 0.0 < until < math.inf):
             raise CasesError(f"the peak force to reach is a positive number, not {until}")
-    if made.measure is None:
+    if measure is None:
         known = [*SUMMARY, *(FOUND if until is not None else ())]
         if extra:
-            known += [name for name, _ in made.limits if name in COLUMNS or name.startswith(GAGE)]
-        check_limits(made.limits, [*known, *(LIMITED if limited else ())], threshold=limited)
+            known += [name for name, _ in limits if name in COLUMNS or name.startswith(GAGE)]
+        check_limits(limits, [*known, *(LIMITED if limited else ())], threshold=limited)
     keeping = {*inputs.LOAD, *inputs.CONTACT, "duration"}  # the critical time step
-    own = made.build is None and "dt" not in cases[0] and not keeping.issuperset(cases[0])
+    own = build is None and "dt" not in cases[0] and not keeping.issuperset(cases[0])
     chosen = tuple(name for name in MEASURES if name in extra)
     return replace(made, clock=clock_of(checked) if own else None, extra=chosen)
 
@@ -243,7 +260,9 @@ def freed(some: Sequence[Task]) -> int:
 
 def without_output(checked: Problem, extra: Sequence[str] = ()) -> Problem:
     """Return a problem whose program stores no fields, but those of more columns."""
-    dropped = {"DISP", "STRE", "PLYS", "REAC", "EIGE", "" if FAILURE in extra else "FAIL"}
+    dropped = {"DISP", "STRE", "PLYS", "REAC", "EIGE"}
+    if FAILURE not in extra:
+        dropped.add("FAIL")
 
     def kept(body: Body) -> Iterator[Macro | Loop]:
         for item in body:

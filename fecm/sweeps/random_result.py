@@ -26,7 +26,7 @@ RESAMPLES, COUNTS = 1000, 2_000_000  # of the bootstrap, and counts of them in m
 ENDS = (0.025, 0.975)  # of a 95 % interval
 Z = 1.959963984540054  # the standard normal distribution is 0.975 there
 ROUNDING = 1e-12  # variation relative to the largest value below which a quantity is constant
-PRINTED = 4  # most quantities, of these, and combinations that are printed
+PRINTED = 4  # most quantities of MAIN, and most combinations, that are printed
 MAIN = ("found_velocity", "found_energy", "peak_force", "max_indentation", "contact_time",
         "energy_absorbed")  # fmt: skip
 FORCE = "threshold_force"
@@ -221,9 +221,10 @@ def stored(random: RandomResult) -> Iterator[tuple[Any, ...]]:
 def attributes(random: RandomResult) -> dict[str, dict[str, Any]]:
     """Attributes of the groups of the file."""
     design = random.design
-    some = {"sensitivity": random.sensitivity, "exceedance": random.exceedance.quantity.size}
+    empty = set() if random.sensitivity else {"sensitivity"}
+    empty |= set() if len(random.exceedance.quantity) else {"exceedance"}
     made: dict[str, dict[str, Any]] = {
-        name: {"description": text} for name, text in GROUPS.items() if some.get(name, True)
+        name: {"description": text} for name, text in GROUPS.items() if name not in empty
     }
     about = {name: getattr(design, name) for name in ("kind", "samples", "seed", "sensitivity")}
     made["design"] |= {**about, "names": list(design.laws), "notes": random.notes}

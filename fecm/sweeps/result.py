@@ -8,7 +8,6 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import repeat
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Literal
@@ -70,9 +69,9 @@ def summary(result: SweepResult) -> list[str]:
         digits = 8 if word == "found" else 6
         for size, case in (("smallest", np.nanargmin(shown)), ("largest", np.nanargmax(shown))):
             texts = [f"{result[n][case]:.{digits}g} {result.unit(n)}".rstrip() for n in names]
+            form = {"f": ".6g"} if result.random is not None else {}  # by the kind of the values
             values = ", ".join(
-                f"{name} {v[case]:{'.6g' if result.random and v.dtype.kind == 'f' else ''}}"
-                for name, v in result.cases.items()
+                f"{name} {v[case]:{form.get(v.dtype.kind, '')}}" for name, v in result.cases.items()
             )
             given = f" ({values})" if values else ""
             lines.append(f"{size} {word:{16 - len(size)}} {', '.join(texts)}{given}")
@@ -308,7 +307,7 @@ def _grid(cases: Mapping[str, Array], count: int) -> tuple[dict[str, Array], NDA
         order = np.argsort(first) if values.dtype.kind == "U" else np.arange(len(found))
         levels[name] = found[order]
         places.append(np.argsort(order)[place])
-    if len(set(zip(*places, strict=True))) == math.prod(map(len, levels.values())) == count:
+    if math.prod(map(len, levels.values())) == count == len(set(zip(*places, strict=True))):
         return levels, np.lexsort(places[::-1])
     return {}, np.arange(count)
 
@@ -416,10 +415,12 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     """
     path = contents.path
     names = sorted(contents, key=lambda name: name in contents.lists)  # numbers before texts
-    cases, summary, steps = (
-        {n.removeprefix(group): contents[n] for n in names if n.startswith(group) and n != FORCE}
-        for group in ("cases/", "summary/", "history/")
+    cases, summary = (
+        {n.removeprefix(group): contents[n] for n in names if n.startswith(group)}
+        for group in ("cases/", "summary/")
     )
+    given = [n for n in ("dt", "steps", "unsettled_steps") if f"history/{n}" in contents]
+    steps = {n: contents[f"history/{n}"] for n in given}
     required = (*SUMMARY, "status")
     if not (summary.keys() >= {*required} and steps.keys() >= {"dt", "steps"}):
         raise schema.ResultFileError(f"{path}: the result of the sweep is incomplete")
@@ -481,4 +482,4 @@ def _step_rows(sweep: SweepResult) -> Iterator[Iterable[Any]]:
         count = int(sweep.steps[case])
         times = np.add.accumulate(np.full(count, sweep.dt[case])).tolist()
         forces = sweep.force[case, :count].tolist()
-        yield from zip(repeat(case), range(1, count + 1), times, forces, strict=False)
+        yield from zip([case] * count, range(1, count + 1), times, forces, strict=True)

@@ -3,8 +3,8 @@
 Tasks are independent, and their outcomes do not depend on where they run.  Each outcome is reported
 as soon as it is available, so that an interrupted sweep loses only the tasks in progress.
 
-Partial results are in a folder beside the result: one file per task, which is only there when it
-is complete, with a checksum at its end that reveals damage.
+Partial results are in a folder beside the result: one file per task, renamed into place when
+complete, with a checksum at its end that reveals damage.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ def _client(scheduler: Any) -> Any:
 
 
 def on_dask(tasks: Sequence[Task], scheduler: Any, done: Done, idle: Idle) -> None:
-    """Run tasks on Dask, by address, client or object; it reruns those of a dead worker."""
+    """Run tasks on Dask, by address, client or cluster; it reruns those of a dead worker."""
     with _client(scheduler) as client:
         if getattr(client, "status", "running") != "running":
             raise SchedulerError(f"the Dask client is {client.status}; make a new one")

@@ -122,8 +122,9 @@ def quarter_plate(
     elements: int, plate: model.Material, macros: Iterable[Macro], load: float | Floats = 0.0,
     codes: str = BENDING, others: Sequence[model.Segment] = (),
 ) -> model.Deck:  # fmt: skip
-    """Build a quarter of a simply supported square plate of side 1, its middle at node 1.
+    """Build a quarter of a simply supported square plate of side 1.
 
+    x = 0 and y = 0 are lines of symmetry, and node 1 is the plate's middle.
     `elements` are those of a side, `load` is force/area at the nodes, (nodes along y, nodes along
     x), `codes` are supports such as `BENDING`, `others` further segments.
     """

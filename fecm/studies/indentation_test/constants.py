@@ -93,7 +93,7 @@ class Line:
 def line(peaks: Floats, permanents: Floats, covariance: Floats) -> Line | None:
     """Fit alpha_0 = max(0, s_p (alpha_m - alpha_p)); None if fewer than two cycles exceed alpha_p.
 
-    The covariance is that of all peaks alpha_m, then all permanent indentations alpha_0.
+    The covariance, regular, is that of all peaks alpha_m, then all permanent indentations alpha_0.
     """
     order = np.argsort(peaks)
     fits: list[tuple[float, Line]] = []
@@ -104,7 +104,7 @@ def line(peaks: Floats, permanents: Floats, covariance: Floats) -> Line | None:
         start = found[1].alpha_p.value
         if not count or peaks[order[count - 1]] <= start < peaks[order[count]]:
             fits.append(found)
-    return min(fits, key=lambda fit: fit[0])[1] if fits else None
+    return min(fits, key=lambda one: one[0])[1] if fits else None
 
 
 def _split(

@@ -52,7 +52,10 @@ class Filter:
     size: float
 
     def in_unit(self, time: str) -> Filter:
-        """The same filter for times in a unit; StudyError if that is unknown and it has a class."""
+        """The same filter for times in a unit; a class is in Hz.
+
+        Raises StudyError if the filter has a class, and the unit is unknown.
+        """
         if self.kind != CFC or not time:
             return self
         if time not in KNOWN["time"]:
