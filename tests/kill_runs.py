@@ -25,7 +25,7 @@ from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from tests.decks import LONG, PROGRAM, small
+from tests.decks import LONGER, PROGRAM, small
 
 FECM = [sys.executable, "-m", "fecm"]
 QUIET = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -128,7 +128,7 @@ def main() -> int:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "deck.inp").write_text(LONG.read_text())
+        (folder / "deck.inp").write_text(LONGER)
         (folder / "sweep.inp").write_text(SWEPT)
         command = SWEEP if options.sweeps else [*FECM, "run", "deck.inp", "-o"]
         begin = time.monotonic()

@@ -28,7 +28,7 @@ from fecm.simulation.checkpoint import checkpoint_of
 from fecm.simulation.interpreter import Interpreter
 from fecm.simulation.run import simulate
 from tests.calls import call, program
-from tests.decks import DATA_CARDS, LONG, PROGRAM, small
+from tests.decks import DATA_CARDS, LONG, LONGER, PROGRAM, small
 from tests.kill_runs import FECM, SWEEP, SWEPT, sweep_trial, trial, verdict
 from tests.stopped_runs import StoppedError, stop_at_once
 
@@ -37,7 +37,7 @@ from tests.stopped_runs import StoppedError, stop_at_once
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the long deck and the result of a run that nothing disturbed."""
     folder = tmp_path_factory.mktemp("whole")
-    shutil.copy(LONG, folder / "deck.inp")
+    (folder / "deck.inp").write_text(LONGER)
     assert call("run", "deck.inp", "-o", "whole.h5", cwd=folder).exit_code == 0
     return folder
 
@@ -185,9 +185,10 @@ NUMPY = ("--solver", "numpy")
 
 
 def test_a_disk_that_fills_leaves_the_last_checkpoint_usable(whole: Path) -> None:
+    shutil.copy(LONG, whole / "short.inp")
     (whole / "f.h5").write_text("precious")
     done = program(
-        "run", "deck.inp", "-o", "f.h5", "--overwrite", "--checkpoint", "0",
+        "run", "short.inp", "-o", "f.h5", "--overwrite", "--checkpoint", "0",
         *NUMPY,
         cwd=whole, preexec_fn=lambda: small_files(2_000_000),
     )  # fmt: skip
@@ -195,10 +196,10 @@ def test_a_disk_that_fills_leaves_the_last_checkpoint_usable(whole: Path) -> Non
     assert "Traceback" not in done.stderr
     assert "File too large" in done.stderr
     assert (whole / "f.h5").read_text() == "precious"
-    again = call("run", "deck.inp", "-o", "f.h5", "--resume", *NUMPY, cwd=whole)
+    again = call("run", "short.inp", "-o", "f.h5", "--resume", *NUMPY, cwd=whole)
     assert again.exit_code == 0
     assert "resumes after step" in again.stderr
-    assert call("run", "deck.inp", "-o", "n.h5", *NUMPY, cwd=whole).exit_code == 0
+    assert call("run", "short.inp", "-o", "n.h5", *NUMPY, cwd=whole).exit_code == 0
     assert (whole / "f.h5").read_bytes() == (whole / "n.h5").read_bytes()
 
 
@@ -233,7 +234,7 @@ def test_a_read_only_folder_is_told_and_left_alone(tmp_path: Path) -> None:
 
 
 def test_a_small_disk_that_fills_is_told_and_what_was_there_stays(tmp_path: Path) -> None:
-    shutil.copy(LONG, tmp_path / "deck.inp")
+    (tmp_path / "deck.inp").write_text(LONGER)
     with mounted(tmp_path / "out", "20m"):  # enough to begin with, not for checkpoints as well
         (tmp_path / "out" / "d.h5").write_text("precious")
         options = ("-o", "out/d.h5", "--overwrite", "--checkpoint", "0")

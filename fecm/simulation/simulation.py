@@ -132,7 +132,7 @@ class Simulation:
             state.prop_force = 1.0  # PROP's first value in the listing
         self.interpreter = Interpreter(problem.program)
         # Steps between two calls of the observers.
-        most, work = (64, 100_000) if self.model.steps is None else (1024, 20_000_000)
+        most, work = (64, 100_000) if self.model.steps is None else (4096, 20_000_000)
         self.interval = max(1, min(most, work // self.model.plate.neq))
         limit = None if options.slips else options.energy_limit
         # Without a reference to the run, which would keep it alive.
