@@ -163,5 +163,11 @@ def congruence(family: ElementBlock) -> Congruence:
     pitch = TOLERANCE * float(np.abs(flat).max())
     # An uncommon offset keeps round numbers away from the grid lines.
     cells = np.floor(flat / pitch + 1.0 / np.pi).astype(np.int64)
-    _, representatives, group = np.unique(cells, axis=0, return_index=True, return_inverse=True)
-    return Congruence(representatives.astype(np.intp), group.ravel().astype(np.intp))
+    group = np.zeros(len(cells), dtype=np.intp)
+    representatives = group[:1]
+    for column in cells.T:  # in lexicographic order, as far as elements of a group differ
+        if len(representatives) == len(cells):
+            break
+        keys = group * (np.ptp(column) + 1) + column - column.min()
+        _, representatives, group = np.unique(keys, return_index=True, return_inverse=True)
+    return Congruence(representatives, group)

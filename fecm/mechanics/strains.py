@@ -12,7 +12,7 @@ from fecm.mechanics.assumed_shear import TiedStrains
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import NDOF, inverse_jacobian, local_shape_functions
 from fecm.mechanics.laminate import Laminate
-from fecm.mechanics.mesh import Ints, element_blocks
+from fecm.mechanics.mesh import ElementBlock, Ints, element_blocks
 
 GENERALISED_STRAINS = (
     "eps_xx", "eps_yy", "gamma_xy", "kappa_x", "kappa_y", "kappa_xy", "gamma_xz", "gamma_yz",
@@ -60,7 +60,12 @@ class StrainField:
         self.shape = (len(elements), len(rule.xi))
         self.rule, self.assumes_shear = rule, assumes_shear
         self.transposed_jacobian = transposed_jacobian
-        self.families = element_blocks(elements, coordinates)
+        self._mesh = elements, coordinates
+
+    @cached_property
+    def families(self) -> list[ElementBlock]:
+        """The elements, in blocks with the same nodes present."""
+        return element_blocks(*self._mesh)
 
     @cached_property
     def _blocks(self) -> list[tuple[Indices, Indices, Floats, Floats, TiedStrains | None]]:

@@ -97,11 +97,13 @@ def half_turn_images(coordinates: Floats) -> Indices | None:
     low, high = coordinates.min(axis=0), coordinates.max(axis=0)
     pitch = TOLERANCE * float((high - low).max())
     centred = (coordinates - (low + high) / 2.0) / pitch
-    # An uncommon offset keeps the positions away from the edges of the grid.
-    here, there = (np.floor(c + 1.0 / np.pi).astype(np.int64) for c in (centred, -centred))
-    order, images = np.lexsort(here.T), np.lexsort(there.T)
-    if not np.array_equal(here[order], there[images]):
+    # An uncommon offset keeps the positions away from the edges of the grid, of less than 2**31
+    # cells in each direction.
+    cells = (np.floor(c + 1.0 / np.pi).astype(np.int64) for c in (centred, -centred))
+    here, there = (x + 2**32 * y for x, y in (cell.T for cell in cells))
+    if not np.array_equal(np.sort(here), np.sort(there)):
         return None
+    order, images = np.argsort(here, kind="stable"), np.argsort(there, kind="stable")
     partners = np.empty(len(coordinates), dtype=np.intp)
     partners[images] = order
     # The images of coincident nodes are ambiguous.

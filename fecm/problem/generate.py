@@ -10,12 +10,13 @@ import bisect
 import operator
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
 
 from fecm._errors import FecmError
-from fecm._typing import Bools, Floats
+from fecm._typing import Bools, Floats, Indices
 from fecm.deck.findings import Findings, Place
 from fecm.deck.model import (
     Boundary,
@@ -120,45 +121,54 @@ _R = TypeVar("_R", NodeValues, NodeCodes, ElementNodes)
 
 def _existing(
     records: Sequence[_R], what: str, count: int, code: str, findings: Findings
-) -> list[_R]:
+) -> Sequence[_R]:
     """Records whose node or element exists; the others are reported together."""
-    number = operator.attrgetter(what)
-    if outside := [record for record in records if not 1 <= number(record) <= count]:
-        more = f" (and {len(outside) - 1} more)" if len(outside) > 1 else ""
-        first = f"{what.capitalize()} {number(outside[0])}{more}"
-        message = f"{first} does not exist; the control card defines the {what}s 1 to {count}."
-        findings.add(code, message, outside[0].place(what))
-    return [record for record in records if 1 <= number(record) <= count]
+    numbers = list(map(operator.attrgetter(what), records))
+    if not numbers or (min(numbers) >= 1 and max(numbers) <= count):
+        return records
+    pairs = list(zip(numbers, records, strict=True))
+    outside = [pair for pair in pairs if not 1 <= pair[0] <= count]
+    (number, record), more = outside[0], len(outside) - 1
+    first = f"{what.capitalize()} {number}" + (f" (and {more} more)" if more else "")
+    message = f"{first} does not exist; the control card defines the {what}s 1 to {count}."
+    findings.add(code, message, record.place(what))
+    return [record for number, record in pairs if 1 <= number <= count]
 
 
-def _rows(first: NodeValues | NodeCodes, last: NodeValues | NodeCodes) -> range:
+def _rows(first: NodeValues | NodeCodes, last: NodeValues | NodeCodes) -> Indices:
     """Rows of the nodes from one card up to the next, without that of the next."""
     step = abs(first.increment) if last.node >= first.node else -abs(first.increment)
-    return range(first.node - 1, last.node - 1, step)
+    return np.arange(first.node - 1, last.node - 1, step)
 
 
 def _interpolate(
     values: Floats, records: Sequence[NodeValues], findings: Findings, budget: _Budget
 ) -> None:
     """Fill rows between two cards linearly, adding one constant step at a time (GENVEC)."""
-    last: NodeValues | None = None
-    for record in _existing(records, "node", len(values), "E301", findings):
-        values[record.node - 1] = record.values
-        if last is not None and last.increment != 0:
-            if record.node == last.node:
-                message = f"Node {record.node} follows itself, so nothing can be generated."
-                hint = "the card before has a generation increment"
-                findings.add("E302", message, record.place("node"), hint)
-            run = _rows(last, record)
-            if not budget.covers(len(run), record.place("node")):
-                return
-            if len(run) > 1:
-                ends = values[record.node - 1] - values[last.node - 1]
-                steps = np.tile(ends / len(run), (len(run), 1))
-                steps[0] = values[last.node - 1]
-                # Summed one by one, so that each node has the listing's rounding.
-                values[run[1:]] = np.add.accumulate(steps, axis=0)[1:]
-        last = record
+    known = _existing(records, "node", len(values), "E301", findings)
+    if not known:
+        return
+    rows = [record.node - 1 for record in known]
+    given = np.array([record.values for record in known])
+    generating = [i for i, record in enumerate(known, start=1) if record.increment != 0]
+    for begin, i in pairwise([0, *generating, len(known)]):
+        values[rows[begin : i + 1]] = given[begin : i + 1]
+        if i == len(known):
+            return
+        last, record = known[i - 1], known[i]
+        if record.node == last.node:
+            message = f"Node {record.node} follows itself, so nothing can be generated."
+            hint = "the card before has a generation increment"
+            findings.add("E302", message, record.place("node"), hint)
+        run = _rows(last, record)
+        if not budget.covers(len(run), record.place("node")):
+            return
+        if len(run) > 1:
+            ends = values[record.node - 1] - values[last.node - 1]
+            steps = np.tile(ends / len(run), (len(run), 1))
+            steps[0] = values[last.node - 1]
+            # Summed one by one, so that each node has the listing's rounding.
+            values[run[1:]] = np.add.accumulate(steps, axis=0)[1:]
 
 
 def _carry(codes: Ints, records: Sequence[NodeCodes], findings: Findings, budget: _Budget) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fecm._typing import Floats
 from fecm.mechanics import assumed_shear
 from fecm.mechanics.elements import Quadrature
-from fecm.mechanics.interpolation import NDOF, local_shape_functions
+from fecm.mechanics.interpolation import NDOF, jacobian, local_shape_functions
 from fecm.mechanics.kernels import LIBRARY, Chunk, Group, Integers, Plate, floats
 from fecm.mechanics.kernels.layout import LANES, Indices, Layout, Places, layout_of, places_of
 from fecm.mechanics.mesh import ElementBlock, congruence, distinct
@@ -161,9 +161,7 @@ def jacobians(family: ElementBlock, local: Floats, transposed: bool) -> tuple[Fl
 
     See :func:`fecm.mechanics.interpolation.inverse_jacobian`.
     """
-    # Rounded as there: coordinates are large beside an element.
-    J = np.einsum("pan,eni->epai", local, family.coordinates)
-    (a, b), (c, d) = J.transpose(2, 3, 0, 1)  # x and y by xi, x and y by eta
+    (a, b), (c, d) = jacobian(family, local).transpose(2, 3, 0, 1)  # x, y by xi; x, y by eta
     determinant = a * d - b * c
     rows = (d, -c, -b, a) if transposed else (d, -b, -c, a)
     return np.stack(rows, axis=2) / determinant[:, :, None], determinant
@@ -344,10 +342,11 @@ def _leaders(kept: SymmetryReduction) -> Indices:
     """Node that each node follows, (numnp,): itself if it moves independently."""
     numnp = len(kept.index)
     nodes, dofs = np.nonzero(kept.sign)
-    first = np.full(kept.count, numnp)
-    np.minimum.at(first, kept.index[nodes, dofs], nodes)
+    index = kept.index[nodes, dofs]
+    first = np.empty(kept.count, dtype=np.intp)
+    first[index[::-1]] = nodes[::-1]  # the lowest is assigned last
     leader = np.arange(numnp)
-    leader[nodes] = first[kept.index[nodes, dofs]]
+    leader[nodes] = first[index]
     return leader
 
 
@@ -360,7 +359,7 @@ def _factors(mass: Floats) -> tuple[Floats, Floats | None]:
     if len(whole):
         ratio = whole[0] / whole[0, 0]
         factor = (mass / ratio).max(axis=1)
-        if (abs(factor[:, None] * ratio - mass) <= EQUAL * mass)[mass > 0.0].all():
+        if ((abs(factor[:, None] * ratio - mass) <= EQUAL * mass) | (mass <= 0.0)).all():
             return ratio, factor
     return np.ones(mass.shape[1]), None
 
