@@ -163,11 +163,13 @@ def congruence(family: ElementBlock) -> Congruence:
     pitch = TOLERANCE * float(np.abs(flat).max())
     # An uncommon offset keeps round numbers away from the grid lines.
     cells = np.floor(flat / pitch + 1.0 / np.pi).astype(np.int64)
+    low = cells.min(axis=0)
+    spans = cells.max(axis=0) - low
     group = np.zeros(len(cells), dtype=np.intp)
     representatives = group[:1]
-    for column in cells.T:  # in lexicographic order, as far as elements of a group differ
+    for i in np.flatnonzero(spans):  # in lexicographic order, until all are told apart
+        keys = group * (spans[i] + 1) + cells[:, i] - low[i]
+        _, representatives, group = np.unique(keys, return_index=True, return_inverse=True)
         if len(representatives) == len(cells):
             break
-        keys = group * (np.ptp(column) + 1) + column - column.min()
-        _, representatives, group = np.unique(keys, return_index=True, return_inverse=True)
     return Congruence(representatives, group)

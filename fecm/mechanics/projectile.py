@@ -123,11 +123,11 @@ class Rod:
     def lumped_mass(self) -> Floats:
         """Lumped mass of each dof, (n,): rho A L/2 for u and rho A L^3/420 for du/dx (listing)."""
         L = self.element_length
-        m = np.zeros(2 * self.elements + 2)
-        for element, area in enumerate(self.areas):
-            share = self.density * area * L * np.array([0.5, L**2 / 420.0])
-            m[2 * element : 2 * element + 4] += np.tile(share, 2)
-        return m
+        shares = (self.density * self.areas * L)[:, None] * [0.5, L**2 / 420.0]
+        m = np.zeros((self.elements + 1, 2))
+        m[:-1] += shares
+        m[1:] += shares
+        return m.ravel()
 
     def kinetic_energy(self, velocity: Floats) -> Floats:
         """Kinetic energy of velocities (rows, n) (force*length)."""
