@@ -41,6 +41,7 @@ class Places(NamedTuple):
     """Places of nodes in the vectors of the kernels."""
 
     node: Indices  # (places,): node of each, chunk by chunk
+    at: Indices  # of the nodes of all elements, one after another: place in their chunk
     starts: Indices  # (chunks + 2,): of each chunk in `node`; the last one has its nodes in `home`
     # (chunks + 1,): nodes of the vectors before each chunk, and its own with room for another one.
     firsts: Indices
@@ -158,8 +159,11 @@ def places_of(layout: Layout, families: list[ElementBlock], leader: Indices) -> 
         keys.append((key + layout.place[members, None] + last).ravel())
         pairs.append((layout.at[members, None] * numnp + family.nodes).ravel())
     order = np.argsort(np.concatenate(keys), kind="stable")
-    found, first = np.unique(np.concatenate(pairs)[order], return_index=True)
-    chunk, node = np.divmod(found[np.argsort(first)], numnp)
+    found, first, which = np.unique(
+        np.concatenate(pairs)[order], return_index=True, return_inverse=True
+    )
+    ranks = np.argsort(first)
+    chunk, node = np.divmod(found[ranks], numnp)
     # Nodes of one chunk alone that nothing follows are its own; the others are shared.
     follows = node[leader[node] != node]
     own = np.bincount(node, minlength=numnp) == 1
@@ -168,8 +172,12 @@ def places_of(layout: Layout, families: list[ElementBlock], leader: Indices) -> 
     starts = np.searchsorted(chunk, np.arange(layout.chunks + 2))
     sizes = np.append(np.diff(starts)[:-1] + 1, len(shared))
     sizes += -sizes % LANES
+    place = np.arange(len(node)) - starts[chunk]
+    at, of_pair = np.empty(len(order), dtype=np.intp), np.empty_like(ranks)
+    of_pair[ranks] = place
+    at[order] = of_pair[which]
     home = np.full((2, numnp), -1)
     mine = own[node]
-    home[:, node[mine]] = chunk[mine], (np.arange(len(node)) - starts[chunk])[mine]
+    home[:, node[mine]] = chunk[mine], place[mine]
     home[:, shared] = np.broadcast_arrays(layout.chunks, np.arange(len(shared)))
-    return Places(node, starts, np.cumsum(sizes) - sizes, sizes, home)
+    return Places(node, at, starts, np.cumsum(sizes) - sizes, sizes, home)

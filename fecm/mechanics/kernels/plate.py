@@ -194,17 +194,17 @@ class CompiledPlate:
         index = kept.index[nodes, dofs]
         self.position = np.empty(kept.count, dtype=np.intp)
         self.position[index] = nd * first + dof * size + place[nodes]
-        mass = np.zeros((sizes.sum(), nd))
+        mass = np.zeros((nd, count := int(sizes.sum())))
         masses = kept.gather(kept.sign * plate.field(plate.mass, 0.0))
-        mass[first + place[nodes], dof] = masses[index]
-        parts = [mass[a : a + n] for a, n in zip(firsts.tolist(), sizes.tolist(), strict=True)]
+        mass[dof, first + place[nodes]] = masses[index]
+        parts = [mass[:, a : a + n] for a, n in zip(firsts.tolist(), sizes.tolist(), strict=True)]
         self._ratio, factor = _factors(mass)
         if factor is None:
-            factor = np.concatenate([part.T.ravel() for part in parts])
+            factor = np.concatenate([part.ravel() for part in parts])
         inverse = np.zeros_like(factor)
         np.divide(1.0, factor, out=inverse, where=factor > 0.0)
         self._rate = np.empty(nd)
-        self.u, self.d, self.s = np.zeros((3, nd * len(mass)))
+        self.u, self.d, self.s = np.zeros((3, nd * count))
         cuts = (Chunk * len(parts))()
         self._held.append(cuts)
         for c, part in enumerate(parts):
@@ -212,9 +212,9 @@ class CompiledPlate:
             copies = np.flatnonzero(chunk[here] != c)
             copied = leader[here[copies]]
             signs = np.where((copied != here[copies])[:, None], TURNED[columns], 1.0)
-            at_rest = np.flatnonzero((part <= 0.0).T)
+            at_rest = np.flatnonzero(part <= 0.0)
             cuts[c] = Chunk(
-                0, None, int(firsts[c]), len(part), len(copies), len(at_rest),
+                0, None, int(firsts[c]), part.shape[1], len(copies), len(at_rest),
                 self._ints(place[copied]), self._ints(copies), self._ints(at_rest),
                 self._floats(signs), self._floats(np.zeros(signs.shape)),
             )  # fmt: skip
@@ -222,22 +222,19 @@ class CompiledPlate:
         laminate = plate.laminate
         stiffness = np.block([[laminate.A, -laminate.B], [-laminate.B, laminate.D]])
         self.structure = Plate(
-            nd, layout.chunks, len(mass), int(sizes.max()), cuts, self._ints(lanes),
+            nd, layout.chunks, count, int(sizes.max()), cuts, self._ints(lanes),
             self._floats(stiffness), self._floats(laminate.shear),
-            int(plate.rules.transposed_jacobian), len(factor) // len(mass),
+            int(plate.rules.transposed_jacobian), len(factor) // count,
             self._floats(factor), self._floats(inverse),
             floats(self._ratio), None, floats(self.u), floats(self.d), floats(self.s),
-            self._floats(np.zeros(nd * len(parts[-1]))), 0.0,
+            self._floats(np.zeros(parts[-1].size)), 0.0,
         )  # fmt: skip
 
     def _blocks(
         self, cuts: Any, layout: Layout, groups: list[_Elements], places: Places
     ) -> Indices:
         """Give the chunks their blocks; returns places of lanes that don't follow one another."""
-        numnp, counts = places.home.shape[1], np.diff(places.starts)
-        key = np.repeat(np.arange(len(counts)), counts) * numnp + places.node
-        place = np.arange(len(key)) - np.repeat(places.starts[:-1], counts)
-        order = np.argsort(key)
+        counts, left = np.diff(places.starts), places.at
         table = np.zeros(len(layout.group), dtype=BLOCK)
         self._held.append(table)
         lanes: list[Indices] = []
@@ -246,9 +243,8 @@ class CompiledPlate:
             (rows,) = np.nonzero(layout.group == number)
             member = layout.element[rows] - elements_before
             elements_before += len(elements.family.rows)
-            nodes = elements.family.nodes[:, elements.order][member].swapaxes(1, 2)
-            wanted = layout.chunk[rows, None, None] * numnp + nodes
-            at = place[order[np.searchsorted(key, wanted, sorter=order)]]
+            own, left = np.split(left, [elements.family.nodes.size])
+            at = own.reshape(elements.family.nodes.shape)[:, elements.order][member].swapaxes(1, 2)
             # Behind the nodes is a place for lanes without an element.
             at = np.where(layout.filled[rows, None], at, counts[layout.chunk[rows], None, None])
             apart = (np.diff(at, axis=2) != 1).any(axis=2)
@@ -355,13 +351,13 @@ def _factors(mass: Floats) -> tuple[Floats, Floats | None]:
 
     The ratio is that of the laminate, but for supports, where masses are 0.
     """
-    whole = mass[(mass > 0.0).all(axis=1)]
+    whole = np.flatnonzero((mass > 0.0).all(axis=0))
     if len(whole):
-        ratio = whole[0] / whole[0, 0]
-        factor = (mass / ratio).max(axis=1)
-        if ((abs(factor[:, None] * ratio - mass) <= EQUAL * mass) | (mass <= 0.0)).all():
-            return ratio, factor
-    return np.ones(mass.shape[1]), None
+        ratio = mass[:, whole[:1]] / mass[0, whole[0]]
+        factor = (mass / ratio).max(axis=0)
+        if ((abs(factor * ratio - mass) <= EQUAL * mass) | (mass <= 0.0)).all():
+            return ratio[:, 0].copy(), factor
+    return np.ones(len(mass)), None
 
 
 def _grouped(family: ElementBlock, weights: Floats) -> list[tuple[Indices, int]]:
