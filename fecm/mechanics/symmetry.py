@@ -102,6 +102,8 @@ def half_turn_images(coordinates: Floats) -> Indices | None:
     cells = (np.floor(c + 1.0 / np.pi).astype(np.int64) for c in (centred, -centred))
     here, there = (x + 2**32 * y for x, y in (cell.T for cell in cells))
     order, images = np.argsort(here, kind="stable"), np.argsort(there, kind="stable")
+    if not np.array_equal(here[order], there[images]):
+        return None
     partners = np.empty(len(coordinates), dtype=np.intp)
     partners[images] = order
     # The images of coincident nodes are ambiguous.
