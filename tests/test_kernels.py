@@ -78,6 +78,7 @@ def test_the_product_is_numpys_for_every_family_and_rule(kind: int, coupled: boo
         text = element_deck(mesh, orders)
         if coupled:
             text = text.replace("2,90.,.053", "2,30.,.053").replace(",1,1,0,0,0", ",0,0,0,0,0")
+            text = text.replace("800000.,800000.\n", "800000.,500000.\n")  # A*45 is not 0
         if variant == "SHEA MITC":
             text = text.replace("EXPE\n", "SHEA MITC\nEXPE\n", 1)
         slips = frozenset(["jacobian"] if variant == "jacobian" else [])
