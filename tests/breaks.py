@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fecm.mechanics import element_matrices, strains
+from fecm.deck.model import Shear
+from fecm.mechanics import element_matrices, failure, strains
 from fecm.mechanics import laminate as laminates
 from fecm.mechanics.contact_law import (
     HystereticLaw,
 )
 from fecm.mechanics.strains import StrainField
-from fecm.sweeps.responses import BLOCK
 
 Break = Callable[[pytest.MonkeyPatch], None]
 
@@ -101,6 +101,11 @@ def in_strains(component: int, unknown: int) -> Break:
     return instead(StrainField, "evaluate", broken)
 
 
+def without_shea(right: Any, deck: Any, **kwargs: Any) -> Any:
+    kept = tuple(segment for segment in deck.segments if not isinstance(segment, Shear))
+    return right(replace(deck, segments=kept), **kwargs)
+
+
 def without_coupling(names: str) -> Break:
     """Forget B in some of the stress resultants."""
 
@@ -144,7 +149,7 @@ def rotary_for_mass(right: Any, family: Any, *args: Any) -> Any:
 
 
 def rotations_reversed(B: Any) -> Any:
-    parts = B.reshape(*B.shape[:-1], -1, 5)
+    parts = B.reshape(*B.shape[:-1], B.shape[-1] // 5, 5)
     parts[..., 3:] *= -1.0
     return parts.reshape(B.shape)
 
@@ -189,9 +194,7 @@ def work_of_the_new_force(right: Any, step: Any, law: Any, state: Any, w: Any) -
 
 
 def partly_given(right: Any, convolution: Any, values: Any) -> None:
-    right(convolution, values)
-    if row := convolution._step % BLOCK:
-        convolution._block[row:] -= 1e-6 * convolution._near[: BLOCK - row] * values
+    right(convolution, (1.0 - 1e-6) * values)
 
 
 def exchanged_on_tape8(
@@ -219,8 +222,51 @@ def in_plate_axes(right: Any, laminate: Any) -> Any:
     )
 
 
+def bent_with_stretching_held(right: Any, laminate: Any) -> Any:
+    coupled = laminate.B @ np.linalg.solve(laminate.A, laminate.B)
+    return right(replace(laminate, D=laminate.D + coupled))
+
+
+def without_q26(moments: Any) -> Any:
+    moments[..., 2, 1] = 0.0
+    return moments
+
+
+def mirrored(right: Any, monitor: Any, stresses: Any, laminate: Any, strengths: Any) -> None:
+    plies = replace(laminate.plies, angles=-laminate.plies.angles)
+    right(monitor, stresses, replace(laminate, plies=plies), strengths)
+
+
+def of_the_first(exposures: Any) -> Any:
+    return np.broadcast_to(exposures[..., :1], exposures.shape)
+
+
+def of_the_last(exposures: Any) -> Any:
+    return np.broadcast_to(exposures[..., -1:], exposures.shape)
+
+
+def without_shear_stress(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, right in list(failure.CRITERIA.items()):
+
+        def broken(ply: Any, s1: Any, s2: Any, tau: Any, right: Any = right) -> Any:
+            return right(ply, s1, s2, 0.0 * tau)
+
+        monkeypatch.setitem(failure.CRITERIA, name, broken)
+
+
+def exchanged_matrices(right: Any, design: Any) -> Any:
+    if not design.sensitivity:
+        return right(design)
+    a, b, *mixed = np.split(right(design), len(design.laws) + 2)
+    return np.concatenate([b, a, *mixed])
+
+
 def halved(number: float) -> float:
     return number / 2.0
+
+
+def doubled(number: float) -> float:
+    return 2.0 * number
 
 
 def negative(matrix: Any) -> Any:

@@ -10,10 +10,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import j1
+from scipy.integrate import solve_ivp
+from scipy.special import beta, j1
 
 from fecm._typing import Floats
 from fecm.deck.records import Ply
+from tests.closed_forms_plies import equilibrium_shear, exposures, interlaminar
+from tests.closed_forms_statistics import ishigami, lognormal, wilson
 
 # Layers ------------------------------------------------------------------------------------------
 
@@ -210,27 +213,6 @@ def middle_under_uniform_load(D: Floats, S: Floats) -> float:
     return float((load * w).sum())
 
 
-def equilibrium_shear(ply: Ply, angles: Sequence[float], h: float) -> tuple[float, float]:
-    """Transverse shear stiffness xz and yz of equal shear energy, equal plies at 0 or 90 degrees.
-
-    The shear stress of a unit Q_x is -d/dx of sigma_x, integrated over z: a parabola in each ply.
-    """
-    faces = np.linspace(-h / 2.0, h / 2.0, len(angles) + 1)
-    compliance_ = np.linalg.inv(bending_and_shear(ply, angles, h)[0])
-    stiff = dict(zip((0.0, 90.0), plane_stress(ply), strict=True))
-    found = []
-    for axis, moduli in enumerate(((ply.g13, ply.g23), (ply.g23, ply.g13))):
-        energy, reached = 0.0, 0.0
-        for low, high, angle in zip(faces, faces[1:], angles, strict=False):
-            slope = float(stiff[angle][axis] @ compliance_[:, axis])
-            tau = np.polynomial.Polynomial([reached + slope * low**2 / 2.0, 0.0, -slope / 2.0])
-            work = (tau * tau).integ()
-            energy += float(work(high) - work(low)) / moduli[angle != 0.0]
-            reached = float(tau(high))
-        found.append(1.0 / energy)
-    return found[0], found[1]
-
-
 # Expected values ---------------------------------------------------------------------------------
 
 
@@ -292,6 +274,39 @@ def hertz_impact(mass: float, velocity: float, k: float) -> tuple[float, ...]:
     return deepest, k * deepest**1.5, integral * deepest / velocity, velocity
 
 
+def acr_impact(mass: float, velocity: float, k: float, alpha_cr: float) -> tuple[float, ...]:
+    """The same with the permanent indentation of equation 3-7, F (x/d)^2.5 in unloading.
+
+    The energy of the rebound is 2/7 F d, which takes d/v times the integral of
+    dx/sqrt(1 - x^3.5) from 0 to 1.
+    """
+    deepest, force, whole, _ = hertz_impact(mass, velocity, k)
+    d = alpha_cr**0.4 * deepest**0.6
+    rebound = math.sqrt(4.0 / 7.0 * force * d / mass)
+    return deepest, force, whole / 2.0 + 2.0 / 7.0 * beta(2.0 / 7.0, 0.5) * d / rebound, rebound
+
+
+def two_bodies(time: float) -> tuple[float, ...]:
+    """Largest force, velocity of the mass, displacement of the plate, and work of DAMP.
+
+    Of a rigid mass on a rigid plate that is slowed down in proportion to its velocity.
+    """
+    mass, plate, k, a = 2.0e-4, 2.5e-4 * 0.2, 1.0e5, 2000.0
+
+    def force(state: Floats) -> float:
+        return float(k * max(state[0] - state[2], 0.0) ** 1.5)
+
+    def rate(_: float, y: Floats) -> list[float]:
+        F, resistance = force(y), a * plate * y[3]
+        return [y[1], -F / mass, y[3], (F - resistance) / plate, resistance * y[3]]
+
+    found = solve_ivp(
+        rate, (0.0, time), [0.0, 100.0, 0.0, 0.0, 0.0], "DOP853", rtol=1e-13, atol=1e-15,
+        events=lambda _, y: y[1] - y[3],
+    )  # fmt: skip
+    return force(found.y_events[0][0]), -found.y[1, -1], found.y[2, -1], found.y[4, -1]
+
+
 def indentation() -> tuple[float | None, ...]:
     """Forces along the paths of the report's law, and the work of a cycle."""
     k, alpha_p, s_p, q, alpha_cr, peak = 1.912e6, 6.564e-4, 0.094, 2.0, 1.2e-3, 2e-3
@@ -334,6 +349,8 @@ BAR_SPEED = math.sqrt(30.0e6 / 7.33e-4)
 IMPULSE = 1000.0 * 40e-6 * math.sqrt(math.pi) * (1.0 + math.erf(2.5))
 PARABOLA = 1.5 / H / (2.0 * math.pi)
 
+ANGLES = equilibrium_shear(PAGANO, (30.0, -45.0, 90.0), 1.0)
+
 # Of each case the values in the order of its checks; None for a figure that is stated.
 EXPECTED: dict[str, Sequence[float | None]] = {
     "isotropic-ply": (
@@ -364,13 +381,28 @@ EXPECTED: dict[str, Sequence[float | None]] = {
     "rod-pulse": (None, None, None, IMPULSE / (7.33e-4 * math.pi * 0.625**2 / 4.0), None),
     "rod-waves": (BAR_SPEED, 1000.0, math.pi * BAR_SPEED, math.pi * BAR_SPEED),
     "indentation": indentation(),
-    "rigid-target": hertz_impact(2.0e-4, 100.0, 1.0e6),
-    "patch-compliance": [compliance(*CROSS, (6.0, 4.0), shape, 0.5) for shape in (disc, hertz)],
+    "rigid-target": (
+        *hertz_impact(2.0e-4, 100.0, 1.0e6), *acr_impact(2.0e-4, 100.0, 1.0e6, 1.2e-3)
+    ),
+    "free-plate": two_bodies(3e-4),
+    "patch-compliance": (
+        *(compliance(*CROSS, (6.0, 4.0), shape, 0.5) for shape in (disc, hertz)), None, None,
+    ),
+    # e_eta = -xi² (1 + xi/2)/2, whose cubic part is 3/5 xi where xi is 0 and ±√(3/5); over y,eta.
     "assumed-shear": [
-        middle_under_uniform_load(*bending_and_shear(UNIT, (0.0,), h)) for h in (0.1, 0.001)
+        *(middle_under_uniform_load(*bending_and_shear(UNIT, (0.0,), h)) for h in (0.1, 0.001)),
+        -(1.0 - 0.3) / (1.0 - 0.5), -(1.0 + 0.3) / (1.0 + 0.5),
     ],
-    "equilibrium-shear": (5.0 / 6.0, *equilibrium_shear(PAGANO, (0.0, 90.0, 0.0), 1.0)),
+    "equilibrium-shear": (
+        5.0 / 6.0, *equilibrium_shear(PAGANO, (0.0, 90.0, 0.0), 1.0).diagonal(),
+        *equilibrium_shear(PAGANO, (0.0, 90.0), 1.0).diagonal(), *ANGLES[[0, 1, 0], [0, 1, 1]],
+    ),
     "ply-stresses": ply_stresses(),
+    "failure-states": (*exposures(), *interlaminar()),
+    "random-values": (*ishigami(), *lognormal(115.0, 0.08), *wilson(3, 40)),
+    "refinement": (1.7, 1.0),
+    "identification": (1.0e6, 100.0),
+    "contact-coefficient": (1.0 / (1.0 - 0.3**2), None, None),
     "ply-shear": (-PARABOLA, -0.75 * PARABOLA, -0.9375 * PARABOLA, 0.0),
     "threshold": (math.sqrt(8.0 * math.pi**2 * 60e3 * 2.0**3 * 0.8 / (9.0 * 0.91)), None),
     # Timoshenko and Woinowsky-Krieger, equation 147: w D/(F a²) of a simply supported square.

@@ -20,6 +20,7 @@ from fecm.verification import CASES, carry_out, chosen
 from fecm.verification.case import HEAD, Case, Check, Row, cells, page
 from fecm.verification.decks import report_impact
 from tests import closed_forms
+from tests.builders import DATA
 from tests.builders import table as reference
 from tests.calls import assert_unusable, call
 from tests.decks import LONG, ROOT
@@ -152,6 +153,7 @@ def test_of_a_field_the_value_farthest_from_the_expected_one_counts() -> None:
 STATED = {
     "static-bending", "frequencies", "wave-fronts", "dispersion", "rod-pulse", "infinite-plate",
     "supported-plate", "patch-impact", "failure", "threshold", "small-mass", "large-mass",
+    "contact-coefficient",
 }  # fmt: skip
 
 
@@ -339,7 +341,7 @@ def test_figures_of_patches_and_plies_are_those_of_the_reference_files() -> None
                **{"law alpha_p s_p q": ""})  # fmt: skip
     assert [check.expected for check in chosen(["patch-impact"])[0].checks] == given
     given = at("shear_stiffness.csv", "[0/90/0] Pagano", ["H xz,xz", "H yz,yz"])
-    expected = [check.expected for check in chosen(["equilibrium-shear"])[0].checks[1:]]
+    expected = [check.expected for check in chosen(["equilibrium-shear"])[0].checks[1:3]]
     assert expected == pytest.approx(given, rel=1e-8)
     columns = ["sx(a/2,b/2,+h/2)/(q0 S^2)", "txy(0,0,+h/2)/(q0 S^2)", "txz(0,b/2,0)/(q0 S)",
                "tyz(a/2,0,0)/(q0 S)", "sy(a/2,b/2,90-ply upper face)/(q0 S^2)"]  # fmt: skip
@@ -362,10 +364,25 @@ def test_figures_of_damage_are_those_of_the_reference_files() -> None:
         ("small-mass", "F T"): ("zener_olsson_small_mass.csv", 4, "F_max/(M V/T) = F_max/(k^.4 "
                                 "V^1.2 M^.6)"),
         ("small-mass", "t_peak"): ("zener_olsson_small_mass.csv", 4, "t_peak/T"),
-        ("small-mass", "largest"): ("response_classes.csv", 1, "peak exact series N"),
+        ("small-mass", "λ of"): ("response_classes.csv", 1, "lambda"),
+        ("small-mass", "largest force on"): ("response_classes.csv", 1,
+                                             "peak infinite plate (Zener) N"),
+        ("small-mass", "largest force of"): ("response_classes.csv", 1, "peak exact series N"),
+        ("contact-coefficient", "indentation modulus of [0"): (
+            "laminate_contact.csv", 0, "M by TI formula (quasi-isotropic only)"),
+        ("contact-coefficient", "k"): ("laminate_contact.csv", 0, "k"),
         ("large-mass", "largest"): ("large_mass_energy_balance.csv", 0,
                                     "F max of the ODE of a mass on the two springs"),
     }  # fmt: skip
     for (case, quantity), (name, row, column) in figures.items():
         given = float(list(reference(name))[row][column])
         assert check_of(case, quantity).expected == pytest.approx(given, rel=1e-7)
+
+
+def test_figures_of_sensitivity_are_those_of_the_reference_file() -> None:
+    _, *rows = (DATA / "ishigami.csv").read_text().splitlines()
+    given = {name: float(value) for name, value in (row.split(",") for row in rows)}
+    for letter, kind in (("S", "first-order"), ("T", "total")):
+        for number, value in enumerate("xyz", start=1):
+            expected = check_of("random-values", f"{kind} index of {value}").expected
+            assert expected == pytest.approx(given[f"{letter}{number}"], rel=1e-9)

@@ -12,7 +12,7 @@ from fecm._typing import Floats
 from fecm.api import Mode, run_one
 from fecm.deck import model
 from fecm.deck.grid import Grid, Section, lines, uniform
-from fecm.deck.records import Control, Integration, Layer, Macro, NodeValues, Ply
+from fecm.deck.records import Control, Integration, Layer, Macro, NodeCodes, NodeValues, Ply
 from fecm.results.result import Result
 
 MITC = model.Shear(assumed=True)
@@ -67,6 +67,12 @@ def supports(grid: Grid, codes: str) -> model.Boundary | None:
     """Restraints of codes such as `SUPPORTED`."""
     every, *edges = ([int(code) for code in word] for word in codes.split())
     return grid.boundary(every, dict(zip(("left", "bottom", "right", "top"), edges, strict=True)))
+
+
+def held_but(dof: int) -> model.Boundary:
+    """Hold the nodes of one element, but for a dof of the first: a deck needs an equation."""
+    first = NodeCodes(1, 0, tuple(int(one != dof) for one in range(5)))
+    return model.Boundary((first, *(NodeCodes(n, 0, (1,) * 5) for n in range(2, 10))))
 
 
 def deck(
@@ -145,6 +151,16 @@ def struck_plate(
     middle = grid.nearest(grid.columns[-1].end / 2.0, grid.rows[-1].end / 2.0)[0]
     segments = (supports(grid, FREE), projectile, model.Impact(middle, 3, velocity), law, plate)
     return deck(grid, segments, impact_program(dt, steps))
+
+
+def fixed_target(
+    mass: float, velocity: float, law: model.Indentation, dt: float, steps: int
+) -> model.Deck:
+    """Build the impact of a rigid mass on a plate of extreme stiffness and density."""
+    grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
+    ply = Ply(1.48e6, 0.3, 1.75e16, 1.75e16, 5e15, 5e15, 5e15)
+    plate, hit = material(ply, (0.0, 90.0), 0.053), model.Projectile(0, 0, mass)
+    return struck_plate(grid, plate, hit, velocity, law, dt, steps)
 
 
 def report_impact(steps: int = 4000) -> model.Deck:

@@ -1,4 +1,4 @@
-"""Parts of the program by themselves: laminates, waves, rods, the indentation law (lb, in, s).
+"""Parts of the program by themselves: laminates, K u, waves, rods, the indentation law (lb, in, s).
 
 Layer 1 lies at z = -h/2.
 """
@@ -12,7 +12,9 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import eigh
 
-from fecm.deck.records import Ply
+from fecm.deck.grid import Grid, lines, uniform
+from fecm.deck.model import Coordinates
+from fecm.deck.records import NodeValues, Ply
 from fecm.mechanics.contact_law import (
     ContactPoint,
     HystereticLaw,
@@ -21,11 +23,22 @@ from fecm.mechanics.contact_law import (
     follow,
 )
 from fecm.mechanics.laminate import Laminate, effective_rigidity, laminate, threshold_force
+from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.projectile import CONSISTENT, Rod, report_rod
+from fecm.problem.build import build_plate
+from fecm.problem.generate import generate
 from fecm.studies.rod_test.pulse_test import gauss_pulse, simulate_pulse, sine_pulse
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from fecm.verification.case import Value, case
-from fecm.verification.decks import REPORT_ANGLES, REPORT_PLY, REPORT_THICKNESS, isotropic
+from fecm.verification.decks import (
+    MITC,
+    REPORT_ANGLES,
+    REPORT_PLY,
+    REPORT_THICKNESS,
+    deck,
+    isotropic,
+    material,
+)
 
 # A ply of the report's kind, with a different G23, and the thickness of two layers.
 FIBRES = Ply(2.5e-4, 0.3, 17.5e6, 1.15e6, 0.8e6, 0.8e6, 0.5e6)
@@ -71,6 +84,23 @@ def _angle_ply() -> Sequence[Value]:
 def report_laminate() -> Laminate:
     """Stack [0/45/0/-45/0]2s of the report's graphite/epoxy."""
     return laminate(REPORT_PLY, REPORT_ANGLES, [REPORT_THICKNESS] * len(REPORT_ANGLES))
+
+
+@case
+def _internal_force() -> Sequence[Value]:
+    """K u on a mesh without parallel sides, which elements compute from their strains."""
+    grid = Grid(uniform(2.0, 3), uniform(2.0, 3))
+    x, y = (v.ravel() for v in np.meshgrid(lines(grid.columns), lines(grid.rows)))
+    corners = enumerate(np.stack([x + 0.1 * x * y, y + 0.2 * x * y], axis=1).tolist(), start=1)
+    places = Coordinates(tuple(NodeValues(n, 0, tuple(place)) for n, place in corners))
+    plate, found = material(FIBRES, (0.0, 30.0), THICK / 2.0), []
+    for shear in (None, MITC):
+        made = deck(grid, (shear, plate), (), places)
+        built = build_plate(made, generate(made))
+        u = np.cos(np.arange(built.neq))
+        force = built.stiffness @ u
+        found.append(np.abs(PlateMotion(built).product(u) - force).max() / np.abs(force).max())
+    return found
 
 
 @case

@@ -13,18 +13,19 @@ from fecm.api import load_deck
 from fecm.deck import model
 from fecm.deck.catalogue import MATERIALS
 from fecm.deck.grid import Grid, Section, lines, refined, uniform
-from fecm.deck.model import Deck, Impact, Patch, Projectile, Segment
+from fecm.deck.model import Deck, Impact, Indentation, Patch, Projectile, Segment
 from fecm.deck.records import Gage, LoadTable, Macro, NodeCodes, NodeValues, Ply
+from fecm.mechanics.laminate import effective_rigidity, laminate
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.build import build_plate
 from fecm.problem.generate import generate
 from fecm.results.result import Result
-from fecm.studies.estimate import infinite_plate, static_plate, static_stiffness
+from fecm.studies.estimate import inelasticity, infinite_plate, static_plate, static_stiffness
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.plan import plan
 from fecm.verification import decks
 from fecm.verification.case import Value, case
-from fecm.verification.parts import FIBRES, THICK
+from fecm.verification.parts import ALPHA_CR, FIBRES, THICK
 
 ELEMENTS = 8  # of 16 a side
 FEWER = 6  # of 12 a side
@@ -221,19 +222,38 @@ def rectangle(along: int, patch: Patch, macros: Sequence[Macro], *others: Segmen
 
 @case
 def _patch_compliance() -> Sequence[Value]:
-    found = []
+    found, radii = [], []
     for shape in ("DISC", "HERT"):
         patch = Patch(shape, 0.5, SIDES[0] / 2.0, SIDES[1] / 2.0, 1.0)
         result = decks.result_of(rectangle(12, patch, DEFLECTION))
         found.append(result.tape3.w[0, result["patch/node"] - 1] @ result["patch/weight"])
-    return found
+        blank = decks.result_of(rectangle(3, replace(patch, radius=None), DEFLECTION))
+        radii.append(blank.attributes_of("patch")["radius"] / 0.106)
+    return found + radii
+
+
+def held_trapezoid() -> Deck:
+    """Build one element with MITC, x = ξ and y = η (1 + ξ/2)/2, that is held in θ_y = ξ².
+
+    The other dofs are 0, so that γ_yz is -θ_y, of which a cubic part in ξ is interpolated.
+    """
+    grid = Grid(uniform(2.0, 1), uniform(1.0, 1))
+    xi, eta = (v.ravel() for v in np.meshgrid((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)))
+    corners = enumerate(np.stack([xi, eta * (1.0 + xi / 2.0) / 2.0], axis=1).tolist(), start=1)
+    places = model.Coordinates(tuple(NodeValues(n, 0, tuple(place)) for n, place in corners))
+    field = np.zeros((9, 5))
+    field[:, 4] = xi**2
+    held, plate = decks.held_but(0), decks.material(ONE, [0.0], 0.1)
+    return decks.deck(grid, (held, decks.forces(field), decks.MITC, plate), STRESSES, places)
 
 
 @case
 def _assumed_shear() -> Sequence[Value]:
     cards = (decks.material(ONE, [0.0], h) for h in (0.1, 0.001))
     made = [decks.quarter_plate(4, card, DEFLECTION, 1.0, others=[decks.MITC]) for card in cards]
-    return [decks.result_of(one).tape3.w[0, 0] for one in made]
+    x, shear = decks.fields(decks.result_of(held_trapezoid()), "stresses", "x gamma_yz")
+    sides = [shear[:, np.isclose(x, at)] for at in (-1.0, 1.0)]
+    return [*(decks.result_of(one).tape3.w[0, 0] for one in made), *sides]
 
 
 @case
@@ -242,9 +262,14 @@ def _equilibrium_shear() -> Sequence[Value]:
     def shear(ply: Ply, angles: Sequence[float]) -> Floats:
         plate = decks.material(ply, angles, 1.0 / len(angles))
         made = decks.quarter_plate(1, plate, (), others=[model.Shear(equilibrium=True)])
-        return build_plate(made, generate(made)).laminate.shear.diagonal()
+        return build_plate(made, generate(made)).laminate.shear
 
-    return [shear(ONE, [0.0])[0] / ONE.g13, *shear(STIFF, CROSS)]
+    unsymmetric = shear(STIFF, (30.0, -45.0, 90.0))
+    return [
+        shear(ONE, [0.0])[0, 0] / ONE.g13, *shear(STIFF, CROSS).diagonal(),
+        *shear(STIFF, (0.0, 90.0)).diagonal(),
+        unsymmetric[0, 0], unsymmetric[1, 1], unsymmetric[0, 1],
+    ]  # fmt: skip
 
 
 def bent(
@@ -300,14 +325,24 @@ def peak(found: Result) -> list[float]:
 
 @case
 def _rigid_target() -> Sequence[Value]:
-    """A plate of extreme stiffness and density."""
-    grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
-    ply = Ply(1.48e6, 0.3, 1.75e16, 1.75e16, 5e15, 5e15, 5e15)
-    plate, mass = decks.material(ply, (0.0, 90.0), 0.053), Projectile(0, 0, 2.0e-4)
-    law = decks.elastic(1.0e6)
-    found = decks.result_of(decks.struck_plate(grid, plate, mass, V, law, 2e-8, 9000))
-    touching = found.time[found.force > 0.0]
-    return [found.indentation.max(), found.force.max(), touching[-1], found.velocity[-1]]
+
+    def values(law: Indentation) -> list[float]:
+        found = decks.result_of(decks.fixed_target(2.0e-4, V, law, 2e-8, 9000))
+        touching = found.time[found.force > 0.0]
+        return [found.indentation.max(), found.force.max(), touching[-1], found.velocity[-1]]
+
+    return values(decks.elastic(1.0e6)) + values(Indentation(1.0e6, ALPHA_CR, 0.0, 2.5, "ACR"))
+
+
+@case
+def _free_plate() -> Sequence[Value]:
+    """A plate so stiff that it moves as a rigid body, which DAMP slows down."""
+    grid = Grid(uniform(1.0, 2), uniform(1.0, 2))
+    plate, law = decks.material(decks.isotropic(1e9, 0.3, 2.5e-4), [0.0], 0.2), decks.elastic(1e5)
+    made = decks.struck_plate(grid, plate, Projectile(0, 0, 2.0e-4), V, law, 3e-8, 10000)
+    found = decks.result_of(replace(made, segments=(*made.segments, model.Damping(2000.0))))
+    ends = (found.velocity[-1], found.plate_w[-1], found.energy.damping_work[-1])
+    return [found.force.max(), *ends]
 
 
 @case
@@ -376,16 +411,20 @@ def _patch_impact() -> Sequence[Value]:
     return peak(decks.result_of(rectangle(48, patch, decks.impact_program(1.0e-7, 1250), *hit)))
 
 
+# A square of 0.256 kg: ply and thickness; contact coefficient (SI).
+SQUARE, SQUARE_H, SQUARE_K = decks.isotropic(240e9, 0.3, 1600.0), 0.004, 8.2641942e9
+
+
 def struck_square(mass: float, end: float) -> Deck:
-    """Build a simply supported square of 0.256 kg, hit in the middle at 1 m/s, until a time."""
+    """Build the simply supported square, hit in the middle at 1 m/s, until a time."""
     side, radius = 0.2, 0.002
     sections = refined(side, 12, side / 2.0, 4.0, radius)
     grid = Grid(sections, sections)
     middle = grid.nearest(side / 2.0, side / 2.0)[0]
     segments = (
         decks.supports(grid, decks.SUPPORTED), Projectile(0, 0, mass), Impact(middle, 3, 1.0),
-        Patch("DISC", radius), decks.elastic(8.2641942e9), decks.MITC,
-        decks.material(decks.isotropic(240e9, 0.3, 1600.0), [0.0], 0.004),
+        Patch("DISC", radius), decks.elastic(SQUARE_K), decks.MITC,
+        decks.material(SQUARE, [0.0], SQUARE_H),
     )  # fmt: skip
     made = decks.deck(grid, segments, ())
     dt = rounded_time_step(critical_time_step(build_plate(made, generate(made))))
@@ -394,8 +433,14 @@ def struck_square(mass: float, end: float) -> Deck:
 
 @case
 def _small_mass() -> Sequence[Value]:
-    dashpot = infinite_plate(1.0, 1.0, 1.0, 1.0)
-    return [dashpot.peak, dashpot.time, decks.result_of(struck_square(0.0128, 3e-5)).force.max()]
+    dashpot, mass = infinite_plate(1.0, 1.0, 1.0, 1.0), 0.0128
+    plate = laminate(SQUARE, [0.0], [SQUARE_H])
+    parameter = inelasticity(mass, 1.0, SQUARE_K, plate.mass, effective_rigidity(plate))
+    return [
+        dashpot.peak, dashpot.time, parameter,
+        infinite_plate(mass, 1.0, SQUARE_K, parameter).peak,
+        decks.result_of(struck_square(mass, 3e-5)).force.max(),
+    ]  # fmt: skip
 
 
 @case

@@ -1,0 +1,72 @@
+"""Studies by themselves: random values, refinement, identification, contact coefficients."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import beta, betaincinv
+
+from fecm._errors import FecmWarning
+from fecm.deck.records import Ply
+from fecm.mechanics.contact_law import hertz_coefficient
+from fecm.studies.indentation_test.modulus import (
+    effective_stiffness,
+    indentation_modulus,
+    ply_stiffness,
+)
+from fecm.sweeps.cases import Design, Law, matrix
+from fecm.sweeps.convergence import convergence
+from fecm.sweeps.identify import identify
+from fecm.sweeps.random_result import indices, statistics, wilson
+from fecm.verification import decks
+from fecm.verification.case import Value, case
+
+
+@case
+def _random_values() -> Sequence[Value]:
+    """Ishigami's function, a lognormal value, and the share of 3 hits in 40 draws."""
+    law, samples = Law("uniform", (-np.pi, np.pi)), 1024
+    design = Design(dict.fromkeys("xyz", law), samples, 0, "sobol", sensitivity=True)
+    x, y, z = matrix(design).T
+    values = np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
+    found = indices(values.reshape(1, 5, samples), 0)
+    drawn = statistics(matrix(Design({"k": Law("lognormal", (115.0, 0.08))}, samples))[:, 0])
+    low, high = wilson(np.array(3), np.array(40))
+    return [
+        *found.first[0], *found.total[0], float(drawn.mean), float(drawn.standard_deviation),
+        drawn.quantiles[3], float(low), float(high),
+    ]  # fmt: skip
+
+
+@case
+def _refinement() -> Sequence[Value]:
+    factors = np.array([1, 2, 4])
+    cases, summary = {"refine": factors}, {"peak_force": 1.0 + 3.0 * factors**-1.7}
+    found = convergence(cases, summary)["peak_force"]
+    return [found.order, found.limit]
+
+
+@case
+def _identification() -> Sequence[Value]:
+    """The force of Hertz's impact on a fixed target, given to a deck with other values."""
+    k, mass, velocity = 1.0e6, 2.0e-4, 100.0
+    deepest = (5.0 * mass * velocity**2 / (4.0 * k)) ** 0.4
+    # t = a/v times the integral of dx/sqrt(1 - x^2.5), an incomplete beta function of x^2.5.
+    half = 0.4 * beta(0.4, 0.5) * deepest / velocity
+    time = np.linspace(0.0, 2.0 * half, 101)
+    share = betaincinv(0.4, 0.5, 1.0 - np.abs(time / half - 1.0))
+    made = decks.fixed_target(mass, 110.0, decks.elastic(0.9e6), 2e-7, 900)
+    with warnings.catch_warnings(action="ignore", category=FecmWarning):
+        found = identify(made, time, k * deepest**1.5 * share**0.6, ["k", "velocity"])
+    return [found.values["k"], found.values["velocity"]]
+
+
+@case
+def _contact_coefficient() -> Sequence[Value]:
+    ply = Ply(1.0, 0.28, 181e9, 10.3e9, 7.17e9, 7.17e9, 3.68e9)
+    angles = (0.0, 45.0, -45.0, 90.0)
+    modulus = indentation_modulus(effective_stiffness(ply, angles, [1.0] * 4, 0.4))
+    one = indentation_modulus(ply_stiffness(decks.isotropic(1.0, 0.3, 1.0), 0.3))
+    return [one, modulus, hertz_coefficient(0.008, 207e9, 0.3, modulus)]
