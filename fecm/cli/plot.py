@@ -12,10 +12,18 @@ from click import option
 
 from fecm._errors import FecmWarning
 from fecm._files import check_outputs
-from fecm.cli.common import DECK_PATH, FILE_PATH, RefusedError, echo, note, progress
+from fecm.cli.common import (
+    DECK_PATH,
+    FILE_PATH,
+    CheckFailedError,
+    RefusedError,
+    echo,
+    note,
+    progress,
+)
 from fecm.cli.isolation import reads
 from fecm.cli.types import Finite, Parsed, assignment, list_of
-from fecm.plot.kinds import KINDS, Picture
+from fecm.plot.kinds import KINDS, LackingError, Picture
 from fecm.plot.pictures import check_options, check_suffix, draw, options_of, save
 from fecm.results.hdf5_reader import read
 from fecm.results.result import Result, result_of
@@ -77,7 +85,11 @@ def plot(
     results: tuple[Path, ...], kinds: tuple[str, ...], output: Path | None, overwrite: bool,
     **asked: Any,
 ) -> None:  # fmt: skip
-    """Draw the report's figures from one or more RESULTs, or the map of a sweep."""
+    """Draw the report's figures from one or more RESULTs, or the map of a sweep.
+
+    A kind whose data were not stored is left out, and the exit status is then 1; 2 if no kind can
+    be drawn.
+    """
     options = {name: value for name, value in asked.items() if value}
     named = _named(results)
     first = next(iter(named.values()))
@@ -88,13 +100,19 @@ def plot(
     folder = output if output is not None and output not in paths.values() else None
     if folder is None or folder.is_dir():
         check_outputs(list(paths.values()), overwrite, results)
-    pictures = _draw(named, chosen, options)
+    pictures, lacking = _draw(named, chosen, options)
+    if not pictures:
+        raise next(iter(lacking.values()))
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-    for kind, path in paths.items():
-        with progress(kind, len(pictures[kind].frames)) as advance:
-            save(pictures[kind], path, overwrite=overwrite, advance=advance)
-        echo(path)
+    for kind, picture in pictures.items():
+        with progress(kind, len(picture.frames)) as advance:
+            save(picture, paths[kind], overwrite=overwrite, advance=advance)
+        echo(paths[kind])
+    if lacking:
+        raise CheckFailedError(
+            "; ".join(f"{kind} is not drawn: {error}" for kind, error in lacking.items())
+        )
 
 
 def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path]:
@@ -130,16 +148,19 @@ def _named(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:
 
 def _draw(
     results: dict[str, Result | SweepResult], kinds: list[str], options: Mapping[str, Any]
-) -> dict[str, Picture]:
-    """Draw all pictures before writing any."""
-    pictures = {}
+) -> tuple[dict[str, Picture], dict[str, LackingError]]:
+    """Draw all pictures before writing any; the pictures, and why others are not drawn, by kind."""
+    pictures, lacking = {}, {}
     with progress("fecm", len(kinds)) as advance, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         for kind in kinds:
-            own = options_of(kind)
-            pictures[kind] = draw(kind, results, **{n: v for n, v in options.items() if n in own})
+            own = {name: options[name] for name in options_of(kind) if name in options}
+            try:
+                pictures[kind] = draw(kind, results, **own)
+            except LackingError as error:
+                lacking[kind] = error
             advance(1)
     notes = [str(one.message) for one in caught if issubclass(one.category, FecmWarning)]
     notes += [text for picture in pictures.values() for text in picture.notes]
     note(*dict.fromkeys(notes))
-    return pictures
+    return pictures, lacking

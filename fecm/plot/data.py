@@ -17,7 +17,7 @@ from fecm.deck.model import Deck, Impact
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.mesh import ElementBlock, element_blocks
-from fecm.plot.kinds import PlotError
+from fecm.plot.kinds import LackingError, PlotError
 from fecm.results.plies import model_of, points_of, rows_at
 from fecm.results.result import Result
 from fecm.results.schema import NotStoredError, ResultFileError, remedy
@@ -32,15 +32,15 @@ MANY = 2000  # meshes with more elements are drawn with fewer points per element
 def require(result: Result, name: str, *paths: str) -> list[Array]:
     """Datasets of a result.
 
-    Raises PlotError if one is missing (the message names the macro that stores it), is empty, or
-    holds numbers that an axis can't show.
+    Raises LackingError if one is missing (the message names the macro that stores it) or empty,
+    PlotError if it holds numbers that an axis can't show.
     """
     for path in paths:
         if path not in result:
-            raise PlotError(f"{name} has no {path}{remedy(path)}")
+            raise LackingError(f"{name} has no {path}{remedy(path)}")
     for path in paths:
         if not result[path].size:
-            raise PlotError(f"{name} has no rows of {path}")
+            raise LackingError(f"{name} has no rows of {path}")
         if not (np.abs(result[path]) <= LARGEST).all():
             raise PlotError(
                 f"{path} of {name} holds numbers beyond ±{LARGEST:g}, infinities or NaN, which "
@@ -157,6 +157,12 @@ def patches(result: Result, cuts: int, name: str = "the result") -> Patches:
         edges += list(starts[:, None] + around)
         start += len(points[-1])
     return Patches(np.concatenate(points), np.concatenate(quads), edges, parts)
+
+
+def reach(result: Result, name: str, thickness: float) -> float:
+    """Distance from the load below which plate theory does not hold: the patch's radius + h/2."""
+    patch = circle(result, name)
+    return thickness / 2.0 + (0.0 if patch is None else patch[1])
 
 
 def strain_points(result: Result, name: str) -> Floats:

@@ -59,7 +59,8 @@ def _mark_open_ends(axes: Axes, results: Results, width: str) -> None:
 def force(results: Results, *, overlay: Source | None = None, width: str = "column") -> Picture:
     """Contact force and transducer against time; of several results, one above the other.
 
-    A dashed line marks the delamination threshold of a result that has one.  `overlay` is a
+    The transducers of rigid masses show the contact force and are not drawn again.  A dashed line
+    marks the delamination threshold of a result that has one.  `overlay` is a
     measured force: a CSV file with the columns time and force (or transducer), or times and forces,
     in the deck's units.
     """
@@ -76,27 +77,23 @@ def force(results: Results, *, overlay: Source | None = None, width: str = "colu
         measured = measurement_of(overlay, declared_units(first.attributes))
         forces.append(measured.force)
     pound = style.scale_of(results, "force", [*forces, np.array(list(limits.values()))])
+    equal = all(np.array_equal(c, t) for _, c, t in drawn.values())  # of rigid masses
     if len(drawn) == 1:
         figure, axes = style.panels(width)
         ((time, contact, transducer),) = drawn.values()
-        equal = np.array_equal(contact, transducer)  # of a rigid mass
-        label = f"contact force{' and transducer, which are equal' if equal else ''}"
-        axes[0].plot(time, contact, color=style.colours()[0], label=label)
+        axes[0].plot(time, contact, color=style.colours()[0], label="contact force")
         if not equal:
             axes[0].plot(time, transducer, color=style.colours()[1], label="transducer")
-        pound.name(axes[0].yaxis, "Force")
+        pound.name(axes[0].yaxis, "Contact force" if equal else "Force")
     else:
-        figure, axes = style.panels(width, 2, sharex=True, sharey=True, tall=0.65)
+        layout = {"tall": 1.0} if equal else {"rows": 2, "tall": 0.65}
+        figure, axes = style.panels(width, sharex=True, sharey=True, **layout)
         for (name, (time, *both)), colour in zip(drawn.items(), style.colours(), strict=False):
-            for ax, values in zip(axes, both, strict=True):
+            for ax, values in zip(axes, both, strict=False):
                 ax.plot(time, values, color=colour, label=name)
-        pound.name(axes[0].yaxis, "Contact force")
-        pound.name(axes[1].yaxis, "Transducer")
-    shared = len(set(limits.values())) == 1
-    for name, limit in list(limits.items())[: 1 if shared else None]:
-        label = "delamination threshold" if shared else f"{name}, delamination threshold"
-        colour = "0.3" if shared else dict(zip(drawn, style.colours(), strict=False))[name]
-        axes[0].axhline(limit, color=colour, ls=style.STYLES[1], lw=0.8, label=label)
+        for ax, text in zip(axes, ("Contact force", "Transducer"), strict=False):
+            pound.name(ax.yaxis, text)
+    _mark_thresholds(axes[0], limits, list(drawn))
     _time_axis(axes[-1], clock, times)
     _mark_open_ends(axes[0], results, width)
     notes = []
@@ -111,6 +108,18 @@ def force(results: Results, *, overlay: Source | None = None, width: str = "colu
             notes.append(f"{measured.quantity} of {name} against {measured.name}: {compared}")
     style.lines_legend(figure, axes[0])
     return Picture(figure, notes=notes)
+
+
+def _mark_thresholds(axes: Axes, limits: Mapping[str, float], names: Sequence[str]) -> None:
+    """Draw thresholds by the names of their results: one line if all results have the same."""
+    look: dict[str, Any] = {"ls": style.STYLES[1], "lw": 0.8}
+    if len(limits) == len(names) and len(set(limits.values())) == 1:
+        axes.axhline(limits[names[0]], color="0.3", label="delamination threshold", **look)
+        return
+    for name, colour in zip(names, style.colours(), strict=False):
+        if name in limits:
+            label = f"{name}, delamination threshold"
+            axes.axhline(limits[name], color=colour, label=label, **look)
 
 
 def _measured_look(time: data.Array) -> dict[str, Any]:
@@ -223,9 +232,9 @@ def strain(
     At an angle θ from the x-axis κ = κx cos² θ + κy sin² θ + κxy sin θ cos θ, with the engineering
     twist κxy.  At a node it is the mean of the adjacent elements.
 
-    The points `at` (length) are by default the centre of the contact patch, or the point nearest to
-    the impact node that is at least the thickness h away; `gages` are degrees from the x-axis;
-    `face` is ``"far"`` (z = h/2), ``"struck"`` (z = -h/2), or ``"curvature"``.
+    The points `at` (length) are by default the one with the largest bending strain outside the
+    load; `gages` are degrees from the x-axis; `face` is ``"far"`` (z = h/2), ``"struck"``
+    (z = -h/2), or ``"curvature"``.
     """
     lines: dict[str, tuple[data.Array, data.Array]] = {}
     for name, result in results.items():
@@ -258,8 +267,12 @@ def _strains(
     points = data.strain_points(result, name)
     layers = data.deck_of(result, name).require(Material).layers
     thickness = sum(layer.thickness for layer in layers)
-    places = [np.array(place) for place in at] or [_default_place(result, name, points, thickness)]
+    places = [np.array(place) for place in at]
+    if not places:
+        outside = _distance(result, name, points) >= data.reach(result, name, thickness)
+        places = [_most_strained(columns, points, outside)]
     height = {"far": thickness / 2.0, "curvature": 1.0}.get(face, -thickness / 2.0)
+    symbol = "κ" if face == "curvature" else "ε"
     if face != "curvature" and result["mesh/equations"][:, :2].any():
         warn(
             f"the midplane of {name} may stretch; its strains are not stored, and the picture "
@@ -273,25 +286,29 @@ def _strains(
         for angle in gages:
             c, s = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
             values = height * (c * c * kappa_x + s * s * kappa_y + s * c * kappa_xy)
-            direction = {0.0: "x", 90.0: "y"}.get(angle, f"{angle:g}°")
-            found[f"{direction} at {x:.4g}, {y:.4g}"] = values
+            direction = {0.0: "x", 90.0: "y"}.get(angle, f" {angle:g}°")
+            found[f"{symbol}{direction} at {x:.4g}, {y:.4g}"] = values
     return found
 
 
-def _default_place(result: Result, name: str, points: data.Array, thickness: float) -> data.Array:
-    """Place of the strain if none is given, (2,): not under a point force."""
-    hit = data.impact_point(result, name)
-    if data.circle(result, name) is not None:
-        return hit
-    distance = np.hypot(*np.moveaxis(points - hit, -1, 0))
-    away = distance >= thickness * (1.0 - 1e-9)
-    if not away.any():
-        return hit
-    at_least = distance[away].min() * (1.0 + 1e-9)
-    x, y = max(points[away & (distance <= at_least)].round(12).tolist())
-    warn(
-        f"strains at the impact node of a point force depend on the mesh: of {name} those at "
-        f"{x:.4g}, {y:.4g} are shown, the nearest point that is at least the thickness away; --at "
-        "chooses another"
-    )
-    return np.array([x, y])
+def _distance(result: Result, name: str, points: data.Array) -> data.Array:
+    """Distance of points, (..., 2), from the load; infinite without a load."""
+    load = data.struck(result, name)
+    if not len(load):
+        return np.full(points.shape[:-1], np.inf)
+    return np.asarray(np.hypot(*np.moveaxis(points - load[0], -1, 0)))
+
+
+def _most_strained(
+    curvatures: Sequence[data.Array], points: data.Array, outside: data.Array
+) -> data.Array:
+    """Place, (2,), of the largest principal curvature of all rows, outside the load if possible.
+
+    Of equal ones, as of a symmetric plate, the place with the largest x, then y.
+    """
+    x, y, xy = curvatures
+    largest = (np.abs(x + y) + np.hypot(x - y, xy)).max(axis=0)
+    if outside.any():
+        largest = np.where(outside, largest, -1.0)
+    equal = largest >= largest.max() * (1.0 - 1e-9)
+    return np.array(max(points[equal].round(12).tolist()))

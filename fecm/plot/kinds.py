@@ -22,6 +22,10 @@ class PlotError(FecmError, ValueError):
     """A result lacks what a picture needs, or the options do not fit it."""
 
 
+class LackingError(PlotError):
+    """A result lacks the data of one kind of picture; other kinds may be drawn."""
+
+
 class MatplotlibError(FecmError, ImportError):
     """matplotlib is not installed."""
 

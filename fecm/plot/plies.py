@@ -24,7 +24,7 @@ from fecm.mechanics.failure import CRITERIA
 from fecm.mechanics.mesh import element_blocks, element_centres
 from fecm.mechanics.points import locate
 from fecm.plot import style
-from fecm.plot.data import Array, circle, deck_of, mesh_of, on_plate, require, struck
+from fecm.plot.data import Array, deck_of, mesh_of, on_plate, reach, require
 from fecm.plot.kinds import Picture, PlotError
 from fecm.plot.plate import aspect, mark_impact
 from fecm.problem.build import rules
@@ -243,7 +243,7 @@ def thickness(
 
     Of `at` (length) at most one place selects the nearest element with ply stresses, and its
     nearest point; of `times` (the deck's unit) at most one the nearest stored row.  By default both
-    are those of the largest abs(sigma_1).
+    are those of the largest abs(sigma_1) outside the elements under the load.
     """
     ((name, result),) = results.items()
     plies, point = _chosen(result, name, at, times)
@@ -255,7 +255,7 @@ def thickness(
     if np.isfinite([xz, yz]).all():
         drawn[r"$\tau_{xz}$"], drawn[r"$\tau_{yz}$"] = (depth, xz), (depth, yz)
         drawn[r"$(\tau_{xz}^2 + \tau_{yz}^2)^{1/2}$"] = depth, np.hypot(xz, yz)
-    _warn(result, name, plies, point)
+    _warn(result, name, plies)
     columns = 2 if width == "column" else 3
     lines = math.ceil(len(drawn) / columns)
     figure, axes = style.panels(width, lines, columns, sharey=True, ratio=1.8 / columns)
@@ -286,12 +286,16 @@ def _chosen(
     """Plies of one element at one time, and the number of the point in it, from 0."""
     if len(at) > 1 or len(times) > 1:
         raise PlotError("the kind thickness shows one point at one time; give --at and --time once")
-    sigma, stored, numbers = require(result, name, "plies/sigma_1", "plies/time", "plies/element")
+    sigma, stored, numbers, near = require(
+        result, name, "plies/sigma_1", "plies/time", "plies/element", "plies/under_load"
+    )
     mesh = mesh_of(result, name)
+    outside = near == 0
     try:
         rows = rows_at(stored, times, "ply stresses") if times else np.arange(len(stored))
         largest = np.abs(sigma[rows]).max(axis=(3, 4))  # (rows, elements, points)
-        member = int(largest.max(axis=(0, 2)).argmax())
+        loaded = largest.max(axis=(0, 2))  # (elements,)
+        member = int(np.where(outside, loaded, -1.0).argmax() if outside.any() else loaded.argmax())
         if at:
             member = _nearest_element(mesh, numbers, np.array(at[0]), name)
         row, point = np.unravel_index(largest[:, member].argmax(), largest[:, member].shape)
@@ -323,13 +327,12 @@ def _nearest_element(mesh: tuple[Array, Floats], numbers: Array, at: Floats, nam
     return nearest
 
 
-def _warn(result: Result, name: str, plies: Plies, point: int) -> None:
+def _warn(result: Result, name: str, plies: Plies) -> None:
     """Say what limits the stresses of an element."""
-    element, patch = f"element {plies.element[0]} of {name}", circle(result, name)
-    reach = plies.z[-1, 2] + (0.0 if patch is None else patch[1])
-    distance = np.hypot(*(struck(result, name) - [plies.x[0, point], plies.y[0, point]]).T)
-    if plies.under_load[0] or (distance < reach).any():
-        warn(f"{element} is within {reach:.3g} of the load, where plate theory does not hold")
+    element = f"element {plies.element[0]} of {name}"
+    if plies.under_load[0]:
+        near = reach(result, name, 2.0 * float(plies.z[-1, 2]))
+        warn(f"{element} is within {near:.3g} of the load, where plate theory does not hold")
     tau = np.abs([plies.tau_xz, plies.tau_yz]).max()
     residual = np.abs(plies.residual).max()
     if np.isnan(tau):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fecm.plot.kinds import Picture, PlotError
+from fecm.plot.kinds import LackingError, Picture, PlotError
 from fecm.plot.maps import LEVEL, Ints, axis_of, case_rows, quantity_of
 from fecm.plot.style import WIDTHS, colours, legend, limit_count, lines_legend, panels
 from fecm.sweeps.random_result import Indices, RandomResult, wilson
@@ -111,7 +111,7 @@ def sensitivity(
     """
     name, sweep, random, chosen = _random(results, where)
     if not random.sensitivity:
-        raise PlotError(f"{name} has no indices; run the sweep with --sensitivity")
+        raise LackingError(f"{name} has no indices; run the sweep with --sensitivity")
     place, draws = _one(random, name, chosen)
     shown = quantity_of(sweep, name, draws, quantity)
     found = random.sensitivity[shown.name]
