@@ -10,7 +10,7 @@ import click
 from fecm._tables import aligned
 from fecm.cli.common import DECK_PATH, FORMAT_OPTION, echo, echo_json, note
 from fecm.cli.decks import load_single
-from fecm.deck.units import unit_names, unit_of
+from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.studies.estimate import estimate as estimate_problem
 from fecm.sweeps.api import carry_out
 from fecm.sweeps.plan import plan
@@ -60,7 +60,7 @@ def estimate(deck: Path, form: str) -> None:
     names = unit_names(problem.deck)
 
     def text(value: float, dimension: str) -> str:
-        return "-" if math.isnan(value) else f"{value:.5g} {unit_of(dimension, names)}".rstrip()
+        return "-" if math.isnan(value) else quantity(value, unit_of(dimension, names), 5)
 
     echo(problem.deck.title or "(no title)")
     echo(f"  class       M/M_plate = {found.mass_ratio:.4g}, {found.response}")

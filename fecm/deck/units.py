@@ -1,7 +1,12 @@
-"""Names of a deck's units, for output and axes; nothing is ever converted."""
+"""Names of a deck's units, for output and axes.
+
+Numbers are never converted, except that text and pictures show masses in g and energies in J where
+the deck's own units of them are powers of ten of these.
+"""
 
 from __future__ import annotations
 
+import math
 import re
 
 from fecm.deck.model import Deck, Units
@@ -18,6 +23,15 @@ KNOWN = {
     },
     "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6},
 }  # fmt: skip
+# Units that take prefixes: base unit and power of ten.
+PREFIXED = {
+    "s": ("s", 0), "ms": ("s", -3), "us": ("s", -6), "µs": ("s", -6),
+    "m": ("m", 0), "mm": ("m", -3), "N": ("N", 0), "kN": ("N", 3), "J": ("J", 0),
+    "N*m": ("J", 0), "N*mm": ("J", -3), "kN*mm": ("J", 0), "kN*m": ("J", 3),
+    "N*s^2/m": ("g", 3), "N*s^2/mm": ("g", 6), "kN*s^2/m": ("g", 6), "kN*s^2/mm": ("g", 9),
+    "N*ms^2/mm": ("g", 0), "kN*ms^2/mm": ("g", 3),
+}  # fmt: skip
+PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 MASS = "force*time^2/length"
 MODULUS = "force/length^2"
 TOUGHNESS = "force/length"
@@ -53,9 +67,30 @@ def in_si(dimension: str, names: dict[str, str]) -> float | None:
     return value
 
 
-def mass_in_si(mass: float, names: dict[str, str]) -> str:
-    """A mass in t where the deck's unit of mass is the tonne, otherwise in kg; may be empty."""
-    if (unit := in_si(MASS, names)) is None:
+def thousands(value: float) -> int:
+    """Power of 1000, as one of ten, that leaves 1 to 1000 of a positive value."""
+    return 3 * math.floor(math.log10(value) / 3.0)
+
+
+def with_prefix(unit: str, power: int) -> str:
+    """Name of 10^power of a unit, as kN of 10^3 N; empty if it has none."""
+    base, own = PREFIXED.get(unit, ("", 0))
+    if not base or power + own not in PREFIXES:
         return ""
-    tonnes = abs(unit / 1e3 - 1.0) < 1e-9
-    return f"{mass:.4g} t" if tonnes else f"{mass * unit:.4g} kg"
+    name = PREFIXES[power + own] + base
+    return "t" if name == "Mg" else name
+
+
+def quantity(value: float, unit: str, digits: int = 6) -> str:
+    """A value with its unit: 20 g instead of 2e-05 N*s^2/mm, 1.5 J instead of 1500 N*mm."""
+    if PREFIXED.get(unit, ("",))[0] in ("g", "J") and 0.0 < abs(value) < math.inf:
+        power = thousands(float(f"{abs(value):.{digits}g}"))
+        if name := with_prefix(unit, power):
+            return f"{value / 10.0**power:.{digits}g} {name}"
+    return f"{value:.{digits}g} {unit}".rstrip()
+
+
+def mass_in_si(mass: float, names: dict[str, str]) -> str:
+    """A mass in g, kg or t; empty if the deck's units are not known."""
+    unit = in_si(MASS, names)
+    return "" if unit is None else quantity(mass * unit, "N*s^2/m", 4)

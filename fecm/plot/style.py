@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import Formatter, Locator
 
 from fecm._frozen import frozen
-from fecm.deck.units import unit_of
+from fecm.deck.units import PREFIXED, thousands, unit_of, with_prefix
 from fecm.plot.kinds import PlotError
 from fecm.results.result import Result
 from fecm.results.schema import printable
@@ -67,13 +67,6 @@ UNDATED: dict[str, dict[str, Any]] = {
     ".svg": {"Date": None, "Creator": None},
     ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
-# Units that take prefixes: base unit and power of ten.
-_PREFIXED = {
-    "s": ("s", 0), "ms": ("s", -3), "us": ("s", -6), "µs": ("s", -6),
-    "m": ("m", 0), "mm": ("m", -3), "N": ("N", 0), "kN": ("N", 3), "J": ("J", 0),
-    "N*m": ("J", 0), "N*mm": ("J", -3), "kN*mm": ("J", 0), "kN*m": ("J", 3),
-}  # fmt: skip
-_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 # Decorates functions to draw in this style.
@@ -117,9 +110,14 @@ class Scale:
     factor: float
     unit: str
 
+    @property
+    def shown(self) -> str:
+        """The unit with its broken powers, as in N/mm^1.5, above the line."""
+        return re.sub(r"\^(\d+\.\d+)", r"$^{\1}$", literal(self.unit))
+
     def label(self, name: str) -> str:
         """Label of an axis."""
-        return f"{name} ({literal(self.unit)})" if self.unit else name
+        return f"{name} ({self.shown})" if self.unit else name
 
     def name(self, axis: Axis, name: str) -> None:
         """Label an axis; its ticks show the numbers in the unit."""
@@ -129,7 +127,7 @@ class Scale:
     def show(self, value: float) -> str:
         """A value with its unit, to four significant digits."""
         times = " ×" if self.unit.startswith("10") else ""
-        return f"{self.factor * value:.4g}{times} {literal(self.unit)}".rstrip()
+        return f"{self.factor * value:.4g}{times} {self.shown}".rstrip()
 
 
 def scale(peak: float, unit: str) -> Scale:
@@ -137,12 +135,11 @@ def scale(peak: float, unit: str) -> Scale:
 
     Some units take a prefix (800 µs), others follow the power (1.3, 10⁻³ in).
     """
-    base, own = _PREFIXED.get(unit, ("", 0))
     power = 0
-    if 1e-100 < peak < math.inf and not (1.0 if base else 0.1) <= peak < 1e4:
-        power = 3 * math.floor(math.log10(peak) / 3.0)
-    if base and power + own in _PREFIXES:
-        return Scale(10.0**-power, _PREFIXES[power + own] + base)
+    if 1e-100 < peak < math.inf and not (1.0 if unit in PREFIXED else 0.1) <= peak < 1e4:
+        power = thousands(peak)
+    if name := with_prefix(unit, power):
+        return Scale(10.0**-power, name)
     text = f"{unit[2:]}⁻¹" if unit.startswith("1/") else unit
     text = re.sub(r"\^(\d+)(?![\d.])", lambda found: found[1].translate(_SUPERSCRIPTS), text)
     power_of_ten = f"10{str(power).translate(_SUPERSCRIPTS)} " if power else ""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fecm._frozen import frozen
+from fecm.deck.units import quantity as shown_quantity
 from fecm.mechanics.failure import CRITERIA
 from fecm.results.result import Result
 from fecm.results.schema import DATASETS, GROUPS, row_blocks
@@ -108,7 +109,7 @@ def largest_exposures(result: Result) -> list[LargestExposure]:
 
 
 def _quantity(result: Result, value: float, dimension: str) -> str:
-    return f"{value:.6g} {result.unit(dimension)}".rstrip()
+    return shown_quantity(value, result.unit(dimension))
 
 
 def _impact(result: Result) -> list[str]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from fecm._tables import html_table
 from fecm._version import __version__
 from fecm.deck.model import Delamination
-from fecm.deck.units import unit_names, unit_of
+from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.results import schema
 from fecm.results.metrics import COLUMNS, FOUND, SUMMARY, THRESHOLD, described
 from fecm.sweeps.cases import pair
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from fecm.results.hdf5_reader import Contents
 
 Array = NDArray[Any]
+WEIGHED = ("mass", "rod_mass", "energy")  # values that the summary shows in g and J
 WORDS = 18  # letters of the names in the lines of the summary
 SAME = 1e-9  # distance from the place given, relative to its coordinates, that is rounding
 FORCE = "history/force"
@@ -68,11 +69,13 @@ def summary(result: SweepResult) -> list[str]:
     if np.isfinite(shown).any():
         digits = 8 if word == "found" else 6
         for size, case in (("smallest", np.nanargmin(shown)), ("largest", np.nanargmax(shown))):
-            texts = [f"{result[n][case]:.{digits}g} {result.unit(n)}".rstrip() for n in names]
+            texts = [quantity(result[n][case], result.unit(n), digits) for n in names]
             form = {"f": ".6g"} if result.random is not None else {}  # by the kind of the values
             values = ", ".join(
-                f"{name} {v[case]:{form.get(v.dtype.kind, '')}}" for name, v in result.cases.items()
-            )
+                f"{name} {quantity(v[case], result.unit(name))}" if name in WEIGHED
+                else f"{name} {v[case]:{form.get(v.dtype.kind, '')}}"
+                for name, v in result.cases.items()
+            )  # fmt: skip
             given = f" ({values})" if values else ""
             lines.append(f"{size} {word:{16 - len(size)}} {', '.join(texts)}{given}")
     if "at" in result.cases and "hit_x" in result.summary:
