@@ -183,7 +183,7 @@ def test_places_of_strains_may_be_an_array(result: Result) -> None:
 
 def test_strain_is_curvature_times_the_distance_of_the_face(result: Result) -> None:
     far = plot(result, "strain", gages=(0.0, 90.0, 45.0), at=((1.1, 0.9),))
-    assert legend_of(far) == ["x at 1, 1", "y at 1, 1", "45° at 1, 1"]
+    assert legend_of(far) == ["εx at 1, 1", "εy at 1, 1", "ε 45° at 1, 1"]
     corners = np.array([2, 3, 1, 0])
     means = {
         name: result[f"tape8/{name}"][:, [0, 1, 2, 3], corners].mean(axis=1)
@@ -192,22 +192,36 @@ def test_strain_is_curvature_times_the_distance_of_the_face(result: Result) -> N
     expected = 0.053 * (means["kappa_x"] + means["kappa_y"] + means["kappa_xy"]) / 2.0
     assert far.axes[0].get_ylabel() == "Strain, far face (10⁻⁶)"
     shown = lines(far.axes[0])
-    np.testing.assert_allclose(shown["x at 1, 1"][1], 0.053 * means["kappa_x"], rtol=1e-12)
-    np.testing.assert_allclose(shown["45° at 1, 1"][1], expected, rtol=1e-12)
+    np.testing.assert_allclose(shown["εx at 1, 1"][1], 0.053 * means["kappa_x"], rtol=1e-12)
+    np.testing.assert_allclose(shown["ε 45° at 1, 1"][1], expected, rtol=1e-12)
     middle: dict[str, Any] = {"at": ((1.0, 1.0),)}
     struck = lines(plot(result, "strain", face="struck", gages=(0.0,), **middle).axes[0])
-    np.testing.assert_allclose(struck["x at 1, 1"][1], -shown["x at 1, 1"][1], rtol=1e-12)
+    np.testing.assert_allclose(struck["εx at 1, 1"][1], -shown["εx at 1, 1"][1], rtol=1e-12)
     curvature = plot(result, "strain", face="curvature", gages=(90.0,), **middle).axes[0]
-    np.testing.assert_allclose(lines(curvature)["y at 1, 1"][1], means["kappa_y"], rtol=1e-12)
+    np.testing.assert_allclose(lines(curvature)["κy at 1, 1"][1], means["kappa_y"], rtol=1e-12)
     assert curvature.get_ylabel() == "Curvature (10⁻⁶ in⁻¹)"
 
 
-def test_strain_is_not_shown_under_a_point_force_unless_asked_for(result: Result) -> None:
-    with pytest.warns(FecmWarning, match="point force depend on the mesh: .* those at 1.5, 1 are"):
-        shown = legend_of(plot(result, "strain"))
-    assert shown == ["x at 1.5, 1", "y at 1.5, 1"]
-    patch = run(small(data=DISC + DATA_CARDS))
-    assert legend_of(plot(patch, "strain")) == ["x at 1.5, 1.5", "y at 1.5, 1.5"]
+def test_strain_by_default_is_the_largest_outside_the_load(result: Result) -> None:
+    for one, place, reach in (
+        (result, (1.0, 1.0), 0.053),
+        (run(small(data=DISC + DATA_CARDS)), (1.5, 1.5), 0.2 + 0.053),
+    ):
+        points = strain_points(one, "small")
+        outside = np.hypot(*np.moveaxis(points - place, -1, 0)) >= reach
+        arrays = {path: one[path] for path in one}
+        for name in ("x", "y", "xy"):
+            larger = np.where(outside, 1.0, 100.0)
+            arrays[f"tape8/kappa_{name}"] = larger * arrays[f"tape8/kappa_{name}"]
+        x, y, xy = (arrays[f"tape8/kappa_{name}"] for name in ("x", "y", "xy"))
+        middle, radius = (x + y) / 2.0, np.sqrt(((x - y) / 2.0) ** 2 + (xy / 2.0) ** 2)
+        largest = np.maximum(np.abs(middle + radius), np.abs(middle - radius)).max(axis=0)
+        assert largest[~outside].max() > largest[outside].max()
+        groups = {name: one.attributes_of(name) for name in ("patch", "tape8")}
+        one = Result(arrays, {"deck": one.deck}, groups)
+        equal = points[outside & (largest > (1.0 - 1e-9) * largest[outside].max())]
+        (line,) = plot(one, "strain", gages=(0.0,)).axes[0].get_lines()
+        assert line.get_label() in [f"εx at {x:.4g}, {y:.4g}" for x, y in equal]
 
 
 def test_strain_points_are_nodes_or_gauss_points(result: Result) -> None:
@@ -344,12 +358,19 @@ def test_thickness_shows_six_components_with_jumps_at_the_faces_of_plies(plies: 
 
 
 @pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
-def test_thickness_without_a_place_is_that_of_the_largest_stress_along_the_fibres(
+def test_thickness_without_a_place_is_that_of_the_largest_stress_outside_the_load(
     plies: Result,
 ) -> None:
-    largest = np.abs(plies["plies/sigma_1"]).max()
+    stress, under = np.abs(plies["plies/sigma_1"]), plies["plies/under_load"] != 0
+    largest = stress[:, ~under].max()
+    assert stress[:, under].max() > largest
     axes: Any = plot(plies, "thickness").axes[0]
     assert np.abs(axes.get_lines()[-1].get_xdata()).max() == largest
+    arrays = {path: plies[path] for path in plies} | {"plies/under_load": np.ones_like(under)}
+    everywhere = Result(arrays, {"deck": plies.deck}, {"patch": plies.patch.attributes})
+    with pytest.warns(FecmWarning, match="of the load, where plate theory does not hold"):
+        axes = plot(everywhere, "thickness").axes[0]
+    assert np.abs(axes.get_lines()[-1].get_xdata()).max() == stress.max()
 
 
 def test_thickness_beside_the_stored_elements_names_the_nearest(plies: Result) -> None:
@@ -542,16 +563,23 @@ def test_force_draws_the_delamination_threshold_if_there_is_one(result: Result) 
         for value in (4.0, 1.0)
     )
     figure = plot(tough, "force")
-    assert legend_of(figure)[-1] == "delamination threshold"
+    assert legend_of(figure)[-1] == f"delamination threshold {tough.threshold['force']:.4g} lbf"
     line = figure.axes[0].get_lines()[-1]
     assert line.get_ydata() == pytest.approx([tough.threshold["force"]] * 2)
     figure = draw("force", {"none": result, "tough": tough, "weak": weak}).figure
-    labels = ["tough, delamination threshold", "weak, delamination threshold"]
+    labels = [
+        f"{name}: delamination threshold {one.threshold['force']:.4g} lbf"
+        for name, one in (("tough", tough), ("weak", weak))
+    ]
     assert legend_of(figure) == ["none", "tough", "weak", *labels]
     first, second = (lines(figure.axes[0])[label][1][0] for label in labels)
     assert first == pytest.approx(2.0 * second)  # the square root of G_IIc
     same = draw("force", {"none": result, "a": weak, "b": weak}).figure
-    assert legend_of(same) == ["none", "a", "b", "delamination threshold"]
+    assert [text.partition(" thre")[0] for text in legend_of(same)] == [
+        "none", "a", "b", "a, b: delamination"
+    ]  # fmt: skip
+    all_weak = draw("force", {"a": weak, "b": weak}).figure
+    assert legend_of(all_weak)[2].startswith("delamination threshold")
     assert "delamination threshold" not in legend_of(plot(result, "force"))
 
 

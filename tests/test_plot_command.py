@@ -45,10 +45,7 @@ def test_the_command_writes_every_kind_and_keeps_what_is_there(file: Path) -> No
     done = call("plot", file, *asked, cwd=file.parent)
     expected = [f"small-{k}.{'gif' if k == 'animation' else 'png'}" for k in OF_RUNS]
     assert (done.exit_code, done.stdout.split()) == (0, expected)
-    under_load, residual, left_out = done.stderr.splitlines()
-    assert under_load.endswith(
-        "element 4 of small is within 0.253 of the load, where plate theory does not hold"
-    )
+    residual, left_out = done.stderr.splitlines()
     assert "in-plane supports act there" in residual  # a coupled laminate with u = v = 0
     assert left_out.endswith("are left out: 1 point of element 4")
     assert sorted(p.name for p in file.parent.iterdir()) == sorted([*expected, "small.h5"])
@@ -166,6 +163,20 @@ def test_what_is_wrong_with_a_result_is_named(file: Path) -> None:
         infinite(stored)
     assert "the mesh of small has no area" in call("plot", file, "--kind", "mesh").stderr
     assert "history/force of small holds numbers beyond" in call("plot", file).stderr
+
+
+def test_a_kind_whose_data_were_not_stored_leaves_the_others(file: Path) -> None:
+    with h5py.File(file, "r+") as stored:
+        del stored["plies"]
+    kinds = [part for kind in ("force", "thickness", "mesh") for part in ("--kind", kind)]
+    done = call("plot", file, *kinds, cwd=file.parent)
+    assert (done.exit_code, done.stdout.split()) == (1, ["small-force.png", "small-mesh.png"])
+    assert (file.parent / "small-force.png").stat().st_size > 0
+    words = "thickness is not drawn: small has no plies/sigma_1; add PLYS to the deck's program"
+    assert words in done.stderr
+    alone = call("plot", file, "--kind", "thickness", "--kind", "sensitivity", cwd=file.parent)
+    assert alone.exit_code == 2
+    assert not (file.parent / "small-thickness.png").exists()
 
 
 def test_a_name_that_is_no_text_is_escaped(file: Path) -> None:

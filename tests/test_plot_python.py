@@ -133,12 +133,17 @@ def test_the_kinds_for_type_checkers_are_those_of_results() -> None:
     assert list(get_args(RunKind)) == [name for name, kind in KINDS.items() if not kind.sweep]
 
 
-def test_a_rigid_mass_has_one_curve_that_says_so() -> None:
-    deck = small(data=DATA_CARDS + "PROJ\n0, 0, 2.E-4\n\n")
-    axes: Any = fecm.run_one(deck).plot()
-    assert [line.get_label() for line in axes.get_lines()] == [
-        "contact force and transducer, which are equal"
-    ]
+def test_transducers_of_rigid_masses_are_not_drawn_again() -> None:
+    rigid = fecm.run_one(small(data=DATA_CARDS + "PROJ\n0, 0, 2.E-4\n\n"))
+    axes: Any = rigid.plot()
+    assert [line.get_label() for line in axes.get_lines()] == ["contact force"]
+    rod = fecm.run_one(small())
+    for others, labels in (
+        ({"other": rigid}, ["Contact force"]),
+        ({"rod": rod}, ["Contact force", "Transducer"]),
+    ):
+        figure = draw("force", {"rigid": rigid, **others}).figure
+        assert [axes.get_ylabel() for axes in figure.axes] == labels
 
 
 def test_what_a_notebook_shows_of_an_object_is_short_and_escaped(

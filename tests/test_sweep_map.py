@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +90,7 @@ def test_a_full_grid_is_a_cell_a_case_in_rising_order(plane: SweepResult) -> Non
     figure = plot(plane)
     axes, bar = figure.axes
     assert axes.get_xlabel() == "Impact velocity (in/s)"
-    assert axes.get_ylabel() == "Contact coefficient $k$ (10⁶ lbf/in^1.5)"
+    assert axes.get_ylabel() == "Contact coefficient $k$ (10⁶ lbf/in$^{1.5}$)"
     assert bar.get_xlabel() == "Peak force (lbf)"
     drawn = mesh_of(figure).get_array()
     assert drawn.shape == (4, 3)
@@ -118,7 +119,7 @@ def test_lines_of_equal_value_are_labelled_and_lie_where_the_values_are(
     assert figure.axes[0].texts  # numbers on the lines
 
 
-TOUGH = small(STEPS, data=DATA_CARDS.replace("EXPE", "DELA\n.2,\nEXPE"))
+TOUGH = NAMED.replace("EXPE", "DELA\n.2,\nEXPE")
 
 
 def test_a_threshold_of_all_cases_is_a_level_of_peak_forces_only() -> None:
@@ -130,14 +131,50 @@ def test_a_threshold_of_all_cases_is_a_level_of_peak_forces_only() -> None:
     assert len(plot(sweep, "impulse").axes[0].collections) == 2  # cells and lines
 
 
+def legend_of(figure: Any) -> list[str]:
+    """Texts of a figure's legend."""
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_the_legend_names_thresholds_and_levels_with_their_values() -> None:
+    sweep = fecm.sweep(TOUGH, {"velocity": [20.0, 200.0], "k": [1e6, 3e6]})
+    force = sweep["threshold_force"][0]
+    named = f"delamination threshold {force:.4g} lbf"
+    assert legend_of(plot(sweep)) == [named]
+    row = plot(sweep, over="velocity", where={"k": 1e6}, level=(50.0,))
+    assert legend_of(row) == ["level 50 lbf", named]
+
+
+def test_a_threshold_that_no_case_reaches_is_told_as_such() -> None:
+    sweep = fecm.sweep(TOUGH, {"velocity": [20.0, 25.0], "k": [1e6, 3e6]})
+    force = sweep["threshold_force"][0]
+    assert sweep["peak_force"].max() < force
+    with warnings.catch_warnings(action="error"):  # nobody has asked for this level
+        picture = draw("map", {"the sweep": sweep})
+    below = f"all values of peak_force are below the delamination threshold {force:.4g} lbf"
+    assert picture.notes == [below]
+    row: Any = draw("map", {"the sweep": sweep}, over=("velocity",), where={"k": 1e6}).figure
+    assert row.axes[0].get_ylim()[1] > force
+
+
+def test_markers_of_the_largest_values_are_not_cut(plane: SweepResult) -> None:
+    values = {"peak_force": np.array([10.0, 9.9, 9.8])}
+    summary = {name: column[:3] for name, column in plane.summary.items()} | values
+    cases = {"velocity": np.array([50.0, 100.0, 150.0])}
+    sweep = SweepResult(cases, summary, plane.dt[:3], plane.steps[:3], units=plane.units)
+    assert plot(sweep).axes[0].get_ylim() == (0.0, pytest.approx(10.5))
+
+
 def test_thresholds_of_different_plates_are_drawn_case_by_case() -> None:
     layups = ["[0/90]", "[0/0]"]
     sweep = fecm.sweep(TOUGH, {"layup": layups, "velocity": [20.0, 200.0]})
     lines = plot(sweep).axes[0].get_lines()
     limits = sweep["threshold_force"].reshape(2, 2)
     assert limits[0, 0] != limits[1, 0]
-    for line, forces in zip(lines[2:], limits, strict=True):
+    drawn = [line for line in lines if str(line.get_label()).startswith("_child")]
+    for line, forces in zip(drawn, limits, strict=True):
         np.testing.assert_allclose(data_of(line)[1], forces)
+    assert "delamination threshold" in [line.get_label() for line in lines]
     sweep = fecm.sweep(TOUGH, {"thickness": [0.1, 0.12], "velocity": [20.0, 200.0]})
     axes = plot(sweep).axes[0]
     low, high = (sweep["peak_force"] - sweep["threshold_force"]).reshape(2, 2).T
@@ -198,7 +235,9 @@ def test_each_layup_is_a_curve(layups: SweepResult) -> None:
         assert x.tolist() == sorted(VELOCITIES)
         order = np.argsort(layups["velocity"][here])
         np.testing.assert_array_equal(y, layups["peak_force"][here][order])
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == LAYUPS
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        *LAYUPS, "level 100 lbf"
+    ]  # fmt: skip
     assert data_of(axes.get_lines()[-1])[1].tolist() == [100.0, 100.0]
     assert axes.get_ylabel() == "Peak force (lbf)"
 
@@ -252,7 +291,7 @@ def test_points_have_colours_where_one_other_value_varies_too(plane: SweepResult
     axes, bar = plot(plane, over="velocity").axes
     assert not axes.get_lines()
     points: Any = axes.collections[0]
-    assert bar.get_xlabel() == "Contact coefficient $k$ (10⁶ lbf/in^1.5)"
+    assert bar.get_xlabel() == "Contact coefficient $k$ (10⁶ lbf/in$^{1.5}$)"
     drawn = sorted(zip(*np.asarray(points.get_offsets()).T, points.get_array(), strict=True))
     cases = zip(plane["velocity"], plane["peak_force"], plane["k"], strict=True)
     np.testing.assert_allclose(drawn, sorted(cases))

@@ -93,7 +93,7 @@ def force(results: Results, *, overlay: Source | None = None, width: str = "colu
                 ax.plot(time, values, color=colour, label=name)
         for ax, text in zip(axes, ("Contact force", "Transducer"), strict=False):
             pound.name(ax.yaxis, text)
-    _mark_thresholds(axes[0], limits, list(drawn))
+    _mark_thresholds(axes[0], limits, list(drawn), pound)
     _time_axis(axes[-1], clock, times)
     _mark_open_ends(axes[0], results, width)
     notes = []
@@ -110,16 +110,18 @@ def force(results: Results, *, overlay: Source | None = None, width: str = "colu
     return Picture(figure, notes=notes)
 
 
-def _mark_thresholds(axes: Axes, limits: Mapping[str, float], names: Sequence[str]) -> None:
-    """Draw thresholds by the names of their results: one line if all results have the same."""
-    look: dict[str, Any] = {"ls": style.STYLES[1], "lw": 0.8}
-    if len(limits) == len(names) and len(set(limits.values())) == 1:
-        axes.axhline(limits[names[0]], color="0.3", label="delamination threshold", **look)
-        return
-    for name, colour in zip(names, style.colours(), strict=False):
-        if name in limits:
-            label = f"{name}, delamination threshold"
-            axes.axhline(limits[name], color=colour, label=label, **look)
+def _mark_thresholds(
+    axes: Axes, limits: Mapping[str, float], names: Sequence[str], pound: style.Scale
+) -> None:
+    """Draw thresholds, and name their results unless all have the same one."""
+    colours = dict(zip(names, style.colours(), strict=False))
+    for limit in dict.fromkeys(limits.values()):
+        owners = [name for name in limits if limits[name] == limit]
+        whose = f"{', '.join(owners)}: " if len(owners) < len(names) else ""
+        axes.axhline(
+            limit, ls=style.STYLES[1], lw=0.8, color=colours[owners[0]] if whose else "0.3",
+            label=f"{whose}delamination threshold {pound.show(limit)}",
+        )  # fmt: skip
 
 
 def _measured_look(time: data.Array) -> dict[str, Any]:

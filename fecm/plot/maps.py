@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -45,11 +45,13 @@ MANY = 10_000  # more cells or points are stored as an image in vector formats
 LINES = 8  # contour lines, approximately
 # Heights of a row of texts, of everything around the rows, and of a colour bar (in).
 ROW, HEAD, BAR = 0.17, 0.75, 0.45
-DASHES = (0, (5, 1.5))
+THRESHOLD = "delamination threshold"
+DASHES, DOTS = (0, (5, 1.5)), (0, (1, 1))
 # Style of a level among curves, and its colour and contour lines on a map.
 LEVEL: Any = {"color": "0.2", "linestyle": DASHES, "linewidth": 1.1}
 LEVEL_COLOUR = style.COLOURS[1]
 CONTOUR: Any = {"colors": LEVEL_COLOUR, "linestyles": [DASHES], "linewidths": 1.2}
+RING: Any = {"ms": 4.2, "mfc": "none", "mec": LEVEL_COLOUR}  # around points from a level on
 SHADES = 256  # of a colour map
 MARKERS = "osD^vP*"
 # A quantity on a full grid of two parameters: x (nx,) and y (ny,), ascending, and the values,
@@ -91,7 +93,7 @@ class Choice:
 
     over: list[Axis]  # one or two
     shown: Axis  # quantity; NaN where a case has none
-    levels: list[float]  # values to mark
+    levels: dict[float, str]  # values to mark, and what they are
     title: str  # values that select the cases; empty for all cases
     other: Axis | None  # second varying parameter of a map over one
     still: Bools  # (cases,): mask of the cases that ended in contact
@@ -130,12 +132,13 @@ def choose(
     shown = quantity_of(sweep, name, rows, quantity)
     title = ", ".join(f"{held} {_text(sweep, held, rows[0])}" for held in where)
     still = sweep["status"][rows] == STILL
+    levels = dict.fromkeys(level, "level")
     limits = np.empty(0)
     if shown.name == "peak_force" and "threshold_force" in sweep.summary:
         limits = sweep["threshold_force"][rows]
         highest = float(np.nanmax(limits))
         if highest - np.nanmin(limits) <= 1e-9 * highest:
-            level, limits = [*level, highest], np.empty(0)
+            levels[highest], limits = THRESHOLD, np.empty(0)
     low, high = np.nanmin(shown.values), np.nanmax(shown.values)
     for value in level:
         if not low <= value <= high:
@@ -143,7 +146,7 @@ def choose(
                 f"the level {value:g} is outside the picture's values, which range from {low:g} "
                 f"to {high:g}"
             )
-    return Choice(axes, shown, list(level), title, other, still, limits)
+    return Choice(axes, shown, levels, title, other, still, limits)
 
 
 def case_rows(sweep: SweepResult, name: str, where: Mapping[str, Any]) -> Ints:
@@ -279,10 +282,30 @@ def parameter_map(
         axes.set_xlabel(f"{axes.get_xlabel()}\n\N{MULTIPLICATION SIGN} {text}")
     if len(choice.limits):
         _mark_limits(axes, x, y, choice)
+    notes = [] if choice.shown in (x, y) else _name_levels(axes, x, y, choice)
     if choice.title:
         axes.set_title(choice.title, loc="left")
     figure: Any = axes.figure
-    return Picture(figure)
+    style.lines_legend(figure, axes)
+    return Picture(figure, notes=notes)
+
+
+def _name_levels(axes: Axes, x: Axis, y: Axis, choice: Choice) -> list[str]:
+    """Name levels among colours in the legend; the note of a threshold that no colour reaches."""
+    shown, notes = choice.shown, []
+    low, high = np.nanmin(shown.values), np.nanmax(shown.values)
+    points = _grid(x, y, shown) is None
+    for value, name in choice.levels.items():
+        text = f"{name} {shown.scale.show(value)}"
+        if low < value < high and not points:
+            look = {"color": LEVEL_COLOUR, "ls": "-" if y.ticks else DASHES, "lw": 1.2}
+            axes.plot([], [], label=text, **look)
+        elif low < value < high and value == min(choice.levels):
+            axes.plot([], [], "o", label=f"from {text} on", **RING)
+        elif not low < value < high and name == THRESHOLD:
+            side = "below" if high <= value else "above"
+            notes.append(f"all values of {shown.name} are {side} the {text}")
+    return notes
 
 
 def _draw(choice: Choice, width: str) -> tuple[Axes, Axis, Axis]:
@@ -323,14 +346,13 @@ def _draw(choice: Choice, width: str) -> tuple[Axes, Axis, Axis]:
 
 def _curves(x: Axis, texts: Axis, choice: Choice, width: str) -> Axes:
     """A curve a text."""
-    figure, (axes,) = style.panels(width, tall=1.15)
+    _, (axes,) = style.panels(width, tall=1.15)
     looks = zip(texts.ticks, style.colours(), MARKERS, strict=False)
     for here, (text, colour, marker) in zip(_runs(x, texts), looks, strict=True):
         values = choice.shown.values[here]
         if not np.isnan(values).all():  # else they have failed
             axes.plot(x.values[here], values, marker=marker, color=colour, ms=2.2, label=text)
     _finish(axes, x, choice.shown, choice)
-    style.lines_legend(figure, axes)
     return axes
 
 
@@ -350,12 +372,17 @@ def _label(axes: Axes, x: Axis, y: Axis) -> None:
 
 def _finish(axes: Axes, x: Axis, y: Axis, choice: Choice) -> None:
     """Label the axes and mark the levels; the axis of the quantity begins at zero if it can."""
-    across = x is choice.shown
-    if np.nanmin(choice.shown.values) >= 0.0:
-        axes.set(**{"xlim" if across else "ylim": (0.0, None)})
+    shown, across = choice.shown, x is choice.shown
     _label(axes, x, y)
-    for level in choice.levels:
-        (axes.axvline if across else axes.axhline)(level, **LEVEL)
+    for level, name in choice.levels.items():
+        look = LEVEL | {"label": f"{name} {shown.scale.show(level)}"}
+        if name != THRESHOLD:
+            look["linestyle"] = DOTS
+        (axes.axvline if across else axes.axhline)(level, **look)
+    if np.nanmin(shown.values) >= 0.0:
+        limits = [level for level, name in choice.levels.items() if name == THRESHOLD]
+        room = 1.05 * max(np.nanmax(shown.values), *limits, 0.0)  # also for the markers
+        axes.set(**{"xlim" if across else "ylim": (0.0, room or 1.0)})
     if across:
         axes.grid(axis="y", linewidth=0.4, color="0.85")
         axes.set_axisbelow(True)
@@ -369,22 +396,26 @@ def _mark_limits(axes: Axes, x: Axis, y: Axis, choice: Choice) -> None:
     texts = next((axis for axis in (*choice.over, choice.other) if axis and axis.ticks), None)
     if x is shown:
         axes.set_xlim(right=max(axes.get_xlim()[1], highest))
-        axes.plot(limits, y.values, "|", color="0.2", ms=11.0)
+        axes.plot(limits, y.values, "|", color="0.2", ms=11.0, label=THRESHOLD)
     elif y is shown:
         axes.set_ylim(top=max(axes.get_ylim()[1], highest))
         if texts is None and choice.other is not None:
-            axes.plot(x.values, limits, "_", color="0.2")
+            axes.plot(x.values, limits, "_", color="0.2", label=THRESHOLD)
             return
+        axes.plot([], [], label=THRESHOLD, **LEVEL)  # for the legend
         for row, here in enumerate(_runs(x, texts)):
             look = LEVEL | ({"color": style.colours()[row]} if texts else {})
             axes.plot(x.values[here], limits[here], **look)
     elif (found := _grid(x, y, above)) is None:
         at = above.values >= 0.0
-        axes.plot(x.values[at], y.values[at], "o", ms=4.2, mfc="none", mec=LEVEL_COLOUR)
-    elif y.ticks:
-        _crossings(axes, found, 0.0)
+        axes.plot(x.values[at], y.values[at], "o", label=f"from {THRESHOLD} on", **RING)
     elif found[2].min() < 0.0 < found[2].max():
-        axes.contour(*found, [0.0], **CONTOUR)
+        if y.ticks:
+            _crossings(axes, found, 0.0)
+        else:
+            axes.contour(*found, [0.0], **CONTOUR)
+        dashes = "-" if y.ticks else DASHES
+        axes.plot([], [], color=LEVEL_COLOUR, ls=dashes, lw=1.2, label=THRESHOLD)  # for the legend
 
 
 def _colours(shown: Axis) -> Normalize:
@@ -395,7 +426,7 @@ def _colours(shown: Axis) -> Normalize:
     return Normalize(low, high)
 
 
-def _bar(axes: Axes, drawn: Any, shown: Axis, levels: list[float]) -> None:
+def _bar(axes: Axes, drawn: Any, shown: Axis, levels: Collection[float]) -> None:
     locator = MaxNLocator(6, integer=shown.whole)
     bar = style.colour_bar(axes, drawn, shown.scale, shown.label, locator)
     for level in levels:
@@ -403,7 +434,7 @@ def _bar(axes: Axes, drawn: Any, shown: Axis, levels: list[float]) -> None:
             bar.ax.axvline(level, color=LEVEL_COLOUR, linewidth=1.5)
 
 
-def _cells(axes: Axes, grid: Grid, shown: Axis, levels: list[float], *, rows: bool) -> None:
+def _cells(axes: Axes, grid: Grid, shown: Axis, levels: Collection[float], *, rows: bool) -> None:
     """One cell per case, with contour lines unless the rows are texts."""
     values = grid[2]
     look: Any = {"edgecolor": "face", "linewidth": 0.1, "rasterized": values.size > MANY}
@@ -419,7 +450,11 @@ def _cells(axes: Axes, grid: Grid, shown: Axis, levels: list[float], *, rows: bo
     text: Any = {"fontsize": 6.0, "inline_spacing": 2, "fmt": style.Multiple(shown.scale.factor)}
     if not shown.whole and low < high:
         ticks = MaxNLocator(LINES).tick_values(low, high)
-        inner = [tick for tick in ticks if low < tick < high and tick not in levels]
+        apart = 0.3 * np.diff(ticks).min()  # the numbers of near lines would collide
+        inner = [
+            tick for tick in ticks
+            if low < tick < high and all(abs(tick - level) > apart for level in levels)
+        ]  # fmt: skip
         axes.clabel(axes.contour(*grid, inner, colors="white", linewidths=0.5), **text)
     if inside := sorted({level for level in levels if low < level < high}):
         axes.clabel(axes.contour(*grid, inside, **CONTOUR), colors="white", **text)
@@ -436,7 +471,7 @@ def _crossings(axes: Axes, grid: Grid, level: float) -> None:
         axes.vlines(at, row - 0.5, row + 0.5, color=LEVEL_COLOUR, linewidth=1.2)
 
 
-def _points(axes: Axes, x: Axis, y: Axis, shown: Axis, levels: list[float]) -> None:
+def _points(axes: Axes, x: Axis, y: Axis, shown: Axis, levels: Collection[float]) -> None:
     """One coloured point per case; those above the lowest level have an edge."""
     fine = np.isfinite(shown.values)
     values = shown.values[fine]
