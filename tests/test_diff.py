@@ -388,7 +388,7 @@ def test_a_wrong_tolerance_or_name_exits_2_and_says_what_would_do(
 def test_help_says_how_numbers_are_judged() -> None:
     text = " ".join(diff("--help").stdout.split())
     assert "|a - b| <= T + R * max" in text
-    assert "--rtol 1e-3" in text
+    assert "to one unit of the last of their four digits" in text
     assert "largest absolute value" in text
 
 

@@ -45,6 +45,35 @@ def test_a_results_own_tapes_are_the_originals_text_in_report_order(
     assert done.exit_code == 0, done.stdout
 
 
+@pytest.mark.parametrize("name", ["report", "listing", "small"])
+def test_a_result_is_its_own_tapes_to_their_last_digit(
+    runs: Path, tmp_path: Path, name: str
+) -> None:
+    result = runs / f"{name}.h5"
+    write_tapes(load(result), tmp_path)
+    done = diff(result, tmp_path)
+    assert done.exit_code == 0, done.stdout
+    assert done.stdout.endswith("within the last digit of the tapes\n")
+    assert diff(result, tmp_path, "--rtol", "0").exit_code == 1
+
+
+def test_tapes_differ_where_a_number_is_two_units_of_its_last_digit_away(
+    runs: Path, tmp_path: Path
+) -> None:
+    a, b = tmp_path / "a", tmp_path / "b"
+    write_tapes(load(runs / "small.h5"), a)
+    lines = (a / "tape9").read_text().splitlines()
+    least = min((line[:12] for line in lines), key=lambda field: abs(float(field)))
+    for units, status in ((1, 0), (2, 1)):
+        shutil.copytree(a, b, dirs_exist_ok=True)
+        digits = int(least.strip()[2:6])
+        near = digits - units if digits > 5000 else digits + units
+        moved = least.replace(f".{digits:04d}", f".{near:04d}")
+        (b / "tape9").write_text("\n".join(lines).replace(least, moved) + "\n")
+        assert diff(a, b).exit_code == status
+    assert "1 number differs" in told(diff(a, b), "tape9/force")
+
+
 def test_the_tapes_of_both_modes_differ_most_at_the_impact_node(tmp_path: Path) -> None:
     done = diff(originals("report", tmp_path / "a"), originals("listing", tmp_path / "b"))
     assert done.exit_code == 1

@@ -46,7 +46,9 @@ def _tolerances(text: str) -> dict[str, Any]:
         raise ValueError("exclude is not a list of texts")
     if not isinstance(own, dict):
         raise ValueError('tol is not a table; begin it with [tol], and give "NAME" = RTOL')
-    rtol, atol = (_tolerance(name, [given.get(name, 0.0)])[0] for name in ("rtol", "atol"))
+    rtol, atol = (
+        _tolerance(name, [given[name]])[0] if name in given else None for name in ("rtol", "atol")
+    )
     tolerances = [(name, _tolerance(name, values)) for name, values in own.items()]
     return {"rtol": rtol, "atol": atol, "exclude": exclude, "own": tolerances}
 
@@ -55,8 +57,8 @@ def _tolerances(text: str) -> dict[str, Any]:
 @click.argument("a", type=FILE_PATH)
 @click.argument("b", type=FILE_PATH)
 @option("--rtol", type=NOT_NEGATIVE, metavar="R",
-        help="Relative tolerance, of the dataset's largest absolute value.  [default: "
-             "0]")  # fmt: skip
+        help="Relative tolerance, of the dataset's largest absolute value.  [default: 0; of "
+             "tapes their last digit]")  # fmt: skip
 @option("--atol", type=NOT_NEGATIVE, metavar="T",
         help="Absolute tolerance, in the dataset's unit.  [default: 0]")  # fmt: skip
 @option("--only", multiple=True, metavar="PATTERN",
@@ -90,8 +92,8 @@ def diff(
     difference.  Differing titles, modes, slips, other attributes and decks are only listed.
 
     A folder of tapes holds tape3, tape8 and tape9 (or tape3.txt etc.) as `fecm tapes` or the
-    original program wrote them, in either order.  Only datasets of tapes are then compared; their
-    four digits need a tolerance: --rtol 1e-3.
+    original program wrote them, in either order.  Only datasets of tapes are then compared, by
+    default to one unit of the last of their four digits.
 
     Exit status: 0 equal, 1 different, 2 unusable file or call.
     """
@@ -105,7 +107,8 @@ def diff(
         echo_json({
             "verdict": "same" if found.same else "different",
             "a": printable(str(a)), "b": printable(str(b)),
-            "rtol": rtol, "atol": atol, "tol": dict(own),
+            "rtol": rtol or 0.0, "atol": atol or 0.0, "last_digit": found.to_last_digit,
+            "tol": dict(own),
             "datasets": [_entry(c) for c in found.compared if not (brief and c.same)],
             "only_in_a": found.only[0], "only_in_b": found.only[1],
             "excluded": found.excluded, "listed": found.listed,
@@ -114,7 +117,9 @@ def diff(
         lines = list(map(printable, sorted(different))) if brief else _lines(found)
         count = len(found.compared) + len(found.only[0]) + len(found.only[1])
         compared = f"{count} dataset{'s' * (count != 1)}"
-        within = f"rtol {rtol:g}, atol {atol:g}" + ", --tol" * bool(own)
+        within = f"rtol {rtol or 0.0:g}, atol {atol or 0.0:g}"
+        within = "the last digit of the tapes" if found.to_last_digit else within
+        within += ", --tol" * bool(own)
         within += f"; {len(found.excluded)} excluded" if found.excluded else ""
         verdict = f"different: {len(different)} of {compared} at {within}"
         if found.same:

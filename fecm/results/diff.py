@@ -6,6 +6,8 @@ size of the history.  Datasets that may hold nothing but rounding errors have an
 (`SCALE_NAMES`).  Integers (steps, node and equation numbers) and texts must be equal.  NaN equals
 NaN, and an infinity the same infinity; either differs from anything else at any tolerance.
 
+Numbers of tapes are by default equal if they differ by at most one unit of the last printed digit.
+
 Datasets are read in blocks of rows: memory does not grow with the results.
 """
 
@@ -26,7 +28,7 @@ from fecm._typing import Array
 from fecm.deck.records import DOF_NAMES
 from fecm.results.hdf5_reader import Contents, read
 from fecm.results.schema import CONTACT, DATASETS, FORMAT, SCALES, SWEEP, row_blocks, suggestion
-from fecm.results.tapes import CURVATURES, SHEARS, TAPES, TapeText, W, read_tapes
+from fecm.results.tapes import CURVATURES, SHEARS, TAPES, TapeText, W, last_digit, read_tapes
 
 ON_TAPE = {
     W, *(f"tape8/{name}" for name in (*CURVATURES, *SHEARS["tape8"])),
@@ -69,6 +71,7 @@ class Comparison:
     maximum: float = 0.0  # largest finite absolute value in both
     scale: float = 0.0  # of the differences: `maximum` except for `SCALE_NAMES`
     tolerance: float = 0.0  # largest difference of equal numbers
+    to_last_digit: bool = False  # whether that of smaller numbers is smaller: their last digit
     largest: float = 0.0  # largest difference; infinite if only one of two numbers is finite
     # Its place: index, step, time and names of other indices; None if all is equal.
     at: dict[str, Any] | None = None
@@ -124,6 +127,7 @@ class Difference:
     # Attributes and texts that differ, which are not judged: name, a, b, line.
     listed: list[dict[str, Any]]
     excluded: list[str]  # datasets that were not compared
+    to_last_digit: bool = False  # whether numbers of tapes are compared to their last digit
 
     @property
     def same(self) -> bool:
@@ -134,8 +138,8 @@ class Difference:
 def difference(
     a: Path,
     b: Path,
-    rtol: float = 0.0,
-    atol: float = 0.0,
+    rtol: float | None = None,
+    atol: float | None = None,
     only: Sequence[str] = (),
     exclude: Sequence[str] = (),
     own: Sequence[tuple[str, Sequence[float]]] = (),
@@ -143,7 +147,7 @@ def difference(
     """Compare two results: files, or folders of tapes.
 
     Two numbers are equal if they differ by at most `rtol` times the dataset's scale plus `atol` (in
-    its unit).  `only` and `exclude` are datasets, groups, or patterns of their names.  `own` are
+    its unit); without both, exactly, or those of tapes to their last digit.  `only` and `exclude` are datasets, groups, or patterns of their names.  `own` are
     such names, each with ``(rtol,)`` or ``(rtol, atol)`` instead of the general ones; of several
     that match, the last one holds.
 
@@ -165,20 +169,23 @@ def difference(
     chosen = asked - excluded
     if excluded and not chosen:
         raise IncomparableError("every dataset is excluded")
-    tolerances = dict.fromkeys(chosen, (rtol, atol))
+    to_last_digit = TAPES in forms and rtol is None and atol is None
+    general = None if to_last_digit else (rtol or 0.0, atol or 0.0)
+    tolerances = dict.fromkeys(chosen, general)
     for pattern, (relative, *absolute) in own:
         for path in _chosen(both, [pattern], DATASETS) & chosen:
-            tolerances[path] = (relative, absolute[0] if absolute else atol)
+            tolerances[path] = (relative, absolute[0] if absolute else atol or 0.0)
     with contextlib.ExitStack() as stack:
         for source in (left, right):
             if isinstance(source, Contents):
                 stack.enter_context(source.held())
         pair = left, right
         return Difference(
-            [_compare(pair, path, *tolerances[path]) for path in sorted(in_a & in_b & chosen)],
+            [_compare(pair, path, tolerances[path]) for path in sorted(in_a & in_b & chosen)],
             (sorted((in_a - in_b) & chosen), sorted((in_b - in_a) & chosen)),
             _listed(*pair),
             sorted(excluded),
+            to_last_digit,
         )
 
 
@@ -235,8 +242,10 @@ def _attributes(source: Contents) -> dict[str, Any]:
     }
 
 
-def _compare(sources: tuple[Source, Source], path: str, rtol: float, atol: float) -> Comparison:
-    """Compare a dataset that both sources have."""
+def _compare(
+    sources: tuple[Source, Source], path: str, tolerances: tuple[float, float] | None
+) -> Comparison:
+    """Compare a dataset of both sources, by rtol and atol, or to the last digit of tapes."""
     found = Comparison(path, sources)
     if found.comparable and found.holds_texts:
         left, right = (source.rows(path, 0, source.shapes[path][0]) for source in sources)
@@ -249,8 +258,13 @@ def _compare(sources: tuple[Source, Source], path: str, rtol: float, atol: float
         infinite = _measure(found)
         integers = all(source.dtypes[path].kind in "biu" for source in sources)
         found.scale = _scale(found)
-        found.tolerance = 0.0 if integers else atol + rtol * found.scale
-        if infinite or found.largest > found.tolerance:
+        if tolerances is None:
+            found.tolerance = float(last_digit(np.array(found.maximum)))
+            found.to_last_digit = True
+        elif not integers:
+            rtol, atol = tolerances
+            found.tolerance = atol + rtol * found.scale
+        if infinite or found.largest > (0.0 if found.to_last_digit else found.tolerance):
             _count(found)
     return found
 
@@ -323,7 +337,12 @@ def _count(found: Comparison) -> None:
     instants = found.shapes[0] and (_clock(found) or found.path.startswith("tape"))
     for start, left, right in found.blocks():
         apart, strange = _differences(left, right)
-        wrong = strange | (apart > found.tolerance)
+        tolerance: Any = found.tolerance
+        if found.to_last_digit:
+            pairs = zip(found.sources, (left, right), strict=True)
+            printed = [last_digit(values) for one, values in pairs if isinstance(one, TapeText)]
+            tolerance = (1.0 + 1e-9) * np.max(printed, axis=0)
+        wrong = strange | (apart > tolerance)
         found.differing += int(np.count_nonzero(wrong))
         if found.first is None and wrong.any() and instants:
             row = int(wrong.reshape(len(wrong), -1).any(axis=1).argmax())

@@ -28,6 +28,7 @@ from fecm.results.schema import CONTACT, ResultFileError
 TAPES = "tapes"  # form of a folder of tapes, as `Contents.form` of a file
 NAMES = ("tape3", "tape8", "tape9")
 WIDTH = 12  # characters per number
+DIGITS = 4  # of them
 PER_LINE = 6  # numbers per line without labels
 SHEARS = {"tape8": ("gamma_yz", "gamma_xz"), "tape9": ("gamma_xz", "gamma_yz")}
 W = "tape3/w"
@@ -51,6 +52,14 @@ def fortran_e(value: float) -> str:
     # A three-digit exponent has no letter.
     mark = f"E{exponent:+03d}" if abs(exponent) < 100 else f"{exponent:+04d}"
     return f"{sign}0.{digits}{mark}".rjust(WIDTH)
+
+
+def last_digit(values: Floats) -> Floats:
+    """One unit of the last printed digit of numbers on a tape; 0 of zeros and what is not finite."""
+    size = np.abs(values)
+    known = np.isfinite(values) & (size > 0.0)
+    power = np.floor(np.log10(np.where(known, size, 1.0)) + 1e-9) + 1.0
+    return np.where(known, 10.0 ** (power - DIGITS), 0.0)
 
 
 def _lines(table: Floats) -> Iterator[str]:
