@@ -419,7 +419,7 @@ def test_a_command_notes_failed_cases(plane: SweepResult, tmp_path: Path) -> Non
         ("plane.h5", ("copy/plane.h5",), "one result; 2 were given"),
         ("plane.h5", ("--over", "q"), "plane has no parameter q"),
         ("plane.h5", ("--quantity", "status"), "unknown quantity status"),
-        ("deck.inp", ("--kind", "map"), "not a readable HDF5 file"),
+        ("deck.inp", ("--kind", "map"), "is a deck, not a result; `fecm run "),
     ],
 )
 def test_a_call_that_makes_no_map_is_refused_in_one_line(

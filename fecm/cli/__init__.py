@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
 import click
 
-from fecm._errors import FecmError
+from fecm._errors import FecmError, did_you_mean
 from fecm._version import __version__
 from fecm.cli import common, isolation
 from fecm.cli.common import INTERRUPTED, SIGNALLED, UNUSABLE, echo, signals
@@ -70,6 +70,15 @@ class LazyGroup(click.Group):
         found: click.Command = getattr(import_module(command.module), cmd_name)
         return found
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find a command; of an unknown one, name the most similar."""
+        name = args[0]
+        if not (name in COMMANDS or name.startswith("-") or ctx.resilient_parsing):
+            ctx.fail(f"there is no command {name!r}{did_you_mean(name, COMMANDS)}")
+        return super().resolve_command(ctx, args)
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands with their summaries."""
         with formatter.section("Commands"):
@@ -121,8 +130,9 @@ def _status(arguments: Sequence[str] | None, prog_name: str) -> int:
             echo(error.message, err=True)  # the name of a command is missing
         else:
             line = " ".join(error.format_message().split()).rstrip(".")
-            see = "" if context is None else f"; see {context.command_path} --help"
-            echo(f"fecm: error: {line}{see}", err=True)
+            see = "" if context is None else f"see {context.command_path} --help"
+            end = f" ({see})" if line.endswith("?") else f"; {see}"
+            echo(f"fecm: error: {line}{end if see else ''}", err=True)
         return error.exit_code
     except (KeyboardInterrupt, click.Abort):
         echo("fecm: interrupted", err=True)

@@ -11,7 +11,7 @@ from fecm.cli.common import DASH, DECK_PATH, FILE_PATH, FORMAT_OPTION, NO, echo,
 from fecm.cli.decks import load_single
 from fecm.cli.outputs import OutputPaths, write_lines
 from fecm.cli.rod import FILTER_HELP
-from fecm.cli.types import Parsed, list_of
+from fecm.cli.types import OneOf, Parsed, list_of
 from fecm.deck.units import unit_names, unit_of
 from fecm.studies.comparison import measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of
@@ -21,7 +21,7 @@ from fecm.sweeps.identify import FREE, fit
 @click.command()
 @click.argument("deck", type=DECK_PATH)
 @click.argument("measured", type=DECK_PATH, metavar="MEASURED.csv")
-@option("--free", type=list_of("NAME,...", click.Choice(FREE)), required=True,
+@option("--free", type=list_of("NAME,...", OneOf(FREE)), required=True,
         help=f"Parameters to fit: {', '.join(FREE)}.")  # fmt: skip
 @option("--filter", "sensor", type=Parsed(filter_of, "FILTER"),
         help="Filter of the measurement, which the computed force passes too: "

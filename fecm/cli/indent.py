@@ -15,7 +15,7 @@ from click import option
 from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError, echo, note
 from fecm.cli.laminate_options import laminate_options, ply_of_options
 from fecm.cli.outputs import OutputPaths, outputs
-from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, list_of, stacked
+from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, OneOf, list_of, stacked
 from fecm.deck import catalogue
 from fecm.deck.catalogue import CONTACTS, SYSTEM, SYSTEMS, NamedPly
 from fecm.deck.model import Deck, Indentation
@@ -277,7 +277,7 @@ def estimate(
 
 
 @indent.command()
-@click.argument("name", type=click.Choice(list(CONTACTS)), metavar="[NAME]", required=False)
+@click.argument("name", type=OneOf(list(CONTACTS)), metavar="[NAME]", required=False)
 @option("--units", type=click.Choice(list(SYSTEMS)), default=SYSTEM, show_default=True,
         help="Units of the parameters.")  # fmt: skip
 @FORMAT_OPTION

@@ -32,7 +32,7 @@ def laminate_options(*, required: bool) -> Callable[[Decorated], Decorated]:
                help="Thickness of a ply."),
         option("--ply", type=list_of("RHO,NU12,E1,E2,G12,G13,G23", Finite(), [7]),
                help="Density and moduli of a ply."),
-        option("--material", callback=_named, metavar="NAME",
+        option("--material", callback=_named, type=Parsed(str, "NAME", MATERIALS),
                help="Named ply, instead of --ply; `fecm materials` lists them."),
         option("--materials", "file", type=PLIES, is_eager=True, expose_value=False,
                callback=lambda context, _, plies: context.meta.update({_META: plies or {}}),

@@ -22,10 +22,12 @@ from fecm.cli.common import (
     progress,
 )
 from fecm.cli.isolation import reads
-from fecm.cli.types import Finite, Parsed, assignment, list_of
+from fecm.cli.types import Finite, OneOf, Parsed, assignment, list_of
+from fecm.mechanics.failure import CRITERIA
 from fecm.plot.kinds import KINDS, LackingError, Picture
 from fecm.plot.pictures import check_options, check_suffix, draw, options_of, save
 from fecm.results.hdf5_reader import read
+from fecm.results.metrics import COLUMNS
 from fecm.results.result import Result, result_of
 from fecm.results.schema import FORMAT, SWEEP, printable
 
@@ -45,7 +47,7 @@ def _by_name(_: Any, __: Any, pairs: tuple[tuple[str, str], ...]) -> dict[str, s
 
 @click.command(short_help="Draw the report's figures, or the map of a sweep.")
 @click.argument("results", type=DECK_PATH, nargs=-1, required=True, metavar="RESULT...")
-@option("--kind", "kinds", type=click.Choice(list(KINDS)), multiple=True, metavar="KIND",
+@option("--kind", "kinds", type=OneOf(list(KINDS)), multiple=True, metavar="KIND",
         help=f"Picture to draw; may be repeated.  {_KIND_HELP}.  [default: force; map of a sweep, "
              "exceedance of a random one]")  # fmt: skip
 @option("-o", "--output", type=FILE_PATH, metavar="PATH",
@@ -70,7 +72,7 @@ def _by_name(_: Any, __: Any, pairs: tuple[tuple[str, str], ...]) -> dict[str, s
 @option("--along", type=click.Choice(["x", "y"]), help="Direction of line.  [default: x]")
 @option("--width", type=click.Choice(["column", "full"]),
         help="3.5 in, or 7.2 in.  [default: column]")  # fmt: skip
-@option("--quantity", metavar="NAME",
+@option("--quantity", type=Parsed(str, "NAME", (*COLUMNS, *CRITERIA)),
         help="Quantity of a sweep: a name of its summary; of failure: a criterion.  [default: "
              "peak_force, found_velocity; the largest of all]")  # fmt: skip
 @option("--over", type=list_of("NAME or NAME,NAME", click.STRING, [1, 2]), metavar="NAME[,NAME]",

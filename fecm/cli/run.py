@@ -15,7 +15,7 @@ from fecm.api import numbered
 from fecm.cli import common
 from fecm.cli.common import CheckFailedError, RefusedError, echo, note, signals
 from fecm.cli.decks import load_valid
-from fecm.cli.types import POSITIVE, Finite
+from fecm.cli.types import POSITIVE, Finite, OneOf
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.projectile import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
 from fecm.mechanics.solutions import SingularStiffnessError
@@ -41,7 +41,7 @@ from fecm.simulation.simulation import Simulation
 @option("-o", "--output", type=common.FILE_PATH, metavar="OUT.h5",
         help="Result file.  [default: the deck's name with .h5, in this folder]")  # fmt: skip
 @common.MODE_OPTION
-@option("--slip", "slips", type=click.Choice(NAMES), multiple=True, metavar="NAME",
+@option("--slip", "slips", type=OneOf(NAMES), multiple=True, metavar="NAME",
         help="Add a single slip of the program to report mode; may be repeated.  Names: "
              f"{', '.join(NAMES)}.")  # fmt: skip
 @option("--overwrite", is_flag=True,

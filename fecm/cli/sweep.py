@@ -12,7 +12,7 @@ from fecm._files import check_outputs
 from fecm.api import load_deck
 from fecm.cli.common import DECK_PATH, FILE_PATH, NO, RefusedError, echo, note, progress, signals
 from fecm.cli.decks import count_findings
-from fecm.cli.types import Parsed, list_of
+from fecm.cli.types import OneOf, Parsed, list_of
 from fecm.deck.findings import DeckError
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
@@ -27,10 +27,12 @@ from fecm.sweeps.random_result import tables
 from fecm.sweeps.result import SweepResult, save, summary, verdict
 from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_in
 
+NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
+
 
 @click.command()
 @click.argument("deck", type=DECK_PATH)
-@option("--vary", "varied", type=Parsed(inputs.parse_vary, "NAME=VALUES"), multiple=True,
+@option("--vary", "varied", type=Parsed(inputs.parse_vary, "NAME=VALUES", NAMED), multiple=True,
         help="FROM:TO:N or A,B,C; may be repeated, for a full grid.  Names: "
              f"{', '.join(inputs.NAMES)}.")  # fmt: skip
 @option("--cases", "table", type=DECK_PATH, metavar="CASES.csv",
@@ -38,7 +40,7 @@ from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_i
 @option("--refine", "factors", type=list_of("FACTOR,...", click.IntRange(1, 8)), metavar="1,2,4",
         help="Instead: divide the sides of all elements and DT by factors; order and limit of "
              "every quantity.")  # fmt: skip
-@option("--random", "laws", type=Parsed(inputs.parse_random, "NAME=LAW"), multiple=True,
+@option("--random", "laws", type=Parsed(inputs.parse_random, "NAME=LAW", NAMED), multiple=True,
         help="Random value: normal:MEAN,SD, lognormal:MEDIAN,SIGMA, uniform:A,B or "
              "triangular:A,MODE,B; may be repeated, together with --vary.")  # fmt: skip
 @option("--samples", type=int, metavar="N", help="Number of samples of --random.")
@@ -59,7 +61,7 @@ from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_i
 @option("-o", "--output", type=FILE_PATH, metavar="SWEEP.h5",
         help="Result file.  [default: the deck's name with -sweep.h5, in this folder]")  # fmt: skip
 @option("--history", is_flag=True, help="Also store the contact force of every step.")
-@option("--measure", "extra", type=list_of("NAME,...", click.Choice(plans.MEASURES)), default=(),
+@option("--measure", "extra", type=list_of("NAME,...", OneOf(plans.MEASURES)), default=(),
         help=f"Also store {', '.join(plans.MEASURES)}: the largest deflection, strains of gages "
              "(GAGE), exposures (FAIL).")  # fmt: skip
 @option("--full", type=list_of("CASE,...", click.IntRange(min=0)),

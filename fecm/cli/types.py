@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+from fecm._errors import did_you_mean
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 Decorated = Callable[..., None]
 
@@ -50,13 +55,16 @@ NOT_NEGATIVE = Finite(min=0.0)
 class Parsed(click.ParamType):  # type: ignore[type-arg]
     """Result of a function of the text, whose ValueError is the message of the option.
 
-    The form, as in ``X,Y``, is for help pages.
+    The form, as in ``X,Y``, is for help pages, the values for the shell's completion: of the whole
+    text, or of the part after the last comma of a list.
     """
 
     name = "text"
 
-    def __init__(self, function: Callable[[Any], Any], form: str) -> None:
-        self._function, self._form = function, form
+    def __init__(
+        self, function: Callable[[Any], Any], form: str, values: Iterable[str] = ()
+    ) -> None:
+        self._function, self._form, self._values = function, form, values
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
         """Form of the value."""
@@ -68,6 +76,29 @@ class Parsed(click.ParamType):  # type: ignore[type-arg]
             return self._function(value)
         except ValueError as error:
             self.fail(str(error), param, ctx)
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Complete a value."""
+        from click.shell_completion import CompletionItem
+
+        done, comma, begun = incomplete.rpartition(",")
+        return [
+            CompletionItem(f"{done}{comma}{value}")
+            for value in self._values
+            if value.startswith(begun)
+        ]
+
+
+class OneOf(click.Choice):  # type: ignore[type-arg]
+    """One of many names; the message about another one says which is similar."""
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        """Read the name."""
+        if hint := value not in self.choices and did_you_mean(value, map(str, self.choices)):
+            self.fail(f"there is no {value!r}{hint}", param, ctx)
+        return super().convert(value, param, ctx)
 
 
 def list_of(form: str, item: Any, counts: Sequence[int] = (), separator: str = ",") -> Parsed:
@@ -87,7 +118,7 @@ def list_of(form: str, item: Any, counts: Sequence[int] = (), separator: str = "
         except click.BadParameter as error:
             raise ValueError(f"{text!r} is not of the form {form}: {error.message}") from None
 
-    return Parsed(read, form)
+    return Parsed(read, form, getattr(item, "choices", ()))
 
 
 def file_of(parse: Callable[[str], Any]) -> Parsed:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from fecm._errors import did_you_mean
+
 # What is in each file.
 CONTENTS = {
     "impact-115.inp": "the report's experiment at 115 in/s, with a contact patch (lbf, in, s)",
@@ -50,4 +52,6 @@ def path(name: str) -> Path:
     for known in CONTENTS:
         if name in (known, Path(known).stem):
             return Path(__file__).parent / known
-    raise ValueError(f"there is no example {name!r}; there are {', '.join(CONTENTS)}")
+    stems = [Path(known).stem for known in CONTENTS]
+    others = did_you_mean(name, [*CONTENTS, *stems]) or f"; there are {', '.join(CONTENTS)}"
+    raise ValueError(f"there is no example {name!r}{others}")

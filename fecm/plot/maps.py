@@ -13,7 +13,7 @@ from matplotlib.colors import BoundaryNorm, Normalize
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from fecm._errors import warn
+from fecm._errors import did_you_mean, warn
 from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.plot import style
@@ -219,7 +219,8 @@ def quantity_of(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axi
     quantity = quantity or ("found_velocity" if "found_velocity" in sweep.summary else "peak_force")
     known = [name for name in sweep.summary if name != "status"]
     if quantity not in known:
-        raise PlotError(f"unknown quantity {quantity}; the sweep has {_listed(known)}")
+        others = did_you_mean(quantity, known) or f"; the sweep has {_listed(known)}"
+        raise PlotError(f"unknown quantity {quantity}{others}")
     status, values = sweep["status"][rows], sweep[quantity][rows].astype(float)
     run, still = np.isin(status, RUN), status == STILL
     values = np.where(run, values, np.nan)

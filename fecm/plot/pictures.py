@@ -15,7 +15,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from fecm._errors import FecmError
+from fecm._errors import FecmError, did_you_mean
 from fecm._files import beside
 from fecm.plot.kinds import KINDS, MISSING, Kind, MatplotlibError, Picture, PlotError
 from fecm.results.result import Result
@@ -34,7 +34,8 @@ RunKind = Literal[
 def kind_named(name: str) -> Kind:
     """Return the kind of this name, or raise a PlotError."""
     if name not in KINDS:
-        raise PlotError(f"unknown kind of picture {name!r}; the kinds are {', '.join(KINDS)}")
+        others = did_you_mean(name, KINDS) or f"; the kinds are {', '.join(KINDS)}"
+        raise PlotError(f"unknown kind of picture {name!r}{others}")
     return KINDS[name]
 
 

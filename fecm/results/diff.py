@@ -147,9 +147,9 @@ def difference(
     """Compare two results: files, or folders of tapes.
 
     Two numbers are equal if they differ by at most `rtol` times the dataset's scale plus `atol` (in
-    its unit); without both, exactly, or those of tapes to their last digit.  `only` and `exclude` are datasets, groups, or patterns of their names.  `own` are
-    such names, each with ``(rtol,)`` or ``(rtol, atol)`` instead of the general ones; of several
-    that match, the last one holds.
+    its unit); without both, exactly, or those of tapes to their last digit.  `only` and `exclude`
+    are datasets, groups, or patterns of their names.  `own` are such names, each with ``(rtol,)``
+    or ``(rtol, atol)`` instead of the general ones; of several that match, the last one holds.
 
     Raises IncomparableError if only one is the result of a sweep, if `only` matches no dataset of
     the results, if another pattern matches neither that nor one that a result can have, or if

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import re
 from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
@@ -29,6 +30,8 @@ LINKS = {
     h5py.h5l.TYPE_SOFT: "a soft link to another object",
     h5py.h5l.TYPE_EXTERNAL: "an external link to another file",
 }
+FIRST = 4096  # number of bytes that identify a deck
+DECK = re.compile(rb"\A[^\0]*^ *FECM\b", re.IGNORECASE | re.MULTILINE)
 PACKED = 2000  # upper bound of the compression of HDF5's filters; deflate reaches 1032
 
 
@@ -134,8 +137,9 @@ def read(path: Path, *forms: str) -> Contents:
     path = Path(path)
     if path.exists() and not (path.is_file() or path.is_dir()):
         raise ResultFileError(f"{path}: not a regular file")
-    with path.open("rb"):
-        pass  # raises the error of a missing or forbidden file
+    with path.open("rb") as opened:  # raises the error of a missing or forbidden file
+        if DECK.search(opened.read(FIRST)):
+            raise ResultFileError(f"{path} is a deck, not a result; `fecm run {path}` makes one")
     with _troubles(path), h5py.File(path) as file:
         attributes, forms = _attributes(file), forms or (FORMAT,)
         form, version = attributes.get("format"), attributes.get("format_version")

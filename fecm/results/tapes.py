@@ -55,7 +55,7 @@ def fortran_e(value: float) -> str:
 
 
 def last_digit(values: Floats) -> Floats:
-    """One unit of the last printed digit of numbers on a tape; 0 of zeros and what is not finite."""
+    """One unit of the last printed digit of numbers on a tape; 0 where it is zero or not finite."""
     size = np.abs(values)
     known = np.isfinite(values) & (size > 0.0)
     power = np.floor(np.log10(np.where(known, size, 1.0)) + 1e-9) + 1.0

@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from fecm._errors import FecmError
+from fecm._errors import FecmError, did_you_mean
 from fecm._typing import Floats
 from fecm.deck.grid import SUPPORTS
 from fecm.results.metrics import COLUMNS
@@ -243,7 +243,8 @@ def _known(name: str, where: str, free: bool = False) -> None:
     if fault := name_fault(name) if free else "":
         raise CasesError(f"{where}: {fault}")
     if not free and name not in NAMES:
-        raise CasesError(f"{where}: `{name}` cannot be varied; the names are {', '.join(NAMES)}")
+        others = did_you_mean(name, NAMES) or f"; the names are {', '.join(NAMES)}"
+        raise CasesError(f"{where}: `{name}` cannot be varied{others}")
 
 
 def _number(name: str, text: str) -> float:
