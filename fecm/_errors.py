@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Iterable
+
+PACKAGE = __file__.removesuffix("_errors.py")  # folder of this package
 
 
 class FecmError(Exception):
@@ -31,5 +34,8 @@ class FecmWarning(UserWarning):
 
 
 def warn(text: str) -> None:
-    """Warn with a :class:`FecmWarning` of the caller's caller."""
-    warnings.warn(FecmWarning(text), stacklevel=3)
+    """Warn with a :class:`FecmWarning` of the first caller outside this package."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(FecmWarning(text), stacklevel=level)

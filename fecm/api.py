@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import logging
-import warnings
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import BinaryIO, Literal
 
-from fecm._errors import FecmWarning
+from fecm._errors import warn
 from fecm._frozen import frozen
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.model import Deck
@@ -210,7 +209,7 @@ def _run(
     deck: str | Path | Deck, mode: str, force: bool, choices: RunOptions,
     output: str | Path | None, progress: Progress | None, *, one: bool,
 ) -> list[Result]:  # fmt: skip
-    """Run the problems of a deck; warn as the caller's caller."""
+    """Run the problems of a deck; warn of what is doubtful."""
     prepared = load_deck(deck, mode)
     if prepared.errors(force):
         raise DeckError(prepared.findings, prepared.source)
@@ -219,7 +218,7 @@ def _run(
     found = tuple(finding for finding in prepared.findings if finding.severity != "error")
     for finding in found:
         if finding.severity == "warning":
-            warnings.warn(FecmWarning(finding.render(prepared.source)), stacklevel=3)
+            warn(finding.render(prepared.source))
     results: list[Result] = []
     for number, problem in enumerate(prepared.problems, start=1):
         check_memory(problem, solver=choices.solver, in_memory=output is None)
@@ -230,7 +229,7 @@ def _run(
         LOGGER.info("%s: done", title)
         result.findings = found
         for note in result.notes:
-            warnings.warn(FecmWarning(note), stacklevel=3)
+            warn(note)
         results.append(result)
     return results
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Literal
 
 from fecm import objects
-from fecm._errors import FecmWarning
+from fecm._errors import warn
 from fecm._frozen import frozen
 from fecm.api import load_deck
 from fecm.deck import catalogue, model
@@ -141,7 +140,7 @@ def impact(
     if errors := loaded.errors():
         raise DeckError(errors, "<deck>")
     for doubt in made.doubts:
-        warnings.warn(FecmWarning(doubt), stacklevel=2)
+        warn(doubt)
     return replace(loaded.problems[0].deck, text="")
 
 

@@ -20,7 +20,14 @@ import h5py
 import numpy as np
 
 from fecm._typing import Array
-from fecm.results.schema import FORMAT, FORMAT_VERSION, SWEEP, NotStoredError, ResultFileError
+from fecm.results.schema import (
+    FORMAT,
+    FORMAT_VERSION,
+    SWEEP,
+    NotStoredError,
+    ResultFileError,
+    not_stored,
+)
 
 ELEMENTS, COORDINATES = "mesh/elements", "mesh/coordinates"
 
@@ -76,7 +83,7 @@ class Contents(Mapping[str, Array]):
 
     def __getitem__(self, key: str) -> Array:
         if key not in self.shapes:
-            raise NotStoredError(f"{self.path}: there is no {key} in this result")
+            raise NotStoredError(f"{self.path}: {not_stored(key, self.shapes)}")
         if key in self.lists:
             return np.array(self.lists[key])
         if key not in self._read:

@@ -415,7 +415,10 @@ class Result(schema.Contact):
         return compare(self, measurement_of(measured, declared_units(self.attributes)))
 
     def __getitem__(self, path: str) -> Array:
-        return np.asarray(self._arrays[path.strip("/")])
+        name = path.strip("/")
+        if name not in self._arrays:
+            raise NotStoredError(schema.not_stored(name, self._arrays))
+        return np.asarray(self._arrays[name])
 
     def __contains__(self, path: str) -> bool:
         return path.strip("/") in self._arrays
@@ -433,7 +436,7 @@ class Result(schema.Contact):
                 return self._arrays[f"{HISTORY}/{name}"]
             if any(path.startswith(f"{name}/") for path in self._arrays):
                 return schema.group(name, self._arrays, self._groups)
-            raise NotStoredError(f"there is no {name} in this result")
+            raise NotStoredError(schema.not_stored(name, self._arrays))
 
     def __dir__(self) -> list[str]:
         heads = {path.partition("/")[0] for path in self._arrays}

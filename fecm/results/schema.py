@@ -8,7 +8,7 @@ The annotations of a group serve type checkers, editors and :data:`DATASETS`.
 
 import math
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -71,6 +71,16 @@ def suggestion(asked: str, paths: Iterable[str]) -> str:
         return f"; did you mean {' or '.join(alike)}?"
     groups = sorted({name.partition("/")[0] for name in known})
     return f"; there are {', '.join(groups)}" if groups else ""
+
+
+def not_stored(asked: str, paths: Collection[str]) -> str:
+    """Message about a path that is no dataset of a result: what is, or what stores it."""
+    if members := sorted(path for path in paths if path.startswith(f"{asked}/")):
+        return f"{asked} is a group, not a dataset; its datasets are {', '.join(members)}"
+    group = asked.partition("/")[0]
+    known = any(path.startswith(f"{group}/") for path in paths)
+    more = suggestion(asked, paths) if known else remedy(asked) or suggestion(asked, paths)
+    return f"there is no {asked} in this result{more}"
 
 
 def jsonable(value: Any) -> Any:
@@ -172,7 +182,7 @@ class Group:
                     return self._arrays[path]
                 if any(other.startswith(f"{path}/") for other in self._arrays):
                     return group(path, self._arrays, self._attributes)
-            raise NotStoredError(f"there is no {self._name}/{name} in this result")
+            raise NotStoredError(not_stored(f"{self._name}/{name}", self._arrays))
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *{name.partition("/")[0] for name in self._shapes()}]

@@ -312,6 +312,7 @@ def indices(values: Floats, seed: int) -> Indices:
     """
     m, rows, n = values.shape
     d = rows - 2
+    values = np.where(np.isfinite(values), values, np.nan)
     flat = values.reshape(m, -1)
     with np.errstate(invalid="ignore"):
         varies = np.ptp(flat[:, : 2 * n], axis=1) > ROUNDING * np.abs(flat).max(axis=1)
@@ -324,8 +325,9 @@ def indices(values: Floats, seed: int) -> Indices:
 
     def ratios(means: Floats) -> Floats:
         """First-order and total indices (..., m, 2 d) from means (..., m, 2 + 2 d)."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(means[..., 2:] / (means[..., 1] - means[..., 0] ** 2)[..., None])
+        variance = means[..., 1] - means[..., 0] ** 2
+        variance = np.where(variance > 0.0, variance, np.nan)  # else there are no indices
+        return np.asarray(means[..., 2:] / variance[..., None])
 
     generator = np.random.default_rng([seed, 1])
     step = max(1, COUNTS // n)

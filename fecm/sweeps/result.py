@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._errors import did_you_mean
 from fecm._tables import html_table
 from fecm._version import __version__
 from fecm.deck.model import Delamination
@@ -170,7 +171,13 @@ class SweepResult:
 
     def __getitem__(self, name: str) -> Array:
         """Values or results of every case, by name."""
-        return self.cases[name] if name in self.cases else self.summary[name]
+        if name in self.cases:
+            return self.cases[name]
+        if name not in self.summary:
+            names = [*self.cases, *self.summary]
+            others = did_you_mean(name, names) or f"; there are {', '.join(names)}"
+            raise schema.NotStoredError(f"there is no {name} in this sweep{others}")
+        return self.summary[name]
 
     @property
     def fine(self) -> NDArray[np.bool_]:
