@@ -20,6 +20,7 @@ from fecm._version import __version__
 from fecm.api import LoadedDeck, load_deck
 from fecm.cli import common
 from fecm.cli.common import DASH, FILE_PATH, CheckFailedError, RefusedError, echo, echo_json
+from fecm.cli.help import typical
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.format import format_deck
 from fecm.deck.reader import load_text
@@ -86,7 +87,13 @@ def _failures(decks: Sequence[Path], work: Callable[[Path], None]) -> list[Excep
     return failed
 
 
-@click.command(short_help="Check decks without running them, and summarise them.")
+@click.command(
+    short_help="Check decks without running them, and summarise them.",
+    epilog=typical(
+        "fecm check impact-115.inp",
+        "fecm check impact-115.inp --mesh-error --strict",
+    ),
+)
 @DECKS
 @common.MODE_OPTION
 @option("--format", "form", type=click.Choice(["text", "json", "sarif"]), default="text",
@@ -219,7 +226,13 @@ def _location(deck: Path, finding: Finding) -> dict[str, Any]:
     return {"artifactLocation": {"uri": uri}, "region": region}
 
 
-@click.command(short_help="Align the columns of decks.")
+@click.command(
+    short_help="Align the columns of decks.",
+    epilog=typical(
+        "fecm fmt impact-115.inp -o aligned.inp",
+        "fecm fmt impact-115.inp --check",
+    ),
+)
 @DECKS
 @option("-o", "--output", type=FILE_PATH, metavar="FILE",
         help="File to write; - is standard output.  [default: DECK itself]")  # fmt: skip

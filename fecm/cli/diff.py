@@ -11,6 +11,7 @@ import click
 from click import option
 
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, echo_json
+from fecm.cli.help import typical
 from fecm.cli.isolation import reads
 from fecm.cli.types import NOT_NEGATIVE, Parsed, assignment, file_of
 from fecm.results.diff import SCALE_NAMES, Comparison, Difference, difference
@@ -53,7 +54,12 @@ def _tolerances(text: str) -> dict[str, Any]:
     return {"rtol": rtol, "atol": atol, "exclude": exclude, "own": tolerances}
 
 
-@click.command()
+@click.command(
+    epilog=typical(
+        "fecm diff a.h5 b.h5 --rtol 1e-6",
+        "fecm diff a.h5 tapes --only tape9/force",
+    )
+)
 @click.argument("a", type=FILE_PATH)
 @click.argument("b", type=FILE_PATH)
 @option("--rtol", type=NOT_NEGATIVE, metavar="R",

@@ -10,6 +10,7 @@ import click
 from fecm._tables import aligned
 from fecm.cli.common import DECK_PATH, FORMAT_OPTION, echo, echo_json, note
 from fecm.cli.decks import load_single
+from fecm.cli.help import typical
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.studies.estimate import estimate as estimate_problem
 from fecm.sweeps.api import carry_out
@@ -22,7 +23,12 @@ COLUMNS = {
 }  # fmt: skip
 
 
-@click.command()
+@click.command(
+    epilog=typical(
+        "fecm estimate drop-weight.inp",
+        "fecm estimate impact-115.inp --format json",
+    )
+)
 @click.argument("deck", type=DECK_PATH)
 @FORMAT_OPTION
 def estimate(deck: Path, form: str) -> None:

@@ -9,10 +9,17 @@ import click
 from fecm import examples
 from fecm._files import check_outputs
 from fecm.cli.common import DASH, FILE_PATH, echo, write_text
+from fecm.cli.help import typical
 from fecm.cli.types import Parsed
 
 
-@click.command(short_help="List the example decks and tables, or write one.")
+@click.command(
+    short_help="List the example decks and tables, or write one.",
+    epilog=typical(
+        "fecm example",
+        "fecm example impact-115.inp",
+    ),
+)
 @click.argument("name", type=Parsed(str, "NAME", examples.CONTENTS), required=False)
 @click.option("-o", "--output", type=FILE_PATH, metavar="FILE",
               help="File to write; - is standard output.  [default: NAME]")  # fmt: skip

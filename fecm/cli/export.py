@@ -8,6 +8,7 @@ import click
 
 from fecm._files import check_outputs
 from fecm.cli.common import DASH, DECK_PATH, FILE_PATH, RefusedError, echo, note
+from fecm.cli.help import typical
 from fecm.cli.isolation import reads
 from fecm.cli.outputs import write_lines
 from fecm.results import csv
@@ -18,7 +19,12 @@ from fecm.results.tapes import tape_texts, write_tapes
 from fecm.results.vtkhdf import write_vtkhdf
 
 
-@click.command()
+@click.command(
+    epilog=typical(
+        "fecm tapes impact-115.h5",
+        "fecm tapes impact-115.h5 -d tapes",
+    )
+)
 @click.argument("result", type=DECK_PATH)
 @click.option("-d", "--directory", type=FILE_PATH, default=Path(), metavar="DIR",
               help="Folder for the tapes.  [default: this folder]")  # fmt: skip
@@ -35,7 +41,12 @@ def tapes(result: Path, directory: Path, overwrite: bool) -> None:
         echo(path)
 
 
-@click.command()
+@click.command(
+    epilog=typical(
+        "fecm export impact-115.h5 --to vtkhdf",
+        "fecm export impact-115.h5 --to csv --dataset energy",
+    )
+)
 @click.argument("result", type=DECK_PATH)
 @click.option("--to", "target", type=click.Choice(["vtkhdf", "csv"]), required=True,
               help="vtkhdf for ParaView and VTK, csv for spreadsheets.")  # fmt: skip

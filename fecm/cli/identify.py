@@ -9,6 +9,7 @@ from click import option
 
 from fecm.cli.common import DASH, DECK_PATH, FILE_PATH, FORMAT_OPTION, NO, echo, echo_json, note
 from fecm.cli.decks import load_single
+from fecm.cli.help import typical
 from fecm.cli.outputs import OutputPaths, write_lines
 from fecm.cli.rod import FILTER_HELP
 from fecm.cli.types import OneOf, Parsed, list_of
@@ -18,7 +19,12 @@ from fecm.studies.rod_test.filters import Filter, filter_of
 from fecm.sweeps.identify import FREE, fit
 
 
-@click.command()
+@click.command(
+    epilog=typical(
+        "fecm identify impact-115.inp measured-force.csv --free k",
+        "fecm identify impact-115.inp measured-force.csv --free k,velocity --plot fit.png",
+    )
+)
 @click.argument("deck", type=DECK_PATH)
 @click.argument("measured", type=DECK_PATH, metavar="MEASURED.csv")
 @option("--free", type=list_of("NAME,...", OneOf(FREE)), required=True,

@@ -13,6 +13,7 @@ import numpy as np
 from click import option
 
 from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError, echo, note
+from fecm.cli.help import Group, typical
 from fecm.cli.laminate_options import laminate_options, ply_of_options
 from fecm.cli.outputs import OutputPaths, outputs
 from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, OneOf, list_of, stacked
@@ -33,12 +34,17 @@ from fecm.studies.indentation_test.modulus import effective_stiffness, indentati
 from fecm.studies.tables import read_test
 
 
-@click.group()
+@click.group(cls=Group)
 def indent() -> None:
     """Indentation tests and the law of contact (the report's chapter 3)."""
 
 
-@indent.command()
+@indent.command(
+    epilog=typical(
+        "fecm indent fit indentation-test.csv --plot fit.png",
+        "fecm indent fit indentation-test.csv --unit mm,N --acr",
+    )
+)
 @click.argument("test", type=DECK_PATH, metavar="TEST.csv")
 @option("--acr", is_flag=True,
         help="Fit alpha_cr of the law with one unloading rigidity (q = 5/2) instead of s_p and "
@@ -102,7 +108,12 @@ def _law(deck: Path) -> tuple[Deck, Indentation]:
     return laws[0]
 
 
-@indent.command()
+@indent.command(
+    epilog=typical(
+        "fecm indent curve impact-115.inp --path 1.5e-3,0,2.5e-3,0 -o path.csv",
+        "fecm indent curve impact-115.inp --rigidity --path 0,5e-3 --plot rigidity.png",
+    )
+)
 @click.argument("deck", type=DECK_PATH)
 @option("--path", type=list_of("A,B,C,...", Finite()),
         help="Indentations at which the path turns, from 0; with --rigidity the range FROM,TO of "
@@ -215,7 +226,12 @@ CARD = stacked(
 )  # fmt: skip
 
 
-@indent.command()
+@indent.command(
+    epilog=typical(
+        "fecm indent hertz --radius 0.25 --es 30e6 --nus 0.3 --et 1.15e6",
+        "fecm indent hertz --radius 8 --es 207000 --nus 0.3 --et 11400 --format json",
+    )
+)
 @SPHERE
 @option("--et", "e_t", type=float, required=True,
         help="Young's modulus of the laminate through its thickness.")  # fmt: skip
@@ -241,7 +257,12 @@ def _print_law(k: float, card: dict[str, Any], form: str, **others: float) -> No
     click.echo(json.dumps({"k": k, **others, "card": law}) if form == "json" else law)
 
 
-@indent.command()
+@indent.command(
+    epilog=typical(
+        'fecm indent estimate --layup "[45/0/-45/90]2s" --ply-thickness .131 \\',
+        "    --material IM7/8552 --units mm-N-s --radius 8 --es 207000 --nus 0.3",
+    )
+)
 @laminate_options(required=True)
 @option("--nu23", type=Finite(),
         help="Poisson's ratio of the ply across the fibres.  [default: the named ply's, or "
@@ -276,7 +297,12 @@ def estimate(
     _print_law(k, card, form, modulus=modulus, k_by_e2=by_e2)
 
 
-@indent.command()
+@indent.command(
+    epilog=typical(
+        "fecm indent contacts",
+        "fecm indent contacts report-0.5 --units mm-N-s",
+    )
+)
 @click.argument("name", type=OneOf(list(CONTACTS)), metavar="[NAME]", required=False)
 @option("--units", type=click.Choice(list(SYSTEMS)), default=SYSTEM, show_default=True,
         help="Units of the parameters.")  # fmt: skip

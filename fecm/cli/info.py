@@ -14,6 +14,7 @@ import numpy as np
 from fecm._tables import aligned
 from fecm._version import __version__
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION, echo_json
+from fecm.cli.help import typical
 from fecm.cli.isolation import reads
 from fecm.results.hdf5_reader import Contents, read
 from fecm.results.result import result_of
@@ -52,7 +53,13 @@ def _system(context: click.Context, _: object, asked: bool) -> None:
     context.exit()
 
 
-@click.command(short_help="Describe the contents of RESULT.")
+@click.command(
+    short_help="Describe the contents of RESULT.",
+    epilog=typical(
+        "fecm info impact-115.h5",
+        "fecm info impact-115.h5 --format json",
+    ),
+)
 @click.argument("result", type=FILE_PATH)
 @click.option("--system", is_flag=True, is_eager=True, expose_value=False, callback=_system,
               help="Show the versions in use instead, and whether the kernels are "

@@ -15,6 +15,7 @@ from fecm._files import check_outputs
 from fecm.api import load_deck
 from fecm.authoring import AUTO, FULL, MITC, Authored, author
 from fecm.cli.common import DASH, FILE_PATH, RefusedError, echo, note, write_text
+from fecm.cli.help import typical
 from fecm.cli.laminate_options import PLIES, laminate_options, one_ply
 from fecm.cli.types import POSITIVE, Finite, Parsed, assignment, list_of
 from fecm.deck.catalogue import CONTACTS, MATERIALS, STRENGTHS, NamedContact, NamedPly
@@ -155,7 +156,12 @@ def new(output: Path, overwrite: bool, **options: Any) -> None:
         echo(output)
 
 
-@click.command()
+@click.command(
+    epilog=typical(
+        "fecm materials",
+        "fecm materials own-plies.toml",
+    )
+)
 @click.argument("plies", type=PLIES, metavar="[FILE.toml]", required=False)
 def materials(plies: dict[str, NamedPly] | None) -> None:
     """List the named plies of `fecm new`, or those of a file, with their sources."""

@@ -21,6 +21,7 @@ from fecm.cli.common import (
     note,
     progress,
 )
+from fecm.cli.help import typical
 from fecm.cli.isolation import reads
 from fecm.cli.types import Finite, OneOf, Parsed, assignment, list_of
 from fecm.mechanics.failure import CRITERIA
@@ -45,7 +46,13 @@ def _by_name(_: Any, __: Any, pairs: tuple[tuple[str, str], ...]) -> dict[str, s
     return values
 
 
-@click.command(short_help="Draw the report's figures, or the map of a sweep.")
+@click.command(
+    short_help="Draw the report's figures, or the map of a sweep.",
+    epilog=typical(
+        "fecm plot impact-115.h5 --kind force --kind loop",
+        "fecm plot impact-115-sweep.h5 --quantity peak_force --over velocity",
+    ),
+)
 @click.argument("results", type=DECK_PATH, nargs=-1, required=True, metavar="RESULT...")
 @option("--kind", "kinds", type=OneOf(list(KINDS)), multiple=True, metavar="KIND",
         help=f"Picture to draw; may be repeated.  {_KIND_HELP}.  [default: force; map of a sweep, "

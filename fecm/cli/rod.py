@@ -14,6 +14,7 @@ from click import option
 from fecm._typing import Floats
 from fecm.cli.common import DASH, DECK_PATH, FORMAT_OPTION, RefusedError
 from fecm.cli.decks import load_valid
+from fecm.cli.help import Group, typical
 from fecm.cli.outputs import OutputPaths, outputs
 from fecm.cli.types import POSITIVE, Finite, Parsed
 from fecm.deck.catalogue import SYSTEMS
@@ -39,7 +40,7 @@ FILTER_HELP = ("first-order:RISE or moving-average:RISE, with the time RISE from
                "step response; or cfc:60, 180, 600 or 1000 of SAE J211.")  # fmt: skip
 
 
-class _PulseGroup(click.Group):
+class _PulseGroup(Group):
     """A group whose default command is ``pulse``."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -57,7 +58,12 @@ def rod() -> None:
     """
 
 
-@rod.command()
+@rod.command(
+    epilog=typical(
+        "fecm rod impact-115.inp --pulse gauss:1000,200e-6,40e-6 --plot pulse.png",
+        "fecm rod impact-115.inp --pulse pulse.csv --station .25 --station .5 -o forces.csv",
+    )
+)
 @click.argument("deck", type=DECK_PATH, required=False)
 @option("--pulse", "applied", type=Parsed(pulse_test.pulse_of, "PULSE"), required=True,
         help="gauss:F0,TAU,B (F0 exp(-(t-TAU)²/4B²)), sine:F0,B (F0 sin(πt/B), zero after B), or a "
@@ -150,7 +156,13 @@ def _summarise(struck: Rod, history: RodHistory) -> None:
         click.echo(f"force at {x:<8.4g} {peak(force)}; mean ratio to the applied {ratio:.3f}")
 
 
-@rod.command("filter")
+@rod.command(
+    "filter",
+    epilog=typical(
+        "fecm rod filter impact-115.h5 --filter first-order:10e-6 -o filtered.csv",
+        "fecm rod filter calibration-test.csv --column V_F --filter cfc:1000",
+    ),
+)
 @click.argument("history", type=DECK_PATH, metavar="RESULT")
 @option("--filter", "transducer", type=Parsed(filter_of, "FILTER"), required=True, help=FILTER_HELP)
 @option("--column", metavar="NAME",
@@ -171,7 +183,12 @@ def filter_(history: Path, transducer: Filter, column: str | None, targets: Outp
     targets.write(f"time,{series.name},filtered", columns[series.first :].tolist())
 
 
-@rod.command()
+@rod.command(
+    epilog=typical(
+        "fecm rod calibrate calibration-test.csv --mass 2.862e-3 --c-a 1e-5",
+        "fecm rod calibrate calibration-test.csv --mass 2.862e-3 --c-a 1e-5 --plot fit.png",
+    )
+)
 @click.argument("test", type=DECK_PATH, metavar="TEST.csv")
 @option("--mass", type=POSITIVE, required=True, help="Mass of the target.")
 @option("--c-a", type=POSITIVE, required=True,

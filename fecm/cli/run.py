@@ -15,6 +15,7 @@ from fecm.api import numbered
 from fecm.cli import common
 from fecm.cli.common import CheckFailedError, RefusedError, echo, note, signals
 from fecm.cli.decks import load_valid
+from fecm.cli.help import typical
 from fecm.cli.types import POSITIVE, Finite, OneOf
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.projectile import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
@@ -36,7 +37,12 @@ from fecm.simulation.run import run as simulate_run
 from fecm.simulation.simulation import Simulation
 
 
-@click.command()
+@click.command(
+    epilog=typical(
+        "fecm run impact-115.inp",
+        "fecm run drop-weight.inp -o drop.h5 --overwrite --fail-limit 1",
+    )
+)
 @click.argument("deck", type=common.DECK_PATH)
 @option("-o", "--output", type=common.FILE_PATH, metavar="OUT.h5",
         help="Result file.  [default: the deck's name with .h5, in this folder]")  # fmt: skip

@@ -12,6 +12,7 @@ from fecm._files import check_outputs
 from fecm.api import load_deck
 from fecm.cli.common import DECK_PATH, FILE_PATH, NO, RefusedError, echo, note, progress, signals
 from fecm.cli.decks import count_findings
+from fecm.cli.help import typical
 from fecm.cli.types import OneOf, Parsed, list_of
 from fecm.deck.findings import DeckError
 from fecm.problem.problem import Problem
@@ -30,7 +31,14 @@ from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_i
 NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
 
 
-@click.command()
+@click.command(
+    epilog=typical(
+        "fecm sweep impact-115.inp --vary velocity=50:150:11 --vary k=1e6,2e6",
+        "fecm sweep drop-weight.inp --find velocity --until peak_force=threshold",
+        "fecm sweep drop-weight.inp --random k=lognormal:42000,.2 --samples 200 \\",
+        "    --exceed peak_force=threshold",
+    )
+)
 @click.argument("deck", type=DECK_PATH)
 @option("--vary", "varied", type=Parsed(inputs.parse_vary, "NAME=VALUES", NAMED), multiple=True,
         help="FROM:TO:N or A,B,C; may be repeated, for a full grid.  Names: "

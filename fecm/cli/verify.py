@@ -8,11 +8,17 @@ from itertools import chain, tee
 import click
 
 from fecm.cli.common import FORMAT_OPTION, CheckFailedError, RefusedError
+from fecm.cli.help import typical
 from fecm.verification import carry_out, chosen
 from fecm.verification.case import fields, page, table
 
 
-@click.command()
+@click.command(
+    epilog=typical(
+        "fecm verify",
+        "fecm verify --list",
+    )
+)
 @click.argument("cases", nargs=-1, metavar="[CASE]...")
 @click.option("--list", "listing", is_flag=True, help="List the cases without computing them.")
 @click.option("--markdown", is_flag=True, help="Write the page of the documentation instead.")

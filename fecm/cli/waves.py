@@ -14,6 +14,7 @@ from click import option
 
 from fecm.cli.common import DECK_PATH, RefusedError, note
 from fecm.cli.decks import load_valid
+from fecm.cli.help import Group, typical
 from fecm.cli.laminate_options import laminate_of_options, laminate_options
 from fecm.cli.outputs import OutputPaths, outputs
 from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, Parsed, list_of, stacked
@@ -119,12 +120,18 @@ def _normals(step: float) -> list[float]:
     return [n * step for n in range(count)] + [min(360.0, count * step)]
 
 
-@click.group()
+@click.group(cls=Group)
 def waves() -> None:
     """Waves in the laminate of a DECK, or of a layup: the report's chapter 2, for any laminate."""
 
 
-@waves.command(cls=_ListCommand)
+@waves.command(
+    cls=_ListCommand,
+    epilog=typical(
+        "fecm waves dispersion impact-115.inp --angle 0 45 90 --plot dispersion.png",
+        "fecm waves dispersion impact-115.inp --wavelengths 1:20:100 -o dispersion.csv",
+    ),
+)
 @option("--angle", "angles", type=list_of("A,B,...", Finite()), multiple=True, callback=_joined,
         default=("0", "45", "90"), show_default=True, metavar="A ...",
         help="Directions of propagation, degrees; one or several.")  # fmt: skip
@@ -151,7 +158,12 @@ def dispersion(
     targets.write("angle_deg,wavelength_over_h,mode,phase_velocity,angular_frequency", rows)
 
 
-@waves.command()
+@waves.command(
+    epilog=typical(
+        "fecm waves speeds impact-115.inp -o speeds.csv",
+        "fecm waves speeds impact-115.inp --plot speeds.png",
+    )
+)
 @STEP
 @_SHARED
 def speeds(step: float, targets: OutputPaths, **shared: Any) -> None:
@@ -166,7 +178,13 @@ def speeds(step: float, targets: OutputPaths, **shared: Any) -> None:
     targets.write(",".join(("angle_deg", *FRONTS)), rows)
 
 
-@waves.command(cls=_ListCommand)
+@waves.command(
+    cls=_ListCommand,
+    epilog=typical(
+        "fecm waves fronts impact-115.inp --time 10e-6 -o fronts.csv",
+        "fecm waves fronts impact-115.inp --time 10e-6 20e-6 --plot fronts.png",
+    ),
+)
 @option("--time", "times", type=list_of("T,T,...", NOT_NEGATIVE), multiple=True, callback=_joined,
         required=True, metavar="T ...", help="Times; one or several.")  # fmt: skip
 @option("--radius", type=NOT_NEGATIVE, metavar="R",
