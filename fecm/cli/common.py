@@ -14,6 +14,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from time import monotonic as clock
 from types import FrameType
 from typing import Any, TextIO
 
@@ -30,6 +31,7 @@ NO, UNUSABLE, INTERRUPTED = 1, 2, 130
 SIGNALS = tuple(n for n in signal.Signals if n.name in ("SIGINT", "SIGTERM", "SIGHUP"))
 SIGNALLED = tuple(128 + number for number in SIGNALS)  # exit status after each of them
 
+MINUTE = 60.0  # seconds between two lines about the progress
 DASH = Path("-")  # standard input or output
 DECK_PATH = click.Path(exists=True, dir_okay=False, path_type=Path)
 FILE_PATH = click.Path(path_type=Path, allow_dash=True)
@@ -78,17 +80,38 @@ def note(*texts: object) -> None:
 def progress(
     label: str, length: int, remark: Callable[[object], str] | None = None
 ) -> Iterator[Callable[[int], object]]:
-    """Show a progress bar if standard error is a terminal; yield the function that advances it.
+    """Show a progress bar on standard error; yield the function that advances it.
 
-    The bar ends with a remark, and is left out for a single step without one.
+    The bar ends with a remark, and is left out for a single step without one.  If standard error is
+    no terminal, a line a minute takes its place.
     """
-    if (length < 2 and remark is None) or not sys.stderr.isatty():
+    if length < 2 and remark is None:
         yield lambda steps: None
+        return
+    if not sys.stderr.isatty():
+        yield _by_the_minute(label, length, remark)
         return
     with click.progressbar(
         length=length, label=label, file=sys.stderr, item_show_func=remark
     ) as bar:
         yield bar.update
+
+
+def _by_the_minute(
+    label: str, length: int, remark: Callable[[object], str] | None
+) -> Callable[[int], object]:
+    """Return a function that counts steps, and at most once a minute says how many are done."""
+    done, last = 0, clock()
+
+    def advance(steps: int) -> None:
+        nonlocal done, last
+        done += steps
+        if clock() - last >= MINUTE:
+            last = clock()
+            more = remark(None) if remark is not None else ""
+            echo(f"{label}: {done} of {length} done{more and ', '}{more}", err=True)
+
+    return advance
 
 
 @contextlib.contextmanager

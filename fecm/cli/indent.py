@@ -259,8 +259,10 @@ def _print_law(k: float, card: dict[str, Any], form: str, **others: float) -> No
 
 @indent.command(
     epilog=typical(
-        'fecm indent estimate --layup "[45/0/-45/90]2s" --ply-thickness .131 \\',
-        "    --material IM7/8552 --units mm-N-s --radius 8 --es 207000 --nus 0.3",
+        'fecm indent estimate --layup "[0/90]4s" --ply-thickness .131 --material IM7/8552 '
+        "--units mm-N-s --radius 8 --es 207000 --nus 0.3",
+        'fecm indent estimate --layup "[0/90]4s" --ply-thickness .25 '
+        "--ply 1.6e-9,.3,140000,9000,5000,5000,3000 --radius 8 --es 207000 --nus 0.3",
     )
 )
 @laminate_options(required=True)

@@ -35,8 +35,8 @@ NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
     epilog=typical(
         "fecm sweep impact-115.inp --vary velocity=50:150:11 --vary k=1e6,2e6",
         "fecm sweep drop-weight.inp --find velocity --until peak_force=threshold",
-        "fecm sweep drop-weight.inp --random k=lognormal:42000,.2 --samples 200 \\",
-        "    --exceed peak_force=threshold",
+        "fecm sweep drop-weight.inp --random k=lognormal:42000,.2 --samples 200 "
+        "--exceed peak_force=threshold",
     )
 )
 @click.argument("deck", type=DECK_PATH)
@@ -185,7 +185,7 @@ def _carry_out(
     def rate(_: object) -> str:
         seconds = time.monotonic() - begin
         per_core = finished / seconds / workers if seconds else 0.0
-        return f"{finished} cases, {per_core:.3g} a second per worker" if finished else ""
+        return f"{per_core:.3g} cases a second per worker" if finished else ""
 
     def done(task: plans.Task, outcome: plans.Outcome) -> None:
         nonlocal finished
@@ -194,9 +194,14 @@ def _carry_out(
 
     try:
         with signals.deferred(), progress("fecm", len(planned.cases), rate) as advance:
+
+            def idle() -> None:
+                signals.heed()
+                advance(0)
+
             return carry_out(
                 problem, planned, workers=workers, scheduler=scheduler, parts=parts, done=done,
-                idle=signals.heed, note=note,
+                idle=idle, note=note,
             )  # fmt: skip
     except SchedulerError:
         parts.clear()
