@@ -34,9 +34,9 @@ COLUMNS = {
 def estimate(deck: Path, form: str) -> None:
     """Estimate the impact of DECK by models without a mesh, beside the run itself.
 
-    The infinite plate is for small masses, the static plate for large ones.  With a DELA segment,
-    velocity and energy are those at which the peak force reaches the delamination threshold.
-    The models without a mesh neglect DAMP.
+    The infinite plate is for small masses, the static plate for large ones; a model out of its
+    range is marked.  With a DELA segment, velocity and energy are those at which the peak force
+    reaches the delamination threshold.  The models without a mesh neglect DAMP.
     """
     problem = load_single(deck, "estimate")
     found = estimate_problem(problem)
@@ -56,11 +56,13 @@ def estimate(deck: Path, form: str) -> None:
     w, h = found.models[-1].impact.peak / found.stiffness, problem.laminate.thickness
     if w > 0.5 * h:  # not of a free plate, whose stiffness is NaN
         note(f"the static plate deflects by {w / h:.3g} h: beyond h/2 a linear plate is too soft")
+    applies = {model.name: model.applies for model in found.models} | {"run": True}
     if form == "json":
+        named = [dict(zip(("model", *COLUMNS), row, strict=True)) for row in rows]
         echo_json({
             "class": found.response, "mass_ratio": found.mass_ratio, "lambda": found.parameter,
             "stiffness": found.stiffness,
-            "models": [dict(zip(("model", *COLUMNS), row, strict=True)) for row in rows],
+            "models": [row | {"applies": applies[row["model"]]} for row in named],
         })  # fmt: skip
         return
     names = unit_names(problem.deck)
@@ -76,6 +78,8 @@ def estimate(deck: Path, form: str) -> None:
     if problem.damping:
         echo("  damping     in the run only: the models without a mesh neglect DAMP")
     table = [["model", *(name.replace("_", " ") for name in COLUMNS)]]
-    table += [[name, *map(text, numbers, COLUMNS.values())] for name, *numbers in rows]
+    for name, *numbers in rows:
+        marked = name if applies[name] else f"{name} (out of range)"
+        table.append([marked, *map(text, numbers, COLUMNS.values())])
     for line in aligned(table):
         echo(f"  {line}")

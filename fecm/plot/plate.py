@@ -268,7 +268,7 @@ def _plates(
         title.set_text(f"time {clock.show(float(result['tape3/time'][row]))}")
 
     plates = [_plate(ax, cut, place, length, span) for ax in axes[:count]]
-    look = {"shrink": 0.6, "pad": 0.0, "fraction": 0.06}
+    look = {"shrink": 0.6, "pad": 0.0, "fraction": 0.06, "aspect": 30 * columns}
     bar = style.colour_bar(axes, plates[0][0], length, "Deflection", MaxNLocator(5), **look)
     if span[0] < span[1]:
         bar.ax.set_xlim(span)
@@ -305,5 +305,6 @@ def _plate(
         axis._axinfo["grid"]["linewidth"] = 0.3
     axes.tick_params(pad=-3.0)
     axes.locator_params(nbins=5)
+    axes.locator_params(axis="y", prune="lower")  # it would collide with the last of x
     axes.locator_params(axis="z", nbins=4)
     return collection, title

@@ -96,10 +96,12 @@ def failure(results: Mapping[str, Result], *, quantity: str = "", width: str = "
     mark_impact(plate, result, name)
     worst = found.worst
     plate.plot(worst.x, worst.y, clip_on=False, **LARGEST)
-    plate.set_title(
-        f"{worst.exposure:.4g} ({worst.criterion.replace('_', ' ')}): {worst.mode}, {worst.plies}",
-        loc="left",
+    title = (
+        f"{worst.exposure:.4g} ({worst.criterion.replace('_', ' ')}): {worst.mode}, {worst.plies}"
     )
+    if result.still_in_contact:
+        title += "\nstill in contact at the end: exposures may grow"
+    plate.set_title(title, loc="left")
     place.name(plate.xaxis, "$x$")
     place.name(plate.yaxis, "$y$")
     _bars(figure, bars, found)

@@ -88,12 +88,12 @@ def exceedance(
             case = f", {label}" if label else ""
             notes.append(f"P({shown.name} > {limit:g}) = {p:.5g} ({low:.5g} to {high:.5g}){case}")
     for limit in limits:
-        axes.axvline(limit, zorder=0, **LEVEL)
+        axes.axvline(limit, zorder=0, label=f"limit {every[-1].scale.show(limit)}", **LEVEL)
     axes.set_yscale("log")
     axes.set_ylim(top=1.15)
     axes.set_ylabel("Probability of exceedance")
     every[-1].scale.name(axes.xaxis, every[-1].label)
-    if len(chosen) > 1:
+    if len(chosen) > 1 or limits:
         lines_legend(figure, axes)
     return Picture(figure, notes=notes)
 
@@ -154,7 +154,7 @@ def scatter(
     name, sweep, random, chosen = _random(results, where)
     _, rows = _one(random, name, chosen)
     shown = quantity_of(sweep, name, rows, quantity)
-    laws = random.design.laws
+    laws, limits = random.design.laws, _limits(random, shown.name, level)
     columns = min(len(laws), BESIDE[width])
     lines = -(-len(laws) // columns)
     figure, every = panels(width, lines, columns, ratio=0.85, sharey=True)
@@ -164,11 +164,13 @@ def scatter(
     for place, (axes, law) in enumerate(zip(every, laws, strict=False)):
         over = axis_of(sweep, law, sweep[law][rows])
         axes.plot(over.values, shown.values, ".", **look)
-        for limit in _limits(random, shown.name, level):
-            axes.axhline(limit, **LEVEL)
+        for limit in limits:
+            axes.axhline(limit, label=f"limit {shown.scale.show(limit)}", **LEVEL)
         over.scale.name(axes.xaxis, over.label)
         if not place % columns:
             shown.scale.name(axes.yaxis, shown.label)
         for axis in (axes.xaxis, axes.yaxis):  # a half column is narrow
             axis.set_label_text(axis.get_label_text().replace(" (", "\n("))
+    if limits:
+        lines_legend(figure, every[0])
     return Picture(figure)

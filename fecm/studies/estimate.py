@@ -99,6 +99,7 @@ class Model:
     impact: QuickImpact
     threshold: float  # delamination threshold that applies to the model, force; NaN without DELA
     velocity: float  # at which the model reaches it; NaN without DELA
+    applies: bool  # whether the mass ratio is in the model's range
 
 
 @frozen
@@ -117,7 +118,8 @@ class Estimate:
         if self.mass_ratio < SMALL:
             return "wave-controlled: the infinite plate applies"
         if self.mass_ratio > LARGE:
-            return "quasi-static: the static plate applies, about 10 % low"
+            low = "which underestimates the force by about 10 %"
+            return f"quasi-static: the static plate applies, {low}"
         return "neither small nor large: run it"
 
 
@@ -138,17 +140,19 @@ def estimate(problem: Problem) -> Estimate:
     def large(v: float) -> QuickImpact:
         return static_plate(mass, v, k, stiffness)
 
-    models = [_model("infinite plate", small, velocity, SMALL_MASS * force)]
+    applies = ratio < SMALL
+    models = [_model("infinite plate", small, velocity, SMALL_MASS * force, applies=applies)]
     stiffness = static_stiffness(problem.moving_plate, contact)
     if math.isfinite(stiffness):
-        models.append(_model("static plate", large, velocity, force))
+        models.append(_model("static plate", large, velocity, force, applies=ratio > LARGE))
     parameter = inelasticity(mass, velocity, k, laminate.mass, rigidity)
     return Estimate(mass, ratio, parameter, stiffness, tuple(models))
 
 
 def _model(
-    name: str, impact: Callable[[float], QuickImpact], velocity: float, threshold: float
-) -> Model:
+    name: str, impact: Callable[[float], QuickImpact], velocity: float, threshold: float, *,
+    applies: bool,
+) -> Model:  # fmt: skip
     """A model, with the velocity at which its peak reaches the threshold."""
     found = math.nan
     if math.isfinite(threshold):
@@ -160,7 +164,7 @@ def _model(
         if low == high:
             low /= 2.0
         found = float(brentq(lambda v: impact(v).peak - threshold, low, high, rtol=1e-9))
-    return Model(name, impact(velocity), threshold, found)
+    return Model(name, impact(velocity), threshold, found, applies)
 
 
 def static_stiffness(plate: PlateModel, contact: Floats) -> float:

@@ -74,6 +74,8 @@ def parse_vary(text: str) -> tuple[str, list[Value]]:
         raise CasesError(f"`{text}`: write {name}=FROM:TO:N or {name}=A,B,C")
     if name in TEXTS or ":" not in text_of_values:  # split at commas outside brackets
         parts = re.split(r",(?![^\[]*\]|[^(]*\))", text_of_values)
+        if name == "at" and not re.search("[(; ]", text_of_values):
+            parts = _points(parts)
         return name, [_value(name, part) for part in parts if part.strip()]
     parts = text_of_values.split(":")
     if len(parts) != 3 or not re.fullmatch(r"\d+", parts[2].strip()) or not int(parts[2]):
@@ -86,6 +88,15 @@ def parse_vary(text: str) -> tuple[str, list[Value]]:
     if not all(map(math.isfinite, values)):
         raise CasesError(f"`{text}`: the range is beyond the range of numbers")
     return name, [_value(name, repr(v)) for v in values]
+
+
+def _points(numbers: Sequence[str]) -> list[str]:
+    """One point from two numbers; CasesError, with the brackets to write, if there are more."""
+    if len(numbers) == 2:
+        return [",".join(numbers)]
+    pairs = [f"({','.join(numbers[n : n + 2])})" for n in range(0, len(numbers) - 1, 2)]
+    example = ",".join(pairs) or f"({numbers[0]},Y)"
+    raise CasesError(f"at has two numbers a point; write at={example}")
 
 
 def parse_until(text: str) -> float | str:
