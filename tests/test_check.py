@@ -270,15 +270,15 @@ def test_the_reports_rod_is_a_warning_in_a_deck_of_other_units(units: str) -> No
     assert warning.severity == "warning"
 
 
-def test_masses_are_shown_in_tonnes_or_kilograms_beside_the_decks_unit() -> None:
+def test_masses_are_shown_in_grams_beside_the_decks_unit() -> None:
     # 100 mm x 100 mm x 2 mm at 1.6e-9 t/mm^3; the report's plate of 6 x 4 x 0.106 in is 65.9 g.
     shown = call("check", str(DATA / "plate-100x100x2.inp")).stdout
-    assert "plate mass          3.2e-05 N*s^2/mm (3.2e-05 t)" in shown
+    assert "plate mass          3.2e-05 N*s^2/mm (32 g)" in shown
     named = re.sub("^COOR", "UNIT\nin lbf s\nCOOR", APPENDIX.read_text(), flags=re.M)
     lines = ProblemSummary(load_deck(named).problems[0]).lines()
     (line,) = (line for line in lines if "plate mass" in line)
-    assert float(line.split("(")[1].split()[0]) == pytest.approx(0.06594, rel=1e-3)
-    assert line.endswith(" kg)")
+    assert float(line.split("(")[1].split()[0]) == pytest.approx(65.94, rel=1e-3)
+    assert line.endswith(" g)")
 
 
 def test_every_impact_has_its_elements_per_wave_in_the_summary() -> None:

@@ -41,6 +41,22 @@ def test_the_row_of_the_run_is_the_run(tmp_path: Path) -> None:
     assert found["models"][1]["threshold"] == pytest.approx(full.threshold["force"], rel=1e-12)
 
 
+def test_a_model_out_of_its_range_is_marked(tmp_path: Path) -> None:
+    ratios = {"small": 1e-6, "medium": 1.0, "large": 1e3}
+    expected = {"small": [True, False], "medium": [False, False], "large": [False, True]}
+    plate = load_deck(deck(mesh=HELD)).problems[0]
+    for name, ratio in ratios.items():
+        mass = ratio * plate.plate.area() * plate.laminate.mass
+        text = deck(f"PROJ\n0, 0, {mass:.9g}\n\n", mesh=HELD)
+        found = estimate(load_deck(text).problems[0])
+        assert found.mass_ratio == pytest.approx(ratio, rel=1e-6)
+        assert [model.applies for model in found.models] == expected[name]
+    (tmp_path / "d.inp").write_text(text)
+    lines = call("estimate", "d.inp", cwd=tmp_path).stdout.splitlines()
+    assert any(line.startswith("  infinite plate (out of range)  ") for line in lines)
+    assert not any(line.startswith("  static plate (out") for line in lines)
+
+
 def test_a_held_plate_has_a_static_model_with_its_own_stiffness() -> None:
     (free,) = load_deck(deck()).problems
     assert np.isnan(estimate(free).stiffness)

@@ -65,5 +65,5 @@ def test_an_unknown_example_and_an_existing_file_are_refused(tmp_path: Path) -> 
     assert_unusable(call("example", "pulse.csv", cwd=tmp_path))
     assert_unusable(call("example", "pulse", "-o", examples.path("pulse"), "--overwrite"))
     assert (tmp_path / "pulse.csv").read_text() == "mine\n"
-    with pytest.raises(ValueError, match="there are impact-115"):
+    with pytest.raises(ValueError, match="did you mean pulse"):
         examples.path("pulses")

@@ -477,6 +477,13 @@ def test_the_map_of_exposures_has_a_cell_around_every_point(points: int) -> None
         assert (cell.max(axis=0) >= place - 1e-12).all()
 
 
+def test_an_open_contact_is_told_above_the_exposures(failing: Result) -> None:
+    assert failing.still_in_contact
+    with pytest.warns(FecmWarning, match="are left out"):
+        plate = plot(failing, "failure").axes[0]
+    assert "still in contact at the end" in plate.get_title(loc="left")
+
+
 def test_a_bar_per_ply_leaves_out_what_is_under_the_load(failing: Result) -> None:
     raised = scaled(failing, 1.0)
     raised["failure/puck/exposure"][3, 8] = 9.0  # the point under the load

@@ -133,6 +133,12 @@ def test_the_kinds_for_type_checkers_are_those_of_results() -> None:
     assert list(get_args(RunKind)) == [name for name, kind in KINDS.items() if not kind.sweep]
 
 
+def test_a_warning_of_a_picture_is_one_of_the_users_line(sweep: fecm.SweepResult) -> None:
+    with pytest.warns(fecm.FecmWarning, match="level 1e.09 is outside") as caught:
+        sweep.plot(level=[1e9])
+    assert {warning.filename for warning in caught} == {__file__}
+
+
 def test_transducers_of_rigid_masses_are_not_drawn_again() -> None:
     rigid = fecm.run_one(small(data=DATA_CARDS + "PROJ\n0, 0, 2.E-4\n\n"))
     axes: Any = rigid.plot()

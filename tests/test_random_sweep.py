@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -190,6 +191,18 @@ def test_a_constant_quantity_has_no_indices() -> None:
     assert np.isfinite(found.total_interval[0]).all()
     assert all(np.isnan(part[1]).all() for part in found)
     assert np.isnan(found.total[2]).all()
+
+
+def test_resamples_without_variance_and_infinite_values_give_no_interval_and_no_warning() -> None:
+    values = np.ones((2, 4, 32))
+    values[0, 2, 3] = values[0, 0, 5] = 2.0  # a resample may lack row 5 and have row 3
+    values[1, 0] = np.linspace(0.0, 1.0, 32)
+    values[1, 2, 3] = np.inf
+    with warnings.catch_warnings(action="error"):
+        found = indices(values, 0)
+    assert np.isfinite(found.total[0]).all()
+    assert np.isnan(found.total_interval[0]).all()
+    assert all(np.isnan(part[1]).all() for part in found)
 
 
 def test_the_interval_of_a_probability_is_wilsons() -> None:

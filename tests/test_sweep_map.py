@@ -338,7 +338,8 @@ def test_a_sweep_without_units_has_none_on_its_axes() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"quantity": "force"}, "unknown quantity force; the sweep has peak_force, "),
+        ({"quantity": "zzz"}, "unknown quantity zzz; the sweep has peak_force, "),
+        ({"quantity": "force"}, "unknown quantity force; did you mean peak_force"),
         ({"over": "q"}, "no parameter q; it has velocity and k"),
         ({"over": "velocity", "where": {"velocity": 50.0}}, "velocity does not vary"),
         ({"where": {"velocity": 50.0, "k": 1e6}}, "nothing varies"),

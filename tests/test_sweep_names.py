@@ -286,6 +286,9 @@ def test_the_command_measures_and_counts_what_failed(tmp_path: Path) -> None:
 
 def test_places_and_sizes_are_read(tmp_path: Path) -> None:
     assert parse_vary("at=(3,2),(1.50, 1)") == ("at", ["(3,2)", "(1.5,1)"])
+    assert parse_vary("at=75,50") == ("at", ["(75,50)"])
+    with pytest.raises(CasesError, match=r"write at=\(75,50\),\(80,50\)$"):
+        parse_vary("at=75,50,80,50")
     assert parse_vary("size=6x4,9×6.0") == ("size", ["6x4", "9x6"])
     assert parse_vary("dt=auto,1e-7") == ("dt", [0.0, 1e-7])
     assert parse_vary("layup=[0/(45,90)2]s,[0]") == ("layup", ["[0/(45,90)2]s", "[0]"])
@@ -298,7 +301,7 @@ def test_places_and_sizes_are_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["at=3,2", "at=(3)", "at=(3,x)", "at=1:2:3", "size=6", "size=axb", "support=pinned", "energy=a",
+    ["at=3", "at=(3)", "at=(3,x)", "at=1:2:3", "size=6", "size=axb", "support=pinned", "energy=a",
      "duration=auto", "at=(nan,1)"],
 )  # fmt: skip
 def test_what_is_no_place_size_or_support_is_refused(text: str) -> None:

@@ -1,0 +1,163 @@
+"""Help pages, suggestions, completion in the shell, and progress without a terminal."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import pytest
+
+from fecm import examples
+from fecm.cli import COMMANDS, cli, common
+from fecm.deck.units import quantity
+from tests.calls import assert_unusable, call
+from tests.decks import APPENDIX, small
+
+CONTEXT = click.Context(cli, info_name="fecm")
+
+
+def commands(group: click.Command = cli, names: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """Names of all commands that are no groups."""
+    if not isinstance(group, click.Group):
+        yield names
+        return
+    for name in group.list_commands(CONTEXT):
+        command = group.get_command(CONTEXT, name)
+        assert command is not None
+        yield from commands(command, (*names, name))
+
+
+def found(names: tuple[str, ...]) -> click.Command:
+    """A command by its names."""
+    command: click.Command = cli
+    for name in names:
+        assert isinstance(command, click.Group)
+        inner = command.get_command(CONTEXT, name)
+        assert inner is not None
+        command = inner
+    return command
+
+
+@pytest.mark.parametrize("names", [n for n in commands() if n != ("new",)], ids=" ".join)
+def test_a_help_page_ends_with_two_calls_that_the_command_takes(
+    names: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in examples.names():
+        (tmp_path / name).write_bytes(examples.path(name).read_bytes())
+    ply = '["mine"]\ndensity = 1.6e-9\nnu12 = 0.3\nE1 = 14e4\nE2 = 9e3\nG12 = 5e3\n'
+    (tmp_path / "own-plies.toml").write_text(ply)
+    for name in ("impact-115.h5", "impact-115-sweep.h5"):
+        (tmp_path / name).write_text("")  # must only exist
+    command = found(names)
+    _, _, calls = call(*names, "--help").stdout.partition("Typical calls:\n")
+    lines = [line.strip() for line in calls.splitlines()]
+    assert len(lines) >= 2
+    for line in lines:
+        program, *arguments = shlex.split(line)
+        assert program == "fecm"
+        inner = len(names) if tuple(arguments[: len(names)]) == names else 1  # rod for rod pulse
+        with command.make_context(" ".join(names), arguments[inner:], parent=CONTEXT):
+            pass
+
+
+@pytest.mark.parametrize("group", ["indent", "waves", "rod"])
+def test_a_group_lists_whole_sentences(group: str) -> None:
+    assert "..." not in call(group, "--help").stdout.partition("Commands:")[2]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "hint"),
+    [
+        (("chek",), "there is no command 'chek'; did you mean check? (see fecm --help)"),
+        (("plot", APPENDIX, "--kind", "forse"), "did you mean force?"),
+        (("run", APPENDIX, "--slip", "tape"), "did you mean tapes?"),
+        (("sweep", APPENDIX, "--vary", "velosity=1"), "did you mean velocity?"),
+        (("sweep", APPENDIX, "--vary", "k=1e6", "--measure", "deflection"), "max_deflection?"),
+        (("example", "impct-115"), "did you mean impact-115"),
+        (("indent", "contacts", "report0.5"), "did you mean report-0.5?"),
+    ],
+)
+def test_an_unknown_name_gets_the_most_similar_one(
+    arguments: tuple[str, ...], hint: str, tmp_path: Path
+) -> None:
+    done = call(*arguments, cwd=tmp_path)
+    assert_unusable(done)
+    assert hint in done.stderr
+
+
+def test_a_name_like_no_other_gets_no_hint_but_the_choices() -> None:
+    assert call("zzzz").stderr == "fecm: error: there is no command 'zzzz'; see fecm --help\n"
+    assert "'loop', 'energy'" in call("plot", APPENDIX, "--kind", "zzzz").stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "values"),
+    [
+        ("plot r.h5 --kind fo", {"force"}),
+        ("plot r.h5 --quantity max_d", {"max_deflection"}),
+        (
+            "sweep d.inp --vary rod_",
+            {f"rod_{n}=" for n in ("mass", "length", "modulus", "density")},
+        ),
+        ("sweep d.inp --random velo", {"velocity="}),
+        ("new --material IM", {"IM7/8552", "IM7/8551-7"}),
+        ("identify d.inp m.csv --free mass,velo", {"mass,velocity"}),
+        ("example imp", {"impact-115.inp"}),
+    ],
+)
+def test_the_shell_completes_values(
+    words: str, values: set[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("_FECM_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", f"fecm {words}")
+    monkeypatch.setenv("COMP_CWORD", str(len(words.split())))
+    completed = {line.partition(",")[2] for line in call().stdout.splitlines()}
+    assert values <= completed
+    assert all(value.startswith(words.split()[-1]) for value in completed)
+
+
+@pytest.mark.parametrize("arguments", [("info",), ("plot",), ("tapes",), ("export", "--to", "csv")])
+def test_a_deck_in_place_of_a_result_is_told_to_be_run(
+    arguments: tuple[str, ...], tmp_path: Path
+) -> None:
+    (tmp_path / "d.inp").write_text(f"! a comment\n{small()}")
+    done = call(*arguments, "d.inp", cwd=tmp_path)
+    assert_unusable(done)
+    assert "d.inp is a deck, not a result; `fecm run d.inp` makes one" in done.stderr
+
+
+def test_a_run_without_a_terminal_says_once_a_minute_how_far_it_is(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now = 0.0
+    monkeypatch.setattr(common, "clock", lambda: now)
+    with common.progress("fecm", 1000, lambda _: "5 cases a second") as advance:
+        for step in range(1, 6):
+            now = 25.0 * step
+            advance(100)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == ["fecm: 300 of 1000 done, 5 cases a second"]
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (2e-5, "N*s^2/mm", "20 g"), (5.5e-3, "N*s^2/mm", "5.5 kg"), (0.5, "N*s^2/m", "500 g"),
+        (2.0, "N*s^2/mm", "2 t"), (1225.0, "N*mm", "1.225 J"), (78.8549, "N*mm", "78.8549 mJ"),
+        (999.9999999, "N*mm", "1 J"), (0.0, "N*mm", "0 N*mm"), (3.0, "lbf*in", "3 lbf*in"),
+        (4.3e-3, "s", "0.0043 s"), (-1.5e3, "N*mm", "-1.5 J"), (7.0, "", "7"),
+    ],
+)  # fmt: skip
+def test_masses_are_shown_in_grams_and_energies_in_joules(
+    value: float, unit: str, text: str
+) -> None:
+    assert quantity(value, unit) == text
+
+
+def test_every_command_has_a_help_page() -> None:
+    listed = re.findall(r"^  ([a-z]+) ", call("--help").stdout, re.M)
+    assert set(COMMANDS) <= set(listed)
