@@ -45,6 +45,7 @@ def test_a_model_out_of_its_range_is_marked(tmp_path: Path) -> None:
     ratios = {"small": 1e-6, "medium": 1.0, "large": 1e3}
     expected = {"small": [True, False], "medium": [False, False], "large": [False, True]}
     plate = load_deck(deck(mesh=HELD)).problems[0]
+    text = ""
     for name, ratio in ratios.items():
         mass = ratio * plate.plate.area() * plate.laminate.mass
         text = deck(f"PROJ\n0, 0, {mass:.9g}\n\n", mesh=HELD)

@@ -121,7 +121,6 @@ def test_what_a_result_or_a_sweep_lacks_is_named_with_what_there_is(
     for asked, words in (
         (lambda: result["history"], "history is a group, not a dataset; .*history/force"),
         (lambda: result["history/forse"], "no history/forse .*did you mean history/force"),
-        (lambda: result.forse, "no forse .*did you mean history/force"),
         (lambda: result["plies/sigma_1"], "no plies/sigma_1 .*add PLYS"),
         (lambda: sweep["peak_forse"], "no peak_forse in this sweep; did you mean peak_force"),
     ):

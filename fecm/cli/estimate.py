@@ -56,13 +56,15 @@ def estimate(deck: Path, form: str) -> None:
     w, h = found.models[-1].impact.peak / found.stiffness, problem.laminate.thickness
     if w > 0.5 * h:  # not of a free plate, whose stiffness is NaN
         note(f"the static plate deflects by {w / h:.3g} h: beyond h/2 a linear plate is too soft")
-    applies = {model.name: model.applies for model in found.models} | {"run": True}
+    applies = [*(model.applies for model in found.models), True]  # the run always does
     if form == "json":
         named = [dict(zip(("model", *COLUMNS), row, strict=True)) for row in rows]
         echo_json({
             "class": found.response, "mass_ratio": found.mass_ratio, "lambda": found.parameter,
             "stiffness": found.stiffness,
-            "models": [row | {"applies": applies[row["model"]]} for row in named],
+            "models": [
+                {**row, "applies": one} for row, one in zip(named, applies, strict=True)
+            ],
         })  # fmt: skip
         return
     names = unit_names(problem.deck)
@@ -78,8 +80,8 @@ def estimate(deck: Path, form: str) -> None:
     if problem.damping:
         echo("  damping     in the run only: the models without a mesh neglect DAMP")
     table = [["model", *(name.replace("_", " ") for name in COLUMNS)]]
-    for name, *numbers in rows:
-        marked = name if applies[name] else f"{name} (out of range)"
+    for (name, *numbers), fits in zip(rows, applies, strict=True):
+        marked = name if fits else f"{name} (out of range)"
         table.append([marked, *map(text, numbers, COLUMNS.values())])
     for line in aligned(table):
         echo(f"  {line}")

@@ -86,8 +86,8 @@ def force(results: Results, *, overlay: Source | None = None, width: str = "colu
             axes[0].plot(time, transducer, color=style.colours()[1], label="transducer")
         pound.name(axes[0].yaxis, "Contact force" if equal else "Force")
     else:
-        layout = {"tall": 1.0} if equal else {"rows": 2, "tall": 0.65}
-        figure, axes = style.panels(width, sharex=True, sharey=True, **layout)
+        rows, tall = (1, 1.0) if equal else (2, 0.65)
+        figure, axes = style.panels(width, rows, sharex=True, sharey=True, tall=tall)
         for (name, (time, *both)), colour in zip(drawn.items(), style.colours(), strict=False):
             for ax, values in zip(axes, both, strict=False):
                 ax.plot(time, values, color=colour, label=name)

@@ -299,7 +299,7 @@ def _name_levels(axes: Axes, x: Axis, y: Axis, choice: Choice) -> list[str]:
     for value, name in choice.levels.items():
         text = f"{name} {shown.scale.show(value)}"
         if low < value < high and not points:
-            look = {"color": LEVEL_COLOUR, "ls": "-" if y.ticks else DASHES, "lw": 1.2}
+            look: Any = {"color": LEVEL_COLOUR, "ls": "-" if y.ticks else DASHES, "lw": 1.2}
             axes.plot([], [], label=text, **look)
         elif low < value < high and value == min(choice.levels):
             axes.plot([], [], "o", label=f"from {text} on", **RING)
