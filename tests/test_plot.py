@@ -255,6 +255,13 @@ def test_contours_share_colours_about_zero_and_a_bar_of_those_that_occur(result:
     assert low > -0.5 * high
 
 
+def test_the_last_tick_of_x_and_the_first_of_y_do_not_collide(result: Result) -> None:
+    axes = plot(result, "surface").axes[0]
+    (x, _), (y, _) = ticks(axes.xaxis)[-1], ticks(axes.yaxis)[0]
+    assert x == pytest.approx(2.0)  # at the corner where y begins
+    assert y > 0.2
+
+
 def test_the_surface_has_the_heights_of_the_nodes(result: Result) -> None:
     axes: Any
     axes, bar = plot(result, "surface").axes

@@ -488,3 +488,5 @@ def test_the_picture_of_exceedance_goes_through_the_probabilities(folder: Path) 
     x, y = np.asarray(curve.get_xdata(), float), np.asarray(curve.get_ydata(), float)
     assert np.interp(600.0, x, y) == pytest.approx(loaded.random.exceedance.probability, abs=1 / 64)
     assert picture.notes[0].startswith("P(peak_force > 600) = ")
+    (named,) = picture.figure.legends[0].get_texts()
+    assert named.get_text().split()[:2] == ["limit", "600"]
