@@ -128,7 +128,9 @@ def test_a_threshold_of_all_cases_is_a_level_of_peak_forces_only() -> None:
     assert sweep["peak_force"].min() < force < sweep["peak_force"].max()
     marked: Any = plot(sweep).axes[0].collections[-1]
     np.testing.assert_allclose(marked.levels, [force])
-    assert len(plot(sweep, "impulse").axes[0].collections) == 2  # cells and lines
+    impulse = plot(sweep, "impulse")
+    assert len(impulse.axes[0].collections) == 2  # cells and lines
+    assert not impulse.legends
 
 
 def legend_of(figure: Any) -> list[str]:

@@ -258,11 +258,12 @@ def legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str], title:
 
 
 def lines_legend(figure: Figure, axes: Axes, title: str = "") -> None:
-    """Draw the legend of the labelled lines of axes."""
+    """Draw the legend of the labelled lines of axes, if there are any."""
     named = [(str(line.get_label()), line) for line in axes.get_lines()]
     unnamed = ("_", "_nolegend_")  # matplotlib gives the latter to error bars
     named = [
         (text, line) for text, line in named
         if text not in unnamed and not text.startswith("_child")
     ]  # fmt: skip
-    legend(figure, [line for _, line in named], [text for text, _ in named], title)
+    if named:
+        legend(figure, [line for _, line in named], [text for text, _ in named], title)
