@@ -113,19 +113,17 @@ def test_each_warning_of_a_deck_is_a_warning_in_python_at_the_users_line() -> No
     assert {warning.filename for warning in caught} == {__file__}
 
 
-def test_what_a_result_or_a_sweep_lacks_is_named_with_what_there_is(
-    runs: Path,
-) -> None:
+def test_what_a_result_or_a_sweep_lacks_is_named_with_what_there_is(runs: Path) -> None:
     result = fecm.load(runs / "small.h5")
     sweep = fecm.sweep(small(), {"velocity": [50.0]})
-    for asked, words in (
-        (lambda: result["history"], "history is a group, not a dataset; .*history/force"),
-        (lambda: result["history/forse"], "no history/forse .*did you mean history/force"),
-        (lambda: result["plies/sigma_1"], "no plies/sigma_1 .*add PLYS"),
-        (lambda: sweep["peak_forse"], "no peak_forse in this sweep; did you mean peak_force"),
+    for source, asked, words in (
+        (result, "history", "history is a group, not a dataset; .*history/force"),
+        (result, "history/forse", "no history/forse .*did you mean history/force"),
+        (result, "plies/sigma_1", "no plies/sigma_1 .*add PLYS"),
+        (sweep, "peak_forse", "no peak_forse in this sweep; did you mean peak_force"),
     ):
         with pytest.raises(KeyError, match=words):
-            asked()
+            source[asked]
 
 
 def test_doubts_about_a_run_are_warnings_and_stay_with_the_result(tmp_path: Path) -> None:
