@@ -12,7 +12,10 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 KERNELS = "fecm/mechanics/kernels"
-FLAGS = ["-O3", "-g0", "-std=gnu11", "-Wno-psabi", "-fvisibility=hidden"]
+# These undo -Ofast and -ffast-math of CFLAGS, which are also given to the linker: it would then make
+# the library flush small numbers to zero in the whole process.
+EXACT = ["-O3", "-fno-fast-math", "-fno-unsafe-math-optimizations"]
+FLAGS = [*EXACT, "-g0", "-std=gnu11", "-Wno-psabi", "-fvisibility=hidden"]
 
 
 class CustomBuildHook(BuildHookInterface[Any]):
@@ -58,6 +61,7 @@ def _compiled(root: Path, folder: Path) -> Path:
         [str(root / KERNELS / "kernels.c")],
         define_macros=[("FECM_STAMP", str(stamp))],
         extra_compile_args=FLAGS,
+        extra_link_args=EXACT,
         libraries=["m", "pthread"],
         py_limited_api=True,
     )
@@ -65,4 +69,7 @@ def _compiled(root: Path, folder: Path) -> Path:
     command.build_lib, command.build_temp = str(folder), str(folder / "objects")
     command.ensure_finalized()
     command.run()
-    return folder / command.get_ext_filename("_compiled")
+    built = folder / command.get_ext_filename("_compiled")
+    if not built.is_file():
+        raise FileNotFoundError("the compiler wrote no library")
+    return built

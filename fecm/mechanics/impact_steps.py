@@ -7,8 +7,8 @@ after is that of :mod:`fecm.mechanics.impact`.
 from __future__ import annotations
 
 import ctypes
-import math
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any, cast
 
 import numpy as np
@@ -29,10 +29,19 @@ from fecm.mechanics.projectile import RodIntegrator, RodState
 
 # Difference of squares of frequencies below which modes count as equal, relative to the largest.
 EQUAL = 1e-10
-# Critical indentation and slope of the laws that the kernels know: equations 3-8 and 3-7.
-CRITICAL: dict[type, Any] = {
-    LinearPermanent: lambda law: (law.alpha_p, law.s_p),
-    YangSunPermanent: lambda law: (law.alpha_cr, math.nan),
+
+
+class LawKind(IntEnum):
+    """Permanent indentation of a contact law, as impact.h numbers it."""
+
+    LINEAR = 0  # equation 3-8
+    YANG_SUN = 1  # equation 3-7
+
+
+# Kind, critical indentation and slope of the laws that the kernels know.
+LAWS: dict[type, Any] = {
+    LinearPermanent: lambda law: (LawKind.LINEAR, law.alpha_p, law.s_p),
+    YangSunPermanent: lambda law: (LawKind.YANG_SUN, law.alpha_cr, 0.0),
 }
 
 
@@ -118,7 +127,7 @@ def supports(system: ImpactSystem) -> bool:
     return (
         isinstance(motion.product, CompiledProduct)
         and isinstance(law, HystereticLaw)
-        and type(law.constants) in CRITICAL
+        and type(law.constants) in LAWS
         and contact.plate_moves
         and not contact.keeps_first_step
         and contact.share == 1.0
@@ -167,13 +176,14 @@ class ImpactSteps:
         motion = self._modes.motion(state.rod)
         law: Any = system.law
         c = law.constants
+        kind, critical, slope = LAWS[type(c)](c)
         rows = np.ascontiguousarray(stored, dtype=np.int64)
         records = np.empty((steps, len(COLUMNS)))
         strains = np.empty((steps, len(self._gage_entry)))
         fields = np.empty((len(rows), len(kernel.u)))
         m: LoadingHistory = state.memory
         impact = Impact(
-            c.k, c.q, *CRITICAL[type(c)](c), *m,
+            c.k, c.q, critical, slope, kind, *m,
             *state.contact, state.plate_w, state.contact_work, plate.time,
             int(state.unconverged_steps), integrator.dt, integrator.theta, *integrator.weights,
             integrator.gain, len(self._tip_shape), floats(T), floats(h),

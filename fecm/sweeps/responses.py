@@ -22,7 +22,7 @@ from fecm._typing import Floats
 from fecm.mechanics import kernels
 from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, LinearPermanent
 from fecm.mechanics.impact import ContactState, ImpactConditions, ImpactSystem, couple_step
-from fecm.mechanics.impact_steps import CRITICAL, ImpactSteps, Modes, supports
+from fecm.mechanics.impact_steps import LAWS, ImpactSteps, Modes, supports
 from fecm.mechanics.kernels import floats
 from fecm.mechanics.plate_motion import AppliedForce, DofSums, Load, PlateMotion
 from fecm.mechanics.projectile import Projectile, RigidMass, RodIntegrator, RodState, WilsonStep
@@ -268,7 +268,7 @@ def impacts(response: Floats, dt: float, node_mass: float, hits: Hits) -> Impact
     `node_mass` is the mass that the contact force accelerates: the lumped mass of the impact node,
     or 1/(g M^-1 g) of a patch with the weights g.
     """
-    if kernels.LIBRARY is not None and type(hits.law.constants) in CRITICAL:
+    if kernels.LIBRARY is not None and type(hits.law.constants) in LAWS:
         return _by_kernels(response, dt, node_mass, hits)
     return by_numpy(response, node_mass, TipSteps(hits, dt, len(response)))[0]
 
@@ -342,7 +342,8 @@ def _modes(rod: Projectile) -> Modes:
 def _by_kernels(response: Floats, dt: float, node_mass: float, hits: Hits) -> Impacts:
     """Compute impacts by the compiled kernels, and projectiles by their modes."""
     steps, cases, c = len(response), len(hits.speed), hits.law.constants
-    given = np.stack(np.broadcast_arrays(c.k, c.q, *CRITICAL[type(c)](c), hits.speed, hits.scale))
+    kind, critical, slope = LAWS[type(c)](c)
+    given = np.stack(np.broadcast_arrays(c.k, c.q, critical, slope, hits.speed, hits.scale))
     force, found = np.empty((cases, steps)), np.empty((len(FOUND), cases))
     starts = np.searchsorted(hits.kind, np.arange(len(hits.rods) + 1)).tolist()
     for rod, first, last in zip(hits.rods, starts[:-1], starts[1:], strict=True):
@@ -350,7 +351,7 @@ def _by_kernels(response: Floats, dt: float, node_mass: float, hits: Hits) -> Im
         modes = _modes(rod)
         (T, h), shape = modes.step(step), modes.shapes[0].copy()
         own = kernels.Sweep(
-            last - first, cases, steps, len(shape), dt, step.theta, *step.weights,
+            last - first, cases, steps, len(shape), kind, dt, step.theta, *step.weights,
             floats(T), floats(h), floats(modes.stiffness), floats(shape), floats(response),
             floats(given[:, first:]), floats(force[first:]), floats(found[:, first:]),
         )  # fmt: skip

@@ -5,7 +5,10 @@ from __future__ import annotations
 import ctypes
 import zlib
 from ctypes import POINTER, Structure, c_double, c_int8, c_int32, c_int64
+from io import SEEK_END
+from importlib.util import find_spec
 from pathlib import Path
+from struct import Struct
 from typing import Any
 
 from fecm._typing import Floats
@@ -85,8 +88,8 @@ class Impact(Structure):
     """Contact, projectile and records of steps."""
 
     _fields_ = _fields(
-        "float: k q critical slope branch f b w p peak peak_force permanent indentation force"
-        " plate_w work time; int: unconverged; float: dt theta weight_before weight gain;"
+        "float: k q critical slope; int: law; float: branch f b w p peak peak_force permanent"
+        " indentation force plate_w work time; int: unconverged; float: dt theta weight_before weight gain;"
         " int: modes; floats: T h stiffness tip_shape station motion; float: tip dt2; int: loaded;"
         " longs: entry; floats: load_weight mobility last; int: gages gage_dofs; longs: gage_entry;"
         " floats: gage_weight; int: rows; longs: stored; floats: records strains fields",
@@ -98,8 +101,8 @@ class Sweep(Structure):
     """Impacts of many cases by one kind of projectile."""
 
     _fields_ = _fields(
-        "int: cases stride steps modes; float: dt theta weight_before weight; floats: T h stiffness"
-        " tip_shape plate given force found"
+        "int: cases stride steps modes law; float: dt theta weight_before weight;"
+        " floats: T h stiffness tip_shape plate given force found"
     )
 
 
@@ -110,15 +113,46 @@ COLUMNS = (
 )  # fmt: skip
 
 
+ELF64 = b"\x7fELF\x02\x01"  # begin of a little-endian 64-bit ELF file
+# e_phoff and e_phnum of its header; p_offset and p_filesz of a segment's.
+ELF_HEADER, SEGMENT = Struct("<32x Q 16x H"), Struct("<8x Q 16x Q 16x")
+
+
 def _load() -> Any:
-    try:
-        from fecm.mechanics.kernels import _compiled  # type: ignore[attr-defined]
-    except ImportError:
+    """Compiled library of these sources, None without one.
+
+    One of other sources, left by an earlier installation in place, is not used.
+    """
+    found = find_spec(f"{__name__}._compiled")
+    if found is None or found.origin is None:
         return None
-    library = ctypes.CDLL(_compiled.__file__)
+    try:
+        if not _is_whole(Path(found.origin)):
+            return None
+        library = ctypes.CDLL(found.origin)
+        if library.fecm_stamp() != stamp(Path(__file__).parent):
+            return None
+    except (OSError, AttributeError):  # no library, or an older one without a stamp
+        return None
     library.fecm_impact_steps.restype = c_int64
-    # A library of other sources, left by an earlier installation in place, is not used.
-    return library if library.fecm_stamp() == stamp(Path(__file__).parent) else None
+    return library
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a library has all bytes that loading it maps; one cut short would crash the process.
+
+    Only 64-bit ELF files are judged (System V ABI, gABI 4.1, chapters 4 and 5).
+    """
+    with path.open("rb") as file:
+        head = file.read(ELF_HEADER.size)
+        if len(head) < ELF_HEADER.size or not head.startswith(ELF64):
+            return True  # the system's loader refuses it, or knows its format
+        table, count = ELF_HEADER.unpack(head)
+        file.seek(table)
+        headers = file.read(count * SEGMENT.size)
+        size = file.seek(0, SEEK_END)
+    complete = len(headers) == count * SEGMENT.size
+    return complete and all(a + length <= size for a, length in SEGMENT.iter_unpack(headers))
 
 
 def stamp(folder: Path) -> int:

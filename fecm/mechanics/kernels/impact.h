@@ -2,9 +2,13 @@
 
 enum { VIRGIN, UNLOADING, RELOADING };
 
-/* Constants of the contact law: equation 3-8, or 3-7 where `slope` is not a number. */
+/* Permanent indentation after a peak: equation 3-8, or 3-7, which has no slope. */
+enum { LINEAR_PERMANENT, YANG_SUN_PERMANENT };
+
+/* Constants of the contact law; `kind` is one of the above. */
 typedef struct {
     double k, q, critical, slope;
+    int64_t kind;
 } Law;
 
 /* LoadingHistory of contact_law.py. */
@@ -61,10 +65,9 @@ static double force_of(const History *m, double a) {
     return a > m->b ? m->f * power((a - m->b) / m->w, m->p) : 0.0;
 }
 
-/* Permanent indentation after a peak, equation 3-8 or 3-7. */
 static double permanent(const Law *law, double peak) {
     double value;
-    if (!isnan(law->slope))
+    if (law->kind == LINEAR_PERMANENT)
         value = law->slope * (peak - law->critical);
     else {
         const double top = peak > 0.0 ? peak : 0.0;

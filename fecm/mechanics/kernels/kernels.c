@@ -8,6 +8,9 @@
  * the nodes that several chunks share or that have images by symmetry.  Chunks have copies of these.
  * nd is 3, for w, theta_x, theta_y, or 5.  Restrained dofs are among them.
  */
+#if defined __FAST_MATH__ || (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__)
+#error "divergence is found by isfinite(), and sums have a fixed order: compile without -ffast-math"
+#endif
 #define Py_LIMITED_API 0x030B0000
 #include <Python.h>
 #include <math.h>
@@ -98,6 +101,7 @@ typedef struct {
 /* Impacts on one plate by one kind of projectile, whose mass and stiffness have a factor in each case. */
 typedef struct {
     int64_t cases, stride, steps, modes; /* `stride`: columns of the arrays of cases */
+    int64_t law;                         /* kind of the contact law */
     double dt, theta, weight_before, weight; /* as in RodIntegrator */
     const double *T, *h, *stiffness, *tip_shape; /* modes: see Rod */
     const double *plate; /* (steps,): displacement per force after 1, 2, ... steps */

@@ -167,7 +167,7 @@ TARGET void NAME(run_cases)(const Sweep *x, const Response *r, int64_t first) {
     }
     Law law[CASES];
     for (int lane = 0; lane < CASES; lane++)
-        law[lane] = (Law){given[0][lane], given[1][lane], given[2][lane], given[3][lane]};
+        law[lane] = (Law){given[0][lane], given[1][lane], given[2][lane], given[3][lane], x->law};
     const half scale = given[5], gain = r->gain / scale;
     half m[8] = {none, given[0], none, none + 1.0, none + 1.5, none, none, none};
     half tip = none, velocity = -given[4], acceleration = none, indentation = none, force = none, w = none;

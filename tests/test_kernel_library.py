@@ -1,0 +1,124 @@
+"""The compiled library: what it is built with, and when it is not used."""
+
+from __future__ import annotations
+
+import importlib
+import shutil
+import subprocess
+import sys
+import types
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+from typing import Any
+
+import h5py
+import pytest
+
+from fecm.mechanics import kernels
+
+ROOT = Path(__file__).parent.parent
+SOURCE = Path(kernels.__file__).parent / "kernels.c"
+CC = shutil.which("cc") or shutil.which("gcc")
+needs_compiler = pytest.mark.skipif(CC is None, reason="there is no C compiler")
+FAST = ["-ffast-math", "-Ofast", "-funsafe-math-optimizations"]
+
+# A number below the normal range, from an operation that the compiler can't do beforehand.
+TINY = "double tiny(double x) { volatile double y = x; return y / 4.0; }"
+ASK = """
+import ctypes, sys
+library = ctypes.CDLL(sys.argv[1])
+library.tiny.restype, library.tiny.argtypes = ctypes.c_double, [ctypes.c_double]
+print(library.tiny(2.0**-1022) > 0.0)
+"""
+
+
+@pytest.fixture
+def hook(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The module of the build hook, without the program that calls it."""
+    interface: Any = types.ModuleType("interface")
+    interface.BuildHookInterface = dict  # any class with one parameter
+    parts = "hatchling.builders.hooks.plugin.interface".split(".")
+    for depth in range(1, len(parts) + 1):
+        monkeypatch.setitem(sys.modules, ".".join(parts[:depth]), interface)
+    monkeypatch.syspath_prepend(str(ROOT))
+    monkeypatch.delitem(sys.modules, "hatch_build", raising=False)
+    return importlib.import_module("hatch_build")
+
+
+@needs_compiler
+@pytest.mark.parametrize("flag", ["-ffast-math", "-Ofast", "-ffinite-math-only"])
+def test_the_sources_refuse_a_compiler_that_takes_all_numbers_for_finite(
+    flag: str, hook: Any
+) -> None:
+    def preprocessed(*flags: str) -> str:
+        given = [CC, "-E", "-std=gnu11", "-DFECM_STAMP=1", *flags, str(SOURCE), "-o", "/dev/null"]
+        return subprocess.run(given, capture_output=True, text=True).stderr
+
+    assert "compile without -ffast-math" in preprocessed(flag)
+    assert "compile without -ffast-math" not in preprocessed()
+    assert "compile without -ffast-math" not in preprocessed(flag, *hook.EXACT)
+
+
+@needs_compiler
+@pytest.mark.parametrize("flag", FAST)
+def test_flags_of_the_user_do_not_flush_small_numbers_to_zero(
+    flag: str, hook: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "tiny.c").write_text(TINY)
+    library = tmp_path / "tiny.so"
+    subprocess.run(
+        [CC, "-shared", "-fPIC", flag, tmp_path / "tiny.c", "-o", library, *hook.EXACT], check=True
+    )
+    asked = subprocess.run(
+        [sys.executable, "-c", ASK, library], capture_output=True, text=True, check=True
+    )
+    assert asked.stdout == "True\n"
+
+
+def test_a_compiler_that_writes_nothing_leaves_numpy(
+    hook: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("setuptools")
+    said: list[str] = []
+    monkeypatch.setenv("CC", "true")
+    build = hook.CustomBuildHook()
+    build.target_name, build.root = "wheel", str(ROOT)
+    build.app = types.SimpleNamespace(display_warning=said.append)
+    data: dict[str, Any] = {"force_include": {}}
+    build.initialize("standard", data)
+    build.finalize("standard", data, "")
+    assert data == {"force_include": {}}
+    assert len(said) == 1
+    assert "the compiler wrote no library" in said[0]
+    assert "fecm uses NumPy" in said[0]
+
+
+def loaded_from(path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """What is loaded where the library is this file."""
+    monkeypatch.setattr(kernels, "find_spec", lambda name: ModuleSpec(name, None, origin=str(path)))
+    return kernels._load()
+
+
+def test_a_library_without_a_stamp_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert loaded_from(Path(h5py.h5.__file__), monkeypatch) is None
+
+
+@pytest.mark.parametrize("content", [b"", b"no library", b"\x7fELF\x02\x01\x01" + bytes(57)])
+def test_a_file_that_is_no_library_is_not_used(
+    content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "_compiled.so"
+    path.write_bytes(content)
+    assert loaded_from(path, monkeypatch) is None
+
+
+@pytest.mark.skipif(kernels.LIBRARY is None, reason="the kernels are not compiled")
+@pytest.mark.skipif(sys.platform != "linux", reason="judges ELF files")
+@pytest.mark.parametrize("eighths", range(8))
+def test_a_library_cut_short_is_not_loaded(
+    eighths: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = Path(kernels.LIBRARY._name).read_bytes()
+    path = tmp_path / "_compiled.so"
+    path.write_bytes(whole[: max(100, len(whole) * eighths // 8)])
+    assert loaded_from(path, monkeypatch) is None
