@@ -12,8 +12,8 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 KERNELS = "fecm/mechanics/kernels"
-# These undo -Ofast and -ffast-math of CFLAGS, which are also given to the linker: it would then make
-# the library flush small numbers to zero in the whole process.
+# These undo -Ofast and -ffast-math of CFLAGS, also for the linker, which would otherwise add code
+# that flushes small numbers to zero in the whole process.
 EXACT = ["-O3", "-fno-fast-math", "-fno-unsafe-math-optimizations"]
 FLAGS = [*EXACT, "-g0", "-std=gnu11", "-Wno-psabi", "-fvisibility=hidden"]
 

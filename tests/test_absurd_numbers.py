@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import warnings
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.deck import DeckError
+from fecm.problem.summary import ProblemSummary
 from tests.decks import PROGRAM, small
 from tests.fuzz_decks import FORC, OWN
 
@@ -46,6 +48,39 @@ def test_an_absurd_number_in_any_field_runs_or_is_refused_in_words(
         result = fecm.run(text)
         assert isinstance(result, fecm.Result)
         assert np.isfinite(result.force).all()
+
+
+@pytest.mark.parametrize("value", ["5E-324", "1E-308", "1E-300", "1E-20", "1E300"])
+def test_any_critical_indentation_of_yang_and_sun_runs_or_is_refused_in_words(value: str) -> None:
+    acr = f"EXPE ACR\n{'1912000.':>10}{value:>10}\n"
+    text = re.sub(r"EXPE\n.*\n", acr, DECK)
+    with warnings.catch_warnings(), contextlib.suppress(DeckError, fecm.DivergenceError):
+        warnings.simplefilter("error")
+        warnings.simplefilter("ignore", fecm.FecmWarning)
+        result = fecm.run(text)
+        assert isinstance(result, fecm.Result)
+        assert np.isfinite(result.force).all()
+
+
+@pytest.mark.parametrize(
+    ("k", "velocity"),
+    [
+        ("1E-308", "1E-150"),
+        ("1E-308", "1E300"),
+        ("1E300", "1E150"),
+        ("1E-308", "1E-308"),
+    ],  # fmt: skip
+)
+def test_the_summary_of_a_deck_with_absurd_numbers_warns_of_nothing_in_numpys_words(
+    k: str, velocity: str
+) -> None:
+    text = DECK.replace("13    3     115.0", f"13    3{velocity:>10}").replace(
+        "  1912000.", f"{k:>10}"
+    )
+    (problem,) = load_deck(text).problems
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert ProblemSummary(problem).lines()
 
 
 @pytest.mark.parametrize(("dt", "code"), [("1e-300", "E515"), ("1e-15", "E515"), ("4e-7", "")])

@@ -37,7 +37,7 @@ def hook(monkeypatch: pytest.MonkeyPatch) -> Any:
     """The module of the build hook, without the program that calls it."""
     interface: Any = types.ModuleType("interface")
     interface.BuildHookInterface = dict  # any class with one parameter
-    parts = "hatchling.builders.hooks.plugin.interface".split(".")
+    parts = ["hatchling", "builders", "hooks", "plugin", "interface"]
     for depth in range(1, len(parts) + 1):
         monkeypatch.setitem(sys.modules, ".".join(parts[:depth]), interface)
     monkeypatch.syspath_prepend(str(ROOT))

@@ -265,12 +265,12 @@ def expected_peak(deck: model.Deck, plate: PlateModel) -> float:
 def contact_stiffness(deck: model.Deck, plate: PlateModel) -> float:
     """Larger tangent stiffness of loading (3-1) and unloading (3-3) at the expected peak."""
     law = build_constants(deck.require(model.Indentation))
-    with np.errstate(all="ignore"):
-        force = expected_peak(deck, plate)
-    peak = (force / law.k) ** (2.0 / 3.0)
-    if not peak > 0.0:
-        return 0.0
-    return float(force * max(1.5 / peak, law.q / (peak - law.permanent(peak))))
+    with np.errstate(all="ignore"):  # infinite where the unloading curve is a vertical line
+        force = np.float64(expected_peak(deck, plate))
+        peak = (force / law.k) ** (2.0 / 3.0)
+        if not peak > 0.0:
+            return 0.0
+        return float(force * max(1.5 / peak, law.q / (peak - law.permanent(peak))))
 
 
 @frozen

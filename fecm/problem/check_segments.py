@@ -230,9 +230,10 @@ def resolution(problem: Problem) -> Resolution | None:
         return None
     laminate, mass = problem.laminate, build_projectile(deck).total_mass
     v = np.float64(impact.velocity)  # a division by zero is then infinite, not an error
-    contact = 2.94 * (5.0 * mass * v**2 / (4.0 * law.k)) ** 0.4 / v
     rigidity = float(min(laminate.D[0, 0], laminate.D[1, 1]))
-    wave = 2.0 * np.pi * (rigidity / (laminate.mass * (np.pi / contact) ** 2)) ** 0.25
+    with np.errstate(all="ignore"):
+        contact = 2.94 * (5.0 * mass * v**2 / (4.0 * law.k)) ** 0.4 / v
+        wave = 2.0 * np.pi * (rigidity / (laminate.mass * (np.pi / contact) ** 2)) ** 0.25
     touching = (mesh.elements == impact.node).any(axis=1)
     side = float(longest_sides(mesh.elements[touching], mesh.coordinates).max())
     if not np.isfinite(wave):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import ctypes
 import zlib
 from ctypes import POINTER, Structure, c_double, c_int8, c_int32, c_int64
-from io import SEEK_END
 from importlib.util import find_spec
+from io import SEEK_END
 from pathlib import Path
 from struct import Struct
 from typing import Any
@@ -89,9 +89,9 @@ class Impact(Structure):
 
     _fields_ = _fields(
         "float: k q critical slope; int: law; float: branch f b w p peak peak_force permanent"
-        " indentation force plate_w work time; int: unconverged; float: dt theta weight_before weight gain;"
-        " int: modes; floats: T h stiffness tip_shape station motion; float: tip dt2; int: loaded;"
-        " longs: entry; floats: load_weight mobility last; int: gages gage_dofs; longs: gage_entry;"
+        " indentation force plate_w work time; int: unconverged; float: dt theta weight_before"
+        " weight gain; int: modes; floats: T h stiffness tip_shape station motion;"
+        " float: tip dt2; int: loaded; longs: entry; floats: load_weight mobility last; int: gages gage_dofs; longs: gage_entry;"
         " floats: gage_weight; int: rows; longs: stored; floats: records strains fields",
         longs=Longs,
     )
