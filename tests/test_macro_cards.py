@@ -11,6 +11,7 @@ from fecm.deck import Deck, DeckError, Finding, read_deck
 from fecm.deck.format import format_deck
 from fecm.deck.macros import WORDS, estimate_work
 from fecm.deck.model import Impact, Indentation, Patch, Projectile, Segment, Shear
+from fecm.deck.reader import Reader
 from fecm.deck.records import Macro
 from fecm.problem.slips import MODES
 from tests.calls import call
@@ -205,6 +206,27 @@ def test_a_macros_number_is_written_exactly(value: float) -> None:
     deck = replace(read(small()), macros=(Macro("DT", value=value),), text="")
     assert read(deck.to_text()).macros[0].value == value
     assert read(format_deck(deck.to_text())).macros[0].value == value
+
+
+@pytest.mark.parametrize("card", ["LOßP", "LAŉS", "ǰT,,5.E-7"])
+def test_a_macro_of_foreign_letters_is_formatted_as_it_is_read(card: str) -> None:
+    def macros(text: str) -> tuple[Macro, ...]:
+        deck = Reader(text).problems()[0].deck
+        assert deck is not None
+        return deck.macros
+
+    deck = small(PROGRAM + f"{card}\n")
+    assert len(macros(deck)) == 8
+    assert macros(format_deck(deck)) == macros(deck)
+
+
+@pytest.mark.parametrize("end", [" END", " END  ! of the program", " END,"])
+def test_an_indented_end_ends_the_program_as_it_does_when_it_is_formatted(end: str) -> None:
+    text = small(PROGRAM)
+    assert text.count("NEXT\nEND\n") == 1
+    indented = text.replace("NEXT\nEND\n", f"NEXT\n{end}\n")
+    assert read(indented) == read(text)
+    assert read(format_deck(indented)) == read(text)
 
 
 def test_a_number_that_is_not_finite_is_written_in_no_form() -> None:

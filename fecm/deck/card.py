@@ -28,6 +28,15 @@ _REAL = re.compile(
 )
 
 
+def capitals(word: str) -> str:
+    """A word without the blanks around it, in capitals.
+
+    Letters beyond ASCII stay as they are: the capitals of some are two letters, so that a word would
+    outgrow its field.
+    """
+    return "".join(c.upper() if c.isascii() else c for c in word.strip())
+
+
 def parse_integer(text: str) -> int | None:
     """Read an I field without blanks; None if it is no integer.  The caller limits its length."""
     return int(text) if _INTEGER.fullmatch(text) else None

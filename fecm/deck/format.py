@@ -6,7 +6,7 @@ and are replaced each time.
 
 from __future__ import annotations
 
-from fecm.deck.card import Card, Fields, Value, write_card
+from fecm.deck.card import Card, Fields, Value, capitals, write_card
 from fecm.deck.findings import DeckError
 from fecm.deck.model import STOP
 from fecm.deck.reader import READERS, Reader
@@ -62,7 +62,7 @@ def _aligned(card: Card, fields: Fields, values: list[Value]) -> str:
     count = max([n for n, text in enumerate(texts, start=1) if text.strip()], default=0)
     kept: list[Value] = list(values[:count])
     if fields in (Macro.fields, Macro.short_fields):
-        kept[:1] = [str(v).strip().upper() for v in kept[:1]]
+        kept[:1] = [capitals(str(v)) for v in kept[:1]]
         if fields == Macro.short_fields:
             kept[1:1] = [""]
         return write_card(Macro.fields[: len(kept)], without_points(kept))

@@ -11,7 +11,7 @@ from typing import Any, BinaryIO, TypeVar
 
 from fecm._memory import NotEnoughMemoryError, available, format_bytes, require
 from fecm.deck import model, records
-from fecm.deck.card import Card, Fields, Source, Value, read_values
+from fecm.deck.card import Card, Fields, Source, Value, capitals, read_values
 from fecm.deck.findings import DeckError, Findings, Place
 from fecm.deck.model import STOP, TITLE, Deck, Segment
 
@@ -316,7 +316,12 @@ class Reader(Stream):
                 self._unsound.add(MACROS)
             else:
                 (word, *option, value, second), source = row
-                name, text = str(word).strip().upper(), "".join(map(str, option)).strip().upper()
+                name, text = (capitals(str(part)) for part in (word, "".join(map(str, option))))
+                if name == END:  # not in column 1
+                    return macros
+                if name in (STOP, TITLE):
+                    self.give_back()
+                    break
                 macros.append(records.Macro(name, text, float(value), float(second), source=source))
         self.findings.add("E004", "The macro program is not ended by END.", (card or head).place)
         self._unsound.add(MACROS)
