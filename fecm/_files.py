@@ -193,6 +193,26 @@ def _lock(handle: int, *, wait: bool = False) -> bool:
     return True
 
 
+@contextlib.contextmanager
+def held(folder: Path, message: str) -> Iterator[None]:
+    """Make a folder if there is none, and lock it.
+
+    Raises OutputError with this message if another process holds the lock.
+    """
+    folder.mkdir(exist_ok=True)
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except PermissionError:  # Windows opens no folders
+        yield
+        return
+    try:
+        if not _lock(handle):
+            raise OutputError(message)
+        yield
+    finally:
+        os.close(handle)
+
+
 def _is(handle: int, path: Path) -> bool:
     """Whether a path still leads to an open file."""
     try:

@@ -17,9 +17,9 @@ from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.batch import run
 from fecm.sweeps.cases import grid
 from fecm.sweeps.plan import Outcome, Plan, Task, plan, tasks
-from fecm.sweeps.schedule import LOST, DamagedPartError, PartialResults
+from fecm.sweeps.schedule import LOST, DamagedPartError, OtherSweepError, PartialResults, alone
 from fecm.sweeps.vary import with_time_step
-from tests.calls import call
+from tests.calls import assert_unusable, call
 from tests.decks import model, small
 from tests.kill_runs import SWEEP, SWEPT
 
@@ -61,6 +61,44 @@ def test_cases_lost_with_their_workers_are_not_stored_as_finished(
     found = carry_out(problem, made, parts=parts)
     assert found.fine.tolist() == [False, True]
     assert [parts.get(task) is None for task in tasks(problem, made)] == [True, False]
+
+
+def test_a_sweep_that_was_killed_before_its_first_plate_was_done_begins_again(
+    tmp_path: Path,
+) -> None:
+    deck, result = tmp_path / "s.inp", tmp_path / "s.h5"
+    deck.write_text(small())
+    left = tmp_path / ".s.h5.parts"
+    left.mkdir()
+    (left / ".sweep.partial.json").write_text("")
+    done = call("sweep", deck, "--vary", "k=1e6", "-o", result)
+    assert done.exit_code == 0, done.stderr
+    assert result.exists()
+    assert not left.exists()
+
+
+def test_an_outcome_without_the_mark_of_its_sweep_is_not_taken(made: Plan, tmp_path: Path) -> None:
+    parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
+    (task, *_) = tasks(problem_of(made.deck), made)
+    parts.put(task, run(task))
+    (parts.folder / "sweep.json").unlink()
+    with pytest.raises(OtherSweepError, match="another sweep"):
+        PartialResults(tmp_path / "s.h5", made.fingerprint())
+    again = PartialResults(tmp_path / "s.h5", made.fingerprint(), restart=True)
+    assert again.get(task) is None
+
+
+def test_two_sweeps_begun_at_once_do_not_write_the_same_parts(tmp_path: Path) -> None:
+    pytest.importorskip("fcntl")
+    deck, result = tmp_path / "s.inp", tmp_path / "s.h5"
+    deck.write_text(small())
+    command = ("sweep", deck, "--vary", "k=1e6", "-o", result)
+    with alone(result):
+        refused = call(*command)
+        assert_unusable(refused)
+        assert "s.h5 is being computed by another process" in refused.stderr
+        assert not result.exists()
+    assert call(*command).exit_code == 0
 
 
 def workers_of(pid: int) -> list[int]:

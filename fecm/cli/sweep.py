@@ -26,7 +26,7 @@ from fecm.sweeps.convergence import refined_cases
 from fecm.sweeps.convergence import table as table_of
 from fecm.sweeps.random_result import tables
 from fecm.sweeps.result import SweepResult, save, summary, verdict
-from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_in
+from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_in, alone
 
 NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
 
@@ -154,6 +154,7 @@ def sweep(
             f"B is not zero in {count} case{'' if count == 1 else 's'}: u and v, which the deck "
             "restrains at every node, are free there except where w is held"
         )
+    click.get_current_context().with_resource(alone(path))
     parts = PartialResults(path, planned.fingerprint(), restart=overwrite)
     result = _carry_out(problem, planned, parts, workers, scheduler)
     forces = parts.forces(plans.tasks(problem, planned)) if history else ()

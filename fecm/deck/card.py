@@ -31,7 +31,7 @@ _REAL = re.compile(
 def capitals(word: str) -> str:
     """A word without the blanks around it, in capitals.
 
-    Letters beyond ASCII stay as they are: the capitals of some are two letters, so that a word would
+    Letters beyond ASCII stay as they are: the capitals of some are two letters, and the word would
     outgrow its field.
     """
     return "".join(c.upper() if c.isascii() else c for c in word.strip())

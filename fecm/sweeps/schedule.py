@@ -20,7 +20,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent import futures
-from contextlib import nullcontext, suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 from pickle import PicklingError
 from typing import Any
@@ -29,7 +29,7 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from fecm._errors import FecmError
-from fecm._files import beside, packed
+from fecm._files import beside, held, packed
 from fecm.sweeps.batch import run, told
 from fecm.sweeps.plan import Forces, Outcome, Task
 
@@ -179,6 +179,16 @@ class DamagedPartError(FecmError, ValueError):
     """A file of the folder is damaged."""
 
 
+def parts_of(result: Path) -> Path:
+    """Folder of the partial results of a sweep."""
+    return result.with_name(f".{result.name}.parts")
+
+
+def alone(result: Path) -> AbstractContextManager[None]:
+    """Keep other processes from this result; raises OutputError if one computes it."""
+    return held(parts_of(result), f"{result} is being computed by another process")
+
+
 class PartialResults:
     """Outcomes of finished tasks of the sweep with a fingerprint, for its result file.
 
@@ -186,16 +196,19 @@ class PartialResults:
     """
 
     def __init__(self, result: Path, fingerprint: str, *, restart: bool = False) -> None:
-        self.folder = result.with_name(f".{result.name}.parts")
+        self.folder = parts_of(result)
+        self.folder.mkdir(exist_ok=True)
         mark, found = self.folder / "sweep.json", ""
         with suppress(OSError, ValueError, KeyError, TypeError):
             found = str(json.loads(mark.read_text())["fingerprint"])
-        if self.folder.exists() and found != fingerprint:
+        # A sweep that was killed while it began has left a folder without outcomes.
+        outcomes = list(self.folder.glob("task-*"))
+        if outcomes and found != fingerprint:
             if not restart:
                 text = "holds the outcomes of another sweep; --overwrite deletes them"
                 raise OtherSweepError(f"{self.folder} {text}")
-            shutil.rmtree(self.folder)
-        self.folder.mkdir(exist_ok=True)
+            for path in outcomes:
+                path.unlink()
         with beside(mark) as partial:
             partial.write_text(json.dumps({"fingerprint": fingerprint}))
 

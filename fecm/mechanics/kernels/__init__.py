@@ -91,8 +91,9 @@ class Impact(Structure):
         "float: k q critical slope; int: law; float: branch f b w p peak peak_force permanent"
         " indentation force plate_w work time; int: unconverged; float: dt theta weight_before"
         " weight gain; int: modes; floats: T h stiffness tip_shape station motion;"
-        " float: tip dt2; int: loaded; longs: entry; floats: load_weight mobility last; int: gages gage_dofs; longs: gage_entry;"
-        " floats: gage_weight; int: rows; longs: stored; floats: records strains fields",
+        " float: tip dt2; int: loaded; longs: entry; floats: load_weight mobility last;"
+        " int: gages gage_dofs; longs: gage_entry; floats: gage_weight; int: rows; longs: stored;"
+        " floats: records strains fields",
         longs=Longs,
     )
 
