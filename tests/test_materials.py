@@ -119,7 +119,7 @@ def test_a_users_file_is_used_and_listed(tmp_path: Path) -> None:
         ("E1=1\n" + OWN, 'E1 is outside the table of a ply; begin each ply with ["its name"]'),
         (OWN + "XT 2000", "(at line 8, column 4)"),
         ("", "no plies"),
-        ("a=" + "[" * 9000, "recursion"),
+        ("a=" + "[" * 9000, "nested too deeply"),
     ],
 )  # fmt: skip
 def test_a_file_that_cannot_be_meant_is_refused_with_the_place(

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from pathlib import Path
 from typing import Any
 
 import click
 from click import option
 
+from fecm._inputs import parsed_toml
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, echo_json
 from fecm.cli.help import typical
 from fecm.cli.isolation import reads
@@ -39,7 +39,7 @@ def _own(text: str) -> tuple[str, tuple[float, ...]]:
 
 def _tolerances(text: str) -> dict[str, Any]:
     """Options of a tolerance file."""
-    given = tomllib.loads(text)
+    given = parsed_toml(text)
     if unknown := given.keys() - {"rtol", "atol", "exclude", "tol"}:
         raise ValueError(f"{min(unknown)} is unknown; the keys are rtol, atol, exclude and tol")
     exclude, own = given.get("exclude", []), given.get("tol", {})

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fecm._errors import did_you_mean
+from fecm._inputs import InputError, read_input
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -126,11 +127,12 @@ def file_of(parse: Callable[[str], Any]) -> Parsed:
 
     def read(path: str) -> Any:
         try:
-            with Path(path).open("rb") as file:
-                return parse(file.read(MOST).decode("utf-8-sig"))
+            return parse(read_input(Path(path), MOST).decode("utf-8-sig"))
+        except InputError as error:
+            raise ValueError(str(error)) from None
         except OSError as error:
             raise ValueError(f"{path} can't be read: {error.strerror}") from None
-        except (ValueError, RecursionError) as error:
+        except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
 
     return Parsed(read, "FILE.toml")

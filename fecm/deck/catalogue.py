@@ -7,12 +7,12 @@ all of them (section 3.2.2 and the input listing), and q for each indenter.
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import replace
 from importlib import resources
 from typing import Any
 
 from fecm._frozen import frozen
+from fecm._inputs import parsed_toml
 from fecm.deck.model import Allowables, Delamination, Indentation, Units
 from fecm.deck.records import Ply
 from fecm.deck.units import DENSITY, MODULUS, TOUGHNESS, in_si
@@ -100,7 +100,7 @@ def read_plies(text: str) -> dict[str, NamedPly]:
     the file or of a ply, is a key of :data:`SYSTEMS`; mm-N-s if it is missing.  Raises ValueError
     if a name, value or unit cannot be meant, or the file is not TOML.
     """
-    tables = tomllib.loads(text)
+    tables = parsed_toml(text)
     units = tables.pop("units", SYSTEM_OF_FILES)
     for name, table in tables.items():
         if not isinstance(table, dict):
@@ -160,5 +160,5 @@ class NamedContact:
 
 CONTACTS = {
     name: NamedContact(name, Indentation(**table["law"]), table["source"])
-    for name, table in tomllib.loads(_text("contacts.toml")).items()
+    for name, table in parsed_toml(_text("contacts.toml")).items()
 }

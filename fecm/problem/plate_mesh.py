@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecm._errors import FecmError
+from fecm._inputs import read_input
 from fecm._typing import Bools, Floats
 from fecm.deck.grid import CLAMPED, HELD, SIMPLE, SUPPORTS, boundary_cards, round_to
 from fecm.deck.model import Boundary, Coordinates, Elements
@@ -147,7 +148,7 @@ def read_mesh(path: str | Path) -> PlateMesh:
     except ModuleNotFoundError:
         raise ImportError("meshes need meshio: pip install 'fecm[mesh]'") from None
     path = Path(path)
-    text = path.read_bytes()  # an OSError says what is wrong with the file
+    text = read_input(path)
     include = path.suffix.lower() == ".inp" and b"*include" in text.lower()
     if include or path.suffix.lower() in ELSEWHERE:
         raise MeshError(f"{path} refers to other files, which are not read; put it into one file")

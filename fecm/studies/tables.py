@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from fecm._frozen import frozen
+from fecm._inputs import read_input
 from fecm._typing import Floats
 from fecm.studies import StudyError
 
@@ -125,7 +126,7 @@ def _has_number(row: Row) -> bool:
 
 def read_rows(path: Path) -> list[Row]:
     """Read the number and the fields of every line with content; raises as :func:`read_table`."""
-    data = path.read_bytes()
+    data = read_input(path)
     if b"\0" in data:
         raise StudyError(f"{path} is not a text file")
     try:

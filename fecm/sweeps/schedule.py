@@ -30,6 +30,7 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm._files import beside, held, packed
+from fecm._inputs import read_input
 from fecm.sweeps.batch import run, told
 from fecm.sweeps.plan import Forces, Outcome, Task
 
@@ -39,6 +40,7 @@ DEATHS = 3  # of workers without a finished task, after which the remaining task
 LOOK = 0.5  # polling interval in seconds
 PATIENCE = "5s"  # timeout for the scheduler
 LOST = "lost with its worker"
+MOST_ADDRESS = 100_000  # bytes of a file with the scheduler's address
 CHECKSUM = hashlib.sha256().digest_size  # bytes of the checksum after the arrays of a file
 
 
@@ -165,7 +167,7 @@ def on_executor(tasks: Sequence[Task], executor: futures.Executor, done: Done, i
 def address_in(file: Path) -> str:
     """Address in a file of ``dask scheduler --scheduler-file``; SchedulerError if it has none."""
     try:
-        return str(json.loads(file.read_bytes())["address"])
+        return str(json.loads(read_input(file, MOST_ADDRESS))["address"])
     except (ValueError, KeyError, TypeError):
         message = f"{file} has no address; dask scheduler --scheduler-file writes such a file"
         raise SchedulerError(message) from None

@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from fecm._frozen import frozen
+from fecm._inputs import open_input
 from fecm._typing import Floats
 from fecm.deck.reader import HDF5
 from fecm.deck.units import KNOWN
@@ -154,7 +155,7 @@ def recorded(path: Path, column: str | None = None) -> TimeHistory:
     history does not exist, or the CSV file is invalid, ResultFileError if the result file is
     damaged, OSError if the file cannot be read.
     """
-    with path.open("rb") as file:
+    with open_input(path) as file:
         is_result = file.read(len(HDF5)) == HDF5
     return _of_result(path, load(path), column) if is_result else _of_table(path, column)
 

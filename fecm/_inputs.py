@@ -1,0 +1,60 @@
+"""Files that the user names, read within bounds: regular files of a size that memory holds."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from fecm._errors import FecmError
+from fecm._files import NO_WAIT
+from fecm._memory import format_bytes, require
+
+LARGEST = 1_000_000_000  # bytes of a file; no mesh or measurement needs more
+BYTES_A_BYTE = 12  # memory of a table of numbers or of a mesh, per byte of its text
+MOST_DOTS = 100  # of a line of TOML: tomllib takes a time quadratic in the depth of a key
+
+
+class InputError(FecmError, OSError):
+    """A file can't be read; the message says why."""
+
+
+@contextlib.contextmanager
+def open_input(path: Path) -> Iterator[BinaryIO]:
+    """Open a regular file; raises InputError for devices and FIFOs, which may never end."""
+    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | NO_WAIT)) as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise InputError(f"{path} is not a regular file")
+        yield file
+
+
+def read_input(path: Path, most: int = LARGEST) -> bytes:
+    """Contents of a regular file of at most `most` bytes.
+
+    Raises InputError for any other file, NotEnoughMemoryError if there is not enough memory to work
+    with its contents, and OSError if it can't be read.
+    """
+    with open_input(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > most:
+            raise InputError(
+                f"{path} has {format_bytes(size)}; no more than {format_bytes(most)} are read"
+            )
+        require(BYTES_A_BYTE * size, f"{path}: reading it")
+        return file.read()
+
+
+def parsed_toml(text: str) -> dict[str, Any]:
+    """Tables of a TOML text; raises ValueError if it is not TOML, or nested too deeply."""
+    import tomllib
+
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.count(".") > MOST_DOTS:
+            raise ValueError(f"line {number} has more than {MOST_DOTS} dots; write it as several")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("tables or lists are nested too deeply") from None
