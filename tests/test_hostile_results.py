@@ -18,6 +18,7 @@ import fecm
 from fecm.cli.isolation import GB, limits_for
 from fecm.results.schema import ResultFileError
 from tests.calls import assert_unusable, call
+from tests.decks import PROGRAM as PROGRAM_CARDS
 from tests.decks import small
 
 PROGRAM = """
@@ -201,6 +202,64 @@ def test_a_missing_dataset_is_a_missing_key_and_a_missing_attribute(result: Path
     with pytest.raises(AttributeError, match="there is no mesh/elements"):
         _ = loaded.mesh.elements
     assert not hasattr(loaded.mesh, "elements")
+
+
+@pytest.fixture(scope="module")
+def complete(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A result with every group that has attributes of its own."""
+    path = tmp_path_factory.mktemp("complete") / "complete.h5"
+    cards = (
+        "PATC\nDISC,.2\nALLO\n   200000.   200000.     7000.    28000.    13000.\n\nDELA\n  2.,\n"
+    )
+    program = PROGRAM_CARDS.replace("DISP          5", "DISP          5\nFAIL")
+    fecm.run(small(program).replace("EXPE", f"{cards}\nEXPE"), output=path)
+    return path
+
+
+@pytest.mark.parametrize("value", ["text", b"\xff", [1.0, 2.0], True], ids=repr)
+@pytest.mark.parametrize(
+    "attribute",
+    ["threshold/force", "threshold/time", "threshold/margin", "patch/x", "patch/radius",
+     "failure/modes"],
+)  # fmt: skip
+def test_an_attribute_of_another_type_is_one_line(
+    complete: Path, attribute: str, value: object, tmp_path: Path
+) -> None:
+    path = Path(shutil.copy(complete, tmp_path / "crafted.h5"))
+    group, _, name = attribute.partition("/")
+    assert call("info", path).exit_code == 0
+    with h5py.File(path, "r+") as file:
+        assert name in file[group].attrs
+        file[group].attrs[name] = value
+    for options in ([], ["--format", "json"]):
+        done = call("info", path, *options)
+        assert_unusable(done)
+        assert f"the attribute {name} of {group} is " in done.stderr
+    with pytest.raises(ResultFileError, match=f"attribute {name} of {group}"):
+        fecm.load(path)
+
+
+@pytest.mark.parametrize("attribute", ["threshold/force", "threshold/time", "threshold/margin"])
+def test_a_lacking_attribute_is_one_line(complete: Path, attribute: str, tmp_path: Path) -> None:
+    path = Path(shutil.copy(complete, tmp_path / "crafted.h5"))
+    group, _, name = attribute.partition("/")
+    with h5py.File(path, "r+") as file:
+        del file[group].attrs[name]
+    done = call("info", path)
+    assert_unusable(done)
+    assert f"{group} has no attribute {name}" in done.stderr
+
+
+@pytest.mark.parametrize("code", [-1, 100])
+def test_a_mode_of_failure_without_a_name_is_one_line(
+    complete: Path, code: int, tmp_path: Path
+) -> None:
+    path = Path(shutil.copy(complete, tmp_path / "crafted.h5"))
+    with h5py.File(path, "r+") as file:
+        file["failure/hashin/mode"][...] = code
+    done = call("info", path)
+    assert_unusable(done)
+    assert f"failure/hashin/mode has the mode {code}, which has no name" in done.stderr
 
 
 def test_what_a_file_says_of_itself_does_not_reach_the_terminal_raw(result: Path) -> None:

@@ -485,10 +485,11 @@ def load(path: str | Path) -> Result:
 def result_of(contents: Contents, model: Deck | None = None) -> Result:
     """Build a run's result from the contents of its file, and the deck's model where it is known.
 
-    Raises ResultFileError if a dataset has the wrong shape or type.
+    Raises ResultFileError if a dataset has the wrong shape or type, or an attribute the wrong type.
     """
     kinds = {name: dtype.kind for name, dtype in contents.dtypes.items()}
-    if found := schema.shape_error(contents.shapes, kinds):
+    found = schema.shape_error(contents.shapes, kinds) or schema.attribute_error(contents.groups)
+    if found:
         raise ResultFileError(f"{contents.path}: {found}")
     attributes = {"": contents.attributes, **contents.groups}
     return Result(contents, contents.texts, attributes, model)

@@ -510,6 +510,41 @@ def shape_error(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str])
     return ""
 
 
+# Attributes that are numbers, and lists of texts, by group.  Without those of `history` and `energy`
+# a result only lacks its summary.
+NUMBERS = {
+    "threshold": ("force", "time", "margin"),
+    "patch": ("x", "y", "radius"),
+}
+TEXTS = {"failure": ("modes",)}
+COMPLETE = ("threshold", "failure")  # groups that have all of these attributes or none
+
+
+def attribute_error(groups: Mapping[str, Mapping[str, Any]]) -> str:
+    """Message about the first attribute of a wrong type or missing; empty if there is none.
+
+    Attributes are by group and name.
+    """
+    for table, fits, what in ((NUMBERS, _is_number, "a number"), (TEXTS, _is_texts, "texts")):
+        for group, names in table.items():
+            found = groups.get(group, {})
+            missing = [name for name in names if name not in found]
+            if group in COMPLETE and 0 < len(missing) < len(names):
+                return f"{group} has no attribute {missing[0]}"
+            for name in names:
+                if name in found and not fits(found[name]):
+                    return f"the attribute {name} of {group} is {shown(found[name])}, not {what}"
+    return ""
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_texts(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(text, str) for text in value)
+
+
 def declared_units(attributes: Mapping[str, Any]) -> dict[str, str]:
     """Names of the units of length, force and time; empty if the deck names none."""
     names = {n: str(attributes.get(f"unit_{n}", "")) for n in ("length", "force", "time")}

@@ -13,7 +13,7 @@ from fecm._frozen import frozen
 from fecm.deck.units import quantity as shown_quantity
 from fecm.mechanics.failure import CRITERIA
 from fecm.results.result import Result
-from fecm.results.schema import DATASETS, GROUPS, row_blocks
+from fecm.results.schema import DATASETS, GROUPS, ResultFileError, row_blocks
 
 if TYPE_CHECKING:
     from fecm.results.hdf5_reader import Contents
@@ -89,7 +89,7 @@ def largest_exposures(result: Result) -> list[LargestExposure]:
         return []
     under = result["failure/under_load"] != 0
     x, y = result["failure/x"], result["failure/y"]
-    modes = [str(mode) for mode in result.failure.attributes["modes"]]
+    modes = result.failure.attributes.get("modes", ())
     found = []
     for name in (*CRITERIA, "interlaminar"):
         exposure = result[f"failure/{name}/exposure"]
@@ -101,7 +101,10 @@ def largest_exposures(result: Result) -> list[LargestExposure]:
         place = np.unravel_index(int(np.nanargmax(outside)), outside.shape)
         # (element, point, ply, face), or (element, interface)
         at, ply = (place[:2], place[2]) if exposure.ndim > 2 else (place[:1], place[1])
-        mode = modes[int(result[f"failure/{name}/mode"][place])]
+        code = int(result[f"failure/{name}/mode"][place])
+        if not 0 <= code < len(modes):
+            raise ResultFileError(f"failure/{name}/mode has the mode {code}, which has no name")
+        mode = modes[code]
         time = float(result[f"failure/{name}/time"][place])
         where = int(ply) + 1, float(x[at].mean()), float(y[at].mean())
         found.append(LargestExposure(name, float(exposure[place]), mode, *where, time))

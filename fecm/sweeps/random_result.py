@@ -278,7 +278,7 @@ def random_of(
              for name in known if design.sensitivity},
             exceedance, made, tuple(map(str, about["notes"])),
         )  # fmt: skip
-    except (KeyError, ValueError, TypeError, AttributeError, ZeroDivisionError) as error:
+    except (KeyError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
         message = f"{contents.path}: the results of this random sweep are incomplete ({error})"
         raise ResultFileError(message) from None
 
