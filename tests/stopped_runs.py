@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fecm.api import load_deck
+from fecm.mechanics.stiffness_product import AUTO
 from fecm.problem.build import RunOptions
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
@@ -25,6 +26,7 @@ def run(
     resume: bool = False,
     slips: str = "",
     macros: bool = False,
+    solver: str = AUTO,
 ) -> int:
     """Run a deck into a file; stop with a checkpoint at the n-th look, between steps or macros.
 
@@ -46,7 +48,7 @@ def run(
     names = frozenset(slips.split())
     with hdf5_writer.writing(path) as sink:
         checkpointer = Checkpointer(path, sink)
-        simulation = Simulation(problem, sink, RunOptions(names))
+        simulation = Simulation(problem, sink, RunOptions(names, solver=solver))
         if macros:
             simulation.on_macro = look
         else:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from fecm.api import load_deck
+from fecm.mechanics import kernels
 from fecm.results import hdf5_writer
 from fecm.results.sinks import RowBuffer
 from fecm.simulation.checkpoint import (
@@ -175,6 +176,28 @@ def test_a_checkpoint_of_another_run_is_refused_and_says_why(tmp_path: Path) -> 
     with pytest.raises(CheckpointError, match="there is no checkpoint"):
         run(deck(), path, resume=True)
     assert not path.exists()
+
+
+def test_a_checkpoint_of_another_solver_says_which_one_continues_it(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    with pytest.raises(StoppedError):
+        run(deck(), path, 5, solver="numpy")
+    with pytest.raises(CheckpointError, match=r"numpy, not csr\): --solver numpy continues it"):
+        run(deck(), path, resume=True, solver="csr")
+
+
+@pytest.mark.skipif(kernels.LIBRARY is None, reason="the kernels are not compiled")
+def test_a_checkpoint_of_the_kernels_says_that_an_installation_lacks_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.h5"
+    with pytest.raises(StoppedError):
+        run(deck(), path, 5)
+    monkeypatch.setattr(kernels, "LIBRARY", None)
+    with pytest.raises(
+        CheckpointError, match="the compiled kernels, which this installation lacks"
+    ):
+        run(deck(), path, resume=True)
 
 
 @pytest.mark.parametrize("place", [0.02, 0.5, 0.999])

@@ -510,7 +510,7 @@ def shape_error(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str])
     return ""
 
 
-# Attributes that are numbers, and lists of texts, by group.  Without those of `history` and `energy`
+# Attributes that are numbers, and lists of texts, by group.  Without those of history and energy
 # a result only lacks its summary.
 NUMBERS = {
     "threshold": ("force", "time", "margin"),

@@ -23,11 +23,14 @@ from fecm._errors import FecmError
 from fecm._files import beside, naming, open_ordinary, packed, sync
 from fecm._typing import Array
 from fecm._version import __version__
+from fecm.mechanics import kernels
+from fecm.mechanics.stiffness_product import KERNELS
 from fecm.results.hdf5_writer import FileSink
 from fecm.results.schema import DATASETS
 from fecm.simulation.simulation import Simulation
 
 FORMAT = 4
+SOLVER = "another solver"
 CHUNK = 1_000_000  # bytes read at once when a spool is checked
 
 
@@ -56,12 +59,21 @@ def identity(simulation: Simulation) -> dict[str, Any]:
         "another version of fecm": __version__,
         "another deck": hashlib.sha256(text.encode()).hexdigest(),
         "another mode or other slips": sorted(options.slips),
-        "another solver": simulation.model.motion.solver,
+        SOLVER: simulation.model.motion.solver,
         "another mass matrix or integrator of the rod": [
             options.rod_method.mass, options.rod_method.integrator
         ],
         "a run with another choice of --print": simulation.printer.is_on,
     }  # fmt: skip
+
+
+def _difference(what: str, theirs: object, own: object) -> str:
+    """How a checkpoint differs from the run, as far as it helps; begins with a blank."""
+    if what == SOLVER and theirs == KERNELS and kernels.LIBRARY is None:
+        return ", the compiled kernels, which this installation lacks"
+    if what == SOLVER:
+        return f" ({theirs}, not {own}): --solver {theirs} continues it"
+    return f" ({theirs}, not {own})" if own == __version__ else ""
 
 
 class Checkpointer:
@@ -145,7 +157,7 @@ class Checkpointer:
             theirs = about["identity"]
             for what, value in identity(simulation).items():
                 if theirs.get(what) != value:
-                    which = f" ({theirs[what]}, not {value})" if value == __version__ else ""
+                    which = _difference(what, theirs.get(what), value)
                     raise CheckpointError(f"{self._checkpoint} belongs to {what}{which}")
             part = about["spool"]
             spooled = part["length"], part["checksum"]
