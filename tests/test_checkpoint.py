@@ -195,7 +195,7 @@ def test_a_checkpoint_of_the_kernels_says_that_an_installation_lacks_them(
         run(deck(), path, 5)
     monkeypatch.setattr(kernels, "LIBRARY", None)
     with pytest.raises(
-        CheckpointError, match="the compiled kernels, which this installation lacks"
+        CheckpointError, match="compiled kernels, which this installation lacks"
     ):
         run(deck(), path, resume=True)
 
