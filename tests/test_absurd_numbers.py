@@ -69,7 +69,7 @@ def test_any_critical_indentation_of_yang_and_sun_runs_or_is_refused_in_words(va
         ("1E-308", "1E300"),
         ("1E300", "1E150"),
         ("1E-308", "1E-308"),
-    ],  # fmt: skip
+    ],
 )
 def test_the_summary_of_a_deck_with_absurd_numbers_warns_of_nothing_in_numpys_words(
     k: str, velocity: str

@@ -194,9 +194,7 @@ def test_a_checkpoint_of_the_kernels_says_that_an_installation_lacks_them(
     with pytest.raises(StoppedError):
         run(deck(), path, 5)
     monkeypatch.setattr(kernels, "LIBRARY", None)
-    with pytest.raises(
-        CheckpointError, match="compiled kernels, which this installation lacks"
-    ):
+    with pytest.raises(CheckpointError, match="compiled kernels, which this installation lacks"):
         run(deck(), path, resume=True)
 
 
