@@ -250,6 +250,16 @@ def test_a_lacking_attribute_is_one_line(complete: Path, attribute: str, tmp_pat
     assert f"{group} has no attribute {name}" in done.stderr
 
 
+def test_a_threshold_without_any_attribute_is_one_line(complete: Path, tmp_path: Path) -> None:
+    path = Path(shutil.copy(complete, tmp_path / "crafted.h5"))
+    with h5py.File(path, "r+") as file:
+        for name in ("force", "time", "margin"):
+            del file["threshold"].attrs[name]
+    done = call("info", path)
+    assert_unusable(done)
+    assert "threshold has no attribute force" in done.stderr
+
+
 @pytest.mark.parametrize("code", [-1, 100])
 def test_a_mode_of_failure_without_a_name_is_one_line(
     complete: Path, code: int, tmp_path: Path

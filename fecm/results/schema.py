@@ -517,7 +517,7 @@ NUMBERS = {
     "patch": ("x", "y", "radius"),
 }
 TEXTS = {"failure": ("modes",)}
-COMPLETE = ("threshold", "failure")  # groups that have all of these attributes or none
+COMPLETE = ("threshold",)  # groups that have all of these attributes
 
 
 def attribute_error(groups: Mapping[str, Mapping[str, Any]]) -> str:
@@ -529,7 +529,7 @@ def attribute_error(groups: Mapping[str, Mapping[str, Any]]) -> str:
         for group, names in table.items():
             found = groups.get(group, {})
             missing = [name for name in names if name not in found]
-            if group in COMPLETE and 0 < len(missing) < len(names):
+            if group in groups and group in COMPLETE and missing:
                 return f"{group} has no attribute {missing[0]}"
             for name in names:
                 if name in found and not fits(found[name]):
