@@ -247,7 +247,7 @@ def test_a_misspelt_keyword_is_one_finding_that_names_the_right_one() -> None:
         ("MACR\n", "", "E009"),
         ("MACR\n", "MCAR\n", "E005"),
         ("STOP\n", "", "W002"),
-        ("FECM", "FEAP", "E005"),
+        ("FECM", "FEAP", "E013"),
     ],
 )
 def test_a_slip_in_the_decks_frame_is_named_first(old: str, new: str, code: str) -> None:

@@ -244,14 +244,49 @@ def read_values(
     if more:
         end = len(card.data)
         place = Place(card.line, end - len(more) + 1, end, card.text)
-        findings.add(code, f"`{more}` {what}", place)
+        findings.add(code, f"`{more}` {what}", place, "" if fixed else _separators(card, fields))
         if not fixed:
             return None
     zeros = fixed and blanks_are_zeros
-    pairs = zip(fields, texts, strict=False)  # more texts than fields
-    values = [_value(field, text, source, findings, zeros) for field, text in pairs]
-    valid = [value for value in values if value is not None]
-    return valid if len(valid) == len(values) else None
+    valid: list[Value] = []
+    for field, text in zip(fields, texts, strict=False):  # more texts than fields
+        value = _value(field, text, source, findings, zeros)
+        if value is not None:
+            valid.append(value)
+        elif _separators(card, fields):  # one cause, one finding
+            return None
+    return valid if len(valid) == len(fields) else None
+
+
+def _separators(card: Card, fields: Fields) -> str:
+    """Hint for a card with blanks between its values, or decimal commas; empty for another."""
+    if "," in card.data:
+        return _with_points(card, fields)
+    words = card.data.split()
+    if not re.fullmatch(r" {0,2}\S+(?: {1,2}\S+)+", card.data):
+        return ""
+    if len(words) > len(fields) or len(words) < min(3, len(fields)):
+        return ""
+    if words == [text.strip() for _, text in card.cut(fields) if text.strip()]:
+        return ""  # every value is in its columns
+    widths = {field.width for field in fields}
+    columns = f"{widths.pop()} columns" if len(widths) == 1 else "fixed columns"
+    return f"fields have {columns}; or separate the values by commas: {','.join(words)}"
+
+
+def _with_points(card: Card, fields: Fields) -> str:
+    """Hint for a card with commas, of which some stand in numbers for the decimal point."""
+    pointed = re.sub("(?<=[0-9]),(?=[0-9])", ".", card.data)
+    words = pointed.replace(",", " ").split()
+    pieces = [text for _, text in card.cut(fields)]
+    with_blanks = any(" " in piece for piece in pieces)
+    too_many = len(pieces) > len(fields) and "." not in card.data
+    if pointed == card.data or len(words) > len(fields) or not (with_blanks or too_many):
+        return ""
+    if not all(parse_real(word[:LONGEST]) is not None or word.isalpha() for word in words):
+        return ""
+    written = f"{words[0]}," if len(words) == 1 else ",".join(words)
+    return f"a comma separates values; with decimal points the card is `{written}`"
 
 
 def _is_aligned(card: Card, fields: Fields, findings: Findings, *, cut_is_meant: bool) -> bool:
@@ -263,7 +298,8 @@ def _is_aligned(card: Card, fields: Fields, findings: Findings, *, cut_is_meant:
         touched = [f for f in fields if f.first <= last and f.last >= first]
         names = ", ".join(f"cols {f.first}-{f.last}: {f.name}" for f in touched)
         place = Place(card.line, first, last, card.text, names)
-        findings.add(code, message, place, _remedy(card, fields, last - first + 1, width) or hint)
+        remedy = _remedy(card, fields, last - first + 1, width)
+        findings.add(code, message, place, _separators(card, fields) or remedy or hint)
         return False
 
     for field, following in pairwise(fields):
@@ -353,6 +389,7 @@ def _value(
             hint = "this field takes no decimal point"
         elif re.search("[A-Za-z]", squeezed):
             hint = "it has a letter in place of a digit"
+        hint = _separators(source.card, source.fields) or hint
         findings.add("E101", f"`{written}` is not a {kind}.", source.place(field.name), hint)
         return None
     value = padded if zeros else plain
@@ -367,6 +404,7 @@ def _value(
             hint = f"right-justified, the card is `{meant.rstrip()}`"
             if "," in line:
                 hint = "remove the blank"
+            hint = _separators(source.card, source.fields) or hint
             findings.add("E104", f"{what}; {read}.", source.place(field.name), hint)
             return None
         message = f"A blank inside `{text}` was read as a zero: the value is {value:g}."

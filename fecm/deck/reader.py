@@ -33,11 +33,19 @@ LINE_ENDS = b"\n\r\x0b\x0c\x1c\x1d\x1e\x85\xa8\xa9"
 FIRST = 4096  # number of bytes that identify a binary file
 STDIN = "<stdin>"  # name of the deck on standard input
 HDF5 = b"\x89HDF\r\n\x1a\n"
-# First lines of other programs' files.
+TAKES_A_MESH = "`fecm new DECK --mesh FILE`, or fecm.Plate.from_mesh, takes a mesh from it"
+# First lines of other programs' files, and hints.
 OTHERS = {
-    r"\*\*|\*[a-z]": "an input file of Abaqus or CalculiX",
-    r"\$MeshFormat": "a mesh of Gmsh",
+    r"\*\*|\*[a-z]": ("an input file of Abaqus or CalculiX", TAKES_A_MESH),
+    r"\$MeshFormat": ("a mesh of Gmsh", TAKES_A_MESH),
+    r"feap\b": (
+        "an input file of FEAP",
+        "the first word is FECM here; COOR, ELEM and BOUN are read as FEAP reads them, MATE and "
+        "the program of macros are those of this program",
+    ),
 }
+# Keywords whose cards begin with a letter; they can be read without a control card.
+WORDED = ("UNIT", "PATC", "PAGE")
 _R = TypeVar("_R", bound=records.Record)
 
 
@@ -145,10 +153,9 @@ class Reader(Stream):
         stopped = False
         while (card := self.take_filled()) is not None:
             others = (kind for head, kind in OTHERS.items() if re.match(head, card.data, re.I))
-            if not (problems or self.findings) and (other := next(others, "")):
-                message = f"This is {other}, not a deck."
-                hint = "`fecm new DECK --mesh FILE`, or fecm.Plate.from_mesh, takes a mesh from it"
-                self.findings.add("E013", message, card.place, hint)
+            if not (problems or self.findings) and (other := next(others, None)):
+                what, hint = other
+                self.findings.add("E013", f"This is {what}, not a deck.", card.place, hint)
                 self.findings.closed = True
                 break
             if card.keyword == STOP:
@@ -244,7 +251,7 @@ class Reader(Stream):
                 self._stray(card, [*READERS, END])
                 if not card.is_keyword:
                     self.skip_data()
-            elif control is None:
+            elif control is None and keyword not in WORDED:
                 self.skip_data()  # without counts the cards are ambiguous
             elif self._segments == MOST_SEGMENTS:
                 self._end(f"The file has more than {MOST_SEGMENTS} segments.", card)
@@ -433,7 +440,10 @@ class Reader(Stream):
         if card is not None and card.keyword in (*READERS, END):
             self.give_back()
         message = "UNIT takes one card with three names: the units of length, force and time."
-        self.findings.add("E010", message, (card or head).place, "for example: in lbf s")
+        place, hint = (card or head).place, "for example: in lbf s"
+        if len(names := head.data.replace(",", " ").split()[1:]) == 3:
+            place, hint = head.place, f"put the names on the card after UNIT: {' '.join(names)}"
+        self.findings.add("E010", message, place, hint)
         return None
 
     def _page(self, head: Card) -> Segment:
