@@ -18,7 +18,7 @@ from fecm.deck.findings import MOST, Findings, Place
 from fecm.deck.layup import LayupError, parse_layup
 from fecm.deck.macros import estimate_work
 from fecm.deck.reader import MOST_PROBLEMS, load_text
-from fecm.problem import check_segments, generate
+from fecm.problem import check_gages, generate
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, MESH, OWN_FINDINGS, PROGRAM, small
 
@@ -172,7 +172,7 @@ def test_too_many_segments_layers_and_gages_are_refused(monkeypatch: pytest.Monk
     prints = small(data=DATA_CARDS + "PRIN\nNOPR\n")
     gages = small(data=DATA_CARDS + "GAGE\n1,.5,.5\n2,.5,.5\n\n")
     assert codes(prints) == codes(gages) == []
-    monkeypatch.setattr(check_segments, "MOST_GAGES", 1)
+    monkeypatch.setattr(check_gages, "MOST_GAGES", 1)
     assert codes(gages) == ["E012"]
     monkeypatch.setattr(reader, "MOST_LAYERS", 1)
     assert codes(small()) == ["E201"]

@@ -15,7 +15,7 @@ from fecm._frozen import frozen
 from fecm._inputs import parsed_toml
 from fecm.deck.model import Allowables, Delamination, Indentation, Units
 from fecm.deck.records import Ply
-from fecm.deck.units import DENSITY, MODULUS, TOUGHNESS, in_si
+from fecm.deck.units import COEFFICIENT, DENSITY, MODULUS, TOUGHNESS, in_si
 
 # Systems of units: names of length, force and time.
 NAMES = ("in-lbf-s", "m-N-s", "mm-N-s")
@@ -141,7 +141,6 @@ MATERIALS = read_plies(_text("materials.toml"))
 # Constants of the report that are not the indenter's: alpha_p, s_p and reference 14's alpha_cr.
 ALPHA_P, S_P, ALPHA_CR = 6.564e-4, 0.094, 3.16e-3
 SYSTEM = "in-lbf-s"  # system of units of the report
-COEFFICIENT = "force/length^1.5"
 
 
 @frozen

@@ -36,6 +36,8 @@ MASS = "force*time^2/length"
 MODULUS = "force/length^2"
 TOUGHNESS = "force/length"
 DENSITY = "force*time^2/length^4"
+VELOCITY = "length/time"
+COEFFICIENT = "force/length^1.5"  # of Hertz's law
 
 
 def unit_names(deck: Deck) -> dict[str, str]:

@@ -226,8 +226,8 @@ class Problem:
         return estimate_work(self.program)
 
     @cached_property
-    def output_bytes(self) -> int:
-        """Size of the result's large datasets."""
+    def stored_bytes(self) -> dict[str, int]:
+        """Size of the result's large datasets, by the macro that stores them."""
         control, work = self.deck.control, self.work
         an_element = len(self.rules[2].xi)
         points, field = control.numel * an_element, control.numnp * control.ndf
@@ -235,15 +235,22 @@ class Problem:
         layers = len(self.deck.require(model.Material).layers)
         chosen = next((int(m.second) for m in flat(self.program) if m.word == "PLYS"), 0)
         plies = (chosen or control.numel) * (layers * (6 * an_element + 6) + 2)
-        return 8 * (
-            work.passes["DISP"] * (field + control.numnp)
-            + work.passes["STRE"] * points * 16
-            + (work.passes["REAC"] + work.passes["EIGE"]) * field
-            + work.passes["PLYS"] * plies
-            + min(1, work.passes["FAIL"]) * 9 * points * layers * 2  # both faces of a ply
-            + work.contact_rows * (points * 5 + 8)
-            + work.steps * (18 + gages + bool(self.damping))
-        )
+        history = work.steps * (18 + gages + bool(self.damping))
+        numbers = {
+            "DISP": work.passes["DISP"] * (field + control.numnp),
+            "STRE": work.passes["STRE"] * points * 16,
+            "REAC": work.passes["REAC"] * field,
+            "EIGE": work.passes["EIGE"] * field,
+            "PLYS": work.passes["PLYS"] * plies,
+            "FAIL": min(1, work.passes["FAIL"]) * 9 * points * layers * 2,  # both faces of a ply
+            "RODP": work.contact_rows * (points * 5 + 8) + history,
+        }
+        return {word: 8 * count for word, count in numbers.items()}
+
+    @property
+    def output_bytes(self) -> int:
+        """Size of the result's large datasets."""
+        return sum(self.stored_bytes.values())
 
 
 @frozen

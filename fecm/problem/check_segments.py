@@ -18,13 +18,13 @@ from fecm.mechanics.points import DISC, HERTZ, RADIUS_PER_THICKNESS, PatchError,
 from fecm.mechanics.projectile import Rod, report_rod
 from fecm.problem import check_mesh
 from fecm.problem.build import ContactPatch, Problem, W, build_projectile
+from fecm.problem.check_units import check_unit_names
 from fecm.problem.generate import rod_diameters
 
 # One inch, pound and second in m, N and s.
 REPORT_UNITS = [KNOWN["length"]["in"], KNOWN["force"]["lbf"], KNOWN["time"]["s"]]
 # A rod's step is a full matrix of three times as many rows and columns as it has dofs.
 MOST_ROD_ELEMENTS = 500
-MOST_GAGES, MOST_GAGE_PAIRS = 10_000, 10**8  # each gage is compared with every element
 # Elements per bending wave of the contact's duration: the minimum, and enough for a peak.
 LEAST_PER_WAVE, ENOUGH_PER_WAVE = 4, 8
 # Mesh error of the peak that is warned of, and the largest that is estimated.
@@ -111,48 +111,6 @@ def check_projectile(projectile: model.Projectile, findings: Findings) -> None:
         findings.add("E429", message, projectile.place("length or mass"), hint)
 
 
-def check_gages(segment: model.Gages, mesh: Mesh, deck: model.Deck, findings: Findings) -> None:
-    """Check a GAGE segment on a mesh without errors."""
-    count = len(segment.records)
-    if count > MOST_GAGES or count * len(mesh.elements) > MOST_GAGE_PAIRS:
-        most = f"{MOST_GAGES} gages and {MOST_GAGE_PAIRS:.0e} pairs of gage and element are allowed"
-        message = f"{count} gages on {len(mesh.elements)} elements are too many: at most {most}."
-        findings.add("E012", message, segment.place())
-        return
-    families = element_blocks(mesh.elements, mesh.coordinates)
-    seen: set[int] = set()
-    for record in segment.records:
-        if record.number in seen:
-            message = f"Gage {record.number} is defined twice."
-            findings.add("E425", message, record.place("gage"), "give each gage its own number")
-        seen.add(record.number)
-        point = np.array([[record.x, record.y]])
-        if not any(len(locate(family, point)[0]) for family in families):
-            message = f"Gage {record.number} at ({record.x:g}, {record.y:g}) is not on the plate."
-            findings.add("E424", message, record.place("gage's x"))
-        half = deck.require(model.Material).integration.thickness / 2.0
-        if abs(record.z) > half * (1.0 + 1e-9):
-            what = f"Gage {record.number} at z = {record.z:g} is outside the laminate"
-            message = f"{what}, whose faces are at {half:g} from the mid-plane."
-            findings.add("W426", message, record.place("gage's z"))
-
-
-def check_gages_under_force(problem: Problem, findings: Findings) -> None:
-    """Warn of gages nearer than the thickness to the impact node of a point force."""
-    segment = problem.deck.last(model.Gages)
-    if segment is None or problem.deck.has(model.Patch):
-        return
-    x, y = problem.mesh.coordinates[problem.deck.require(model.Impact).node - 1]
-    for record in segment.records:
-        distance = float(np.hypot(record.x - x, record.y - y))
-        if distance < problem.laminate.thickness * (1.0 - 1e-9):
-            what = f"Gage {record.number} is {distance:.3g} from the impact node"
-            why = "strains at the impact node of a point force depend on the mesh"
-            hint = f"put it at least the thickness {problem.laminate.thickness:.3g} away"
-            hint += ", or give the contact force an area by a PATC segment"
-            findings.add("W452", f"{what}: {why}.", record.place("gage's x"), hint)
-
-
 def check_shear_correction(segment: model.Shear, findings: Findings) -> None:
     """Check a SHEA segment."""
     if not segment.factor > 0.0:
@@ -162,6 +120,13 @@ def check_shear_correction(segment: model.Shear, findings: Findings) -> None:
     elif segment.factor > 1.0:
         message = f"The shear correction factor is {segment.factor:g}, more than 1."
         findings.add("W428", message, segment.place("shear correction factor"))
+    if segment.equilibrium and segment.factor != 1.0:
+        message = (
+            f"SHEA has EQUI and the factor {segment.factor:g}: the stiffness from equilibrium is "
+            "reduced once more."
+        )
+        hint = "leave out the factor's card; a factor is for the sum of the plies' stiffnesses"
+        findings.add("W481", message, segment.place("shear correction factor"), hint)
 
 
 def warn_of_the_reports_rod(deck: model.Deck, findings: Findings) -> None:
@@ -453,4 +418,5 @@ CHECKS: tuple[tuple[type[model.Segment], Callable[[Any, Findings], None]], ...] 
     (model.Indentation, check_law), (model.Allowables, check_allowables),
     (model.Delamination, check_delamination), (model.Damping, check_damping),
     (model.Projectile, check_projectile), (model.Shear, check_shear_correction),
+    (model.Units, check_unit_names),
 )  # fmt: skip

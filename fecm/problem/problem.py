@@ -17,7 +17,14 @@ from fecm.deck.macros import MOST_MACROS, STEPS, compile_program, every, flat
 from fecm.deck.reader import ParsedProblem
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.ply_stresses import is_complete
-from fecm.problem import check_mesh, check_plausibility, check_segments
+from fecm.problem import (
+    check_contact,
+    check_damage,
+    check_gages,
+    check_mesh,
+    check_plausibility,
+    check_segments,
+)
 from fecm.problem.build import Problem, W
 from fecm.problem.generate import generate
 
@@ -60,7 +67,7 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
         return findings.error_count == before and not unsound
 
     if (gages := deck.last(model.Gages)) is not None and sound():
-        check_segments.check_gages(gages, mesh, deck, findings)
+        check_gages.check_gages(gages, mesh, deck, findings)
     checked = Problem(deck, mesh, program)
     if sound():
         if deck.has(model.Shear):
@@ -82,15 +89,24 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
                 check_mesh.check_side_nodes(deck, mesh, findings)
                 check_mesh.check_support(deck, mesh, findings)
                 check_mesh.check_in_plane_supports(checked, findings)
-                check_plausibility.check_plausibility(checked, findings)
+                check_values(checked, findings)
                 if STEPS.intersection(macro.word for macro in deck.macros):
                     check_plausibility.check_time_step_of_contact(checked, findings)
             if checked.has_impact:
                 if not deck.has(model.Projectile):
                     check_segments.warn_of_the_reports_rod(deck, findings)
                 check_segments.check_resolution(checked, findings)
-                check_segments.check_gages_under_force(checked, findings)
+                check_gages.check_gages_under_force(checked, findings)
     return checked
+
+
+def check_values(problem: Problem, findings: Findings) -> None:
+    """Warn of the valid values of a sound problem that look like a mistake."""
+    check_plausibility.check_plausibility(problem, findings)
+    check_damage.check_damage(problem, findings)
+    check_gages.check_gage_places(problem, findings)
+    if problem.has_impact:
+        check_contact.check_contact(problem, findings)
 
 
 def _element_errors(findings: Findings) -> int:
@@ -145,9 +161,16 @@ def check_program(problem: Problem, findings: Findings) -> None:
         findings.add("W511", "The program takes no step and stores nothing.", place)
     _check_ply_stresses(problem, findings)
     if problem.output_bytes > LARGE_OUTPUT:
-        storing = next((m for m in flat(problem.program) if m.word in ("RODP", "DISP")), None)
-        message = f"The result will take {problem.output_bytes / 1e9:.3g} GB."
-        hint = "RODP and DISP store every N steps: take a larger N"
+        word = max(problem.stored_bytes, key=problem.stored_bytes.__getitem__)
+        share = problem.stored_bytes[word]
+        message = (
+            f"The result will take {problem.output_bytes / 1e9:.3g} GB, {share / 1e9:.3g} GB of "
+            f"them for {word}."
+        )
+        storing = next((macro for macro in flat(problem.program) if macro.word == word), None)
+        hint = f"{word} stores every N steps: take a larger N"
+        if word == "PLYS":
+            hint += ", or only the M elements nearest to the load: PLYS,,N,M"
         findings.add("W512", message, storing.place("value") if storing else None, hint)
 
 
