@@ -24,6 +24,7 @@ from fecm.sweeps.api import carry_out, check_draws, problem_of
 from fecm.sweeps.batch import deck_of
 from fecm.sweeps.convergence import refined_cases
 from fecm.sweeps.convergence import table as table_of
+from fecm.sweeps.doubts import doubtful_values
 from fecm.sweeps.random_result import tables
 from fecm.sweeps.result import SweepResult, save, summary, verdict
 from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_in, alone
@@ -144,6 +145,7 @@ def sweep(
         problem, cases, history=history, until=until, extra=extra, design=design, limits=limits
     )
     check_draws(planned)
+    note(*(() if factors else doubtful_values(problem, cases)))
     if design is not None:
         shared = plans.shares_plate(problem) and not planned.alone
         cost = inputs.cost(cases, design, shared=shared)

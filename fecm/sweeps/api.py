@@ -22,6 +22,7 @@ from fecm.sweeps import schedule
 from fecm.sweeps.batch import built, deck_of
 from fecm.sweeps.cases import Case, CasesError, DesignKind
 from fecm.sweeps.convergence import refined_cases
+from fecm.sweeps.doubts import doubtful_values
 from fecm.sweeps.plan import RUN, Build, Measure, Outcome, Plan, Task, merge, plan
 from fecm.sweeps.result import SweepResult, result_of, save
 
@@ -301,6 +302,8 @@ def sweep(
         design=drawn, limits=tuple(limits),
     )  # fmt: skip
     check_draws(planned)
+    for text in doubtful_values(problem, made) if build is None else ():
+        warn(text)
     here = workers if executor is None else getattr(executor, "_max_workers", 0)
     plans.check_memory(problem, planned, 0 if scheduler is not None else here)
     finished = 0

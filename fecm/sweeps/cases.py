@@ -32,7 +32,11 @@ CONTACT = (
     "mass", "rod_mass", "rod_length", "rod_modulus", "rod_density",
 )  # fmt: skip
 LOAD = ("at", "impact_node", "patch", "x0", "y0")
-LAMINATE = ("thickness", "density", "nu12", "e1", "e2", "g12", "g13", "g23", "layup", "angle")
+THICKNESS = "thickness"  # older name of laminate_thickness
+LAMINATE = (
+    "laminate_thickness", "ply_thickness", THICKNESS,
+    "density", "nu12", "e1", "e2", "g12", "g13", "g23", "layup", "angle",
+)  # fmt: skip
 PLATE = (*LOAD, *LAMINATE, "size", "support", "dt", "duration")
 NAMES = (*CONTACT, *PLATE)
 REFINE = "refine"  # factor of a refinement study, which varies nothing else
@@ -40,6 +44,7 @@ OF_PLATE = frozenset((*PLATE, REFINE))  # those that need another response of th
 EXCLUDING = (  # names of which only one can vary
     ("velocity", "energy"), ("k", "radius"), ("mass", "rod_mass", "rod_density"),
     ("at", "impact_node"), ("at", "x0"), ("at", "y0"),
+    ("laminate_thickness", "ply_thickness", THICKNESS),
 )  # fmt: skip
 TEXTS = ("layup", "at", "size", "support")  # names with texts
 PAIRS = {"at": ("({},{})", r"[,;\s]+"), "size": ("{}x{}", "[xX×]")}  # their forms and separators

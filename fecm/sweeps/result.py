@@ -43,7 +43,8 @@ LISTED = 5  # reasons of failure that the summary lists
 STATUS = "ok, still in contact, or why the case failed"
 DIMENSIONS = {  # of the values, and of the stored force
     "velocity": "length/time", "energy": "force*length", "force": "force",
-    "k": "force/length^1.5", "thickness": "length",
+    "k": "force/length^1.5",
+    **dict.fromkeys(("thickness", "laminate_thickness", "ply_thickness"), "length"),
     **dict.fromkeys(("alpha_p", "radius", "rod_length", "patch", "x0", "y0"), "length"),
     **dict.fromkeys(("mass", "rod_mass"), "force*time^2/length"),
     **dict.fromkeys(("density", "rod_density"), "force*time^2/length^4"),

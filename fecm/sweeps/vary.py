@@ -29,18 +29,27 @@ from fecm.problem.generate import RefineError, generate, refined, restraint_code
 from fecm.problem.plate_mesh import BOUNDARY, PlateMesh
 from fecm.problem.problem import UNSTABLE, Problem, check
 from fecm.studies.indentation_test.modulus import effective_stiffness, indentation_modulus
-from fecm.sweeps.cases import REFINE, Case, CasesError, Value, check_names, pair
+from fecm.sweeps.cases import (
+    LAMINATE,
+    REFINE,
+    THICKNESS,
+    Case,
+    CasesError,
+    Value,
+    check_names,
+    pair,
+)
 
 MASS = ("mass", "rod_mass")
-PLY = ("density", "nu12", "e1", "e2", "g12", "g13", "g23")  # fields of a ply card
 
 
 def apply_case(deck: model.Deck, case: Case) -> model.Deck:
     """Return a deck with the values of a case.
 
-    A layup uses the ply thickness of the deck, so that more plies give a thicker plate; a thickness
-    scales every layer.  A mass scales the density of a rod.  A time step changes the number of
-    steps, so that the duration is kept; 0 is 0.9 of the critical time step of the case.
+    A layup uses the ply thickness of the deck, so that more plies give a thicker plate; the
+    thickness of the laminate scales every layer.  A mass scales the density of a rod.  A time step
+    changes the number of steps, so that the duration is kept; 0 is 0.9 of the critical time step of
+    the case.
 
     A deck with B = 0 may restrain u and v at every node, because they are zero anyway.  If the case
     has B != 0, they are restrained only at the nodes that restrain w, as in a deck of ``fecm new``.
@@ -230,12 +239,12 @@ def _support(deck: model.Deck, name: str, value: Value) -> model.Deck:
 
 
 def _material(deck: model.Deck, name: str, value: Value) -> model.Deck:
-    """Change all plies, or their number; a thickness is that of the laminate."""
+    """Change all plies, or their number."""
     old, control = deck.require(model.Material), deck.control
     ply, layers, integration = old.ply, old.layers, old.integration
+    if name in ("layup", "ply_thickness") and len({layer.thickness for layer in layers}) > 1:
+        raise CasesError(f"{name}: the plies of the deck differ in thickness")
     if name == "layup":
-        if len({layer.thickness for layer in layers}) > 1:
-            raise CasesError("layup: the plies of the deck differ in thickness")
         try:
             angles = parse_layup(str(value))
         except LayupError as error:
@@ -244,7 +253,10 @@ def _material(deck: model.Deck, name: str, value: Value) -> model.Deck:
         layers = tuple(Layer(n, angle, thickness) for n, angle in enumerate(angles, start=1))
         integration = replace(integration, thickness=len(angles) * thickness, source=None)
         control = replace(control, layers=len(layers), source=None)
-    elif name == "thickness":
+    elif name == "ply_thickness":
+        layers = tuple(replace(y, thickness=float(value), source=None) for y in layers)
+        integration = replace(integration, thickness=len(layers) * float(value), source=None)
+    elif name in (THICKNESS, "laminate_thickness"):
         factor = float(value) / sum(layer.thickness for layer in layers)
         layers = tuple(replace(y, thickness=y.thickness * factor, source=None) for y in layers)
         integration = replace(integration, thickness=float(value), source=None)
@@ -270,7 +282,7 @@ def _refined(deck: model.Deck, name: str, value: Value) -> model.Deck:
 # In the order in which they are applied.
 _SETTERS: dict[str, Callable[[model.Deck, str, Value], model.Deck]] = {
     REFINE: _refined,
-    **dict.fromkeys(("layup", "angle", "thickness", *PLY), _material),
+    **dict.fromkeys(("layup", "angle", *LAMINATE), _material),
     "size": _size,
     "support": _support,
     **dict.fromkeys(_FIELDS, _field),

@@ -1,0 +1,91 @@
+"""Values of cases that look like a mistake, found before the sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from fecm.deck import model
+from fecm.deck.findings import Finding, Findings
+from fecm.problem import check_segments
+from fecm.problem.problem import Problem, check_values
+from fecm.sweeps.cases import CONTACT, LAMINATE, THICKNESS, Case, CasesError
+from fecm.sweeps.vary import apply_case
+
+JUDGED = frozenset((*CONTACT, *LAMINATE, "patch")) - {"layup", "angle"}
+FEW = 4  # plies below which a laminate as thin as two of them is possible
+
+
+def doubtful_values(checked: Problem, cases: Sequence[Case]) -> list[str]:
+    """Say which values of a deck's cases look like a mistake, such as another unit.
+
+    The rules are those of a deck's values.  They are limits, so that only the smallest and the
+    largest value of every name are judged, each alone in the deck.
+    """
+    notes: list[str] = []
+    known = {(finding.code, finding.message) for finding in _findings(checked)}
+    for name in cases[0]:
+        if name not in JUDGED:
+            continue
+        values = [float(case[name]) for case in cases]
+        least, greatest = min(values), max(values)
+        notes += _thickness_notes(checked.deck, name, least)
+        told: set[str] = set()  # codes of this name
+        for value in dict.fromkeys((least, greatest)):
+            found = [
+                finding
+                for finding in _of_value(checked, name, value)
+                if (finding.code, finding.message) not in known
+            ]
+            if not found:
+                continue
+            best = max(found, key=lambda finding: "looks like" in finding.message)
+            if best.code not in told:
+                told.add(best.code)
+                notes.append(f"{name} = {value:g}: {best.message} [{best.code}]")
+    return notes
+
+
+def _thickness_notes(deck: model.Deck, name: str, least: float) -> Iterator[str]:
+    """What may be misunderstood about a thickness."""
+    if name not in (THICKNESS, "laminate_thickness"):
+        return
+    if name == THICKNESS:
+        yield (
+            f"{THICKNESS} is that of the laminate, as laminate_thickness; that of one ply is "
+            "ply_thickness"
+        )
+    layers = deck.require(model.Material).layers
+    ply = max(layer.thickness for layer in layers)
+    if len(layers) >= FEW and least < 2.0 * ply:
+        yield (
+            f"{name} = {least:g} is less than two plies of the deck, whose {len(layers)} plies are "
+            f"up to {ply:g} thick: ply_thickness varies the thickness of every ply"
+        )
+
+
+def _of_value(checked: Problem, name: str, value: float) -> list[Finding]:
+    """Warnings about the deck with one value; none where it is invalid, as its cases say."""
+    try:
+        deck = apply_case(checked.deck, {name: value})
+    except CasesError:
+        return []
+    errors = Findings()
+    check_segments.check_material(deck.require(model.Material), errors)
+    for kind, check_segment in check_segments.CHECKS:
+        if (segment := deck.last(kind)) is not None:
+            check_segment(segment, errors)
+    if errors.errors:
+        return []
+    try:
+        return _findings(Problem(deck, checked.mesh, checked.program))
+    except (ArithmeticError, ValueError):  # no plate, a patch beyond it, or numbers out of range
+        return []
+
+
+def _findings(problem: Problem) -> list[Finding]:
+    findings = Findings()
+    with np.errstate(all="ignore"):
+        check_values(problem, findings)
+    return [finding for finding in findings if finding.severity == "warning"]

@@ -1,0 +1,85 @@
+"""Swept values in another unit, and the names of thicknesses."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from functools import cache
+
+import pytest
+
+import fecm
+from fecm.api import load_deck
+from fecm.sweeps.cases import Case
+from fecm.sweeps.doubts import JUDGED, doubtful_values
+from fecm.sweeps.vary import apply_case
+from tests.sound_plate import base, replaced, with_card
+
+
+def sweep_notes(**vary: list[float]) -> list[str]:
+    """Warnings of a sweep of the sound plate over a short time."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        fecm.sweep(short(), vary)
+    return [str(warning.message) for warning in caught]
+
+
+@cache
+def short() -> fecm.Deck:
+    """The sound plate for 20 steps."""
+    return fecm.read_one(replaced(r"^FAIL .*\n", "")(replaced(r"^LOOP .*", "LOOP,,20")(base())))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "text"),
+    [("velocity", [1.0, 3.0, 5.0], "velocity = 1: .*looks like m/s"),
+     ("mass", [5.5], "mass = 5.5: .*looks like kg"),
+     ("e1", [1.7e11], "e1 = 1.7e.11: .*looks like Pa"),
+     ("thickness", [3.0], "that of one ply is ply_thickness"),
+     ("laminate_thickness", [0.15, 0.2], "laminate_thickness = 0.15 is less than two plies")],
+)  # fmt: skip
+def test_a_swept_value_in_another_unit_is_told_once(
+    name: str, values: list[float], text: str
+) -> None:
+    told = [note for note in sweep_notes(**{name: values}) if re.search(text, note)]
+    assert len(told) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("velocity", [1000.0, 5000.0]), ("mass", [1e-3, 6e-3]), ("laminate_thickness", [2.0, 4.0]),
+     ("ply_thickness", [0.15, 0.2]), ("k", [2e4, 1e5]), ("radius", [5.0, 25.0])],
+)  # fmt: skip
+def test_sound_swept_values_are_not_remarked(name: str, values: list[float]) -> None:
+    assert not [note for note in sweep_notes(**{name: values}) if f"{name} =" in note]
+
+
+@pytest.mark.parametrize("name", sorted(JUDGED))
+@pytest.mark.parametrize("value", [0.0, -1.0, 1e300, 1e-300, 1.7e308, 5e-324])
+def test_an_impossible_value_is_left_to_its_case(name: str, value: float) -> None:
+    (problem,) = load_deck(with_card("DAMP", "50.,")(base())).problems
+    assert all(note.startswith(name) for note in doubtful_values(problem, [{name: value}]))
+
+
+def test_only_the_extremes_of_a_name_are_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    applied: list[Case] = []
+
+    def apply(deck: fecm.Deck, case: Case) -> fecm.Deck:
+        applied.append(case)
+        return apply_case(deck, case)
+
+    monkeypatch.setattr("fecm.sweeps.doubts.apply_case", apply)
+    (problem,) = load_deck(short()).problems
+    cases: list[Case] = [{"velocity": 1000.0 + n, "k": 4e4 + n} for n in range(10_000)]
+    assert doubtful_values(problem, cases) == []
+    assert applied == [{"velocity": 1000.0}, {"velocity": 10999.0}, {"k": 4e4}, {"k": 49999.0}]
+
+
+def test_a_ply_thickness_is_that_of_every_ply() -> None:
+    text = base()
+    thinner = replaced(r"     0\.184$", "      0.15")(replaced(r"2\.944", "  2.4")(text))
+    deck = fecm.read_one(text)
+    assert deck.with_(ply_thickness=0.15) == fecm.read_one(thinner)
+    assert deck.with_(laminate_thickness=2.4) == deck.with_(thickness=2.4)
+    with pytest.raises(ValueError, match="exclude each other"):
+        deck.with_(ply_thickness=0.15, laminate_thickness=2.4)
