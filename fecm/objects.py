@@ -15,12 +15,12 @@ from numpy.typing import ArrayLike
 from fecm._errors import FecmError
 from fecm._frozen import frozen
 from fecm.deck import grid as grids
-from fecm.deck.catalogue import CONTACTS, NamedContact, NamedPly, convert
+from fecm.deck.catalogue import CONTACTS, SYSTEMS, NamedContact, NamedPly, convert
 from fecm.deck.grid import EDGES, SUPPORTS, Grid, Section
 from fecm.deck.layup import parse_layup
 from fecm.deck.model import Indentation, Patch
 from fecm.deck.records import Ply
-from fecm.deck.units import MODULUS
+from fecm.deck.units import MODULUS, in_si, unit_in_si
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.mechanics.points import DISC, HERTZ
 from fecm.problem import plate_mesh
@@ -37,6 +37,7 @@ STANDARD, E_S, NU_S = "mm-N-s", 207e3, 0.3
 # Shapes of the contact patch.
 PATCHES = {"disc": DISC, "hertz": HERTZ}
 CUSTOM = "window:LXxLY,WXxWY"
+NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 
 Support = Literal["free", "simple", "clamped"]
 
@@ -54,6 +55,7 @@ class DropWeight:
     energy: float  # impact energy per thickness, force
     thinnest: float  # limits of the laminate's thickness, length
     thickest: float
+    least_energy: float = 100.0  # per thickness, below which a unit is probably mistaken, force
 
 
 @frozen
@@ -286,8 +288,8 @@ class Laminate:
         As in ``"[0/45]2s"``, or angles in degrees, from the struck face on.
     ply : str or Ply or NamedPly
         Name of a ply, which `fecm materials` lists, or constants in the deck's units.
-    ply_thickness : float
-        Thickness of one ply, length.
+    ply_thickness : float, optional
+        Thickness of one ply, length; a named ply's own by default, where it is known.
 
     Examples
     --------
@@ -298,7 +300,7 @@ class Laminate:
 
     layup: str | Sequence[float]
     ply: str | Ply | NamedPly
-    ply_thickness: float
+    ply_thickness: float | None = None
 
     @property
     def angles(self) -> tuple[float, ...]:
@@ -314,7 +316,9 @@ class Laminate:
 
     @property
     def thickness(self) -> float:
-        """Total thickness, length."""
+        """Total thickness, length; ValueError without the thickness of a ply."""
+        if self.ply_thickness is None:
+            raise ObjectError("`ply_thickness` is missing")
         return float(f"{len(self.angles) * self.ply_thickness:.9g}")
 
 
@@ -428,6 +432,30 @@ def check_positive(**values: float | None) -> None:
     for name, value in values.items():
         if value is not None and not (isinstance(value, Real) and 0.0 < value < math.inf):
             raise ObjectError(f"`{name}` is {value!r}; it must be a positive number")
+
+
+def in_units(
+    name: str, value: float | str | None, dimension: str, system: str | None
+) -> float | None:
+    """A parameter in a system of units; one that is a number or None stays as it is.
+
+    Raises ObjectError if a text, as in ``10J`` or ``3m/s``, is no positive number with a unit of
+    the dimension, or the system is not known.
+    """
+    if not isinstance(value, str):
+        return value
+    match = re.fullmatch(rf"\s*({NUMBER})\s*(\S.*)?", value)
+    unit = match[2] if match else None
+    known = unit_in_si(unit, dimension) if unit else 1.0
+    if match is None or known is None or not math.isfinite(float(match[1])):
+        example = {"force*length": "10J", "length/time": "3m/s"}.get(dimension, "4ms")
+        raise ObjectError(f"`{name}` is {value!r}, not a number or one with a unit, as in {example}")
+    if unit is None:
+        return float(match[1])
+    own = in_si(dimension, SYSTEMS[system]) if system else None
+    if own is None:
+        raise ObjectError(f"`{name}` is {value!r}: give `units`, the deck's")
+    return float(f"{float(match[1]) * known / own:.9g}")
 
 
 def pair(name: str, value: Sequence[float]) -> tuple[float, float]:

@@ -136,7 +136,9 @@ def check(decks: tuple[Path, ...], mode: str, form: str, strict: bool, mesh_erro
 
 def _print(prepared: LoadedDeck, form: str, *, brief: bool, passes: bool) -> None:
     """Print findings and, if there are no errors, a summary, or one line of a deck that passes."""
-    views = [] if prepared.errors() else [ProblemSummary(problem) for problem in prepared.problems]
+    shown = form == "json" or (form == "text" and not brief)
+    problems = prepared.problems if shown and not prepared.errors() else []
+    views = [ProblemSummary(problem) for problem in problems]
     if form == "json":
         for finding in prepared.findings:
             echo_json(finding.to_dict(prepared.source))
@@ -149,7 +151,7 @@ def _print(prepared: LoadedDeck, form: str, *, brief: bool, passes: bool) -> Non
             counts = Counter(finding.severity for finding in prepared.findings)
             found = [f"{n} {word}{'s' * (n != 1)}" for word, n in counts.items()]
             echo(f"{prepared.source}: {', '.join(found) or 'no findings'}")
-        for view in [] if brief else views:
+        for view in views:
             echo("\n".join(view.lines()))
 
 

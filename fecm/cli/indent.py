@@ -265,7 +265,7 @@ def _print_law(k: float, card: dict[str, Any], form: str, **others: float) -> No
         "--ply 1.6e-9,.3,140000,9000,5000,5000,3000 --radius 8 --es 207000 --nus 0.3",
     )
 )
-@laminate_options(required=True)
+@laminate_options(required=True, thickness_required=True)
 @option("--nu23", type=Finite(),
         help="Poisson's ratio of the ply across the fibres.  [default: the named ply's, or "
              "0.4]")  # fmt: skip

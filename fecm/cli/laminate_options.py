@@ -23,13 +23,16 @@ _META = "fecm.plies"  # key of the plies of --materials among the values of a co
 PLIES = file_of(read_plies)
 
 
-def laminate_options(*, required: bool) -> Callable[[Decorated], Decorated]:
+def laminate_options(
+    *, required: bool, thickness_required: bool = False
+) -> Callable[[Decorated], Decorated]:
     """Add ``--layup``, ``--ply-thickness``, ``--ply``, ``--material`` and ``--units``."""
+    own = "" if thickness_required else "  [default: that of a named ply]"
     return stacked(
         option("--layup", type=Parsed(parse_layup, "LAYUP"), required=required,
                help='Layup from the struck face, as in "[0/45/0/-45/0]2s".'),
-        option("--ply-thickness", type=POSITIVE, required=required, metavar="T",
-               help="Thickness of a ply."),
+        option("--ply-thickness", type=POSITIVE, required=thickness_required, metavar="T",
+               help=f"Thickness of a ply.{own}"),
         option("--ply", type=list_of("RHO,NU12,E1,E2,G12,G13,G23", Finite(), [7]),
                help="Density and moduli of a ply."),
         option("--material", callback=_named, type=Parsed(str, "NAME", MATERIALS),
@@ -75,6 +78,8 @@ def laminate_of_options(
     material: NamedPly | None, units: str | None,
 ) -> tuple[Laminate, dict[str, str]]:  # fmt: skip
     """Laminate of these options, checked as in a deck, and the names of its units."""
+    if ply_thickness is None and material is not None:
+        ply_thickness = material.value("thickness", units or material.system)
     if ply_thickness is None:
         raise click.UsageError("--layup needs --ply-thickness")
     constants = ply_of_options(ply, material, units)

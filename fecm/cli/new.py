@@ -13,14 +13,22 @@ from click.core import ParameterSource
 
 from fecm._files import check_outputs
 from fecm.api import load_deck
-from fecm.authoring import AUTO, FULL, MITC, Authored, author
-from fecm.cli.common import DASH, FILE_PATH, RefusedError, echo, note, write_text
+from fecm.authoring import AUTO, EQUI, FULL, MITC, Authored, author
+from fecm.cli.common import (
+    DASH,
+    FILE_PATH,
+    GroupedCommand,
+    RefusedError,
+    echo,
+    note,
+    write_text,
+)
 from fecm.cli.help import typical
 from fecm.cli.laminate_options import PLIES, laminate_options, one_ply
 from fecm.cli.types import POSITIVE, Finite, Parsed, assignment, list_of
 from fecm.deck.catalogue import CONTACTS, MATERIALS, STRENGTHS, NamedContact, NamedPly
 from fecm.deck.format import format_deck
-from fecm.deck.grid import SUPPORTS
+from fecm.deck.grid import IN_PLANE, SUPPORTS
 from fecm.deck.model import Deck, Indentation, Material, Patch, Shear
 from fecm.mechanics.points import DISC, RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass, Rod
@@ -72,7 +80,37 @@ def _mesh(text: str) -> tuple[int, int] | Path:
     return path
 
 
-@click.command(short_help="Write a deck from plate, layup, supports and impact.")
+GROUPS = {
+    "Plate": ("size", "mesh", "grading", "columns", "rows"),
+    "Laminate": (
+        "layup", "ply_thickness", "material", "file", "ply", "units", "damage", "giic",
+    ),
+    "Supports": ("fixture", "support", "edges", "in_plane"),
+    "Impact": ("energy", "velocity", "at", "projectile", "contact", "law"),
+    "Numerics": ("patch", "shear", "shear_factor", "duration", "dt", "every"),
+}  # fmt: skip
+EXAMPLES = """\b
+Examples:
+  fecm new d7136.inp --fixture D7136 --layup "[45/0/-45/90]4s" --material IM7/8552 \\
+      --energy 10J --damage
+  fecm new plate.inp --size 100x80 --mesh 10x8 --support clamped --layup "[0/90]4s" \\
+      --material IM7/8552 --projectile mass:1e-3 --contact estimate:8 \\
+      --velocity 3m/s --duration 1ms
+"""
+
+
+def _shear_factor(text: str) -> float | str:
+    """Read a factor, or the word for the stiffness from equilibrium."""
+    try:
+        return text if text == EQUI else float(text)
+    except ValueError:
+        raise ValueError(f"{text!r} is not a number or {EQUI}") from None
+
+
+@click.command(
+    cls=GroupedCommand, groups=GROUPS, epilog=EXAMPLES,
+    short_help="Write a deck from plate, layup, supports and impact.",
+)  # fmt: skip
 @click.argument("output", type=FILE_PATH, metavar="DECK")
 @option("--title", default="", help="Title of the deck.")
 @option("--size", type=list_of("6x4", POSITIVE, [2], "[xX×]"), metavar="LXxLY",
@@ -90,6 +128,9 @@ def _mesh(text: str) -> tuple[int, int] | Path:
 @option("--damage", is_flag=True,
         help="Add strengths and toughness of a named ply: failure exposures (ALLO, FAIL) and the "
              "delamination threshold (DELA).")  # fmt: skip
+@option("--giic", type=POSITIVE, metavar="G",
+        help="Toughness G_IIc of the delamination threshold (DELA), force/length; goes before that "
+             "of a named ply.")  # fmt: skip
 @option("--support", type=click.Choice(SUPPORTS), default="free", show_default=True,
         help="Support of all edges.")  # fmt: skip
 @option("--edge", "edges", type=Parsed(assignment, "EDGE=SUPPORT"), multiple=True,
@@ -98,12 +139,16 @@ def _mesh(text: str) -> tuple[int, int] | Path:
 @option("--fixture", metavar="NAME",
         help=f"Fixture of a drop-weight test: {', '.join(FIXTURES)} or {CUSTOM}, a plate on the "
              "edges of a window; --mesh then counts the window's elements.")  # fmt: skip
+@option("--in-plane", type=click.Choice(list(IN_PLANE)),
+        help="In-plane displacements of a coupled laminate on its supports: held, normal (held "
+             "across the edge only) or free.  [default: held; with --fixture free]")  # fmt: skip
 @option("--at", type=list_of("X,Y", Finite(), [2]),
         help="Impact point.  [default: the plate's centre]")  # fmt: skip
-@option("--velocity", type=Finite(), help="Approach velocity.")
-@option("--energy", type=POSITIVE,
-        help="Impact energy in the deck's units (mJ in mm-N-s), instead of "
-             "--velocity.")  # fmt: skip
+@option("--velocity", metavar="V[UNIT]",
+        help="Approach velocity in the deck's units, or with a unit, as in 3m/s.")  # fmt: skip
+@option("--energy", metavar="E[UNIT]",
+        help="Impact energy instead of --velocity: in the deck's units (mJ in mm-N-s), or with a "
+             "unit, as in 10J.")  # fmt: skip
 @option("--law", type=list_of("K,ALPHA_P,S_P,Q", Finite(), [4]),
         help="Parameters of the indentation law.")  # fmt: skip
 @option("--contact", type=Parsed(_contact, "NAME"),
@@ -118,9 +163,12 @@ def _mesh(text: str) -> tuple[int, int] | Path:
              "is then refined; or none, a point force.  D7136 takes hertz.")  # fmt: skip
 @option("--shear", type=click.Choice([MITC, FULL]), default=MITC, show_default=True,
         help="Transverse shear: assumed strains, or full quadrature.")  # fmt: skip
-@option("--duration", type=POSITIVE,
-        help="Simulated time.  [default with --fixture: 1.25 times half a period of the projectile "
-             "on the plate]")  # fmt: skip
+@option("--shear-factor", type=Parsed(_shear_factor, "K|equi"), default="1", show_default=True,
+        help="Factor of the transverse shear stiffness, or equi, the stiffness from equilibrium "
+             "(SHEA EQUI).")  # fmt: skip
+@option("--duration", metavar="T[UNIT]",
+        help="Simulated time, also with a unit, as in 4ms.  [default with --fixture: longer than "
+             "the contact of the projectile with the static plate]")  # fmt: skip
 @option("--dt", type=POSITIVE, help="Time step.  [default: 0.9 of the critical one]")
 @option("--every", type=click.IntRange(min=1),
         help="Steps between stored rows.  [default: for about 200 rows]")  # fmt: skip
@@ -185,7 +233,7 @@ def _as_options(message: str, options: Collection[str]) -> str:
 def _author(
     given: Collection[str], *, size: tuple[float, float] | None,
     mesh: tuple[int, int] | Path | None, grading: float, columns: str, rows: str,
-    layup: Sequence[float], ply_thickness: float, ply: Sequence[float] | None,
+    layup: Sequence[float], ply_thickness: float | None, ply: Sequence[float] | None,
     material: NamedPly | None, support: Any, edges: Sequence[tuple[str, Any]], fixture: str | None,
     law: tuple[float, float, float, float] | None, contact: NamedContact | Sphere | None,
     patch: Patch | None, **options: Any,
@@ -226,6 +274,10 @@ def _additions(deck: Deck) -> str:
         about = "" if patch.radius else f" ({share:g} of the thickness)"
         pressure = "a uniform pressure" if patch.shape == DISC else "Hertz's pressure"
         parts.append(f"{pressure} of radius {radius:.4g}{about} instead of a point force (PATC)")
-    if deck.has(Shear):
-        parts.append("assumed shear strains (SHEA MITC)")
+    if (shear := deck.last(Shear)) is not None:
+        words = " ".join([Shear.keyword, *shear.words()])
+        if shear.assumed:
+            parts.append(f"assumed shear strains ({words})")
+        elif shear.equilibrium:
+            parts.append(f"shear stiffness from equilibrium ({words})")
     return f"the deck has {' and '.join(parts)}; --patch none and --shear full leave them out"

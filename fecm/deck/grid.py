@@ -21,7 +21,9 @@ DIGITS = 6
 LEAST_BESIDE = 2  # least number of elements between a window and an edge
 # Restraints of an edge: nothing; w and, along x or y, the rotation along it; all out of the plane.
 SUPPORTS = ("free", "simple", "clamped")
-HELD, SIMPLE, CLAMPED = (1, 1, 1, 0, 0), ((1, 1, 1, 1, 0), (1, 1, 1, 0, 1)), (1, 1, 1, 1, 1)
+W_HELD, SIMPLE, CLAMPED = (1, 0, 0), ((1, 1, 0), (1, 0, 1)), (1, 1, 1)
+# Restraints of u and v on an edge along x and on one along y.
+IN_PLANE = {"held": ((1, 1), (1, 1)), "normal": ((0, 1), (1, 0)), "free": ((0, 0), (0, 0))}
 EDGES = ("left", "right", "bottom", "top")
 
 
@@ -203,26 +205,35 @@ class Grid:
         everywhere: Sequence[int],
         supports: Mapping[str, str],
         window: tuple[float, float] | None = None,
+        *,
+        in_plane: str = "held",
     ) -> Boundary | None:
-        """BOUN cards of the supports of the edges; w is held along the edges of a window."""
-        # The rotation along an edge x = const is theta_y, along y = const theta_x.
-        codes = {
-            edge: CLAMPED if support == "clamped" else SIMPLE[edge in ("left", "right")]
-            for edge, support in supports.items()
-            if support != "free"
-        }
-        return self.boundary(everywhere, codes, window)
+        """BOUN cards of the supports of the edges; w is held along the edges of a window.
+
+        `in_plane`, a key of :data:`IN_PLANE`, is what these supports do to u and v.
+        """
+        codes: dict[str, tuple[int, ...]] = {}
+        for edge, support in supports.items():
+            # The rotation along an edge x = const is theta_y, along y = const theta_x.
+            along_y = edge in ("left", "right")
+            if support != "free":
+                out_of_plane = CLAMPED if support == "clamped" else SIMPLE[along_y]
+                codes[edge] = (*IN_PLANE[in_plane][along_y], *out_of_plane)
+        return self.boundary(everywhere, codes, window, in_plane=in_plane)
 
     def boundary(
         self,
         everywhere: Sequence[int],
         edges: Mapping[str, Sequence[int]],
         window: tuple[float, float] | None = None,
+        *,
+        in_plane: str = "held",
     ) -> Boundary | None:
         """BOUN cards; None where nothing is restrained.
 
-        Codes are those of every node, and of the nodes of each of the :data:`EDGES`; w is held
-        along the edges of a window in the middle of the plate, given by its sides.
+        Codes are those of every node, and of the nodes of each of the :data:`EDGES`; w, and u and v
+        by `in_plane`, are held along the edges of a window in the middle of the plate, given by its
+        sides.
         """
         codes = np.tile(np.array(everywhere), (self.up, self.across, 1))
         parts = {"left": codes[:, 0], "right": codes[:, -1], "bottom": codes[0], "top": codes[-1]}
@@ -235,8 +246,9 @@ class Grid:
                 for distance in (-side, side)
             )
             across, up = slice(left, right + 1), slice(low, high + 1)
-            for place in ((up, [left, right]), ([low, high], across)):
-                codes[place] = np.maximum(codes[place], HELD)
+            for along_y, place in enumerate((([low, high], across), (up, [left, right]))):
+                code = (*IN_PLANE[in_plane][along_y], *W_HELD)
+                codes[place] = np.maximum(codes[place], code)
         return boundary_cards(codes.reshape(self.nodes, -1))
 
 

@@ -69,6 +69,24 @@ def in_si(dimension: str, names: dict[str, str]) -> float | None:
     return value
 
 
+# Units of products and quotients that have a name of their own, in m, N and s.
+NAMED = {"force*length": {"J": 1.0, "mJ": 1e-3, "kJ": 1e3}}
+
+
+def unit_in_si(unit: str, dimension: str) -> float | None:
+    """A unit such as ``mm/s`` or ``J`` in m, N and s; None if it is not one of the dimension.
+
+    The dimension is a product or a quotient of length, force and time, without powers.
+    """
+    if (value := NAMED.get(dimension, {}).get(unit)) is not None:
+        return value
+    words, names = re.split(r"([*/])", dimension), re.split(r"([*/])", unit.replace(" ", ""))
+    if len(words) != len(names) or words[1::2] != names[1::2]:
+        return None
+    units = dict(zip(words[::2], names[::2], strict=True))
+    return in_si(dimension, units)
+
+
 def thousands(value: float) -> int:
     """Power of 1000, as one of ten, that leaves 1 to 1000 of a positive value."""
     return 3 * math.floor(math.log10(value) / 3.0)

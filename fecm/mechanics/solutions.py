@@ -24,24 +24,61 @@ DENSE = 60
 SHIFT = 1.0e-9
 
 
+# Squared length, relative to the largest, below which a rigid motion is not held by the supports.
+NOT_HELD = 1.0e-9
+
+
 class SingularStiffnessError(FecmError, ArithmeticError):
     """The supports allow motion without strain."""
 
 
+def in_plane_pins(plate: PlateModel) -> list[int]:
+    """Equations, from 0, of as few dofs u and v as hold the plate in its plane.
+
+    Empty where its supports hold it.  A load without resultants in the plane has no reaction at the
+    pins: they choose the rigid motion, and change no strain.
+    """
+    equations = plate.mesh.equations[:, :2]
+    coordinates = plate.mesh.coordinates
+    x, y = ((coordinates - coordinates.mean(axis=0)) / np.ptp(coordinates, axis=0).max()).T
+    motions = np.zeros((*equations.shape, 3))  # u and v of two translations and the rotation
+    motions[:, 0, 0] = motions[:, 1, 1] = 1.0
+    motions[:, 0, 2], motions[:, 1, 2] = -y, x
+    held = motions[equations == 0]
+    gram = held.T @ held
+    pins: list[int] = []
+    while True:
+        values, vectors = np.linalg.eigh(gram)
+        if values[0] > NOT_HELD * values[-1]:
+            return pins
+        moves = np.where(equations > 0, np.abs(motions @ vectors[:, 0]), -1.0)
+        node, dof = np.unravel_index(moves.argmax(), moves.shape)
+        pins.append(int(equations[node, dof]) - 1)
+        gram = gram + np.outer(motions[node, dof], motions[node, dof])
+
+
 class Tangent:
-    """The factorised stiffness; raises SingularStiffnessError if that fails."""
+    """The factorised stiffness; raises SingularStiffnessError if that fails.
+
+    Rigid motions in the plane are pinned, so that they need no supports.
+    """
 
     def __init__(self, plate: PlateModel) -> None:
+        from scipy.sparse import diags_array
         from scipy.sparse.linalg import MatrixRankWarning, splu  # slow to import
 
-        self._stiffness = plate.stiffness
+        self._stiffness = held = plate.stiffness
+        if pins := in_plane_pins(plate):
+            springs = np.zeros(plate.neq)
+            springs[pins] = held.diagonal()[pins]
+            held = held + diags_array(springs, format="csr")
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error", MatrixRankWarning)
                 # K is positive definite; pivoting only costs fill, a factor of 40 on a plate of
                 # 30 x 30 elements.
                 self._factors: SuperLU = splu(
-                    plate.stiffness.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                    held.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
                     options={"SymmetricMode": True},
                 )  # fmt: skip
         except (RuntimeError, MatrixRankWarning) as error:
@@ -54,6 +91,15 @@ class Tangent:
         if not left <= SINGULAR * np.abs(residual).max():
             raise SingularStiffnessError("the stiffness is singular")
         return np.asarray(change)
+
+
+def compliance(plate: PlateModel, load: Floats) -> float:
+    """Displacement under a load in its own direction, per unit of it.
+
+    The load, (neq,), is that of a unit force.  Raises SingularStiffnessError for a plate that is
+    not held.
+    """
+    return float(load @ Tangent(plate).solve(load))
 
 
 def reactions(plate: PlateModel, field: Floats, factor: float) -> Floats:

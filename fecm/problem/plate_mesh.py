@@ -15,7 +15,15 @@ from numpy.typing import ArrayLike, NDArray
 from fecm._errors import FecmError
 from fecm._inputs import read_input
 from fecm._typing import Bools, Floats
-from fecm.deck.grid import CLAMPED, HELD, SIMPLE, SUPPORTS, boundary_cards, round_to
+from fecm.deck.grid import (
+    CLAMPED,
+    IN_PLANE,
+    SIMPLE,
+    SUPPORTS,
+    W_HELD,
+    boundary_cards,
+    round_to,
+)
 from fecm.deck.model import Boundary, Coordinates, Elements
 from fecm.deck.records import ElementNodes, NodeValues
 
@@ -82,10 +90,13 @@ class PlateMesh:
         rows = enumerate((self.cells + 1).tolist(), start=1)
         return Elements(tuple(ElementNodes(n, tuple(nodes), 0) for n, nodes in rows))
 
-    def supported(self, everywhere: Sequence[int], supports: Mapping[str, str]) -> Boundary | None:
+    def supported(
+        self, everywhere: Sequence[int], supports: Mapping[str, str], *, in_plane: str = "held"
+    ) -> Boundary | None:
         """BOUN cards of the supports of groups; None where nothing is restrained.
 
-        The support of the boundary leaves out the other groups.
+        The support of the boundary leaves out the other groups.  `in_plane` is what the supports do
+        to u and v; raises MeshError if it is "normal" and a side is along neither x nor y.
         """
         codes = np.tile(np.array(everywhere), (self.nodes, 1))
         for name, support in supports.items():
@@ -93,21 +104,33 @@ class PlateMesh:
             if name == BOUNDARY and name not in self.groups:
                 for other in supports.keys() - {name}:
                     rows = np.setdiff1d(rows, self._group(other))
+            if support == "free":
+                continue
+            sides, _, counts = _sides(self.cells)
+            sides = sides[_inside(sides, counts, rows)]
+            along = np.ptp(self.points[sides], axis=1) <= SAME * np.ptp(self.points)
+            straight = len(sides) > 0 and bool(along.any(axis=1).all())
+            lines = [np.unique(sides[along[:, axis]]) for axis in (1, 0)]  # along x, along y
             if support == "clamped":
-                codes[rows] = np.maximum(codes[rows], CLAMPED)
-            elif support == "simple":
-                sides, _, counts = _sides(self.cells)
-                sides = sides[_inside(sides, counts, rows)]
-                along = np.ptp(self.points[sides], axis=1) <= SAME * np.ptp(self.points)
-                if len(sides) and along.any(axis=1).all():
-                    # The rotation along the sides, if all of them run along x or y.
-                    for axis, code in enumerate(reversed(SIMPLE)):
-                        on = np.unique(sides[along[:, axis]])
-                        codes[on] = np.maximum(codes[on], code)
-                else:
-                    # Three nodes in a line, on a polygon for a curve, would hold its rotation too.
-                    rows = np.setdiff1d(rows, self.middles)
-                codes[rows] = np.maximum(codes[rows], HELD)
+                codes[rows, 2:] = CLAMPED
+            elif straight:
+                # The rotation along the sides, if all of them run along x or y.
+                for on, code in zip(lines, SIMPLE, strict=True):
+                    codes[on, 2:] = np.maximum(codes[on, 2:], code)
+            else:
+                # Three nodes in a line, on a polygon for a curve, would hold its rotation too.
+                rows = np.setdiff1d(rows, self.middles)
+            codes[rows, 2:] = np.maximum(codes[rows, 2:], W_HELD)
+            if in_plane == "held":
+                codes[rows, :2] = 1
+            elif in_plane == "normal":
+                if not straight:
+                    raise MeshError(
+                        f"the sides of {name!r} are not all along x or y: u and v are not normal "
+                        "to them"
+                    )
+                for on, held in zip(lines, IN_PLANE[in_plane], strict=True):
+                    codes[on, :2] = np.maximum(codes[on, :2], held)
         return boundary_cards(codes)
 
     def _group(self, name: str) -> Integers:

@@ -3,20 +3,50 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
 from fecm._memory import format_bytes
 from fecm._typing import Floats
 from fecm.deck.macros import flat
+from fecm.deck.model import Shear
 from fecm.deck.units import MASS, mass_in_si, unit_names, unit_of
 from fecm.mechanics.plate import UnsoundPlateError
+from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
+from fecm.mechanics.solutions import SingularStiffnessError, compliance
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import Problem, build_projectile
 from fecm.problem.check_segments import resolution, said_error
 
 ROOM = 0.6  # share of the critical time step below which the step that DT 0 takes is shown
+
+MOST_SOLVED = 1000  # elements up to which a summary takes static solutions
+
+
+def leaves_out_equilibrium(problem: Problem) -> bool:
+    """Whether the deck of an impact has assumed shear strains and the factor 1 without EQUI."""
+    card = problem.deck.last(Shear)
+    plain = card is not None and card.assumed and not card.equilibrium and card.factor == 1.0
+    return plain and problem.contact is not None
+
+
+def equilibrium_change(problem: Problem) -> float | None:
+    """By how much the shear stiffness of SHEA EQUI changes the static deflection under the load.
+
+    The deck has the factor 1.  None for a plate that is not held, and one of more elements than
+    MOST_SOLVED: a static solution of many takes longer than all other checks.
+    """
+    plate, contact = problem.moving_plate, problem.contact
+    if contact is None or problem.deck.control.numel > MOST_SOLVED:
+        return None
+    load, laminate = contact[plate.mesh.equations > 0], plate.laminate
+    softer = replace(plate, laminate=replace(laminate, shear=equilibrium_shear_stiffness(laminate)))
+    try:
+        return compliance(softer, load) / compliance(plate, load) - 1.0
+    except SingularStiffnessError:
+        return None
 
 
 def larger_steps(problem: Problem) -> list[str]:
@@ -54,12 +84,18 @@ class ProblemSummary:
         # of the peak force, relative to it; None without impact.
         self.elements_per_wave = None if resolved is None else resolved.elements
         self.mesh_error = None if resolved is None else resolved.error
+        # Change of the static deflection under the load by SHEA EQUI; None where it does not apply
+        # or is not computed.
+        self.equilibrium_change: float | None = None
+        self._leaves_out_equilibrium = leaves_out_equilibrium(problem)
+        if self._leaves_out_equilibrium:
+            self.equilibrium_change = equilibrium_change(problem)
         self.units = unit_names(deck)  # empty if the deck has none
 
     def to_dict(self) -> dict[str, object]:
         """Plain values, for JSON."""
-        arrays = {n: v.tolist() for n, v in vars(self).items() if isinstance(v, np.ndarray)}
-        return vars(self) | arrays
+        values = {name: v for name, v in vars(self).items() if not name.startswith("_")}
+        return {n: v.tolist() if isinstance(v, np.ndarray) else v for n, v in values.items()}
 
     def lines(self) -> list[str]:
         """Lines of text."""
@@ -73,6 +109,8 @@ class ProblemSummary:
         for name, dimension in (("A", "force/length"), ("B", "force"), ("D", "force*length")):
             lines += _matrix(name, getattr(self, name), unit_of(dimension, self.units))
         lines += _matrix("shear xz, yz", self.shear, unit_of("force/length", self.units))
+        if self._leaves_out_equilibrium:
+            lines.append(f"  shear factor        1; {self._said_change()}")
 
         def mass(value: float) -> str:
             known = mass_in_si(value, self.units)
@@ -96,6 +134,14 @@ class ProblemSummary:
             lines.append(f"  elements per wave   {self.elements_per_wave:.1f}{error}")
         size = format_bytes(self.output_bytes)
         return [*lines, f"  impact steps        {self.steps}", f"  output              {size}"]
+
+    def _said_change(self) -> str:
+        """What SHEA EQUI would change."""
+        if self.equilibrium_change is not None:
+            return f"SHEA EQUI changes the static deflection by {self.equilibrium_change:+.1%}"
+        if self.elements > MOST_SOLVED:
+            return f"the change by SHEA EQUI is computed up to {MOST_SOLVED} elements"
+        return "the plate is not held: no static deflection to compare with SHEA EQUI"
 
 
 def _matrix(name: str, values: Floats, unit: str) -> list[str]:

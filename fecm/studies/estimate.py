@@ -19,13 +19,14 @@ from fecm._typing import Floats
 from fecm.deck.model import Impact, Indentation
 from fecm.mechanics.laminate import SMALL_MASS, effective_rigidity
 from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.solutions import SingularStiffnessError, Tangent
+from fecm.mechanics.solutions import SingularStiffnessError, compliance
 from fecm.problem.build import build_projectile
 from fecm.problem.problem import Problem
 from fecm.studies import StudyError
 
 # Mass over the plate's below which waves control the impact, and above which it is quasi-static.
 SMALL, LARGE = 0.1, 50.0
+MIDPOINTS = 1000  # of the quadrature over the force
 
 
 @frozen
@@ -89,6 +90,22 @@ def static_plate(mass: float, velocity: float, k: float, stiffness: float) -> Qu
     duration = math.pi * math.sqrt(mass / stiffness)
     peak = float(brentq(missing, 0.0, most, xtol=1e-12 * most))
     return QuickImpact(peak, duration / 2.0, duration)
+
+
+def contact_time(mass: float, velocity: float, k: float, stiffness: float) -> float:
+    """Duration of the contact of :func:`static_plate`, with the indentation.
+
+    Plate and contact are springs in series.  The displacement of the mass at the force F is
+    x = F/k_b + (F/k)^(2/3), and the time is 2 times the integral of dx/v up to the peak F_m; the
+    variable s of F = F_m (1 - s^2) leaves no singularity.
+    """
+    peak = static_plate(mass, velocity, k, stiffness).peak
+    s = (np.arange(MIDPOINTS) + 0.5) / MIDPOINTS
+    force = peak * (1.0 - s * s)
+    stored = force**2 / (2.0 * stiffness) + 0.4 * np.cbrt(force**5 / k**2)
+    left = np.sqrt(velocity**2 - 2.0 * stored / mass)
+    slope = 1.0 / stiffness + 2.0 / 3.0 / np.cbrt(force * k**2)
+    return 2.0 * float(np.mean(slope * 2.0 * peak * s / left))
 
 
 @frozen
@@ -169,8 +186,7 @@ def _model(
 
 def static_stiffness(plate: PlateModel, contact: Floats) -> float:
     """Force per displacement under the load; NaN for a plate that is not held."""
-    load = contact[plate.mesh.equations > 0]
     try:
-        return 1.0 / float(load @ Tangent(plate).solve(load))
+        return 1.0 / compliance(plate, contact[plate.mesh.equations > 0])
     except SingularStiffnessError:
         return math.nan
