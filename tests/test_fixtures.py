@@ -98,8 +98,8 @@ def test_what_does_not_go_with_a_fixture_is_refused(options: list[str], message:
 
 def test_a_laminate_outside_the_standard_is_warned_of() -> None:
     made = new("--fixture", "D7136", "--layup", "[0/90]s", *PLATE[2:], *QUICK)
-    assert "warning: D7136 is for laminates of 4 to 6 mm; this one has 0.736 mm" in made.stderr
-    assert "warning" not in new("--fixture", "D7136", *PLATE, *QUICK).stderr
+    assert "note: D7136 is for laminates of 4 to 6 mm; this one has 0.736 mm" in made.stderr
+    assert "D7136 is for" not in new("--fixture", "D7136", *PLATE, *QUICK).stderr
 
 
 SPHERE = ("--size", "100x80", "--mesh", "4x4", "--projectile", "mass:1e-3", "--velocity", "1000",

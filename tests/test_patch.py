@@ -68,6 +68,19 @@ def test_the_compliance_under_a_patch_is_that_of_the_series(shape: str, c: float
     assert found == pytest.approx(exact, rel=1e-3)
 
 
+@pytest.mark.parametrize(("count", "least"), [(12, 0.1), (36, 0.4)])
+def test_the_centre_of_an_element_inside_a_large_patch_has_the_share_of_its_area(
+    count: int, least: float
+) -> None:
+    mesh = rectangle(count, count, 6.0, 6.0)
+    weights = patch_weights(mesh, DISC, 2.0, 3.0, 3.0)
+    side = 6.0 / count
+    centres = mesh.elements[:, 8] - 1
+    inside = np.hypot(*(mesh.coordinates[centres] - 3.0).T) < 2.0 - side
+    exact = 4.0 / 9.0 * side**2 / (np.pi * 2.0**2)
+    assert np.abs(weights[centres][inside] / exact - 1.0).max() < least
+
+
 def test_the_compliance_is_the_same_with_the_patch_on_a_node_or_inside_an_element() -> None:
     on_node, inside = (
         compliance(mesh, patch_weights(mesh, DISC, 0.25, 3.0, 2.0))

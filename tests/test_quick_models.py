@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import fecm
 from fecm.api import load_deck
@@ -14,6 +16,7 @@ from fecm.deck.records import Ply
 from fecm.mechanics.laminate import SMALL_MASS, effective_rigidity, laminate, threshold_force
 from fecm.results.result import Result
 from fecm.studies.estimate import (
+    contact_time,
     inelasticity,
     infinite_plate,
     static_plate,
@@ -75,6 +78,27 @@ def test_a_large_mass_is_stopped_by_bending_and_indentation(row: dict[str, str])
     found = static_plate(mass, velocity, k, stiffness)
     assert found.peak == pytest.approx(float(row["F max (energy balance)"]), rel=1e-7)
     assert found.duration == pytest.approx(float(row["duration by SDOF pi sqrt(M/keff)"]), rel=1e-5)
+
+
+def test_the_contact_lasts_as_the_mass_moves_on_plate_and_indentation_in_series() -> None:
+    mass, velocity, k, stiffness = 2.0, 3.0, 50.0, 40.0
+
+    def rate(_: float, state: list[float]) -> list[float]:
+        # x = F/k_b + (F/k)^(2/3), solved for F.
+        force = brentq(
+            lambda f: f / stiffness + (f / k) ** (2.0 / 3.0) - max(state[0], 0.0), 0.0, 1e3
+        )
+        return [state[1], -force / mass]
+
+    def leaves(_: float, state: list[float]) -> float:
+        return state[0]
+
+    leaves.terminal, leaves.direction = True, -1.0  # type: ignore[attr-defined]
+    moved = solve_ivp(rate, (0.0, 9.0), [0.0, velocity], events=leaves, rtol=1e-8, atol=1e-10)
+    found = contact_time(mass, velocity, k, stiffness)
+    assert found == pytest.approx(moved.t_events[0][0], rel=1e-5)
+    rigid = contact_time(mass, velocity, 1e12, stiffness)
+    assert rigid == pytest.approx(math.pi * math.sqrt(mass / stiffness), rel=1e-5)
 
 
 def test_zeners_parameter_classifies_the_reference_plates() -> None:

@@ -246,9 +246,11 @@ class Grid:
                 for distance in (-side, side)
             )
             across, up = slice(left, right + 1), slice(low, high + 1)
-            for along_y, place in enumerate((([low, high], across), (up, [left, right]))):
-                code = (*IN_PLANE[in_plane][along_y], *W_HELD)
-                codes[place] = np.maximum(codes[place], code)
+            along_x, along_y = (np.array([*code, *W_HELD]) for code in IN_PLANE[in_plane])
+            for line in (low, high):
+                codes[line, across] = np.maximum(codes[line, across], along_x)
+            for line in (left, right):
+                codes[up, line] = np.maximum(codes[up, line], along_y)
         return boundary_cards(codes.reshape(self.nodes, -1))
 
 

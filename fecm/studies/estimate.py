@@ -97,15 +97,16 @@ def contact_time(mass: float, velocity: float, k: float, stiffness: float) -> fl
 
     Plate and contact are springs in series.  The displacement of the mass at the force F is
     x = F/k_b + (F/k)^(2/3), and the time is 2 times the integral of dx/v up to the peak F_m; the
-    variable s of F = F_m (1 - s^2) leaves no singularity.
+    variable s of F = F_m (1 - s^2)^3 leaves no singularity.
     """
     peak = static_plate(mass, velocity, k, stiffness).peak
     s = (np.arange(MIDPOINTS) + 0.5) / MIDPOINTS
-    force = peak * (1.0 - s * s)
+    root = 1.0 - s * s
+    force = peak * root**3
     stored = force**2 / (2.0 * stiffness) + 0.4 * np.cbrt(force**5 / k**2)
     left = np.sqrt(velocity**2 - 2.0 * stored / mass)
     slope = 1.0 / stiffness + 2.0 / 3.0 / np.cbrt(force * k**2)
-    return 2.0 * float(np.mean(slope * 2.0 * peak * s / left))
+    return 2.0 * float(np.mean(slope * 6.0 * peak * root**2 * s / left))
 
 
 @frozen

@@ -1,0 +1,327 @@
+"""fecm new: energies with units, plies and supports by default, shear factor, help."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm.api import load_deck
+from fecm.cli.new import new as command
+from fecm.deck import Deck
+from fecm.deck.catalogue import MATERIALS
+from fecm.deck.model import Delamination, Impact, Material, Shear
+from fecm.mechanics.solutions import in_plane_pins
+from fecm.problem.summary import ProblemSummary
+from fecm.studies.estimate import static_stiffness
+from tests import closed_forms
+from tests.builders import DATA
+from tests.calls import Done, assert_unusable, call
+
+MM = ("--material", "IM7/8552", "--projectile", "mass:1e-3", "--contact", "estimate:8")
+PLATE = (*MM, "--size", "100x80", "--mesh", "5x4")
+D7136 = ("--fixture", "D7136", "--mesh", "8x6", "--material", "IM7/8552", "--layup",
+         "[45/0/-45/90]4s")  # fmt: skip
+QUICK = ("--duration", "1e-4")
+
+
+def new(*options: str) -> Done:
+    return call("new", "-", *options)
+
+
+def deck_of(*options: str) -> Deck:
+    made = new(*options)
+    assert made.exit_code == 0, made.stderr
+    deck = fecm.read_deck(made.stdout)
+    assert isinstance(deck, Deck)
+    return deck
+
+
+def held_in_plane(*options: str) -> dict[str, list[bool]]:
+    """Whether u and v are restrained in the middles of the four edges, and in the plate's middle."""
+    (problem,) = load_deck(new(*options, *QUICK).stdout).problems
+    mesh = problem.mesh
+    places = {
+        "left": (0, 40), "right": (100, 40), "bottom": (50, 0), "top": (50, 80), "inside": (50, 40)
+    }  # fmt: skip
+    found = {}
+    for name, place in places.items():
+        node = np.hypot(*(mesh.coordinates - place).T).argmin()
+        found[name] = (mesh.equations[node, :2] == 0).tolist()
+    return found
+
+
+# Energy and velocity -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "velocity"),
+    [
+        (("--energy", "4.5J"), 3000.0),
+        (("--energy", "4500"), 3000.0),
+        (("--energy", "4500 N*mm"), 3000.0),
+        (("--velocity", "3m/s"), 3000.0),
+        (("--velocity", "3000"), 3000.0),
+        (("--velocity", "10 ft/s"), 3048.0),
+    ],
+)
+def test_energy_and_velocity_take_a_unit(options: tuple[str, ...], velocity: float) -> None:
+    made = new(*PLATE, "--layup", "[0/90]4s", *QUICK, *options)
+    deck = fecm.read_deck(made.stdout)
+    assert isinstance(deck, Deck)
+    assert deck.require(Impact).velocity == pytest.approx(velocity, rel=1e-6)
+    joules = 0.5 * (velocity / 1e3) ** 2  # of 1 kg
+    assert f"note: energy {joules:.4g} J, {velocity:g} mm/s" in made.stderr
+
+
+def test_a_duration_takes_a_unit() -> None:
+    deck = deck_of(*PLATE, "--layup", "[0/90]4s", "--velocity", "3m/s", "--duration", "0.1ms")
+    values = {macro.word: macro.value for macro in deck.macros}
+    assert values["DT"] * values["LOOP"] == pytest.approx(1e-4, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "message"),
+    [
+        ("--energy", "10kg", "--energy is '10kg', not a number or one with a unit, as in 10J"),
+        ("--energy", "J", "as in 10J"),
+        ("--energy", "-1J", "--energy is -1000.0; it must be a positive number"),
+        ("--velocity", "3 m s", "as in 3m/s"),
+        ("--velocity", "1e999", "as in 3m/s"),
+        ("--duration", "4J", "as in 4ms"),
+    ],
+)
+def test_units_that_cannot_be_meant_are_refused(option: str, value: str, message: str) -> None:
+    made = new(*PLATE, "--layup", "[0/90]4s", *QUICK, option, value)
+    assert_unusable(made)
+    assert message in made.stderr
+
+
+def test_a_unit_needs_the_decks_own() -> None:
+    ply = ("--ply", "1.58e-9,.32,161000,11380,5170,5170,3980", "--ply-thickness", "0.125")
+    made = new(*ply, *PLATE[2:4], "--law", "5e4,0,0,1.5", *PLATE[6:], "--layup", "[0/90]4s",
+               *QUICK, "--energy", "4J")  # fmt: skip
+    assert_unusable(made)
+    assert "--energy is '4J': give --units, the deck's" in made.stderr
+
+
+def test_a_fixtures_energy_in_millijoules_is_doubted() -> None:
+    doubt = "where D7136 has 6.7: --energy is in mJ unless it has a unit"
+    made = new(*D7136, *QUICK, "--energy", "10")
+    assert made.exit_code == 0
+    assert "note: the energy is 0.01 J, 0.0024 J per mm of thickness, " + doubt in made.stderr
+    assert "note: energy 0.01 J (0.00239 J per mm of thickness), 60.3 mm/s" in made.stderr
+    assert doubt not in new(*D7136, *QUICK, "--energy", "10J").stderr
+    plate = fecm.Plate.on_fixture("D7136", (8, 6))
+    laminate = fecm.Laminate("[45/0/-45/90]4s", "IM7/8552")
+    with pytest.warns(fecm.FecmWarning, match="is in mJ unless it has a unit"):
+        fecm.impact(plate, laminate, energy=10, duration=1e-4)
+    deck = fecm.impact(plate, laminate, energy="10J", duration="0.1ms")
+    assert 0.5 * 5.5 * (deck.require(Impact).velocity / 1e3) ** 2 == pytest.approx(10.0, rel=1e-5)
+
+
+# Plies -------------------------------------------------------------------------------------------
+
+
+def test_a_named_ply_has_its_own_thickness_in_the_decks_units() -> None:
+    options = ("--size", "100x80", "--mesh", "5x4", "--layup", "[0/90]4s", "--velocity", "3000",
+               "--law", "1e4,0,0,1.5", "--projectile", "mass:1e-3", *QUICK)  # fmt: skip
+    made = new(*options, "--material", "T300/5208", "--units", "mm-N-s")
+    assert "note: the plies are 0.125 mm thick, as T300/5208 is listed" in made.stderr
+    deck = fecm.read_deck(made.stdout)
+    assert isinstance(deck, Deck)
+    assert deck.require(Material).layers[0].thickness == 0.125
+    (thinner,) = {
+        layer.thickness
+        for layer in deck_of(*options, "--material", "T300/5208", "--units", "mm-N-s",
+                             "--ply-thickness", "0.1").require(Material).layers
+    }  # fmt: skip
+    assert thinner == 0.1
+    unknown = new(*options, "--material", "T700/2510")
+    assert_unusable(unknown)
+    assert "--ply-thickness is missing: that of T700/2510 is not known" in unknown.stderr
+
+
+def test_a_ply_thickness_in_another_unit_is_named_against_the_plates_side() -> None:
+    made = new(*D7136, *QUICK, "--ply-thickness", "125")
+    assert_unusable(made)
+    assert "32 plies of --ply-thickness 125 are 4000 thick" in made.stderr
+    assert "the plate's shorter side is 100" in made.stderr
+
+
+def test_a_toughness_stands_in_for_one_that_a_ply_does_not_have() -> None:
+    ply = ("--material", "T700/2510", "--ply-thickness", "0.15", "--damage")
+    assert MATERIALS["T700/2510"].delamination("mm-N-s") is None
+    without = new(*D7136[:4], *D7136[6:], *ply, *QUICK)
+    assert "so no delamination threshold (DELA); --giic gives it" in without.stderr
+    deck = deck_of(*D7136[:4], *D7136[6:], *ply, *QUICK, "--giic", "0.9")
+    assert deck.require(Delamination) == Delamination(0.9)
+    assert deck_of(*D7136, *QUICK, "--giic", "0.9").require(Delamination).toughness == 0.9
+    own = deck_of(*D7136, *QUICK, "--damage").require(Delamination).toughness
+    assert own == MATERIALS["IM7/8552"].value("GIIc", "mm-N-s")
+
+
+# Supports in the plane ---------------------------------------------------------------------------
+
+COUPLED = (*PLATE, "--layup", "[0_4/90_4]", "--velocity", "3000")
+
+
+@pytest.mark.parametrize(
+    ("support", "in_plane", "left", "bottom"),
+    [
+        ("simple", None, [True, True], [True, True]),
+        ("clamped", "held", [True, True], [True, True]),
+        ("simple", "normal", [True, False], [False, True]),
+        ("clamped", "normal", [True, False], [False, True]),
+        ("simple", "free", [False, False], [False, False]),
+    ],
+)
+def test_the_edges_of_a_coupled_laminate_are_held_in_the_plane_as_asked(
+    support: str, in_plane: str | None, left: list[bool], bottom: list[bool]
+) -> None:
+    asked = () if in_plane is None else ("--in-plane", in_plane)
+    found = held_in_plane(*COUPLED, "--support", support, *asked)
+    assert found == {
+        "left": left, "right": left, "bottom": bottom, "top": bottom, "inside": [False, False]
+    }  # fmt: skip
+
+
+def test_an_imported_mesh_is_held_across_its_straight_edges_only() -> None:
+    mesh = ("--mesh", str(DATA / "hole-quad8.msh"))
+    options = (*MM, "--layup", "[0/90]", "--velocity", "1000", *QUICK, "--in-plane", "normal")
+    made = new(*mesh, *options, "--support", "simple")
+    assert made.exit_code == 2
+    assert "the sides of 'boundary' are not all along x or y" in made.stderr
+
+
+def test_a_laminate_without_coupling_stays_held_everywhere() -> None:
+    options = (*PLATE, "--layup", "[0/90]2s", "--velocity", "3000", "--support", "simple", *QUICK)
+    plain, free = new(*options), new(*options, "--in-plane", "free")
+    assert free.stdout == plain.stdout
+    assert "--in-plane has no effect: the laminate is not coupled" in free.stderr
+
+
+def test_a_coupled_laminate_slides_on_the_window_of_a_fixture() -> None:
+    # N/mm on 20 x 12 elements, with u and v of the window's nodes restrained and freed by hand.
+    for in_plane, expected in (("held", 3060.0), (None, 2199.0)):
+        asked = () if in_plane is None else ("--in-plane", in_plane)
+        made = new("--fixture", "D7136", "--mesh", "10x8", "--layup", "[0_8/90_8]",
+                   "--ply-thickness", ".276", "--material", "IM7/8552", *asked)  # fmt: skip
+        assert ("! The plate slides on the window" in made.stdout) == (in_plane is None)
+        (problem,) = load_deck(made.stdout).problems
+        assert problem.contact is not None
+        found = static_stiffness(problem.moving_plate, problem.contact)
+        assert found == pytest.approx(expected, rel=0.015)
+
+
+def test_as_many_dofs_are_pinned_as_rigid_motions_in_the_plane_are_free() -> None:
+    counts = {"free": 3, "held": 0}
+    for in_plane, count in counts.items():
+        made = new(*COUPLED, "--support", "simple", "--in-plane", in_plane, *QUICK)
+        (problem,) = load_deck(made.stdout).problems
+        assert len(in_plane_pins(problem.plate)) == count
+    one_edge = ("--edge", "left=simple", "--in-plane", "normal")
+    (problem,) = load_deck(new(*COUPLED, *one_edge, *QUICK).stdout).problems
+    (pin,) = in_plane_pins(problem.plate)
+    assert pin in problem.plate.mesh.equations[:, 1] - 1  # v, along the edge
+
+
+# Time --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("layup", ["[45/-45]8s", "[0_16/90_16]"])
+def test_the_default_duration_of_a_fixture_ends_after_the_contact(layup: str) -> None:
+    # Indentation makes the contact of a stiff plate longer at a low energy than half a period.
+    deck = deck_of("--fixture", "D7136", "--mesh", "6x4", "--layup", layup, "--ply-thickness",
+                   "0.18", "--material", "IM7/8552", "--energy", "1J")  # fmt: skip
+    result = fecm.run_one(deck)
+    assert result.force.max() > 0.0
+    assert result.force[-1] == 0.0
+
+
+# Transverse shear --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ((), Shear(assumed=True)),
+        (("--shear-factor", "1"), Shear(assumed=True)),
+        (("--shear-factor", "0.8"), Shear(0.8, assumed=True)),
+        (("--shear-factor", "equi"), Shear(assumed=True, equilibrium=True)),
+        (("--shear-factor", "equi", "--shear", "full"), Shear(equilibrium=True)),
+        (("--shear", "full"), None),
+    ],
+)
+def test_the_shear_factor_is_written_beside_the_assumed_strains(
+    options: tuple[str, ...], expected: Shear | None
+) -> None:
+    assert deck_of(*D7136, *QUICK, *options).last(Shear) == expected
+
+
+@pytest.mark.parametrize("value", ["0", "-1", "x", "nan"])
+def test_what_is_no_shear_factor_is_refused(value: str) -> None:
+    assert_unusable(new(*D7136, *QUICK, "--shear-factor", value))
+
+
+SQUARE = ("--size", "1x1", "--mesh", "12x12", "--layup", "[0/90]s", "--ply-thickness", ".02",
+          "--ply", "1,.3,25,1,.5,.5,.2", "--patch", "disc:.1", "--projectile", "mass:1",
+          "--velocity", "1e-3", "--law", "1,0,0,1.5", "--duration", "1", "--dt", "1e-3")  # fmt: skip
+
+
+def test_check_says_how_much_equilibrium_changes_the_static_deflection() -> None:
+    deck = new(*SQUARE, "--support", "simple").stdout
+    ply, angles, h = fecm.read_one(deck).require(Material).ply, [0.0, 90.0, 90.0, 0.0], 0.08
+    D, S = closed_forms.bending_and_shear(ply, angles, h)
+    equal_energy = np.array(closed_forms.equilibrium_shear(ply, angles, h))
+    one, other = (
+        closed_forms.compliance(D, shear, (1.0, 1.0), closed_forms.disc, 0.1)
+        for shear in (S, equal_energy)
+    )
+    expected = other / one - 1.0
+    assert expected > 0.1
+    found = summary_of(deck)
+    assert found["equilibrium_change"] == pytest.approx(expected, rel=2e-3)
+
+
+def summary_of(deck: str) -> dict[str, float | None]:
+    (problem,) = load_deck(deck).problems
+    values: dict[str, float | None] = json.loads(json.dumps(ProblemSummary(problem).to_dict()))
+    return values
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        ((), "the plate is not held: no static deflection"),
+        (("--support", "simple", "--mesh", "13x12"), "is computed up to 150 elements"),
+        (("--support", "simple", "--shear-factor", "equi"), ""),
+        (("--support", "simple", "--shear-factor", "0.9"), ""),
+        (("--support", "simple", "--shear", "full"), ""),
+    ],
+)
+def test_check_compares_with_equilibrium_where_that_is_cheap_and_has_a_meaning(
+    options: tuple[str, ...], line: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fecm.problem.summary.MOST_SOLVED", 150)
+    (problem,) = load_deck(new(*SQUARE, *options).stdout).problems
+    view = ProblemSummary(problem)
+    assert view.equilibrium_change is None
+    lines = "\n".join(view.lines())
+    assert ("shear factor " in lines) == bool(line)
+    assert line in lines
+
+
+# Help --------------------------------------------------------------------------------------------
+
+
+def test_help_has_every_option_once_in_groups_and_typical_calls_at_the_end() -> None:
+    text = call("new", "--help").stdout
+    titles = ["Plate:", "Laminate:", "Supports:", "Impact:", "Numerics:", "Other options:"]
+    assert [line for line in text.splitlines() if line in titles] == titles
+    shown = [line.split()[0].rstrip(",") for line in text.splitlines() if line.startswith("  -")]
+    options = [option.opts[0] for option in command.params if option.opts[0].startswith("-")]
+    assert sorted(shown) == sorted([*options, "-h"])
+    assert "Examples:" in text[text.index("--overwrite") :]
