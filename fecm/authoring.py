@@ -433,7 +433,7 @@ def _damages(
 def _placed(
     plate: Plate, laminate: Laminate, at: Sequence[float] | None, patch: model.Patch | None,
     doubts: list[str],
-) -> tuple[Grid | PlateMesh, int, model.Patch | None]:
+) -> tuple[Grid | PlateMesh, int, model.Patch | None]:  # fmt: skip
     """Mesh, node that is hit, and patch; adds what was changed in them to `doubts`."""
     place = None if at is None else objects.pair("at", at)
     mesh = plate.imported or objects.grid_of(plate, place, None if patch is None else patch.radius)

@@ -449,7 +449,9 @@ def in_units(
     known = unit_in_si(unit, dimension) if unit else 1.0
     if match is None or known is None or not math.isfinite(float(match[1])):
         example = {"force*length": "10J", "length/time": "3m/s"}.get(dimension, "4ms")
-        raise ObjectError(f"`{name}` is {value!r}, not a number or one with a unit, as in {example}")
+        raise ObjectError(
+            f"`{name}` is {value!r}, not a number or one with a unit, as in {example}"
+        )
     if unit is None:
         return float(match[1])
     own = in_si(dimension, SYSTEMS[system]) if system else None

@@ -40,7 +40,7 @@ def deck_of(*options: str) -> Deck:
 
 
 def held_in_plane(*options: str) -> dict[str, list[bool]]:
-    """Whether u and v are restrained in the middles of the four edges, and in the plate's middle."""
+    """Whether u and v are restrained in the middles of the edges and of the plate."""
     (problem,) = load_deck(new(*options, *QUICK).stdout).problems
     mesh = problem.mesh
     places = {
@@ -268,7 +268,8 @@ def test_what_is_no_shear_factor_is_refused(value: str) -> None:
 
 SQUARE = ("--size", "1x1", "--mesh", "12x12", "--layup", "[0/90]s", "--ply-thickness", ".02",
           "--ply", "1,.3,25,1,.5,.5,.2", "--patch", "disc:.1", "--projectile", "mass:1",
-          "--velocity", "1e-3", "--law", "1,0,0,1.5", "--duration", "1", "--dt", "1e-3")  # fmt: skip
+          "--velocity", "1e-3", "--law", "1,0,0,1.5", "--duration", "1",
+          "--dt", "1e-3")  # fmt: skip
 
 
 def test_check_says_how_much_equilibrium_changes_the_static_deflection() -> None:

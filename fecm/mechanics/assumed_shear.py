@@ -3,7 +3,7 @@
 The covariant strains e_xi = w,xi - theta_x x,xi - theta_y y,xi and e_eta are taken from the
 displacements at tying points only and interpolated between them.  9-node elements: e_xi is linear
 in xi from +-1/sqrt(3) and quadratic in eta from 0 and +-sqrt(3/5), e_eta the other way round
-(Huang and Hinton 1986; Bucalem and Bathe 1993).  4-node elements: e_xi is constant in xi and linear
+(Bucalem and Bathe 1993).  4-node elements: e_xi is constant in xi and linear
 in eta from +-1 (MITC4, Dvorkin and Bathe 1984).
 """
 
