@@ -13,7 +13,7 @@ from fecm.cli.new import new as command
 from fecm.deck import Deck
 from fecm.deck.catalogue import MATERIALS
 from fecm.deck.model import Delamination, Impact, Material, Shear
-from fecm.mechanics.solutions import in_plane_pins
+from fecm.mechanics.solutions import Tangent, in_plane_pins
 from fecm.problem.summary import ProblemSummary
 from fecm.studies.estimate import static_stiffness
 from tests import closed_forms
@@ -61,6 +61,7 @@ def held_in_plane(*options: str) -> dict[str, list[bool]]:
     [
         (("--energy", "4.5J"), 3000.0),
         (("--energy", "4500"), 3000.0),
+        (("--energy", "4500mJ"), 3000.0),
         (("--energy", "4500 N*mm"), 3000.0),
         (("--velocity", "3m/s"), 3000.0),
         (("--velocity", "3000"), 3000.0),
@@ -226,6 +227,17 @@ def test_as_many_dofs_are_pinned_as_rigid_motions_in_the_plane_are_free() -> Non
     (problem,) = load_deck(new(*COUPLED, *one_edge, *QUICK).stdout).problems
     (pin,) = in_plane_pins(problem.plate)
     assert pin in problem.plate.mesh.equations[:, 1] - 1  # v, along the edge
+
+
+def test_a_static_solution_pins_the_rigid_motion_in_the_plane_without_a_reaction() -> None:
+    made = new(*COUPLED, "--support", "simple", "--in-plane", "free", *QUICK)
+    (problem,) = load_deck(made.stdout).problems
+    plate, contact = problem.plate, problem.contact
+    assert contact is not None
+    load = contact[plate.mesh.equations > 0]
+    moved = Tangent(plate).solve(load)
+    assert np.abs(moved[in_plane_pins(plate)]).max() < 1e-12 * np.abs(moved).max()
+    assert np.abs(plate.stiffness @ moved - load).max() < 1e-9 * np.abs(load).max()
 
 
 # Time --------------------------------------------------------------------------------------------
