@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Literal
@@ -494,6 +495,8 @@ def _duration(deck: model.Deck) -> float:
     stiffness = static_stiffness(problem.moving_plate, problem.contact)
     mass, velocity = build_projectile(deck).total_mass, deck.require(model.Impact).velocity
     duration = HALF_PERIODS * math.pi * math.sqrt(mass / stiffness)
-    k = deck.require(model.Indentation).k
-    duration = max(duration, CONTACT_TIMES * contact_time(mass, velocity, k, stiffness))
+    if velocity > 0.0:
+        with suppress(OverflowError):  # of a k that the checks doubt
+            k = deck.require(model.Indentation).k
+            duration = max(duration, CONTACT_TIMES * contact_time(mass, velocity, k, stiffness))
     return float(f"{duration:.2g}")

@@ -253,6 +253,20 @@ def test_the_default_duration_of_a_fixture_ends_after_the_contact(layup: str) ->
     assert result.force[-1] == 0.0
 
 
+@pytest.mark.parametrize("options", [("--velocity", "0"), ("--law", "1e200,0,0,1.5")])
+def test_an_impact_whose_contact_cannot_be_estimated_gets_half_periods(
+    options: tuple[str, ...],
+) -> None:
+    made = new(*D7136, *options)
+    plain = deck_of(*D7136)
+    deck = fecm.read_deck(made.stdout)
+    assert isinstance(deck, Deck)
+    time, expected = (
+        {macro.word: macro.value for macro in one.macros}["LOOP"] for one in (deck, plain)
+    )
+    assert time == pytest.approx(expected, rel=0.1)
+
+
 # Transverse shear --------------------------------------------------------------------------------
 
 
