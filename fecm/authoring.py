@@ -26,6 +26,7 @@ from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.objects import (
     STANDARD,
     Contact,
+    DropWeight,
     Fixture,
     Laminate,
     ObjectError,
@@ -209,11 +210,7 @@ def author(
         energy=energy, duration=duration, dt=dt, every=every, giic=giic, ply_thickness=thickness
     )
     if plate.fixture is not None and test is not None:
-        if not test.thinnest <= round(laminate.thickness, 9) <= test.thickest:
-            doubts.append(
-                f"{plate.fixture.name} is for laminates of {test.thinnest:g} to "
-                f"{test.thickest:g} mm; this one has {laminate.thickness:.4g} mm"
-            )
+        doubts += _doubts_of_thickness(plate.fixture.name, test, laminate.thickness)
         projectile = projectile or RigidMass(test.mass)
         if velocity is None and energy is None:
             energy = test.energy * laminate.thickness
@@ -295,6 +292,14 @@ def _check_choices(shear: str, in_plane: str | None, units: str | None, title: s
             raise ObjectError(f"`{name}` is {value!r}, none of {known}")
     if "\n" in title:
         raise ObjectError("`title` has more than one line")
+
+
+def _doubts_of_thickness(name: str, test: DropWeight, thickness: float) -> list[str]:
+    """What a standard says about the thickness of a laminate that is outside its range."""
+    if test.thinnest <= round(thickness, 9) <= test.thickest:
+        return []
+    limits = f"{test.thinnest:g} to {test.thickest:g} mm"
+    return [f"{name} is for laminates of {limits}; this one has {thickness:.4g} mm"]
 
 
 def _known(ply: object) -> object:
