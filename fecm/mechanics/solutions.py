@@ -24,7 +24,7 @@ DENSE = 60
 SHIFT = 1.0e-9
 
 
-# Squared length, relative to the largest, below which a rigid motion is not held by the supports.
+# Eigenvalue of the supported rigid motions, relative to the largest, below which one is free.
 NOT_HELD = 1.0e-9
 
 
