@@ -126,8 +126,8 @@ def impact(
     shear_factor : float or str
         Factor of the transverse shear stiffness, or ``"equi"``, the stiffness from equilibrium.
     in_plane : str, optional
-        u and v of a coupled laminate where the plate is supported: ``"held"``, the default of
-        edges; ``"free"``, the default of fixtures; or ``"normal"``, held across the edge only.
+        Displacements u and v of a coupled laminate where the plate is supported: ``"held"``, the
+        default of edges; ``"free"``, that of fixtures; or ``"normal"``, held across the edge only.
     gages : iterable of tuple
         Place x, y and z from the mid-plane (length) and direction (degrees) of strain gages.
     damage : bool
