@@ -351,4 +351,4 @@ def test_help_has_every_option_once_in_groups_and_typical_calls_at_the_end() -> 
     shown = [line.split()[0].rstrip(",") for line in text.splitlines() if line.startswith("  -")]
     options = [option.opts[0] for option in command.params if option.opts[0].startswith("-")]
     assert sorted(shown) == sorted([*options, "-h"])
-    assert "Examples:" in text[text.index("--overwrite") :]
+    assert "Typical calls:" in text[text.index("--overwrite") :]

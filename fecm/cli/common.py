@@ -12,7 +12,7 @@ import io
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import monotonic as clock
 from types import FrameType
@@ -42,32 +42,6 @@ MODE_OPTION = click.option("--mode", type=click.Choice(MODES), default=REPORT, s
 FORMAT_OPTION = click.option("--format", "form", type=click.Choice(["text", "json"]),
                              default="text", show_default=True,
                              help="Text for people, or JSON for programs.")  # fmt: skip
-
-
-class GroupedCommand(click.Command):
-    """A command whose help page has its options in groups.
-
-    Groups are titles with the names of parameters, in the order of the page; what is in no group
-    comes last.
-    """
-
-    def __init__(
-        self, *arguments: Any, groups: Mapping[str, Sequence[str]], **settings: Any
-    ) -> None:
-        super().__init__(*arguments, **settings)
-        self._groups = groups
-
-    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write a section for each group."""
-        options = [param for param in self.get_params(ctx) if isinstance(param, click.Option)]
-        shown = {option.name: option.get_help_record(ctx) for option in options}
-        sections = {
-            title: [shown.pop(name) for name in names] for title, names in self._groups.items()
-        }
-        sections["Other options"] = list(shown.values())
-        for title, records in sections.items():
-            with formatter.section(title):
-                formatter.write_dl([record for record in records if record is not None])
 
 
 class RefusedError(FecmError):

@@ -14,16 +14,8 @@ from click.core import ParameterSource
 from fecm._files import check_outputs
 from fecm.api import load_deck
 from fecm.authoring import AUTO, EQUI, FULL, MITC, Authored, author
-from fecm.cli.common import (
-    DASH,
-    FILE_PATH,
-    GroupedCommand,
-    RefusedError,
-    echo,
-    note,
-    write_text,
-)
-from fecm.cli.help import typical
+from fecm.cli.common import DASH, FILE_PATH, RefusedError, echo, note, write_text
+from fecm.cli.help import GroupedCommand, typical
 from fecm.cli.laminate_options import PLIES, laminate_options, one_ply
 from fecm.cli.types import POSITIVE, Finite, Parsed, assignment, list_of
 from fecm.deck.catalogue import CONTACTS, MATERIALS, STRENGTHS, NamedContact, NamedPly
@@ -89,14 +81,6 @@ GROUPS = {
     "Impact": ("energy", "velocity", "at", "projectile", "contact", "law"),
     "Numerics": ("patch", "shear", "shear_factor", "duration", "dt", "every"),
 }  # fmt: skip
-EXAMPLES = """\b
-Examples:
-  fecm new d7136.inp --fixture D7136 --layup "[45/0/-45/90]4s" --material IM7/8552 \\
-      --energy 10J --damage
-  fecm new plate.inp --size 100x80 --mesh 10x8 --support clamped --layup "[0/90]4s" \\
-      --material IM7/8552 --projectile mass:1e-3 --contact estimate:8 \\
-      --velocity 3m/s --duration 1ms
-"""
 
 
 def _shear_factor(text: str) -> float | str:
@@ -108,9 +92,17 @@ def _shear_factor(text: str) -> float | str:
 
 
 @click.command(
-    cls=GroupedCommand, groups=GROUPS, epilog=EXAMPLES,
+    cls=GroupedCommand,
+    groups=GROUPS,
     short_help="Write a deck from plate, layup, supports and impact.",
-)  # fmt: skip
+    epilog=typical(
+        'fecm new d7136.inp --fixture D7136 --layup "[45/0/-45/90]4s" --material IM7/8552 '
+        "--energy 10J --damage",
+        'fecm new plate.inp --size 100x80 --mesh 10x8 --support clamped --layup "[0/90]4s" '
+        "--material IM7/8552 --projectile mass:1e-3 --contact estimate:8 --velocity 3m/s "
+        "--duration 1ms",
+    ),
+)
 @click.argument("output", type=FILE_PATH, metavar="DECK")
 @option("--title", default="", help="Title of the deck.")
 @option("--size", type=list_of("6x4", POSITIVE, [2], "[xX×]"), metavar="LXxLY",
