@@ -213,6 +213,25 @@ def middle_under_uniform_load(D: Floats, S: Floats) -> float:
     return float((load * w).sum())
 
 
+def mean_rigidity(ply: Ply, angles: Sequence[float], h: float) -> float:
+    """Bending stiffness of the isotropic infinite plate of equal point mobility, equal plies.
+
+    The velocity of a point under a force is the mean over all directions of that of isotropic
+    plates with their bending stiffness, which goes with its power -1/2.
+    """
+    directions = np.arange(4096) * np.pi / 4096
+    faces = np.linspace(-h / 2.0, h / 2.0, len(angles) + 1)
+    nu21 = ply.nu12 * ply.e2 / ply.e1
+    e1, e2 = ply.e1 / (1.0 - ply.nu12 * nu21), ply.e2 / (1.0 - ply.nu12 * nu21)
+    stiffness_ = np.zeros_like(directions)
+    for low, high, angle in zip(faces, faces[1:], angles, strict=False):
+        c, s = np.cos(directions - np.deg2rad(angle)), np.sin(directions - np.deg2rad(angle))
+        mixed = ply.nu12 * e2 + 2.0 * ply.g12
+        along = e1 * c**4 + 2.0 * mixed * c**2 * s**2 + e2 * s**4
+        stiffness_ += along * (high**3 - low**3) / 3.0
+    return float(np.mean(stiffness_**-0.5) ** -2.0)
+
+
 # Expected values ---------------------------------------------------------------------------------
 
 
@@ -344,6 +363,8 @@ REPORT = Ply(0.000148, 0.3, 17.5e6, 1.15e6, 0.8e6, 0.8e6, 0.8e6)
 PAGANO = Ply(1.0, 0.25, 25.0, 1.0, 0.5, 0.5, 0.2)
 UNIT = Ply(1.0, 0.3, 1.0, 1.0, 1.0 / 2.6, 1.0 / 2.6, 1.0 / 2.6)
 CROSS = bending_and_shear(REPORT, 5 * (0.0, 90.0) + 5 * (90.0, 0.0), 0.106)
+REPORT_HALF = 2 * (0.0, 45.0, 0.0, -45.0, 0.0)
+REPORT_RIGIDITY = mean_rigidity(REPORT, REPORT_HALF + REPORT_HALF[::-1], 0.106)
 BAR_SPEED = math.sqrt(30.0e6 / 7.33e-4)
 # Impulse of the pulse: the area of the Gaussian without its tail before t = 0.
 IMPULSE = 1000.0 * 40e-6 * math.sqrt(math.pi) * (1.0 + math.erf(2.5))
@@ -404,7 +425,10 @@ EXPECTED: dict[str, Sequence[float | None]] = {
     "identification": (1.0e6, 100.0),
     "contact-coefficient": (1.0 / (1.0 - 0.3**2), None, None),
     "ply-shear": (-PARABOLA, -0.75 * PARABOLA, -0.9375 * PARABOLA, 0.0),
-    "threshold": (math.sqrt(8.0 * math.pi**2 * 60e3 * 2.0**3 * 0.8 / (9.0 * 0.91)), None),
+    "threshold": (
+        math.sqrt(8.0 * math.pi**2 * 60e3 * 2.0**3 * 0.8 / (9.0 * 0.91)),
+        *[math.pi * math.sqrt(32.0 * REPORT_RIGIDITY * 2.9 / 3.0)] * 2,
+    ),
     # Timoshenko and Woinowsky-Krieger, equation 147: w D/(F a²) of a simply supported square.
     "large-mass": (240e9 * 0.004**3 / (12.0 * 0.91) / (0.0116008395 * 0.2**2), None),
 }  # fmt: skip

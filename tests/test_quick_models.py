@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from scipy.special import ellipk
 
 import fecm
 from fecm.api import load_deck
 from fecm.deck.records import Ply
-from fecm.mechanics.laminate import SMALL_MASS, effective_rigidity, laminate, threshold_force
+from fecm.mechanics.laminate import (
+    SMALL_MASS,
+    Laminate,
+    effective_rigidity,
+    laminate,
+    threshold_force,
+)
+from fecm.problem.check_plausibility import wave_impedance
 from fecm.results.result import Result
+from fecm.results.summary import summary
 from fecm.studies.estimate import (
     contact_time,
     inelasticity,
@@ -24,7 +36,7 @@ from fecm.studies.estimate import (
 )
 from fecm.verification.decks import result_of
 from fecm.verification.plates import struck_square
-from tests.builders import report_plate, table
+from tests.builders import REPORT_ANGLES, report_plate, table
 from tests.calls import call
 from tests.decks import small
 
@@ -48,9 +60,56 @@ def test_one_delamination_of_an_isotropic_plate_is_davies_and_robinsons() -> Non
     assert threshold_force(rigidity, G) == pytest.approx(expected, rel=1e-12)
 
 
-def test_the_effective_rigidity_of_the_reports_plate_is_olssons() -> None:
-    (row,) = (row for row in THRESHOLDS if row["case"].startswith("report"))
-    assert effective_rigidity(report_plate()) == pytest.approx(float(row["D*"]), rel=1e-7)
+@pytest.mark.parametrize("row", [row for row in THRESHOLDS if row["D11"]], ids=lambda r: r["case"])
+def test_the_effective_rigidity_is_near_olssons_for_orthotropic_laminates(
+    row: dict[str, str],
+) -> None:
+    d11, d12, d22, d66 = (float(row[name]) for name in ("D11", "D12", "D22", "D66"))
+    found = effective_rigidity(with_stiffness([[d11, d12, 0.0], [d12, d22, 0.0], [0.0, 0.0, d66]]))
+    assert found == pytest.approx(float(row["D*"]), rel=0.01)
+    assert found >= float(row["D*"]) * (1.0 - 1e-7)  # an arithmetic-geometric mean's lower bound
+
+
+def with_stiffness(D: Sequence[Sequence[float]]) -> Laminate:
+    """A plate with this bending stiffness."""
+    return replace(report_plate(), B=np.zeros((3, 3)), D=np.array(D))
+
+
+@pytest.mark.parametrize("ratio", [1.0, 1.001, 15.0, 300.0, 1e6])
+@pytest.mark.parametrize("shear", [1e-3, 0.3, 1.0, 30.0])
+def test_the_effective_rigidity_is_the_elliptic_integral_of_orthotropic_plates(
+    ratio: float, shear: float
+) -> None:
+    D = np.array([[ratio, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, shear * math.sqrt(ratio)]])
+    # D(theta) = D22 (t^2 + a)(t^2 + b)/(1 + t^2)^2 with t = tan(theta), a and b maybe conjugate.
+    a, b = np.roots([1.0, 2.0 * (D[0, 1] + 2.0 * D[2, 2]), ratio]) * -1.0
+    middle, product = (np.sqrt(a) + np.sqrt(b)).real / 2.0, ratio**0.25
+    m = 1.0 - (min(middle, product) / max(middle, product)) ** 2
+    expected = (math.pi * max(middle, product) / (2.0 * ellipk(m))) ** 2
+    assert effective_rigidity(with_stiffness(D)) == pytest.approx(expected, rel=1e-12)
+
+
+ANGLES = {
+    "[0]16": [0.0] * 16,
+    "[0/90]4s": 4 * [0.0, 90.0] + 4 * [90.0, 0.0],
+    "quasi-isotropic": 2 * [45.0, 0.0, -45.0, 90.0] + 2 * [90.0, -45.0, 0.0, 45.0],
+    "unsymmetric": [0.0, 30.0, 30.0, 75.0, -20.0],
+}
+
+
+@pytest.mark.parametrize("turn", [22.5, 37.0, 45.0, 90.0, -71.0])
+@pytest.mark.parametrize("layup", ANGLES)
+def test_the_effective_rigidity_does_not_depend_on_the_axes(layup: str, turn: float) -> None:
+    ply, angles = Ply(1.0, 0.3, 141e3, 9.75e3, 5.2e3, 5.2e3, 3.2e3), ANGLES[layup]
+    thick = [4.0 / len(angles)] * len(angles)
+    turned = effective_rigidity(laminate(ply, [angle + turn for angle in angles], thick))
+    assert turned == pytest.approx(effective_rigidity(laminate(ply, angles, thick)), rel=1e-12)
+
+
+def test_wave_impedance_of_the_time_step_check_does_not_depend_on_the_axes() -> None:
+    ply = Ply(1.0, 0.3, 141e3, 9.75e3, 5.2e3, 5.2e3, 3.2e3)
+    along, across = (wave_impedance(laminate(ply, [angle], [4.0])) for angle in (0.0, 45.0))
+    assert across == pytest.approx(along, rel=1e-12)
 
 
 def test_an_unsymmetric_laminate_is_softer_than_its_d() -> None:
@@ -169,6 +228,47 @@ def test_a_run_stores_the_threshold_and_its_first_crossing(tmp_path: Path) -> No
 @pytest.mark.parametrize("card", ["0.,", "-1.,", "1.,0.5", "1.,2.5", "1.,-1."])
 def test_toughness_and_number_of_delaminations_are_checked(card: str) -> None:
     assert "E457" in [finding.code for finding in load_deck(with_threshold(card)).errors()]
+
+
+def test_the_threshold_is_printed_with_the_number_of_delaminations_it_assumes() -> None:
+    found = run_one(with_threshold("1.0E-3,7."))
+    values = found.threshold
+    assert (values["number"], values["interfaces"]) == (7, 1)
+    assert list(values["band"]) == pytest.approx([values["force"] * math.sqrt(3.0)] * 2, rel=1e-12)
+    (line,) = [line for line in summary(found) if line.startswith("delamination")]
+    assert line.endswith(f"(for 7 delaminations; {values['band'][1]:.6g} with 1)")
+
+
+def test_the_band_ends_with_a_delamination_in_each_interface_of_unlike_plies() -> None:
+    # [0/45/0/-45/0]2s: like plies meet in the middle and between its groups.
+    layers = sum(a != b for a, b in pairwise(REPORT_ANGLES))
+    assert layers == report_plate().unlike_interfaces == 16
+    deck = fecm.examples.path("drop-weight.inp")  # [45/0/-45/90]3s
+    threshold = load_deck(deck).problems[0].threshold
+    assert threshold is not None
+    assert threshold.interfaces == 22
+    assert threshold.band[0] / threshold.force == pytest.approx(math.sqrt(3.0 / 24.0), rel=1e-12)
+    assert threshold.band[1] == threshold.force
+
+
+def test_plies_that_differ_by_half_a_turn_are_alike() -> None:
+    ply = Ply(1.0, 0.3, 20.0, 1.0, 0.5, 0.5, 0.5)
+    assert laminate(ply, [90.0, -90.0, 0.0, 180.0, 45.0], [0.1] * 5).unlike_interfaces == 2
+
+
+@pytest.mark.parametrize(("angles", "warns"), [((0.0, 90.0, 90.0, 0.0), False), ((45.0,), True)])
+def test_a_laminate_whose_bending_twists_it_is_named_beside_its_threshold(
+    angles: Sequence[float], warns: bool
+) -> None:
+    ply = "1.6e-9,.3,141e3,9.75e3,5.2e3,5.2e3,3.2e3"
+    layup = "[" + "/".join(f"{angle:g}" for angle in angles) + "]"
+    made = call(
+        "new", "-", "--size", "100x80", "--mesh", "2x2", "--layup", layup, "--ply-thickness", ".5",
+        "--ply", ply, "--velocity", "2000", "--law", "5e4,0,0,1.5", "--projectile", "mass:1e-3",
+        "--duration", "1e-5", "--patch", "disc:2",
+    )  # fmt: skip
+    deck = load_deck(made.stdout.replace("EXPE", "DELA\n0.5\nEXPE"))
+    assert ("W461" in [finding.code for finding in deck.findings]) is warns
 
 
 def test_more_delaminations_lower_the_threshold() -> None:

@@ -380,6 +380,10 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
         changed(laminates, "threshold_force", lambda force: force / 12.0**0.5),
         {"threshold": ("",)},
     ),
+    "Olsson's D* in the delamination threshold": (
+        instead(laminates, "_agm", lambda right, a, b: (a * b) ** 0.5),
+        {"threshold": ("the report", "the same")},
+    ),
     "a tenth of the plate's inertia missing in Zener's parameter": (
         instead(estimate, "infinite_plate", lambda right, *a: right(*a[:-1], a[-1] / 0.9**0.5)),
         {"small-mass": ("F T", "t_peak")},

@@ -36,9 +36,11 @@ KEYS = ELASTIC | {
     "G13": MODULUS, "G23": MODULUS, "nu23": "",
     "XT": MODULUS, "XC": MODULUS, "YT": MODULUS, "YC": MODULUS, "S12": MODULUS,
     "S13": MODULUS, "S23": MODULUS,
+    "p_plus": "", "p_minus": "",
     "GIc": TOUGHNESS, "GIIc": TOUGHNESS, "thickness": "length",
 }  # fmt: skip
 TEXTS = ("source", "assumed", "units")
+SLOPES = ("p_plus", "p_minus")  # Puck's; those of carbon fibres where a ply does not give them
 STRENGTHS = ("XT", "XC", "YT", "YC", "S12")
 SYSTEM_OF_FILES = "mm-N-s"
 NU23 = 0.4
@@ -85,7 +87,8 @@ class NamedPly:
             return None
         s13 = self.value("S13", system) or s12
         s23 = self.value("S23", system) or s13
-        return Allowables(xt=xt, xc=xc, yt=yt, yc=yc, s12=s12, s13=s13, s23=s23)
+        slopes = {key: self.values[key] for key in SLOPES if key in self.values}
+        return Allowables(xt=xt, xc=xc, yt=yt, yc=yc, s12=s12, s13=s13, s23=s23, **slopes)
 
     def delamination(self, system: str) -> Delamination | None:
         """Toughness G_IIc in a system of units; None if it is not known."""
@@ -124,6 +127,8 @@ def _ply(name: str, table: dict[str, Any]) -> NamedPly:
         elif not math.isfinite(value) or (KEYS[key] and value <= 0.0):
             hint = "; compressive strengths are positive too" if key in ("XC", "YC") else ""
             raise ValueError(f"[{name}] {key}: {value:g} is not a positive number{hint}")
+        elif key in SLOPES and not 0.0 < value < 1.0:
+            raise ValueError(f"[{name}] {key}: {value:g} is not between 0 and 1")
     system = table["units"]
     if system not in SYSTEMS:
         raise ValueError(f"[{name}] units: {system!r} is none of {', '.join(SYSTEMS)}")

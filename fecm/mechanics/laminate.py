@@ -70,6 +70,12 @@ class Laminate:
     plies: Plies
 
     @property
+    def unlike_interfaces(self) -> int:
+        """Number of interfaces between plies of different fibre angle, which can delaminate."""
+        turns = np.diff(self.plies.angles) % 180.0
+        return int(np.count_nonzero(turns))
+
+    @property
     def is_coupled(self) -> bool:
         """Whether stretching and bending are coupled (B is not zero beyond rounding)."""
         scale = np.abs(self.A).max() * self.thickness
@@ -162,16 +168,38 @@ SMALL_MASS = 1.213
 
 
 def effective_rigidity(laminate: Laminate) -> float:
-    """Bending stiffness D* of the isotropic plate of equal threshold (force*length).
+    """Bending stiffness D* of the isotropic plate of equal response to a point force.
 
-    sqrt(D11 D22 (eta + 1)/2) with eta = (D12 + 2 D66)/sqrt(D11 D22), Olsson 1992; an unsymmetric
-    laminate has D - B A^-1 B for D.
+    D* = [mean over theta of D(theta)^(-1/2)]^(-2), force*length, where D(theta) is D11 in axes
+    turned by theta; a coupled laminate has D - B A^-1 B for D.  It is that of the infinite plate
+    whose point moves at the same velocity under the same force, and does not depend on the axes.
+
+    With t = tan(theta) the mean is the integral of 1/(pi sqrt(q)) over all t, where q(t) is a
+    quartic with two pairs of conjugate roots.  This elliptic integral is an arithmetic-geometric
+    mean of two lengths made of the roots.  For orthotropic axes the geometric mean of the same two
+    gives Olsson's sqrt(D11 D22 (eta + 1)/2), 1992, with eta = (D12 + 2 D66)/sqrt(D11 D22).
+
+    NaN if the stiffness is not finite.
     """
     A, B, D = laminate.A, laminate.B, laminate.D
     if laminate.is_coupled:
         D = D - B @ np.linalg.solve(A, B)
-    mean = math.sqrt(D[0, 0] * D[1, 1])
-    return mean * math.sqrt(((D[0, 1] + 2.0 * D[2, 2]) / mean + 1.0) / 2.0)
+    mean, scale = np.sqrt(D[0, 0] * D[1, 1]), (D[0, 0] / D[1, 1]) ** 0.25
+    # q(scale t)/D11, whose roots have a product of 1.
+    twist = 2.0 * (D[0, 1] + 2.0 * D[2, 2]) / mean
+    quartic = [1.0, 4.0 * D[1, 2] * scale / mean, twist, 4.0 * D[0, 2] / scale / mean, 1.0]
+    if not np.isfinite(quartic).all():
+        return math.nan
+    one, other = sorted(np.roots(quartic), key=lambda root: root.imag)[2:]
+    distance = abs(one - other.conjugate()) / 2.0
+    return float(mean) * _agm(distance, math.sqrt(one.imag * other.imag)) ** 2
+
+
+def _agm(a: float, b: float) -> float:
+    """Arithmetic-geometric mean of two positive numbers."""
+    while abs(a - b) > 1e-15 * a:
+        a, b = (a + b) / 2.0, math.sqrt(a * b)
+    return a
 
 
 def threshold_force(rigidity: float, toughness: float, delaminations: int = 1) -> float:

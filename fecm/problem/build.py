@@ -81,10 +81,13 @@ class RunOptions:
 
 
 class Threshold(NamedTuple):
-    """Force at which delaminations grow, and the laminate's effective rigidity D*."""
+    """Force at which delaminations grow, and what it is computed from."""
 
     force: float
-    rigidity: float
+    rigidity: float  # effective rigidity D*, force*length
+    number: int  # delaminations of `force`
+    interfaces: int  # between plies of different angle: the largest possible number
+    band: tuple[float, float]  # forces for a delamination in each of them, and for a single one
 
 
 @frozen
@@ -212,8 +215,12 @@ class Problem:
         """Delamination threshold; None without a DELA segment."""
         if (card := self.deck.last(model.Delamination)) is None:
             return None
-        rigidity = effective_rigidity(self.laminate)
-        return Threshold(threshold_force(rigidity, card.toughness, int(card.number)), rigidity)
+        rigidity, interfaces = effective_rigidity(self.laminate), self.laminate.unlike_interfaces
+        number = int(card.number)
+        force, least, largest = (
+            threshold_force(rigidity, card.toughness, n) for n in (number, max(1, interfaces), 1)
+        )
+        return Threshold(force, rigidity, number, interfaces, (least, largest))
 
     @property
     def damping(self) -> float:

@@ -15,7 +15,7 @@ from fecm._frozen import frozen
 from fecm.deck import model
 from fecm.deck.findings import Findings
 from fecm.deck.units import MASS, in_si, unit_names
-from fecm.mechanics.laminate import Laminate
+from fecm.mechanics.laminate import Laminate, effective_rigidity
 from fecm.mechanics.mesh import Mesh, distinct
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError
 from fecm.mechanics.projectile import RigidMass, Rod
@@ -284,15 +284,8 @@ CLAMPED = 1.0 / (64.0 * 0.0056)
 
 
 def wave_impedance(laminate: Laminate) -> float:
-    """Force over velocity of a point of an infinite plate, 8 (m D*)^(1/2) (force*time/length).
-
-    D* is the effective bending stiffness of an orthotropic plate: R. Olsson, Impact response of
-    orthotropic composite plates predicted from a one-parameter differential equation, AIAA Journal
-    30 (1992) 1587-1596.
-    """
-    D = laminate.D
-    mean = math.sqrt(D[0, 0] * D[1, 1])
-    return 8.0 * math.sqrt(laminate.mass * (mean + D[0, 1] + 2.0 * D[2, 2]) / 2.0)
+    """Force over velocity of a point of an infinite plate, 8 (m D*)^(1/2) (force*time/length)."""
+    return 8.0 * math.sqrt(laminate.mass * effective_rigidity(laminate))
 
 
 def expected_peak(deck: model.Deck, plate: PlateModel) -> float:

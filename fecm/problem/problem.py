@@ -37,6 +37,7 @@ SINGLE: tuple[type[model.Segment], ...] = (
     *ALWAYS, *IN_AN_IMPACT, model.Projectile, model.Shear, model.Patch, model.Gages, model.Units,
     model.Allowables, model.Delamination, model.Damping,
 )  # fmt: skip
+MOST_TWIST = 0.1  # largest |D16| and |D26|, over (D11 D22)^(1/2), without a warning of DELA
 
 
 def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) -> Problem | None:
@@ -78,10 +79,7 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
                 mesh.forces[:, W] += patch.load * checked.patch.weights
     if sound():
         with np.errstate(all="ignore"):  # numbers out of range end in a finding
-            delamination = deck.last(model.Delamination)
-            if delamination is not None and checked.laminate.is_coupled:
-                message = "B is not zero: the delamination threshold takes D - B A^-1 B for D."
-                findings.add("W458", message, delamination.place())
+            _check_threshold(checked, findings)
             check_time_step(checked, findings)
             check_program(checked, findings)
             check_plausibility.check_purpose(deck, mesh, findings)
@@ -107,6 +105,25 @@ def check_values(problem: Problem, findings: Findings) -> None:
     check_gages.check_gage_places(problem, findings)
     if problem.has_impact:
         check_contact.check_contact(problem, findings)
+
+
+def _check_threshold(problem: Problem, findings: Findings) -> None:
+    """Warn of laminates to which the threshold of an isotropic plate is only an approximation."""
+    delamination, laminate = problem.deck.last(model.Delamination), problem.laminate
+    if delamination is None:
+        return
+    if laminate.is_coupled:
+        message = "B is not zero: the delamination threshold takes D - B A^-1 B for D."
+        findings.add("W458", message, delamination.place())
+    D = laminate.D
+    twist = float(np.abs(D[:2, 2]).max() / np.sqrt(D[0, 0] * D[1, 1]))
+    if twist > MOST_TWIST:
+        message = (
+            f"Bending twists the plate: D16 or D26 is {twist:.2g} (D11 D22)^(1/2). The delamination "
+            "threshold is that of an isotropic plate with the mean stiffness D*."
+        )
+        hint = "threshold and D* do not depend on the axes; how delaminations grow does"
+        findings.add("W461", message, delamination.place(), hint)
 
 
 def _element_errors(findings: Findings) -> int:

@@ -175,7 +175,11 @@ class Result(schema.Contact):
 
     @property
     def threshold(self) -> Mapping[str, Any]:
-        """Delamination threshold of DELA: force, d_star, time, margin; empty without it."""
+        """Delamination threshold of DELA; empty without it.
+
+        `force` of `number` delaminations, `d_star`, `time` of the first crossing, `margin` of the
+        peak, and `band`: forces of one in each of the `interfaces` of unlike plies, and of one.
+        """
         return self._groups.get("threshold", {})
 
     @property

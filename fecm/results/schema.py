@@ -418,7 +418,10 @@ GROUPS: dict[str, tuple[type[Group], str, str]] = {
     "patch": (PatchGroup, "nodal weights of the contact force", ""),
     "plies": (PlyRows, "stresses ply by ply, stored by PLYS", "PLYS"),
     "threshold": (
-        Group, "delamination threshold: force, time of its first crossing, margin of the peak", ""
+        Group,
+        "delamination threshold: force of `number` delaminations, time of its first crossing, margin "
+        "of the peak; band: forces of a delamination in each interface of unlike plies, and of one",
+        "",
     ),
     "failure": (Failure, "largest exposures over time, found by FAIL", "FAIL"),
     "reactions": (Reactions, "forces of the supports, stored by REAC", "REAC"),

@@ -45,6 +45,7 @@ def summary(result: Result) -> list[str]:
         missed = f"not reached: the peak is {float(known['margin']):.1%} below"
         reached = f"reached at time {quantity(crossing, 'time')}"
         lines.append(f"delamination      {force} {missed if math.isnan(crossing) else reached}")
+        lines[-1] += _delaminations(result)
     lines += [exposure.line(result) for exposure in largest_exposures(result)]
     if "failure/x" in result and (count := np.count_nonzero(result["failure/under_load"])):
         lines.append(f"under the load    {count} points are left out of these exposures")
@@ -54,6 +55,20 @@ def summary(result: Result) -> list[str]:
         more = f" and {len(found) - LISTED} more" if len(found) > LISTED else ""
         lines.append(f"frequencies       {texts}{more} {result.unit('1/time')}".rstrip())
     return lines or ["nothing was stored"]
+
+
+def _delaminations(result: Result) -> str:
+    """How many delaminations the threshold assumes, and the forces for other numbers of them."""
+    known = result.threshold
+    if "band" not in known:  # a result of an older version
+        return ""
+    number, interfaces = int(known["number"]), int(known["interfaces"])
+    least, most = (_quantity(result, float(force), "force") for force in known["band"])
+    others = {1: most, max(1, interfaces): least}
+    others.pop(number, None)
+    count = "one delamination" if number == 1 else f"{number} delaminations"
+    texts = [f"{force} with {n}" for n, force in others.items()]
+    return f" (for {'; '.join([count, *texts])})"
 
 
 @frozen

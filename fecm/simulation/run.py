@@ -132,6 +132,8 @@ def _write_footer(simulation: Simulation) -> None:
         values = {
             "force": threshold.force, "d_star": threshold.rigidity, "time": state.monitor.crossing,
             "margin": 1.0 - state.monitor.peak_force / threshold.force,
+            "number": threshold.number, "interfaces": threshold.interfaces,
+            "band": np.array(threshold.band),
         }  # fmt: skip
         simulation.sink.attributes("threshold", values)
     impact, system = state.impact, simulation.model.impact

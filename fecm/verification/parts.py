@@ -105,7 +105,12 @@ def _internal_force() -> Sequence[Value]:
 
 @case
 def _threshold() -> Sequence[Value]:
-    plates = ((laminate(isotropic(60e3, 0.3, 1.0), [0.0], [2.0]), 0.8), (report_laminate(), 2.9))
+    turned = [angle + 37.0 for angle in REPORT_ANGLES]
+    plates = (
+        (laminate(isotropic(60e3, 0.3, 1.0), [0.0], [2.0]), 0.8),
+        (report_laminate(), 2.9),
+        (laminate(REPORT_PLY, turned, [REPORT_THICKNESS] * len(turned)), 2.9),
+    )
     return [threshold_force(effective_rigidity(plate), toughness) for plate, toughness in plates]
 
 
