@@ -17,6 +17,8 @@ from fecm.deck.records import RodDiameter
 from fecm.mechanics import contact_law
 from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
+from fecm.mechanics.exposures import OutsideLoad
+from fecm.mechanics.failure import CRITERIA
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.impact_steps import ImpactSteps, supports
 from fecm.mechanics.kernels import LIBRARY
@@ -249,7 +251,10 @@ class Problem:
             "REAC": work.passes["REAC"] * field,
             "EIGE": work.passes["EIGE"] * field,
             "PLYS": work.passes["PLYS"] * plies,
-            "FAIL": min(1, work.passes["FAIL"]) * 9 * points * layers * 2,  # both faces of a ply
+            "FAIL": (
+                min(1, work.passes["FAIL"]) * 9 * points * layers * 2  # both faces of a ply
+                + work.passes["FAIL"] * len(CRITERIA) * 5
+            ),
             "RODP": work.contact_rows * (points * 5 + 8) + history,
         }
         return {word: 8 * count for word, count in numbers.items()}
@@ -276,6 +281,7 @@ class ImpactModel:
     patch: ContactPatch | None
     plies: PlyStresses | None  # elements whose ply stresses are stored; None without PLYS
     failure: FailureMonitor | None  # failure criteria; None without FAIL
+    outside: OutsideLoad | None  # where their exposures count; None without FAIL
     # (numel, points): where plate theory does not hold; None without PLYS and FAIL.
     under_load: Bools | None
 
@@ -414,10 +420,11 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         steps = ImpactSteps(impact, sums, station.dof, workers.count)
     strains = plate.strain_field(plate.rules.strains, CompiledStrains if compiled else StrainField)
     under_load = places and problem.under_load(*places)
+    outside = OutsideLoad(under_load, *places) if failure and under_load is not None else None
     return ImpactModel(
         plate=plate, motion=motion, impact=impact, steps=steps, station=station, strains=strains,
         stress_points=stress_points, gages=read, patch=problem.patch, plies=plies,
-        failure=failure, under_load=under_load,
+        failure=failure, outside=outside, under_load=under_load,
     )  # fmt: skip
 
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from fecm.deck.findings import Finding
     from fecm.plot.pictures import RunKind
+    from fecm.results.first_failure import FirstFailure
     from fecm.results.hdf5_reader import Contents
     from fecm.results.plies import Plies
     from fecm.studies.comparison import Comparison
@@ -112,6 +113,7 @@ class Result(schema.Contact):
     stresses: schema.Stresses
     patch: schema.PatchGroup
     failure: schema.Failure
+    exposures: schema.Exposures
     reactions: schema.Reactions
     modes: schema.Modes
 
@@ -181,6 +183,16 @@ class Result(schema.Contact):
         peak, and `band`: forces of one in each of the `interfaces` of unlike plies, and of one.
         """
         return self._groups.get("threshold", {})
+
+    @property
+    def first_failures(self) -> list[FirstFailure]:
+        """When each criterion of FAIL first reaches an exposure of 1, the earliest first.
+
+        Empty without FAIL, or if all exposures stay below 1.
+        """
+        from fecm.results.first_failure import first_failures
+
+        return first_failures(self)
 
     @property
     def metrics(self) -> dict[str, float]:

@@ -19,6 +19,7 @@ from fecm._frozen import frozen
 from fecm._tables import html_table
 from fecm._typing import Array, Floats
 from fecm.deck.records import AXES, DOF_NAMES
+from fecm.mechanics.failure import CRITERIA
 
 Ints = NDArray[np.int64]
 Int32s = NDArray[np.int32]
@@ -384,6 +385,18 @@ class Failure(Group):
 INTERLAMINAR = "failure/interlaminar"
 
 
+class Exposures(Rows):
+    """Largest exposure so far of each criterion outside the load, at every evaluation of FAIL."""
+
+    exposure: Annotated[Floats, "rows criteria", "largest exposure so far, outside the load"]
+    mode: Annotated[Int8s, "rows criteria", "its mode: index into the attribute modes of failure"]
+    ply: Annotated[
+        Int32s, "rows criteria", "its ply, from 1 at z = -h/2; of an interface the one above it"
+    ]
+    x: Annotated[Floats, "rows criteria", "x of its place", "length"]
+    y: Annotated[Floats, "rows criteria", "y of its place", "length"]
+
+
 class Reactions(Rows):
     """Forces of the supports, stored by REAC."""
 
@@ -424,6 +437,9 @@ GROUPS: dict[str, tuple[type[Group], str, str]] = {
         "",
     ),
     "failure": (Failure, "largest exposures over time, found by FAIL", "FAIL"),
+    "exposures": (
+        Exposures, "largest exposures so far outside the load, at every evaluation of FAIL", "FAIL"
+    ),
     "reactions": (Reactions, "forces of the supports, stored by REAC", "REAC"),
     "modes": (Modes, "natural modes, found by EIGE", "EIGE"),
 }  # fmt: skip
@@ -454,7 +470,7 @@ def _datasets(group: str, kind: type[Group], outer: str = "") -> Iterator[Datase
 
 DATASETS = {d.path: d for name, (kind, _, _) in GROUPS.items() for d in _datasets(name, kind)}
 
-FIXED = {"faces": 2, "levels": 3, "directions": 2}  # sizes of axes that every result has
+FIXED = {"faces": 2, "levels": 3, "directions": 2, "criteria": len(CRITERIA) + 1}  # sizes of axes that every result has
 # Dimension scales: name and description by size.
 SCALES = {
     "numnp": ("node", "number of the node"),
@@ -472,6 +488,7 @@ SCALES = {
     "faces": ("face", "face of the ply: 1 at its lower z, 2 at its upper z"),
     "levels": ("level", "level in the ply: 1 at its lower z, 2 at its middle, 3 at its upper z"),
     "directions": ("direction", "1 is xz, 2 is yz"),
+    "criteria": ("criterion", "name of the failure criterion"),
     "gages": ("gage", "position of the gage among the gages, from 1"),
     "cases": ("case", "number of the case, from 0"),
     "steps": ("step", "number of time steps taken"),
@@ -486,6 +503,7 @@ FROM_0 = ("cases", "combinations")
 AXIS_NAMES: dict[str | int, tuple[str, ...]] = {
     "ndf": DOF_NAMES,
     "ndm": AXES,
+    "criteria": (*CRITERIA, "interlaminar"),
     "statistics": ("draws", "mean", "standard_deviation", "1 %", "5 %", "50 %", "95 %", "99 %"),
     "bounds": ("lower", "upper"),
 }

@@ -12,6 +12,12 @@ import numpy as np
 from fecm._frozen import frozen
 from fecm.deck.units import quantity as shown_quantity
 from fecm.mechanics.failure import CRITERIA
+from fecm.results.first_failure import (
+    evaluations_in_contact,
+    failure_metrics,
+    first_failures,
+    where,
+)
 from fecm.results.result import Result
 from fecm.results.schema import DATASETS, GROUPS, ResultFileError, row_blocks
 
@@ -46,7 +52,7 @@ def summary(result: Result) -> list[str]:
         reached = f"reached at time {quantity(crossing, 'time')}"
         lines.append(f"delamination      {force} {missed if math.isnan(crossing) else reached}")
         lines[-1] += _delaminations(result)
-    lines += [exposure.line(result) for exposure in largest_exposures(result)]
+    lines += _exposures(result)
     if "failure/x" in result and (count := np.count_nonzero(result["failure/under_load"])):
         lines.append(f"under the load    {count} points are left out of these exposures")
     if "modes/angular_frequency" in result:
@@ -71,6 +77,36 @@ def _delaminations(result: Result) -> str:
     return f" (for {'; '.join([count, *texts])})"
 
 
+def _exposures(result: Result) -> list[str]:
+    """Lines about the largest exposures and the first failure."""
+    quantity = partial(_quantity, result)
+    largest, first = largest_exposures(result), first_failures(result)
+    reached = {one.criterion: one.force for one in first if not math.isnan(one.force)}
+    lines = []
+    for exposure in largest:
+        force = reached.get(exposure.criterion)
+        known = "" if force is None else f"; 1 at {_rounded(result, force, 'force')}"
+        lines.append(f"{exposure.line(result)}{known}")
+    count = evaluations_in_contact(result)
+    if count is not None and "history/force" in result:
+        lines.append(f"evaluations       {count} of FAIL during contact")
+    if first:
+        one, rounded = first[0], partial(_rounded, result)
+        texts = [
+            f"{one.mode} ({one.criterion.replace('_', ' ')})",
+            f"{one.where} at ({one.x:.6g}, {one.y:.6g})",
+            f"time {rounded(one.time, 'time')}, between {one.earliest:.4g} and {one.latest:.4g}",
+        ]
+        if one.criterion in reached:
+            texts.append(f"force {rounded(one.force, 'force')}")
+            texts.append(f"energy {rounded(one.energy, 'force*length')}")
+        lines.append(f"first failure     {', '.join(texts)}")
+    elif largest and count:
+        ends = " by the end of the run, which is in contact: open"
+        lines.append(f"first failure     none{ends if result.still_in_contact else ''}")
+    return lines
+
+
 @frozen
 class LargestExposure:
     """Largest exposure of a criterion outside the elements under the load."""
@@ -91,9 +127,9 @@ class LargestExposure:
 
     def line(self, result: Result) -> str:
         """One line of the summary."""
-        where = f"{'interface of ' if self.criterion == 'interlaminar' else ''}{self.plies}"
+        place = where(self.criterion, self.ply)
         return (
-            f"{self.criterion.replace('_', ' '):18}{self.exposure:.4g}: {self.mode}, {where} at "
+            f"{self.criterion.replace('_', ' '):18}{self.exposure:.4g}: {self.mode}, {place} at "
             f"({self.x:.6g}, {self.y:.6g}), time {_quantity(result, self.time, 'time')}"
         )
 
@@ -124,6 +160,11 @@ def largest_exposures(result: Result) -> list[LargestExposure]:
         where = int(ply) + 1, float(x[at].mean()), float(y[at].mean())
         found.append(LargestExposure(name, float(exposure[place]), mode, *where, time))
     return found
+
+
+def _rounded(result: Result, value: float, dimension: str) -> str:
+    """An interpolated quantity, to four digits."""
+    return _quantity(result, float(f"{value:.4g}"), dimension)
 
 
 def _quantity(result: Result, value: float, dimension: str) -> str:
@@ -237,9 +278,15 @@ def about_run(result: Result) -> dict[str, Any]:
         "time": result["history/time"][[0, -1]].tolist() if steps else None,
         "still_in_contact": result.still_in_contact,
         "notes": list(result.notes),
-        "metrics": {} if missing else result.metrics,
+        "metrics": {} if missing else _metrics(result),
         "summary": missing or summary(result),
     }
+
+
+def _metrics(result: Result) -> dict[str, Any]:
+    """Impact metrics, and those of FAIL under ``failure``."""
+    failure = failure_metrics(result)
+    return {**result.metrics, "failure": failure} if failure else result.metrics
 
 
 def _missing(result: Result) -> list[str]:

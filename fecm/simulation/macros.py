@@ -195,11 +195,12 @@ def _store_ply_stresses(run: Simulation, steps: Steps, times: Times, fields: Flo
             run.recorder.row("plies", step, time, run.model.plies.evaluate(field))
 
 
-def _evaluate_failure(run: Simulation, _: Steps, times: Times, fields: Floats) -> None:
-    envelope, monitor = run.state.failure, run.model.failure
-    if envelope is not None and monitor is not None:
-        for time, field in zip(times, fields, strict=True):
+def _evaluate_failure(run: Simulation, steps: Steps, times: Times, fields: Floats) -> None:
+    envelope, monitor, outside = run.state.failure, run.model.failure, run.model.outside
+    if envelope is not None and monitor is not None and outside is not None:
+        for step, time, field in zip(steps, times, fields, strict=True):
             monitor.update(envelope, field, time)
+            run.recorder.row("exposures", step, time, outside.largest(envelope))
 
 
 # What is done with displacement fields, (rows, numnp, 5), at every N-th step of RODP or pass.

@@ -26,7 +26,7 @@ from fecm.results.sinks import RowBuffer, Sink
 Steps = Sequence[int]  # of rows
 Times = Sequence[float]
 FAILURE = ("failure", INTERLAMINAR, *(f"failure/{name}" for name in CRITERIA))
-AT_MACROS = ("tape3", "tape8", "stresses", "plies", "reactions", "modes")
+AT_MACROS = ("tape3", "tape8", "stresses", "plies", "exposures", "reactions", "modes")
 EVERY_STEP = ("energy", "history", "gages")
 BLOCK = 1024
 SCALARS = (

@@ -21,6 +21,7 @@ from fecm.problem.build import ImpactModel, RunOptions
 from fecm.problem.check_plausibility import contact_step
 from fecm.problem.problem import Problem
 from fecm.problem.slips import mode_of
+from fecm.results.first_failure import FEWEST, count_evaluations
 from fecm.results.result import Result
 from fecm.results.schema import FORMAT, FORMAT_VERSION, row_blocks
 from fecm.results.sinks import Sink
@@ -136,6 +137,9 @@ def _write_footer(simulation: Simulation) -> None:
             "band": np.array(threshold.band),
         }  # fmt: skip
         simulation.sink.attributes("threshold", values)
+    if state.failure is not None:
+        count = count_evaluations(Result(simulation.sink.arrays, {}, {}))
+        simulation.sink.attributes("failure", {"evaluations_in_contact": count})
     impact, system = state.impact, simulation.model.impact
     if impact is not None and system is not None and impact.plate.step:
         permanent = system.law.permanent(impact.memory, impact.contact)
@@ -158,6 +162,8 @@ def _judge(simulation: Simulation) -> None:
     groups: dict[str, dict[str, Any]] = {"": units, "failure": {"modes": list(MODES)}}
     result = Result(simulation.sink.arrays, {}, groups)
     notes += _warnings(simulation, result)
+    if state.failure is not None:
+        notes += _few_evaluations(result)
     if result.still_in_contact:
         notes.append(OPEN_END)
     if notes:
@@ -196,6 +202,17 @@ def _warnings(simulation: Simulation, result: Result) -> list[str]:
             "softening that follows the first failure"
         )
     return found
+
+
+def _few_evaluations(result: Result) -> list[str]:
+    """Warn of contacts in which FAIL is evaluated so rarely that maxima are missed."""
+    count = count_evaluations(result)
+    if "history/force" not in result or count >= FEWEST or not result["history/force"].any():
+        return []
+    return [
+        f"FAIL was evaluated {count} times during contact, less than {FEWEST}: larger exposures and "
+        "the first failure may be missed; evaluate more often, within the loop of the steps"
+    ]
 
 
 def _rigid_deflections(mesh: Mesh) -> Floats:
