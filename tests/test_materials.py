@@ -135,3 +135,28 @@ def test_a_file_that_cannot_be_meant_is_refused_with_the_place(
 
 def test_the_nearest_names_are_shown_for_an_unknown_one() -> None:
     assert "did you mean IM7/8552" in new("--material", "IM7-8552").stderr
+
+
+# Puck, Kopp and Knops, Compos. Sci. Technol. 62 (2002) 371-378.
+@pytest.mark.parametrize(
+    ("name", "slopes"),
+    [
+        ("IM7/8552", (0.35, 0.30)), ("T300/5208", (0.35, 0.30)),
+        ("E-glass/LY556", (0.30, 0.25)), ("E-glass/MY750", (0.30, 0.25)),
+        ("S2-glass/epoxy", (0.30, 0.25)), ("Scotchply-1002", (0.30, 0.25)),
+    ],
+)  # fmt: skip
+def test_pucks_slopes_are_those_of_the_fibre(name: str, slopes: tuple[float, float]) -> None:
+    for units in SYSTEMS:
+        card = deck_of("--material", name, "--damage", "--units", units).require(Allowables)
+        assert (card.p_plus, card.p_minus) == slopes
+
+
+def test_a_users_ply_has_its_own_slopes(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    strengths = "XT=2e3\nXC=1e3\nYT=50\nYC=200\nS12=80\n"
+    file.write_text(f"{OWN}{strengths}p_plus=0.27\n")
+    card = deck_of("--material", "mine", "--materials", file, "--damage").require(Allowables)
+    assert (card.p_plus, card.p_minus) == (0.27, 0.30)
+    file.write_text(f"{OWN}p_plus=1.0\n")
+    assert "[mine] p_plus: 1 is not between 0 and 1" in call("materials", file).stderr

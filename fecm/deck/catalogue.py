@@ -40,7 +40,7 @@ KEYS = ELASTIC | {
     "GIc": TOUGHNESS, "GIIc": TOUGHNESS, "thickness": "length",
 }  # fmt: skip
 TEXTS = ("source", "assumed", "units")
-SLOPES = ("p_plus", "p_minus")  # Puck's; those of carbon fibres where a ply does not give them
+SLOPES = ("p_plus", "p_minus")  # of Puck's criterion
 STRENGTHS = ("XT", "XC", "YT", "YC", "S12")
 SYSTEM_OF_FILES = "mm-N-s"
 NU23 = 0.4
@@ -87,8 +87,11 @@ class NamedPly:
             return None
         s13 = self.value("S13", system) or s12
         s23 = self.value("S23", system) or s13
-        slopes = {key: self.values[key] for key in SLOPES if key in self.values}
-        return Allowables(xt=xt, xc=xc, yt=yt, yc=yc, s12=s12, s13=s13, s23=s23, **slopes)
+        plus = self.values.get("p_plus", Allowables.p_plus)
+        minus = self.values.get("p_minus", Allowables.p_minus)
+        return Allowables(
+            xt=xt, xc=xc, yt=yt, yc=yc, s12=s12, s13=s13, s23=s23, p_plus=plus, p_minus=minus
+        )
 
     def delamination(self, system: str) -> Delamination | None:
         """Toughness G_IIc in a system of units; None if it is not known."""

@@ -1,6 +1,9 @@
-"""Where exposures count: outside the load, near which plate theory does not hold."""
+"""Largest exposures outside the load, near which plate theory does not hold."""
 
 from __future__ import annotations
+
+import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,6 +11,20 @@ from fecm._frozen import frozen
 from fecm._typing import Array, Bools, Floats
 from fecm.mechanics.failure import CRITERIA
 from fecm.mechanics.ply_stresses import FailureEnvelope
+
+
+class Largest(NamedTuple):
+    """Largest exposure of a criterion so far."""
+
+    exposure: float
+    mode: int  # index into :data:`~fecm.mechanics.failure.MODES`
+    ply: int  # from 1 at z = -h/2; of an interface the one above it
+    # Place; of an interface the mean of its element's points.
+    x: float
+    y: float
+
+
+NONE = Largest(math.nan, 0, 0, math.nan, math.nan)
 
 
 @frozen
@@ -20,47 +37,38 @@ class OutsideLoad:
     y: Floats
 
     def largest(self, envelope: FailureEnvelope) -> dict[str, Array]:
-        """Largest exposure so far of every criterion, and its mode, ply and place, (criteria,) each.
-
-        Plies count from 1; that of an interface is the one above it, and its place the mean of the
-        element's points.  Without any exposure it is NaN, and the ply 0.
-        """
+        """Fields of :class:`Largest`, (criteria,) each; the last criterion is the interlaminar."""
         found = [*self._of_plies(envelope), self._of_interfaces(envelope)]
-        names = ("exposure", "mode", "ply", "x", "y")
-        return {name: np.array(values) for name, values in zip(names, zip(*found), strict=True)}
+        return {name: np.array([getattr(one, name) for one in found]) for name in Largest._fields}
 
-    def _of_plies(self, envelope: FailureEnvelope) -> list[tuple[float, int, int, float, float]]:
-        """Exposure, mode, ply, x and y of each criterion."""
-        near, states = self.near.ravel(), envelope.plies
-        exposures = states.exposure.reshape(len(CRITERIA), near.size, -1)
-        # Hidden for the search: it takes a fraction of the time of one in a copy.
-        hidden = exposures[:, near]
-        exposures[:, near] = -1.0
-        places = states.exposure.argmax(axis=1)
+    def _of_plies(self, envelope: FailureEnvelope) -> list[Largest]:
+        """Of each criterion of the plies."""
+        near, plies = self.near.ravel(), envelope.plies
+        if near.all():
+            return [NONE] * len(CRITERIA)
+        at_points = plies.exposure.reshape(len(CRITERIA), near.size, -1)
+        # Points under the load are hidden for the search, which is much faster than one in a copy.
+        hidden = at_points[:, near]
+        at_points[:, near] = -1.0
+        states = plies.exposure.argmax(axis=1)
+        at_points[:, near] = hidden
         found = []
-        for number, place in enumerate(places.tolist()):
-            point, state = divmod(place, exposures.shape[2])
-            values = float(states.exposure[number, place]), int(states.mode[number, place])
-            found.append(self._found(*values, state // 2 + 1, self.x.flat[point], self.y.flat[point]))
-        exposures[:, near] = hidden
+        for number, state in enumerate(states.tolist()):
+            point, ply_and_face = divmod(state, at_points.shape[2])
+            exposure, mode = float(plies.exposure[number, state]), int(plies.mode[number, state])
+            place = float(self.x.flat[point]), float(self.y.flat[point])
+            found.append(Largest(exposure, mode, ply_and_face // 2 + 1, *place))
         return found
 
-    def _of_interfaces(self, envelope: FailureEnvelope) -> tuple[float, int, int, float, float]:
-        """The same of the interlaminar criterion."""
+    def _of_interfaces(self, envelope: FailureEnvelope) -> Largest:
+        """Of the interlaminar criterion."""
         exposure = envelope.interfaces.exposure
-        counts = ~self.near.any(axis=1)[:, None] & np.isfinite(exposure)
+        counts = np.isfinite(exposure)
+        counts[self.near.any(axis=1)] = False
         if not counts.any():
-            return self._found(-1.0, 0, 0, 0.0, 0.0)
-        element, interface = np.unravel_index(np.where(counts, exposure, -1.0).argmax(), counts.shape)
-        mode = int(envelope.interfaces.mode[element, interface])
-        x, y = self.x[element].mean(), self.y[element].mean()
-        return self._found(float(exposure[element, interface]), mode, int(interface) + 1, x, y)
-
-    @staticmethod
-    def _found(
-        exposure: float, mode: int, ply: int, x: float, y: float
-    ) -> tuple[float, int, int, float, float]:
-        """The values, or those of no exposure if it is negative."""
-        if exposure < 0.0:
-            return float("nan"), 0, 0, float("nan"), float("nan")
-        return exposure, mode, ply, float(x), float(y)
+            return NONE
+        place = np.unravel_index(np.where(counts, exposure, -1.0).argmax(), counts.shape)
+        element, interface = (int(index) for index in place)
+        mode = int(envelope.interfaces.mode[place])
+        x, y = float(self.x[element].mean()), float(self.y[element].mean())
+        return Largest(float(exposure[place]), mode, interface + 1, x, y)

@@ -419,8 +419,10 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         sums = None if read is None else motion.dof_sums(read.dof_indices, read.weights)
         steps = ImpactSteps(impact, sums, station.dof, workers.count)
     strains = plate.strain_field(plate.rules.strains, CompiledStrains if compiled else StrainField)
-    under_load = places and problem.under_load(*places)
-    outside = OutsideLoad(under_load, *places) if failure and under_load is not None else None
+    under_load = outside = None
+    if places is not None:
+        under_load = problem.under_load(*places)
+        outside = OutsideLoad(under_load, *places) if failure else None
     return ImpactModel(
         plate=plate, motion=motion, impact=impact, steps=steps, station=station, strains=strains,
         stress_points=stress_points, gages=read, patch=problem.patch, plies=plies,

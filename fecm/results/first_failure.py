@@ -51,7 +51,9 @@ class FirstFailure:
 
 def where(criterion: str, ply: int) -> str:
     """A ply, or of the interlaminar criterion an interface, in words."""
-    return f"interface of plies {ply} and {ply + 1}" if criterion == "interlaminar" else f"ply {ply}"
+    return (
+        f"interface of plies {ply} and {ply + 1}" if criterion == "interlaminar" else f"ply {ply}"
+    )
 
 
 def first_failures(result: Result, level: float = 1.0) -> list[FirstFailure]:
@@ -73,9 +75,7 @@ def first_failures(result: Result, level: float = 1.0) -> list[FirstFailure]:
         before, below = (times[row - 1], exposure[row - 1, number]) if row else (0.0, 0.0)
         share = (level - below) / (exposure[row, number] - below)
         time = float(before + share * (times[row] - before))
-        mode, ply, x, y = (
-            result[f"exposures/{name}"][row, number].item() for name in COLUMNS[1:]
-        )
+        mode, ply, x, y = (result[f"exposures/{name}"][row, number].item() for name in COLUMNS[1:])
         at_time = (float(np.interp(time, clock, values)) for values in (force, work))
         span = float(before), float(times[row])
         name = modes.get(mode, "unknown")

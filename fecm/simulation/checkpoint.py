@@ -29,7 +29,7 @@ from fecm.results.hdf5_writer import FileSink
 from fecm.results.schema import DATASETS
 from fecm.simulation.simulation import Simulation
 
-FORMAT = 4
+FORMAT = 5
 SOLVER = "another solver"
 CHUNK = 1_000_000  # bytes read at once when a spool is checked
 

@@ -1,0 +1,164 @@
+"""FAIL: when each criterion first reaches 1, at what force and energy, and how often it is judged."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm.api import load_deck
+from fecm.deck.model import Allowables
+from fecm.mechanics.failure import CRITERIA, exposure_of
+from fecm.mechanics.ply_stresses import PlyStresses
+from fecm.results.first_failure import evaluations_in_contact, first_failures
+from fecm.results.result import Result
+from tests.calls import call
+from tests.decks import DISC, PROGRAM, small
+from tests.test_machines import validate
+
+STEPS = 60
+WEAK = "ALLO\n5000.,5000.,150.,700.,300.,25.\n\nEXPE"
+
+
+def failing(every: int = 1, allowables: str = WEAK, steps: int = STEPS) -> str:
+    """The small plate hit off its middle, whose displacements are stored at every step."""
+    program = PROGRAM.replace("LOOP         10", f"LOOP{steps:11}")
+    program = program.replace("DISP          5", f"DISP          1\nFAIL{every:11}")
+    return small(program).replace("EXPE", f"{DISC}{allowables}", 1)
+
+
+def run(text: str, **options: object) -> Result:
+    found = fecm.run(text, **options)  # type: ignore[arg-type]
+    assert isinstance(found, Result)
+    return found
+
+
+@pytest.fixture(scope="module")
+def every_step() -> Result:
+    return run(failing())
+
+
+def histories(found: Result) -> dict[str, np.ndarray]:
+    """Largest exposure outside the load at every stored row, from the ply stresses."""
+    (problem,) = load_deck(failing()).problems
+    stresses = PlyStresses(problem.mesh, problem.laminate, problem.rules[2])
+    card = problem.deck.require(Allowables)
+    outside = found["failure/under_load"] == 0
+    rows = [stresses.evaluate(field) for field in found["tape3/displacement"]]
+    return {
+        name: np.array([
+            exposure_of(criterion(card, row["sigma_1"], row["sigma_2"], row["tau_12"]))[outside]
+            .max()
+            for row in rows
+        ])
+        for name, criterion in CRITERIA.items()
+    }  # fmt: skip
+
+
+def test_first_failures_are_the_first_crossings_of_the_stresses(every_step: Result) -> None:
+    found = {one.criterion: one for one in every_step.first_failures}
+    times = every_step["tape3/time"]
+    expected = histories(every_step)
+    assert {*CRITERIA} <= {*found}
+    for name, exposures in expected.items():
+        so_far = np.maximum.accumulate(exposures)
+        row = int(np.argmax(so_far >= 1.0))
+        assert 0 < row < len(times) - 1
+        one = found[name]
+        assert (one.earliest, one.latest) == (times[row - 1], times[row])
+        assert one.time == pytest.approx(np.interp(1.0, so_far, times), rel=1e-12)
+        assert one.force == pytest.approx(np.interp(one.time, every_step.time, every_step.force))
+    assert every_step.first_failures == sorted(found.values(), key=lambda one: one.time)
+
+
+def test_the_energy_of_the_first_failure_is_what_the_projectile_has_lost(
+    every_step: Result,
+) -> None:
+    left = every_step["energy/projectile_kinetic"] + every_step["energy/projectile_strain"]
+    initial = every_step.energy.attributes["initial"]
+    for one in every_step.first_failures:
+        lost = np.interp(one.time, every_step.time, initial - left)
+        assert one.energy == pytest.approx(lost, rel=2e-3)
+
+
+def test_place_ply_and_mode_are_those_of_the_state_that_reaches_1(every_step: Result) -> None:
+    (one,) = (one for one in every_step.first_failures if one.criterion == "max_stress")
+    until = int(np.searchsorted(every_step["tape3/time"], one.latest)) + 1
+    cut = run(failing(steps=until))
+    exposure = cut["failure/max_stress/exposure"].copy()
+    exposure[cut["failure/under_load"] != 0] = 0.0
+    element, point, ply, face = np.unravel_index(exposure.argmax(), exposure.shape)
+    modes = cut.failure.attributes["modes"]
+    assert one.ply == ply + 1
+    assert one.mode == modes[cut["failure/max_stress/mode"][element, point, ply, face]]
+    places = [cut[f"failure/{axis}"][element, point] for axis in "xy"]
+    assert [one.x, one.y] == pytest.approx(places, rel=1e-12)
+
+
+def test_rare_evaluations_bracket_the_first_failure_and_are_counted(every_step: Result) -> None:
+    rare = run(failing(every=7))
+    assert evaluations_in_contact(rare) == np.count_nonzero(rare.force[6::7] > 0.0) < 20
+    assert any(f"evaluated {STEPS // 7} times during contact" in note for note in rare.notes)
+    assert evaluations_in_contact(every_step) == np.count_nonzero(every_step.force > 0.0)
+    assert not any("evaluated" in note for note in every_step.notes)
+    exact = {one.criterion: one for one in every_step.first_failures}
+    for one in first_failures(rare):
+        assert one.earliest <= exact[one.criterion].latest
+        assert exact[one.criterion].earliest <= one.latest
+        assert one.latest - one.earliest <= 7 * 0.5e-6 * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("where", ["interval", "outside"])
+def test_fail_that_is_never_evaluated_in_contact_is_told(tmp_path: Path, where: str) -> None:
+    text = failing(every=9000)
+    if where == "outside":
+        text = text.replace("FAIL       9000\n", "").replace("LOOP", "FAIL\nLOOP")
+    (tmp_path / "d.inp").write_text(text)
+    done = call("run", "d.inp", cwd=tmp_path)
+    assert "note: FAIL was evaluated 0 times during contact, less than 20" in done.stderr
+    assert "evaluations       0 of FAIL during contact" in done.stdout
+    assert "first failure" not in done.stdout
+    assert run(text).first_failures == []
+
+
+def test_numpy_and_the_kernels_find_the_same_first_failures(every_step: Result) -> None:
+    other = run(failing(), solver="numpy")
+    assert [one.criterion for one in other.first_failures] == [
+        one.criterion for one in every_step.first_failures
+    ]
+    for one, same in zip(every_step.first_failures, other.first_failures, strict=True):
+        assert (one.mode, one.ply, one.x, one.y) == (same.mode, same.ply, same.x, same.y)
+        assert one.time == pytest.approx(same.time, rel=1e-9)
+
+
+def test_summary_and_json_have_the_first_failure(tmp_path: Path, every_step: Result) -> None:
+    (tmp_path / "d.inp").write_text(failing())
+    done = call("run", "d.inp", cwd=tmp_path)
+    first = every_step.first_failures[0]
+    (line,) = (line for line in done.stdout.splitlines() if "first failure" in line)
+    for words in (
+        f"{first.mode} ({first.criterion})",
+        f"ply {first.ply} at ({first.x:.6g}, {first.y:.6g})",
+        f"time {float(f'{first.time:.4g}'):.6g}",
+        f"force {float(f'{first.force:.4g}'):.6g}",
+    ):
+        assert words in line
+    for command in (("run", "d.inp", "--overwrite"), ("info", "d.h5")):
+        output = call(*command, "--format", "json", cwd=tmp_path).stdout
+        validate(command[0], output)
+        given = json.loads(output)
+        failure = given.get("run", given)["metrics"]["failure"]
+        assert failure["evaluations_in_contact"] == evaluations_in_contact(every_step)
+        assert failure["first"][0] == vars(first)
+        assert failure["largest"]["puck"] == every_step["exposures/exposure"][-1, 3]
+
+
+def test_exposures_below_1_have_no_first_failure(tmp_path: Path) -> None:
+    strong = "ALLO\n1e9,1e9,1e9,1e9,1e9\n\nEXPE"
+    (tmp_path / "d.inp").write_text(failing(allowables=strong))
+    done = call("run", "d.inp", cwd=tmp_path)
+    assert "first failure     none by the end of the run, which is in contact: open" in done.stdout
+    assert fecm.load(tmp_path / "d.h5").first_failures == []
