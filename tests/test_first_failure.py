@@ -1,4 +1,4 @@
-"""FAIL: when each criterion first reaches 1, at what force and energy, and how often it is judged."""
+"""FAIL: when, and at what force and energy, each criterion first reaches 1."""
 
 from __future__ import annotations
 

@@ -119,8 +119,8 @@ def _check_threshold(problem: Problem, findings: Findings) -> None:
     twist = float(np.abs(D[:2, 2]).max() / np.sqrt(D[0, 0] * D[1, 1]))
     if twist > MOST_TWIST:
         message = (
-            f"Bending twists the plate: D16 or D26 is {twist:.2g} (D11 D22)^(1/2). The threshold is "
-            "that of an isotropic plate with the mean stiffness D*."
+            f"Bending twists the plate: D16 or D26 is {twist:.2g} (D11 D22)^(1/2). The threshold "
+            "is that of an isotropic plate with the mean stiffness D*."
         )
         hint = "threshold and D* do not depend on the axes; how delaminations grow does"
         findings.add("W461", message, delamination.place(), hint)

@@ -79,7 +79,6 @@ def _delaminations(result: Result) -> str:
 
 def _exposures(result: Result) -> list[str]:
     """Lines about the largest exposures and the first failure."""
-    quantity = partial(_quantity, result)
     largest, first = largest_exposures(result), first_failures(result)
     reached = {one.criterion: one.force for one in first if not math.isnan(one.force)}
     lines = []

@@ -210,8 +210,8 @@ def _few_evaluations(result: Result) -> list[str]:
     if "history/force" not in result or count >= FEWEST or not result["history/force"].any():
         return []
     return [
-        f"FAIL was evaluated {count} times during contact, less than {FEWEST}: larger exposures and "
-        "the first failure may be missed; evaluate more often, within the loop of the steps"
+        f"FAIL was evaluated {count} times during contact, less than {FEWEST}: larger exposures "
+        "and the first failure may be missed; evaluate more often, in the loop of the steps"
     ]
 
 
