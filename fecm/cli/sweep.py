@@ -65,8 +65,9 @@ NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
              "threshold, that of DELA.  May be repeated.")  # fmt: skip
 @option("--find", type=click.Choice(["velocity"]),
         help="Search in every case for the velocity at which --until holds.")  # fmt: skip
-@option("--until", type=Parsed(inputs.parse_until, "peak_force=VALUE"),
-        help="Peak force to reach: a number, or threshold, that of DELA.")  # fmt: skip
+@option("--until", type=Parsed(inputs.parse_until, "QUANTITY=VALUE"),
+        help="What to reach: peak_force=NUMBER, peak_force=threshold (that of DELA), or "
+             "exposure=NUMBER, the largest of FAIL outside the load, by full runs.")  # fmt: skip
 @option("-o", "--output", type=FILE_PATH, metavar="SWEEP.h5",
         help="Result file.  [default: the deck's name with -sweep.h5, in this folder]")  # fmt: skip
 @option("--history", is_flag=True, help="Also store the contact force of every step.")
@@ -87,7 +88,7 @@ def sweep(
     deck: Path, varied: tuple[tuple[str, list[inputs.Value]], ...], table: Path | None,
     factors: tuple[int, ...] | None, laws: tuple[tuple[str, inputs.Law], ...],
     samples: int | None, seed: int | None, kind: inputs.DesignKind | None, sensitivity: bool,
-    limits: tuple[inputs.Limit, ...], find: str | None, until: float | str | None,
+    limits: tuple[inputs.Limit, ...], find: str | None, until: inputs.Until | None,
     output: Path | None, history: bool, extra: tuple[str, ...], full: tuple[int, ...] | None,
     workers: int, scheduler: str | None, scheduler_file: Path | None, allow_failed: bool,
     overwrite: bool,
@@ -115,7 +116,7 @@ def sweep(
     if len(dict(laws)) < len(laws):
         raise click.UsageError("--random: a name is given twice")
     if (find is None) != (until is None):
-        raise click.UsageError("--find velocity and --until peak_force=VALUE belong together")
+        raise click.UsageError("--find velocity and --until QUANTITY=VALUE belong together")
     if (workers > 1) + (scheduler is not None) + (scheduler_file is not None) > 1:
         raise click.UsageError("give only one of --workers, --scheduler and --scheduler-file")
     if full and find:

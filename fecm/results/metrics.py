@@ -42,7 +42,7 @@ METRICS = {
 }
 # Those of a search for velocities, and all of a sweep.
 FOUND = {
-    "found_velocity": ("velocity at which the peak force reaches the value", "length/time"),
+    "found_velocity": ("velocity at which the value searched for is reached", "length/time"),
     "found_energy": ("kinetic energy of the projectile at that velocity", "force*length"),
 }
 # Those of a sweep that are measured on request; and the place that is hit instead of the one given.
@@ -50,8 +50,9 @@ EXPOSURES = {
     f"exposure_{name}": (f"largest exposure {name.replace('_', ' ')} outside the load", "")
     for name in (*CRITERIA, "interlaminar")
 }
+EVALUATIONS = {"fail_evaluations": ("evaluations of FAIL during contact", "")}
 HIT = {f"hit_{axis}": (f"{axis} of the impact node or of the patch", "length") for axis in "xy"}
-COLUMNS = {**METRICS, **FOUND, **EXPOSURES, **HIT}
+COLUMNS = {**METRICS, **FOUND, **EXPOSURES, **EVALUATIONS, **HIT}
 GAGE = "gage_"
 INTEGERS = ("contacts",)
 

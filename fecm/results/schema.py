@@ -432,8 +432,8 @@ GROUPS: dict[str, tuple[type[Group], str, str]] = {
     "plies": (PlyRows, "stresses ply by ply, stored by PLYS", "PLYS"),
     "threshold": (
         Group,
-        "delamination threshold: force of `number` delaminations, its first crossing, margin of the "
-        "peak; band: forces of one delamination in each interface of unlike plies, and of one alone",
+        "delamination threshold: force of `number` delaminations, first crossing, margin of the "
+        "peak; band: forces of one delamination in each of the `interfaces`, and of a single one",
         "",
     ),
     "failure": (Failure, "largest exposures over time, found by FAIL", "FAIL"),

@@ -140,7 +140,7 @@ def sweep(
     design: DesignKind = "lhs",
     sensitivity: bool = False,
     exceed: Mapping[str, float | Literal["threshold"] | Sequence[float]] | None = None,
-    until: float | Literal["threshold"] | None = None,
+    until: float | Literal["threshold"] | Mapping[str, float | str] | None = None,
     history: bool = False,
     build: Build | None = None,
     measure: Measure | str | Sequence[str] | None = None,
@@ -181,9 +181,11 @@ def sweep(
     exceed : mapping of str to float, str or sequence of float, optional
         Limits of quantities, whose probability of exceedance is estimated; ``"threshold"`` for
         the peak force: the delamination threshold.
-    until : float or str, optional
+    until : float, str or mapping of str to float, optional
         Search in every case for the velocity at which the peak force reaches this value;
-        ``"threshold"``: the delamination threshold.  Without `vary` and `cases`, of the deck alone.
+        ``"threshold"``: the delamination threshold.  ``{"exposure": 1.0}``: at which the largest
+        exposure of FAIL outside the load reaches 1, by some six full runs.  Without `vary` and
+        `cases`, of the deck alone.
     history : bool
         Store the contact force of every step.
     build : callable, optional

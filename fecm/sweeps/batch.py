@@ -30,13 +30,14 @@ from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import build_law, build_model, build_projectile
 from fecm.problem.check_segments import check_impact, check_law, check_projectile
 from fecm.problem.problem import Problem, check_program
-from fecm.results.metrics import GAGE, HIT, Indentation, summarise
+from fecm.results.first_failure import count_evaluations
+from fecm.results.metrics import EVALUATIONS, GAGE, HIT, Indentation, summarise
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.results.summary import largest_exposures
 from fecm.simulation.run import ENERGY_WARNING, simulate
-from fecm.sweeps import plan
-from fecm.sweeps.cases import THRESHOLD, Case, CasesError, Value, name_fault, plate_values
+from fecm.sweeps import find_exposure, plan
+from fecm.sweeps.cases import EXPOSURE, THRESHOLD, Case, CasesError, Value, name_fault, plate_values
 from fecm.sweeps.plan import RUN, Outcome, merge, outcome_of
 from fecm.sweeps.responses import Hits, impacts, largest_sums, plate_response
 from fecm.sweeps.vary import Clock, apply_case, check_deck, raise_first, with_time_step
@@ -100,10 +101,19 @@ def _in_full(task: plan.Task, number: int, case: Case) -> Outcome:
             (checked,) = built(task.build, case).problems
             if unit_names(checked.deck) != unit_names(task.deck):
                 raise CasesError("build: the units of the deck are not those of the other cases")
-        outcome = _alone(number, checked, task.extra, task.measure, case)
+        if task.sought == EXPOSURE and task.until is not None:
+            runs = partial(_with_deck, number, checked, task.extra)
+            outcome = find_exposure.found(number, checked.deck, float(task.until), runs)
+        else:
+            outcome = _alone(number, checked, task.extra, task.measure, case)
         return _with_hit(outcome, checked, {} if task.build else case)
     except CasesError as error:
         return Outcome.failed({number: str(error)})
+
+
+def _with_deck(number: int, checked: Problem, extra: Sequence[str], deck: Deck) -> Outcome:
+    """Run another deck of the same plate in full."""
+    return _alone(number, replace(checked, deck=deck), extra)
 
 
 def _with_hit(outcome: Outcome, checked: Problem, case: Case) -> Outcome:
@@ -302,6 +312,8 @@ def _extra(extra: Sequence[str], result: Result) -> dict[str, NDArray[Any]]:
     for one in largest_exposures(result) if plan.FAILURE in extra else ():
         last = np.array([one.exposure if one.time >= result["history/time"][-1] else 0.0])
         found[f"exposure_{one.criterion}"] = _known(np.array([one.exposure]), last, force)
+    if plan.FAILURE in extra:
+        found |= {name: np.array([float(count_evaluations(result))]) for name in EVALUATIONS}
     return found
 
 

@@ -23,6 +23,8 @@ from fecm.studies.tables import read_rows
 Value = float | int | str
 Case = dict[str, Value]
 THRESHOLD = "threshold"  # instead of a number: the delamination threshold
+PEAK_FORCE, EXPOSURE = SOUGHT = ("peak_force", "exposure")  # quantities of a search
+Until = float | str | Mapping[str, float | str]  # what a search reaches; see sought_of
 Limit = tuple[str, float | str]  # of a quantity whose probability of exceedance is asked for
 
 # Names that change the projectile, its velocity or the contact law; where the force acts, which
@@ -104,12 +106,23 @@ def _points(numbers: Sequence[str]) -> list[str]:
     raise CasesError(f"at has two numbers a point; write at={example}")
 
 
-def parse_until(text: str) -> float | str:
-    """Read ``peak_force=NUMBER`` or ``peak_force=threshold``; CasesError if it is neither."""
+def parse_until(text: str) -> Until:
+    """Read ``peak_force=VALUE`` or ``exposure=NUMBER``; CasesError if it is neither."""
     name, _, value = (part.strip() for part in text.partition("="))
-    if name != "peak_force" or not value:
-        raise CasesError(f"`{text}`: write peak_force=NUMBER or peak_force={THRESHOLD}")
-    return parse_exceed(text)[1]
+    if name not in SOUGHT or not value:
+        forms = f"peak_force=NUMBER or peak_force={THRESHOLD}, or exposure=NUMBER"
+        raise CasesError(f"`{text}`: write {forms}")
+    return {name: parse_exceed(text)[1]}
+
+
+def sought_of(until: Until | None) -> tuple[str, float | str | None]:
+    """Quantity and value of a search; a value alone is a peak force, None no search."""
+    if not isinstance(until, Mapping):
+        return PEAK_FORCE, until
+    if len(until) != 1 or not {*until} <= {*SOUGHT}:
+        example = '{"exposure": 1.0}'
+        raise CasesError(f"until is {until!r}; write a number, {THRESHOLD!r} or {example}")
+    return next(iter(until.items()))
 
 
 def parse_exceed(text: str) -> Limit:

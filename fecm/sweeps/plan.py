@@ -26,7 +26,18 @@ from fecm.results.metrics import COLUMNS, FOUND, GAGE, SUMMARY
 from fecm.results.metrics import THRESHOLD as LIMITED
 from fecm.results.result import Result
 from fecm.sweeps import cases as inputs
-from fecm.sweeps.cases import REFINE, THRESHOLD, Case, CasesError, Design, Limit, plate_values
+from fecm.sweeps.cases import (
+    EXPOSURE,
+    PEAK_FORCE,
+    REFINE,
+    THRESHOLD,
+    Case,
+    CasesError,
+    Design,
+    Limit,
+    Until,
+    plate_values,
+)
 from fecm.sweeps.vary import Clock, apply_case, check_deck, clock_of
 
 Build = Callable[[dict[str, Any]], Deck]
@@ -53,7 +64,8 @@ class Plan:
     cases: tuple[Case, ...]  # values of every case
     history: bool = False  # whether contact forces are stored
     clock: Clock | None = None  # None if the deck's time step applies to every plate
-    until: float | str | None = None  # peak force whose velocity is searched, or "threshold"
+    until: float | str | None = None  # value whose velocity is searched, or "threshold"
+    sought: str = PEAK_FORCE  # quantity of this value
     build: Build | None = None  # makes the deck of a case; `deck` is that of one of the cases
     measure: Measure | None = None  # computes more columns from the result of a case
     extra: tuple[str, ...] = ()  # more columns, of :data:`MEASURES`
@@ -94,7 +106,7 @@ def plan(
     cases: Sequence[Case],
     *,
     history: bool = False,
-    until: float | str | None = None,
+    until: Until | None = None,
     build: Build | None = None,
     measure: Measure | None = None,
     extra: Sequence[str] = (),
@@ -106,10 +118,12 @@ def plan(
     Raises CasesError if the deck has no impact, names exclude each other, or the deck lacks what is
     searched or measured.
     """
-    deck = checked.deck
+    deck, (sought, value) = checked.deck, inputs.sought_of(until)
+    if sought == EXPOSURE:
+        extra = (*extra, FAILURE)
     made = Plan(
-        deck, tuple(cases), history=history, until=until, build=build, measure=measure,
-        extra=tuple(extra), design=design, limits=tuple(limits),
+        deck, tuple(cases), history=history, until=value, sought=sought, build=build,
+        measure=measure, extra=tuple(extra), design=design, limits=tuple(limits),
     )  # fmt: skip
     words = {macro.word for macro in deck.macros}
     if "RODP" not in words:
@@ -123,17 +137,18 @@ def plan(
     if FAILURE in extra and "FAIL" not in words:
         raise CasesError("measure failure: the program of the deck has no FAIL; add it to the loop")
     limited = deck.last(Delamination) is not None
-    if until is not None:
-        if made.alone:
+    if value is not None:
+        if made.alone and not (sought == EXPOSURE and build is None and measure is None):
             raise CasesError("until can't be given together with build, measure or failure")
         if not {"velocity", "energy"}.isdisjoint(cases[0]):
             raise CasesError("velocity is what is searched; it can't be varied as well")
         if not deck.require(Impact).velocity:
             raise CasesError("the search begins at the velocity of ROD, which must not be 0")
-        if until == THRESHOLD and not limited:
+        if value == THRESHOLD and not limited:
             raise CasesError("the threshold needs a DELA segment, which the deck does not have")
-        if until != THRESHOLD and not (isinstance(until, float | int) and 0.0 < until < math.inf):
-            raise CasesError(f"the peak force to reach is a positive number, not {until}")
+        if value != THRESHOLD and not (isinstance(value, float | int) and 0.0 < value < math.inf):
+            name = sought.replace("_", " ")
+            raise CasesError(f"the {name} to reach is a positive number, not {value}")
     if measure is None:
         known = [*SUMMARY, *(FOUND if until is not None else ())]
         if extra:

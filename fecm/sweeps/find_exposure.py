@@ -1,0 +1,81 @@
+"""Search for the velocity at which the largest exposure of a case reaches a value."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from fecm.deck.model import Deck, Impact
+from fecm.problem.build import build_projectile
+from fecm.results.first_failure import FEWEST
+from fecm.results.metrics import EVALUATIONS, EXPOSURES
+from fecm.sweeps.cases import CasesError
+from fecm.sweeps.plan import RUN, Outcome
+from fecm.sweeps.vary import apply_case
+
+RANGE = 100.0  # of velocities relative to the deck's
+ERROR = 1e-5  # largest relative excess of the exposure found
+MOST = 40  # runs of a case; a smooth dependence takes about six
+(COUNTED,) = EVALUATIONS
+
+
+def found(number: int, deck: Deck, level: float, run: Callable[[Deck], Outcome]) -> Outcome:
+    """Run a case at the velocity at which its largest exposure outside the load reaches a level.
+
+    Every trial is a full run, as exposures need the whole plate.  Raises CasesError with the reason
+    if no velocity is found.
+    """
+    outcomes: dict[float, Outcome] = {}
+
+    def exposure(velocity: float) -> float:
+        outcome = outcomes[velocity] = run(apply_case(deck, {"velocity": velocity}))
+        if outcome.status[0] not in RUN:
+            raise CasesError(f"at velocity {velocity:.6g}: {outcome.status[0]}")
+        if (count := int(outcome.columns[COUNTED][0])) < FEWEST:
+            why = f"FAIL was evaluated {count} times during contact, less than {FEWEST}"
+            raise CasesError(f"at velocity {velocity:.6g}: {why}")
+        values = [outcome.columns[name][0] for name in EXPOSURES if name in outcome.columns]
+        if not values or np.isnan(values).any():
+            raise CasesError(f"at velocity {velocity:.6g} the run ends before its largest exposure")
+        return float(max(values))
+
+    velocity = search(deck.require(Impact).velocity, level, exposure)
+    outcome, mass = outcomes[velocity], build_projectile(deck).total_mass
+    values = {"found_velocity": velocity, "found_energy": 0.5 * mass * velocity**2}
+    outcome.columns |= {name: np.array([value]) for name, value in values.items()}
+    return outcome
+
+
+def search(start: float, level: float, exposure: Callable[[float], float]) -> float:
+    """Find a velocity at which an exposure is at the level, or above it by at most :data:`ERROR`.
+
+    Secants in the logarithms, as the exposure is almost a power of the velocity; a bracket guards
+    them once it is known.  Raises CasesError if there is none within 1/100 to 100 times the start.
+    """
+    least, most = math.log(start / RANGE), math.log(start * RANGE)
+    low, high = -math.inf, math.inf  # bracket
+    x, slope, last = math.log(start), 1.0, None
+    for _ in range(MOST):
+        velocity = math.exp(x)
+        found = exposure(velocity)
+        if not found > 0.0:
+            raise CasesError(f"there is no exposure at velocity {velocity:.6g}")
+        y = math.log(found / level)
+        if 0.0 <= y <= ERROR:
+            return velocity
+        if x <= least and y > 0.0:
+            raise CasesError(f"the exposure is above {level:.6g} from velocity {velocity:.6g} on")
+        if x >= most and y < 0.0:
+            raise CasesError(f"the exposure is below {level:.6g} up to velocity {velocity:.6g}")
+        low, high = (x, high) if y < 0.0 else (low, x)
+        if last is not None and (y - last[1]) / (x - last[0]) > 0.0:
+            slope = (y - last[1]) / (x - last[0])
+        last = x, y
+        x = min(max(x - (y - ERROR / 2.0) / slope, least), most)
+        if not low < x < high:
+            x = (low + high) / 2.0
+        if x in (low, high):
+            break
+    raise CasesError(f"no exposure of {level:.6g}: it jumps at velocity {math.exp(x):.6g}")

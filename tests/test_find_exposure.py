@@ -1,0 +1,112 @@
+"""fecm sweep --until exposure=VALUE: velocities at which the largest exposure reaches a value."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm.results.metrics import EXPOSURES
+from fecm.sweeps.cases import CasesError
+from fecm.sweeps.find_exposure import ERROR, search
+from tests.calls import assert_unusable, call
+from tests.decks import DATA_CARDS, small
+from tests.test_first_failure import failing, run
+
+# The projectile has left the plate.
+DECK = failing(every=4, steps=400)
+
+
+@pytest.mark.parametrize(("factor", "power"), [(0.5, 1.2), (3.0, 0.9), (0.1, 1.0)])
+def test_the_velocity_of_a_power_law_is_found_in_a_few_runs(factor: float, power: float) -> None:
+    trials: list[float] = []
+
+    def exposure(velocity: float) -> float:
+        trials.append(velocity)
+        return factor * velocity**power
+
+    velocity = search(2.0, 1.5, exposure)
+    assert 1.5 <= factor * velocity**power <= 1.5 * (1.0 + ERROR)
+    assert len(trials) <= 4
+
+
+def test_a_bent_law_is_found_too_and_a_jump_is_told() -> None:
+    trials = 0
+
+    def bent(velocity: float) -> float:
+        nonlocal trials
+        trials += 1
+        return max(0.1 * velocity, 0.01 * velocity**2.5)
+
+    assert bent(search(1.0, 7.0, bent)) == pytest.approx(7.0, rel=ERROR)
+    assert trials <= 12
+    with pytest.raises(CasesError, match="no exposure of 1: it jumps at velocity 3"):
+        search(2.0, 1.0, lambda velocity: 0.5 if velocity < 3.0 else 2.0)
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        (lambda _: 0.5, "the exposure is below 1 up to velocity 200"),
+        (lambda _: 2.0, "the exposure is above 1 from velocity 0.02 on"),
+        (lambda _: 0.0, "there is no exposure at velocity 2"),
+    ],
+)  # fmt: skip
+def test_what_is_not_reached_is_told(law: object, words: str) -> None:
+    with pytest.raises(CasesError, match=words):
+        search(2.0, 1.0, law)  # type: ignore[arg-type]
+
+
+def test_a_run_at_the_found_velocity_has_this_exposure(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(DECK)
+    options = ("--find", "velocity", "--until", "exposure=1", "-o", "s.h5")
+    done = call("sweep", "d.inp", *options, cwd=tmp_path)
+    assert done.exit_code == 0, done.stdout + done.stderr
+    found = fecm.load_sweep(tmp_path / "s.h5")
+    (velocity,) = found["found_velocity"]
+    assert f"smallest found    {velocity:.8g}, " in done.stdout
+    result = run(DECK.replace("     115.0", f"{velocity:10.6f}"))
+    largest = result["exposures/exposure"][-1]
+    assert largest.max() == pytest.approx(1.0, rel=2e-5)
+    columns = [found[name][0] for name in EXPOSURES]
+    assert columns == pytest.approx(largest.tolist(), rel=1e-5)
+    assert found["fail_evaluations"][0] == result.failure.attributes["evaluations_in_contact"]
+    # The mass of the report's rod is 1.8096e-4.
+    assert found["found_energy"][0] == pytest.approx(0.5 * 1.8096e-4 * velocity**2, rel=1e-4)
+
+
+def test_each_case_of_a_sweep_has_its_velocity() -> None:
+    together = fecm.sweep(DECK, {"layup": ["[0/90]", "[0/0]"]}, until={"exposure": 0.5})
+    alone = fecm.sweep(DECK, {"layup": ["[0/0]"]}, until={"exposure": 0.5})
+    velocities = together["found_velocity"]
+    assert velocities[1] == alone["found_velocity"][0]
+    assert velocities[0] != pytest.approx(velocities[1], rel=0.05)
+    for row in range(2):
+        exposures = [together[name][row] for name in EXPOSURES]
+        assert np.max(exposures) == pytest.approx(0.5, rel=2e-5)
+
+
+def test_few_evaluations_and_short_runs_find_no_velocity() -> None:
+    rare = fecm.sweep(failing(every=40, steps=400), until={"exposure": 1.0})
+    assert "FAIL was evaluated" in rare["status"][0]
+    short = fecm.sweep(failing(steps=40), until={"exposure": 1.0})
+    assert "ends before its largest exposure" in short["status"][0]
+    assert np.isnan(short["found_velocity"][0])
+
+
+def test_a_search_that_makes_no_sense_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(small(data=DATA_CARDS))
+    (tmp_path / "f.inp").write_text(DECK)
+    for deck, until, words in (
+        ("d.inp", "exposure=1", "the program of the deck has no FAIL"),
+        ("f.inp", "exposure=-1", "the exposure to reach is a positive number, not -1"),
+        ("f.inp", "exposure=threshold", "write QUANTITY=NUMBER"),
+        ("f.inp", "force=3", "peak_force=threshold, or exposure=NUMBER"),
+    ):
+        done = call("sweep", deck, "--find", "velocity", "--until", until, cwd=tmp_path)
+        assert_unusable(done)
+        assert words in done.stderr
+    with pytest.raises(CasesError, match="until is"):
+        fecm.sweep(DECK, until={"exposures": 1.0})
