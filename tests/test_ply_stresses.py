@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from itertools import pairwise
 
 import numpy as np
@@ -92,6 +93,21 @@ def test_a_plate_of_equal_plies_has_the_parabola_of_a_beam_in_shear() -> None:
     )
     np.testing.assert_allclose(tau[:, :, 0], 1.5 * plate.D[0, 0] * (1.0 - 4.0 * z**2), atol=1e-8)
     np.testing.assert_allclose(np.einsum("tds,ds->t", residual, gradient), 0.0, atol=1e-9)
+
+
+def test_memory_of_the_interlaminar_stresses_grows_with_the_number_of_plies_not_its_square() -> (
+    None
+):
+    def peak(plies: int) -> int:
+        plate = laminate(PAGANO, [0.0, 90.0] * (plies // 2), [0.1] * plies)
+        tracemalloc.start()
+        interlaminar_stresses(plate)
+        equilibrium_shear_stiffness(plate)
+        size = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return size
+
+    assert peak(1000) < 5 * peak(250)
 
 
 def test_interlaminar_stresses_vanish_at_both_faces_and_are_continuous_in_between() -> None:

@@ -39,10 +39,17 @@ def in_plane_stresses(laminate: Laminate) -> Floats:
 def _moments(laminate: Laminate, z: Floats) -> Floats:
     """Integrals of Qbar and Qbar zeta from the struck face to z, (2, n, 3, 3)."""
     plies = laminate.plies
-    upper = np.clip(z[:, None], plies.faces[:-1], plies.faces[1:])
-    lower = plies.faces[:-1]
-    powers = np.stack([upper - lower, (upper**2 - lower**2) / 2.0])
-    return np.asarray(np.einsum("azk,kij->azij", powers, plies.stiffness))
+
+    def integrals(lower: Floats, upper: Floats, stiffness: Floats) -> Floats:
+        powers = np.stack([upper - lower, (upper**2 - lower**2) / 2.0])
+        return np.asarray(powers[:, :, None, None] * stiffness)
+
+    # The sum over the plies below, and the part of the ply at z.
+    whole = integrals(plies.faces[:-1], plies.faces[1:], plies.stiffness)
+    below = np.zeros_like(whole)
+    np.cumsum(whole[:, :-1], axis=1, out=below[:, 1:])
+    at = np.clip(np.searchsorted(plies.faces, z, side="right") - 1, 0, len(plies.angles) - 1)
+    return below[:, at] + integrals(plies.faces[at], z, plies.stiffness[at])
 
 
 def interlaminar_stresses(laminate: Laminate) -> tuple[Floats, Floats]:
