@@ -11,8 +11,9 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.deck.model import Allowables
+from fecm.mechanics.exposures import OutsideLoad
 from fecm.mechanics.failure import CRITERIA, exposure_of
-from fecm.mechanics.ply_stresses import PlyStresses
+from fecm.mechanics.ply_stresses import FailureEnvelope, Maxima, PlyStresses
 from fecm.results.first_failure import evaluations_in_contact, first_failures
 from fecm.results.result import Result
 from tests.calls import call
@@ -162,3 +163,31 @@ def test_exposures_below_1_have_no_first_failure(tmp_path: Path) -> None:
     done = call("run", "d.inp", cwd=tmp_path)
     assert "first failure     none by the end of the run, which is in contact: open" in done.stdout
     assert fecm.load(tmp_path / "d.h5").first_failures == []
+
+
+def test_points_under_the_load_do_not_count_and_keep_their_exposures() -> None:
+    generator = np.random.default_rng(4)
+    elements, points, plies = 3, 4, 5
+    near = np.zeros((elements, points), dtype=bool)
+    near[1, 2:] = near[2, 0] = True
+    x, y = generator.random((2, elements, points))
+    states = Maxima.none(len(CRITERIA), elements * points * plies * 2)
+    states.exposure[:] = generator.random(states.exposure.shape)
+    each = states.exposure.reshape(len(CRITERIA), elements, points, plies, 2)
+    each[:, near] += 1.0  # the largest of all
+    interfaces = Maxima.none(elements, plies - 1)
+    interfaces.exposure[:] = [[3.0] * 4, [9.0] * 4, [1.0, 2.0, 8.0, 2.0]]
+    before = states.exposure.copy()
+    found = OutsideLoad(near, x, y).largest(FailureEnvelope(states, interfaces))
+    np.testing.assert_array_equal(states.exposure, before)
+    for number in range(len(CRITERIA)):
+        outside = np.where(near[:, :, None, None], 0.0, each[number])
+        element, point, ply, _ = np.unravel_index(outside.argmax(), outside.shape)
+        assert found["exposure"][number] == outside.max() < 1.0
+        assert found["ply"][number] == ply + 1
+        assert (found["x"][number], found["y"][number]) == (x[element, point], y[element, point])
+    # Elements 2 and 3 have a point under the load.
+    assert (found["exposure"][-1], found["ply"][-1]) == (3.0, 1)
+    assert found["x"][-1] == pytest.approx(x[0].mean())
+    nothing = OutsideLoad(np.ones_like(near), x, y).largest(FailureEnvelope(states, interfaces))
+    assert np.isnan(nothing["exposure"]).all()
