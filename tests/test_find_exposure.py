@@ -25,7 +25,7 @@ def test_the_velocity_of_a_power_law_is_found_in_a_few_runs(factor: float, power
 
     def exposure(velocity: float) -> float:
         trials.append(velocity)
-        return factor * velocity**power
+        return float(factor * velocity**power)
 
     velocity = search(2.0, 1.5, exposure)
     assert 1.5 <= factor * velocity**power <= 1.5 * (1.0 + ERROR)
@@ -38,7 +38,7 @@ def test_a_bent_law_is_found_too_and_a_jump_is_told() -> None:
     def bent(velocity: float) -> float:
         nonlocal trials
         trials += 1
-        return max(0.1 * velocity, 0.01 * velocity**2.5)
+        return float(max(0.1 * velocity, 0.01 * velocity**2.5))
 
     assert bent(search(1.0, 7.0, bent)) == pytest.approx(7.0, rel=ERROR)
     assert trials <= 12
