@@ -51,9 +51,8 @@ class FirstFailure:
 
 def where(criterion: str, ply: int) -> str:
     """A ply, or of the interlaminar criterion an interface, in words."""
-    return (
-        f"interface of plies {ply} and {ply + 1}" if criterion == "interlaminar" else f"ply {ply}"
-    )
+    between = criterion == "interlaminar"
+    return f"interface of plies {ply} and {ply + 1}" if between else f"ply {ply}"
 
 
 def first_failures(result: Result, level: float = 1.0) -> list[FirstFailure]:

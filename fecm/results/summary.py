@@ -84,7 +84,7 @@ def _exposures(result: Result) -> list[str]:
     lines = []
     for exposure in largest:
         force = reached.get(exposure.criterion)
-        known = "" if force is None else f"; 1 at {_rounded(result, force, 'force')}"
+        known = "" if force is None else f"; reaches 1 at {_rounded(result, force, 'force')}"
         lines.append(f"{exposure.line(result)}{known}")
     count = evaluations_in_contact(result)
     if count is not None and "history/force" in result:
