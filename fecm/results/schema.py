@@ -470,12 +470,8 @@ def _datasets(group: str, kind: type[Group], outer: str = "") -> Iterator[Datase
 
 DATASETS = {d.path: d for name, (kind, _, _) in GROUPS.items() for d in _datasets(name, kind)}
 
-FIXED = {
-    "faces": 2,
-    "levels": 3,
-    "directions": 2,
-    "criteria": len(CRITERIA) + 1,
-}  # sizes of axes that every result has
+# Sizes of axes that every result has.
+FIXED = {"faces": 2, "levels": 3, "directions": 2, "criteria": len(CRITERIA) + 1}
 # Dimension scales: name and description by size.
 SCALES = {
     "numnp": ("node", "number of the node"),

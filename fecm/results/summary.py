@@ -66,10 +66,11 @@ def summary(result: Result) -> list[str]:
 def _delaminations(result: Result) -> str:
     """How many delaminations the threshold assumes, and the forces for other numbers of them."""
     known = result.threshold
-    if "band" not in known:  # a result of an older version
-        return ""
-    number, interfaces = int(known["number"]), int(known["interfaces"])
-    least, most = (_quantity(result, float(force), "force") for force in known["band"])
+    band, number, interfaces = (known.get(name) for name in ("band", "number", "interfaces"))
+    counts = isinstance(number, int | np.integer) and isinstance(interfaces, int | np.integer)
+    if np.shape(band) != (2,) or not counts:
+        return ""  # a result of an older version
+    least, most = (_quantity(result, force, "force") for force in np.array(band))
     others = {1: most, max(1, interfaces): least}
     others.pop(number, None)
     count = "one delamination" if number == 1 else f"{number} delaminations"
