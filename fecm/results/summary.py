@@ -66,13 +66,15 @@ def summary(result: Result) -> list[str]:
 def _delaminations(result: Result) -> str:
     """How many delaminations the threshold assumes, and the forces for other numbers of them."""
     known = result.threshold
-    band, number, interfaces = (known.get(name) for name in ("band", "number", "interfaces"))
-    counts = isinstance(number, int | np.integer) and isinstance(interfaces, int | np.integer)
-    if np.shape(band) != (2,) or not counts:
+    band, number, interfaces = (
+        np.asarray(known.get(name, "")) for name in ("band", "number", "interfaces")
+    )
+    kinds = [(array.dtype.kind, array.shape) for array in (band, number, interfaces)]
+    if kinds != [("f", (2,)), ("i", ()), ("i", ())]:
         return ""  # a result of an older version
-    least, most = (_quantity(result, force, "force") for force in np.array(band))
-    others = {1: most, max(1, interfaces): least}
-    others.pop(number, None)
+    least, most = (_quantity(result, force, "force") for force in band.tolist())
+    others = {1: most, max(1, int(interfaces)): least}
+    others.pop(int(number), None)
     count = "one delamination" if number == 1 else f"{number} delaminations"
     texts = [f"{force} with {n}" for n, force in others.items()]
     return f" (for {'; '.join([count, *texts])})"
