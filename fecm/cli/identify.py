@@ -16,7 +16,7 @@ from fecm.cli.types import OneOf, Parsed, list_of
 from fecm.deck.units import unit_names, unit_of
 from fecm.studies.comparison import measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of
-from fecm.sweeps.identify import FREE, fit
+from fecm.sweeps.identify import CARDS, FREE, Identification, fit
 
 
 @click.command(
@@ -47,7 +47,8 @@ def identify(
 
     MEASURED.csv has the columns time and force, in the deck's units; time 0 is the first contact,
     unless delay is fitted.  The deck's values are the start of the fit.  The exit status is 1 if
-    the measurement does not determine the parameters, or the fit does not converge.
+    the measurement does not determine the parameters, the fit does not converge, the model does
+    not describe the data, or a delay or an offset should be fitted too.
     """
     targets = OutputPaths(output or DASH, picture, overwrite, deck, measured)
     problem = load_single(deck, "identify")
@@ -66,7 +67,8 @@ def identify(
         echo_json({
             "values": values, "correlation": found.correlation.tolist(),
             "points": len(found.time), "dof": found.dof, "rms": found.rms, "share": found.share,
-            "converged": found.converged, "notes": list(found.notes), "cards": found.cards(),
+            "converged": found.converged, "accepted": found.accepted,
+            "plate_errors": found.plate_errors, "notes": list(found.notes), "cards": found.cards(),
         })  # fmt: skip
     else:
         rms = f"{found.rms:.4g} {unit_of('force', units)}".rstrip()
@@ -80,6 +82,20 @@ def identify(
             echo("correlation  " + "".join(f"{name:>12}" for name in found.values))
             for name, row in zip(found.values, found.correlation, strict=True):
                 echo(f"  {name:<11}" + "".join(f"{value:12.3f}" for value in row))
+        for line in _plate_errors(found):
+            echo(line)
         echo(found.cards())
-    if not found.converged:
+    if not found.accepted:
         raise SystemExit(NO)
+
+
+def _plate_errors(found: Identification) -> list[str]:
+    """Table of the changes of the values with 1 % more of a property of the plate."""
+    if not found.plate_errors:
+        return []
+    lines = ["1 % more in the deck" + "".join(f"{name:>12}" for name in found.plate_errors)]
+    for name, value in found.values.items():
+        changes = [changes[name] for changes in found.plate_errors.values()]
+        texts = [f"{c / value:+.2%}" if name in CARDS and value else f"{c:+.2g}" for c in changes]
+        lines.append(f"  {name:<18}" + "".join(f"{text:>12}" for text in texts))
+    return lines

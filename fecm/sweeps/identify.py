@@ -7,49 +7,58 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from fecm._errors import FecmError, warn
+from fecm._errors import warn
 from fecm._typing import Floats
 from fecm.deck.model import Deck, Impact, Indentation, Projectile
-from fecm.deck.units import KNOWN, unit_names
+from fecm.deck.units import unit_names
 from fecm.mechanics.projectile import RigidMass
 from fecm.problem.build import build_projectile
 from fecm.studies import StudyError
 from fecm.studies.comparison import Measurement, measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of
+from fecm.sweeps.alignment import IdentifyError, check_measured, lags
 from fecm.sweeps.api import problem_of
 from fecm.sweeps.batch import Runs, runs_of
+from fecm.sweeps.fitting import (
+    DELAY,
+    FIRST_EVALUATIONS,
+    LOST,
+    MOST_EVALUATIONS,
+    OF_RECORD,
+    OFFSET,
+    POINTS,
+    Model,
+    Scaling,
+    Solution,
+    bounds,
+    covariance,
+    during_run,
+    fitted,
+    share_lost,
+    solve,
+)
+from fecm.sweeps.misfit import (
+    coloured,
+    neighbours,
+    plate_errors,
+    proposal,
+    undescribed,
+    wrong_model,
+)
 from fecm.sweeps.plan import RUN, shares_plate
-from fecm.sweeps.vary import apply_case
 
-DELAY = "delay"  # measured time at which the approach of the projectile ends in a contact
 CARDS: dict[str, type[Impact | Indentation | Projectile]] = {
     **dict.fromkeys(("velocity", "energy"), Impact),
     **dict.fromkeys(("k", "alpha_p", "s_p", "q"), Indentation),
     **dict.fromkeys(("mass", "rod_length", "rod_modulus", "rod_density"), Projectile),
 }
-FREE = (*CARDS, DELAY)
-STEP = 1e-3  # half of the step of central differences, in the scaled parameters
-BOUND = 1e3  # factor between the parameters of the deck and their bounds
-OFF = 20.0  # factor between measured and computed peak or duration: a unit must be wrong
-POINTS, TOP_POINTS = 10, 3  # fewest measured points, and fewest above half of the peak
-# Smallest singular value of the Jacobian with unit columns, and smallest column (rms over peak).
-SINGULAR, NO_EFFECT = 1e-3, 1e-6
-SHARE = 0.1  # share of a parameter in a singular vector above which the vector concerns it
-# A finding reports a larger correlation: of two parameters, and of neighbouring residuals where the
-# force exceeds a share of its peak.
-CORRELATED, COLOURED, FAINT = 0.99, 0.5, 1e-3
-SETTLED = 0.01  # share of a standard error: the fit ends with a step below it
-MOST_EVALUATIONS = 60
-
-
-class IdentifyError(FecmError):
-    """The measurement does not determine the parameters."""
-
-    exit_code = 1
+FREE = (*CARDS, *OF_RECORD)
+CORRELATED = 0.99  # a finding reports a larger correlation of two parameters
+UNIT_OFFSET = 0.01  # size of an offset over the peak of the deck's own run
 
 
 @dataclass(frozen=True)
@@ -68,6 +77,12 @@ class Identification:
         Measured times and forces that were fitted, and the fitted force at these times.
     converged : bool
         Whether the fit has converged.
+    accepted : bool
+        Whether the fit has converged, the model describes the data, and no delay or offset is
+        missing among the parameters.
+    plate_errors : dict of str to dict
+        Changes of the fitted values with 1 % more ``"thickness"`` and 1 % more ``"e1"`` of the
+        plate in the deck, linearised.
     deck : Deck
         The deck with the fitted values, rounded to five digits.
     notes : tuple of str
@@ -82,6 +97,8 @@ class Identification:
     force: Floats
     model: Floats
     converged: bool
+    accepted: bool
+    plate_errors: dict[str, dict[str, float]]
     deck: Deck
     notes: tuple[str, ...]
 
@@ -121,9 +138,10 @@ def identify(
 ) -> Identification:
     """Fit parameters of an impact to a measured contact force.
 
-    The values of the deck are the start of the fit, by least squares with equal weights.  Standard
-    errors are those of independent errors of the measured points, with the variance of the
-    residual.  The notes of the result are :class:`FecmWarning`.
+    The values of the deck are the start of the fit, by least squares with equal weights; a delay is
+    started from several lags.  Standard errors are those of independent errors of the measured
+    points, with the variance of the residual; errors of the model come in addition, of which
+    :attr:`Identification.plate_errors` are two.  The notes of the result are :class:`FecmWarning`.
 
     Parameters
     ----------
@@ -134,8 +152,9 @@ def identify(
         Time 0 is that of the deck: the projectile touches the plate.
     free : str or sequence of str
         Parameters to fit: ``"velocity"``, ``"energy"``, ``"k"``, ``"alpha_p"``, ``"s_p"``, ``"q"``,
-        ``"mass"``, ``"rod_length"``, ``"rod_modulus"``, ``"rod_density"``; and ``"delay"``, the
-        measured time at which the projectile touches the plate.
+        ``"mass"``, ``"rod_length"``, ``"rod_modulus"``, ``"rod_density"``; and of the
+        record ``"delay"``, the measured time at which the projectile touches the plate, and
+        ``"offset"``, the measured force without a contact.
     filter : str, optional
         Filter of the measurement, which the computed force passes too: ``"first-order:RISE"``,
         ``"moving-average:RISE"`` or ``"cfc:CLASS"``.
@@ -148,10 +167,10 @@ def identify(
     Raises
     ------
     IdentifyError
-        If the measurement does not determine the parameters.
+        If the measurement does not determine the parameters, or is constant.
     StudyError
-        If the measurement is invalid, in other units, or too short; or if a name or the filter is
-        unknown.
+        If the measurement is invalid, in other units, or too short; if more than 20 % of the points
+        of the contact are outside the run of the deck; or if a name or the filter is unknown.
     DeckError
         If the deck has errors.
     CasesError
@@ -175,30 +194,7 @@ def identify(
     return found
 
 
-class _Model(NamedTuple):
-    """Contact forces of a deck with trial values, all from one response of the plate."""
-
-    deck: Deck
-    runs: Runs
-    sensor: Filter | None
-
-    def histories(self, trials: Sequence[Mapping[str, float]]) -> tuple[Floats, Floats]:
-        """Times, from one duration before the contact on, and forces (times, trials)."""
-        found = self.runs({n: _fitted(self.deck, one) for n, one in enumerate(trials)}, False)
-        assert found.force is not None
-        steps = found.force.shape[1]
-        clock = float(found.columns["dt"][0]) * np.arange(-steps, steps + 1.0)
-        forces = np.vstack([np.zeros((steps + 1, len(trials))), found.force.T])
-        return clock, forces if self.sensor is None else self.sensor(clock, forces)
-
-    def at(self, time: Floats, trials: Sequence[Mapping[str, float]]) -> Floats:
-        """Forces at measured times, (times, trials)."""
-        clock, forces = self.histories(trials)
-        columns = zip((trial.get(DELAY, 0.0) for trial in trials), forces.T, strict=True)
-        return np.column_stack([np.interp(time - d, clock, force) for d, force in columns])
-
-
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)
 def _shared(deck: Deck) -> Runs:
     """The function that runs cases of a deck by one response of its plate."""
     problem = problem_of(deck)
@@ -213,68 +209,93 @@ def fit(
     deck: Deck, measured: Measurement, free: Sequence[str], sensor: Filter | None = None
 ) -> Identification:
     """Fit parameters of a deck to a measurement; see :func:`identify`."""
-    from scipy.optimize import least_squares
-
     if not free or not set(free) <= set(FREE) or len(set(free)) < len(free):
         given = ", ".join(map(str, free)) or "none"
         raise StudyError(f"can't fit {given}; fit different ones of {', '.join(FREE)}")
     units = unit_names(deck)
     sensor = None if sensor is None else sensor.in_unit(units.get("time", ""))
-    model = _Model(deck, _shared(deck), sensor)
+    model = Model(deck, _shared(deck), sensor)
     clock, own = model.histories([{}])
-    first, width = _check(measured, clock, own[:, 0], units)
-    if DELAY not in free and abs(first) > width:
-        side = "after" if first > 0.0 else "before"
-        text = f"the force rises {abs(first):.3g} {side} that of the deck's own run"
-        raise StudyError(f"{measured.name}: {text}; fit delay too, or shift the times")
-    start = {name: first if name == DELAY else _start(deck, name) for name in free}
-    # A value is start exp(x), or start + size x; x is between low and high.
-    depth = (own.max() / deck.require(Indentation).k) ** (2.0 / 3.0)
-    size, low, high = np.array([_scale(n, v, width, depth) for n, v in start.items()]).T
-    middle = np.array(list(start.values()))
-    inside = np.abs(measured.time - start.get(DELAY, 0.0)) <= clock[-1] * (1.0 + 1e-9)
-    time, force = measured.time[inside], measured.force[inside]
-    if len(time) < POINTS:
-        text = f"{len(time)} points during the run of the deck; at least {POINTS} are needed"
+    width = check_measured(measured, clock, own[:, 0], units)
+    if len(measured.time) < POINTS:
+        text = f"{len(measured.time)} points; at least {POINTS} are needed"
         raise StudyError(f"{measured.name} has {text}")
-    peak = float(force.max())
+    starts = lags(measured, clock, own[:, 0])
+    depth = (own.max() / deck.require(Indentation).k) ** (2.0 / 3.0)
+    sizes = {DELAY: width, OFFSET: UNIT_OFFSET * float(own.max()), "alpha_p": depth}
 
-    def trial(x: Floats) -> dict[str, float]:
-        values = np.where(size > 0.0, middle + size * x, middle * np.exp(x))
-        return dict(zip(start, values.tolist(), strict=True))
+    def best(names: Sequence[str]) -> Solution | None:
+        """The best fit of all starts of the delay; None if the run of the deck is too short."""
+        known = {name: _start(deck, name) for name in names}
+        trials = [{**known, DELAY: lag} for lag in starts] if DELAY in names else [known]
+        scalings, x = [_scaling(one, sizes) for one in trials], np.zeros(len(names))
+        if len(scalings) > 1:
+            short = [solve(model, measured, one, x, FIRST_EVALUATIONS) for one in scalings]
+            scalings = [min(zip(short, scalings, strict=True), key=lambda pair: _rank(pair[0]))[1]]
+        found = solve(model, measured, scalings[0], x, MOST_EVALUATIONS)
+        return None if found is None or found.lost > LOST else found
 
-    @lru_cache(maxsize=1)
-    def evaluate(*given: float) -> tuple[Floats, Floats]:
-        """Force over peak and its Jacobian."""
-        x, steps = np.array(given), STEP * np.eye(len(given))
-        up, down = np.minimum(x + steps, high), np.maximum(x - steps, low)
-        forces = model.at(time, [trial(row) for row in (x, *up, *down)]) / peak
-        above, below = np.split(forces[:, 1:], 2, axis=1)
-        return forces[:, 0], (above - below) / np.diagonal(up - down)
+    found = best(free)
+    if found is None:
+        lag = starts[0] if DELAY in free else 0.0
+        if share_lost(measured.force, during_run(measured.time, clock, lag)) <= LOST:
+            raise IdentifyError(wrong_model("the fit shifts the run away from the contact"))
+        raise StudyError(f"{measured.name}: {_outside(free, starts[0], width, units)}")
 
-    found = least_squares(
-        lambda x: evaluate(*x)[0] - force / peak, np.zeros(len(start)), lambda x: evaluate(*x)[1],
-        (low, high), max_nfev=MOST_EVALUATIONS, ftol=SETTLED**2 / len(time), xtol=1e-7,
-    )  # fmt: skip
-    values = trial(found.x)
-    cov = _covariance(found.jac, 2.0 * found.cost / (len(time) - len(start)), list(start))
+    fault = proposal(model, found, lambda: best([*free, DELAY]), units) or undescribed(found, units)
+    try:
+        cov = covariance(found)
+    except IdentifyError as error:
+        raise IdentifyError(f"{fault}; besides, {error}" if fault else str(error)) from None
+    return _identification(model, measured, found, cov, fault)
+
+
+def _identification(
+    model: Model, measured: Measurement, found: Solution, cov: Floats, fault: str
+) -> Identification:
+    """Values, errors and notes of a fit; `fault` is why it is not accepted."""
     deviation = np.sqrt(np.diagonal(cov))
     correlation = cov / np.outer(deviation, deviation)
     np.fill_diagonal(correlation, 1.0)
-    errors = deviation * np.where(size > 0.0, size, list(values.values()))
+    values, start = found.values, found.scaling.start
+    errors = deviation * found.scaling.slopes(found.x)
+    rounded = {name: float(f"{value:.5g}") for name, value in values.items()}
+    plates = {}
+    if not fault:
+        plates = plate_errors(model, found, lambda deck: Model(deck, _shared(deck), model.sensor))
     made = Identification(
         values, dict(zip(start, errors.tolist(), strict=True)), start, correlation,
-        time, force, found.fun * peak + force, found.status > 0,
-        _fitted(deck, {n: float(f"{v:.5g}") for n, v in values.items()}), (),
+        found.time, found.force, found.model, found.converged, found.converged and not fault,
+        plates, fitted(model.deck, rounded), (),
     )  # fmt: skip
-    return replace(made, notes=tuple(_notes(made, measured, found.active_mask, model)))
+    notes = filter(None, (fault, *_notes(made, found, measured, model)))
+    return replace(made, notes=tuple(notes))
 
 
-def _fitted(deck: Deck, values: Mapping[str, float]) -> Deck:
-    return apply_case(deck, {name: value for name, value in values.items() if name != DELAY})
+def _rank(found: Solution | None) -> tuple[bool, float]:
+    """Order of fits: those with the points of the contact, then by their residuals."""
+    return (True, math.inf) if found is None else (found.lost > LOST, found.variance)
+
+
+def _scaling(start: dict[str, float], sizes: Mapping[str, float]) -> Scaling:
+    size, low, high = np.array([bounds(n, v, sizes) for n, v in start.items()]).T
+    return Scaling(start, size, low, high)
+
+
+def _outside(free: Sequence[str], lag: float, width: float, units: dict[str, str]) -> str:
+    """Say why points of the contact are outside the run of the deck."""
+    text = f"more than {100.0 * LOST:.0f} % of the points of the contact are outside the run"
+    if DELAY not in free and abs(lag) > width:
+        side = "after" if lag > 0.0 else "before"
+        late = f"{abs(lag):.3g} {units.get('time', '')}".rstrip()
+        rise = f"the force rises {late} {side} that of the deck's own run"
+        return f"{text}, and {rise}; fit delay too, or shift the times"
+    return f"{text} of the deck; lengthen the run, or cut the table"
 
 
 def _start(deck: Deck, name: str) -> float:
+    if name in OF_RECORD:
+        return 0.0
     rod = build_projectile(deck)
     if name == "mass":
         return rod.total_mass
@@ -287,105 +308,23 @@ def _start(deck: Deck, name: str) -> float:
     return float(getattr(rod, name.removeprefix("rod_")))
 
 
-def _scale(name: str, start: float, width: float, depth: float) -> tuple[float, float, float]:
-    """Size (0: exponential) and bounds of x; `width` is a time, `depth` an indentation."""
-    if name == DELAY:
-        return width, -BOUND, BOUND
-    if name == "s_p":
-        return 1.0, -start, max(1e-9, 1.0 - 1e-6 - start)
-    if name == "alpha_p" and not start:
-        return depth, 0.0, BOUND
-    if not start > 0.0:
-        raise StudyError(f"{name} is {start:g} in the deck; the fit must start from a positive one")
-    return 0.0, -math.log(BOUND), math.log(BOUND)
-
-
-def _top(time: Floats, force: Floats) -> tuple[float, float]:
-    """First time above half of the peak, and the time from there to the last."""
-    top = time[force > 0.5 * force.max()]
-    return (float(top[0]), float(np.ptp(top))) if len(top) else (0.0, 0.0)
-
-
-def _check(
-    measured: Measurement, clock: Floats, own: Floats, units: Mapping[str, str]
-) -> tuple[float, float]:
-    """Compare a measurement with the deck's own run.
-
-    Returns its delay at half of the peak, and the time that the own run is above it.
-    """
-    name, force, peak = measured.name, measured.force, float(own.max())
-    begin, width = _top(clock, own)
-    if measured.column != "force":
-        text = "has a column transducer and no force; the contact force is fitted"
-        raise StudyError(f"{name} {text}")
-    if not (peak > 0.0 and width > 0.0):
-        raise StudyError("the deck's own run has no contact force to compare with; check its ROD")
-    if -force.min() > force.max():
-        raise StudyError(f"{name}: the contact force is negative; it is positive in compression")
-    if np.count_nonzero(force > 0.5 * force.max()) < TOP_POINTS:
-        raise StudyError(f"{name} has fewer than {TOP_POINTS} points above half of its peak")
-    first, long = _top(measured.time, force)
-    for dimension, found, expected in (("force", force.max(), peak), ("time", long, width)):
-        if not 1.0 / OFF < found / expected < OFF:
-            what = {"force": "peak force", "time": "time above half of the peak"}[dimension]
-            unit, cause = units.get(dimension, ""), _cause(dimension, found / expected, units)
-            usual = f"that of the deck's own run {expected:.3g} {unit}".rstrip()
-            raise StudyError(f"{name}: the {what} is {found:.3g}, {usual}; {cause}")
-    return first - begin, width
-
-
-def _cause(dimension: str, ratio: float, units: Mapping[str, str]) -> str:
-    """Likely cause of a measurement that is off by a factor, and the remedy."""
-    known, own = KNOWN[dimension], units.get(dimension, "")
-    text = f"is the column in another unit of {dimension}?  Convert it"
-    if own in known:
-        unit = min(known, key=lambda one: abs(math.log(ratio * known[one] / known[own])))
-        if 0.2 < ratio * known[unit] / known[own] < 5.0:
-            text = f"the column seems to be in {unit}; convert it to {own}"
-    return f"{text}, or exchange time and force if they are swapped"
-
-
-def _covariance(jac: Floats, variance: float, names: Sequence[str]) -> Floats:
-    """Covariance of the scaled parameters; IdentifyError if the residual doesn't determine them."""
-    columns = np.sqrt(np.sum(jac**2, axis=0))
-    if idle := [n for n, c in zip(names, columns, strict=True) if c < NO_EFFECT * len(jac) ** 0.5]:
-        text = f"the force does not depend on {_listed(idle)} here"
-        hint = f"leave {'it' if len(idle) == 1 else 'them'} out of the free parameters"
-        raise IdentifyError(f"{text} (does the indentation reach alpha_p?); {hint}")
-    _, singular, right = np.linalg.svd(jac / columns, full_matrices=False)
-    if singular[-1] < SINGULAR:
-        both = [n for n, share in zip(names, right[-1], strict=True) if abs(share) > SHARE]
-        text = f"a combination of {_listed(both)} (singular value {singular[-1]:.1g})"
-        hint = "give one of them the known value in the deck and leave it out"
-        raise IdentifyError(f"the force determines only {text}; {hint}")
-    root = right.T / singular / columns[:, None]
-    covariance: Floats = variance * root @ root.T
-    errors = zip(names, np.sqrt(np.diagonal(covariance)), strict=True)
-    if vague := [f"{name} ({100.0 * error:.0f} %)" for name, error in errors if error > 1.0]:
-        hint = "the standard error is above 100 %; give known values in the deck and leave them out"
-        raise IdentifyError(f"the measurement does not determine {_listed(vague)}: {hint}")
-    return covariance
-
-
-def _listed(names: Sequence[str]) -> str:
-    """Names with commas and an `and`."""
-    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
-
-
-def _notes(found: Identification, given: Measurement, active: Any, model: _Model) -> Iterator[str]:
+def _notes(
+    found: Identification, solution: Solution, given: Measurement, model: Model
+) -> Iterator[str]:
+    """Reasons to doubt the values."""
     if not found.converged:
         yield "the fit has not converged; start from better values in the deck"
     if out := len(given.time) - len(found.time):
         yield f"{out} of {len(given.time)} points are outside the run of the deck and left out"
-    for name, side in zip(found.values, active, strict=True):
+    for name, side in zip(found.values, solution.active, strict=True):
         if side:
             yield f"{name} is at its bound {found.values[name]:.6g}; its standard error is void"
     names = list(found.values)
     for i, j in zip(*np.nonzero(np.triu(np.abs(found.correlation) > CORRELATED, 1)), strict=True):
         text = f"{names[i]} and {names[j]} have the correlation {found.correlation[i, j]:.4f}"
         yield f"{text}: their values can hardly be told apart"
-    e = found.residual
-    if found.share > FAINT and (near := float(e[1:] @ e[:-1] / (e @ e))) > COLOURED:
+    if coloured(solution):
+        near = neighbours(found.residual)
         text = "the model does not describe the measurement down to its noise"
         text = f"{text}, and the standard errors are too small"
         yield f"neighbouring residuals have the correlation {near:.2f}: {text}"

@@ -1,0 +1,135 @@
+"""A measured force beside that of a deck's own run: units, noise, onset and lags, before a fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._errors import FecmError
+from fecm._typing import Floats
+from fecm.deck.units import KNOWN
+from fecm.studies import StudyError
+from fecm.studies.comparison import Measurement
+
+OFF = 20.0  # factor between measured and computed peak or duration: a unit must be wrong
+TOP_POINTS = 3  # fewest measured points above half of the peak
+# Level of an onset: share of the peak, and standard deviations of the noise.
+LEAST_LEVEL, MOST_LEVEL, CLEAR = 0.1, 0.5, 5.0
+FIRST = 3  # points whose median is the base line of an onset
+LAGS = 2  # lags of the largest cross-correlations that are tried
+LONGEST = 2**22  # points of a record that are correlated
+FLAT = 1e-3  # variation of a constant force over its largest value
+
+
+class IdentifyError(FecmError):
+    """The measurement does not determine the parameters."""
+
+    exit_code = 1
+
+
+def noise(force: Floats) -> float:
+    """Standard deviation of the noise of a force, from its second differences.
+
+    Of independent errors these have the variance 6 sigma^2; a smooth force hardly has any.  The
+    median makes the estimate robust against the few points where the force bends.
+
+    >>> values = np.random.default_rng(0).normal(size=4000)
+    >>> round(noise(values + 1e-5 * np.arange(4000.0) ** 2), 1)
+    1.0
+    """
+    return float(np.median(np.abs(np.diff(force, 2)))) / (0.6745 * math.sqrt(6.0))
+
+
+def contact_points(force: Floats) -> NDArray[np.bool_]:
+    """Points whose force is above the level of an onset."""
+    return np.asarray(force > level(force) * force.max())
+
+
+def level(force: Floats) -> float:
+    """Share of the peak that a force passes at its onset: above its noise."""
+    share = CLEAR * noise(force) / float(force.max())
+    return min(max(share, LEAST_LEVEL), MOST_LEVEL)
+
+
+def onset(time: Floats, force: Floats, share: float) -> float:
+    """First time at which a force and the next one are a share of the peak above the base line."""
+    base = min(float(np.median(force[:FIRST])), 0.5 * float(force.max()))
+    above = force > base + share * (force.max() - base)
+    both = np.flatnonzero(above[:-1] & above[1:])
+    return float(time[both[0]] if len(both) else time[np.argmax(force)])
+
+
+def lags(measured: Measurement, clock: Floats, own: Floats) -> list[float]:
+    """Likely delays of a measurement: difference of the onsets, and largest cross-correlations.
+
+    `clock` are the equally spaced times of the deck's own force.
+    """
+    share = level(measured.force)
+    found = [onset(measured.time, measured.force, share) - onset(clock, own, share)]
+    dt = float(clock[1] - clock[0])
+    first = float(measured.time[0])
+    count = math.ceil((float(measured.time[-1]) - first) / dt) + 1
+    grid = first + dt * np.arange(min(count, LONGEST))
+    force = np.interp(grid, measured.time, measured.force)
+    size = len(grid) + len(own)
+    spectrum = np.fft.rfft(force, size) * np.conj(np.fft.rfft(own, size))
+    # Element n + len(own) is the sum of force[i + n] own[i].
+    both = np.roll(np.fft.irfft(spectrum, size), len(own))
+    shift = first - float(clock[0]) + dt * (np.arange(size) - len(own))
+    inner = both[1:-1]
+    tops = 1 + np.flatnonzero((inner > both[:-2]) & (inner >= both[2:]))
+    for top in tops[np.argsort(-both[tops])][:LAGS]:
+        found.append(float(shift[top]))
+    return found
+
+
+def _top(time: Floats, force: Floats) -> float:
+    """Time from the first to the last value above half of the peak."""
+    top = time[force > 0.5 * force.max()]
+    return float(np.ptp(top)) if len(top) else 0.0
+
+
+def check_measured(
+    measured: Measurement, clock: Floats, own: Floats, units: Mapping[str, str]
+) -> float:
+    """Compare peak and duration of a measurement with those of the deck's own run.
+
+    Returns the time that the own run is above half of its peak.  Raises IdentifyError if the
+    measured force is constant, StudyError if it is not a contact force in the deck's units.
+    """
+    name, force, peak = measured.name, measured.force, float(own.max())
+    width = _top(clock, own)
+    if measured.column != "force":
+        text = "has a column transducer and no force; the contact force is fitted"
+        raise StudyError(f"{name} {text}")
+    if not (peak > 0.0 and width > 0.0):
+        raise StudyError("the deck's own run has no contact force to compare with; check its ROD")
+    if np.ptp(force) <= FLAT * np.abs(force).max():
+        text = f"the measured force is constant, {np.mean(force):.3g}"
+        raise IdentifyError(f"{name}: {text}; there is no contact in it")
+    if -force.min() > force.max():
+        raise StudyError(f"{name}: the contact force is negative; it is positive in compression")
+    if np.count_nonzero(force > 0.5 * force.max()) < TOP_POINTS:
+        raise StudyError(f"{name} has fewer than {TOP_POINTS} points above half of its peak")
+    long = _top(measured.time, force)
+    for dimension, found, expected in (("force", force.max(), peak), ("time", long, width)):
+        if not 1.0 / OFF < found / expected < OFF:
+            what = {"force": "peak force", "time": "time above half of the peak"}[dimension]
+            unit, cause = units.get(dimension, ""), _cause(dimension, found / expected, units)
+            usual = f"that of the deck's own run {expected:.3g} {unit}".rstrip()
+            raise StudyError(f"{name}: the {what} is {found:.3g}, {usual}; {cause}")
+    return width
+
+
+def _cause(dimension: str, ratio: float, units: Mapping[str, str]) -> str:
+    """Likely cause of a measurement that is off by a factor, and the remedy."""
+    known, own = KNOWN[dimension], units.get(dimension, "")
+    text = f"is the column in another unit of {dimension}?  Convert it"
+    if own in known:
+        unit = min(known, key=lambda one: abs(math.log(ratio * known[one] / known[own])))
+        if 0.2 < ratio * known[unit] / known[own] < 5.0:
+            text = f"the column seems to be in {unit}; convert it to {own}"
+    return f"{text}, or exchange time and force if they are swapped"

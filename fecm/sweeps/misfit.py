@@ -1,0 +1,190 @@
+"""What speaks against a fit: a delay or an offset left out, another model, errors of the plate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from fecm._errors import FecmError
+from fecm._typing import Floats
+from fecm.deck.model import Deck, Material
+from fecm.deck.units import unit_of
+from fecm.sweeps.alignment import noise
+from fecm.sweeps.fitting import DELAY, OFFSET, Model, Solution, listed
+from fecm.sweeps.vary import apply_case
+
+# A finding reports a larger correlation of neighbouring residuals, where they exceed a share of the
+# peak.
+COLOURED, FAINT = 0.5, 1e-3
+# Share of the variance of the force in a residual with a shape, above which the model does not
+# describe it.
+UNDESCRIBED = 0.05
+CERTAIN = 5.0  # standard errors from 0, beyond which a delay or an offset is not noise
+HALF = 0.5  # of the systematic part of the residual, which a proposal must remove
+QUIET, LEAST_QUIET = 1e-3, 10  # share of the peak without contact, and fewest such points
+CHANGED = 0.01  # relative change of a property of the plate
+PROPERTIES = ("thickness", "e1")
+
+
+def neighbours(residual: Floats) -> float:
+    """Correlation of neighbouring residuals."""
+    return float(residual[1:] @ residual[:-1] / (residual @ residual))
+
+
+def coloured(found: Solution) -> bool:
+    """Whether the residual has a shape, and is not as small as the errors of arithmetic."""
+    return not _faint(found) and neighbours(found.residual) > COLOURED
+
+
+def _faint(found: Solution) -> bool:
+    return math.sqrt(found.variance) <= FAINT * float(found.force.max())
+
+
+def undescribed(found: Solution, units: dict[str, str]) -> str:
+    """Say that the model does not describe the data; empty if it does."""
+    if _faint(found) or _describes(found.residual, found.force):
+        return ""
+    rms = f"{math.sqrt(found.variance):.3g} {unit_of('force', units)}".rstrip()
+    share = 100.0 * math.sqrt(found.variance) / float(np.std(found.force))
+    return wrong_model(f"the rms of the residual, {rms}, is {share:.0f} % of the standard deviation")
+
+
+def wrong_model(why: str) -> str:
+    """Say that the model does not describe the data, and what to look at."""
+    hint = "compare supports, laminate, patch, mesh and filter with those of the test"
+    return f"the model does not describe the data: {why} of the measured force; {hint}"
+
+
+def _describes(residual: Floats, force: Floats) -> bool:
+    share = float(residual @ residual) / (len(force) * float(np.var(force)))
+    shaped = neighbours(residual) > COLOURED
+    return share < 1.0 and (share <= UNDESCRIBED or not shaped)
+
+
+# A delay or an offset that was left out -----------------------------------------------------------
+
+
+class Trial(NamedTuple):
+    """A fit with more parameters."""
+
+    added: dict[str, float]  # values of the added parameters
+    residual: Floats
+    certain: bool  # whether each added value is beyond its noise
+
+    def explains(self, before: Floats, force: Floats) -> bool:
+        """Whether the added parameters remove half of the systematic part of a residual.
+
+        The model must describe the force with them.
+
+        The systematic part is estimated by the covariance of neighbours, in which noise of
+        independent points has no part.
+        """
+        first = float(before[1:] @ before[:-1]) / len(before)
+        rest = float(self.residual[1:] @ self.residual[:-1]) / len(self.residual)
+        white = float(self.residual @ self.residual) / len(self.residual) ** 1.5
+        halved = first > 0.0 and rest < max(HALF**2 * first, 2.0 * white)
+        return self.certain and halved and _describes(self.residual, force)
+
+
+def proposal(
+    model: Model, found: Solution, refit: Callable[[], Solution | None],
+    units: dict[str, str],
+) -> str:  # fmt: skip
+    """Propose to fit a delay or an offset too; empty if neither explains the residual.
+
+    Linearised fits with one or both come first; if the residual has a shape, `refit` fits the delay
+    too, from several starts.
+    """
+    before = found.residual
+    missing = [name for name in (OFFSET, DELAY) if name not in found.scaling.start]
+    choices = [[name] for name in missing] + ([missing] if len(missing) > 1 else [])
+    if _faint(found):
+        return ""
+    for names in choices:
+        trial = _linear(model, found, names)
+        if trial.explains(before, found.force):
+            return _told(trial, before, units)
+    if DELAY in missing and coloured(found) and (other := refit()) is not None:
+        trial = Trial({DELAY: other.values[DELAY]}, other.residual, certain=True)
+        if trial.explains(before, other.force):
+            return _told(trial, before, units)
+    if OFFSET in missing and (level := _out_of_contact(model, found)):
+        force = f"{level:.3g} {unit_of('force', units)}".rstrip()
+        return f"fit {OFFSET} too: without contact the measured force is {force}, beyond its noise"
+    return ""
+
+
+def _linear(model: Model, found: Solution, names: Sequence[str]) -> Trial:
+    """Add parameters to the linearised fit."""
+    columns = {OFFSET: np.ones(len(found.time))}
+    if DELAY in names:
+        values, step = found.values, float(np.median(np.diff(found.time)))
+        trials = [{**values, DELAY: values.get(DELAY, 0.0) + s * step} for s in (1.0, -1.0)]
+        columns[DELAY] = model.at(found.time, trials) @ [1.0, -1.0] / (2.0 * step)
+    jac = np.column_stack([found.jacobian, *(columns[name] for name in names)])
+    size = np.linalg.norm(jac, axis=0)
+    size[size == 0.0] = 1.0
+    left, singular, right = np.linalg.svd(jac / size, full_matrices=False)
+    kept = singular > 1e-10 * singular[0]
+    root = right[kept].T / singular[kept]
+    x = root @ (left[:, kept].T @ found.residual) / size
+    rest = found.residual - jac @ x
+    variance = float(rest @ rest) / (len(rest) - len(x))
+    errors = np.sqrt(variance * np.sum(root**2, axis=1)) / size
+    certain = bool(np.all(np.abs(x) > CERTAIN * errors, where=np.arange(len(x)) >= len(found.x)))
+    return Trial(dict(zip(names, x[len(found.x) :].tolist(), strict=True)), rest, certain)
+
+
+def _told(trial: Trial, before: Floats, units: dict[str, str]) -> str:
+    dimensions = {DELAY: "time", OFFSET: "force"}
+    values = [
+        f"{name} {value:.3g} {unit_of(dimensions[name], units)}".rstrip()
+        for name, value in trial.added.items()
+    ]
+    rms = [float(np.sqrt(np.mean(e**2))) for e in (before, trial.residual)]
+    force = f"{rms[1]:.3g} {unit_of('force', units)}".rstrip()
+    effect = f"with {listed(values)} the rms of the residual falls from {rms[0]:.3g} to {force}"
+    return f"fit {listed(list(trial.added))} too: {effect}; the values given here are biased"
+
+
+def _out_of_contact(model: Model, found: Solution) -> float:
+    """Median force before and after the contact; 0 if it is noise, or if there is no such time."""
+    force = model.at(found.time, [{**found.values, OFFSET: 0.0}])[:, 0]
+    quiet = found.force[force <= QUIET * force.max()]
+    if len(quiet) < LEAST_QUIET:
+        return 0.0
+    level = float(np.median(quiet))
+    error = 1.2533 * max(noise(found.residual), float(np.std(quiet))) / math.sqrt(len(quiet))
+    return level if abs(level) > CERTAIN * error else 0.0
+
+
+# Errors of the plate ------------------------------------------------------------------------------
+
+
+def plate_errors(
+    model: Model, found: Solution, runs: Callable[[Deck], Model]
+) -> dict[str, dict[str, float]]:
+    """Changes of the fitted values with 1 % more thickness, or E1, of the plate in the deck.
+
+    The fit is linearised.  `runs` gives the model of another deck.  A property is left out if the
+    plate can't be run with the time step of the deck.
+    """
+    material = model.deck.require(Material)
+    own = {"thickness": sum(y.thickness for y in material.layers), "e1": material.ply.e1}
+    dt = float(np.diff(model.histories([found.values])[0][:2])[0])
+    errors: dict[str, dict[str, float]] = {}
+    for name in PROPERTIES:
+        for change in (CHANGED, -CHANGED):  # one of them may be unstable
+            try:
+                other = runs(apply_case(model.deck, {name: (1.0 + change) * own[name], "dt": dt}))
+                force = other.at(found.time, [found.values])[:, 0]
+            except FecmError:
+                continue
+            x = np.linalg.lstsq(found.jacobian, found.model - force, rcond=None)[0]
+            changes = CHANGED / change * found.scaling.slopes(found.x) * x
+            errors[name] = dict(zip(found.scaling.start, changes.tolist(), strict=True))
+            break
+    return errors
