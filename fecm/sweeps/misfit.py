@@ -12,7 +12,6 @@ from fecm._errors import FecmError
 from fecm._typing import Floats
 from fecm.deck.model import Deck, Material
 from fecm.deck.units import unit_of
-from fecm.sweeps.alignment import noise
 from fecm.sweeps.fitting import DELAY, OFFSET, Model, Solution, listed
 from fecm.sweeps.vary import apply_case
 
@@ -151,14 +150,19 @@ def _told(trial: Trial, before: Floats, units: dict[str, str]) -> str:
 
 
 def _out_of_contact(model: Model, found: Solution) -> float:
-    """Median force before and after the contact; 0 if it is noise, or if there is no such time."""
-    force = model.at(found.time, [{**found.values, OFFSET: 0.0}])[:, 0]
-    quiet = found.force[force <= QUIET * force.max()]
-    if len(quiet) < LEAST_QUIET:
+    """Median force before the contact, or after it; 0 if it is noise, or there is no such time."""
+    without = {**found.values, OFFSET: 0.0}
+    model_force = model.at(found.time, [without])[:, 0]
+    quiet = model_force <= QUIET * model_force.max()
+    before = quiet & (found.time <= found.values.get(DELAY, 0.0))
+    if np.count_nonzero(before) >= LEAST_QUIET:
+        quiet = before  # whatever the model is
+    elif np.count_nonzero(quiet) < LEAST_QUIET:
         return 0.0
-    level = float(np.median(quiet))
-    error = 1.2533 * max(noise(found.residual), float(np.std(quiet))) / math.sqrt(len(quiet))
-    return level if abs(level) > CERTAIN * error else 0.0
+    force = found.force[quiet]
+    level = float(np.median(force))
+    deviation = float(np.median(np.abs(force - level))) / 0.6745
+    return level if abs(level) > CERTAIN * 1.2533 * deviation / math.sqrt(len(force)) else 0.0
 
 
 # Errors of the plate ------------------------------------------------------------------------------

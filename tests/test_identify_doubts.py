@@ -1,0 +1,231 @@
+"""Onsets, lags, offsets and other models: what a fit to a measured force must not mistake."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import fecm
+from fecm.studies import StudyError
+from fecm.sweeps.alignment import noise, onset
+from fecm.sweeps.identify import IdentifyError
+from tests.calls import call
+
+Floats = NDArray[np.float64]
+NOISE = 0.02  # standard deviation over the peak
+
+# A plate whose first hump is just below half of its peak -----------------------------------------
+
+HUMPS = 1e-6 * np.arange(1.0, 241.0)
+TRUE = {"k": 6e4, "mass": 4e-5, "velocity": 2500.0, "delay": 0.0}
+
+
+def clamped(k: float, mass: float, velocity: float, support: str = "clamped") -> fecm.Deck:
+    """A mass of 40 g on a thin plate, mm-N-s: humps of 480, 288, 361 and 996 N."""
+    return fecm.impact(
+        fecm.Plate.rectangle((120, 80), (12, 8), support=support),
+        fecm.Laminate("[0/90]3s", "IM7/8552", 0.2), fecm.RigidMass(mass),
+        fecm.Contact(k, 1.0, 0.0, 1.5), velocity=velocity, duration=2.4e-4, dt=4e-7,
+        units="mm-N-s", patch="disc:12",
+    )  # fmt: skip
+
+
+@cache
+def humps() -> Floats:
+    """Force of the true values."""
+    result = fecm.run_one(clamped(TRUE["k"], TRUE["mass"], TRUE["velocity"]))
+    return np.interp(HUMPS, result.time, result.force)
+
+
+@cache
+def started(support: str = "clamped") -> fecm.Deck:
+    """Deck with values that are 6 to 17 % off."""
+    return clamped(TRUE["k"] / 1.17, 1.1 * TRUE["mass"], 0.94 * TRUE["velocity"], support)
+
+
+def noisy(force: Floats, seed: int) -> Floats:
+    return force + NOISE * force.max() * np.random.default_rng(seed).normal(size=len(force))
+
+
+def deviations(seed: int, free: list[str]) -> list[float]:
+    """Fitted minus true values over their standard errors."""
+    found = fecm.identify(started(), HUMPS, noisy(humps(), seed), free)
+    assert found.accepted
+    return [(found.values[name] - TRUE[name]) / found.errors[name] for name in free]
+
+
+def assert_inside(seeds: Iterable[int]) -> Floats:
+    """Assert that all values are within four errors, with and without a delay; returns the last."""
+    free = ["k", "mass", "velocity"]
+    for names in (free, [*free, "delay"]):
+        found = np.array([deviations(seed, names) for seed in seeds])
+        assert np.abs(found).max() < 4.0, names
+    return found
+
+
+@pytest.mark.filterwarnings("ignore:. of 240 points:fecm.FecmWarning")
+def test_humps_near_half_of_the_peak_are_neither_refused_nor_shifted() -> None:
+    # With these, the first hump is above half of the largest force.
+    assert_inside([3, 4, 9])
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("ignore:. of 240 points:fecm.FecmWarning")
+def test_100_noises_of_humps_are_fitted_within_four_standard_errors() -> None:
+    assert np.std(assert_inside(range(100)), axis=0) == pytest.approx(np.ones(4), abs=0.25)
+
+
+@pytest.mark.parametrize("free", [["k", "mass", "velocity"], ["k", "mass", "velocity", "delay"]])
+def test_wrong_supports_are_called_a_wrong_model_and_not_a_delay(free: list[str]) -> None:
+    with pytest.raises(IdentifyError, match="the model does not describe the data") as caught:
+        fecm.identify(started("simple"), HUMPS, noisy(humps(), 0), free)
+    assert "delay" not in str(caught.value)
+
+
+def test_a_wrong_model_that_is_not_refused_is_not_accepted() -> None:
+    force = humps()[::-1].copy()  # the largest hump first
+    with pytest.warns(fecm.FecmWarning, match="the model does not describe the data"):
+        found = fecm.identify(started(), HUMPS, force, ["velocity"])
+    assert not found.accepted
+
+
+@pytest.mark.parametrize("level", [0.05, 0.5, 3.0])
+def test_noise_is_found_under_a_smooth_force(level: float) -> None:
+    errors = level * np.random.default_rng(2).normal(size=2000)
+    force = 100.0 * np.sin(np.linspace(0.0, np.pi, 2000)) + errors
+    assert noise(force) == pytest.approx(level, rel=0.1)
+
+
+def test_an_onset_is_that_of_the_first_hump_above_any_base_line() -> None:
+    time = np.linspace(0.0, 1.0, 1001)
+    force = np.where(time < 0.3, 0.0, 20.0) + np.where(time < 0.7, 0.0, 80.0)
+    assert onset(time, force, 0.1) == pytest.approx(0.3)
+    assert onset(time, force + 15.0, 0.1) == pytest.approx(0.3)
+    force[100] = 100.0  # a single point
+    assert onset(time, force, 0.1) == pytest.approx(0.3)
+
+
+# A zero error of the force, and a trigger ---------------------------------------------------------
+
+LONG = np.linspace(0.0, 3e-3, 1000)
+BASE, LATE = 60.0, 2.3e-4
+HEAVY = {"k": 1e5, "mass": 5e-4, "velocity": 2000.0, "offset": BASE, "delay": LATE}
+
+
+def heavy(k: float, mass: float, velocity: float, thickness: float = 0.18) -> fecm.Deck:
+    """A mass of 0.5 kg that leaves the plate after 2.1 ms, mm-N-s; its peak is 2080 N."""
+    return fecm.impact(
+        fecm.Plate.rectangle((100, 100), (6, 6), support="simple"),
+        fecm.Laminate("[45/0/-45/90]2s", "AS4/8552", thickness), fecm.RigidMass(mass),
+        fecm.Contact(k, 1.0, 0.0, 1.5), velocity=velocity, duration=3e-3, dt=5e-7,
+        units="mm-N-s", patch="hertz:18",
+    )  # fmt: skip
+
+
+def recorded(offset: float = 0.0, delay: float = 0.0) -> Floats:
+    """A noisy force of the true values with errors of the record."""
+    time, force = _heavy_force()
+    return noisy(np.interp(LONG - delay, time, force), seed=1) + offset
+
+
+@cache
+def _heavy_force() -> tuple[Floats, Floats]:
+    result = fecm.run_one(heavy(HEAVY["k"], HEAVY["mass"], HEAVY["velocity"]))
+    return np.append([-1.0, 0.0], result.time), np.append([0.0, 0.0], result.force)
+
+
+@cache
+def doubted() -> fecm.Deck:
+    return heavy(1.15 * HEAVY["k"], 1.08 * HEAVY["mass"], 0.94 * HEAVY["velocity"])
+
+
+def found_inside(force: Floats, more: list[str], errors: float) -> fecm.Identification:
+    found = fecm.identify(doubted(), LONG, force, ["k", "mass", "velocity", *more])
+    assert found.accepted
+    for name, value in found.values.items():
+        assert abs(value - HEAVY[name]) < errors * found.errors[name], name
+    return found
+
+
+def test_an_offset_is_fitted_or_proposed() -> None:
+    force = recorded(offset=BASE)
+    found_inside(force, ["offset"], errors=3.0)
+    with pytest.warns(fecm.FecmWarning, match=r"fit offset too: with offset 5\d\.\d N the rms"):
+        found = fecm.identify(doubted(), LONG, force, ["k", "mass", "velocity"])
+    assert not found.accepted
+
+
+def test_an_offset_shows_before_the_contact_though_the_model_is_wrong() -> None:
+    time = np.concatenate([np.linspace(-4e-5, -1e-6, 40), HUMPS])
+    force = np.concatenate([np.zeros(40), humps()]) + 30.0
+    with pytest.warns(fecm.FecmWarning, match="fit offset too: without contact the measured force"):
+        fecm.identify(started("simple"), time, noisy(force, 0), ["velocity"])
+
+
+@pytest.mark.parametrize("late", [LATE, -LATE])
+def test_a_delay_is_fitted_or_proposed(late: float) -> None:
+    force = recorded(delay=late)
+    with pytest.warns(fecm.FecmWarning, match=rf"fit delay too: with delay {late:.1g}\d* s"):
+        found = fecm.identify(doubted(), LONG, force, ["k", "mass", "velocity"])
+    assert not found.accepted
+
+
+def test_delay_and_offset_are_fitted_together() -> None:
+    found_inside(recorded(BASE, LATE), ["delay", "offset"], errors=3.0)
+
+
+def test_points_of_the_contact_beyond_the_run_are_refused_and_others_are_not() -> None:
+    longer = np.linspace(0.0, 3e-2, 10000)
+    time, force = _heavy_force()
+    force = np.interp(longer, time, force, right=0.0)
+    with pytest.warns(fecm.FecmWarning, match="9000 of 10000 points are outside"):
+        assert fecm.identify(doubted(), longer, force, ["k", "mass", "velocity"]).accepted
+    short = HUMPS < 1.7e-4
+    deck = started().with_(duration=1.2e-4)
+    with pytest.raises(StudyError, match="more than 20 % of the points of the contact"):
+        fecm.identify(deck, HUMPS[short], humps()[short], ["k", "velocity"])
+
+
+# Errors of the plate ------------------------------------------------------------------------------
+
+
+def test_errors_of_the_plate_are_those_of_a_fit_with_another_plate() -> None:
+    free = ["k", "mass", "velocity", "offset"]
+    force = np.interp(LONG, *_heavy_force()) + BASE
+    found = fecm.identify(doubted(), LONG, force, free)
+    for name, values in (("thickness", {"thickness": 1.01 * 16 * 0.18}), ("e1", {})):
+        own = doubted().require(fecm.deck.model.Material).ply.e1
+        other = doubted().with_(**(values or {"e1": 1.01 * own}))
+        again = fecm.identify(other, LONG, force, free)
+        for one in free[:3]:
+            change = again.values[one] - found.values[one]
+            expected = pytest.approx(change, rel=0.15)  # second order: 1 % is 3 % of D
+            assert found.plate_errors[name][one] == expected, (name, one)
+
+
+# The command --------------------------------------------------------------------------------------
+
+
+def write(path: Path, time: Floats, force: Floats) -> None:
+    np.savetxt(path, np.array([time, force]).T, delimiter=",", header="time,force", comments="")
+
+
+def test_the_command_fails_where_values_are_not_to_be_used(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(doubted().to_text())
+    write(tmp_path / "constant.csv", LONG, np.full(len(LONG), 1000.0))
+    done = call("identify", "d.inp", "constant.csv", "--free", "k", cwd=tmp_path)
+    assert (done.exit_code, done.stdout) == (1, "")
+    assert "the measured force is constant, 1e+03; there is no contact in it" in done.stderr
+    write(tmp_path / "offset.csv", LONG, recorded(BASE))
+    free = "k,mass,velocity"
+    done = call("identify", "d.inp", "offset.csv", "--free", free, cwd=tmp_path)
+    assert done.exit_code == 1
+    assert "fit offset too" in done.stderr
+    done = call("identify", "d.inp", "offset.csv", "--free", f"{free},offset", cwd=tmp_path)
+    assert done.exit_code == 0
+    assert "1 % more in the deck   thickness          e1" in done.stdout
