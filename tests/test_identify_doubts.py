@@ -204,7 +204,7 @@ def test_errors_of_the_plate_are_those_of_a_fit_with_another_plate() -> None:
         again = fecm.identify(other, LONG, force, free)
         for one in free[:3]:
             change = again.values[one] - found.values[one]
-            expected = pytest.approx(change, rel=0.15)  # second order: 1 % is 3 % of D
+            expected = pytest.approx(change, rel=0.1)
             assert found.plate_errors[name][one] == expected, (name, one)
 
 

@@ -123,7 +123,7 @@ def during_run(time: Floats, clock: Floats, delay: float) -> NDArray[np.bool_]:
 def share_lost(force: Floats, inside: NDArray[np.bool_]) -> float:
     """Share of the points of the contact that are outside the run of the deck."""
     loaded = contact_points(force)
-    return float(np.count_nonzero(loaded & ~inside) / max(1, np.count_nonzero(loaded)))
+    return float(np.mean(~inside[loaded]))
 
 
 def solve(
@@ -138,7 +138,7 @@ def solve(
     def within(x: Floats) -> NDArray[np.bool_]:
         return during_run(measured.time, clock, scaling.values(x).get(DELAY, 0.0))
 
-    inside = within(x)
+    inside, found = within(x), None
     for number in range(MOST_FITS):
         if np.count_nonzero(inside) < POINTS:
             return None

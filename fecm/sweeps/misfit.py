@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +24,9 @@ UNDESCRIBED = 0.05
 CERTAIN = 5.0  # standard errors from 0, beyond which a delay or an offset is not noise
 HALF = 0.5  # of the systematic part of the residual, which a proposal must remove
 QUIET, LEAST_QUIET = 1e-3, 10  # share of the peak without contact, and fewest such points
-CHANGED = 0.01  # relative change of a property of the plate
+# Relative change of a property of the plate that gives the derivatives, and the one reported:
+# vibrations shift in phase, so that larger changes are not linear.
+CHANGED, PERCENT = 1e-3, 0.01
 PROPERTIES = ("thickness", "e1")
 
 
@@ -48,13 +50,15 @@ def undescribed(found: Solution, units: dict[str, str]) -> str:
         return ""
     rms = f"{math.sqrt(found.variance):.3g} {unit_of('force', units)}".rstrip()
     share = 100.0 * math.sqrt(found.variance) / float(np.std(found.force))
-    return wrong_model(f"the rms of the residual, {rms}, is {share:.0f} % of the standard deviation")
+    return wrong_model(
+        f"the rms of the residual, {rms}, is {share:.0f} % of the standard deviation"
+    )
 
 
 def wrong_model(why: str) -> str:
     """Say that the model does not describe the data, and what to look at."""
     hint = "compare supports, laminate, patch, mesh and filter with those of the test"
-    return f"the model does not describe the data: {why} of the measured force; {hint}"
+    return f"the model does not describe the data: {why}; {hint}"
 
 
 def _describes(residual: Floats, force: Floats) -> bool:
@@ -188,7 +192,7 @@ def plate_errors(
             except FecmError:
                 continue
             x = np.linalg.lstsq(found.jacobian, found.model - force, rcond=None)[0]
-            changes = CHANGED / change * found.scaling.slopes(found.x) * x
+            changes = PERCENT / change * found.scaling.slopes(found.x) * x
             errors[name] = dict(zip(found.scaling.start, changes.tolist(), strict=True))
             break
     return errors
