@@ -7,14 +7,17 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import fecm
 from fecm.deck.model import Deck, Patch
 from fecm.sweeps.cases import CasesError
-from fecm.sweeps.convergence import convergence
+from fecm.sweeps.convergence import Convergence, convergence
 from tests.builders import REPORT_PLY, table
 from tests.calls import assert_unusable, call
 from tests.decks import small
+
+Floats = NDArray[np.float64]
 
 # Peak force of the simply supported cross-ply plate under a disc, from the exact series.
 RADIUS = 0.25
@@ -37,14 +40,46 @@ def plate() -> Deck:
         )  # fmt: skip
 
 
-@pytest.mark.parametrize("order", [1.0, 2.0, 3.5])
+def found_from(values: Floats | list[float], nodes: int = 9) -> Convergence:
+    """Order, limit and band of values on meshes, each twice as fine as the last."""
+    factors = np.array([1, 2, 4, 8])[: len(values)]
+    summary = {"peak_force": np.array(values)}
+    return convergence({"refine": factors}, summary, nodes)["peak_force"]
+
+
+def power_law(order: float) -> Floats:
+    return 80.0 - 3.0 * (1.0 / np.array([1, 2, 4, 8])) ** order
+
+
+@pytest.mark.parametrize("order", [1.6, 2.0, 3.5])
 def test_a_power_law_has_its_order_and_its_limit(order: float) -> None:
-    factors = np.array([1, 2, 4, 8])
-    values = 80.0 - 3.0 * (1.0 / factors) ** order
-    found = convergence({"refine": factors}, {"peak_force": values})["peak_force"]
+    values = power_law(order)
+    found = found_from(values)
     assert found.order == pytest.approx(order, rel=1e-9)
     assert found.limit == pytest.approx(80.0, rel=1e-12)
+    assert found.band == pytest.approx(1.25 * (80.0 - values[-1]), rel=1e-9)
     assert not found.remark
+
+
+@pytest.mark.parametrize(("order", "nodes"), [(1.0, 9), (5.28, 9), (3.5, 4)])
+def test_an_order_that_the_scheme_does_not_have_is_not_extrapolated(
+    order: float, nodes: int
+) -> None:
+    values = power_law(order)
+    found = found_from(values, nodes)
+    assert found.order == pytest.approx(order, rel=1e-9)
+    assert "not yet asymptotic" in found.remark
+    used = min(order, 4.0 if nodes == 9 else 2.0)
+    rest = (values[-1] - values[-2]) / (2.0**used - 1.0)
+    assert found.limit == pytest.approx(values[-1] + rest, rel=1e-12)
+    assert found.band == pytest.approx(3.0 * rest, rel=1e-9)
+
+
+def test_the_band_contains_the_limit_of_the_series_where_the_order_is_too_high() -> None:
+    # Peak forces of the cross-ply plate with 12 x 8 elements, and Hertz's pressure on 0.25 in.
+    found = found_from([98.01768, 92.90860, 92.77713])
+    assert found.order > 5.0
+    assert abs(92.77713 - 92.7672) < found.band < 0.05
 
 
 @pytest.mark.parametrize(
@@ -54,14 +89,13 @@ def test_a_power_law_has_its_order_and_its_limit(order: float) -> None:
         ([1.0, 2.0, 3.0], np.nan, "does not converge"),
         ([1.0, 2.0, 2.0], 2.0, "equal"),
         ([1.0, np.nan, 2.0], np.nan, "missing"),
-        ([1.0, 4.0], 5.0, "order 2 is assumed"),
+        ([1.0, 4.0], 5.0, "order 2 is assumed, not observed"),
     ],
 )
 def test_no_order_is_stated_where_there_is_none(
     values: list[float], limit: float, remark: str
 ) -> None:
-    factors = np.array([1, 2, 4])[: len(values)]
-    found = convergence({"refine": factors}, {"impulse": np.array(values)})["impulse"]
+    found = found_from(values)
     np.testing.assert_equal(found.limit, limit)
     assert remark in found.remark
 
@@ -81,11 +115,12 @@ def test_order_and_limit_of_three_meshes_are_printed_and_stored(tmp_path: Path) 
     done = call("sweep", "plate.inp", "--refine", "1,2,4", "-o", "s.h5", cwd=tmp_path)
     assert done.exit_code == 0
     (line,) = [line for line in done.stdout.splitlines() if "peak_force" in line]
-    order, limit = map(float, line.split()[-2:])
+    order, limit, band = (float(word.removeprefix("±")) for word in line.split()[-3:])
     with h5py.File(tmp_path / "s.h5") as file:
         stored = dict(file["convergence/peak_force"].attrs)
     assert stored["order"] == pytest.approx(order, abs=5e-3)
     assert stored["limit"] == pytest.approx(limit, rel=1e-5)
+    assert stored["band"] == pytest.approx(band, rel=1e-1)
     assert limit == pytest.approx(PEAK, rel=1e-3)
     assert order > 1.0
     assert fecm.load_sweep(tmp_path / "s.h5").convergence["peak_force"].order == stored["order"]

@@ -47,8 +47,8 @@ NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
 @option("--cases", "table", type=DECK_PATH, metavar="CASES.csv",
         help="A table instead of --vary: a header of names, one row per case.")  # fmt: skip
 @option("--refine", "factors", type=list_of("FACTOR,...", click.IntRange(1, 8)), metavar="1,2,4",
-        help="Instead: divide the sides of all elements and DT by factors; order and limit of "
-             "every quantity.")  # fmt: skip
+        help="Instead: divide the sides of all elements and DT by factors; order, limit and error "
+             "band of every quantity.")  # fmt: skip
 @option("--random", "laws", type=Parsed(inputs.parse_random, "NAME=LAW", NAMED), multiple=True,
         help="Random value: normal:MEAN,SD, lognormal:MEDIAN,SIGMA, uniform:A,B or "
              "triangular:A,MODE,B; may be repeated, together with --vary.")  # fmt: skip
@@ -167,7 +167,7 @@ def sweep(
     else:
         parts.clear()
     echo(result.title or "sweep")
-    for line in (*summary(result), *table_of(result.cases, result.summary)):
+    for line in (*summary(result), *table_of(result.cases, result.summary, result.convergence)):
         echo(f"  {line}")
     for line in () if result.random is None else tables(result.random, result.unit):
         echo(f"  {line}".rstrip())

@@ -165,7 +165,7 @@ def sweep(
         Cases instead, one mapping each.
     refine : sequence of int, optional
         Factors 1, 2, 4, 8 or a part of them, instead: the sides of all elements and DT are divided
-        by each.  :attr:`SweepResult.convergence` has observed orders and limits.
+        by each.  :attr:`SweepResult.convergence` has orders, limits and error bands.
     random : mapping of str to str, optional
         Laws of random values by name: ``"normal:MEAN,SD"``, ``"lognormal:MEDIAN,SIGMA"``,
         ``"uniform:A,B"`` or ``"triangular:A,MODE,B"``.  With `vary` all combinations get the same

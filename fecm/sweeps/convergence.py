@@ -1,6 +1,7 @@
 """Convergence of meshes: orders and limits of a refined sweep, and the mesh error of a peak force.
 
-P. J. Roache, Verification and Validation in Computational Science and Engineering, 1998, chapter 5.
+P. J. Roache, Verification and Validation in Computational Science and Engineering, 1998, chapter 5;
+the error band is his grid convergence index (J. Fluids Engineering 116, 1994, 405-413).
 """
 
 from __future__ import annotations
@@ -28,6 +29,10 @@ from fecm.sweeps.vary import apply_case, check_deck, stable_time_step, with_time
 
 FACTORS = "1,2,4,8"
 ASSUMED, LOWEST = 2.0, 0.5  # order that two factors assume, and the lowest that gives a limit
+# Order of the scheme in time, that of all elements in space but those of nine nodes, and theirs; and
+# how far an observed order may be from them.
+ORDER, NINE_NODE_ORDER, NEAR = 2.0, 4.0, 0.5
+OBSERVED, UNCONFIRMED = 1.25, 3.0  # safety factors of the error band
 SAME = 1e-12  # relative change that is rounding
 COUNTS = ("contacts",)  # counts, which have no order
 
@@ -37,8 +42,13 @@ class Convergence:
     """Limit of a quantity for fine meshes and small time steps."""
 
     order: float  # observed order; NaN if there is none
-    limit: float  # Richardson extrapolation from the last values; NaN if there is none
-    remark: str  # empty, or why there is no order
+    # Richardson extrapolation from the last values with the observed order, or with the highest of
+    # the scheme if that is lower; NaN if there is none.
+    limit: float
+    # The limit is expected within plus and minus this band of the finest value; NaN without limit or
+    # order.
+    band: float
+    remark: str  # empty, or what is doubtful about order and band
 
 
 def refined_cases(checked: Problem, factors: Sequence[int]) -> list[Case]:
@@ -61,46 +71,60 @@ def refined_cases(checked: Problem, factors: Sequence[int]) -> list[Case]:
 
 
 def convergence(
-    cases: Mapping[str, NDArray[Any]], summary: Mapping[str, NDArray[Any]]
+    cases: Mapping[str, NDArray[Any]], summary: Mapping[str, NDArray[Any]], nodes: int
 ) -> dict[str, Convergence]:
-    """Order and limit of every quantity of a refined sweep; empty for other sweeps."""
+    """Order, limit and error band of every quantity of a refined sweep; empty for other sweeps.
+
+    `nodes` are those of an element, which decide the order of the scheme.
+    """
     if REFINE not in cases:
         return {}
     numbers = {n: values for n, values in summary.items() if n not in ("status", *COUNTS)}
-    return {name: _limit(values[-3:]) for name, values in numbers.items()}
+    highest = NINE_NODE_ORDER if nodes == 9 else ORDER
+    return {name: _limit(values[-3:], highest) for name, values in numbers.items()}
 
 
-def _limit(values: Floats) -> Convergence:
-    """Order and limit of the values of two or three meshes, each twice as fine as the last."""
+def _limit(values: Floats, highest: float) -> Convergence:
+    """Order, limit and band of the values of two or three meshes, each twice as fine as the last."""
     none, (*earlier, before, last) = math.nan, values.tolist()
     change = last - before
     if not np.isfinite(values).all():
-        return Convergence(none, none, "a value is missing")
+        return Convergence(none, none, none, "a value is missing")
     if abs(change) <= SAME * abs(last):
-        return Convergence(none, last, "the last two are equal")
+        return Convergence(none, last, none, "the last two are equal")
     if not earlier:
-        return Convergence(none, last + change / (2.0**ASSUMED - 1.0), "order 2 is assumed")
+        rest = change / (2.0**ASSUMED - 1.0)
+        remark = f"order {ASSUMED:g} is assumed, not observed"
+        return Convergence(none, last + rest, UNCONFIRMED * abs(rest), remark)
     ratio = (before - earlier[0]) / change
     if ratio <= 0.0:
-        return Convergence(none, none, "not monotone: no order")
+        return Convergence(none, none, none, "not monotone: no order")
     order = math.log2(ratio)
     if order < LOWEST:
-        return Convergence(order, none, "does not converge at these sizes")
-    return Convergence(order, last + change / (ratio - 1.0), "")
+        return Convergence(order, none, none, "does not converge at these sizes")
+    rest = change / (2.0 ** min(order, highest) - 1.0)
+    if ORDER - NEAR <= order <= highest + NEAR:
+        return Convergence(order, last + rest, OBSERVED * abs(rest), "")
+    scheme = f"{ORDER:g}" if highest == ORDER else f"{ORDER:g} to {highest:g}"
+    remark = f"not yet asymptotic: the scheme has order {scheme}"
+    return Convergence(order, last + rest, UNCONFIRMED * abs(rest), remark)
 
 
-def table(cases: Mapping[str, NDArray[Any]], summary: Mapping[str, NDArray[Any]]) -> list[str]:
-    """Lines with the values of every case, and order and limit of every quantity."""
-    found = convergence(cases, summary)
+def table(
+    cases: Mapping[str, NDArray[Any]], summary: Mapping[str, NDArray[Any]],
+    found: Mapping[str, Convergence],
+) -> list[str]:  # fmt: skip
+    """Lines with the values of every case, and order, limit and band of every quantity."""
     if not found:
         return []
-    rows = [[n, *(f"{v:.6g}" for v in cases[n].tolist()), "", "", ""] for n in cases]
-    rows[0][-3:-1] = "order", "limit"
+    rows = [[n, *(f"{v:.6g}" for v in cases[n].tolist()), "", "", "", ""] for n in cases]
+    rows[0][-4:-1] = "order", "limit", "band"
     for name, one in found.items():
         order = "" if math.isnan(one.order) else f"{one.order:.2f}"
         limit = "" if math.isnan(one.limit) else f"{one.limit:.6g}"
+        band = "" if math.isnan(one.band) else f"±{one.band:.2g}"
         values = (f"{value:.6g}" for value in summary[name].tolist())
-        rows.append([name, *values, order, limit, one.remark])
+        rows.append([name, *values, order, limit, band, one.remark])
     names, *numbers, remarks = zip(*rows, strict=True)
     justified = ([text.rjust(max(map(len, column))) for text in column] for column in numbers)
     return aligned(list(zip(names, *justified, remarks, strict=True)))

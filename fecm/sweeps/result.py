@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from fecm._errors import did_you_mean
 from fecm._tables import html_table
 from fecm._version import __version__
+from fecm.api import read_one
 from fecm.deck.model import Delamination
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.results import schema
 from fecm.results.metrics import COLUMNS, FOUND, SUMMARY, THRESHOLD, described
-from fecm.sweeps.cases import pair
+from fecm.sweeps.cases import REFINE, pair
 from fecm.sweeps.convergence import Convergence, convergence
 from fecm.sweeps.plan import RUN, STILL, Forces, Outcome, Plan
 from fecm.sweeps.random_result import RandomResult, attributes, evaluate, random_of, stored
@@ -192,8 +193,10 @@ class SweepResult:
 
     @property
     def convergence(self) -> dict[str, Convergence]:
-        """Order and limit of every quantity of a refinement study; empty for other sweeps."""
-        return convergence(self.cases, self.summary)
+        """Order, limit and band of every quantity of a refinement study; empty for others."""
+        if REFINE not in self.cases:
+            return {}
+        return convergence(self.cases, self.summary, read_one(self.deck).control.nen)
 
     @property
     def notes(self) -> tuple[str, ...]:
