@@ -387,6 +387,8 @@ def test_the_cost_is_told_beforehand(folder: Path) -> None:
     assert "17 draws share 1 plate" in done.stderr
     assert "17 samples are no power of 2" in done.stderr
     assert "take 16" in done.stderr
+    done = sweep(folder, "--random", "velocity=lognormal:50,2", "--samples", 16, "--design", "mc")
+    assert "of the logarithm; a standard deviation of 2 is SIGMA 0.04\n" in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -403,7 +405,9 @@ def test_the_cost_is_told_beforehand(folder: Path) -> None:
         (("--random", "kk=uniform:1,2", "--samples", 16), "the names are velocity"),
         (("--random", "k=uniform:1e6,2e6", "--samples", 15), "at least 16"),
         (("--random", "k=uniform:1e6,2e6"), "needs --samples"),
-        (("--random", "k=lognormal:1e6,900", "--samples", 16), "beyond the range"),
+        (("--random", "k=lognormal:42000,8000", "--samples", 16),
+         "of the logarithm; a standard deviation of 8000 is SIGMA 0.19; it is at most 3"),
+        (("--random", "k=lognormal:1e308,3", "--samples", 16), "beyond the range"),
         (("--random", "k=uniform:1e6,2e6", "--samples", 16, "--seed", -1), "seed"),
         (("--random", "k=uniform:1e6,2e6", "--samples", 2_000_000), "at most 1000000"),
         (("--random", "k=uniform:1,2", "--random", "k=uniform:1,2", "--samples", 16), "twice"),

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm.sweeps.result import SweepResult, summary
 from tests.calls import assert_unusable, call
 from tests.decks import PROGRAM
 from tests.decks import small as small_of
@@ -59,7 +60,7 @@ def test_info_tells_the_cases_and_what_came_out(swept: Path) -> None:
     forces = fecm.load_sweep(swept)["peak_force"]
     for line in (
         "cases 6, 3 failed",
-        f"largest peak {np.nanmax(forces):.6g} (velocity 150.0, layup [0/90])",
+        f"largest peak {np.nanmax(forces):.6g} (velocity 150, layup [0/90])",
         "velocity 6 float64 length/time 50 to 150",
         "layup 6 text 2 different",
         "peak_force 6 float64 force "
@@ -67,6 +68,18 @@ def test_info_tells_the_cases_and_what_came_out(swept: Path) -> None:
         "cases: values of what varies",
     ):
         assert line in text
+
+
+def test_values_in_the_summary_have_the_digits_that_tell_cases_apart() -> None:
+    thirds = np.array([1e6, 8.5e6 / 3.0, 3e6])
+    close = np.array([1e6, 1e6 + 0.125, 3e6])
+    for k, velocity, shown in (
+        (thirds, 50.0, "k 2.83333e+06"), (close, 50.0, "k 1000000.1"), (thirds, 1e-3, "velocity 0.001")
+    ):  # fmt: skip
+        cases = {"k": k, "velocity": np.full(3, velocity)}
+        columns = {"peak_force": np.array([1.0, 5.0, 2.0]), "status": np.full(3, "ok")}
+        lines = summary(SweepResult(cases, columns, np.ones(3), np.ones(3)))
+        assert any(shown in line for line in lines), lines
 
 
 def test_info_tells_programs_the_same(swept: Path) -> None:

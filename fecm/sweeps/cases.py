@@ -62,6 +62,8 @@ LAWS: dict[str, tuple[str, str, Callable[..., bool]]] = {
     "triangular": ("A,MODE,B", "MODE must be from A to B, and A less than B",
                    lambda a, mode, b: a < b and a <= mode <= b),
 }  # fmt: skip
+# Largest SIGMA of a lognormal law, and the one from which a note asks whether it is meant.
+WIDEST, WIDE = 3.0, 1.0
 DesignKind = Literal["lhs", "sobol", "mc"]
 DESIGNS: tuple[DesignKind, ...] = get_args(DesignKind)
 FEWEST = 16  # fewest draws
@@ -343,7 +345,19 @@ def parse_law(name: str, text: str, *, free: bool = False) -> Law:
         raise CasesError(f"{name}: `{text}` is not {kind}:{names} with finite numbers")
     if not holds(*parameters):
         raise CasesError(f"{name}: `{text}`: {rule}")
-    return Law(kind, parameters)
+    law = Law(kind, parameters)
+    if kind == "lognormal" and parameters[1] > WIDEST:
+        raise CasesError(f"{name}: {_of_logarithm(law)}; it is at most {WIDEST:g}")
+    return law
+
+
+def _of_logarithm(law: Law) -> str:
+    """Say that SIGMA of a lognormal law is that of the logarithm, and what it would be of an SD."""
+    median, sigma = law.parameters
+    # The variance is m^2 s (s - 1) with the median m and s = exp(SIGMA^2).
+    meant = math.sqrt(math.log(0.5 + 0.5 * math.hypot(1.0, 2.0 * sigma / median)))
+    text = f"SIGMA of {law} is the standard deviation of the logarithm"
+    return f"{text}; a standard deviation of {sigma:g} is SIGMA {meant:.2g}"
 
 
 def parse_random(text: str) -> tuple[str, Law]:
@@ -392,10 +406,16 @@ def design_of(
 
 def doubt(design: Design) -> str:
     """What is doubtful about a design; empty if nothing is."""
+    texts = [
+        f"{name}: {_of_logarithm(law)}"
+        for name, law in design.laws.items()
+        if law.kind == "lognormal" and law.parameters[1] >= WIDE
+    ]
     if design.kind == "sobol" and design.samples & (design.samples - 1):
         why = "no power of 2, which a Sobol' design needs to be balanced"
-        return f"{design.samples} samples are {why}; take {2 ** round(math.log2(design.samples))}"
-    return ""
+        nearest = 2 ** round(math.log2(design.samples))
+        texts.append(f"{design.samples} samples are {why}; take {nearest}")
+    return "; ".join(texts)
 
 
 def unit_samples(kind: DesignKind, samples: int, columns: int, seed: int) -> Floats:

@@ -40,6 +40,7 @@ WEIGHED = ("mass", "rod_mass", "energy")  # values that the summary shows in g a
 WORDS = 18  # letters of the names in the lines of the summary
 SAME = 1e-9  # distance from the place given, relative to its coordinates, that is rounding
 FORCE = "history/force"
+DIGITS = 6  # of the values of a case, unless others are closer
 LISTED = 5  # reasons of failure that the summary lists
 STATUS = "ok, still in contact, or why the case failed"
 DIMENSIONS = {  # of the values, and of the stored force
@@ -73,12 +74,7 @@ def summary(result: SweepResult) -> list[str]:
         digits = 8 if word == "found" else 6
         for size, case in (("smallest", np.nanargmin(shown)), ("largest", np.nanargmax(shown))):
             texts = [quantity(result[n][case], result.unit(n), digits) for n in names]
-            form = {"f": ".6g"} if result.random is not None else {}  # by the kind of the values
-            values = ", ".join(
-                f"{name} {quantity(v[case], result.unit(name))}" if name in WEIGHED
-                else f"{name} {v[case]:{form.get(v.dtype.kind, '')}}"
-                for name, v in result.cases.items()
-            )  # fmt: skip
+            values = ", ".join(f"{name} {_shown(result, name, int(case))}" for name in result.cases)
             given = f" ({values})" if values else ""
             lines.append(f"{size} {word:{16 - len(size)}} {', '.join(texts)}{given}")
     if "at" in result.cases and "hit_x" in result.summary:
@@ -95,6 +91,20 @@ def summary(result: SweepResult) -> list[str]:
     if result.random is not None and failed:
         lines.append(f"failed share      {(~fine).mean():.3%} of the draws")
     return lines
+
+
+def _shown(result: SweepResult, name: str, case: int) -> str:
+    """Value of a case with six digits, or as many as tell it from those that are not random."""
+    values = result.cases[name]
+    if values.dtype.kind != "f":
+        return str(values[case])
+    digits = DIGITS
+    if result.random is None:
+        size = max(abs(float(values[case])), 1e-300)
+        others = np.abs(values[values != values[case]] - values[case])
+        gap = float(np.min(others / size, initial=1.0))
+        digits = min(max(DIGITS, 1 - math.floor(math.log10(gap))), 17)
+    return quantity(values[case], result.unit(name) if name in WEIGHED else "", digits)
 
 
 def verdict(result: SweepResult) -> str:
