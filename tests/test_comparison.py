@@ -57,6 +57,16 @@ def test_a_late_measurement_is_correlated_as_the_cosine_of_its_delay() -> None:
     assert found.correlation == pytest.approx(math.cos(0.3), abs=1e-3)
 
 
+def test_a_delay_and_an_offset_of_the_measurement_are_subtracted() -> None:
+    time = np.linspace(0.0, 2.0, 4001)
+    force = 3.0 + np.where(time < 0.25, 0.0, 10.0 * np.sin(np.pi * (time - 0.25)))
+    found = half_sine().compare((time, force), delay=0.25, offset=3.0)
+    assert found.rms == pytest.approx(0.0, abs=1e-4)
+    assert half_sine().compare((time, force)).rms > 3.0
+    with pytest.raises(StudyError, match="must be finite"):
+        half_sine().compare((time, force), delay=math.nan)
+
+
 @pytest.mark.parametrize(
     ("head", "factor"),
     [("", 1.0), ("time,force\n", 1.0), ("force (lb),Time [s]\n", 1.0), ("time,transducer\n", 0.5)],
@@ -118,6 +128,17 @@ def test_the_command_draws_a_measurement_and_notes_its_difference(tmp_path: Path
     assert (done.exit_code, done.stdout) == (0, "a-force.png\n")
     assert done.stderr.startswith("fecm: note: contact force of a against m.csv: 10 points from")
     assert "(+100.0%), impulse" in done.stderr
+
+
+def test_the_command_draws_a_measurement_without_its_delay_and_offset(tmp_path: Path) -> None:
+    result = fecm.run_one(small(), output=tmp_path / "a.h5")
+    late = 5.0 * float(result.time[-1])
+    table(tmp_path / "m.csv", "time,force\n", result.time + late, result.force + 7.0)
+    options = ("--delay", repr(late), "--offset", 7)
+    done = call("plot", "a.h5", "--overlay", "m.csv", *options, cwd=tmp_path)
+    assert done.exit_code == 0
+    assert "correlation 1.0000" in done.stderr
+    assert_unusable(call("plot", "a.h5", "--offset", 7, "-o", "b.png", cwd=tmp_path))
 
 
 @pytest.mark.parametrize("column", ["force", "transducer"])

@@ -56,14 +56,19 @@ def _mark_open_ends(axes: Axes, results: Results, width: str) -> None:
         axes.set_title(text, loc="right", fontsize=7.0).set_parse_math(False)
 
 
-def force(results: Results, *, overlay: Source | None = None, width: str = "column") -> Picture:
+def force(
+    results: Results, *, overlay: Source | None = None, delay: float = 0.0, offset: float = 0.0,
+    width: str = "column",
+) -> Picture:  # fmt: skip
     """Contact force and transducer against time; of several results, one above the other.
 
     The transducers of rigid masses show the contact force and are not drawn again.  A dashed line
     marks the delamination threshold of a result that has one.  `overlay` is a
     measured force: a CSV file with the columns time and force (or transducer), or times and forces,
-    in the deck's units.
+    in the deck's units.  `delay` and `offset` are subtracted from its times and forces.
     """
+    if overlay is None and (delay or offset):
+        raise PlotError("delay and offset are those of a measured force; give an overlay too")
     style.limit_count(len(results), "forces")
     paths = ("history/time", "history/force", "history/transducer")
     drawn = {name: data.require(result, name, *paths) for name, result in results.items()}
@@ -74,7 +79,8 @@ def force(results: Results, *, overlay: Source | None = None, width: str = "colu
     measured = None
     if overlay is not None:
         first = next(iter(results.values()))
-        measured = measurement_of(overlay, declared_units(first.attributes))
+        units = declared_units(first.attributes)
+        measured = measurement_of(overlay, units).corrected(delay, offset)
         forces.append(measured.force)
     pound = style.scale_of(results, "force", [*forces, np.array(list(limits.values()))])
     equal = all(np.array_equal(c, t) for _, c, t in drawn.values())  # of rigid masses

@@ -402,7 +402,13 @@ class Result(schema.Contact):
 
         return plot(kind, {self.title or "the result": self}, path, ax, **options)
 
-    def compare(self, measured: str | Path | tuple[Any, Any]) -> Comparison:
+    def compare(
+        self,
+        measured: str | Path | tuple[Any, Any],
+        *,
+        delay: float = 0.0,
+        offset: float = 0.0,
+    ) -> Comparison:
         """Compare the contact force, or the transducer, with a measured one.
 
         Parameters
@@ -410,6 +416,9 @@ class Result(schema.Contact):
         measured : str, Path or tuple
             CSV file with the columns time and force (or transducer), or times and forces, in the
             deck's units.
+        delay, offset : float
+            Measured time of the first contact, and measured force without a contact, which are
+            subtracted; :func:`fecm.identify` fits them.
 
         Returns
         -------
@@ -428,7 +437,8 @@ class Result(schema.Contact):
         """
         from fecm.studies.comparison import compare, measurement_of
 
-        return compare(self, measurement_of(measured, declared_units(self.attributes)))
+        given = measurement_of(measured, declared_units(self.attributes))
+        return compare(self, given.corrected(delay, offset))
 
     def __getitem__(self, path: str) -> Array:
         name = path.strip("/")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,21 @@ class Measurement:
     def quantity(self) -> str:
         """The column in words."""
         return "contact force" if self.column == "force" else self.column
+
+    def corrected(self, delay: float, offset: float) -> Measurement:
+        """The measurement without a delay of its times and an offset of its force.
+
+        They have the signs of ``fecm identify``: `delay` is the measured time at which the
+        projectile touches the plate, `offset` the measured force without a contact.  Raises
+        StudyError if one is not finite.
+
+        >>> late = Measurement("m", "force", np.array([1.0, 2.0]), np.array([5.0, 6.0]))
+        >>> late.corrected(1.0, 5.0).force
+        array([0., 1.])
+        """
+        if not (math.isfinite(delay) and math.isfinite(offset)):
+            raise StudyError(f"delay and offset must be finite, not {delay:g} and {offset:g}")
+        return replace(self, time=self.time - delay, force=self.force - offset)
 
 
 @frozen
