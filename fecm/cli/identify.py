@@ -75,6 +75,7 @@ def identify(
         echo(f"points       {len(found.time)}, {found.dof} degrees of freedom")
         echo(f"residual     {rms} rms, {100.0 * found.share:.2g} % of the peak")
         echo(f"converged    {'yes' if found.converged else 'no'}")
+        echo(f"accepted     {'yes' if found.accepted else 'no'}")
         for name, value in found.values.items():
             error, start = found.errors[name], found.start[name]
             echo(f"{name:<11}  {value:.5g} ± {error:.2g}, from {start:.5g}")

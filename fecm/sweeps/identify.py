@@ -194,7 +194,7 @@ def identify(
     return found
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=4)
 def _shared(deck: Deck) -> Runs:
     """The function that runs cases of a deck by one response of its plate."""
     problem = problem_of(deck)
