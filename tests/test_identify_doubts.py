@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm.studies import StudyError
-from fecm.sweeps.alignment import noise, onset
+from fecm.sweeps.alignment import level, noise, onset
 from fecm.sweeps.identify import IdentifyError
 from tests.calls import call
 
@@ -94,11 +94,11 @@ def test_a_wrong_model_that_is_not_refused_is_not_accepted() -> None:
     assert not found.accepted
 
 
-@pytest.mark.parametrize("level", [0.05, 0.5, 3.0])
-def test_noise_is_found_under_a_smooth_force(level: float) -> None:
-    errors = level * np.random.default_rng(2).normal(size=2000)
+@pytest.mark.parametrize("deviation", [0.05, 0.5, 3.0])
+def test_noise_is_found_under_a_smooth_force(deviation: float) -> None:
+    errors = deviation * np.random.default_rng(2).normal(size=2000)
     force = 100.0 * np.sin(np.linspace(0.0, np.pi, 2000)) + errors
-    assert noise(force) == pytest.approx(level, rel=0.1)
+    assert noise(force) == pytest.approx(deviation, rel=0.1)
 
 
 def test_an_onset_is_that_of_the_first_hump_above_any_base_line() -> None:
@@ -108,6 +108,12 @@ def test_an_onset_is_that_of_the_first_hump_above_any_base_line() -> None:
     assert onset(time, force + 15.0, 0.1) == pytest.approx(0.3)
     force[100] = 100.0  # a single point
     assert onset(time, force, 0.1) == pytest.approx(0.3)
+
+
+def test_the_level_of_an_onset_is_that_of_the_noise_and_not_half_of_the_peak() -> None:
+    assert level(humps()) == 0.1
+    errors = 0.05 * humps().max() * np.random.default_rng(5).normal(size=len(HUMPS))
+    assert level(humps() + errors) == pytest.approx(0.25, rel=0.25)
 
 
 # A zero error of the force, and a trigger ---------------------------------------------------------

@@ -100,6 +100,11 @@ def test_no_order_is_stated_where_there_is_none(
     assert remark in found.remark
 
 
+def test_the_band_of_two_meshes_holds_down_to_order_1() -> None:
+    values = power_law(1.0)[:2]
+    assert found_from(values).band == pytest.approx(80.0 - values[-1], rel=1e-12)
+
+
 def test_the_limit_of_two_meshes_is_that_of_the_series() -> None:
     found = fecm.sweep(plate(), refine=[1, 2])
     assert found["elements"].tolist() == [216, 864]
