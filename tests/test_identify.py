@@ -14,7 +14,7 @@ import fecm
 from fecm.plot.histories import fit_picture
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import filter_of
-from fecm.sweeps.identify import IdentifyError
+from fecm.sweeps.alignment import IdentifyError
 from tests.calls import Done, assert_unusable, call
 from tests.decks import PROGRAM, small
 

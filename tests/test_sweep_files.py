@@ -74,8 +74,10 @@ def test_values_in_the_summary_have_the_digits_that_tell_cases_apart() -> None:
     thirds = np.array([1e6, 8.5e6 / 3.0, 3e6])
     close = np.array([1e6, 1e6 + 0.125, 3e6])
     for k, velocity, shown in (
-        (thirds, 50.0, "k 2.83333e+06"), (close, 50.0, "k 1000000.1"), (thirds, 1e-3, "velocity 0.001")
-    ):  # fmt: skip
+        (thirds, 50.0, "k 2.83333e+06"),
+        (close, 50.0, "k 1000000.1"),
+        (thirds, 1e-3, "velocity 0.001"),
+    ):
         cases = {"k": k, "velocity": np.full(3, velocity)}
         columns = {"peak_force": np.array([1.0, 5.0, 2.0]), "status": np.full(3, "ok")}
         lines = summary(SweepResult(cases, columns, np.ones(3), np.ones(3)))

@@ -77,9 +77,11 @@ def _by_name(_: Any, __: Any, pairs: tuple[tuple[str, str], ...]) -> dict[str, s
         help="Measured force to draw over that of the kind force: columns time and force (or "
              "transducer) in the deck's units.  Notes compare both.")  # fmt: skip
 @option("--delay", type=Finite(), metavar="TIME",
-        help="Measured time of the first contact in --overlay, subtracted.  [default: 0]")  # fmt: skip
+        help="Measured time of the first contact in --overlay, subtracted.  [default: "
+             "0]")  # fmt: skip
 @option("--offset", type=Finite(), metavar="FORCE",
-        help="Measured force without a contact in --overlay, subtracted.  [default: 0]")  # fmt: skip
+        help="Measured force without a contact in --overlay, subtracted.  [default: "
+             "0]")  # fmt: skip
 @option("--along", type=click.Choice(["x", "y"]), help="Direction of line.  [default: x]")
 @option("--width", type=click.Choice(["column", "full"]),
         help="3.5 in, or 7.2 in.  [default: column]")  # fmt: skip

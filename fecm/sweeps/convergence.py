@@ -29,8 +29,8 @@ from fecm.sweeps.vary import apply_case, check_deck, stable_time_step, with_time
 
 FACTORS = "1,2,4,8"
 ASSUMED, LOWEST = 2.0, 0.5  # order that two factors assume, and the lowest that gives a limit
-# Order of the scheme in time, that of all elements in space but those of nine nodes, and theirs; and
-# how far an observed order may be from them.
+# Order of the scheme in time, and in space of all elements but those of nine nodes; theirs; and how
+# far an observed order may be from them.
 ORDER, NINE_NODE_ORDER, NEAR = 2.0, 4.0, 0.5
 OBSERVED, UNCONFIRMED = 1.25, 3.0  # safety factors of the error band
 SAME = 1e-12  # relative change that is rounding
@@ -45,8 +45,8 @@ class Convergence:
     # Richardson extrapolation from the last values with the observed order, or with the highest of
     # the scheme if that is lower; NaN if there is none.
     limit: float
-    # The limit is expected within plus and minus this band of the finest value; NaN without limit or
-    # order.
+    # The limit is expected within plus and minus this band of the finest value; NaN if there is no
+    # limit, or the last values are equal.
     band: float
     remark: str  # empty, or what is doubtful about order and band
 
@@ -85,7 +85,7 @@ def convergence(
 
 
 def _limit(values: Floats, highest: float) -> Convergence:
-    """Order, limit and band of the values of two or three meshes, each twice as fine as the last."""
+    """Order, limit and band of two or three values, of meshes twice as fine as the last."""
     none, (*earlier, before, last) = math.nan, values.tolist()
     change = last - before
     if not np.isfinite(values).all():

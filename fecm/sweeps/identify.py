@@ -229,10 +229,11 @@ def fit(
         known = {name: _start(deck, name) for name in names}
         trials = [{**known, DELAY: lag} for lag in starts] if DELAY in names else [known]
         scalings, x = [_scaling(one, sizes) for one in trials], np.zeros(len(names))
+        chosen = 0
         if len(scalings) > 1:
             short = [solve(model, measured, one, x, FIRST_EVALUATIONS) for one in scalings]
-            scalings = [min(zip(short, scalings, strict=True), key=lambda pair: _rank(pair[0]))[1]]
-        found = solve(model, measured, scalings[0], x, MOST_EVALUATIONS)
+            chosen = min(range(len(short)), key=lambda n: _rank(short[n]))
+        found = solve(model, measured, scalings[chosen], x, MOST_EVALUATIONS)
         return None if found is None or found.lost > LOST else found
 
     found = best(free)
@@ -311,7 +312,7 @@ def _start(deck: Deck, name: str) -> float:
 def _notes(
     found: Identification, solution: Solution, given: Measurement, model: Model
 ) -> Iterator[str]:
-    """Reasons to doubt the values."""
+    """Reasons to doubt the values: those of the fit, and those of the run of the fitted deck."""
     if not found.converged:
         yield "the fit has not converged; start from better values in the deck"
     if out := len(given.time) - len(found.time):

@@ -24,6 +24,7 @@ UNDESCRIBED = 0.05
 CERTAIN = 5.0  # standard errors from 0, beyond which a delay or an offset is not noise
 HALF = 0.5  # of the systematic part of the residual, which a proposal must remove
 QUIET, LEAST_QUIET = 1e-3, 10  # share of the peak without contact, and fewest such points
+SMALL = 5e-3  # share of the peak up to which an offset without contact is not reported
 # Relative change of a property of the plate that gives the derivatives, and the one reported:
 # vibrations shift in phase, so that larger changes are not linear.
 CHANGED, PERCENT = 1e-3, 0.01
@@ -78,9 +79,7 @@ class Trial(NamedTuple):
     certain: bool  # whether each added value is beyond its noise
 
     def explains(self, before: Floats, force: Floats) -> bool:
-        """Whether the added parameters remove half of the systematic part of a residual.
-
-        The model must describe the force with them.
+        """Whether the model describes the force with less than half of a systematic residual.
 
         The systematic part is estimated by the covariance of neighbours, in which noise of
         independent points has no part.
@@ -93,9 +92,11 @@ class Trial(NamedTuple):
 
 
 def proposal(
-    model: Model, found: Solution, refit: Callable[[], Solution | None],
+    model: Model,
+    found: Solution,
+    refit: Callable[[], Solution | None],
     units: dict[str, str],
-) -> str:  # fmt: skip
+) -> str:
     """Propose to fit a delay or an offset too; empty if neither explains the residual.
 
     Linearised fits with one or both come first; if the residual has a shape, `refit` fits the delay
@@ -127,6 +128,7 @@ def _linear(model: Model, found: Solution, names: Sequence[str]) -> Trial:
         values, step = found.values, float(np.median(np.diff(found.time)))
         trials = [{**values, DELAY: values.get(DELAY, 0.0) + s * step} for s in (1.0, -1.0)]
         columns[DELAY] = model.at(found.time, trials) @ [1.0, -1.0] / (2.0 * step)
+    old = len(found.x)
     jac = np.column_stack([found.jacobian, *(columns[name] for name in names)])
     size = np.linalg.norm(jac, axis=0)
     size[size == 0.0] = 1.0
@@ -137,8 +139,8 @@ def _linear(model: Model, found: Solution, names: Sequence[str]) -> Trial:
     rest = found.residual - jac @ x
     variance = float(rest @ rest) / (len(rest) - len(x))
     errors = np.sqrt(variance * np.sum(root**2, axis=1)) / size
-    certain = bool(np.all(np.abs(x) > CERTAIN * errors, where=np.arange(len(x)) >= len(found.x)))
-    return Trial(dict(zip(names, x[len(found.x) :].tolist(), strict=True)), rest, certain)
+    certain = bool(np.all(np.abs(x[old:]) > CERTAIN * errors[old:]))
+    return Trial(dict(zip(names, x[old:].tolist(), strict=True)), rest, certain)
 
 
 def _told(trial: Trial, before: Floats, units: dict[str, str]) -> str:
@@ -154,7 +156,10 @@ def _told(trial: Trial, before: Floats, units: dict[str, str]) -> str:
 
 
 def _out_of_contact(model: Model, found: Solution) -> float:
-    """Median force before the contact, or after it; 0 if it is noise, or there is no such time."""
+    """Median force before the contact, or after it; 0 if it is noise, or there is no such time.
+
+    After the contact the force must have no shape, which another model could explain.
+    """
     without = {**found.values, OFFSET: 0.0}
     model_force = model.at(found.time, [without])[:, 0]
     quiet = model_force <= QUIET * model_force.max()
@@ -166,7 +171,10 @@ def _out_of_contact(model: Model, found: Solution) -> float:
     force = found.force[quiet]
     level = float(np.median(force))
     deviation = float(np.median(np.abs(force - level))) / 0.6745
-    return level if abs(level) > CERTAIN * 1.2533 * deviation / math.sqrt(len(force)) else 0.0
+    error = 1.2533 * deviation / math.sqrt(len(force))  # of a median
+    least = max(CERTAIN * error, SMALL * float(found.force.max()))
+    shaped = quiet is not before and deviation > 0.0 and neighbours(force - level) > COLOURED
+    return level if abs(level) > least and not shaped else 0.0
 
 
 # Errors of the plate ------------------------------------------------------------------------------
@@ -182,7 +190,8 @@ def plate_errors(
     """
     material = model.deck.require(Material)
     own = {"thickness": sum(y.thickness for y in material.layers), "e1": material.ply.e1}
-    dt = float(np.diff(model.histories([found.values])[0][:2])[0])
+    clock, _ = model.histories([found.values])
+    dt = float(clock[len(clock) // 2 + 1])  # the first time after 0
     errors: dict[str, dict[str, float]] = {}
     for name in PROPERTIES:
         for change in (CHANGED, -CHANGED):  # one of them may be unstable
