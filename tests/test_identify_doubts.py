@@ -53,7 +53,8 @@ def started(support: Support = "clamped") -> fecm.Deck:
 
 
 def noisy(force: Floats, seed: int) -> Floats:
-    return force + NOISE * force.max() * np.random.default_rng(seed).normal(size=len(force))
+    errors = NOISE * float(force.max()) * np.random.default_rng(seed).normal(size=len(force))
+    return np.asarray(force + errors)
 
 
 def deviations(seed: int, free: list[str]) -> list[float]:
