@@ -44,7 +44,7 @@ def _random_values() -> Sequence[Value]:
 def _refinement() -> Sequence[Value]:
     factors = np.array([1, 2, 4])
     cases, summary = {"refine": factors}, {"peak_force": 1.0 + 3.0 * factors**-1.7}
-    found = convergence(cases, summary)["peak_force"]
+    found = convergence(cases, summary, nodes=9)["peak_force"]
     return [found.order, found.limit]
 
 
