@@ -13,6 +13,7 @@ import fecm
 from fecm.deck.model import Deck, Patch
 from fecm.sweeps.cases import CasesError
 from fecm.sweeps.convergence import Convergence, convergence
+from fecm.sweeps.result import SweepResult
 from tests.builders import REPORT_PLY, table
 from tests.calls import assert_unusable, call
 from tests.decks import small
@@ -103,6 +104,17 @@ def test_no_order_is_stated_where_there_is_none(
 def test_the_band_of_two_meshes_holds_down_to_order_1() -> None:
     values = power_law(1.0)[:2]
     assert found_from(values).band == pytest.approx(80.0 - values[-1], rel=1e-12)
+
+
+def test_the_deck_of_a_sweep_is_never_read_as_a_path(tmp_path: Path) -> None:
+    (tmp_path / "other.inp").write_text(plate().to_text())
+    cases = {"refine": np.array([1, 2, 4])}
+    summary = {"peak_force": power_law(3.5)[:3], "status": np.full(3, "ok")}
+    one = np.ones(3)
+    found = SweepResult(cases, summary, one, one, deck=str(tmp_path / "other.inp"))
+    assert "the scheme has order 2" in found.convergence["peak_force"].remark
+    whole = SweepResult(cases, summary, one, one, deck=plate().to_text())
+    assert not whole.convergence["peak_force"].remark
 
 
 def test_the_limit_of_two_meshes_is_that_of_the_series() -> None:

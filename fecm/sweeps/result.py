@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from fecm._errors import did_you_mean
 from fecm._tables import html_table
 from fecm._version import __version__
-from fecm.api import read_one
 from fecm.deck.model import Delamination
+from fecm.deck.reader import Reader
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.results import schema
 from fecm.results.metrics import COLUMNS, FOUND, SUMMARY, THRESHOLD, described
@@ -206,7 +206,10 @@ class SweepResult:
         """Order, limit and band of every quantity of a refinement study; empty for others."""
         if REFINE not in self.cases:
             return {}
-        return convergence(self.cases, self.summary, read_one(self.deck).control.nen)
+        # The text of a file, which is no path even if it is one line.
+        decks = (problem.deck for problem in Reader(self.deck).problems())
+        nodes = next((deck.control.nen for deck in decks if deck is not None), 0)
+        return convergence(self.cases, self.summary, nodes)
 
     @property
     def notes(self) -> tuple[str, ...]:
