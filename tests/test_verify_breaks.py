@@ -40,7 +40,7 @@ from fecm.studies import estimate
 from fecm.studies.indentation_test import modulus
 from fecm.studies.rod_test import pulse_test
 from fecm.studies.waves import Fronts, Medium
-from fecm.sweeps import cases, convergence, identify, random_result
+from fecm.sweeps import cases, convergence, fitting, random_result
 from fecm.sweeps.responses import Convolution
 from fecm.verification import CASES, carry_out, chosen
 from tests.breaks import (
@@ -464,11 +464,11 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
         value(random_result, "Z", 1.6448536), {"random-values": ("lower", "upper")},
     ),
     "meshes in the opposite order": (
-        instead(convergence, "_limit", lambda right, values: right(values[::-1])),
+        instead(convergence, "_limit", lambda right, values, order: right(values[::-1], order)),
         {"refinement": ("",)},
     ),
     "the computed force 1 % too large": (
-        changed(identify._Model, "at", lambda force: 1.01 * force), {"identification": ("",)},
+        changed(fitting.Model, "at", lambda force: 1.01 * force), {"identification": ("",)},
     ),
     "E3 taken for the indentation modulus": (
         instead(modulus, "indentation_modulus", lambda _, C: 1.0 / np.linalg.inv(C)[2, 2]),
