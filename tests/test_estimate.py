@@ -25,7 +25,7 @@ HELD = MESH[: MESH.index("BOUN")] + (
 
 
 def deck(segments: str = "", *, mesh: str = MESH) -> str:
-    text = small(PROGRAM.replace("         10", "        100"), mesh=mesh)
+    text = small(PROGRAM.replace("         10", "        400"), mesh=mesh)
     return text.replace("EXPE", f"PATC\nDISC,.2\n{segments}EXPE")
 
 

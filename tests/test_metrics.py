@@ -12,7 +12,7 @@ import pytest
 import fecm
 from fecm.plot.kinds import PlotError
 from fecm.plot.pictures import draw
-from fecm.results.metrics import METRICS, SUMMARY, THRESHOLD
+from fecm.results.metrics import METRICS, RATIO, SUMMARY, THRESHOLD, VERDICTS
 from fecm.results.result import Result
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, small
@@ -100,7 +100,7 @@ def test_a_sweep_has_columns_of_the_threshold_with_dela_only(tmp_path: Path) -> 
     with_it = deck(f"{RIGID}DELA\n.001,\n")
     for text, names in ((deck(), ()), (with_it, tuple(THRESHOLD))):
         swept = fecm.sweep(text, {"k": [2e6, -1.0]}, output=tmp_path / "s.h5")
-        assert tuple(swept.summary) == (*SUMMARY, *names, "status")
+        assert tuple(swept.summary) == (*SUMMARY, *names, RATIO, *VERDICTS)
         loaded = fecm.load_sweep(tmp_path / "s.h5")
         for name in names:
             assert np.isfinite(loaded[name][0])

@@ -102,7 +102,7 @@ def test_a_sweep_is_the_same_as_itself_run_again(swept: Path, tmp_path: Path) ->
     assert again.read_bytes() == swept.read_bytes()
     done = call("diff", swept, again)
     assert done.exit_code == 0
-    assert done.stdout.endswith("same: 17 datasets within rtol 0, atol 0\n")
+    assert done.stdout.endswith("same: 19 datasets within rtol 0, atol 0\n")
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_cases_are_exported_a_row_each_with_their_texts(swept: Path, tmp_path: P
     found = fecm.load_sweep(swept)
     assert [int(row["case"]) for row in rows] == list(range(6))
     assert list(rows[0])[:5] == ["case", "velocity", "layup", "peak_force", "time_of_peak"]
-    assert list(rows[0])[-3:] == ["dt", "steps", "status"]
+    assert list(rows[0])[-4:] == ["dt", "steps", "status", "validity"]
     assert [float(row["velocity"]) for row in rows] == found["velocity"].tolist()
     assert [row["layup"] for row in rows] == found["layup"].tolist()
     assert [row["status"] for row in rows] == found["status"].tolist()

@@ -57,7 +57,8 @@ def some_failed(sweep: SweepResult, *cases: int) -> SweepResult:
     summary["status"] = summary["status"].astype("U40")
     for case in cases:
         for name, values in summary.items():
-            values[case] = "it went wrong" if name == "status" else np.nan
+            texts = {"status": "it went wrong", "validity": "failed"}
+            values[case] = texts.get(name, np.nan)
     return SweepResult(sweep.cases, summary, sweep.dt, sweep.steps, units=sweep.units)
 
 

@@ -75,12 +75,13 @@ def test_a_note_counts_the_cases_whose_u_and_v_are_set_free(tmp_path: Path) -> N
     vary = ("--vary", "velocity=100,200", "--vary", "layup=[0/90]s,[0/90],[45/-45],[90/0]s")
     done = call("sweep", deck, *vary, "-o", tmp_path / "s.h5")
     assert done.exit_code == 0
-    assert done.stderr == (
+    # The short runs end in contact, which another note says.
+    assert done.stderr.startswith(
         "fecm: note: B is not zero in 4 cases: u and v, which the deck restrains at every node, "
         "are free there except where w is held\n"
     )
     deck.write_text(new("[0/90]"))
-    assert call("sweep", deck, *vary, "-o", tmp_path / "t.h5").stderr == ""
+    assert "B is not zero" not in call("sweep", deck, *vary, "-o", tmp_path / "t.h5").stderr
 
 
 def test_supports_in_the_plane_that_hold_some_nodes_only_are_kept() -> None:

@@ -213,11 +213,15 @@ def test_findings_and_doubtful_cases_are_warnings_with_counts(tmp_path: Path) ->
         found = fecm.sweep(small(), layups, output=tmp_path / "s.h5")
     texts = [str(warning.message) for warning in caught]
     assert {warning.filename for warning in caught} == {__file__}
-    assert sum("warning[W" in text for text in texts) == len(texts) - 2
-    assert texts[-2:] == list(found.notes) == list(fecm.load_sweep(tmp_path / "s.h5").notes)
-    assert texts[-2] == "2 of 4 cases still in contact at the end"
-    assert texts[-1].startswith("2 of 4 cases failed: layup: the layup `[x]`")
-    assert texts[-1].endswith(", and 1 other reason")
+    assert sum("warning[W" in text for text in texts) == len(texts) - 4
+    notes = list(found.notes)
+    assert texts[-4:] == notes == list(fecm.load_sweep(tmp_path / "s.h5").notes)
+    assert notes[0] == "2 of 4 cases still in contact at the end"
+    assert notes[1] == "2 of 4 cases with an open peak"
+    assert notes[2].startswith("2 of 4 cases failed: layup: the layup `[x]`")
+    assert notes[2].endswith(", and 1 other reason")
+    assert "2 of 4 cases end before their contact does" in notes[3]
+    assert notes[3].endswith("--vary duration=1e-05")
 
 
 def test_a_scheduler_file_names_the_address(tmp_path: Path) -> None:

@@ -12,9 +12,14 @@ from fecm.cli.common import DECK_PATH, FORMAT_OPTION, echo, echo_json, note
 from fecm.cli.decks import load_single
 from fecm.cli.help import typical
 from fecm.deck.units import quantity, unit_names, unit_of
+from fecm.problem.problem import Problem
+from fecm.results.metrics import RATIO
+from fecm.results.validity import TOO_SOFT, UNSAFE, Judge, softness
 from fecm.studies.estimate import estimate as estimate_problem
 from fecm.sweeps.api import carry_out
 from fecm.sweeps.plan import plan
+
+Row = tuple[str, float, float, float, float]  # name, peak, duration, threshold and velocity
 
 # Columns of the table, and their dimensions.
 COLUMNS = {
@@ -42,20 +47,19 @@ def estimate(deck: Path, form: str) -> None:
     found = estimate_problem(problem)
     models = [(m.name, m.impact.peak, m.impact.duration, m.threshold, m.velocity)
               for m in found.models]  # fmt: skip
-    # The run itself, by the kernel of sweeps.
-    own = carry_out(problem, plan(problem, [{}], history=False))
-    threshold = velocity = math.nan
-    if problem.threshold is not None:
-        threshold = problem.threshold.force
-        reached = carry_out(problem, plan(problem, [{}], until=threshold))
-        velocity = float(reached["found_velocity"][0])
-    peak, duration = (float(own[name][0]) for name in ("peak_force", "contact_time"))
-    models.append(("run", peak, duration, threshold, velocity))
+    own, bent, doubts = _run_itself(problem)
+    models.append(own)
     # A model's name, peak, duration, threshold and velocity; then the energy.
     rows = [(*model, 0.5 * found.mass * model[-1] ** 2) for model in models]
-    w, h = found.models[-1].impact.peak / found.stiffness, problem.laminate.thickness
-    if w > 0.5 * h:  # not of a free plate, whose stiffness is NaN
-        note(f"the static plate deflects by {w / h:.3g} h: beyond h/2 a linear plate is too soft")
+    static, judge = found.models[-1], problem.judge
+    bent = [
+        *_bent("the static plate", static.impact.peak / found.stiffness, judge),
+        *_bent("the static plate at the threshold", static.threshold / found.stiffness, judge),
+        *bent,
+    ]
+    if bent:
+        note(f"beyond {judge.limit} h {TOO_SOFT}; {UNSAFE}", *bent)
+    note(*doubts)
     applies = [*(model.applies for model in found.models), True]  # the run always does
     if form == "json":
         named = [dict(zip(("model", *COLUMNS), row, strict=True)) for row in rows]
@@ -69,8 +73,8 @@ def estimate(deck: Path, form: str) -> None:
         return
     names = unit_names(problem.deck)
 
-    def text(value: float, dimension: str) -> str:
-        return "-" if math.isnan(value) else quantity(value, unit_of(dimension, names), 5)
+    def text(value: float, dimension: str, missing: str = "-") -> str:
+        return missing if math.isnan(value) else quantity(value, unit_of(dimension, names), 5)
 
     echo(problem.deck.title or "(no title)")
     echo(f"  class       M/M_plate = {found.mass_ratio:.4g}, {found.response}")
@@ -82,6 +86,34 @@ def estimate(deck: Path, form: str) -> None:
     table = [["model", *(name.replace("_", " ") for name in COLUMNS)]]
     for (name, *numbers), fits in zip(rows, applies, strict=True):
         marked = name if fits else f"{name} (out of range)"
-        table.append([marked, *map(text, numbers, COLUMNS.values())])
+        # Of the models the duration is known, of the run only if its contact ends.
+        missing = ["open", "open", *["-"] * (len(numbers) - 2)]
+        table.append([marked, *map(text, numbers, COLUMNS.values(), missing)])
     for line in aligned(table):
         echo(f"  {line}")
+
+
+def _run_itself(problem: Problem) -> tuple[Row, list[str], list[str]]:
+    """Row of the run itself, by the kernel of sweeps, its deflections, and what is open in it."""
+    own = carry_out(problem, plan(problem, [{}]))
+    swept, doubts = {"the run": own}, []
+    threshold = velocity = math.nan
+    if problem.threshold is not None:
+        threshold = problem.threshold.force
+        swept["the run at the threshold"] = carry_out(problem, plan(problem, [{}], until=threshold))
+        velocity = float(swept["the run at the threshold"]["found_velocity"][0])
+    peak, duration = (float(own[name][0]) for name in ("peak_force", "contact_time"))
+    if math.isnan(duration):
+        doubts.append("the run ends before its contact does: what is open needs a longer duration")
+    doubts += [f"{name}: {one['status'][0]}" for name, one in swept.items() if not one.fine.all()]
+    h, judge = problem.judge.thickness, problem.judge
+    bent = [text for name, one in swept.items() for text in _bent(name, one[RATIO][0] * h, judge)]
+    return ("run", peak, duration, threshold, velocity), bent, doubts
+
+
+def _bent(where: str, deflection: float, judge: Judge) -> list[str]:
+    """Note about a deflection beyond the linear plate; a free plate has none (NaN)."""
+    ratio = deflection / judge.thickness
+    if not ratio > judge.limit:
+        return []
+    return [f"{where} deflects by {ratio:.3g} h: {softness(ratio, judge.in_plane)}"]

@@ -17,6 +17,8 @@ from fecm.cli.types import OneOf, Parsed, list_of
 from fecm.deck.findings import DeckError
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
+from fecm.results.hdf5_reader import read
+from fecm.results.result import result_of
 from fecm.simulation.run import simulate
 from fecm.sweeps import cases as inputs
 from fecm.sweeps import plan as plans
@@ -26,7 +28,7 @@ from fecm.sweeps.convergence import refined_cases
 from fecm.sweeps.convergence import table as table_of
 from fecm.sweeps.doubts import doubtful_values
 from fecm.sweeps.random_result import tables
-from fecm.sweeps.result import SweepResult, save, summary, verdict
+from fecm.sweeps.result import SweepResult, remarks, save, summary, verdict
 from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_in, alone
 
 NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
@@ -82,7 +84,8 @@ NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
         help="Running Dask scheduler, as in tcp://host:8786, to use instead.")  # fmt: skip
 @option("--scheduler-file", type=DECK_PATH, metavar="FILE",
         help="File of `dask scheduler --scheduler-file` instead of its address.")  # fmt: skip
-@option("--allow-failed", is_flag=True, help="Exit with 0 even if cases failed.")
+@option("--allow-failed", is_flag=True,
+        help="Exit with 0 even if cases failed, or probabilities are open.")  # fmt: skip
 @option("--overwrite", is_flag=True, help="Replace existing results.")
 def sweep(
     deck: Path, varied: tuple[tuple[str, list[inputs.Value]], ...], table: Path | None,
@@ -97,7 +100,8 @@ def sweep(
 
     Cases that differ only in the projectile, its velocity or the indentation law share one run of
     the plate.  The same command resumes an interrupted sweep.  The last line counts the cases that
-    failed, for which the exit status is 1, and those that ended in contact.
+    failed, those that ended in contact, and those that are beyond the range of the model.  The exit
+    status is 1 if a case failed, or ended before a quantity of --exceed was known.
     """
     path = output or Path(f"{deck.stem}-sweep.h5")
     if factors and (varied or table or laws or until or extra):
@@ -174,8 +178,10 @@ def sweep(
     echo(f"  result            {path}")
     _run_in_full(planned, fulls, overwrite=overwrite)
     note(*(() if result.random is None else result.random.notes))
+    note(*remarks(result))
     echo(verdict(result))
-    if not (allow_failed or result.fine.all()):
+    is_open = result.random is not None and result.random.exceedance.open.any()
+    if (is_open or not result.fine.all()) and not allow_failed:
         raise SystemExit(NO)
 
 
@@ -228,3 +234,4 @@ def _run_in_full(planned: plans.Plan, fulls: dict[int, Path], *, overwrite: bool
             note(f"case {case} was not run in full: {error}")
             continue
         echo(f"  case {case:<12} {path}")
+        note(*(f"case {case}: {text}" for text in result_of(read(path)).notes))

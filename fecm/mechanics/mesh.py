@@ -62,6 +62,20 @@ def equation_numbers(codes: Ints) -> Ints:
     return np.where(free, np.cumsum(free), 0).astype(np.int32).reshape(codes.shape)
 
 
+def rigid_deflections(mesh: Mesh) -> Floats:
+    """Orthonormal basis of w, (numnp, n), of the rigid motions that the supports allow."""
+    used = mesh.used
+    place = mesh.coordinates[used, :2] - mesh.coordinates[used, :2].mean(axis=0)
+    w = np.column_stack([np.ones(len(place)), place / np.abs(place).max()])
+    slopes = np.broadcast_to(np.eye(3)[1:], (len(place), 2, 3))
+    motions = np.concatenate([w[:, None], slopes], axis=1)  # of w, theta_x, theta_y
+    held = motions[mesh.equations[used, 2:] == 0]
+    resistance, combined = np.linalg.eigh(held.T @ held)
+    basis = np.zeros((len(used), 3))
+    basis[used] = w
+    return np.linalg.qr(basis @ combined[:, resistance < 1e-9 * len(place)])[0]
+
+
 def holds_the_plane(codes: Ints) -> bool:
     """Whether restraint codes, (numnp, 5), restrain u and v of every node."""
     return bool((codes[:, :2] != 0).all())

@@ -22,7 +22,7 @@ from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import NDOF, jacobian_determinants
 from fecm.mechanics.laminate import Laminate
-from fecm.mechanics.mesh import ElementBlock, Mesh, congruence, element_blocks
+from fecm.mechanics.mesh import ElementBlock, Mesh, congruence, element_blocks, rigid_deflections
 from fecm.mechanics.strains import StrainField
 
 if TYPE_CHECKING:
@@ -182,6 +182,18 @@ class PlateModel:
         full = scale * self.mesh.forces
         full[self._free] = displacement
         return full
+
+    def rigid_mobility(self, share: Floats) -> float:
+        """Velocity under a load of the plate's rigid motion per impulse, 1/mass; 0 if it is held.
+
+        `share` (numnp,) is the distribution of the unit force over w of the nodes.
+        """
+        motions = rigid_deflections(self.mesh)
+        if not motions.size:
+            return 0.0
+        mass = self.field(self.mass, 0.0)[:, 2]
+        along = share @ motions
+        return float(along @ np.linalg.solve((motions.T * mass) @ motions, along))
 
     def strain_field(
         self, points: Quadrature, kind: type[StrainField] = StrainField

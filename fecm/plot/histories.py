@@ -48,11 +48,8 @@ def _time_axis(axes: Axes, clock: style.Scale, times: Iterable[data.Array]) -> N
 
 def _mark_open_ends(axes: Axes, results: Results, width: str) -> None:
     """Say above a graph that contacts last to the end; name the results unless all do."""
-    named = [name for name, result in results.items() if result.still_in_contact]
-    if named:
-        which = f" ({', '.join(named)})" if len(named) < len(results) else ""
-        letters = int(LETTERS * style.WIDTHS[width])
-        text = textwrap.fill(f"still in contact at the end{which}", letters)
+    if text := style.open_ends(results):
+        text = textwrap.fill(text, int(LETTERS * style.WIDTHS[width]))
         axes.set_title(text, loc="right", fontsize=7.0).set_parse_math(False)
 
 

@@ -18,11 +18,11 @@ from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.plot import style
 from fecm.plot.kinds import Picture, PlotError
-from fecm.results.metrics import COLUMNS
+from fecm.results.metrics import COLUMNS, VERDICTS
 from fecm.results.metrics import INTEGERS as WHOLE_NUMBERS
+from fecm.results.validity import DELAMINATED, MEANING, OPEN, counted
 from fecm.sweeps.cases import INTEGERS as WHOLE_VALUES
 from fecm.sweeps.cases import NAMES
-from fecm.sweeps.plan import RUN, STILL
 from fecm.sweeps.result import SweepResult, reasons
 
 Array = NDArray[Any]
@@ -42,6 +42,7 @@ LABELS = {
     "max_indentation": "Largest indentation",
 }  # fmt: skip
 MANY = 10_000  # more cells or points are stored as an image in vector formats
+STILL, ENDED = "still in contact at the end", "contact not over at the end"
 LINES = 8  # contour lines, approximately
 # Heights of a row of texts, of everything around the rows, and of a colour bar (in).
 ROW, HEAD, BAR = 0.17, 0.75, 0.45
@@ -96,7 +97,8 @@ class Choice:
     levels: dict[float, str]  # values to mark, and what they are
     title: str  # values that select the cases; empty for all cases
     other: Axis | None  # second varying parameter of a map over one
-    still: Bools  # (cases,): mask of the cases that ended in contact
+    beyond: dict[str, Bools]  # by what they are: masks of the cases beyond the range of the model
+    ended: dict[str, Bools]  # the same of the cases whose contact is not over
     # (cases,): delamination thresholds, if they differ and peak forces are shown; else empty.
     limits: Array
 
@@ -131,7 +133,6 @@ def choose(
             raise PlotError(f"{vary}; {selects} the cases, {both}")
     shown = quantity_of(sweep, name, rows, quantity)
     title = ", ".join(f"{held} {_text(sweep, held, rows[0])}" for held in where)
-    still = sweep["status"][rows] == STILL
     levels = dict.fromkeys(level, "level")
     limits = np.empty(0)
     if shown.name == "peak_force" and "threshold_force" in sweep.summary:
@@ -146,7 +147,30 @@ def choose(
                 f"the level {value:g} is outside the picture's values, which range from {low:g} "
                 f"to {high:g}"
             )
-    return Choice(axes, shown, levels, title, other, still, limits)
+    return Choice(
+        axes, shown, levels, title, other, beyond(sweep, rows), ended(sweep, rows), limits
+    )
+
+
+def beyond(sweep: SweepResult, rows: Ints) -> dict[str, Bools]:
+    """Cases beyond the range of the model, by what they are."""
+    found = dict(counted(sweep.validity[rows]))
+    for other in (OPEN, DELAMINATED):  # which have a mark and a line of their own
+        found.pop(other, None)
+    return {MEANING.get(reason, reason): some for reason, some in found.items()}
+
+
+def ended(sweep: SweepResult, rows: Ints) -> dict[str, Bools]:
+    """Cases whose contact is not over, by what they are; empty if there are none."""
+    some = sweep.fine[rows] & ~sweep.over[rows]
+    what = STILL if np.array_equal(some, sweep.still[rows]) else ENDED
+    return {what: some} if some.any() else {}
+
+
+def counts(masks: Mapping[str, Bools], sign: str = "") -> str:
+    """Lines for below a picture: how many cases are what."""
+    texts = (f"{sign}{what}: {some.sum()} of {len(some)} cases" for what, some in masks.items())
+    return "".join(f"\n{text}" for text in texts if text)
 
 
 def case_rows(sweep: SweepResult, name: str, where: Mapping[str, Any]) -> Ints:
@@ -217,16 +241,18 @@ def _over(sweep: SweepResult, name: str, varying: list[str], asked: Sequence[str
 def quantity_of(sweep: SweepResult, name: str, rows: Ints, quantity: str) -> Axis:
     """The quantity to show, with a note about cases that lack it."""
     quantity = quantity or ("found_velocity" if "found_velocity" in sweep.summary else "peak_force")
-    known = [name for name in sweep.summary if name != "status"]
+    known = [name for name in sweep.summary if name not in VERDICTS]
     if quantity not in known:
         others = did_you_mean(quantity, known) or f"; the sweep has {_listed(known)}"
         raise PlotError(f"unknown quantity {quantity}{others}")
     status, values = sweep["status"][rows], sweep[quantity][rows].astype(float)
-    run, still = np.isin(status, RUN), status == STILL
+    run, ends = sweep.fine[rows], ended(sweep, rows)
+    still = next(iter(ends.values()), np.zeros_like(run))
     values = np.where(run, values, np.nan)
     cases = f"of {len(rows)} cases of {name}"
     failures = "" if run.all() else f"{(~run).sum()} {cases} failed ({reasons(status[~run])})"
-    open_ends = f"{still.sum()} {cases} were still in contact at the end"
+    what = f"were {STILL}" if STILL in ends else "ended before their contact was over"
+    open_ends = f"{still.sum()} {cases} {what}"
     if np.isnan(values).all():
         nothing = f"no case of {name} has a {quantity}"
         if still.any():
@@ -276,11 +302,17 @@ def parameter_map(
     ((name, sweep),) = results.items()
     choice = choose(sweep, name, quantity, over, where or {}, level)
     axes, x, y = _draw(choice, width)
-    if (still := choice.still).any():
-        mark: Any = {"marker": "x", "color": "0.25", "ms": 3.5, "ls": "none"}
-        axes.plot(x.values[still], y.values[still], zorder=4, clip_on=False, **mark)
-        text = f"still in contact at the end: {still.sum()} of {len(still)} cases"
-        axes.set_xlabel(f"{axes.get_xlabel()}\n\N{MULTIPLICATION SIGN} {text}")
+    marks = {  # by their signs in the text
+        ("x", "\N{MULTIPLICATION SIGN} "): choice.ended,
+        ("$/$", "/ "): choice.beyond,
+    }
+    for (marker, sign), masks in marks.items():
+        if masks:
+            some = np.logical_or.reduce(list(masks.values()))
+            mark: Any = {"marker": marker, "color": "0.25", "ms": 3.5, "ls": "none"}
+            mark |= {"mew": 0.0} if marker != "x" else {}  # a thin hatching
+            axes.plot(x.values[some], y.values[some], zorder=4, clip_on=False, **mark)
+            axes.set_xlabel(f"{axes.get_xlabel()}{counts(masks, sign)}")
     if len(choice.limits):
         _mark_limits(axes, x, y, choice)
     notes = [] if choice.shown in (x, y) else _name_levels(axes, x, y, choice)

@@ -105,6 +105,8 @@ def failure(results: Mapping[str, Result], *, quantity: str = "", width: str = "
     place.name(plate.xaxis, "$x$")
     place.name(plate.yaxis, "$y$")
     _bars(figure, bars, found)
+    if text := style.open_ends(results):
+        bars.set_title(f"{text}: lower bounds", loc="right", fontsize=7.0)
     if len(elements := 1 + np.flatnonzero(found.under_load.any(axis=1))):
         texts = ", ".join(map(str, elements[:NAMED]))
         more = f" and {len(elements) - NAMED} more" if len(elements) > NAMED else ""

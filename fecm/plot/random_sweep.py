@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from fecm.plot.kinds import LackingError, Picture, PlotError
-from fecm.plot.maps import LEVEL, Ints, axis_of, case_rows, quantity_of
+from fecm.plot.maps import LEVEL, Ints, axis_of, beyond, case_rows, counts, quantity_of
 from fecm.plot.style import WIDTHS, colours, legend, limit_count, lines_legend, panels
-from fecm.sweeps.random_result import Indices, RandomResult, wilson
+from fecm.sweeps.random_result import Indices, RandomResult, bounds, chance
 from fecm.sweeps.result import SweepResult
 
 Sweeps = Mapping[str, SweepResult]
@@ -53,6 +54,12 @@ def _limits(random: RandomResult, quantity: str, level: Sequence[float]) -> list
     return list(level) or own.tolist()
 
 
+def _say_doubts(axes: Axes, sweep: SweepResult, chosen: dict[int, Ints]) -> None:
+    """Count the draws beyond the range of the model below a graph."""
+    text = counts(beyond(sweep, np.concatenate(list(chosen.values()))))
+    axes.set_xlabel(f"{axes.get_xlabel()}{text}")
+
+
 def exceedance(
     results: Sweeps,
     *,
@@ -73,26 +80,29 @@ def exceedance(
     notes: list[str] = []
     every = [quantity_of(sweep, name, rows, quantity) for rows in chosen.values()]
     limits = _limits(random, every[0].name, level)
-    for place, shown, colour in zip(chosen, every, colours(), strict=False):
+    for (place, rows), shown, colour in zip(chosen.items(), every, colours(), strict=False):
         values = np.sort(shown.values[np.isfinite(shown.values)])
         count = len(values)
+        ended = sweep.fine[rows] & ~sweep.over[rows]
+        is_open = int((np.isnan(shown.values) & ended).sum())
         label = random.label(place)
         above = (count - np.arange(count) - 0.5) / count
         axes.plot(values, above, color=colour, label=label or "_")
         for limit in limits:
             hits = np.array((values > limit).sum())
-            low, high = wilson(hits, np.array(count))
-            p = float(hits) / count
+            p, low, high = map(float, bounds(hits, np.array(count), np.array(is_open)))
             bar: Any = {"color": colour, "capsize": 2.0, "ms": 3.0, "lw": 0.9}
             axes.errorbar(limit, p, [[p - low], [high - p]], fmt="o", **bar)
             case = f", {label}" if label else ""
-            notes.append(f"P({shown.name} > {limit:g}) = {p:.5g} ({low:.5g} to {high:.5g}){case}")
+            text = chance(p, low, high, is_open, is_open)
+            notes.append(f"P({shown.name} > {limit:g}) = {text}{case}")
     for limit in limits:
         axes.axvline(limit, zorder=0, label=f"limit {every[-1].scale.show(limit)}", **LEVEL)
     axes.set_yscale("log")
     axes.set_ylim(top=1.15)
     axes.set_ylabel("Probability of exceedance")
     every[-1].scale.name(axes.xaxis, every[-1].label)
+    _say_doubts(axes, sweep, chosen)
     if len(chosen) > 1 or limits:
         lines_legend(figure, axes)
     return Picture(figure, notes=notes)
@@ -134,6 +144,7 @@ def sensitivity(
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
     axes.axvline(0.0, color="0.2", linewidth=0.6)
     axes.set_xlabel(f"Sobol' index: {shown.label}")
+    _say_doubts(axes, sweep, chosen)
     legend(figure, *axes.get_legend_handles_labels())
     return Picture(figure)
 
@@ -171,6 +182,7 @@ def scatter(
             shown.scale.name(axes.yaxis, shown.label)
         for axis in (axes.xaxis, axes.yaxis):  # a half column is narrow
             axis.set_label_text(axis.get_label_text().replace(" (", "\n("))
+    _say_doubts(every[len(laws) - 1], sweep, chosen)
     if limits:
         lines_legend(figure, every[0])
     return Picture(figure)

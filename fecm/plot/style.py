@@ -146,6 +146,13 @@ def scale(peak: float, unit: str) -> Scale:
     return Scale(10.0**-power, f"{power_of_ten}{text.replace('*', '·')}".strip())
 
 
+def open_ends(results: Mapping[str, Result]) -> str:
+    """Say that contacts last to the end; name the results unless all do.  Empty if none does."""
+    named = [name for name, result in results.items() if result.still_in_contact]
+    which = f" ({', '.join(named)})" if len(named) < len(results) else ""
+    return f"still in contact at the end{which}" if named else ""
+
+
 def scale_of(results: Mapping[str, Result], dimension: str, arrays: Iterable[Any]) -> Scale:
     """Scale for arrays of one dimension, in the results' unit if all name it; units must agree."""
     units = {name: result.unit(dimension) for name, result in results.items()}

@@ -46,6 +46,7 @@ from fecm.mechanics.strains import StrainField
 from fecm.mechanics.symmetry import half_turn_images, restrain_resting_dofs, symmetry_reduction
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.problem.generate import generate, rod_diameters
+from fecm.results.validity import Judge, in_plane_of
 
 W = 2  # dof w, from 0
 ENERGY_LIMIT = 0.1  # relative error of the energy balance that ends a run
@@ -223,6 +224,14 @@ class Problem:
             threshold_force(rigidity, card.toughness, n) for n in (number, max(1, interfaces), 1)
         )
         return Threshold(force, rigidity, number, interfaces, (least, largest))
+
+    @cached_property
+    def judge(self) -> Judge:
+        """What the validity of an impact on the plate depends on."""
+        mobility = 0.0
+        if self.contact is not None:
+            mobility = self.moving_plate.rigid_mobility(self.contact[:, W])
+        return Judge(self.laminate.thickness, in_plane_of(self.mesh.codes), mobility)
 
     @property
     def damping(self) -> float:

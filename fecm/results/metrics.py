@@ -6,8 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fecm._typing import Floats
+from fecm._typing import Bools, Floats
 from fecm.mechanics.failure import CRITERIA
+from fecm.results import validity
+from fecm.results.validity import Texts
 
 # Description and dimension of every quantity, by name.
 SUMMARY = {
@@ -24,7 +26,9 @@ SUMMARY = {
         "length/time",
     ),
     "energy_absorbed": (
-        "kinetic energy that the projectile's centre has lost at the end", "force*length"
+        "kinetic energy that the projectile's centre has lost at the end: left in the vibration "
+        "of the plate, the indentation and the projectile",
+        "force*length",
     ),
 }  # fmt: skip
 # Those of decks with a delamination threshold.
@@ -52,7 +56,11 @@ EXPOSURES = {
 }
 EVALUATIONS = {"fail_evaluations": ("evaluations of FAIL during contact", "")}
 HIT = {f"hit_{axis}": (f"{axis} of the impact node or of the patch", "length") for axis in "xy"}
-COLUMNS = {**METRICS, **FOUND, **EXPOSURES, **EVALUATIONS, **HIT}
+RATIO = "deflection_ratio"
+RATIOS = {RATIO: ("largest displacement of the plate under the load over its thickness", "")}
+COLUMNS = {**METRICS, **FOUND, **EXPOSURES, **EVALUATIONS, **HIT, **RATIOS}
+# Columns of texts: whether a case was run, and whether its result is valid.
+STATUS, VALIDITY = VERDICTS = "status", "validity"
 GAGE = "gage_"
 INTEGERS = ("contacts",)
 
@@ -64,8 +72,7 @@ def described(name: str) -> str:
     return COLUMNS.get(name, ("measured by the caller",))[0]
 
 
-# Valid even if the run ends in contact, unless they occur at the end.
-PEAKS = ("peak_force", "time_of_peak", "max_indentation")
+MOBILITY = "rigid_mobility"  # attribute of a run whose plate is not held; see `Judge`
 PART = 16  # cases whose forces stay in the cache
 
 
@@ -77,32 +84,52 @@ class Indentation(NamedTuple):
     permanent: Floats
 
 
+class Projectiles(NamedTuple):
+    """Mass and impact velocity of the projectiles of cases: numbers, or (cases,)."""
+
+    mass: Any
+    velocity: Any
+
+
+class Metrics(NamedTuple):
+    """Metrics of cases, and what their ends have decided."""
+
+    columns: dict[str, Floats]  # (cases,) each; NaN where the end of the case has not decided them
+    end: Texts  # (cases,): state of the contact at the end, :class:`~fecm.results.validity.End`
+    reached: Floats  # (cases,): largest contact force up to the end, a lower bound of the peak
+
+
 def summarise(
     force: Floats,
     times: Floats,
     indentation: Indentation,
-    mass: Any,
-    velocity: Any,
+    projectiles: Projectiles,
     threshold: float | None = None,
-) -> dict[str, Floats]:
+    mobility: float = 0.0,
+) -> Metrics:
     """Summarise many cases from their contact forces.
 
-    If the last step is in contact, quantities that depend on the rest of the contact are NaN:
-    everything except the peaks, and a peak at the last step.
+    Contact forces are (steps, cases), times of the steps (steps,).  Returns the names of
+    :data:`SUMMARY`, with a delamination threshold (force) also those of :data:`THRESHOLD`.
+    `mobility` (1/mass) is that of the plate's rigid motion; see
+    :class:`~fecm.results.validity.Judge`.
 
-    Contact forces are (steps, cases), times of the steps (steps,); mass and impact velocity of the
-    projectile are numbers or (cases,).  Returns the names of :data:`SUMMARY`, with a delamination
-    threshold (force) also those of :data:`THRESHOLD`, (cases,) each.
+    Values that the end of a case has not decided are NaN: if it ends in contact everything except
+    the peaks, and the peaks too unless the projectile leaves and they have passed.
     """
     cases = force.shape[1]
-    mass, velocity = (np.broadcast_to(v, cases) for v in (mass, velocity))
+    mass, velocity = (np.broadcast_to(v, cases) for v in projectiles)
     if cases > PART:
         parts = []
         for some in (slice(start, start + PART) for start in range(0, cases, PART)):
             depths = Indentation(*(values[some] for values in indentation))
-            given = force[:, some], times, depths, mass[some], velocity[some], threshold
-            parts.append(summarise(*given))
-        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+            own = Projectiles(mass[some], velocity[some])
+            parts.append(summarise(force[:, some], times, depths, own, threshold, mobility))
+        return Metrics(
+            {n: np.concatenate([part.columns[n] for part in parts]) for n in parts[0].columns},
+            np.concatenate([part.end for part in parts]),
+            np.concatenate([part.reached for part in parts]),
+        )
     force = np.ascontiguousarray(force.T)
     dt = np.diff(times, prepend=0.0)
     touching = force > 0.0
@@ -115,30 +142,30 @@ def summarise(
     # with any others.
     impulse = (0.5 * (dt + np.append(dt[1:], 0.0)) * force).sum(axis=1)
     rebound = impulse / mass - velocity
-    found = {
-        "peak_force": force.max(axis=1),
-        "time_of_peak": np.where(met, times[peak], np.nan),
-        "contacts": begins.sum(axis=1).astype(float),
-        "contact_time": (dt * touching).sum(axis=1),
-        "last_contact": np.where(met, times[last], np.nan),
-        "max_indentation": indentation.largest,
-        "permanent_indentation": indentation.permanent,
-        "impulse": impulse,
-        "rebound_velocity": rebound,
-        "energy_absorbed": 0.5 * mass * (velocity**2 - rebound**2),
+    reached = force.max(axis=1)
+    end = validity.ends(force[:, -1], reached, rebound + mobility * impulse, velocity)
+    over, known = validity.over(end), validity.peak_known(end)
+
+    def where(decided: Bools, values: Floats) -> Floats:
+        return np.where(decided, values, np.nan)
+
+    columns = {
+        "peak_force": where(known, reached),
+        "time_of_peak": where(known & met, times[peak]),
+        "contacts": where(over, begins.sum(axis=1).astype(float)),
+        "contact_time": where(over, (dt * touching).sum(axis=1)),
+        "last_contact": where(over & met, times[last]),
+        "max_indentation": validity.decided(indentation.largest, indentation.last, end),
+        "permanent_indentation": where(over, indentation.permanent),
+        "impulse": where(over, impulse),
+        "rebound_velocity": where(over, rebound),
+        "energy_absorbed": where(over, 0.5 * mass * (velocity**2 - rebound**2)),
     }
-    still = touching[:, -1]
-    unknown = {name: still & (peak == len(times) - 1) for name in PEAKS}
     if threshold is not None:
         above = force >= threshold
         first = times[np.argmax(above, axis=1)]
-        found["threshold_force"] = np.full(len(force), threshold)
-        found["threshold_margin"] = 1.0 - found["peak_force"] / threshold
-        found["threshold_time"] = np.where(above.any(axis=1), first, np.nan)
-        found["time_above"] = (dt * above).sum(axis=1)
-        unknown["threshold_margin"] = unknown["peak_force"]
-        unknown |= dict.fromkeys(("threshold_force", "threshold_time"), np.zeros_like(still))
-    unknown["max_indentation"] = still & (indentation.last >= indentation.largest)
-    return {
-        name: np.where(unknown.get(name, still), np.nan, values) for name, values in found.items()
-    }
+        columns["threshold_force"] = np.full(len(force), threshold)
+        columns["threshold_margin"] = where(known, 1.0 - reached / threshold)
+        columns["threshold_time"] = np.where(above.any(axis=1), first, np.nan)
+        columns["time_above"] = where(over, (dt * above).sum(axis=1))
+    return Metrics(columns, end, reached)

@@ -16,8 +16,18 @@ from fecm.deck.model import Deck, Impact
 from fecm.deck.records import AXES, DOF_NAMES
 from fecm.deck.units import unit_of
 from fecm.results import schema
-from fecm.results.metrics import INTEGERS, METRICS, Indentation, summarise
+from fecm.results.metrics import (
+    INTEGERS,
+    METRICS,
+    MOBILITY,
+    VALIDITY,
+    Indentation,
+    Metrics,
+    Projectiles,
+    summarise,
+)
 from fecm.results.schema import DATASETS, Dataset, NotStoredError, ResultFileError, declared_units
+from fecm.results.validity import End, decided
 
 if TYPE_CHECKING:
     import pandas
@@ -195,34 +205,64 @@ class Result(schema.Contact):
         return first_failures(self)
 
     @property
+    def end(self) -> End | None:
+        """State of the contact at the end of the run; None without impact steps.
+
+        Examples
+        --------
+        >>> import fecm
+        >>> fecm.run_one("decks/impact-115.inp").end
+        <End.OVER: 'contact over'>
+        """
+        found = self._summarised()
+        return None if found is None else End(found.end.item())
+
+    @property
+    def validity(self) -> str:
+        """``"ok"``, or the reasons to doubt the result, in the words that sweeps have.
+
+        Empty in files of earlier versions and without impact steps.
+        """
+        return str(self.attributes.get(VALIDITY, ""))
+
+    @property
     def metrics(self) -> dict[str, float]:
         """Impact metrics by the names of :data:`fecm.results.metrics.METRICS`.
 
-        Empty without impact steps.  Unknown values are NaN: those after a contact that lasts to the
-        end, those that need a deck that can't be read, the time of a threshold that is not reached.
+        Empty without impact steps.  Unknown values are NaN: those that the :attr:`end` of the run
+        has not decided, those that need a deck that can't be read, the time of a threshold that is
+        not reached.
         """
-        if f"{HISTORY}/force" not in self or not len(self[f"{HISTORY}/force"]):
+        if (found := self._summarised()) is None:
             return {}
+        w = self[f"{HISTORY}/plate_w"]
+        columns = found.columns | {"max_deflection": decided(w[[w.argmax()]], w[-1:], found.end)}
+        values: dict[str, float] = {n: columns[n].item() for n in METRICS if n in columns}
+        return values | {n: int(values[n]) for n in INTEGERS if math.isfinite(values[n])}
+
+    def _summarised(self) -> Metrics | None:
+        """Metrics of the run; None without impact steps."""
+        if f"{HISTORY}/force" not in self or not len(self[f"{HISTORY}/force"]):
+            return None
         from fecm.results.plies import model_of
 
         velocity = np.float64(math.nan)
         with contextlib.suppress(ResultFileError):
             if (card := model_of(self).last(Impact)) is not None and card.velocity:
                 velocity = np.float64(card.velocity)
-        names = "force", "time", "indentation", "plate_w"
-        force, time, indentation, w = (self[f"{HISTORY}/{name}"] for name in names)
-        permanent = _number(self.attributes_of(HISTORY).get("permanent_indentation"))
+        force, time, indentation = (
+            self[f"{HISTORY}/{name}"] for name in ("force", "time", "indentation")
+        )
+        history = self.attributes_of(HISTORY)
+        permanent = np.array([_number(history.get("permanent_indentation"))])
         initial = _number(self.attributes_of("energy").get("initial"))
         largest = indentation.max(keepdims=True, initial=0.0)
-        depths = Indentation(largest, indentation[-1:], np.array([permanent]))
+        depths = Indentation(largest, indentation[-1:], permanent)
         threshold = _number(self.threshold.get("force")) if self.threshold else None
+        mobility = _number(history.get(MOBILITY, 0.0))
         with np.errstate(all="ignore"):
-            mass = 2.0 * initial / velocity**2
-            found = summarise(force[:, None], time, depths, mass, velocity, threshold)
-        rising = self.still_in_contact and w.argmax() == len(w) - 1
-        found["max_deflection"] = np.array([math.nan]) if rising else w[[w.argmax()]]
-        values: dict[str, float] = {n: found[n].item() for n in METRICS if n in found}
-        return values if self.still_in_contact else values | {n: int(values[n]) for n in INTEGERS}
+            hit = Projectiles(2.0 * initial / velocity**2, velocity)
+            return summarise(force[:, None], time, depths, hit, threshold, mobility)
 
     def rows(self, path: str, start: int, stop: int) -> Array:
         """Rows of a dataset; those of a file are not kept in memory."""

@@ -20,15 +20,18 @@ from fecm.results.first_failure import (
 )
 from fecm.results.result import Result
 from fecm.results.schema import DATASETS, GROUPS, ResultFileError, row_blocks
+from fecm.results.validity import CROSSED, End
 
 if TYPE_CHECKING:
     from fecm.results.hdf5_reader import Contents
 
+LEFT = "left in plate, indentation and projectile"
 LISTED = 6  # most contacts and frequencies listed individually
-OPEN_END = (
-    "the run ends in contact: the end of the contact, the permanent indentation and the energies "
-    "after it are open; take more steps"
-)
+# Where a run has ended that has not decided its peak.
+UNDECIDED = {
+    End.RISING: "in contact",
+    End.BETWEEN: "between two contacts",
+}
 
 
 def summary(result: Result) -> list[str]:
@@ -46,12 +49,8 @@ def summary(result: Result) -> list[str]:
         lines.append(f"largest w         {quantity(w[row, node], 'length')} at node {node + 1}")
     elif "tape3/w" in result:
         lines.append("largest w         0: nothing moved the plate")
-    if known := result.threshold:
-        force, crossing = quantity(float(known["force"]), "force"), float(known["time"])
-        missed = f"not reached: the peak is {float(known['margin']):.1%} below"
-        reached = f"reached at time {quantity(crossing, 'time')}"
-        lines.append(f"delamination      {force} {missed if math.isnan(crossing) else reached}")
-        lines[-1] += _delaminations(result)
+    if result.threshold:
+        lines.append(f"delamination      {_delamination(result)}{_delaminations(result)}")
     lines += _exposures(result)
     if "failure/x" in result and (count := np.count_nonzero(result["failure/under_load"])):
         lines.append(f"under the load    {count} points are left out of these exposures")
@@ -109,6 +108,18 @@ def _exposures(result: Result) -> list[str]:
     return lines
 
 
+def _delamination(result: Result) -> str:
+    """The threshold of delamination, and whether it is reached."""
+    quantity, known = partial(_quantity, result), result.threshold
+    force, crossing = quantity(float(known["force"]), "force"), float(known["time"])
+    if math.isfinite(crossing):
+        return f"{force} reached at time {quantity(crossing, 'time')}"
+    if (end := result.end) in UNDECIDED:
+        return f"{force} not reached by the end of the run, which is {UNDECIDED[end]}: open"
+    margin = result.metrics.get("threshold_margin", 1.0)
+    return f"{force} not reached: the peak is {margin:.1%} below"
+
+
 @frozen
 class LargestExposure:
     """Largest exposure of a criterion outside the elements under the load."""
@@ -129,9 +140,13 @@ class LargestExposure:
 
     def line(self, result: Result) -> str:
         """One line of the summary."""
-        place = where(self.criterion, self.ply)
+        place, least = (
+            where(self.criterion, self.ply),
+            "at least " if result.end in UNDECIDED else "",
+        )
+        value = f"{least}{self.exposure:.4g}"
         return (
-            f"{self.criterion.replace('_', ' '):18}{self.exposure:.4g}: {self.mode}, {place} at "
+            f"{self.criterion.replace('_', ' '):18}{value}: {self.mode}, {place} at "
             f"({self.x:.6g}, {self.y:.6g}), time {_quantity(result, self.time, 'time')}"
         )
 
@@ -180,6 +195,10 @@ def _impact(result: Result) -> list[str]:
     peak = int(np.argmax(force))
     at = f"{quantity(force[peak], 'force')} at time {quantity(time[peak], 'time')}"
     text = f"{at} (step {peak + 1})" if force[peak] > 0.0 else "0: there was no contact"
+    if (end := result.end) in UNDECIDED and force[peak] > 0.0:
+        text = f"at least {text}, as the run ends {UNDECIDED[end]}"
+    if doubt := _elastic(result, float(force[peak])):
+        text += f" ({doubt})"
     lines = [f"peak force        {text}"]
     edges = np.flatnonzero(np.diff(np.concatenate(([0], force > 0.0, [0])).astype(int)))
     intervals = list(zip(time[edges[::2]], time[edges[1::2] - 1], strict=True))  # in contact
@@ -194,7 +213,7 @@ def _impact(result: Result) -> list[str]:
         indentation, w = result["history/indentation"], result["history/plate_w"]
         deepest, last = (quantity(time[v.argmax()], "time") for v in (indentation, w))
         permanent = float(result.history.attributes["permanent_indentation"])
-        left = "open" if result.still_in_contact else quantity(permanent, "length")
+        left = "open" if end is not End.OVER else quantity(permanent, "length")
         alpha, bent = (quantity(values.max(), "length") for values in (indentation, w))
         lines += [
             f"contact           {', '.join(texts)}",
@@ -202,17 +221,27 @@ def _impact(result: Result) -> list[str]:
             f"largest w         {bent} under the load at time {last}",
         ]
         metrics = result.metrics
-        if not (result.still_in_contact or math.isnan(metrics["rebound_velocity"])):
+        if not math.isnan(metrics["rebound_velocity"]):
             lines.append(
                 f"rebound           {quantity(metrics['rebound_velocity'], 'length/time')}, "
                 f"impulse {quantity(metrics['impulse'], 'force*time')}, "
-                f"{quantity(metrics['energy_absorbed'], 'force*length')} absorbed"
+                f"{quantity(metrics['energy_absorbed'], 'force*length')} {LEFT}"
             )
     initial = float(result.energy.attributes["initial"])
     worst = float(np.abs(result["energy/balance_error"]).max())
     share = f"{worst / initial:.2g} of the initial" if initial else f"{worst:.3g}, initially"
     lines.append(f"energy balance    worst error {share} {quantity(initial, 'force*length')}")
     return lines
+
+
+def _elastic(result: Result, peak: float) -> str:
+    """Why a peak force is that of an elastic plate only; empty if it may be real."""
+    beyond = []
+    if result.threshold and peak > CROSSED * (force := float(result.threshold["force"])):
+        beyond.append(f"delamination at {_quantity(result, force, 'force')}")
+    if any(found.exposure > 1.0 for found in largest_exposures(result)):
+        beyond.append("the first failure")
+    return f"elastic: beyond {' and '.join(beyond)}" if beyond else ""
 
 
 def describe_groups(contents: Contents) -> list[dict[str, Any]]:
@@ -279,6 +308,8 @@ def about_run(result: Result) -> dict[str, Any]:
         "steps": steps,
         "time": result["history/time"][[0, -1]].tolist() if steps else None,
         "still_in_contact": result.still_in_contact,
+        "end": None if missing else result.end,
+        "validity": result.validity,
         "notes": list(result.notes),
         "metrics": {} if missing else _metrics(result),
         "summary": missing or summary(result),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from fecm._version import __version__
 from fecm.deck.model import Deck, Gages, Material
 from fecm.deck.units import unit_names
 from fecm.mechanics.failure import MODES
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.mesh import rigid_deflections
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.time_step import critical_time_step
@@ -22,18 +22,42 @@ from fecm.problem.check_plausibility import contact_step
 from fecm.problem.problem import Problem
 from fecm.problem.slips import mode_of
 from fecm.results.first_failure import FEWEST, count_evaluations
+from fecm.results.metrics import MOBILITY, VALIDITY
 from fecm.results.result import Result
 from fecm.results.schema import FORMAT, FORMAT_VERSION, row_blocks
 from fecm.results.sinks import Sink
-from fecm.results.summary import OPEN_END, largest_exposures
+from fecm.results.summary import largest_exposures
+from fecm.results.validity import (
+    BENT,
+    BROKEN,
+    CROSSED,
+    DELAMINATED,
+    INDENTATION,
+    OPEN,
+    OPEN_ENDS,
+    SOFT,
+    STRAIN,
+    STRAINED,
+    TOO_SOFT,
+    UNSAFE,
+    End,
+    joined,
+    softness,
+)
 from fecm.simulation.macros import bind, bind_loop
 from fecm.simulation.simulation import Observer, Simulation
 
 # Error of the energy balance, relative to the supplied energy, that triggers a warning.
 ENERGY_WARNING = 0.01
-STRAIN = 0.01  # largest strain for which plies are taken as linear
 
-Peak = tuple[float, float, float, float]  # value, time, x and y
+
+class Peak(NamedTuple):
+    """Largest value of a quantity, and where and when it occurs."""
+
+    value: float
+    time: float
+    x: float
+    y: float
 
 
 def simulate(
@@ -74,7 +98,6 @@ def run(simulation: Simulation) -> None:
         cause = _likely_cause(problem, simulation.model, state.dt)
         raise DivergenceError(diverged.step, f"{diverged.reason}; {cause}") from None
     _write_footer(simulation)
-    _judge(simulation)
 
 
 def _likely_cause(problem: Problem, model: ImpactModel, dt: float) -> str:
@@ -127,27 +150,41 @@ def _units(deck: Deck) -> dict[str, str]:
 
 
 def _write_footer(simulation: Simulation) -> None:
-    """Store the permanent indentation, and the number of steps that did not converge."""
-    state, threshold = simulation.state, simulation.problem.threshold
+    """Store what the end of the run has decided, and reasons to doubt the result."""
+    problem, state, sink = simulation.problem, simulation.state, simulation.sink
+    impact, system = state.impact, simulation.model.impact
+    attributes: dict[str, Any] = {}
+    if impact is not None and system is not None and impact.plate.step:
+        permanent = system.law.permanent(impact.memory, impact.contact)
+        attributes["permanent_indentation"] = permanent
+        attributes["unsettled_steps"] = impact.unconverged_steps
+        if problem.judge.mobility:
+            attributes[MOBILITY] = problem.judge.mobility
+        sink.attributes("history", attributes)
+    groups: dict[str, dict[str, Any]] = {
+        "": _units(problem.deck),
+        "failure": {"modes": list(MODES)},
+        "history": attributes,
+        "energy": {"initial": simulation.recorder.steps.initial},
+    }
+    threshold = problem.threshold
+    if threshold is not None:
+        groups["threshold"] = {"force": threshold.force}
+    result = Result(sink.arrays, {}, groups, problem.deck)
     if threshold is not None:
         values = {
             "force": threshold.force, "d_star": threshold.rigidity, "time": state.monitor.crossing,
-            "margin": 1.0 - state.monitor.peak_force / threshold.force,
+            "margin": result.metrics.get("threshold_margin", 1.0),
             "number": threshold.number, "interfaces": threshold.interfaces,
             "band": np.array(threshold.band),
         }  # fmt: skip
-        simulation.sink.attributes("threshold", values)
+        sink.attributes("threshold", values)
     if state.failure is not None:
-        count = count_evaluations(Result(simulation.sink.arrays, {}, {}))
-        simulation.sink.attributes("failure", {"evaluations_in_contact": count})
-    impact, system = state.impact, simulation.model.impact
-    if impact is not None and system is not None and impact.plate.step:
-        permanent = system.law.permanent(impact.memory, impact.contact)
-        values = {"permanent_indentation": permanent, "unsettled_steps": impact.unconverged_steps}
-        simulation.sink.attributes("history", values)
+        sink.attributes("failure", {"evaluations_in_contact": count_evaluations(result)})
+    _judge(simulation, result)
 
 
-def _judge(simulation: Simulation) -> None:
+def _judge(simulation: Simulation, result: Result) -> None:
     """Store reasons to doubt the result, if there are any."""
     notes: list[str] = []
     state, enforced = simulation.state, not simulation.options.slips
@@ -158,50 +195,64 @@ def _judge(simulation: Simulation) -> None:
     steps = state.impact.unconverged_steps if state.impact is not None else 0
     if steps and enforced:
         notes.append(f"the contact iteration did not converge in {steps} steps; a smaller DT helps")
-    units = _units(simulation.problem.deck)
-    groups: dict[str, dict[str, Any]] = {"": units, "failure": {"modes": list(MODES)}}
-    result = Result(simulation.sink.arrays, {}, groups)
-    notes += _warnings(simulation, result)
+    beyond = list(_beyond(simulation, result))
+    notes += [text for _, text in beyond]
     if state.failure is not None:
         notes += _few_evaluations(result)
-    if result.still_in_contact:
-        notes.append(OPEN_END)
+    end = result.end
+    if end is not None:
+        notes += [OPEN_ENDS[end]] if end in OPEN_ENDS else []
+        reasons = [OPEN] if end in (End.RISING, End.BETWEEN) else []
+        reasons += [reason for reason, _ in beyond]
+        if state.monitor.peak_force > CROSSED * result.threshold.get("force", np.inf):
+            reasons.append(DELAMINATED)
+        simulation.sink.attributes("", {VALIDITY: joined(reasons)})
     if notes:
         simulation.sink.attributes("", {"notes": notes})
 
 
-def _warnings(simulation: Simulation, result: Result) -> list[str]:
-    """Warn of deflection, strain, indentation and exposures beyond their limits, once each."""
-    h = simulation.model.plate.laminate.thickness
+def _beyond(simulation: Simulation, result: Result) -> Iterator[tuple[str, str]]:
+    """Reason and note of deflection, strain, indentation and exposures beyond their limits."""
+    judge = simulation.problem.judge
+    h = judge.thickness
     length, clock = result.unit("length"), result.unit("time")
-    free = _rigid_deflections(simulation.problem.mesh)
+    free = rigid_deflections(simulation.problem.mesh)
 
     def size(value: float) -> str:
         return f"{value:.4g} {length}".rstrip() + f" = {value / h:.3g} h"
 
-    less = ", less its rigid motion," if free.size else ""
-    checks = (
-        (f"deflection{less}", _deflections(simulation, result, free), h / 2.0, size,
-         "h/2 a linear plate, without membrane stiffening, is too soft"),
-        ("strain", _strains(simulation, result), STRAIN, "{:.2%}".format,
-         "1 % linear plies are doubtful"),
-        ("indentation", _indentations(simulation, result), h / 4.0, size,
-         "h/4 the contact law of a half-space is doubtful"),
-    )  # fmt: skip
-    found = []
+    def told(what: str, value: str, peak: Peak) -> str:
+        at = f"at ({peak.x:.6g}, {peak.y:.6g}), time {peak.time:.6g} {clock}".rstrip()
+        return f"the {what} reaches {value} {at}: beyond"
+
     with np.errstate(all="ignore"):
-        for what, peaks, limit, shown, why in checks:
-            value, time, x, y = max(peaks, default=(0.0, 0.0, 0.0, 0.0))
-            if value > limit:
-                at = f"at ({x:.6g}, {y:.6g}), time {time:.6g} {clock}".rstrip()
-                found.append(f"the {what} reaches {shown(value)} {at}: beyond {why}")
-    beyond = [e.criterion.replace("_", " ") for e in largest_exposures(result) if e.exposure > 1.0]
-    if beyond:
-        found.append(
-            f"exposure above 1 ({', '.join(beyond)}): the run goes on elastically, without the "
-            "softening that follows the first failure"
+        bent, strained, indented = (
+            max(peaks, default=Peak(0.0, 0.0, 0.0, 0.0))
+            for peaks in (
+                _deflections(simulation, result, free),
+                _strains(simulation, result),
+                _indentations(simulation, result),
+            )
         )
-    return found
+    if bent.value > judge.limit * h:
+        what = f"deflection{', less its rigid motion,' if free.size else ''}"
+        text = f"{told(what, size(bent.value), bent)} {judge.limit} h {TOO_SOFT}"
+        if simulation.problem.has_impact:
+            text += f": {softness(bent.value / h, judge.in_plane)}; {UNSAFE}"
+        yield BENT[judge.in_plane], text
+    if strained.value > STRAIN:
+        text = told("strain", f"{strained.value:.2%}", strained)
+        yield STRAINED, f"{text} 1 % linear plies are doubtful"
+    if indented.value > INDENTATION * h:
+        text = told("indentation", size(indented.value), indented)
+        yield SOFT, f"{text} h/4 the contact law of a half-space is doubtful"
+    found = [e.criterion.replace("_", " ") for e in largest_exposures(result) if e.exposure > 1.0]
+    if found:
+        yield (
+            BROKEN,
+            f"exposure above 1 ({', '.join(found)}): the run goes on elastically, without the "
+            "softening that follows the first failure",
+        )
 
 
 def _few_evaluations(result: Result) -> list[str]:
@@ -215,24 +266,10 @@ def _few_evaluations(result: Result) -> list[str]:
     ]
 
 
-def _rigid_deflections(mesh: Mesh) -> Floats:
-    """Orthonormal basis of w, (numnp, n), of the rigid motions that the supports allow."""
-    used = mesh.used
-    place = mesh.coordinates[used, :2] - mesh.coordinates[used, :2].mean(axis=0)
-    w = np.column_stack([np.ones(len(place)), place / np.abs(place).max()])
-    slopes = np.broadcast_to(np.eye(3)[1:], (len(place), 2, 3))
-    motions = np.concatenate([w[:, None], slopes], axis=1)  # of w, theta_x, theta_y
-    held = motions[mesh.equations[used, 2:] == 0]
-    resistance, combined = np.linalg.eigh(held.T @ held)
-    basis = np.zeros((len(used), 3))
-    basis[used] = w
-    return np.linalg.qr(basis @ combined[:, resistance < 1e-9 * len(place)])[0]
-
-
 def _peak(values: Floats, times: Floats, x: Any, y: Any) -> Peak:
     """The largest of values, (rows, ...), at places (...)."""
     row, *at = np.unravel_index(int(values.argmax()), values.shape)
-    return float(values[row, *at]), float(times[row]), float(x[*at]), float(y[*at])
+    return Peak(float(values[row, *at]), float(times[row]), float(x[*at]), float(y[*at]))
 
 
 def _rows(result: Result, group: str, *names: str) -> Iterator[tuple[Floats, list[Floats]]]:
@@ -248,9 +285,14 @@ def _rows(result: Result, group: str, *names: str) -> Iterator[tuple[Floats, lis
 def _deflections(simulation: Simulation, result: Result, free: Floats) -> Iterator[Peak]:
     """Peaks of the deflection less the rigid motions."""
     x, y = simulation.problem.mesh.coordinates[:, :2].T
+    place = simulation.problem.load_place
+    by_step = place is not None and not free.size and "history/plate_w" in result
+    # Under the load the deflection is that of the summary, the mean over the patch.
+    under = simulation.problem.under_load(x, y) & by_step
     for times, (w,) in _rows(result, "tape3", "w"):
-        yield _peak(np.abs(w - (w @ free) @ free.T), times, x, y)
-    if (place := simulation.problem.load_place) is not None and not free.size:
+        bent = np.abs(w - (w @ free) @ free.T)
+        yield _peak(np.where(under, 0.0, bent), times, x, y)
+    if place is not None and by_step:
         for times, (w,) in _rows(result, "history", "plate_w"):
             yield _peak(np.abs(w), times, *map(np.asarray, place))
 

@@ -6,7 +6,7 @@ then stepped once under a unit force; every case follows by convolution with its
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import compress
@@ -31,22 +31,37 @@ from fecm.problem.build import build_law, build_model, build_projectile
 from fecm.problem.check_segments import check_impact, check_law, check_projectile
 from fecm.problem.problem import Problem, check_program
 from fecm.results.first_failure import count_evaluations
-from fecm.results.metrics import EVALUATIONS, GAGE, HIT, Indentation, summarise
+from fecm.results.metrics import (
+    EVALUATIONS,
+    EXPOSURES,
+    GAGE,
+    HIT,
+    RATIO,
+    VALIDITY,
+    Indentation,
+    Projectiles,
+    summarise,
+)
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.results.summary import largest_exposures
+from fecm.results.validity import Extent, Texts, decided
 from fecm.simulation.run import ENERGY_WARNING, simulate
 from fecm.sweeps import find_exposure, plan
 from fecm.sweeps.cases import EXPOSURE, THRESHOLD, Case, CasesError, Value, name_fault, plate_values
+from fecm.sweeps.find import Decks, Runs, found
 from fecm.sweeps.plan import RUN, Outcome, merge, outcome_of
 from fecm.sweeps.responses import Hits, impacts, largest_sums, plate_response
-from fecm.sweeps.vary import Clock, apply_case, check_deck, raise_first, with_time_step
+from fecm.sweeps.vary import (
+    Clock,
+    apply_case,
+    check_deck,
+    lengthened,
+    raise_first,
+    with_time_step,
+)
 
-Decks = Mapping[int, Deck]  # by the numbers of their cases, ascending
-Runs = Callable[[Decks, bool], Outcome]  # runs decks; doubtful ones in full if they are judged
 UNIT = RigidMass(1.0)
-RANGE, ERROR = 100.0, 1e-6  # of velocities relative to the deck's, and the last relative error
-ROUGH = 1e-4  # relative difference of the peak force from the value searched, beyond which it jumps
 
 
 def run(task: plan.Task) -> Outcome:
@@ -77,7 +92,10 @@ def run(task: plan.Task) -> Outcome:
     parts = [Outcome.failed(lost)]
     if decks:
         force = _threshold(checked) if task.until == THRESHOLD else task.until
-        outcome = runs(decks, True) if force is None else _found(decks, float(force), runs)
+        if force is None:
+            outcome = runs(decks, True)
+        else:
+            outcome = found(decks, float(force), partial(_longer, task, checked, runs))
         parts.append(_with_hit(outcome, checked, first))
     return merge(parts, task.history)
 
@@ -175,34 +193,11 @@ def runs_of(checked: Problem, extra: Sequence[str] = (), *, history: bool = True
     )
 
 
-def _found(decks: Decks, force: float, runs: Runs) -> Outcome:
-    """Run cases at the velocities at which their peaks reach a force."""
-
-    def at(case: int, velocity: float) -> Deck:
-        return apply_case(decks[case], {"velocity": velocity})
-
-    def peaks(pairs: list[tuple[int, float]]) -> Floats:
-        return runs({n: at(*pair) for n, pair in enumerate(pairs)}, False).columns["peak_force"]
-
-    starts = {case: deck.require(Impact).velocity for case, deck in decks.items()}
-    found = search(starts, force, peaks)
-    velocities = {case: v for case, v in found.items() if isinstance(v, float)}
-    parts = [Outcome.failed({case: v for case, v in found.items() if isinstance(v, str)})]
-    if velocities:
-        outcome = runs({case: at(case, v) for case, v in velocities.items()}, True)
-        velocity = np.array(list(velocities.values()))
-        mass = np.array([build_projectile(decks[case]).total_mass for case in velocities])
-        peak, fine = outcome.columns["peak_force"], np.isin(outcome.columns["status"], RUN)
-        outcome.columns |= {"found_velocity": velocity, "found_energy": 0.5 * mass * velocity**2}
-        right = fine & (np.abs(peak - force) <= ROUGH * force)
-        parts.append(outcome.select(np.flatnonzero(right)))
-        for row in np.flatnonzero(~right):
-            text = f"at velocity {velocity[row]:.6g}: {outcome.status[row]}"
-            if fine[row]:
-                text = f"from velocity {velocity[row]:.6g} on it is {peak[row]:.6g}, and below it"
-                text = f"no peak force of {force:.6g}: {text} jumps or the run ends before its peak"
-            parts.append(Outcome.failed({outcome.numbers[row]: text}))
-    return merge(parts)
+def _longer(task: plan.Task, checked: Problem, runs: Runs, factor: int) -> Runs:
+    """What runs the cases of a plate `factor` times as long."""
+    if factor == 1:
+        return runs
+    return runs_of(lengthened(checked, factor), task.extra, history=task.history)
 
 
 def deck_of(planned: plan.Plan, case: int) -> Deck:
@@ -273,20 +268,22 @@ def _together(
         law = HystereticLaw(stacked([build_law(deck).constants for deck in ordered]))
         speed = np.array([deck.require(Impact).velocity for deck in ordered])
         hits = Hits(list(kinds), kind[order], scale, law, speed)
-        found = impacts(plate.response, dt, plate.node_mass, hits)
+        struck = impacts(plate.response, dt, plate.node_mass, hits)
         times = np.add.accumulate(np.full(steps, dt))
-        summary = summarise(found.force, times, found.indentation, mass, speed, _threshold(checked))
-        peaks = {n: largest_sums(r, found.force) for n, r in plate.strains.items() if judged}
-    if plan.DEFLECTION in extra:
-        peaks[plan.DEFLECTION] = found.deflection
-    summary |= {name: _known(*peak, found.force[-1]) for name, peak in peaks.items()}
-    back = np.argsort(order)
-    unsettled = found.unconverged_steps[back]
-    columns = {name: values[back] for name, values in summary.items()}
-    outcome = outcome_of(numbers, columns, found.force[-1, back], steps, dt, unsettled)
+        hit, mobility = Projectiles(mass, speed), checked.judge.mobility
+        threshold = _threshold(checked)
+        metrics = summarise(struck.force, times, struck.indentation, hit, threshold, mobility)
+        peaks = {n: largest_sums(r, struck.force) for n, r in plate.strains.items() if judged}
+    peaks[plan.DEFLECTION] = struck.deflection
+    numbers = [numbers[case] for case in order]
+    last, unsettled = struck.force[-1], struck.unconverged_steps
+    outcome = outcome_of(numbers, metrics, last, steps, dt, unsettled)
+    _judge(outcome, checked, extra, metrics.end, peaks, struck.indentation.largest)
     if history:
-        outcome.force = np.ascontiguousarray(found.force.T[back])
-    doubtful = ~(found.error[back] < ENERGY_WARNING) | (unsettled > 0)
+        outcome.force = struck.force.T
+    back = np.argsort(order)
+    outcome = outcome.select(back)
+    doubtful = (~(struck.error < ENERGY_WARNING) | (unsettled > 0))[back]
     if not (judged and doubtful.any()):
         return outcome
     # Cases near the limits of a run are run in full, which accepts or rejects them.
@@ -295,26 +292,45 @@ def _together(
     return merge([outcome.select(np.flatnonzero(~doubtful)), *full])
 
 
-def _known(largest: Floats, last: Floats, force: Floats) -> Floats:
-    """Largest values; NaN where the last step is in contact and has the largest."""
-    return np.where((force > 0.0) & (last >= largest), np.nan, largest)
+def _judge(
+    outcome: Outcome, checked: Problem, extra: Sequence[str], end: Texts,
+    peaks: Mapping[str, tuple[Floats, Floats]], indentation: Floats,
+) -> None:  # fmt: skip
+    """Add the validity of cases, and the columns of what was measured, with its open values.
 
-
-def _extra(extra: Sequence[str], result: Result) -> dict[str, NDArray[Any]]:
-    peaks: dict[str, Floats] = {}
+    `peaks` are the largest and last values, (cases,) each, of the deflection and of other columns.
+    """
+    judge, known = checked.judge, {name: decided(*peak, end) for name, peak in peaks.items()}
+    deflection = peaks[plan.DEFLECTION][0] if not judge.mobility else np.full(len(end), np.nan)
+    exposures = [largest for name, (largest, _) in peaks.items() if name in EXPOSURES]
+    extent = Extent(
+        end=end,
+        peak=outcome.columns[plan.REACHED],
+        indentation=indentation,
+        deflection=deflection,
+        exposure=np.nanmax(exposures, axis=0) if exposures else np.nan,
+        threshold=np.nan if (force := _threshold(checked)) is None else force,
+    )
+    ratio = known.pop(plan.DEFLECTION) / judge.thickness
     if plan.DEFLECTION in extra:
-        peaks[plan.DEFLECTION] = result["history/plate_w"]
+        known[plan.DEFLECTION] = ratio * judge.thickness
+    known[RATIO] = np.where(np.isnan(deflection), np.nan, ratio)
+    outcome.columns |= {**known, VALIDITY: judge.validity(extent)}
+
+
+def _measured_peaks(extra: Sequence[str], result: Result) -> dict[str, tuple[Floats, Floats]]:
+    """Largest and last values of the deflection, and of columns that are measured on request."""
+    w = result["history/plate_w"]
+    values = {plan.DEFLECTION: w}
     if plan.GAGES in extra and "gages/number" in result:
         strains = np.abs(result["gages/strain"]).T
-        peaks |= {f"{GAGE}{n}": s for n, s in zip(result["gages/number"], strains, strict=True)}
-    force = result["history/force"][-1:]
-    found = {name: _known(v.max(keepdims=True), v[-1:], force) for name, v in peaks.items()}
+        values |= {f"{GAGE}{n}": s for n, s in zip(result["gages/number"], strains, strict=True)}
+    peaks = {name: (v.max(keepdims=True), v[-1:]) for name, v in values.items()}
     for one in largest_exposures(result) if plan.FAILURE in extra else ():
-        last = np.array([one.exposure if one.time >= result["history/time"][-1] else 0.0])
-        found[f"exposure_{one.criterion}"] = _known(np.array([one.exposure]), last, force)
-    if plan.FAILURE in extra:
-        found |= {name: np.array([float(count_evaluations(result))]) for name in EVALUATIONS}
-    return found
+        at_end = one.time >= result["history/time"][-1]
+        last = one.exposure if at_end else 0.0
+        peaks[f"exposure_{one.criterion}"] = np.array([one.exposure]), np.array([last])
+    return peaks
 
 
 def _alone(
@@ -333,52 +349,17 @@ def _alone(
     indentation = Indentation(np.maximum(depth.max(keepdims=True), 0.0), depth[-1:], permanent)
     mass = build_projectile(checked.deck).total_mass
     speed = checked.deck.require(Impact).velocity
-    summary = summarise(force[:, None], times, indentation, mass, speed, _threshold(checked))
+    hit, threshold = Projectiles(mass, speed), _threshold(checked)
+    mobility = checked.judge.mobility
+    metrics = summarise(force[:, None], times, indentation, hit, threshold, mobility)
     unsettled = np.array([about.get("unsettled_steps", 0)])
-    outcome = outcome_of([number], summary, force[-1:], len(force), dt, unsettled, force[None])
+    outcome = outcome_of([number], metrics, force[-1:], len(force), dt, unsettled, force[None])
     result = Result(sink.arrays, sink.texts, sink.groups)
-    outcome.columns |= _extra(extra, result)
+    peaks = _measured_peaks(extra, result)
+    _judge(outcome, checked, extra, metrics.end, peaks, indentation.largest)
+    if plan.FAILURE in extra:
+        count = np.array([float(count_evaluations(result))])
+        outcome.columns |= dict.fromkeys(EVALUATIONS, count)
     if measure is not None:
         outcome.columns |= _measured(measure, result, case or {})
     return outcome
-
-
-def search(
-    starts: Mapping[int, float], force: float, peaks: Callable[[list[tuple[int, float]]], Floats]
-) -> dict[int, float | str]:
-    """Find the lowest velocity of each case at which the contact force reaches a value.
-
-    The range from 1/100 to 100 times the start is searched, by rounds of velocities.  Later rounds
-    gather around the interpolated velocity of the bracket, whose upper end is the result.  `peaks`
-    returns peak forces of pairs of case and velocity; NaN where unknown.  A text is the reason why
-    a case has no velocity.
-    """
-    found: dict[int, float | str] = dict.fromkeys(starts, "")
-    trials = {n: np.geomspace(v / RANGE, v * RANGE, plan.COUNT) for n, v in starts.items()}
-    first = True
-    while trials:
-        given = peaks([(n, float(v)) for n, values in trials.items() for v in values])
-        ends = np.cumsum([len(values) for values in trials.values()])[:-1]
-        left: dict[int, Floats] = {}
-        for (n, values), own in zip(trials.items(), np.split(given, ends), strict=True):
-            if not first:  # the ends of a bracket, whatever rounding makes of them
-                own[0], own[-1] = min(own[0], np.nextafter(force, 0.0)), np.fmax(own[-1], force)
-            (above,) = np.nonzero(own >= force)
-            after = above[0] if len(above) else 0
-            low, high = values[after - 1], values[after]
-            if not len(above):
-                found[n] = f"the peak force is below {force:.6g} up to velocity {values[-1]:.6g}"
-            elif not after:
-                found[n] = f"the peak force is above {force:.6g} from velocity {values[0]:.6g} on"
-            elif high - low <= ERROR * high:
-                found[n] = float(high)
-            else:
-                with np.errstate(all="ignore"):  # a power law; else the middle alone
-                    share = np.log(force / own[after - 1]) / np.log(own[after] / own[after - 1])
-                    guess = low * (high / low) ** share
-                offsets = (high - low) * 10.0 ** -np.arange(1.0, 9.0)
-                around = np.concatenate([guess - offsets, guess + offsets])
-                inside = around[(around > low) & (around < high)]
-                left[n] = np.unique(np.concatenate([[low, (low + high) / 2.0, high], inside]))
-        trials, first = left, False
-    return found

@@ -16,7 +16,7 @@ import numpy as np
 from fecm._errors import FecmError, did_you_mean
 from fecm._typing import Floats
 from fecm.deck.grid import SUPPORTS
-from fecm.results.metrics import COLUMNS
+from fecm.results.metrics import COLUMNS, VERDICTS
 from fecm.studies import StudyError
 from fecm.studies.tables import read_rows
 
@@ -52,7 +52,7 @@ TEXTS = ("layup", "at", "size", "support")  # names with texts
 PAIRS = {"at": ("({},{})", r"[,;\s]+"), "size": ("{}x{}", "[xX×]")}  # their forms and separators
 INTEGERS = ("impact_node",)
 # Names of results, which are no names of cases or of measured columns.
-RESERVED = ("case", "step", "steps", "status", "force", "unsettled_steps", *COLUMNS)
+RESERVED = ("case", "step", "steps", "force", "unsettled_steps", *VERDICTS, *COLUMNS)
 MOST = 1_000_000  # largest number of cases
 # Parameters of the laws, and what must hold for them.
 LAWS: dict[str, tuple[str, str, Callable[..., bool]]] = {

@@ -23,6 +23,7 @@ from fecm.problem.check_segments import resolution
 from fecm.problem.generate import RefineError, refined
 from fecm.problem.memory import check_memory
 from fecm.problem.problem import Problem
+from fecm.results.metrics import VERDICTS
 from fecm.sweeps.cases import REFINE, Case, CasesError
 from fecm.sweeps.plan import without_output
 from fecm.sweeps.vary import apply_case, check_deck, stable_time_step, with_time_step
@@ -79,7 +80,7 @@ def convergence(
     """
     if REFINE not in cases:
         return {}
-    numbers = {n: values for n, values in summary.items() if n not in ("status", *COUNTS)}
+    numbers = {n: values for n, values in summary.items() if n not in (*VERDICTS, *COUNTS)}
     highest = NINE_NODE_ORDER if nodes == 9 else ORDER
     return {name: _limit(values[-3:], highest) for name, values in numbers.items()}
 

@@ -17,7 +17,7 @@ from fecm.studies import StudyError
 from fecm.studies.comparison import Measurement
 from fecm.studies.rod_test.filters import Filter
 from fecm.sweeps.alignment import IdentifyError, contact_points
-from fecm.sweeps.batch import Runs
+from fecm.sweeps.find import Runs
 from fecm.sweeps.vary import apply_case
 
 DELAY = "delay"  # measured time at which the approach of the projectile ends in a contact

@@ -17,12 +17,14 @@ from fecm.deck.model import Deck, Impact, Indentation, Projectile
 from fecm.deck.units import unit_names
 from fecm.mechanics.projectile import RigidMass
 from fecm.problem.build import build_projectile
+from fecm.results.validity import MEANING, OPEN, reasons_of
 from fecm.studies import StudyError
 from fecm.studies.comparison import Measurement, measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of
 from fecm.sweeps.alignment import IdentifyError, check_measured, lags
 from fecm.sweeps.api import problem_of
-from fecm.sweeps.batch import Runs, runs_of
+from fecm.sweeps.batch import runs_of
+from fecm.sweeps.find import Runs
 from fecm.sweeps.fitting import (
     DELAY,
     FIRST_EVALUATIONS,
@@ -329,5 +331,11 @@ def _notes(
         text = "the model does not describe the measurement down to its noise"
         text = f"{text}, and the standard errors are too small"
         yield f"neighbouring residuals have the correlation {near:.2f}: {text}"
-    if (status := model.runs({0: found.deck}, True).status[0]) not in RUN:
+    fitted = model.runs({0: found.deck}, True)
+    if (status := fitted.status[0]) not in RUN:
         yield f"the run of the fitted deck fails: {status}"
+    # A measurement may end before the peak does; what the model lacks biases the parameters.
+    beyond = [r for r in reasons_of(str(fitted.columns["validity"][0])) if r != OPEN]
+    if beyond:
+        meant = ", ".join(MEANING.get(reason, reason) for reason in beyond)
+        yield f"the run of the fitted deck is {meant}: the parameters make up for what it lacks"

@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -22,9 +23,10 @@ from fecm.deck.records import Macro
 from fecm.mechanics.kernels import LIBRARY
 from fecm.problem.memory import needed_bytes
 from fecm.problem.problem import Problem
-from fecm.results.metrics import COLUMNS, FOUND, GAGE, SUMMARY
+from fecm.results.metrics import COLUMNS, FOUND, GAGE, SUMMARY, Metrics
 from fecm.results.metrics import THRESHOLD as LIMITED
 from fecm.results.result import Result
+from fecm.results.validity import FAILED, VALID
 from fecm.sweeps import cases as inputs
 from fecm.sweeps.cases import (
     EXPOSURE,
@@ -49,11 +51,19 @@ COUNT = 25  # velocities of the first round of a search
 # Names of columns that are measured on request.
 DEFLECTION, GAGES, FAILURE = MEASURES = ("max_deflection", "gages", "failure")
 Forces = tuple[Sequence[int], Floats | None]  # of cases, with contact forces (cases, steps)
-RUN = FINE, STILL = (
-    "ok",
-    "still in contact",
-)  # of a case that was run; STILL: in contact at the end
-ABOUT = ("status", "dt", "steps", "unsettled")  # columns that describe the run of a case
+
+
+class Status(StrEnum):
+    """Status of a case that was run; that of another one is the reason of its failure."""
+
+    OK = "ok"
+    STILL = "still in contact"  # at the end
+
+
+RUN = tuple(Status)
+# Columns that describe the run of a case.
+REACHED = "reached"  # the largest contact force, a lower bound of the peak
+ABOUT = ("status", "validity", "dt", "steps", "unsettled", REACHED)
 
 
 @dataclass(frozen=True)
@@ -196,9 +206,10 @@ class Outcome:
 
     numbers: list[int]  # of the cases, from 0
     # (cases,) each, by name: those of :data:`~fecm.results.metrics.METRICS` are NaN if the case
-    # failed, or if they are unknown because the run ended in contact.  ``status`` is ``"ok"``,
-    # ``"still in contact"``, or the reason for the failure; ``dt``, ``steps``; ``unsettled`` counts
-    # the steps whose contact iteration did not converge.
+    # failed, or if its end has not decided them.  ``status`` is a :class:`Status` or the reason for
+    # the failure; ``validity`` is ``"ok"``, the reasons to doubt the case, or ``"failed"``; ``dt``,
+    # ``steps``; ``unsettled`` counts the steps whose contact iteration did not converge;
+    # ``reached`` is the largest contact force, a lower bound of the peak.
     columns: dict[str, NDArray[Any]]
     force: Floats | None = None  # (cases, steps): contact force after every step
 
@@ -223,8 +234,10 @@ class Outcome:
         """Return the outcome of cases that could not be run, from the reasons by their numbers."""
         count, texts = len(reasons), list(reasons.values())
         columns: dict[str, NDArray[Any]] = {name: np.full(count, np.nan) for name in SUMMARY}
-        columns |= {"status": np.array(texts, dtype=np.str_), "dt": np.full(count, np.nan)}
+        columns |= {"status": np.array(texts, dtype=np.str_)}
+        columns |= {"validity": np.full(count, FAILED), "dt": np.full(count, np.nan)}
         columns |= {name: np.zeros(count, dtype=np.int64) for name in ("steps", "unsettled")}
+        columns |= {REACHED: np.full(count, np.nan)}
         return cls(list(reasons), columns)
 
 
@@ -248,16 +261,23 @@ def merge(parts: Sequence[Outcome], history: bool = True) -> Outcome:
 
 
 def outcome_of(
-    numbers: list[int], summary: Mapping[str, Floats], last: Floats, steps: int, dt: float,
+    numbers: list[int], metrics: Metrics, last: Floats, steps: int, dt: float,
     unsettled: NDArray[np.int64], force: Floats | None = None,
 ) -> Outcome:  # fmt: skip
-    """Return the outcome of cases that were run with one time step.
+    """Return the outcome of cases that were run with one time step, before they are judged.
 
     `last` (cases,) are the contact forces after the last step, `force` (cases, steps) all.
     """
-    cases, status = len(numbers), np.where(last > 0.0, STILL, FINE)
-    about = status, np.full(cases, dt), np.full(cases, steps, dtype=np.int64), unsettled
-    return Outcome(numbers, {**summary, **dict(zip(ABOUT, about, strict=True))}, force)
+    cases = len(numbers)
+    about = {
+        "status": np.where(last > 0.0, Status.STILL, Status.OK),
+        "validity": np.full(cases, VALID),
+        "dt": np.full(cases, dt),
+        "steps": np.full(cases, steps, dtype=np.int64),
+        "unsettled": unsettled,
+        REACHED: metrics.reached,
+    }
+    return Outcome(numbers, {**metrics.columns, **about}, force)
 
 
 def freed(some: Sequence[Task]) -> int:

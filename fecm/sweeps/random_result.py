@@ -9,17 +9,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._typing import Floats
-from fecm.results.metrics import COLUMNS
+from fecm._typing import Bools, Floats
+from fecm.results.metrics import COLUMNS, VALIDITY, VERDICTS
 from fecm.results.schema import ResultFileError
+from fecm.results.validity import OPEN
 from fecm.sweeps.cases import DESIGNS, REMEDY, THRESHOLD, Design, Law, Limit
-from fecm.sweeps.plan import RUN, check_limits
+from fecm.sweeps.plan import RUN, Status, check_limits
 
 if TYPE_CHECKING:
     from fecm.results.hdf5_reader import Contents
 
 Array = NDArray[Any]
 Columns = Mapping[str, Array]
+Counts = NDArray[np.int64]
 FEW = 0.01  # share of failed draws above which the results are doubtful
 QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
 RESAMPLES, COUNTS = 1000, 2_000_000  # of the bootstrap, and counts of them in memory at once
@@ -48,9 +50,10 @@ LIMIT_PARTS = {
     "quantity": "name of the quantity",
     "limit": "limit, in the unit of the quantity; NaN: the threshold of each case",
     "probability": "probability that the quantity exceeds the limit",
-    "lower": "lower end of its 95 % interval",
-    "upper": "upper end of its 95 % interval",
+    "lower": "lower end of its 95 % interval, whatever the open draws are",
+    "upper": "upper end of its 95 % interval, whatever the open draws are",
     "draws": "number of draws that have a value",
+    "open": "number of draws that ended before they had a value",
 }
 
 
@@ -60,9 +63,10 @@ class Exceedance(NamedTuple):
     quantity: NDArray[np.str_]  # (e,)
     limit: Floats  # (e,): in the unit of the quantity; NaN: the threshold of each case
     probability: Floats  # (e,)
-    lower: Floats  # (e,): ends of Wilson's 95 % interval
+    lower: Floats  # (e,): ends of its 95 % interval; see :func:`bounds`
     upper: Floats
     draws: NDArray[np.int64]  # (e,): number of draws that have a value
+    open: NDArray[np.int64]  # (e,): number of draws that ended before they had one
 
 
 @dataclass(frozen=True)
@@ -83,8 +87,9 @@ class RandomResult:
         ``design.laws``, and their 95 % intervals ``first_interval`` and ``total_interval`` (d, 2).
         Empty unless asked for; NaN of a quantity that is constant or lacks values.
     exceedance : Exceedance
-        ``quantity``, ``limit``, ``probability``, its 95 % interval from ``lower`` to ``upper``, and
-        ``draws``, those that have a value, for every limit asked for.
+        ``quantity``, ``limit``, ``probability``, its 95 % interval from ``lower`` to ``upper``,
+        ``draws``, those that have a value, and ``open``, those that ended before they had one, for
+        every limit asked for.
     combinations : dict of ndarray
         Varied values of every combination.
     notes : tuple of str
@@ -107,10 +112,10 @@ def evaluate(
     design: Design, cases: Columns, summary: Columns, limits: Sequence[Limit]
 ) -> RandomResult:
     """Evaluate the cases of a random sweep, (combinations * rows,) each."""
-    fine = np.isin(summary["status"], RUN)
+    fine, is_open = np.isin(summary["status"], RUN), open_ends(summary)
     made = {n: v[:: design.rows] for n, v in cases.items() if n not in design.laws}
     shape = (-1, design.rows) if made else (design.rows,)
-    numbers = {name: values for name, values in summary.items() if name != "status"}
+    numbers = {name: values for name, values in summary.items() if name not in VERDICTS}
     columns = {n: np.where(fine, values, np.nan).reshape(shape) for n, values in numbers.items()}
     draws = {name: values[..., : design.draws] for name, values in columns.items()}
     check_limits(limits, list(columns), threshold=FORCE in columns)
@@ -130,27 +135,35 @@ def evaluate(
             notes.append(f"no indices where a case has no value: {text}")
     return RandomResult(
         design, {name: statistics(values) for name, values in draws.items()}, found,
-        _exceedance(draws, limits), made, tuple(notes),
+        _exceedance(draws, is_open.reshape(shape)[..., : design.draws], limits), made, tuple(notes),
     )  # fmt: skip
 
 
-def _exceedance(draws: Columns, limits: Sequence[Limit]) -> Exceedance:
+def open_ends(summary: Columns) -> Bools:
+    """Cases that were run and ended before their contact was over, so that values are open."""
+    rising = np.char.find(summary.get(VALIDITY, summary["status"]), OPEN) >= 0
+    return np.asarray((summary["status"] == Status.STILL) | rising)
+
+
+def _exceedance(draws: Columns, is_open: Bools, limits: Sequence[Limit]) -> Exceedance:
     """Probabilities that quantities (..., draws) exceed limits."""
     thresholds = draws.get(FORCE, np.full(1, np.nan))
     known = thresholds[np.isfinite(thresholds)]
     common = known[0] if len(known) and not np.ptp(known) else np.nan
     over = [draws[n] - (thresholds if isinstance(v, str) else v) for n, v in limits]
     axes = next(iter(draws.values())).shape[:-1]
-    count, hits = (
+    count, hits, lacking = (
         np.array([one.sum(axis=-1) for one in which], dtype=np.int64).reshape(len(limits), *axes).T
-        for which in ([np.isfinite(one) for one in over], [one > 0.0 for one in over])
+        for which in (
+            [np.isfinite(one) for one in over],
+            [one > 0.0 for one in over],
+            [np.isnan(one) & is_open for one in over],
+        )
     )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = hits / count
     return Exceedance(
         np.array([name for name, _ in limits], dtype=np.str_),
         np.array([common if isinstance(v, str) else v for _, v in limits], dtype=float),
-        share, *wilson(hits, count), count,
+        *bounds(hits, count, lacking), count, lacking,
     )  # fmt: skip
 
 
@@ -169,22 +182,32 @@ def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
         rows = [[s.mean[place], s.standard_deviation[place], *s.quantiles[place]] for s in own]
         columns = [chosen, [unit(name) for name in chosen]]
         columns += [[f"{value:.6g}" for value in row] for row in zip(*rows, strict=True)]
+        lacking = [design.draws - int(s.draws[place]) for s in own]
+        columns.append([str(count) for count in lacking] if any(lacking) else [""] * len(own))
         lines += [
             f"{label:12}{''.join(f'{text:>16}' for text in row)}".rstrip()
-            for label, row in zip(["", "", *labels], columns, strict=True)
+            for label, row in zip(["", "", *labels, "no value"], columns, strict=True)
             if any(row)
         ]
         if random.sensitivity:
             lines += ["", *_index_lines(random, chosen[0], place)]
         for row, (name, limit) in enumerate(zip(found.quantity, found.limit, strict=True)):
-            p, low, high, n = (values[(*place, row)] for values in found[2:])
-            lacking = design.draws - n
-            more = f"; {lacking} draws have no value" if lacking else ""
+            p, low, high, n, lacking = (values[(*place, row)] for values in found[2:])
             value = THRESHOLD if np.isnan(limit) else f"{limit:.6g}"
-            lines.append(f"P({name} > {value}) = {p:.5g} ({low:.5g} to {high:.5g}){more}")
+            lines.append(f"P({name} > {value}) = {chance(p, low, high, lacking, design.draws - n)}")
     if count > PRINTED:
         lines += ["", f"{count - PRINTED} more combinations of varied values are in the file"]
     return lines
+
+
+def chance(p: float, low: float, high: float, is_open: int, lacking: int) -> str:
+    """A probability, its interval and the number of draws without a value, in words."""
+    text = f"{'open' if np.isnan(p) else f'{p:.5g}'} ({low:.5g} to {high:.5g})"
+    if is_open:
+        text += f"; {is_open} draws are open, counted as below and as above"
+    if lacking > is_open:
+        text += f"; {lacking - is_open} draws have no value"
+    return text
 
 
 def _index_lines(random: RandomResult, name: str, place: tuple[int, ...]) -> Iterator[str]:
@@ -261,10 +284,13 @@ def random_of(
             draws, mean, deviation = np.moveaxis(values[..., :3], -1, 0)
             return Statistics(draws.astype(int), mean, deviation, values[..., 3:])
 
-        known = [name for name in quantities if name != "status"]
-        exceedance = _exceedance({name: np.empty((*first, 0)) for name in known}, [])
+        known = [name for name in quantities if name not in VERDICTS]
+        none = {name: np.empty((*first, 0)) for name in known}
+        exceedance = _exceedance(none, np.empty((*first, 0), dtype=bool), [])
         if "exceedance/quantity" in contents:
-            exceedance = Exceedance(*(contents[f"exceedance/{p}"] for p in Exceedance._fields))
+            parts = {p: contents[f"exceedance/{p}"] for p in Exceedance._fields if p != "open"}
+            missing = np.zeros_like(parts["draws"])  # in files of earlier versions
+            exceedance = Exceedance(**parts, open=contents.get("exceedance/open", missing))
             shape = (*first, len(exceedance.quantity))
             if exceedance.limit.shape != shape[-1:] or {v.shape for v in exceedance[2:]} != {shape}:
                 raise ValueError("exceedance")
@@ -357,11 +383,25 @@ def statistics(values: Floats) -> Statistics:
     return Statistics(*(a.reshape((*values.shape[:-1], *a.shape[1:])) for a in arrays))
 
 
-def wilson(hits: NDArray[np.int64], count: NDArray[np.int64]) -> tuple[Floats, Floats]:
+def bounds(hits: Counts, count: Counts, lacking: Counts) -> tuple[Floats, Floats, Floats]:
+    """Probability from draws with a value, and the ends of an interval that holds for all draws.
+
+    `hits` of `count` draws exceed a limit, and it is not known whether `lacking` more do.  The
+    interval is Wilson's from its lower end, if none of them does, to its upper end, if all do.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = hits / count
+    lower, _ = wilson(hits, count + lacking)
+    _, upper = wilson(hits + lacking, count + lacking)
+    return share, lower, upper
+
+
+def wilson(hits: Counts, count: Counts) -> tuple[Floats, Floats]:
     """Ends of Wilson's 95 % interval of a probability (E. B. Wilson, JASA 22, 1927, 209)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         share = hits / count
         middle = share + Z**2 / (2.0 * count)
         half = Z * np.sqrt(share * (1.0 - share) / count + (Z / (2.0 * count)) ** 2)
         scale = 1.0 + Z**2 / count
-        return np.maximum(0.0, (middle - half) / scale), np.minimum(1.0, (middle + half) / scale)
+        lower, upper = (middle - half) / scale, (middle + half) / scale
+    return np.where(hits == 0, 0.0, lower), np.where(hits == count, 1.0, upper)

@@ -22,11 +22,28 @@ from fecm.deck.model import Delamination
 from fecm.deck.reader import Reader
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.results import schema
-from fecm.results.metrics import COLUMNS, FOUND, SUMMARY, THRESHOLD, described
+from fecm.results.metrics import (
+    COLUMNS,
+    FOUND,
+    RATIO,
+    SUMMARY,
+    THRESHOLD,
+    VALIDITY,
+    VERDICTS,
+    described,
+)
+from fecm.results.validity import BENT, MEANING, TOO_SOFT, UNSAFE, InPlane, counted, softness
 from fecm.sweeps.cases import REFINE, pair
 from fecm.sweeps.convergence import Convergence, convergence
-from fecm.sweeps.plan import RUN, STILL, Forces, Outcome, Plan
-from fecm.sweeps.random_result import RandomResult, attributes, evaluate, random_of, stored
+from fecm.sweeps.plan import RUN, Forces, Outcome, Plan, Status
+from fecm.sweeps.random_result import (
+    RandomResult,
+    attributes,
+    evaluate,
+    open_ends,
+    random_of,
+    stored,
+)
 
 if TYPE_CHECKING:
     import pandas
@@ -42,7 +59,10 @@ SAME = 1e-9  # distance from the place given, relative to its coordinates, that 
 FORCE = "history/force"
 DIGITS = 6  # of the values of a case, unless others are closer
 LISTED = 5  # reasons of failure that the summary lists
-STATUS = "ok, still in contact, or why the case failed"
+TEXTS_OF = {
+    "status": "ok, still in contact, or why the case failed",
+    "validity": "ok, reasons to doubt the case, or failed",
+}
 DIMENSIONS = {  # of the values, and of the stored force
     "velocity": "length/time", "energy": "force*length", "force": "force",
     "k": "force/length^1.5",
@@ -126,10 +146,45 @@ def _counts(result: SweepResult) -> list[tuple[int, str]]:
     unconverged = np.zeros_like(fine) if steps is None else fine & (steps > 0)
     cases = {
         "still in contact at the end": result.still,
+        **_doubts(result),
         "with a contact iteration that did not converge": unconverged,
         "failed": ~fine,
     }
     return [(int(some.sum()), what) for what, some in cases.items() if some.any()]
+
+
+def _doubts(result: SweepResult) -> dict[str, NDArray[np.bool_]]:
+    """Cases beyond the range of the model, by what they are."""
+    found = {}
+    for reason, some in counted(result.validity):
+        what = MEANING.get(reason, reason)
+        if reason in BENT.values():
+            ratio = result.summary.get(RATIO, np.full(len(some), np.nan))[some]
+            if np.isfinite(ratio).any():
+                what = f"{what[:-1]}, up to {np.nanmax(ratio):.3g} h)"
+        found[what] = some
+    return found
+
+
+def remarks(result: SweepResult) -> Iterator[str]:
+    """What open values and cases beyond the linear plate mean, and what helps."""
+    is_open = result.fine & ~result.over
+    if is_open.any():
+        duration = 2.0 * float((result.dt * result.steps)[is_open].max())
+        yield (
+            f"{is_open.sum()} of {len(result)} cases end before their contact does: what comes "
+            f"after is open; a longer run decides it, as with --vary duration={duration:.3g}"
+        )
+    bent = [reason for reason, _ in counted(result.validity) if reason in BENT.values()]
+    if bent:
+        held = any(reason != BENT[InPlane.FREE] for reason in bent)
+        ratio = result.summary.get(RATIO, np.full(1, np.nan))
+        size = ""
+        if np.isfinite(ratio).any():
+            largest = float(np.nanmax(ratio))
+            in_plane = InPlane.UNKNOWN if held else InPlane.FREE
+            size = f" (at w = {largest:.3g} h {softness(largest, in_plane)})"
+        yield f"beyond its range {TOO_SOFT}{size}; {UNSAFE}"
 
 
 @dataclass(repr=False)
@@ -141,8 +196,8 @@ class SweepResult:
     cases : dict of ndarray (n,)
         Values of every case, by name.
     summary : dict of ndarray (n,)
-        Results of every case, and ``status``: ``"ok"``, ``"still in contact"``, or the reason for
-        the failure.
+        Results of every case; ``status``: ``"ok"``, ``"still in contact"``, or the reason for the
+        failure; and ``validity``: ``"ok"``, the reasons to doubt the case, or ``"failed"``.
     dt, steps : ndarray (n,)
         Time step and number of steps of every case.
     force : ndarray (n, steps) or None
@@ -199,7 +254,17 @@ class SweepResult:
     @property
     def still(self) -> NDArray[np.bool_]:
         """Cases that were run and ended in contact."""
-        return np.asarray(self.summary["status"] == STILL)
+        return np.asarray(self.summary["status"] == Status.STILL)
+
+    @property
+    def validity(self) -> Array:
+        """``"ok"``, reasons to doubt a case, or ``"failed"``; of earlier files empty texts."""
+        return self.summary.get(VALIDITY, np.full(len(self), ""))
+
+    @property
+    def over(self) -> NDArray[np.bool_]:
+        """Cases that were run until their contact was over."""
+        return self.fine & ~open_ends(self.summary)
 
     @property
     def convergence(self) -> dict[str, Convergence]:
@@ -217,7 +282,7 @@ class SweepResult:
         texts = [f"{count} of {len(self)} cases {what}" for count, what in _counts(self)]
         if not self.fine.all():
             texts[-1] += f": {reasons(self['status'][~self.fine])}"
-        return (*texts, *(() if self.random is None else self.random.notes))
+        return (*texts, *remarks(self), *(() if self.random is None else self.random.notes))
 
     def unit(self, name: str) -> str:
         """Return the unit of a value or result; empty if the deck states none."""
@@ -347,8 +412,9 @@ def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
     found = [*SUMMARY, *(THRESHOLD if limited else ())]
     found += FOUND if plan.until is not None else ()
     found += [name for name in COLUMNS if name in columns and name not in found]
+    found += [RATIO] if RATIO not in found else []
     none = np.full(len(plan.cases), np.nan)
-    summary = {name: columns.get(name, none) for name in (*found, *outcome.measured, "status")}
+    summary = {name: columns.get(name, none) for name in (*found, *outcome.measured, *VERDICTS)}
     design = plan.design
     return SweepResult(
         cases, summary,
@@ -392,7 +458,7 @@ def save(
         for name, values in result.cases.items():
             put(f"cases/{name}", values, f"{name} of every case", DIMENSIONS.get(name, ""))
         for name, values in result.summary.items():
-            text = STATUS if name == "status" else described(name)
+            text = TEXTS_OF.get(name) or described(name)
             put(f"summary/{name}", values, text, COLUMNS.get(name, ("", ""))[1])
         put("history/dt", result.dt, "time step of every case", "time")
         put("history/steps", result.steps, "number of steps of every case", "")
@@ -455,7 +521,7 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     count = np.shape(steps["dt"])[:1]
     rows = (*cases.values(), *summary.values(), *steps.values())
     shape = contents.shapes.get(FORCE)
-    kinds = {name: values.dtype.kind for name, values in summary.items() if name != "status"}
+    kinds = {name: values.dtype.kind for name, values in summary.items() if name not in VERDICTS}
     if (
         any(values.shape != count for values in rows)
         or (shape is not None and (len(shape), shape[:1]) != (2, count))
@@ -497,7 +563,8 @@ def csv_lines(sweep: SweepResult, name: str = CASES) -> Iterator[str]:
 
 def _case_rows(sweep: SweepResult) -> Iterator[Iterable[Any]]:
     columns = {**sweep.cases, **sweep.summary}
-    columns |= {"dt": sweep.dt, "steps": sweep.steps, "status": columns.pop("status")}
+    texts = {name: columns.pop(name) for name in VERDICTS if name in columns}
+    columns |= {"dt": sweep.dt, "steps": sweep.steps, **texts}
     yield ("case", *columns)
     yield from zip(range(len(sweep)), *(v.tolist() for v in columns.values()), strict=True)
 

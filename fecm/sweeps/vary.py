@@ -14,7 +14,7 @@ from fecm.deck import model
 from fecm.deck.catalogue import NU23, SYSTEMS
 from fecm.deck.findings import Findings
 from fecm.deck.layup import LayupError, parse_layup
-from fecm.deck.macros import STEPS, every, flat
+from fecm.deck.macros import STEPS, compile_program, every, flat
 from fecm.deck.reader import ParsedProblem
 from fecm.deck.records import Layer, Macro, NodeCodes, NodeValues
 from fecm.deck.units import MODULUS, in_si, unit_names
@@ -345,6 +345,14 @@ def with_time_step(
         text = f"the loops of the deck give the duration {made:.6g} instead of {wanted:.6g}"
         raise CasesError(f"{text}; take all steps in one loop")
     return replace(deck, macros=macros)
+
+
+def lengthened(checked: Problem, factor: float) -> Problem:
+    """Return a problem that runs `factor` times as long, with the same time step."""
+    deck, taken = checked.deck, taken_time_step(checked.critical_time_step)
+    duration, _ = _duration(deck.macros, taken)
+    macros = with_time_step(deck, None, taken, factor * duration).macros
+    return replace(checked, program=compile_program(macros, Findings()))
 
 
 def _duration(macros: Sequence[Macro], taken: float) -> tuple[float, float]:

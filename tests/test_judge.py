@@ -1,0 +1,291 @@
+"""The judge: what an end decides, and where the model ends to hold, the same for all commands."""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm.api import load_deck
+from fecm.deck.model import Deck
+from fecm.plot.pictures import draw
+from fecm.results.metrics import Indentation, Projectiles, summarise
+from fecm.results.summary import summary
+from fecm.results.validity import LIMITS, End, InPlane, ends, in_plane_of, softness
+from fecm.sweeps.random_result import bounds, wilson
+from fecm.sweeps.result import SweepResult
+from tests.builders import table
+from tests.calls import call
+from tests.decks import small
+
+pytestmark = pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
+WHOLE = 9e-3  # after which the contact of the soft plate is over
+
+
+@functools.cache
+def soft(duration: float = WHOLE) -> Deck:
+    """A thin plate under a heavy mass: a force that rings while it rises for 4 ms."""
+    return fecm.impact(
+        fecm.Plate.rectangle((150, 100), (4, 4), support="simple"),
+        fecm.Laminate("[45/0/-45/90]2s", "IM7/8552", 0.125), fecm.RigidMass(2e-3),
+        fecm.Contact(49000.0, 1.0, 0.0, 1.5), velocity=2330, duration=duration,
+        units="mm-N-s", damage=True,
+    )  # fmt: skip
+
+
+@functools.cache
+def swept(duration: float = WHOLE) -> SweepResult:
+    """Draws of the velocity around that at which the peak reaches the threshold."""
+    return fecm.sweep(
+        soft(duration), random={"velocity": "normal:2330,150"}, samples=32,
+        exceed={"peak_force": "threshold"},
+    )  # fmt: skip
+
+
+# The end -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("last", "leaving", "expected"),
+    [
+        (0.0, 50.0, End.OVER),
+        (0.0, -1.0, End.BETWEEN),
+        (0.0, math.nan, End.OVER),
+        (80.0, 50.0, End.PASSED),
+        (95.0, 50.0, End.RISING),  # near the largest force
+        (80.0, -1.0, End.RISING),  # the projectile still approaches
+        (80.0, 5.0, End.RISING),  # it has hardly turned
+        (80.0, math.nan, End.RISING),
+    ],
+)
+def test_an_end_is_judged_by_the_force_and_the_way_of_the_projectile(
+    last: float, leaving: float, expected: End
+) -> None:
+    given = (np.array([value]) for value in (last, 100.0, leaving, 100.0))
+    assert ends(*given).tolist() == [expected]
+
+
+@pytest.mark.parametrize("mass", [4e-6, 4e-5, 2e-3])
+def test_a_peak_that_is_known_at_some_end_is_that_of_the_whole_run(mass: float) -> None:
+    deck = soft().with_(mass=mass)
+    run = fecm.run_one(deck)
+    assert run.end is End.OVER
+    known = 0
+    for steps in range(1, len(run.force), 40):
+        none = np.zeros(1)
+        force, hit = run.force[:steps, None], Projectiles(mass, 2330.0)
+        found = summarise(force, run.time[:steps], Indentation(none, none, none), hit)
+        peak = found.columns["peak_force"][0]
+        if not math.isnan(peak):
+            known += 1
+            assert peak == run.force.max()
+    assert known > 10
+
+
+def test_a_free_plate_is_left_by_a_projectile_that_still_goes_forward() -> None:
+    # The plate is lighter than the projectile: after the contact both fly on.
+    run = fecm.run_one(small().replace("LOOP         10", "LOOP        400"))
+    assert run.metrics["rebound_velocity"] < 0.0
+    assert run.end is End.OVER
+
+
+def test_a_free_plate_moves_under_an_impulse_as_a_rigid_body() -> None:
+    mass = 0.000148 * 2.0 * 2.0 * 0.106  # of the small plate, free at x = y = 2 alone
+    (problem,) = load_deck(small()).problems
+    # Hit at the centre it does not turn.
+    assert problem.judge.mobility == pytest.approx(1.0 / mass, rel=1e-9)
+    (held,) = load_deck(soft()).problems
+    assert held.judge.mobility == 0.0
+
+
+# What it decides ---------------------------------------------------------------------------------
+
+
+def test_no_interval_of_a_probability_excludes_that_of_whole_runs() -> None:
+    whole = swept().random
+    assert whole is not None
+    right = whole.exceedance.probability[0]
+    assert 0.2 < right < 0.8
+    for duration in (2e-3, 3e-3, 4e-3, 5e-3):
+        cut = swept(duration).random
+        assert cut is not None
+        assert cut.exceedance.lower[0] <= right <= cut.exceedance.upper[0]
+        assert cut.exceedance.draws[0] + cut.exceedance.open[0] == 32
+    assert swept(3e-3)["status"].tolist() == ["still in contact"] * 32
+    assert np.isnan(swept(3e-3)["peak_force"]).all()
+
+
+def test_bounds_hold_whatever_the_open_draws_are() -> None:
+    hits, count, lacking = (np.array(n, dtype=np.int64) for n in (3, 10, 4))
+    share, low, high = bounds(hits, count, lacking)
+    assert share == 0.3
+    every = [wilson(hits + more, count + lacking) for more in range(5)]
+    assert low == min(lower for lower, _ in every)
+    assert high == max(upper for _, upper in every)
+
+
+def test_a_velocity_is_found_whatever_the_duration_of_the_deck() -> None:
+    energies = []
+    for duration in (2e-3, 3e-3, WHOLE):
+        found = fecm.sweep(soft(duration), until="threshold")
+        energies.append(found["found_energy"][0])
+        assert found["validity"].tolist() == ["w > 0.3 h"]
+        assert found["deflection_ratio"][0] > 2.0
+    np.testing.assert_allclose(energies, energies[-1], rtol=1e-5)
+
+
+def test_a_search_ends_where_no_run_is_long_enough() -> None:
+    found = fecm.sweep(soft(1e-4), until="threshold")
+    (status,) = found["status"]
+    assert "open even in a run 8 times as long" in status
+    assert found["validity"].tolist() == ["failed"]
+
+
+def test_cases_together_and_full_runs_are_judged_alike() -> None:
+    for duration in (2e-3, 5e-3, WHOLE):
+        deck, speeds = soft(duration), [150.0, 600.0, 2330.0]
+        together = fecm.sweep(deck, {"velocity": speeds})
+        full = fecm.sweep(deck, {"velocity": speeds}, measure=lambda run: {"n": len(run.force)})
+        for name in ("status", "validity"):
+            assert together[name].tolist() == full[name].tolist()
+        np.testing.assert_allclose(together["deflection_ratio"], full["deflection_ratio"], 1e-9)
+        np.testing.assert_allclose(together["peak_force"], full["peak_force"], 1e-9)
+
+
+# The range of the model --------------------------------------------------------------------------
+
+
+def test_the_limit_of_the_deflection_depends_on_the_support_in_the_plane() -> None:
+    codes = np.zeros((9, 5), dtype=np.int32)
+    assert in_plane_of(codes) is InPlane.FREE
+    codes[:8, 2] = 1  # w at the edges
+    assert in_plane_of(codes) is InPlane.FREE
+    codes[:2, :2] = 1  # as few as hold the plate against rigid motion
+    assert in_plane_of(codes) is InPlane.FREE
+    codes[:8, :2] = 1
+    assert in_plane_of(codes) is InPlane.HELD
+    codes[:, :2] = 1
+    assert in_plane_of(codes) is InPlane.UNKNOWN
+    assert LIMITS[InPlane.HELD] < LIMITS[InPlane.FREE]
+
+
+@pytest.mark.parametrize("row", table("linear_error.csv"), ids=lambda row: row["case"])
+def test_the_error_that_is_told_is_that_of_nonlinear_impacts(row: dict[str, str]) -> None:
+    # Impacts of the same energy on plates of thickness 2 mm.
+    ratio, error = float(row["linear_W_mm"]) / 2.0, -float(row["force_error_of_linear_percent"])
+    in_plane = InPlane.FREE if row["case"].endswith("_movable") else InPlane.HELD
+    if ratio > 5.0:
+        assert "at least" in softness(ratio, in_plane)
+        return
+    for told in (softness(ratio, in_plane), softness(ratio, InPlane.UNKNOWN)):
+        low, high = (int(word) for word in told.split() if word.isdigit())
+        assert low - 1.5 <= error <= high + 1.5
+
+
+def test_a_run_says_what_is_open_and_what_is_elastic_only() -> None:
+    cut, whole = fecm.run_one(soft(3e-4)), fecm.run_one(soft().with_(velocity=2500))
+    assert (cut.end, whole.end) == (End.RISING, End.OVER)
+    told = "\n".join(summary(cut))
+    assert "not reached by the end of the run, which is in contact: open" in told
+    assert "peak force        at least" in told
+    assert math.isnan(cut.metrics["peak_force"])
+    assert math.isnan(float(cut.threshold["margin"]))
+    assert "peak not reached" in cut.validity
+    threshold = float(whole.threshold["force"])
+    told = "\n".join(summary(whole))
+    assert f"(elastic: beyond delamination at {threshold:.6g} N" in told
+    assert "N*mm left in plate, indentation and projectile" in told
+    assert {"w > 0.3 h", "peak force > threshold"} <= set(whole.validity.split("; "))
+
+
+def test_one_place_has_one_deflection() -> None:
+    run = fecm.run_one(soft())
+    (note,) = [note for note in run.notes if note.startswith("the deflection")]
+    (line,) = [line for line in summary(run) if line.startswith("largest w")]
+    assert float(note.split()[3]) == pytest.approx(float(line.split()[2]), rel=1e-3)
+    assert "too low at the same energy" in note
+    assert "unsafe" in note
+
+
+def test_an_end_between_two_contacts_is_no_end() -> None:
+    # The plate is hit three times; what lies between is seen by its forces alone.
+    run = fecm.run_one(soft().with_(mass=4e-5))
+    touching = run.force > 0.0
+    gap = int(np.flatnonzero(~touching)[0])
+    assert touching[gap:].any()
+    cut = fecm.run_one(soft(float(run.time[gap])).with_(mass=4e-5))
+    assert not cut.still_in_contact
+    assert cut.end is End.BETWEEN
+    assert any("ends between two contacts" in note for note in cut.notes)
+    assert math.isnan(cut.metrics["peak_force"])
+
+
+# The commands ------------------------------------------------------------------------------------
+
+
+def test_a_sweep_counts_what_is_beyond_its_model(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(soft().to_text())
+    done = call(
+        "sweep", "d.inp", "--vary", "velocity=100,600,2500", "-o", "s.h5", cwd=tmp_path
+    )  # fmt: skip
+    assert done.exit_code == 0
+    last = done.stdout.splitlines()[-1]
+    assert last.startswith("3 cases: 2 beyond the linear plate (w > 0.3 h, up to 3.")
+    assert last.endswith("h), 1 elastic beyond delamination (peak force > threshold)")
+    assert "which is unsafe" in done.stderr
+    found = fecm.load_sweep(tmp_path / "s.h5")
+    assert found["validity"].tolist() == [
+        "ok", "w > 0.3 h", "w > 0.3 h; peak force > threshold"
+    ]  # fmt: skip
+    picture: Any = draw("map", {"s": found}).figure
+    (axes, *_) = picture.axes
+    assert "/ beyond the linear plate (w > 0.3 h): 2 of 3 cases" in axes.get_xlabel()
+    assert axes.get_lines()[-1].get_xdata().tolist() == [600.0, 2500.0]
+
+
+def test_a_case_run_in_full_has_the_notes_of_a_run(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(soft().to_text())
+    given = ("sweep", "d.inp", "--vary", "velocity=100,2500", "--full", "1", "-o", "s.h5")
+    done = call(*given, cwd=tmp_path)
+    notes = fecm.load(tmp_path / "s-1.h5").notes
+    assert notes
+    assert all(f"note: case 1: {text}" in done.stderr for text in notes)
+
+
+def test_an_open_probability_ends_in_1(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(soft(1e-3).to_text())
+    options = ("--random", "velocity=normal:2330,150", "--samples", "16", "--exceed")
+    given = ("sweep", "d.inp", *options, "peak_force=threshold", "-o", "s.h5", "--overwrite")
+    done = call(*given, cwd=tmp_path)
+    assert done.exit_code == 1
+    assert "= open (0 to 1); 16 draws are open" in done.stdout
+    assert "no value                  16" in done.stdout
+    assert "--vary duration=0.002" in done.stderr
+    assert call(*given, "--allow-failed", cwd=tmp_path).exit_code == 0
+
+
+@pytest.mark.long  # the infinite plate takes seconds at such a mass
+def test_an_estimate_tells_the_deflection_at_the_threshold(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(soft(3e-3).with_(velocity=200).to_text())
+    done = call("estimate", "d.inp", cwd=tmp_path)
+    assert done.exit_code == 0
+    (line,) = [line for line in done.stderr.splitlines() if "the run at the threshold" in line]
+    assert 2.0 < float(line.partition("deflects by ")[2].split()[0]) < 4.0
+    (own,) = [line for line in done.stdout.splitlines() if line.lstrip().startswith("run ")]
+    assert own.split()[1:3] == ["open", "open"]
+    assert "needs a longer duration" in done.stderr
+
+
+def test_the_json_of_a_run_has_its_end_and_its_validity(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(soft(3e-4).to_text())
+    done = call("run", "d.inp", "--format", "json", cwd=tmp_path)
+    said = json.loads(done.stdout)
+    assert said["end"] == "in contact, peak not reached"
+    assert said["validity"].startswith("peak not reached")
+    assert said["metrics"]["threshold_margin"] == "NaN"
