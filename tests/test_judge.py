@@ -17,7 +17,7 @@ from fecm.deck.model import Deck
 from fecm.plot.pictures import draw
 from fecm.results.metrics import Indentation, Projectiles, summarise
 from fecm.results.summary import summary
-from fecm.results.validity import LIMITS, End, InPlane, ends, in_plane_of, softness
+from fecm.results.validity import LIMITS, End, InPlane, counted, ends, in_plane_of, softness
 from fecm.sweeps.random_result import bounds, wilson
 from fecm.sweeps.result import SweepResult
 from tests.builders import table
@@ -247,6 +247,15 @@ def test_a_sweep_counts_what_is_beyond_its_model(tmp_path: Path) -> None:
     (axes, *_) = picture.axes
     assert "/ beyond the linear plate (w > 0.3 h): 2 of 3 cases" in axes.get_xlabel()
     assert axes.get_lines()[-1].get_xdata().tolist() == [600.0, 2500.0]
+
+
+def test_reasons_of_other_versions_count_together() -> None:
+    texts = np.array(["ok", "failed", "", "w > 0.3 h; moon full", "sun low"])
+    found = {reason: some.tolist() for reason, some in counted(texts)}
+    assert found == {
+        "w > 0.3 h": [False, False, False, True, False],
+        "other": [False, False, False, True, True],
+    }
 
 
 def test_a_case_run_in_full_has_the_notes_of_a_run(tmp_path: Path) -> None:

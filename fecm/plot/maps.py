@@ -157,7 +157,7 @@ def beyond(sweep: SweepResult, rows: Ints) -> dict[str, Bools]:
     found = dict(counted(sweep.validity[rows]))
     for other in (OPEN, DELAMINATED):  # which have a mark and a line of their own
         found.pop(other, None)
-    return {MEANING.get(reason, reason): some for reason, some in found.items()}
+    return {MEANING[reason]: some for reason, some in found.items()}
 
 
 def ended(sweep: SweepResult, rows: Ints) -> dict[str, Bools]:

@@ -122,6 +122,7 @@ SOFT = "indentation > h/4"
 BROKEN = "exposure > 1"
 STRAINED = "strain > 1 %"
 DELAMINATED = "peak force > threshold"
+OTHER = "other"
 BENT = {in_plane: f"w > {limit} h" for in_plane, limit in LIMITS.items()}
 # What the reasons of a case mean, for the lines of a summary.
 MEANING = {
@@ -131,13 +132,14 @@ MEANING = {
     SOFT: f"beyond the contact law ({SOFT})",
     BROKEN: f"elastic beyond the first failure ({BROKEN})",
     DELAMINATED: f"elastic beyond delamination ({DELAMINATED})",
+    OTHER: "doubtful for other reasons",
 }
 SEPARATOR = "; "
 
 
 def reasons_of(validity: str) -> list[str]:
     """Reasons in the text of a case; empty for a valid or a failed one."""
-    return [] if validity in (VALID, FAILED) else validity.split(SEPARATOR)
+    return [] if validity in ("", VALID, FAILED) else validity.split(SEPARATOR)
 
 
 @frozen
@@ -222,9 +224,15 @@ def joined(reasons: Sequence[str]) -> str:
 
 
 def counted(validity: Texts) -> Iterator[tuple[str, Bools]]:
-    """Reasons among cases, in the order of :data:`MEANING`, with the cases that have them."""
-    own = [reasons_of(text) for text in validity.tolist()]
-    for reason in dict.fromkeys([*MEANING, *(name for names in own for name in names)]):
+    """Reasons among cases, in the order of :data:`MEANING`, with the cases that have them.
+
+    Reasons of other versions, whose number is not bounded, count together.
+    """
+    own = [
+        {name if name in MEANING else OTHER for name in reasons_of(text)}
+        for text in validity.tolist()
+    ]
+    for reason in MEANING:
         some = np.array([reason in names for names in own], dtype=bool)
         if some.any():
             yield reason, some

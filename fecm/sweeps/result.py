@@ -157,7 +157,7 @@ def _doubts(result: SweepResult) -> dict[str, NDArray[np.bool_]]:
     """Cases beyond the range of the model, by what they are."""
     found = {}
     for reason, some in counted(result.validity):
-        what = MEANING.get(reason, reason)
+        what = MEANING[reason]
         if reason in BENT.values():
             ratio = result.summary.get(RATIO, np.full(len(some), np.nan))[some]
             if np.isfinite(ratio).any():
@@ -526,6 +526,7 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
         any(values.shape != count for values in rows)
         or (shape is not None and (len(shape), shape[:1]) != (2, count))
         or not set(kinds.values()) <= set("fiu")
+        or (VALIDITY in summary and summary[VALIDITY].size and summary[VALIDITY].dtype.kind != "U")
     ):
         message = f"{path}: the data of this sweep do not match in type or number of cases"
         raise schema.ResultFileError(message)
