@@ -139,7 +139,8 @@ def test_summary_and_json_have_the_first_failure(tmp_path: Path, every_step: Res
     (tmp_path / "d.inp").write_text(failing())
     done = call("run", "d.inp", cwd=tmp_path)
     first = every_step.first_failures[0]
-    (line,) = (line for line in done.stdout.splitlines() if "first failure" in line)
+    lines = [line.strip() for line in done.stdout.splitlines()]
+    (line,) = (line for line in lines if line.startswith("first failure"))
     for words in (
         f"{first.mode} ({first.criterion})",
         f"ply {first.ply} at ({first.x:.6g}, {first.y:.6g})",
