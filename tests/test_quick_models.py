@@ -216,7 +216,7 @@ def test_a_run_stores_the_threshold_and_its_first_crossing(tmp_path: Path) -> No
     above = found.time[found.force >= values["force"]]
     assert 0 < len(above) < len(found.time)
     assert values["time"] == above[0]
-    assert values["margin"] == pytest.approx(1.0 - found.force.max() / values["force"], rel=1e-12)
+    assert np.isnan(values["margin"])  # the run ends before its peak
     assert values["force"] == pytest.approx(threshold_force(values["d_star"], 1.0e-3), rel=1e-12)
     (tmp_path / "d.inp").write_text(with_threshold("5.,"))
     done = call("run", "d.inp", cwd=tmp_path)
