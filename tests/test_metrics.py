@@ -14,6 +14,7 @@ from fecm.plot.kinds import PlotError
 from fecm.plot.pictures import draw
 from fecm.results.metrics import METRICS, RATIO, SUMMARY, THRESHOLD, VERDICTS
 from fecm.results.result import Result
+from fecm.results.summary import summary
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, small
 
@@ -82,10 +83,16 @@ def test_metrics_of_the_threshold_are_those_of_its_group(tmp_path: Path) -> None
         assert found[f"threshold_{name}"] == pytest.approx(result.threshold[name], rel=1e-12)
     above = result.force >= result.threshold["force"]
     assert found["time_above"] == pytest.approx(0.5e-6 * np.count_nonzero(above), rel=1e-9)
-    below = run(deck(f"{RIGID}DELA\n10.,\n")).metrics
+    assert found["threshold_margin"] == pytest.approx(
+        1.0 - result.force.max() / result.threshold["force"], rel=1e-12
+    )
+    missed = run(deck(f"{RIGID}DELA\n10.,\n"))
+    below = missed.metrics
     assert np.isnan(below["threshold_time"])
     assert below["time_above"] == 0.0
     assert 0.0 < below["threshold_margin"] < 1.0
+    share = f"{1.0 - missed.force.max() / missed.threshold['force']:.1%}"
+    assert f"not reached: the peak is {share} below" in "\n".join(summary(missed))
 
 
 def test_a_contact_that_lasts_to_the_end_has_no_rebound(tmp_path: Path) -> None:
