@@ -70,6 +70,7 @@ def test_a_run_at_the_found_velocity_has_this_exposure(tmp_path: Path) -> None:
     result = run(DECK.replace("     115.0", f"{velocity:10.6f}"))
     largest = result["exposures/exposure"][-1]
     assert largest.max() == pytest.approx(1.0, rel=2e-5)
+    assert "exposure > 1" not in found["validity"][0]
     columns = [found[name][0] for name in EXPOSURES]
     assert columns == pytest.approx(largest.tolist(), rel=1e-5)
     assert found["fail_evaluations"][0] == result.failure.attributes["evaluations_in_contact"]

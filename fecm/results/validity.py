@@ -23,8 +23,8 @@ Texts = NDArray[np.str_]
 # falls and rises again many times before the projectile turns.
 FALLEN, LEAVING = 0.9, 0.1
 STRAIN = 0.01  # largest strain for which plies are taken as linear
-# Force relative to the delamination threshold beyond which a peak is beyond it; a search for the
-# velocity that reaches the threshold ends a hair above.
+# Exposure, or force relative to the delamination threshold, from which on a case is beyond it.  A
+# search for the velocity that reaches 1 ends a hair above.
 CROSSED = 1.0001
 INDENTATION = 0.25  # of the thickness, up to which the contact law of a half-space holds
 
@@ -177,7 +177,7 @@ class Judge:
                 OPEN: ~peak_known(extent.end),
                 BENT[self.in_plane]: extent.deflection > self.limit * h,
                 SOFT: extent.indentation > INDENTATION * h,
-                BROKEN: np.broadcast_to(extent.exposure > 1.0, extent.peak.shape),
+                BROKEN: np.broadcast_to(extent.exposure > CROSSED, extent.peak.shape),
                 DELAMINATED: extent.peak > CROSSED * extent.threshold,
             }
         names, rows = list(masks), np.column_stack(list(masks.values()))
