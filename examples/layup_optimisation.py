@@ -14,7 +14,7 @@ deck = fecm.impact(
     fecm.Laminate("[45/-45]4s", "AS4/8552", 0.13),
     fecm.RigidMass(2e-5),  # t
     fecm.Contact.estimate(radius=8),
-    energy=50,  # mJ
+    energy=40,  # mJ
     duration=2e-3,
     dt=3e-7,  # stable for all angles
     units="mm-N-s",

@@ -9,9 +9,12 @@ import numpy as np
 
 import fecm
 
-text = fecm.examples.path("plate-with-gages.inp").read_text()
-text = text.replace("\nDISC\n", "\nDISC,7\n")  # a patch that the mesh resolves
-result = fecm.run_one(text.replace("\nRODP ", "\nPLYS,,20\nRODP "))  # every 20th step
+plate = fecm.Plate.rectangle((120, 80), (30, 20), support="simple")
+laminate = fecm.Laminate("[45/0/-45/90]2s", "AS4/8552", 0.13)
+ball, steel = fecm.RigidMass(2e-5), fecm.Contact.estimate(radius=8)  # t, mm
+impact = {"energy": 40, "duration": 1e-3, "units": "mm-N-s", "patch": "disc:4"}  # mJ, s
+deck = fecm.impact(plate, laminate, ball, steel, **impact)
+result = fecm.run_one(deck.to_text().replace("\nRODP ", "\nPLYS,,50\nRODP "))  # every 50th step
 
 plies = result.plies()
 strain = abs(plies.eps_1)  # rows, elements, points, plies, faces
