@@ -14,7 +14,7 @@ from fecm._errors import warn
 from fecm._frozen import frozen
 from fecm.api import load_deck
 from fecm.deck import catalogue, model
-from fecm.deck.catalogue import MATERIALS, SYSTEM, SYSTEMS, NamedContact, NamedPly
+from fecm.deck.catalogue import MATERIALS, STANDARD, SYSTEM, SYSTEMS, NamedContact, NamedPly
 from fecm.deck.findings import DeckError
 from fecm.deck.grid import IN_PLANE, Grid
 from fecm.deck.records import Control, Gage, Integration, Layer, Macro, Ply
@@ -22,9 +22,9 @@ from fecm.deck.units import in_si, unit_of
 from fecm.mechanics.laminate import laminate as stiffness_of
 from fecm.mechanics.points import HERTZ
 from fecm.mechanics.projectile import RigidMass, Rod
+from fecm.mechanics.solutions import static_stiffness
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.objects import (
-    STANDARD,
     Contact,
     DropWeight,
     Fixture,
@@ -38,7 +38,7 @@ from fecm.objects import (
 from fecm.problem.build import build_plate, build_projectile, projectile_segment
 from fecm.problem.generate import generate
 from fecm.problem.plate_mesh import PlateMesh
-from fecm.studies.estimate import contact_time, static_stiffness
+from fecm.studies.estimate import contact_time
 
 ORDER, NODAL_POINTS = 3, -3  # integration order of stiffness and mass, stress points
 ROWS = 200  # default number of stored rows of strains and displacements

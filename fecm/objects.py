@@ -15,25 +15,31 @@ from numpy.typing import ArrayLike
 from fecm._errors import FecmError
 from fecm._frozen import frozen
 from fecm.deck import grid as grids
-from fecm.deck.catalogue import CONTACTS, SYSTEMS, NamedContact, NamedPly, convert
+from fecm.deck.catalogue import (
+    CONTACTS,
+    STANDARD,
+    STEEL_MODULUS,
+    STEEL_POISSON,
+    SYSTEMS,
+    NamedContact,
+    NamedPly,
+    convert,
+)
 from fecm.deck.grid import EDGES, SUPPORTS, Grid, Section
 from fecm.deck.layup import parse_layup
 from fecm.deck.model import Indentation, Patch
 from fecm.deck.records import Ply
 from fecm.deck.units import MODULUS, in_si, unit_in_si
 from fecm.mechanics.contact_law import hertz_coefficient
+from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
 from fecm.mechanics.points import DISC, HERTZ
 from fecm.problem import plate_mesh
 from fecm.problem.plate_mesh import BOUNDARY, MeshLike, PlateMesh
-from fecm.studies import StudyError
-from fecm.studies.indentation_test.modulus import effective_stiffness, indentation_modulus
 
 MOST, MOST_ELEMENTS = 2000, 500_000  # most elements in one direction, and in all
 LEAST_RADIUS = 1e-3  # least radius of a patch to which a mesh is refined, over the plate's side
 # Elements of the window where the mesh does not give them, and their grading.
 WINDOW_MESH, WINDOW_GRADING = (20, 12), 3.0
-# Units of the standards; Young's modulus and Poisson's ratio of steel in them.
-STANDARD, E_S, NU_S = "mm-N-s", 207e3, 0.3
 # Shapes of the contact patch.
 PATCHES = {"disc": DISC, "hertz": HERTZ}
 CUSTOM = "window:LXxLY,WXxWY"
@@ -342,14 +348,14 @@ class Sphere:
                 "the `contact` estimate with constants of a `ply` needs `units`, or the sphere's "
                 "elastic constants"
             )
-        modulus = self.modulus or convert(E_S, MODULUS, STANDARD, system or STANDARD)
-        poisson = NU_S if self.poisson is None else self.poisson
+        modulus = self.modulus or convert(STEEL_MODULUS, MODULUS, STANDARD, system or STANDARD)
+        poisson = STEEL_POISSON if self.poisson is None else self.poisson
         angles = laminate.angles
         try:
             stiffness = effective_stiffness(ply, angles, [1.0] * len(angles), nu23)
             effective = indentation_modulus(stiffness)
             k = float(f"{hertz_coefficient(self.radius, modulus, poisson, effective):.6g}")
-        except (StudyError, ValueError, ArithmeticError) as error:
+        except (ValueError, ArithmeticError) as error:
             raise ObjectError(f"k cannot be estimated: {error}; give a law") from None
         return Indentation(k, 0.0, 0.0, 1.5), (
             "! k of EXPE is estimated by the laminate's indentation modulus "

@@ -12,8 +12,8 @@ import fecm
 from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.model import Impact, Patch
+from fecm.mechanics.solutions import static_stiffness
 from fecm.problem.build import build_projectile
-from fecm.studies.estimate import static_stiffness
 from tests.calls import Done, assert_unusable, call
 
 WINDOW = "150x100 plate, w=0 along the window"

@@ -7,8 +7,8 @@ import pytest
 
 from fecm.deck.records import Ply
 from fecm.mechanics.contact_law import hertz_coefficient
-from fecm.studies import StudyError
-from fecm.studies.indentation_test.modulus import (
+from fecm.mechanics.half_space import (
+    PlyError,
     effective_stiffness,
     indentation_modulus,
     ply_stiffness,
@@ -54,5 +54,5 @@ def test_the_reports_plate_has_the_coefficient_of_the_reference() -> None:
 
 
 def test_a_compliance_that_is_not_positive_definite_names_the_ratio() -> None:
-    with pytest.raises(StudyError, match=r"not positive definite.*nu23"):
+    with pytest.raises(PlyError, match=r"not positive definite.*nu23"):
         ply_stiffness(T300, 1.2)

@@ -13,9 +13,8 @@ from fecm.cli.new import new as command
 from fecm.deck import Deck
 from fecm.deck.catalogue import MATERIALS
 from fecm.deck.model import Delamination, Impact, Material, Shear
-from fecm.mechanics.solutions import Tangent, in_plane_pins
+from fecm.mechanics.solutions import Tangent, in_plane_pins, static_stiffness
 from fecm.problem.summary import ProblemSummary
-from fecm.studies.estimate import static_stiffness
 from tests import closed_forms
 from tests.builders import DATA
 from tests.calls import Done, assert_unusable, call

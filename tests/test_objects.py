@@ -18,8 +18,8 @@ from fecm.api import load_deck
 from fecm.deck.format import format_deck
 from fecm.deck.model import Impact, Indentation, Material, Patch
 from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.solutions import static_stiffness
 from fecm.problem.generate import generate
-from fecm.studies.estimate import static_stiffness
 from tests.builders import DATA, table
 from tests.calls import assert_unusable, call
 from tests.patches import STRAIN, residual, stretched

@@ -24,6 +24,7 @@ from fecm.mechanics.laminate import (
     laminate,
     threshold_force,
 )
+from fecm.mechanics.solutions import static_stiffness
 from fecm.problem.check_plausibility import wave_impedance
 from fecm.results.result import Result
 from fecm.results.summary import summary
@@ -32,7 +33,6 @@ from fecm.studies.estimate import (
     inelasticity,
     infinite_plate,
     static_plate,
-    static_stiffness,
 )
 from fecm.verification.decks import result_of
 from fecm.verification.plates import struck_square

@@ -15,6 +15,7 @@ from fecm.mechanics import (
     assumed_shear,
     element_matrices,
     failure,
+    half_space,
     interpolation,
     ply_stresses,
     points,
@@ -37,7 +38,6 @@ from fecm.mechanics.stiffness_product import ElementProduct
 from fecm.problem import build
 from fecm.simulation.recorder import Recorder
 from fecm.studies import estimate
-from fecm.studies.indentation_test import modulus
 from fecm.studies.rod_test import pulse_test
 from fecm.studies.waves import Fronts, Medium
 from fecm.sweeps import cases, convergence, fitting, random_result
@@ -471,14 +471,14 @@ BREAKS: dict[str, tuple[Break, dict[str, tuple[str, ...]]]] = {
         changed(fitting.Model, "at", lambda force: 1.01 * force), {"identification": ("",)},
     ),
     "E3 taken for the indentation modulus": (
-        instead(modulus, "indentation_modulus", lambda _, C: 1.0 / np.linalg.inv(C)[2, 2]),
+        instead(half_space, "indentation_modulus", lambda _, C: 1.0 / np.linalg.inv(C)[2, 2]),
         {"contact-coefficient": ("",)},
     ),
 }  # fmt: skip
 
 
 # The program's own errors of a motion that cannot be.
-REFUSALS = ("DivergenceError", "StudyError")
+REFUSALS = ("DivergenceError", "PlyError", "StudyError")
 ROWS = {(one.name, c.quantity) for one in CASES for c in one.checks if c.label != "against change"}
 
 

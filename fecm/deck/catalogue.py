@@ -20,6 +20,10 @@ from fecm.deck.units import COEFFICIENT, DENSITY, MODULUS, TOUGHNESS, in_si
 # Systems of units: names of length, force and time.
 NAMES = ("in-lbf-s", "m-N-s", "mm-N-s")
 SYSTEMS = {name: dict(zip(Units.NAMES, name.split("-"), strict=True)) for name in NAMES}
+# Units of the test standards, and the constants of steel in them.
+STANDARD = "mm-N-s"
+STEEL_MODULUS = 207e3
+STEEL_POISSON = 0.3
 
 
 def convert(value: float, dimension: str, system: str, other: str) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from typing import TYPE_CHECKING
 
@@ -100,6 +101,14 @@ def compliance(plate: PlateModel, load: Floats) -> float:
     not held.
     """
     return float(load @ Tangent(plate).solve(load))
+
+
+def static_stiffness(plate: PlateModel, contact: Floats) -> float:
+    """Force per displacement under a load on the nodes (numnp, 5); NaN for a plate not held."""
+    try:
+        return 1.0 / compliance(plate, contact[plate.mesh.equations > 0])
+    except SingularStiffnessError:
+        return math.nan
 
 
 def reactions(plate: PlateModel, field: Floats, factor: float) -> Floats:

@@ -18,8 +18,7 @@ from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.deck.model import Impact, Indentation
 from fecm.mechanics.laminate import SMALL_MASS, effective_rigidity
-from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.solutions import SingularStiffnessError, compliance
+from fecm.mechanics.solutions import static_stiffness
 from fecm.problem.build import build_projectile
 from fecm.problem.problem import Problem
 from fecm.studies import StudyError
@@ -183,11 +182,3 @@ def _model(
             low /= 2.0
         found = float(brentq(lambda v: impact(v).peak - threshold, low, high, rtol=1e-9))
     return Model(name, impact(velocity), threshold, found, applies)
-
-
-def static_stiffness(plate: PlateModel, contact: Floats) -> float:
-    """Force per displacement under the load; NaN for a plate that is not held."""
-    try:
-        return 1.0 / compliance(plate, contact[plate.mesh.equations > 0])
-    except SingularStiffnessError:
-        return math.nan

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fecm.deck import model
-from fecm.deck.catalogue import NU23, SYSTEMS
+from fecm.deck.catalogue import NU23, STANDARD, STEEL_MODULUS, STEEL_POISSON, SYSTEMS
 from fecm.deck.findings import Findings
 from fecm.deck.layup import LayupError, parse_layup
 from fecm.deck.macros import STEPS, compile_program, every, flat
@@ -19,16 +19,15 @@ from fecm.deck.reader import ParsedProblem
 from fecm.deck.records import Layer, Macro, NodeCodes, NodeValues
 from fecm.deck.units import MODULUS, in_si, unit_names
 from fecm.mechanics.contact_law import hertz_coefficient
+from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
 from fecm.mechanics.mesh import element_blocks, holds_the_plane
 from fecm.mechanics.points import locate
 from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.time_step import rounded_time_step, taken_time_step
-from fecm.objects import E_S, NU_S, STANDARD
 from fecm.problem.build import build_projectile, is_coupled, projectile_segment
 from fecm.problem.generate import RefineError, generate, refined, restraint_codes
 from fecm.problem.plate_mesh import BOUNDARY, PlateMesh
 from fecm.problem.problem import UNSTABLE, Problem, check
-from fecm.studies.indentation_test.modulus import effective_stiffness, indentation_modulus
 from fecm.sweeps.cases import (
     LAMINATE,
     REFINE,
@@ -170,10 +169,10 @@ def _radius(deck: model.Deck, name: str, value: Value) -> model.Deck:
     if unit is None:
         hint = "add a UNIT segment, or vary k instead"
         raise CasesError(f"radius: the modulus of steel needs the units of the deck; {hint}")
-    steel = E_S * (in_si(MODULUS, SYSTEMS[STANDARD]) or 1.0) / unit
+    steel = STEEL_MODULUS * (in_si(MODULUS, SYSTEMS[STANDARD]) or 1.0) / unit
     try:
         modulus = _indentation_modulus(deck.require(model.Material))
-        k = hertz_coefficient(float(value), steel, NU_S, modulus)
+        k = hertz_coefficient(float(value), steel, STEEL_POISSON, modulus)
     except ValueError as error:
         raise CasesError(f"k cannot be estimated: {error}") from None
     return _field(deck, "k", k)

@@ -11,7 +11,7 @@ from scipy.special import beta, betaincinv
 from fecm._errors import FecmWarning
 from fecm.deck.records import Ply
 from fecm.mechanics.contact_law import hertz_coefficient
-from fecm.studies.indentation_test.modulus import (
+from fecm.mechanics.half_space import (
     effective_stiffness,
     indentation_modulus,
     ply_stiffness,

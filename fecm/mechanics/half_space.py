@@ -12,9 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fecm._errors import FecmError
 from fecm._typing import Floats
 from fecm.mechanics.laminate import PlyConstants
-from fecm.studies import StudyError
 
 SURFACE, AROUND = 72, 180  # directions in the surface and around each of them
 # In-plane and out-of-plane components.
@@ -22,14 +22,18 @@ _A, _B = [0, 1, 5], [2, 4, 3]
 _VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 
 
+class PlyError(FecmError, ValueError):
+    """A ply is a fabric, or its constants belong to no solid."""
+
+
 def ply_stiffness(ply: PlyConstants, nu23: float) -> Floats:
     """Three-dimensional stiffness of a transversely isotropic ply in its own axes, (6, 6).
 
-    A fabric, or a compliance that is not positive definite, is a StudyError.
+    A fabric, or a compliance that is not positive definite, is a PlyError.
     """
     nu12, e1, e2 = ply.nu12, ply.e1, ply.e2
     if e2 > 0.5 * e1 and ply.g12 < 0.25 * e2:
-        raise StudyError("the ply is a fabric (E2 near E1, G12 far below): its E3 is not its E2")
+        raise PlyError("the ply is a fabric (E2 near E1, G12 far below): its E3 is not its E2")
     compliance = np.zeros((6, 6))
     compliance[:3, :3] = [
         [1.0 / e1, -nu12 / e1, -nu12 / e1],
@@ -38,7 +42,7 @@ def ply_stiffness(ply: PlyConstants, nu23: float) -> Floats:
     ]
     compliance[[3, 4, 5], [3, 4, 5]] = 1.0 / ply.g23, 1.0 / ply.g13, 1.0 / ply.g12
     if not np.linalg.eigvalsh(compliance)[0] > 0.0:
-        raise StudyError(
+        raise PlyError(
             f"the ply's compliance is not positive definite: nu12 = {nu12:g} with "
             f"E1/E2 = {e1 / e2:.4g} and nu23 = {nu23:g}; nu23 must stay below "
             f"1 - 2 nu12^2 E2/E1 = {1.0 - 2.0 * nu12**2 * e2 / e1:.4g}"
