@@ -21,6 +21,10 @@ class FecmError(Exception):
     exit_code = 2
 
 
+class StudyError(FecmError, ValueError):
+    """A study can't be computed from these numbers, or their table is invalid."""
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """End of a message about an unknown name: the most similar known one; empty if none is."""
     import difflib

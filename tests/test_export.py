@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm.results.csv import lines
+from fecm.results.errors import ExportError
 from fecm.results.result import Result
-from fecm.results.schema import ExportError
 from fecm.results.vtkhdf import write_vtkhdf
 from tests.builders import SQUARE, one_element
 from tests.calls import call

@@ -14,7 +14,8 @@ from fecm.deck.model import Allowables
 from fecm.mechanics.exposures import OutsideLoad
 from fecm.mechanics.failure import CRITERIA, exposure_of
 from fecm.mechanics.ply_stresses import FailureEnvelope, Maxima, PlyStresses
-from fecm.results.first_failure import evaluations_in_contact, first_failures
+from fecm.results.exposures import evaluations_in_contact
+from fecm.results.first_failure import first_failures
 from fecm.results.result import Result
 from tests.calls import call
 from tests.decks import DISC, PROGRAM, small

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm.results.errors import ResultFileError
 from fecm.results.hdf5_reader import read
-from fecm.results.schema import ResultFileError
 from tests.calls import assert_unusable, call
 from tests.decks import APPENDIX, DATA_CARDS, small
 

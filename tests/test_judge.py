@@ -15,9 +15,11 @@ import fecm
 from fecm.api import load_deck
 from fecm.deck.model import Deck
 from fecm.plot.pictures import draw
+from fecm.results.end import End, ends
+from fecm.results.linear_plate import LIMITS, InPlane, in_plane_of, softness
 from fecm.results.metrics import Indentation, Projectiles, summarise
 from fecm.results.summary import summary
-from fecm.results.validity import LIMITS, End, InPlane, counted, ends, in_plane_of, softness
+from fecm.results.validity import counted
 from fecm.sweeps.random_result import bounds, wilson
 from fecm.sweeps.result import SweepResult
 from tests.builders import table

@@ -10,8 +10,8 @@ import pytest
 
 import fecm
 from fecm.results.csv import lines
+from fecm.results.errors import ExportError, NotStoredError, ResultFileError
 from fecm.results.result import Result
-from fecm.results.schema import ExportError, NotStoredError, ResultFileError
 from fecm.results.vtkhdf import write_vtkhdf
 from tests.builders import REPORT_PLY, turned_stiffness
 from tests.calls import call

@@ -11,7 +11,8 @@ import pytest
 
 import fecm
 from fecm.plot.kinds import KINDS, PlotError
-from fecm.plot.pictures import RunKind, draw
+from fecm.plot.pictures import draw
+from fecm.results.pictures import RunKind
 from tests.calls import call
 from tests.decks import APPENDIX, DATA_CARDS, PROGRAM, small
 

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.results.schema import ResultFileError
+from fecm.results.errors import ResultFileError
 from fecm.sweeps.cases import (
     DESIGNS,
     CasesError,

@@ -14,7 +14,7 @@ import fecm
 from fecm.deck import Deck
 from fecm.deck.model import Impact, Indentation, Material, Patch
 from fecm.problem.generate import generate
-from fecm.results.summary import largest_exposures
+from fecm.results.exposures import largest_exposures
 from fecm.sweeps.cases import Case, CasesError, parse_vary, read_cases
 from fecm.sweeps.result import summary
 from fecm.sweeps.vary import apply_case

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, NamedTuple, NoReturn
 import click
 
 from fecm._errors import FecmError, did_you_mean
+from fecm._text import printable
 from fecm._version import __version__
 from fecm.cli import common, isolation
 from fecm.cli.common import INTERRUPTED, SIGNALLED, UNUSABLE, echo, signals
-from fecm.results.schema import printable
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem

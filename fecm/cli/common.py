@@ -22,8 +22,9 @@ import click
 
 from fecm._errors import FecmError
 from fecm._files import beside
+from fecm._json import jsonable
+from fecm._text import printable
 from fecm.problem.slips import MODES, REPORT
-from fecm.results.schema import jsonable, printable
 
 NO, UNUSABLE, INTERRUPTED = 1, 2, 130
 

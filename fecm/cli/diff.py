@@ -10,12 +10,12 @@ import click
 from click import option
 
 from fecm._inputs import parsed_toml
+from fecm._text import printable, shown_apart
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, echo_json
 from fecm.cli.help import typical
 from fecm.cli.isolation import reads
 from fecm.cli.types import NOT_NEGATIVE, Parsed, assignment, file_of
 from fecm.results.diff import SCALE_NAMES, Comparison, Difference, difference
-from fecm.results.schema import printable, shown_apart
 
 
 def _tolerance(name: str, values: object) -> tuple[float, ...]:

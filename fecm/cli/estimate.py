@@ -13,8 +13,9 @@ from fecm.cli.decks import load_single
 from fecm.cli.help import typical
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.problem.problem import Problem
+from fecm.results.linear_plate import TOO_SOFT, UNSAFE, softness
 from fecm.results.metrics import RATIO
-from fecm.results.validity import TOO_SOFT, UNSAFE, Judge, softness
+from fecm.results.validity import Judge
 from fecm.studies.estimate import estimate as estimate_problem
 from fecm.sweeps.api import carry_out
 from fecm.sweeps.plan import plan

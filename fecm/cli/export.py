@@ -12,9 +12,10 @@ from fecm.cli.help import typical
 from fecm.cli.isolation import reads
 from fecm.cli.outputs import write_lines
 from fecm.results import csv
+from fecm.results.errors import ExportError
 from fecm.results.hdf5_reader import read
 from fecm.results.result import load, result_of
-from fecm.results.schema import FORMAT, SWEEP, ExportError
+from fecm.results.schema import Form
 from fecm.results.tapes import tape_texts, write_tapes
 from fecm.results.vtkhdf import write_vtkhdf
 
@@ -72,8 +73,8 @@ def export(
     if target == "vtkhdf" and output == DASH:
         raise click.UsageError("vtkhdf can't go to standard output")
 
-    contents = read(result, FORMAT, SWEEP)
-    is_sweep = contents.form == SWEEP
+    contents = read(result, Form.RUN, Form.SWEEP)
+    is_sweep = contents.form == Form.SWEEP
     name = (dataset or ("cases" if is_sweep else "history")).strip("/")
     ending = ".vtkhdf" if target == "vtkhdf" else f"-{name.replace('/', '-')}.csv"
     path = output or Path(f"{result.stem}{ending}")

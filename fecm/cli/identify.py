@@ -14,7 +14,7 @@ from fecm.cli.outputs import OutputPaths, write_lines
 from fecm.cli.rod import FILTER_HELP
 from fecm.cli.types import OneOf, Parsed, list_of
 from fecm.deck.units import unit_names, unit_of
-from fecm.studies.comparison import measurement_of
+from fecm.results.comparison import measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of
 from fecm.sweeps.identify import CARDS, FREE, Identification, fit
 

@@ -12,14 +12,16 @@ import click
 import numpy as np
 
 from fecm._tables import aligned
+from fecm._text import printable, shown
 from fecm._version import __version__
 from fecm.cli.common import FILE_PATH, FORMAT_OPTION, echo_json
 from fecm.cli.help import typical
 from fecm.cli.isolation import reads
+from fecm.results.description import describe_groups
 from fecm.results.hdf5_reader import Contents, read
 from fecm.results.result import result_of
-from fecm.results.schema import FORMAT, SWEEP, declared_units, printable, shown
-from fecm.results.summary import about_run, describe_groups
+from fecm.results.schema import Form, declared_units
+from fecm.results.summary import about_run
 
 # Attributes of the file with lines of their own.
 HEADING = ("title", "mode", "slips", "fecm_version", "format", "format_version",
@@ -68,7 +70,7 @@ def _system(context: click.Context, _: object, asked: bool) -> None:
 @reads("result")
 def info(result: Path, form: str) -> None:
     """Describe units, summary and every dataset of RESULT, of a run or of a sweep."""
-    contents = read(result, FORMAT, SWEEP)
+    contents = read(result, Form.RUN, Form.SWEEP)
     with contents.held():
         about = _about(contents)
     if form == "json":
@@ -79,7 +81,7 @@ def info(result: Path, form: str) -> None:
 
 def _about(contents: Contents) -> dict[str, Any]:
     """What is shown, under the keys of the JSON output."""
-    is_sweep = contents.form == SWEEP
+    is_sweep = contents.form == Form.SWEEP
     if is_sweep:
         from fecm.sweeps.random_result import tables
         from fecm.sweeps.result import summary, sweep_of

@@ -35,8 +35,8 @@ from typing import Any, NamedTuple, NoReturn, TypeVar
 
 from fecm._files import clear_partials
 from fecm._memory import available, format_bytes
+from fecm._text import printable
 from fecm.cli.common import SIGNALLED, SIGNALS, RefusedError, echo, standard_error
-from fecm.results.schema import printable
 
 GB = 10**9
 ROOM, ROOM_A_BYTE = 4 * GB, 50

@@ -12,6 +12,7 @@ from click import option
 
 from fecm._errors import FecmWarning
 from fecm._files import check_outputs
+from fecm._text import printable
 from fecm.cli.common import (
     DECK_PATH,
     FILE_PATH,
@@ -30,7 +31,7 @@ from fecm.plot.pictures import check_options, check_suffix, draw, options_of, sa
 from fecm.results.hdf5_reader import read
 from fecm.results.metrics import COLUMNS
 from fecm.results.result import Result, result_of
-from fecm.results.schema import FORMAT, SWEEP, printable
+from fecm.results.schema import Form
 
 if TYPE_CHECKING:
     from fecm.sweeps.result import SweepResult
@@ -151,8 +152,8 @@ def _named(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:
         raise RefusedError("a result is given twice")
     found: dict[str, Result | SweepResult] = {}
     for name, path in zip(names, paths, strict=True):
-        contents = read(path, FORMAT, SWEEP)
-        if contents.form == SWEEP:
+        contents = read(path, Form.RUN, Form.SWEEP)
+        if contents.form == Form.SWEEP:
             from fecm.sweeps.result import sweep_of
 
             found[name] = sweep_of(contents, history=False)

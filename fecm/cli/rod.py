@@ -11,6 +11,7 @@ import click
 import numpy as np
 from click import option
 
+from fecm._measured_tables import read_table
 from fecm._typing import Floats
 from fecm.cli.common import DASH, DECK_PATH, FORMAT_OPTION, RefusedError
 from fecm.cli.decks import load_valid
@@ -34,7 +35,6 @@ from fecm.studies.rod_test import pulse_test
 from fecm.studies.rod_test.filters import Filter, filter_of, recorded
 from fecm.studies.rod_test.filters import calibrate as fit_sensitivity
 from fecm.studies.rod_test.pulse_test import Pulse, RodHistory
-from fecm.studies.tables import read_table
 
 FILTER_HELP = ("first-order:RISE or moving-average:RISE, with the time RISE from 10 to 90 % of the "
                "step response; or cfc:60, 180, 600 or 1000 of SAE J211.")  # fmt: skip

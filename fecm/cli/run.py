@@ -27,10 +27,11 @@ from fecm.problem.problem import Problem
 from fecm.problem.slips import NAMES, active_slips
 from fecm.problem.summary import larger_steps
 from fecm.results import hdf5_writer
+from fecm.results.exposures import largest_exposures
 from fecm.results.hdf5_reader import read
 from fecm.results.result import Result, result_of
 from fecm.results.schema import declared_units
-from fecm.results.summary import about_run, largest_exposures
+from fecm.results.summary import about_run
 from fecm.simulation.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
 from fecm.simulation.printout import Printer
 from fecm.simulation.run import run as simulate_run

@@ -18,9 +18,10 @@ from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.mesh import ElementBlock, element_blocks
 from fecm.plot.kinds import LackingError, PlotError
+from fecm.results.errors import NotStoredError, ResultFileError
+from fecm.results.missing import remedy
 from fecm.results.plies import model_of, points_of, rows_at
 from fecm.results.result import Result
-from fecm.results.schema import NotStoredError, ResultFileError, remedy
 
 Array = NDArray[Any]
 Ints = NDArray[np.intp]

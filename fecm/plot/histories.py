@@ -14,9 +14,9 @@ from fecm._errors import warn
 from fecm.deck.model import Material
 from fecm.plot import data, style
 from fecm.plot.kinds import Picture, PlotError
+from fecm.results.comparison import Source, compare, measurement_of
 from fecm.results.result import Result
 from fecm.results.schema import declared_units
-from fecm.studies.comparison import Source, compare, measurement_of
 
 if TYPE_CHECKING:
     from fecm.sweeps.identify import Identification

@@ -20,7 +20,7 @@ from fecm.plot import style
 from fecm.plot.kinds import Picture, PlotError
 from fecm.results.metrics import COLUMNS, VERDICTS
 from fecm.results.metrics import INTEGERS as WHOLE_NUMBERS
-from fecm.results.validity import DELAMINATED, MEANING, OPEN, counted
+from fecm.results.validity import MEANING, Reason, counted
 from fecm.sweeps.cases import INTEGERS as WHOLE_VALUES
 from fecm.sweeps.cases import NAMES
 from fecm.sweeps.result import SweepResult, reasons
@@ -155,7 +155,7 @@ def choose(
 def beyond(sweep: SweepResult, rows: Ints) -> dict[str, Bools]:
     """Cases beyond the range of the model, by what they are."""
     found = dict(counted(sweep.validity[rows]))
-    for other in (OPEN, DELAMINATED):  # which have a mark and a line of their own
+    for other in (Reason.OPEN, Reason.DELAMINATED):  # which have a mark and a line of their own
         found.pop(other, None)
     return {MEANING[reason]: some for reason, some in found.items()}
 

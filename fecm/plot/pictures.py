@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from fecm._errors import FecmError, did_you_mean
 from fecm._files import beside
@@ -24,11 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fecm.sweeps.result import SweepResult
-
-RunKind = Literal[
-    "force", "loop", "energy", "strain", "thickness", "failure", "line", "contour", "surface",
-    "mesh", "animation",
-]  # fmt: skip
 
 
 def kind_named(name: str) -> Kind:

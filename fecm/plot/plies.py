@@ -28,10 +28,10 @@ from fecm.plot.data import Array, deck_of, mesh_of, on_plate, reach, require
 from fecm.plot.kinds import Picture, PlotError
 from fecm.plot.plate import aspect, mark_impact
 from fecm.problem.build import rules
+from fecm.results.errors import NotStoredError, ResultFileError
+from fecm.results.exposures import LargestExposure, largest_exposures
 from fecm.results.plies import Plies, places, rows_at
 from fecm.results.result import Result
-from fecm.results.schema import NotStoredError, ResultFileError
-from fecm.results.summary import LargestExposure, largest_exposures
 
 BETWEEN = "interlaminar"
 NAMES = (*CRITERIA, BETWEEN)

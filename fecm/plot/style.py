@@ -23,10 +23,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import Formatter, Locator
 
 from fecm._frozen import frozen
+from fecm._text import printable
 from fecm.deck.units import PREFIXED, thousands, unit_of, with_prefix
 from fecm.plot.kinds import PlotError
 from fecm.results.result import Result
-from fecm.results.schema import printable
 
 WIDTHS = {"column": 3.5, "full": 7.2}  # width of a column and of a page (in)
 RATIO = {"column": 0.68, "full": 0.45}  # height over width of a graph

@@ -46,7 +46,8 @@ from fecm.mechanics.strains import StrainField
 from fecm.mechanics.symmetry import half_turn_images, restrain_resting_dofs, symmetry_reduction
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.problem.generate import generate, rod_diameters
-from fecm.results.validity import Judge, in_plane_of
+from fecm.results.linear_plate import in_plane_of
+from fecm.results.validity import Judge
 
 W = 2  # dof w, from 0
 ENERGY_LIMIT = 0.1  # relative error of the energy balance that ends a run

@@ -13,6 +13,9 @@ import numpy as np
 
 from fecm._typing import Array
 from fecm.results import schema
+from fecm.results.errors import ExportError
+from fecm.results.groups import STORED_BY
+from fecm.results.missing import remedy, suggestion
 from fecm.results.plies import IN_PLANE, INTERLAMINAR
 from fecm.results.result import Result
 
@@ -70,7 +73,7 @@ def lines(result: Result, name: str = "history") -> Iterator[str]:
     shape = arrays[0].shape
     if any(array.shape != shape for array in arrays):
         choice = f"choose {', '.join(values[:-1])} or {values[-1]}"
-        raise schema.ExportError(f"the datasets of {name} do not fit into one table; {choice}")
+        raise ExportError(f"the datasets of {name} do not fit into one table; {choice}")
     known = schema.DATASETS[values[0]].shape if values[0] in schema.DATASETS else shape
     axes = list(zip(known, shape, strict=True))[bool(clock) :]
     columns = _names(values)
@@ -98,9 +101,9 @@ def _members(result: Result, name: str) -> list[str]:
         known = list(schema.DATASETS)
         return sorted(members, key=lambda path: known.index(path) if path in known else len(known))
     group = name.partition("/")[0]
-    if group in schema.STORED_BY and not any(path.startswith(f"{group}/") for path in result):
-        raise schema.ExportError(f"the result has no {name}{schema.remedy(name)}")
-    raise schema.ExportError(f"the result has no dataset {name}{schema.suggestion(name, result)}")
+    if group in STORED_BY and not any(path.startswith(f"{group}/") for path in result):
+        raise ExportError(f"the result has no {name}{remedy(name)}")
+    raise ExportError(f"the result has no dataset {name}{suggestion(name, result)}")
 
 
 def _names(paths: Sequence[str]) -> tuple[str, ...]:

@@ -26,8 +26,10 @@ import numpy as np
 from fecm._errors import FecmError
 from fecm._typing import Array
 from fecm.deck.records import DOF_NAMES
+from fecm.results.blocks import row_blocks
 from fecm.results.hdf5_reader import Contents, read
-from fecm.results.schema import CONTACT, DATASETS, FORMAT, SCALES, SWEEP, row_blocks, suggestion
+from fecm.results.missing import suggestion
+from fecm.results.schema import CONTACT, DATASETS, SCALES, Form
 from fecm.results.tapes import CURVATURES, SHEARS, TAPES, TapeText, W, last_digit, read_tapes
 
 ON_TAPE = {
@@ -38,7 +40,7 @@ ON_TAPE = {
 CASES = (("case", 0), ("step", 1))
 LINES = (("line", 1), ("column", 1))  # those of tape3 without a known number of nodes
 SOURCE_NAMES = {
-    FORMAT: "the result of a run", SWEEP: "the result of a sweep", TAPES: "a folder of tapes"
+    Form.RUN: "the result of a run", Form.SWEEP: "the result of a sweep", TAPES: "a folder of tapes"
 }  # fmt: skip
 # Datasets of a resultant or strain that is zero in bending, and those of its bending counterpart.
 MEMBRANE = {"N": ("N_x", "N_y", "N_xy"), "eps": ("eps_xx", "eps_yy", "gamma_xy")}
@@ -155,9 +157,9 @@ def difference(
     the results, if another pattern matches neither that nor one that a result can have, or if
     nothing is left.  Raises ResultFileError if a file can't be read, OSError if it can't be opened.
     """
-    left, right = (read_tapes(p) if p.is_dir() else read(p, FORMAT, SWEEP) for p in (a, b))
+    left, right = (read_tapes(p) if p.is_dir() else read(p, Form.RUN, Form.SWEEP) for p in (a, b))
     forms = left.form, right.form
-    if left.form != right.form and SWEEP in forms:
+    if left.form != right.form and Form.SWEEP in forms:
         names = " and B ".join(SOURCE_NAMES[form] for form in forms)
         raise IncomparableError(f"A is {names}: they can't be compared")
     left, right = _fitted(left, right), _fitted(right, left)
@@ -385,7 +387,7 @@ def _place(found: Comparison, index: tuple[int, ...]) -> dict[str, Any]:
             place[name] = kind(source.rows(f"{group}/{name}", index[0], index[0] + 1)[0])
     path, source = found.path, found.sources[0]
     lines = isinstance(source, TapeText) and source.lines and path == W
-    of_cases = source.form == SWEEP and path.startswith(("cases/", "summary/", "history/"))
+    of_cases = source.form == Form.SWEEP and path.startswith(("cases/", "summary/", "history/"))
     if axes := CASES if of_cases else LINES if lines else ():
         return place | {name: first + i for (name, first), i in zip(axes, index, strict=False)}
     if clock is None and path.startswith("tape"):

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from fecm._frozen import frozen
 from fecm._typing import Floats
-from fecm.mechanics.failure import CRITERIA
+from fecm.results.criteria import ALL_CRITERIA, where
+from fecm.results.exposures import evaluations_in_contact
 
 if TYPE_CHECKING:
     from fecm.results.result import Result
 
-COLUMNS = ("exposure", "mode", "ply", "x", "y")
-FEWEST = 20  # evaluations of FAIL during contact below which maxima may be missed
+NEEDED = tuple(f"exposures/{name}" for name in ("time", "exposure", "mode", "ply", "x", "y"))
 
 
 @frozen
@@ -49,75 +49,77 @@ class FirstFailure:
         return where(self.criterion, self.ply)
 
 
-def where(criterion: str, ply: int) -> str:
-    """A ply, or of the interlaminar criterion an interface, in words."""
-    between = criterion == "interlaminar"
-    return f"interface of plies {ply} and {ply + 1}" if between else f"ply {ply}"
-
-
 def first_failures(result: Result, level: float = 1.0) -> list[FirstFailure]:
     """First time at which each criterion reaches an exposure, the earliest first.
 
     Empty without FAIL.  Criteria that stay below the level are not in the list.
     """
-    if any(f"exposures/{name}" not in result for name in ("time", *COLUMNS)):
+    if any(path not in result for path in NEEDED):
         return []
-    exposure, times = result["exposures/exposure"], result["exposures/time"]
+    exposures, times = result["exposures/exposure"], result["exposures/time"]
     modes = dict(enumerate(map(str, result.attributes_of("failure").get("modes", ()))))
-    clock, force, work = _histories(result)
+    history = _history(result)
     found = []
-    for number, criterion in enumerate((*CRITERIA, "interlaminar")):
-        (reached,) = np.nonzero(exposure[:, number] >= level)
+    for number, criterion in enumerate(ALL_CRITERIA):
+        exposure = exposures[:, number]
+        (reached,) = np.nonzero(exposure >= level)
         if not len(reached):
             continue
         row = int(reached[0])
-        before, below = (times[row - 1], exposure[row - 1, number]) if row else (0.0, 0.0)
-        share = (level - below) / (exposure[row, number] - below)
+        before, below = (times[row - 1], exposure[row - 1]) if row else (0.0, 0.0)
+        share = (level - below) / (exposure[row] - below)
         time = float(before + share * (times[row] - before))
-        mode, ply, x, y = (result[f"exposures/{name}"][row, number].item() for name in COLUMNS[1:])
-        at_time = (float(np.interp(time, clock, values)) for values in (force, work))
-        span = float(before), float(times[row])
-        name = modes.get(mode, "unknown")
-        found.append(FirstFailure(criterion, name, ply, x, y, time, *span, *at_time))
+        mode, ply, x, y = (
+            result[f"exposures/{name}"][row, number].item() for name in ("mode", "ply", "x", "y")
+        )
+        found.append(
+            FirstFailure(
+                criterion,
+                mode=modes.get(mode, "unknown"),
+                ply=ply,
+                x=x,
+                y=y,
+                time=time,
+                earliest=float(before),
+                latest=float(times[row]),
+                force=float(np.interp(time, history.time, history.force)),
+                energy=float(np.interp(time, history.time, history.work)),
+            )
+        )
     return sorted(found, key=lambda one: one.time)
 
 
-def _histories(result: Result) -> tuple[Floats, Floats, Floats]:
-    """Time, contact force and its work on the plate at every step; NaN without impact."""
+class _History(NamedTuple):
+    """Contact force and its work on the plate at every step, from rest; NaN without impact."""
+
+    time: Floats
+    force: Floats
+    work: Floats
+
+
+def _history(result: Result) -> _History:
     if "history/force" not in result:
-        return np.zeros(1), np.full(1, math.nan), np.full(1, math.nan)
+        unknown = np.full(1, math.nan)
+        return _History(np.zeros(1), unknown, unknown)
     time, force, tip = (
         np.concatenate([[0.0], result[f"history/{name}"]])
         for name in ("time", "force", "displacement")
     )
     means = 0.5 * (force[1:] + force[:-1])
     # The tip's displacement is positive away from the plate.
-    return time, force, np.concatenate([[0.0], np.cumsum(-means * np.diff(tip))])
-
-
-def count_evaluations(result: Result) -> int:
-    """Count the evaluations of FAIL at steps with a contact force; 0 without impact."""
-    if "history/force" not in result or "exposures/step" not in result:
-        return 0
-    touching = result["history/step"][result["history/force"] > 0.0]
-    return int(np.count_nonzero(np.isin(result["exposures/step"], touching)))
-
-
-def evaluations_in_contact(result: Result) -> int | None:
-    """Stored number of :func:`count_evaluations`; None without FAIL and in older results."""
-    stored = result.attributes_of("failure").get("evaluations_in_contact")
-    return int(stored) if isinstance(stored, int | np.integer) else None
+    work = np.concatenate([[0.0], np.cumsum(-means * np.diff(tip))])
+    return _History(time, force, work)
 
 
 def failure_metrics(result: Result) -> dict[str, Any]:
     """Evaluations, largest exposures and first failures as plain values; empty without FAIL."""
     if "failure/x" not in result:
         return {}
-    names, largest = (*CRITERIA, "interlaminar"), []
+    largest = []
     if "exposures/exposure" in result:
         largest = result["exposures/exposure"][-1].tolist()
     return {
         "evaluations_in_contact": evaluations_in_contact(result),
-        "largest": dict(zip(names, largest, strict=False)),
+        "largest": dict(zip(ALL_CRITERIA, largest, strict=False)),
         "first": [asdict(one) for one in first_failures(result)],
     }

@@ -20,18 +20,17 @@ import h5py
 import numpy as np
 
 from fecm._typing import Array
-from fecm.results.schema import (
-    FORMAT,
-    FORMAT_VERSION,
-    SWEEP,
-    NotStoredError,
-    ResultFileError,
-    not_stored,
-)
+from fecm.results.errors import NotStoredError, ResultFileError
+from fecm.results.missing import not_stored
+from fecm.results.schema import FORMAT_VERSION, Form
 
-ELEMENTS, COORDINATES = "mesh/elements", "mesh/coordinates"
-
-RESULT_OF = {FORMAT: "a run", SWEEP: "a sweep"}  # source of each form of file
+ELEMENTS = "mesh/elements"
+COORDINATES = "mesh/coordinates"
+# Source of each form of file.
+RESULT_OF: dict[str, str] = {
+    Form.RUN: "a run",
+    Form.SWEEP: "a sweep",
+}
 # Kinds of links that are refused, by HDF5's number.
 LINKS = {
     h5py.h5l.TYPE_SOFT: "a soft link to another object",
@@ -148,11 +147,11 @@ def read(path: Path, *forms: str) -> Contents:
         if DECK.search(opened.read(FIRST)):
             raise ResultFileError(f"{path} is a deck, not a result; `fecm run {path}` makes one")
     with _troubles(path), h5py.File(path) as file:
-        attributes, forms = _attributes(file), forms or (FORMAT,)
+        attributes, forms = _attributes(file), forms or (Form.RUN,)
         form, version = attributes.get("format"), attributes.get("format_version")
         if form not in forms:
             what = "not a result of fecm"
-            if form in (FORMAT, SWEEP):
+            if form in (Form.RUN, Form.SWEEP):
                 wanted = " or ".join(RESULT_OF[one] for one in forms)
                 what = f"the result of {RESULT_OF[form]}, not of {wanted}"
             raise ResultFileError(f"{path}: this HDF5 file is {what}")
@@ -194,7 +193,7 @@ def _list(contents: Contents, file_size: int, name: str, item: h5py.HLObject) ->
         return  # a scale numbers an axis
     if is_text and item.shape == ():
         contents.texts[name] = str(_plain(item[()]))
-    elif is_text and contents.form == SWEEP and item.ndim == 1:
+    elif is_text and contents.form == Form.SWEEP and item.ndim == 1:
         contents.lists[name] = [str(_plain(value)) for value in item[()].tolist()]
         contents.shapes[name], contents.dtypes[name] = item.shape, np.dtype(object)
     elif item.dtype.kind in "biuf" and item.shape is not None and not item.dtype.shape:

@@ -15,6 +15,8 @@ from fecm._files import beside
 from fecm._typing import Array
 from fecm.deck.units import unit_of
 from fecm.results import schema
+from fecm.results.errors import ResultWriteError
+from fecm.results.groups import GROUPS
 
 TEXT = h5py.string_dtype()
 TEXT_TYPE, SCALAR = h5py.h5t.py_create(TEXT, logical=True), h5py.h5s.create(h5py.h5s.SCALAR)
@@ -42,8 +44,8 @@ class FileSink:
         if name not in self._groups:
             new = name not in self._file
             group = self._groups[name] = self._file.require_group(name)
-            if new and name in schema.GROUPS:
-                _set_text(group, schema.GROUPS[name][1], "description")
+            if new and name in GROUPS:
+                _set_text(group, GROUPS[name].description, "description")
         return self._groups[name]
 
     def attributes(self, group: str, values: Mapping[str, Any]) -> None:
@@ -172,7 +174,7 @@ def new_hdf5(path: Path, *, overwrite: bool = True) -> Iterator[tuple[h5py.File,
                 if error is not guarded.error:
                     raise
         if (failed := guarded.error) is not None:
-            raise schema.ResultWriteError(f"{path} can't be written: {failed.strerror or failed}")
+            raise ResultWriteError(f"{path} can't be written: {failed.strerror or failed}")
 
 
 class _Guarded(io.FileIO):

@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fecm._typing import Bools, Floats
-from fecm.mechanics.failure import CRITERIA
-from fecm.results import validity
-from fecm.results.validity import Texts
+from fecm.results.criteria import ALL_CRITERIA, spelt
+from fecm.results.end import Texts, decided, ends, over, peak_known
 
 # Description and dimension of every quantity, by name.
 SUMMARY = {
@@ -51,8 +50,8 @@ FOUND = {
 }
 # Those of a sweep that are measured on request; and the place that is hit instead of the one given.
 EXPOSURES = {
-    f"exposure_{name}": (f"largest exposure {name.replace('_', ' ')} outside the load", "")
-    for name in (*CRITERIA, "interlaminar")
+    f"exposure_{name}": (f"largest exposure {spelt(name)} outside the load", "")
+    for name in ALL_CRITERIA
 }
 EVALUATIONS = {"fail_evaluations": ("evaluations of FAIL during contact", "")}
 HIT = {f"hit_{axis}": (f"{axis} of the impact node or of the patch", "length") for axis in "xy"}
@@ -143,23 +142,23 @@ def summarise(
     impulse = (0.5 * (dt + np.append(dt[1:], 0.0)) * force).sum(axis=1)
     rebound = impulse / mass - velocity
     reached = force.max(axis=1)
-    end = validity.ends(force[:, -1], reached, rebound + mobility * impulse, velocity)
-    over, known = validity.over(end), validity.peak_known(end)
+    end = ends(force[:, -1], reached, rebound + mobility * impulse, velocity)
+    finished, known = over(end), peak_known(end)
 
-    def where(decided: Bools, values: Floats) -> Floats:
-        return np.where(decided, values, np.nan)
+    def where(mask: Bools, values: Floats) -> Floats:
+        return np.where(mask, values, np.nan)
 
     columns = {
         "peak_force": where(known, reached),
         "time_of_peak": where(known & met, times[peak]),
-        "contacts": where(over, begins.sum(axis=1).astype(float)),
-        "contact_time": where(over, (dt * touching).sum(axis=1)),
-        "last_contact": where(over & met, times[last]),
-        "max_indentation": validity.decided(indentation.largest, indentation.last, end),
-        "permanent_indentation": where(over, indentation.permanent),
-        "impulse": where(over, impulse),
-        "rebound_velocity": where(over, rebound),
-        "energy_absorbed": where(over, 0.5 * mass * (velocity**2 - rebound**2)),
+        "contacts": where(finished, begins.sum(axis=1).astype(float)),
+        "contact_time": where(finished, (dt * touching).sum(axis=1)),
+        "last_contact": where(finished & met, times[last]),
+        "max_indentation": decided(indentation.largest, indentation.last, end),
+        "permanent_indentation": where(finished, indentation.permanent),
+        "impulse": where(finished, impulse),
+        "rebound_velocity": where(finished, rebound),
+        "energy_absorbed": where(finished, 0.5 * mass * (velocity**2 - rebound**2)),
     }
     if threshold is not None:
         above = force >= threshold
@@ -167,5 +166,5 @@ def summarise(
         columns["threshold_force"] = np.full(len(force), threshold)
         columns["threshold_margin"] = where(known, 1.0 - reached / threshold)
         columns["threshold_time"] = np.where(above.any(axis=1), first, np.nan)
-        columns["time_above"] = where(over, (dt * above).sum(axis=1))
+        columns["time_above"] = where(finished, (dt * above).sum(axis=1))
     return Metrics(columns, end, reached)

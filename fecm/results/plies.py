@@ -16,7 +16,8 @@ from fecm.deck.reader import Reader
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.mesh import element_blocks
-from fecm.results.schema import NotStoredError, ResultFileError, remedy
+from fecm.results.errors import NotStoredError, ResultFileError
+from fecm.results.missing import remedy
 
 if TYPE_CHECKING:
     from fecm.results.result import Result

@@ -16,6 +16,10 @@ from fecm.deck.model import Deck, Impact
 from fecm.deck.records import AXES, DOF_NAMES
 from fecm.deck.units import unit_of
 from fecm.results import schema
+from fecm.results.checks import attribute_error, shape_error
+from fecm.results.end import End, decided
+from fecm.results.errors import NotStoredError, ResultFileError
+from fecm.results.group import Group
 from fecm.results.metrics import (
     INTEGERS,
     METRICS,
@@ -26,8 +30,8 @@ from fecm.results.metrics import (
     Projectiles,
     summarise,
 )
-from fecm.results.schema import DATASETS, Dataset, NotStoredError, ResultFileError, declared_units
-from fecm.results.validity import End, decided
+from fecm.results.missing import not_stored
+from fecm.results.schema import DATASETS, Dataset, declared_units
 
 if TYPE_CHECKING:
     import pandas
@@ -36,11 +40,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fecm.deck.findings import Finding
-    from fecm.plot.pictures import RunKind
+    from fecm.results.comparison import Comparison
     from fecm.results.first_failure import FirstFailure
     from fecm.results.hdf5_reader import Contents
+    from fecm.results.pictures import RunKind
     from fecm.results.plies import Plies
-    from fecm.studies.comparison import Comparison
 
 HISTORY = "history"
 
@@ -438,7 +442,7 @@ class Result(schema.Contact):
         >>> ax = result.plot("force", width="full")  # doctest: +SKIP
         >>> ax.plot(time, force, ".")  # doctest: +SKIP
         """
-        from fecm.plot.pictures import plot
+        from fecm.results.pictures import plot
 
         return plot(kind, {self.title or "the result": self}, path, ax, **options)
 
@@ -475,7 +479,7 @@ class Result(schema.Contact):
         --------
         >>> print(result.compare("shot-3.csv"))  # doctest: +SKIP
         """
-        from fecm.studies.comparison import compare, measurement_of
+        from fecm.results.comparison import compare, measurement_of
 
         given = measurement_of(measured, declared_units(self.attributes))
         return compare(self, given.corrected(delay, offset))
@@ -483,7 +487,7 @@ class Result(schema.Contact):
     def __getitem__(self, path: str) -> Array:
         name = path.strip("/")
         if name not in self._arrays:
-            raise NotStoredError(schema.not_stored(name, self._arrays))
+            raise NotStoredError(not_stored(name, self._arrays))
         return np.asarray(self._arrays[name])
 
     def __contains__(self, path: str) -> bool:
@@ -501,8 +505,8 @@ class Result(schema.Contact):
             if f"{HISTORY}/{name}" in self._arrays:
                 return self._arrays[f"{HISTORY}/{name}"]
             if any(path.startswith(f"{name}/") for path in self._arrays):
-                return schema.group(name, self._arrays, self._groups)
-            raise NotStoredError(schema.not_stored(name, self._arrays))
+                return schema.GROUP_TYPES.get(name, Group)(name, self._arrays, self._groups)
+            raise NotStoredError(not_stored(name, self._arrays))
 
     def __dir__(self) -> list[str]:
         heads = {path.partition("/")[0] for path in self._arrays}
@@ -554,7 +558,7 @@ def result_of(contents: Contents, model: Deck | None = None) -> Result:
     Raises ResultFileError if a dataset has the wrong shape or type, or an attribute the wrong type.
     """
     kinds = {name: dtype.kind for name, dtype in contents.dtypes.items()}
-    found = schema.shape_error(contents.shapes, kinds) or schema.attribute_error(contents.groups)
+    found = shape_error(contents.shapes, kinds) or attribute_error(contents.groups)
     if found:
         raise ResultFileError(f"{contents.path}: {found}")
     attributes = {"": contents.attributes, **contents.groups}

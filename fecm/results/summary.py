@@ -1,29 +1,20 @@
-"""Summary of a run in a few lines, and contents of a result file for `fecm info`."""
+"""Summary of a run: in a few lines, and as values for `fecm info`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from fecm._frozen import frozen
 from fecm.deck.units import quantity as shown_quantity
-from fecm.mechanics.failure import CRITERIA
-from fecm.results.first_failure import (
-    evaluations_in_contact,
-    failure_metrics,
-    first_failures,
-    where,
-)
+from fecm.results.criteria import spelt, where
+from fecm.results.end import End
+from fecm.results.exposures import LargestExposure, evaluations_in_contact, largest_exposures
+from fecm.results.first_failure import failure_metrics, first_failures
 from fecm.results.result import Result
-from fecm.results.schema import DATASETS, GROUPS, ResultFileError, row_blocks
-from fecm.results.validity import CROSSED, End
-
-if TYPE_CHECKING:
-    from fecm.results.hdf5_reader import Contents
+from fecm.results.validity import CROSSED
 
 LEFT = "left in plate, indentation and projectile"
 LISTED = 6  # most contacts and frequencies listed individually
@@ -87,14 +78,14 @@ def _exposures(result: Result) -> list[str]:
     for exposure in largest:
         force = reached.get(exposure.criterion)
         known = "" if force is None else f"; reaches 1 at {_rounded(result, force, 'force')}"
-        lines.append(f"{exposure.line(result)}{known}")
+        lines.append(f"{_exposure(result, exposure)}{known}")
     count = evaluations_in_contact(result)
     if count is not None and "history/force" in result:
         lines.append(f"evaluations       {count} of FAIL during contact")
     if first:
         one, rounded = first[0], partial(_rounded, result)
         texts = [
-            f"{one.mode} ({one.criterion.replace('_', ' ')})",
+            f"{one.mode} ({spelt(one.criterion)})",
             f"{one.where} at ({one.x:.6g}, {one.y:.6g})",
             f"time {rounded(one.time, 'time')}, between {one.earliest:.4g} and {one.latest:.4g}",
         ]
@@ -108,6 +99,16 @@ def _exposures(result: Result) -> list[str]:
     return lines
 
 
+def _exposure(result: Result, largest: LargestExposure) -> str:
+    """Line of the largest exposure of a criterion."""
+    least = "at least " if result.end in UNDECIDED else ""
+    return (
+        f"{spelt(largest.criterion):18}{least}{largest.exposure:.4g}: {largest.mode}, "
+        f"{where(largest.criterion, largest.ply)} at ({largest.x:.6g}, {largest.y:.6g}), "
+        f"time {_quantity(result, largest.time, 'time')}"
+    )
+
+
 def _delamination(result: Result) -> str:
     """The threshold of delamination, and whether it is reached."""
     quantity, known = partial(_quantity, result), result.threshold
@@ -118,65 +119,6 @@ def _delamination(result: Result) -> str:
         return f"{force} not reached by the end of the run, which is {UNDECIDED[end]}: open"
     margin = result.metrics.get("threshold_margin", 1.0)
     return f"{force} not reached: the peak is {margin:.1%} below"
-
-
-@frozen
-class LargestExposure:
-    """Largest exposure of a criterion outside the elements under the load."""
-
-    criterion: str
-    exposure: float
-    mode: str
-    ply: int  # from 1 at the struck face; of an interface the ply above it
-    x: float
-    y: float
-    time: float
-
-    @property
-    def plies(self) -> str:
-        """The ply, or the plies of the interface, in words."""
-        between = self.criterion == "interlaminar"
-        return f"plies {self.ply} and {self.ply + 1}" if between else f"ply {self.ply}"
-
-    def line(self, result: Result) -> str:
-        """One line of the summary."""
-        place, least = (
-            where(self.criterion, self.ply),
-            "at least " if result.end in UNDECIDED else "",
-        )
-        value = f"{least}{self.exposure:.4g}"
-        return (
-            f"{self.criterion.replace('_', ' '):18}{value}: {self.mode}, {place} at "
-            f"({self.x:.6g}, {self.y:.6g}), time {_quantity(result, self.time, 'time')}"
-        )
-
-
-def largest_exposures(result: Result) -> list[LargestExposure]:
-    """Largest exposure of each criterion; empty without FAIL."""
-    if "failure/x" not in result:
-        return []
-    under = result["failure/under_load"] != 0
-    x, y = result["failure/x"], result["failure/y"]
-    modes = result.failure.attributes.get("modes", ())
-    found = []
-    for name in (*CRITERIA, "interlaminar"):
-        exposure = result[f"failure/{name}/exposure"]
-        # Interlaminar exposures belong to the element.
-        near = under.any(axis=1)[:, None] if name == "interlaminar" else under[:, :, None, None]
-        outside = np.where(near, -1.0, exposure)
-        if not outside.size or not (outside >= 0.0).any():
-            continue
-        place = np.unravel_index(int(np.nanargmax(outside)), outside.shape)
-        # (element, point, ply, face), or (element, interface)
-        at, ply = (place[:2], place[2]) if exposure.ndim > 2 else (place[:1], place[1])
-        code = int(result[f"failure/{name}/mode"][place])
-        if not 0 <= code < len(modes):
-            raise ResultFileError(f"failure/{name}/mode has the mode {code}, which has no name")
-        mode = modes[code]
-        time = float(result[f"failure/{name}/time"][place])
-        where = int(ply) + 1, float(x[at].mean()), float(y[at].mean())
-        found.append(LargestExposure(name, float(exposure[place]), mode, *where, time))
-    return found
 
 
 def _rounded(result: Result, value: float, dimension: str) -> str:
@@ -242,62 +184,6 @@ def _elastic(result: Result, peak: float) -> str:
     if any(found.exposure > 1.0 for found in largest_exposures(result)):
         beyond.append("the first failure")
     return f"elastic: beyond {' and '.join(beyond)}" if beyond else ""
-
-
-def describe_groups(contents: Contents) -> list[dict[str, Any]]:
-    """Describe the groups and datasets of a result file, of a run or of a sweep.
-
-    Of each group ``name`` (empty for the file itself), ``description``, ``rows`` (stored instants,
-    or None), ``attributes`` and ``datasets``; of each dataset ``name`` (its path), ``shape``,
-    ``dtype`` (``"text"`` for texts), ``description``, ``dimension``, ``unit``, ``min`` and ``max``
-    of the finite numbers (None without any), ``not_finite`` and, for texts, the number of
-    ``different`` ones.
-    """
-    members: dict[str, list[dict[str, Any]]] = {name: [] for name in contents.groups}
-    for path in sorted(contents, key=lambda path: _order(DATASETS, path)):
-        members.setdefault(path.rpartition("/")[0], []).append(_describe(contents, path))
-    groups: list[dict[str, Any]] = []
-    for name in sorted(members, key=lambda name: _order(GROUPS, name)):
-        attributes = dict(contents.groups.get(name, {})) if name else {}
-        description = str(attributes.pop("description", ""))
-        rows, *_ = contents.shapes.get(f"{name}/step") or (None,)
-        groups.append({"name": name, "description": description, "rows": rows,
-                       "attributes": attributes, "datasets": members[name]})  # fmt: skip
-    return groups
-
-
-def _order(known: Mapping[str, Any], name: str) -> tuple[int, str]:
-    """Sort key: known names in their order, then others by name."""
-    return list(known).index(name) if name in known else len(known), name
-
-
-def _describe(contents: Contents, path: str) -> dict[str, Any]:
-    """Shape, type, attributes and range of one dataset."""
-    attributes, texts = contents.attributes_of(path), contents.lists.get(path)
-    minimum, maximum, not_finite = (None, None, 0) if texts is not None else _range(contents, path)
-    return {
-        "name": path,
-        "shape": contents.shapes[path],
-        "dtype": str(contents.dtypes[path]) if texts is None else "text",
-        **{key: str(attributes.get(key, "")) for key in ("description", "dimension", "unit")},
-        "min": minimum,
-        "max": maximum,
-        "not_finite": not_finite,
-        "different": None if texts is None else len(set(texts)),
-    }
-
-
-def _range(contents: Contents, path: str) -> tuple[float | None, float | None, int]:
-    """Minimum and maximum of the finite numbers, and number of others, by blocks of rows."""
-    minimum, maximum, not_finite = math.inf, -math.inf, 0
-    for start, stop in row_blocks(contents.shapes[path]):
-        block = contents.rows(path, start, stop)
-        finite = np.isfinite(block)
-        not_finite += int(block.size - np.count_nonzero(finite))
-        if finite.any():
-            minimum = min(minimum, block[finite].min().item())
-            maximum = max(maximum, block[finite].max().item())
-    return (minimum, maximum, not_finite) if minimum <= maximum else (None, None, not_finite)
 
 
 def about_run(result: Result) -> dict[str, Any]:

@@ -22,8 +22,9 @@ import numpy as np
 from fecm._files import beside
 from fecm._frozen import frozen
 from fecm._typing import Array, Floats
+from fecm.results.errors import ResultFileError
 from fecm.results.result import Result
-from fecm.results.schema import CONTACT, ResultFileError
+from fecm.results.schema import CONTACT
 
 TAPES = "tapes"  # form of a folder of tapes, as `Contents.form` of a file
 NAMES = ("tape3", "tape8", "tape9")

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from fecm._typing import Array
 from fecm.mechanics.strains import STRAINS
+from fecm.results.errors import ExportError
 from fecm.results.hdf5_writer import new_hdf5
+from fecm.results.missing import remedy
 from fecm.results.plies import IN_PLANE, INTERLAMINAR
 from fecm.results.result import Result
-from fecm.results.schema import ExportError, remedy
 
 Ints = NDArray[np.int64]
 Note = Callable[[str], None]

@@ -20,12 +20,14 @@ from fecm.mechanics.ply_stresses import FailureEnvelope
 from fecm.mechanics.projectile import Rod
 from fecm.mechanics.strains import STRAINS
 from fecm.problem.build import ImpactModel
-from fecm.results.schema import CONTACT, DATASETS, FIXED, INTERLAMINAR, STORED_BY, Dataset
+from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR
+from fecm.results.groups import STORED_BY
+from fecm.results.schema import CONTACT, DATASETS, FIXED, Dataset
 from fecm.results.sinks import RowBuffer, Sink
 
 Steps = Sequence[int]  # of rows
 Times = Sequence[float]
-FAILURE = ("failure", INTERLAMINAR, *(f"failure/{name}" for name in CRITERIA))
+FAILURE = ("failure", *(f"failure/{name}" for name in ALL_CRITERIA))
 AT_MACROS = ("tape3", "tape8", "stresses", "plies", "exposures", "reactions", "modes")
 EVERY_STEP = ("energy", "history", "gages")
 BLOCK = 1024
@@ -318,7 +320,7 @@ class Recorder:
             for name, values in zip(CRITERIA, getattr(found.plies, part), strict=True):
                 path = f"failure/{name}/{part}"
                 self._sink.write(path, 0, values.reshape(self._shape(DATASETS[path])))
-            self._sink.write(f"{INTERLAMINAR}/{part}", 0, getattr(found.interfaces, part))
+            self._sink.write(f"failure/{INTERLAMINAR}/{part}", 0, getattr(found.interfaces, part))
 
     def finish(self) -> None:
         """Store the remaining rows and trim each dataset to its rows."""

@@ -21,29 +21,15 @@ from fecm.problem.build import ImpactModel, RunOptions
 from fecm.problem.check_plausibility import contact_step
 from fecm.problem.problem import Problem
 from fecm.problem.slips import mode_of
-from fecm.results.first_failure import FEWEST, count_evaluations
+from fecm.results.blocks import row_blocks
+from fecm.results.end import OPEN_ENDS, End
+from fecm.results.exposures import FEWEST, count_evaluations, largest_exposures
+from fecm.results.linear_plate import TOO_SOFT, UNSAFE, softness
 from fecm.results.metrics import MOBILITY, VALIDITY
 from fecm.results.result import Result
-from fecm.results.schema import FORMAT, FORMAT_VERSION, row_blocks
+from fecm.results.schema import FORMAT_VERSION, Form
 from fecm.results.sinks import Sink
-from fecm.results.summary import largest_exposures
-from fecm.results.validity import (
-    BENT,
-    BROKEN,
-    CROSSED,
-    DELAMINATED,
-    INDENTATION,
-    OPEN,
-    OPEN_ENDS,
-    SOFT,
-    STRAIN,
-    STRAINED,
-    TOO_SOFT,
-    UNSAFE,
-    End,
-    joined,
-    softness,
-)
+from fecm.results.validity import BENT, CROSSED, INDENTATION, STRAIN, Reason, joined
 from fecm.simulation.macros import bind, bind_loop
 from fecm.simulation.simulation import Observer, Simulation
 
@@ -127,7 +113,7 @@ def _write_header(simulation: Simulation) -> None:
     """Store the attributes of the file, the deck, and every dataset without its rows."""
     sink, options, deck = simulation.sink, simulation.options, simulation.problem.deck
     attributes = {
-        "format": FORMAT,
+        "format": Form.RUN.value,
         "format_version": FORMAT_VERSION,
         "fecm_version": __version__,
         "title": deck.title,
@@ -202,10 +188,10 @@ def _judge(simulation: Simulation, result: Result) -> None:
     end = result.end
     if end is not None:
         notes += [OPEN_ENDS[end]] if end in OPEN_ENDS else []
-        reasons = [OPEN] if end in (End.RISING, End.BETWEEN) else []
+        reasons: list[str] = [Reason.OPEN] if end in (End.RISING, End.BETWEEN) else []
         reasons += [reason for reason, _ in beyond]
         if state.monitor.peak_force > CROSSED * result.threshold.get("force", np.inf):
-            reasons.append(DELAMINATED)
+            reasons.append(Reason.DELAMINATED)
         simulation.sink.attributes("", {VALIDITY: joined(reasons)})
     if notes:
         simulation.sink.attributes("", {"notes": notes})
@@ -242,14 +228,14 @@ def _beyond(simulation: Simulation, result: Result) -> Iterator[tuple[str, str]]
         yield BENT[judge.in_plane], text
     if strained.value > STRAIN:
         text = told("strain", f"{strained.value:.2%}", strained)
-        yield STRAINED, f"{text} 1 % linear plies are doubtful"
+        yield Reason.STRAINED, f"{text} 1 % linear plies are doubtful"
     if indented.value > INDENTATION * h:
         text = told("indentation", size(indented.value), indented)
-        yield SOFT, f"{text} h/4 the contact law of a half-space is doubtful"
+        yield Reason.SOFT, f"{text} h/4 the contact law of a half-space is doubtful"
     found = [e.criterion.replace("_", " ") for e in largest_exposures(result) if e.exposure > 1.0]
     if found:
         yield (
-            BROKEN,
+            Reason.BROKEN,
             f"exposure above 1 ({', '.join(found)}): the run goes on elastically, without the "
             "softening that follows the first failure",
         )

@@ -1,7 +1,5 @@
 """Waves, indentation tests and rod tests."""
 
-from fecm._errors import FecmError
+from fecm._errors import StudyError
 
-
-class StudyError(FecmError, ValueError):
-    """A study can't be computed from these numbers, or their table is invalid."""
+__all__ = ["StudyError"]

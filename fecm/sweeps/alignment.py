@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from fecm._errors import FecmError
 from fecm._typing import Floats
 from fecm.deck.units import KNOWN
+from fecm.results.comparison import Measurement
 from fecm.studies import StudyError
-from fecm.studies.comparison import Measurement
 
 OFF = 20.0  # factor between measured and computed peak or duration: a unit must be wrong
 TOP_POINTS = 3  # fewest measured points above half of the peak

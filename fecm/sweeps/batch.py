@@ -30,7 +30,8 @@ from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import build_law, build_model, build_projectile
 from fecm.problem.check_segments import check_impact, check_law, check_projectile
 from fecm.problem.problem import Problem, check_program
-from fecm.results.first_failure import count_evaluations
+from fecm.results.end import Texts, decided
+from fecm.results.exposures import count_evaluations, largest_exposures
 from fecm.results.metrics import (
     EVALUATIONS,
     EXPOSURES,
@@ -44,8 +45,7 @@ from fecm.results.metrics import (
 )
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
-from fecm.results.summary import largest_exposures
-from fecm.results.validity import Extent, Texts, decided
+from fecm.results.validity import Extent
 from fecm.simulation.run import ENERGY_WARNING, simulate
 from fecm.sweeps import find_exposure, plan
 from fecm.sweeps.cases import EXPOSURE, THRESHOLD, Case, CasesError, Value, name_fault, plate_values

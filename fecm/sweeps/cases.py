@@ -14,11 +14,11 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 
 from fecm._errors import FecmError, did_you_mean
+from fecm._measured_tables import read_rows
 from fecm._typing import Floats
 from fecm.deck.grid import SUPPORTS
 from fecm.results.metrics import COLUMNS, VERDICTS
 from fecm.studies import StudyError
-from fecm.studies.tables import read_rows
 
 Value = float | int | str
 Case = dict[str, Value]

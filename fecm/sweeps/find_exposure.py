@@ -9,7 +9,7 @@ import numpy as np
 
 from fecm.deck.model import Deck, Impact
 from fecm.problem.build import build_projectile
-from fecm.results.first_failure import FEWEST
+from fecm.results.exposures import FEWEST
 from fecm.results.metrics import EVALUATIONS, EXPOSURES
 from fecm.sweeps.cases import CasesError
 from fecm.sweeps.plan import RUN, Outcome

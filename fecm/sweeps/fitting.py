@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from fecm._typing import Floats
 from fecm.deck.model import Deck
+from fecm.results.comparison import Measurement
 from fecm.studies import StudyError
-from fecm.studies.comparison import Measurement
 from fecm.studies.rod_test.filters import Filter
 from fecm.sweeps.alignment import IdentifyError, contact_points
 from fecm.sweeps.find import Runs

@@ -17,9 +17,9 @@ from fecm.deck.model import Deck, Impact, Indentation, Projectile
 from fecm.deck.units import unit_names
 from fecm.mechanics.projectile import RigidMass
 from fecm.problem.build import build_projectile
-from fecm.results.validity import MEANING, OPEN, reasons_of
+from fecm.results.comparison import Measurement, measurement_of
+from fecm.results.validity import MEANING, Reason, reasons_of
 from fecm.studies import StudyError
-from fecm.studies.comparison import Measurement, measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of
 from fecm.sweeps.alignment import IdentifyError, check_measured, lags
 from fecm.sweeps.api import problem_of
@@ -335,7 +335,7 @@ def _notes(
     if (status := fitted.status[0]) not in RUN:
         yield f"the run of the fitted deck fails: {status}"
     # A measurement may end before the peak does; what the model lacks biases the parameters.
-    beyond = [r for r in reasons_of(str(fitted.columns["validity"][0])) if r != OPEN]
+    beyond = [r for r in reasons_of(str(fitted.columns["validity"][0])) if r != Reason.OPEN]
     if beyond:
         meant = ", ".join(MEANING.get(reason, reason) for reason in beyond)
         yield f"the run of the fitted deck is {meant}: the parameters make up for what it lacks"

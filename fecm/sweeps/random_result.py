@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Bools, Floats
+from fecm.results.errors import ResultFileError
 from fecm.results.metrics import COLUMNS, VALIDITY, VERDICTS
-from fecm.results.schema import ResultFileError
-from fecm.results.validity import OPEN
+from fecm.results.validity import Reason
 from fecm.sweeps.cases import DESIGNS, REMEDY, THRESHOLD, Design, Law, Limit
 from fecm.sweeps.plan import RUN, Status, check_limits
 
@@ -141,7 +141,7 @@ def evaluate(
 
 def open_ends(summary: Columns) -> Bools:
     """Cases that were run and ended before their contact was over, so that values are open."""
-    rising = np.char.find(summary.get(VALIDITY, summary["status"]), OPEN) >= 0
+    rising = np.char.find(summary.get(VALIDITY, summary["status"]), Reason.OPEN) >= 0
     return np.asarray((summary["status"] == Status.STILL) | rising)
 
 

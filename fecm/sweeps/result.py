@@ -22,6 +22,8 @@ from fecm.deck.model import Delamination
 from fecm.deck.reader import Reader
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.results import schema
+from fecm.results.errors import ExportError, NotStoredError, ResultFileError
+from fecm.results.linear_plate import TOO_SOFT, UNSAFE, InPlane, softness
 from fecm.results.metrics import (
     COLUMNS,
     FOUND,
@@ -32,7 +34,8 @@ from fecm.results.metrics import (
     VERDICTS,
     described,
 )
-from fecm.results.validity import BENT, MEANING, TOO_SOFT, UNSAFE, InPlane, counted, softness
+from fecm.results.pictures import plot
+from fecm.results.validity import BENT, MEANING, counted
 from fecm.sweeps.cases import REFINE, pair
 from fecm.sweeps.convergence import Convergence, convergence
 from fecm.sweeps.plan import RUN, Forces, Outcome, Plan, Status
@@ -243,7 +246,7 @@ class SweepResult:
         if name not in self.summary:
             names = [*self.cases, *self.summary]
             others = did_you_mean(name, names) or f"; there are {', '.join(names)}"
-            raise schema.NotStoredError(f"there is no {name} in this sweep{others}")
+            raise NotStoredError(f"there is no {name} in this sweep{others}")
         return self.summary[name]
 
     @property
@@ -381,8 +384,6 @@ class SweepResult:
         ImportError
             If matplotlib is not installed.
         """
-        from fecm.plot.pictures import plot
-
         names = (over,) if isinstance(over, str) else tuple(over)
         named = {self.title or "the sweep": self}
         if names or kind == "map":
@@ -447,7 +448,7 @@ def save(
             sink.create(schema.Dataset(name, axes, text, dimension, dtype), values.shape)
             sink.write(name, 0, values)
 
-        about = {"format": schema.SWEEP, "format_version": schema.FORMAT_VERSION}
+        about = {"format": schema.Form.SWEEP.value, "format_version": schema.FORMAT_VERSION}
         about |= {"fecm_version": __version__, "title": result.title}
         sink.attributes("", about | {f"unit_{name}": unit for name, unit in result.units.items()})
         sink.text("deck", result.deck, "the cards of the deck that was varied")
@@ -497,7 +498,7 @@ def load(path: Path) -> SweepResult:
     """
     from fecm.results.hdf5_reader import read
 
-    return sweep_of(read(path, schema.SWEEP))
+    return sweep_of(read(path, schema.Form.SWEEP))
 
 
 def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
@@ -516,7 +517,7 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
     steps = {n: contents[f"history/{n}"] for n in given}
     required = (*SUMMARY, "status")
     if not (summary.keys() >= {*required} and steps.keys() >= {"dt", "steps"}):
-        raise schema.ResultFileError(f"{path}: the result of the sweep is incomplete")
+        raise ResultFileError(f"{path}: the result of the sweep is incomplete")
     summary = {name: summary[name] for name in required} | summary  # in their order
     count = np.shape(steps["dt"])[:1]
     rows = (*cases.values(), *summary.values(), *steps.values())
@@ -529,10 +530,10 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
         or (VALIDITY in summary and summary[VALIDITY].size and summary[VALIDITY].dtype.kind != "U")
     ):
         message = f"{path}: the data of this sweep do not match in type or number of cases"
-        raise schema.ResultFileError(message)
+        raise ResultFileError(message)
     counts, most = steps["steps"], np.inf if shape is None else shape[1]
     if counts.dtype.kind not in "iu" or not ((counts >= 0) & (counts <= most)).all():
-        raise schema.ResultFileError(f"{path}: history/steps does not match the stored steps")
+        raise ResultFileError(f"{path}: history/steps does not match the stored steps")
     return SweepResult(
         cases, summary, steps["dt"], counts, contents.get(FORCE) if history else None,
         steps.get("unsettled_steps"),
@@ -551,9 +552,9 @@ def csv_lines(sweep: SweepResult, name: str = CASES) -> Iterator[str]:
     would read as formulas.  Raises ExportError if there is no such table.
     """
     if name not in (CASES, HISTORY):
-        raise schema.ExportError(f"unknown table {name}; a sweep has {CASES} and {HISTORY}")
+        raise ExportError(f"unknown table {name}; a sweep has {CASES} and {HISTORY}")
     if name == HISTORY and sweep.force is None:
-        raise schema.ExportError("the sweep has no stored forces; run it again with --history")
+        raise ExportError("the sweep has no stored forces; run it again with --history")
     echo: Any = SimpleNamespace(write=str)  # writerow returns what write returns
     writer = csv.writer(echo, lineterminator="\n")
     return (

@@ -22,13 +22,13 @@ import numpy as np
 
 from fecm._frozen import frozen
 from fecm._inputs import open_input
+from fecm._measured_tables import read_table, same_name
 from fecm._typing import Floats
 from fecm.deck.reader import HDF5
 from fecm.deck.units import KNOWN
 from fecm.results.result import Result, load
 from fecm.results.schema import DATASETS, declared_units
 from fecm.studies import StudyError
-from fecm.studies.tables import read_table, same_name
 
 FIRST_ORDER, MOVING_AVERAGE, CFC = "first-order", "moving-average", "cfc"
 KINDS = (FIRST_ORDER, MOVING_AVERAGE)

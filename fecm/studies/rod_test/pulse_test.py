@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from fecm._frozen import frozen
+from fecm._measured_tables import read_table
 from fecm._typing import Floats
 from fecm.mechanics.projectile import STEPS, WILSON, Rod, RodState
 from fecm.studies import StudyError
-from fecm.studies.tables import read_table
 
 # Pulses: the two of the report, and tables --------------------------------------------------------
 

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from fecm._errors import StudyError
 from fecm._frozen import frozen
+from fecm._measured_tables import read_table, same_name
+from fecm._text import printable
 from fecm._typing import Floats
 from fecm.deck.units import KNOWN
 from fecm.results.result import Result
-from fecm.results.schema import declared_units, printable
-from fecm.studies import StudyError
-from fecm.studies.tables import read_table, same_name
+from fecm.results.schema import declared_units
 
 # A CSV file, or times and forces.
 Source = str | Path | tuple[Any, Any]

@@ -1,0 +1,34 @@
+"""Values and foreign texts in one short line for any terminal."""
+
+from __future__ import annotations
+
+import sys
+
+
+def printable(text: str) -> str:
+    """Escape control characters and lone surrogates, giving one line for any terminal."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def shown(value: object, width: int = 60, *, exact: bool = False) -> str:
+    """Format a value in one short line; numbers to six digits, or exactly."""
+    if isinstance(value, list | tuple):
+        text = "[" + ", ".join(shown(item, width, exact=exact) for item in value) + "]"
+    elif isinstance(value, float):
+        text = repr(value) if exact else f"{value:.6g}"
+    else:
+        text = printable(str(value))
+    return text if len(text) <= width else text[: width - 1] + "…"
+
+
+def shown_apart(one: object, other: object, width: int = 60) -> tuple[str, str]:
+    """Format two different values in short lines that show where they differ."""
+    short = shown(one, width), shown(other, width)
+    if short[0] != short[1]:
+        return short
+    whole = [shown(value, sys.maxsize, exact=True) for value in (one, other)]
+    pairs = zip(*whole, strict=False)
+    same = next((n for n, (a, b) in enumerate(pairs) if a != b), min(map(len, whole)))
+    begin = max(0, same - width // 2)
+    texts = [("…" if begin else "") + text[begin:] for text in whole]
+    return shown(texts[0], width), shown(texts[1], width)

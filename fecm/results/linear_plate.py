@@ -1,0 +1,74 @@
+"""Range of the linear plate: the deflection up to which it holds, and its error beyond."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import numpy as np
+
+from fecm._typing import Array
+
+TOO_SOFT = "a linear plate, without membrane stiffening, is too soft"
+UNSAFE = "a threshold energy there is too high, which is unsafe"
+
+
+class InPlane(StrEnum):
+    """Support of the plate's edges in its plane."""
+
+    HELD = "held"
+    FREE = "free"
+    UNKNOWN = "unknown"  # u and v are restrained at every node, as B = 0 allows for any support
+
+
+# Deflection over the thickness up to which the plate is taken as linear.
+LIMITS = {
+    InPlane.HELD: 0.3,
+    InPlane.FREE: 0.5,
+    InPlane.UNKNOWN: 0.3,
+}
+# Least and largest error of the peak force, in percent, at deflections of the linear plate over the
+# thickness.  They are those of nonlinear impacts of the same energy on isotropic, quasi-isotropic
+# and cross-ply plates, clamped and simply supported.
+DEFLECTIONS = (0.0, 0.25, 0.5, 1.0, 1.5, 2.5, 5.0)
+FREE_LEAST = (0, 1, 2, 8, 14, 24, 41)
+FREE_MOST = (0, 1, 4, 11, 17, 30, 46)
+HELD_LEAST = (0, 2, 6, 15, 23, 38, 57)
+HELD_MOST = (0, 7, 19, 33, 43, 52, 66)
+ERRORS = {
+    InPlane.FREE: (FREE_LEAST, FREE_MOST),
+    InPlane.HELD: (HELD_LEAST, HELD_MOST),
+    InPlane.UNKNOWN: (FREE_LEAST, HELD_MOST),
+}
+
+
+def in_plane_of(codes: Array) -> InPlane:
+    """Support of the edges in the plane, from the restraint codes of all nodes, (numnp, 5).
+
+    Nodes at which w is restrained are the supports; a plate without any is free.
+    """
+    held = codes != 0
+    supports = held[held[:, 2]]
+    if not len(supports):
+        return InPlane.FREE
+    if held[:, :2].all():
+        return InPlane.UNKNOWN
+    return InPlane.HELD if supports[:, :2].any(axis=1).mean() > 0.5 else InPlane.FREE
+
+
+def softness(ratio: float, in_plane: InPlane) -> str:
+    """Error of a linear plate at a deflection over its thickness, in words.
+
+    Examples
+    --------
+    >>> softness(0.5, InPlane.HELD)
+    'the force is about 6 to 19 % too low at the same energy (edges held in the plane)'
+    >>> softness(0.5, InPlane.UNKNOWN)
+    'the force is about 2 % (edges free in the plane) to 19 % (held) too low at the same energy'
+    """
+    low, high = (round(np.interp(ratio, DEFLECTIONS, error)) for error in ERRORS[in_plane])
+    more = "at least" if ratio > DEFLECTIONS[-1] else "about"
+    if in_plane is InPlane.UNKNOWN:
+        size = f"{low} % (edges free in the plane) to {high} % (held)"
+        return f"the force is {more} {size} too low at the same energy"
+    edges = f"(edges {in_plane} in the plane)"
+    return f"the force is {more} {low} to {high} % too low at the same energy {edges}"

@@ -1,0 +1,26 @@
+"""The way from a result, of a run or of a sweep, to its pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Kinds of pictures of a run.
+RunKind = Literal[
+    "force", "loop", "energy", "strain", "thickness", "failure", "line", "contour", "surface",
+    "mesh", "animation",
+]  # fmt: skip
+
+
+def plot(
+    kind: str, results: Mapping[str, Any], path: str | Path | None, ax: Axes | None, **options: Any
+) -> Axes:
+    """Draw results by their names in the legend; see :func:`fecm.plot.pictures.plot`."""
+    # The one import that climbs: whoever draws nothing can do without the room of pictures.
+    from fecm.plot import pictures
+
+    return pictures.plot(kind, results, path, ax, **options)
