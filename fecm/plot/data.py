@@ -20,8 +20,9 @@ from fecm.mechanics.mesh import ElementBlock, element_blocks
 from fecm.plot.kinds import LackingError, PlotError
 from fecm.results.errors import NotStoredError, ResultFileError
 from fecm.results.missing import remedy
-from fecm.results.plies import model_of, points_of, rows_at
+from fecm.results.plies import points_of, rows_at
 from fecm.results.result import Result
+from fecm.results.stored import model_of
 
 Array = NDArray[Any]
 Ints = NDArray[np.intp]

@@ -16,8 +16,8 @@ from fecm._measured_tables import read_table, same_name
 from fecm._text import printable
 from fecm._typing import Floats
 from fecm.deck.units import KNOWN
-from fecm.results.result import Result
 from fecm.results.schema import declared_units
+from fecm.results.stored import Stored
 
 # A CSV file, or times and forces.
 Source = str | Path | tuple[Any, Any]
@@ -130,14 +130,14 @@ def _from_file(path: Path, units: Mapping[str, str]) -> Measurement:
     return Measurement(printable(path.name), column, *columns.values())
 
 
-def compare(result: Result, measured: Measurement) -> Comparison:
+def compare(stored: Stored, measured: Measurement) -> Comparison:
     """Compare a result's force with a measured one, at the measured times of the run.
 
     Raises StudyError if the result has no impact, or fewer than two times are in both.
     """
-    if "history/force" not in result:
+    if "history/force" not in stored:
         raise StudyError("the result has no history to compare with: no impact step was taken")
-    clock = np.append(0.0, result["history/time"])  # at rest before the first step
+    clock = np.append(0.0, stored["history/time"])  # at rest before the first step
     there = (measured.time >= 0.0) & (measured.time <= clock[-1])
     if np.count_nonzero(there) < 2:
         raise StudyError(
@@ -146,7 +146,7 @@ def compare(result: Result, measured: Measurement) -> Comparison:
             "check its unit of time"
         )
     time, force = measured.time[there], measured.force[there]
-    own = np.interp(time, clock, np.append(0.0, result[f"history/{measured.column}"]))
+    own = np.interp(time, clock, np.append(0.0, stored[f"history/{measured.column}"]))
     weights = 0.5 * (np.diff(time, prepend=time[0]) + np.diff(time, append=time[-1]))
     varies = np.ptp(own) > 0.0 and np.ptp(force) > 0.0
     return Comparison(
@@ -154,5 +154,5 @@ def compare(result: Result, measured: Measurement) -> Comparison:
         float(own.max()), float(force.max()), float(weights @ own), float(weights @ force),
         float(np.sqrt(np.mean((own - force) ** 2))),
         float(np.corrcoef(own, force)[0, 1]) if varies else math.nan,
-        declared_units(result.attributes),
+        declared_units(stored.attributes),
     )  # fmt: skip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,9 +12,7 @@ from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.results.criteria import ALL_CRITERIA, where
 from fecm.results.exposures import evaluations_in_contact
-
-if TYPE_CHECKING:
-    from fecm.results.result import Result
+from fecm.results.stored import Stored
 
 NEEDED = tuple(f"exposures/{name}" for name in ("time", "exposure", "mode", "ply", "x", "y"))
 
@@ -49,16 +47,16 @@ class FirstFailure:
         return where(self.criterion, self.ply)
 
 
-def first_failures(result: Result, level: float = 1.0) -> list[FirstFailure]:
+def first_failures(stored: Stored, level: float = 1.0) -> list[FirstFailure]:
     """First time at which each criterion reaches an exposure, the earliest first.
 
     Empty without FAIL.  Criteria that stay below the level are not in the list.
     """
-    if any(path not in result for path in NEEDED):
+    if any(path not in stored for path in NEEDED):
         return []
-    exposures, times = result["exposures/exposure"], result["exposures/time"]
-    modes = dict(enumerate(map(str, result.attributes_of("failure").get("modes", ()))))
-    history = _history(result)
+    exposures, times = stored["exposures/exposure"], stored["exposures/time"]
+    modes = dict(enumerate(map(str, stored.attributes_of("failure").get("modes", ()))))
+    history = _history(stored)
     found = []
     for number, criterion in enumerate(ALL_CRITERIA):
         exposure = exposures[:, number]
@@ -70,7 +68,7 @@ def first_failures(result: Result, level: float = 1.0) -> list[FirstFailure]:
         share = (level - below) / (exposure[row] - below)
         time = float(before + share * (times[row] - before))
         mode, ply, x, y = (
-            result[f"exposures/{name}"][row, number].item() for name in ("mode", "ply", "x", "y")
+            stored[f"exposures/{name}"][row, number].item() for name in ("mode", "ply", "x", "y")
         )
         found.append(
             FirstFailure(
@@ -97,12 +95,12 @@ class _History(NamedTuple):
     work: Floats
 
 
-def _history(result: Result) -> _History:
-    if "history/force" not in result:
+def _history(stored: Stored) -> _History:
+    if "history/force" not in stored:
         unknown = np.full(1, math.nan)
         return _History(np.zeros(1), unknown, unknown)
     time, force, tip = (
-        np.concatenate([[0.0], result[f"history/{name}"]])
+        np.concatenate([[0.0], stored[f"history/{name}"]])
         for name in ("time", "force", "displacement")
     )
     means = 0.5 * (force[1:] + force[:-1])
@@ -111,15 +109,15 @@ def _history(result: Result) -> _History:
     return _History(time, force, work)
 
 
-def failure_metrics(result: Result) -> dict[str, Any]:
+def failure_metrics(stored: Stored) -> dict[str, Any]:
     """Evaluations, largest exposures and first failures as plain values; empty without FAIL."""
-    if "failure/x" not in result:
+    if "failure/x" not in stored:
         return {}
     largest = []
-    if "exposures/exposure" in result:
-        largest = result["exposures/exposure"][-1].tolist()
+    if "exposures/exposure" in stored:
+        largest = stored["exposures/exposure"][-1].tolist()
     return {
-        "evaluations_in_contact": evaluations_in_contact(result),
+        "evaluations_in_contact": evaluations_in_contact(stored),
         "largest": dict(zip(ALL_CRITERIA, largest, strict=False)),
-        "first": [asdict(one) for one in first_failures(result)],
+        "first": [asdict(one) for one in first_failures(stored)],
     }

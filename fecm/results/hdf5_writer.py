@@ -11,12 +11,13 @@ from typing import Any
 import h5py
 import numpy as np
 
-from fecm._files import beside
+from fecm._files import beside, check_outputs
 from fecm._typing import Array
 from fecm.deck.units import unit_of
 from fecm.results import schema
 from fecm.results.errors import ResultWriteError
 from fecm.results.groups import GROUPS
+from fecm.results.stored import Stored
 
 TEXT = h5py.string_dtype()
 TEXT_TYPE, SCALAR = h5py.h5t.py_create(TEXT, logical=True), h5py.h5s.create(h5py.h5s.SCALAR)
@@ -161,6 +162,21 @@ def writing(path: Path, *, overwrite: bool = True) -> Iterator[FileSink]:
         sink = FileSink(file, guarded)
         yield sink
         sink.label_axes()
+
+
+def save(stored: Stored, path: Path, *, overwrite: bool) -> None:
+    """Write a result as a file; see :meth:`fecm.Result.save`."""
+    check_outputs([path], overwrite)
+    with writing(path, overwrite=overwrite) as sink:
+        sink.attributes("", stored.attributes)
+        sink.text("deck", stored.deck, "the cards of the problem")
+        for name in stored:
+            values = stored[name]
+            own = schema.Dataset(name, values.shape, "", dtype=values.dtype.name)
+            sink.create(schema.DATASETS.get(name, own), values.shape)
+            sink.write(name, 0, values)
+        for group in filter(None, stored._groups):
+            sink.attributes(group, stored.attributes_of(group))
 
 
 @contextlib.contextmanager

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from fecm._frozen import frozen
 from fecm._typing import Array, Bools, Floats, Indices
-from fecm.deck.model import Deck, Material
-from fecm.deck.reader import Reader
+from fecm.deck.model import Material
+from fecm.deck.records import Ply
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.mesh import element_blocks
 from fecm.results.errors import NotStoredError, ResultFileError
 from fecm.results.missing import remedy
-
-if TYPE_CHECKING:
-    from fecm.results.result import Result
+from fecm.results.schema import PlyRows
+from fecm.results.stored import Stored, model_of
 
 IN_PLANE = ("sigma_1", "sigma_2", "tau_12")
 INTERLAMINAR = ("tau_xz", "tau_yz")
@@ -56,65 +53,106 @@ class Plies:
     residual: Floats
 
 
-def plies_of(
-    result: Result,
-    time: float | Sequence[float] | None = None,
-    elements: int | Sequence[int] | None = None,
-) -> Plies:
-    """Stresses and strains of plies: see :meth:`fecm.results.result.PlyGroup.__call__`."""
-    if "plies/sigma_1" not in result:
-        raise NotStoredError(f"the result has no ply stresses{remedy('plies')}")
-    stored = {name: result[f"plies/{name}"] for name in (*IN_PLANE, *INTERLAMINAR, "residual")}
-    times, numbers, z = (result[f"plies/{name}"] for name in ("time", "element", "z"))
-    rows = np.arange(len(times))
-    if time is not None:
-        rows = rows_at(times, np.atleast_1d(time), "ply stresses")
-    members = np.arange(len(numbers))
-    if elements is not None:
-        place = {int(number): position for position, number in enumerate(numbers)}
-        for number in np.atleast_1d(elements):
-            if int(number) not in place:
-                raise NotStoredError(
-                    f"no ply stresses of element {number}: they are stored for {len(numbers)} "
-                    f"elements from {min(place)} to {max(place)}"
-                )
-        members = np.array([place[int(n)] for n in np.atleast_1d(elements)], dtype=np.intp)
-    chosen = {name: values[np.ix_(rows, members)] for name, values in stored.items()}
-    material = model_of(result).last(Material)
-    if material is None or len(material.layers) != len(z):
-        raise ResultFileError(f"the result's deck does not have the {len(z)} plies of its stresses")
-    ply, g12 = material.ply, material.ply.g12
-    if "g12" in result.slips and ply.e1 == ply.e2:
+class PlyGroup(PlyRows):
+    """The datasets of ``plies``; called, the stresses and strains of some plies."""
+
+    def __init__(self, stored: Stored) -> None:
+        super().__init__("plies", stored._arrays, stored._groups)
+        self._stored = stored
+
+    def __call__(
+        self,
+        time: float | Sequence[float] | None = None,
+        elements: int | Sequence[int] | None = None,
+    ) -> Plies:
+        """Stresses and strains ply by ply.
+
+        Parameters
+        ----------
+        time : float or sequence of float, optional
+            Times, for which the nearest stored rows are taken; all rows by default.
+        elements : int or sequence of int, optional
+            Numbers of elements; by default all with ply stresses.
+
+        Raises
+        ------
+        NotStoredError
+            If the result has no ply stresses, or not at such a time or of such an element.
+        ResultFileError
+            If the result's deck can't be read or does not fit its ply stresses.
+
+        Examples
+        --------
+        >>> plies = result.plies(time=4e-5, elements=[61, 62])  # doctest: +SKIP
+        >>> plies.sigma_1.max(), plies.eps_1.max()  # doctest: +SKIP
+        """
+        stored = self._stored
+        if "plies/sigma_1" not in stored:
+            raise NotStoredError(f"the result has no ply stresses{remedy('plies')}")
+        times, numbers, z = (stored[f"plies/{name}"] for name in ("time", "element", "z"))
+        rows = np.arange(len(times))
+        if time is not None:
+            rows = rows_at(times, np.atleast_1d(time), "ply stresses")
+        members = np.arange(len(numbers))
+        if elements is not None:
+            members = _members(numbers, np.atleast_1d(elements))
+        chosen = {
+            name: stored[f"plies/{name}"][np.ix_(rows, members)]
+            for name in (*IN_PLANE, *INTERLAMINAR, "residual")
+        }
+        material = model_of(stored).last(Material)
+        if material is None or len(material.layers) != len(z):
+            raise ResultFileError(
+                f"the result's deck does not have the {len(z)} plies of its stresses"
+            )
+        points = points_of(
+            stored,
+            numbers[members],
+            count=chosen["sigma_1"].shape[2],
+            at_nodes=material.integration.points < 0,
+        )
+        return Plies(
+            step=stored["plies/step"][rows],
+            time=times[rows],
+            element=numbers[members],
+            x=points[..., 0],
+            y=points[..., 1],
+            z=z,
+            angles=np.array([layer.angle for layer in material.layers]),
+            under_load=stored["plies/under_load"][members] != 0,
+            **chosen,
+            **_strains(chosen, material.ply, isotropic_shear="g12" in stored.slips),
+        )
+
+
+def _members(numbers: Array, asked: Array) -> Indices:
+    """Positions of the elements asked for among those with ply stresses."""
+    place = {int(number): position for position, number in enumerate(numbers)}
+    for number in asked:
+        if int(number) not in place:
+            raise NotStoredError(
+                f"no ply stresses of element {number}: they are stored for {len(numbers)} "
+                f"elements from {min(place)} to {max(place)}"
+            )
+    return np.array([place[int(number)] for number in asked], dtype=np.intp)
+
+
+def _strains(
+    stresses: Mapping[str, Floats], ply: Ply, *, isotropic_shear: bool
+) -> dict[str, Floats]:
+    """Strains of a ply by its compliance; the slip ``g12`` takes isotropic plies by E and nu."""
+    one, two, shear = (stresses[name] for name in IN_PLANE)
+    g12 = ply.g12
+    if isotropic_shear and ply.e1 == ply.e2:
         g12 = ply.e1 / (2.0 * (1.0 + ply.nu12))
-    one, two, shear = (chosen[name] for name in IN_PLANE)
-    at_nodes = material.integration.points < 0
-    x, y = np.moveaxis(points_of(result, numbers[members], one.shape[2], at_nodes), -1, 0)
-    return Plies(
-        step=result["plies/step"][rows], time=times[rows], element=numbers[members], x=x, y=y, z=z,
-        angles=np.array([layer.angle for layer in material.layers]),
-        under_load=result["plies/under_load"][members] != 0,
-        eps_1=(one - ply.nu12 * two) / ply.e1,
-        eps_2=two / ply.e2 - ply.nu12 * one / ply.e1,
-        gamma_12=shear / g12, **chosen,
-    )  # fmt: skip
+    return {
+        "eps_1": (one - ply.nu12 * two) / ply.e1,
+        "eps_2": two / ply.e2 - ply.nu12 * one / ply.e1,
+        "gamma_12": shear / g12,
+    }
 
 
-def model_of(result: Result) -> Deck:
-    """Model of a result's deck.  Raises ResultFileError if the result holds no readable deck."""
-    deck = result._model or _parsed(result.deck, result.mode == "listing")
-    if deck is None:
-        raise ResultFileError("the result holds no deck that can be read")
-    return deck
-
-
-@functools.lru_cache(maxsize=8)
-def _parsed(text: str, blanks_are_zeros: bool) -> Deck | None:
-    """Parse a deck's text once, however often it is needed."""
-    problems = Reader(text, blanks_are_zeros=blanks_are_zeros).problems()
-    return next((problem.deck for problem in problems if problem.deck is not None), None)
-
-
-def points_of(result: Result, numbers: Array, count: int, at_nodes: bool) -> Floats:
+def points_of(stored: Stored, numbers: Array, count: int, at_nodes: bool) -> Floats:
     """Places of the points of the elements with the numbers (m,): (m, count, 2).
 
     Of each element these are `count` nodes or Gauss points.  Raises ResultFileError if there is no
@@ -123,7 +161,7 @@ def points_of(result: Result, numbers: Array, count: int, at_nodes: bool) -> Flo
     order = math.isqrt(count)
     if order**2 != count or not 1 <= order <= HIGHEST_ORDER:
         raise ResultFileError(f"there are {count} points per element, which is invalid")
-    elements, coordinates = result["mesh/elements"], result["mesh/coordinates"][:, :2]
+    elements, coordinates = stored["mesh/elements"], stored["mesh/coordinates"][:, :2]
     if len(numbers) and not 1 <= numbers.min() <= numbers.max() <= len(elements):
         raise ResultFileError(f"elements outside 1 to {len(elements)} have stored values")
     rule = nodal(order) if at_nodes else gauss(order)

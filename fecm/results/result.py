@@ -2,36 +2,25 @@
 
 from __future__ import annotations
 
-import contextlib
-import math
-from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from fecm._tables import html_table
-from fecm._typing import Array, Floats
-from fecm.deck.model import Deck, Impact
-from fecm.deck.records import AXES, DOF_NAMES
-from fecm.deck.units import unit_of
-from fecm.results import schema
+from fecm._typing import Floats
+from fecm.deck.model import Deck
+from fecm.results import conversions, schema
 from fecm.results.checks import attribute_error, shape_error
-from fecm.results.end import End, decided
+from fecm.results.comparison import Comparison, compare, measurement_of
+from fecm.results.end import End
 from fecm.results.errors import NotStoredError, ResultFileError
+from fecm.results.first_failure import FirstFailure, first_failures
 from fecm.results.group import Group
-from fecm.results.metrics import (
-    INTEGERS,
-    METRICS,
-    MOBILITY,
-    VALIDITY,
-    Indentation,
-    Metrics,
-    Projectiles,
-    summarise,
-)
+from fecm.results.metrics import METRICS
 from fecm.results.missing import not_stored
-from fecm.results.schema import DATASETS, Dataset, declared_units
+from fecm.results.pictures import RunKind, plot
+from fecm.results.plies import PlyGroup
+from fecm.results.run_metrics import end_of, metrics_of
+from fecm.results.stored import Stored
 
 if TYPE_CHECKING:
     import pandas
@@ -40,54 +29,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fecm.deck.findings import Finding
-    from fecm.results.comparison import Comparison
-    from fecm.results.first_failure import FirstFailure
     from fecm.results.hdf5_reader import Contents
-    from fecm.results.pictures import RunKind
-    from fecm.results.plies import Plies
-
-HISTORY = "history"
 
 
-class PlyGroup(schema.PlyRows):
-    """The datasets of ``plies``; called, the stresses and strains of some plies."""
-
-    def __init__(self, result: Result) -> None:
-        super().__init__("plies", result._arrays, result._groups)
-        self._result = result
-
-    def __call__(
-        self,
-        time: float | Sequence[float] | None = None,
-        elements: int | Sequence[int] | None = None,
-    ) -> Plies:
-        """Stresses and strains ply by ply.
-
-        Parameters
-        ----------
-        time : float or sequence of float, optional
-            Times, for which the nearest stored rows are taken; all rows by default.
-        elements : int or sequence of int, optional
-            Numbers of elements; by default all with ply stresses.
-
-        Raises
-        ------
-        NotStoredError
-            If the result has no ply stresses, or not at such a time or of such an element.
-        ResultFileError
-            If the result's deck can't be read or does not fit its ply stresses.
-
-        Examples
-        --------
-        >>> plies = result.plies(time=4e-5, elements=[61, 62])  # doctest: +SKIP
-        >>> plies.sigma_1.max(), plies.eps_1.max()  # doctest: +SKIP
-        """
-        from fecm.results.plies import plies_of
-
-        return plies_of(self._result, time, elements)
-
-
-class Result(schema.Contact):
+class Result(Stored, schema.Contact):
     """Result of a run.
 
     Every dataset is available as ``result["tape3/w"]`` and ``result.tape3.w``; the columns of the
@@ -131,53 +76,7 @@ class Result(schema.Contact):
     reactions: schema.Reactions
     modes: schema.Modes
 
-    def __init__(
-        self,
-        arrays: Mapping[str, Array],
-        texts: Mapping[str, str],
-        groups: Mapping[str, Mapping[str, Any]],
-        model: Deck | None = None,
-    ) -> None:
-        self._arrays = arrays
-        self._groups = groups
-        self.attributes: dict[str, Any] = dict(groups.get("", {}))
-        self.deck: str = texts.get("deck", "")
-        self._model = model
-        self.findings: tuple[Finding, ...] = ()
-
-    @property
-    def title(self) -> str:
-        """The deck's title."""
-        return str(self.attributes.get("title", ""))
-
-    @property
-    def mode(self) -> str:
-        """``"report"`` or ``"listing"``."""
-        return str(self.attributes.get("mode", ""))
-
-    @property
-    def slips(self) -> tuple[str, ...]:
-        """Names of the active slips, sorted."""
-        return self._texts("slips")
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Reasons to doubt the result."""
-        return self._texts("notes")
-
-    def _texts(self, name: str) -> tuple[str, ...]:
-        """An attribute that is a list of texts; empty if it is not there."""
-        texts = self.attributes.get(name)
-        return tuple(map(str, texts)) if isinstance(texts, list | tuple) else ()
-
-    @property
-    def has_listing_tapes(self) -> bool:
-        """Whether tape8 and tape9 are those of the printed program: the slip ``tapes``."""
-        return "tapes" in self.slips
-
-    def unit(self, dimension: str) -> str:
-        """Unit of a dimension such as ``"force/length"``; empty if the deck names none."""
-        return unit_of(dimension, declared_units(self.attributes))
+    findings: tuple[Finding, ...] = ()
 
     @property
     def plies(self) -> PlyGroup:
@@ -185,27 +84,11 @@ class Result(schema.Contact):
         return PlyGroup(self)
 
     @property
-    def still_in_contact(self) -> bool:
-        """Whether the run ended in contact, so that its final values are not known."""
-        return f"{HISTORY}/force" in self and bool((self[f"{HISTORY}/force"][-1:] > 0.0).any())
-
-    @property
-    def threshold(self) -> Mapping[str, Any]:
-        """Delamination threshold of DELA; empty without it.
-
-        `force` of `number` delaminations, `d_star`, `time` of the first crossing, `margin` of the
-        peak, and `band`: forces of one in each of the `interfaces` of unlike plies, and of one.
-        """
-        return self._groups.get("threshold", {})
-
-    @property
     def first_failures(self) -> list[FirstFailure]:
         """When each criterion of FAIL first reaches an exposure of 1, the earliest first.
 
         Empty without FAIL, or if all exposures stay below 1.
         """
-        from fecm.results.first_failure import first_failures
-
         return first_failures(self)
 
     @property
@@ -218,16 +101,7 @@ class Result(schema.Contact):
         >>> fecm.run_one("decks/impact-115.inp").end
         <End.OVER: 'contact over'>
         """
-        found = self._summarised()
-        return None if found is None else End(found.end.item())
-
-    @property
-    def validity(self) -> str:
-        """``"ok"``, or the reasons to doubt the result, in the words that sweeps have.
-
-        Empty in files of earlier versions and without impact steps.
-        """
-        return str(self.attributes.get(VALIDITY, ""))
+        return end_of(self)
 
     @property
     def metrics(self) -> dict[str, float]:
@@ -237,43 +111,7 @@ class Result(schema.Contact):
         has not decided, those that need a deck that can't be read, the time of a threshold that is
         not reached.
         """
-        if (found := self._summarised()) is None:
-            return {}
-        w = self[f"{HISTORY}/plate_w"]
-        columns = found.columns | {"max_deflection": decided(w[[w.argmax()]], w[-1:], found.end)}
-        values: dict[str, float] = {n: columns[n].item() for n in METRICS if n in columns}
-        return values | {n: int(values[n]) for n in INTEGERS if math.isfinite(values[n])}
-
-    def _summarised(self) -> Metrics | None:
-        """Metrics of the run; None without impact steps."""
-        if f"{HISTORY}/force" not in self or not len(self[f"{HISTORY}/force"]):
-            return None
-        from fecm.results.plies import model_of
-
-        velocity = np.float64(math.nan)
-        with contextlib.suppress(ResultFileError):
-            if (card := model_of(self).last(Impact)) is not None and card.velocity:
-                velocity = np.float64(card.velocity)
-        force, time, indentation = (
-            self[f"{HISTORY}/{name}"] for name in ("force", "time", "indentation")
-        )
-        history = self.attributes_of(HISTORY)
-        permanent = np.array([_number(history.get("permanent_indentation"))])
-        initial = _number(self.attributes_of("energy").get("initial"))
-        largest = indentation.max(keepdims=True, initial=0.0)
-        depths = Indentation(largest, indentation[-1:], permanent)
-        threshold = _number(self.threshold.get("force")) if self.threshold else None
-        mobility = _number(history.get(MOBILITY, 0.0))
-        with np.errstate(all="ignore"):
-            hit = Projectiles(2.0 * initial / velocity**2, velocity)
-            return summarise(force[:, None], time, depths, hit, threshold, mobility)
-
-    def rows(self, path: str, start: int, stop: int) -> Array:
-        """Rows of a dataset; those of a file are not kept in memory."""
-        read = getattr(self._arrays, "rows", None)
-        if read is None:
-            return np.asarray(self._arrays[path.strip("/")][start:stop])
-        return np.asarray(read(path, start, stop))
+        return metrics_of(self)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """The history as a pandas DataFrame: one row per step, indexed by time.
@@ -285,17 +123,7 @@ class Result(schema.Contact):
         KeyError
             If the run has no impact step.
         """
-        try:
-            import pandas
-        except ImportError:
-            raise ImportError("a DataFrame needs pandas: pip install pandas") from None
-        members = [path for path in self if path.startswith(f"{HISTORY}/")]
-        if not members:
-            raise KeyError("the result has no history: no impact step was taken")
-        known = [path for path in DATASETS if path in members]
-        columns = {path.partition("/")[2]: self[path] for path in dict.fromkeys(known + members)}
-        index = pandas.Index(columns.pop("time"), name="time")
-        return pandas.DataFrame(columns, index=index)
+        return conversions.dataframe(self)
 
     def to_xarray(self) -> xarray.DataTree:
         """The result as a tree of labelled arrays; needs xarray.
@@ -308,34 +136,7 @@ class Result(schema.Contact):
         >>> tree = result.to_xarray()  # doctest: +SKIP
         >>> tree["tape3"].w.sel(time=1e-4, method="nearest").max()  # doctest: +SKIP
         """
-        try:
-            import xarray
-        except ImportError:
-            raise ImportError("a DataTree needs xarray: pip install 'fecm[xarray]'") from None
-        groups: dict[str, dict[str, Any]] = {}
-        for path in self:
-            values = self[path]
-            known = DATASETS.get(path, Dataset(path, values.shape, ""))
-            texts = {"long_name": known.description, "units": self.unit(known.dimension)}
-            names = {"rows": ("time", ""), **schema.SCALES}
-            axes = [
-                names.get(str(size), (f"{known.name}_{n}",))[0]
-                for n, size in enumerate(known.shape)
-            ]
-            attributes = {name: text for name, text in texts.items() if text}
-            groups.setdefault(known.group, {})[known.name] = (axes, values, attributes)
-        units = {"units": unit} if (unit := self.unit("length")) else {}
-        places = {
-            axis: ("node", values, units)
-            for axis, values in zip(AXES, self["mesh/coordinates"].T, strict=False)
-        }
-        unknowns = {"unknown": list(DOF_NAMES[: self["mesh/equations"].shape[1]])}
-        tree = {"/": xarray.Dataset(coords=unknowns, attrs=self.attributes)}
-        for name, variables in groups.items():
-            at_nodes = any("node" in axes for axes, _, _ in variables.values())
-            own = self.attributes_of(name)
-            tree[name] = xarray.Dataset(variables, places if at_nodes else {}, own)
-        return xarray.DataTree.from_dict(tree)
+        return conversions.datatree(self)
 
     def to_pyvista(self, time: float | None = None) -> pyvista.UnstructuredGrid:
         """The plate with its displacements, w and rotations as point data; needs PyVista.
@@ -350,26 +151,7 @@ class Result(schema.Contact):
         NotStoredError
             If the result has no displacements, or none at this time.
         """
-        try:
-            import pyvista
-        except ImportError:
-            raise ImportError("a grid needs PyVista: pip install 'fecm[pyvista]'") from None
-        from fecm.results.plies import rows_at
-        from fecm.results.vtkhdf import vtk_cells
-
-        if "tape3/w" not in self:
-            raise NotStoredError("there are no displacements (tape3) in this result; add DISP")
-        (row,) = [-1] if time is None else rows_at(self["tape3/time"], [time], "displacements")
-        connectivity, offsets, types = vtk_cells(self["mesh/elements"])
-        points = np.zeros((len(self["mesh/coordinates"]), 3))
-        points[:, :2] = self["mesh/coordinates"][:, :2]
-        cells = np.insert(connectivity, offsets[:-1], np.diff(offsets))
-        grid = pyvista.UnstructuredGrid(cells, types, points)
-        field = self["tape3/displacement"][row]
-        grid.point_data["displacement"] = field[:, :3]
-        grid.point_data["w"], grid.point_data["rotation"] = field[:, 2], field[:, 3:]
-        grid.field_data["time"] = [self["tape3/time"][row]]
-        return grid
+        return conversions.grid(self, time)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the result as a file, such as one of a run in memory.
@@ -379,24 +161,9 @@ class Result(schema.Contact):
         OSError
             If the file exists and may not be replaced, or can't be written.
         """
-        from fecm._files import check_outputs
-        from fecm.results.hdf5_writer import writing
+        from fecm.results.hdf5_writer import save  # h5py takes TODO ms
 
-        check_outputs([Path(path)], overwrite)
-        with writing(Path(path), overwrite=overwrite) as sink:
-            sink.attributes("", self.attributes)
-            sink.text("deck", self.deck, "the cards of the problem")
-            for name in self:
-                values = self[name]
-                own = Dataset(name, values.shape, "", dtype=values.dtype.name)
-                sink.create(DATASETS.get(name, own), values.shape)
-                sink.write(name, 0, values)
-            for group in filter(None, self._groups):
-                sink.attributes(group, self.attributes_of(group))
-
-    def attributes_of(self, group: str) -> dict[str, Any]:
-        """Attributes of a group; empty without the group."""
-        return dict(self._groups.get(group, {}))
+        save(self, Path(path), overwrite=overwrite)
 
     def plot(
         self,
@@ -442,8 +209,6 @@ class Result(schema.Contact):
         >>> ax = result.plot("force", width="full")  # doctest: +SKIP
         >>> ax.plot(time, force, ".")  # doctest: +SKIP
         """
-        from fecm.results.pictures import plot
-
         return plot(kind, {self.title or "the result": self}, path, ax, **options)
 
     def compare(
@@ -479,38 +244,23 @@ class Result(schema.Contact):
         --------
         >>> print(result.compare("shot-3.csv"))  # doctest: +SKIP
         """
-        from fecm.results.comparison import compare, measurement_of
-
-        given = measurement_of(measured, declared_units(self.attributes))
+        given = measurement_of(measured, schema.declared_units(self.attributes))
         return compare(self, given.corrected(delay, offset))
-
-    def __getitem__(self, path: str) -> Array:
-        name = path.strip("/")
-        if name not in self._arrays:
-            raise NotStoredError(not_stored(name, self._arrays))
-        return np.asarray(self._arrays[name])
-
-    def __contains__(self, path: str) -> bool:
-        return path.strip("/") in self._arrays
-
-    def __iter__(self) -> Iterator[str]:
-        """Iterate over the paths of all datasets."""
-        return iter(self._arrays)
 
     if not TYPE_CHECKING:  # so that a misspelt name is a type error
 
         def __getattr__(self, name):
             if name.startswith("_"):
                 raise AttributeError(name)
-            if f"{HISTORY}/{name}" in self._arrays:
-                return self._arrays[f"{HISTORY}/{name}"]
+            if f"history/{name}" in self._arrays:
+                return self._arrays[f"history/{name}"]
             if any(path.startswith(f"{name}/") for path in self._arrays):
                 return schema.GROUP_TYPES.get(name, Group)(name, self._arrays, self._groups)
             raise NotStoredError(not_stored(name, self._arrays))
 
     def __dir__(self) -> list[str]:
         heads = {path.partition("/")[0] for path in self._arrays}
-        columns = [p.partition("/")[2] for p in self._arrays if p.startswith(f"{HISTORY}/")]
+        columns = [p.partition("/")[2] for p in self._arrays if p.startswith("history/")]
         return [*super().__dir__(), *heads, *columns]
 
     def __repr__(self) -> str:
@@ -563,8 +313,3 @@ def result_of(contents: Contents, model: Deck | None = None) -> Result:
         raise ResultFileError(f"{contents.path}: {found}")
     attributes = {"": contents.attributes, **contents.groups}
     return Result(contents, contents.texts, attributes, model)
-
-
-def _number(value: Any) -> float:
-    """A number of a file's attribute; NaN for anything else."""
-    return float(value) if isinstance(value, int | float) else math.nan

@@ -22,14 +22,11 @@ from fecm.results.hdf5_writer import new_hdf5
 from fecm.results.missing import remedy
 from fecm.results.plies import IN_PLANE, INTERLAMINAR
 from fecm.results.result import Result
+from fecm.results.vtk_cells import Ints, vtk_cells
 
-Ints = NDArray[np.int64]
 Note = Callable[[str], None]
 
 VERSION = (2, 2)
-CORNERS = 4
-# VTK's cell types (vtkCellType.h) of elements with 3, 4, 8 or 9 nodes.
-TYPES = {3: 5, 4: 9, 8: 23, 9: 28}
 # Numbers of points that are the first nodes of an element (K = -2: corners, K = -3: nine).
 NODAL_POINTS = (4, 9)
 CONTACT = ("force", "indentation", "transducer")
@@ -58,16 +55,6 @@ def write_vtkhdf(
         _write_contact(root, result, steps)
         _write_strains(root, result, steps, note)
         _write_plies(root, result, steps, note)
-
-
-def vtk_cells(elements: Array) -> tuple[Ints, Ints, Ints]:
-    """Connectivity, offsets and types; elements that VTK lacks are reduced to corners."""
-    count = np.cumprod(elements > 0, axis=1).sum(axis=1)  # nodes before the first absent one
-    whole = (count == (elements > 0).sum(axis=1)) & np.isin(count, list(TYPES))
-    used = np.where(whole, count, np.minimum(count, CORNERS))
-    connectivity = elements[np.arange(elements.shape[1]) < used[:, None]] - 1
-    types = np.array([TYPES[int(n)] for n in used])
-    return connectivity.astype("i8"), np.concatenate(([0], np.cumsum(used))), types
 
 
 def _write_mesh(root: h5py.Group, result: Result, times: Array) -> None:

@@ -1,0 +1,96 @@
+"""A result as objects of pandas, xarray and PyVista."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fecm._typing import Array
+from fecm.deck.records import AXES, DOF_NAMES
+from fecm.results.errors import NotStoredError
+from fecm.results.plies import rows_at
+from fecm.results.schema import DATASETS, SCALES, Dataset
+from fecm.results.stored import Stored
+from fecm.results.vtk_cells import vtk_cells
+
+if TYPE_CHECKING:
+    import pandas
+    import pyvista
+    import xarray
+
+
+def dataframe(stored: Stored) -> pandas.DataFrame:
+    """The history as a pandas DataFrame; see :meth:`fecm.Result.to_dataframe`."""
+    try:
+        import pandas  # optional
+    except ImportError:
+        raise ImportError("a DataFrame needs pandas: pip install pandas") from None
+    members = [path for path in stored if path.startswith("history/")]
+    if not members:
+        raise KeyError("the result has no history: no impact step was taken")
+    known = [path for path in DATASETS if path in members]
+    columns = {path.partition("/")[2]: stored[path] for path in dict.fromkeys(known + members)}
+    index = pandas.Index(columns.pop("time"), name="time")
+    return pandas.DataFrame(columns, index=index)
+
+
+def datatree(stored: Stored) -> xarray.DataTree:
+    """The result as a tree of labelled arrays; see :meth:`fecm.Result.to_xarray`."""
+    try:
+        import xarray  # optional
+    except ImportError:
+        raise ImportError("a DataTree needs xarray: pip install 'fecm[xarray]'") from None
+    groups: dict[str, dict[str, tuple[list[str], Array, dict[str, str]]]] = {}
+    for path in stored:
+        values = stored[path]
+        dataset = DATASETS.get(path, Dataset(path, values.shape, ""))
+        texts = {"long_name": dataset.description, "units": stored.unit(dataset.dimension)}
+        attributes = {name: text for name, text in texts.items() if text}
+        groups.setdefault(dataset.group, {})[dataset.name] = (
+            _axis_names(dataset),
+            values,
+            attributes,
+        )
+    units = {"units": unit} if (unit := stored.unit("length")) else {}
+    places = {
+        axis: ("node", values, units)
+        for axis, values in zip(AXES, stored["mesh/coordinates"].T, strict=False)
+    }
+    unknowns = {"unknown": list(DOF_NAMES[: stored["mesh/equations"].shape[1]])}
+    tree = {"/": xarray.Dataset(coords=unknowns, attrs=stored.attributes)}
+    for name, variables in groups.items():
+        at_nodes = any("node" in axes for axes, _, _ in variables.values())
+        own = stored.attributes_of(name)
+        tree[name] = xarray.Dataset(variables, places if at_nodes else {}, own)
+    return xarray.DataTree.from_dict(tree)
+
+
+def _axis_names(dataset: Dataset) -> list[str]:
+    """Names of the axes: those of the file's scales, else that of the dataset with a number."""
+    names = {"rows": "time", **{size: name for size, (name, _) in SCALES.items()}}
+    return [
+        names.get(str(size), f"{dataset.name}_{axis}") for axis, size in enumerate(dataset.shape)
+    ]
+
+
+def grid(stored: Stored, time: float | None) -> pyvista.UnstructuredGrid:
+    """The plate with its displacements at a time; see :meth:`fecm.Result.to_pyvista`."""
+    try:
+        import pyvista  # optional
+    except ImportError:
+        raise ImportError("a grid needs PyVista: pip install 'fecm[pyvista]'") from None
+    if "tape3/w" not in stored:
+        raise NotStoredError("there are no displacements (tape3) in this result; add DISP")
+    (row,) = [-1] if time is None else rows_at(stored["tape3/time"], [time], "displacements")
+    connectivity, offsets, types = vtk_cells(stored["mesh/elements"])
+    points = np.zeros((len(stored["mesh/coordinates"]), 3))
+    points[:, :2] = stored["mesh/coordinates"][:, :2]
+    cells = np.insert(connectivity, offsets[:-1], np.diff(offsets))
+    made: Any = pyvista.UnstructuredGrid(cells, types, points)
+    field = stored["tape3/displacement"][row]
+    made.point_data["displacement"] = field[:, :3]
+    made.point_data["w"] = field[:, 2]
+    made.point_data["rotation"] = field[:, 3:]
+    made.field_data["time"] = [stored["tape3/time"][row]]
+    return made
