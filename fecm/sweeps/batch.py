@@ -46,7 +46,8 @@ from fecm.results.metrics import (
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.results.validity import Extent
-from fecm.simulation.run import ENERGY_WARNING, simulate
+from fecm.simulation.judge import ENERGY_WARNING
+from fecm.simulation.run import simulate
 from fecm.sweeps import find_exposure, plan
 from fecm.sweeps.cases import EXPOSURE, THRESHOLD, Case, CasesError, Value, name_fault, plate_values
 from fecm.sweeps.find import Decks, Runs, found

@@ -1,0 +1,133 @@
+"""Reasons to doubt the result of a finished run: notes for its reader, and its validity."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from fecm.mechanics.mesh import rigid_deflections
+from fecm.results.criteria import spelt
+from fecm.results.end import OPEN_ENDS, End
+from fecm.results.exposures import FEWEST, count_evaluations, largest_exposures
+from fecm.results.linear_plate import TOO_SOFT, UNSAFE, softness
+from fecm.results.result import Result
+from fecm.results.validity import BENT, CROSSED, INDENTATION, STRAIN, Reason, joined
+from fecm.simulation import peaks
+from fecm.simulation.peaks import Peak
+from fecm.simulation.simulation import Simulation
+
+# Error of the energy balance, relative to the supplied energy, that triggers a warning.
+ENERGY_WARNING = 0.01
+
+
+class Verdict(NamedTuple):
+    """What speaks against a result."""
+
+    notes: list[str]  # sentences; empty if there is no doubt
+    validity: str  # ``"ok"`` or reasons; empty without impact steps
+
+
+class Doubt(NamedTuple):
+    """A quantity beyond the range of the model."""
+
+    reason: Reason
+    note: str
+
+
+def judge(simulation: Simulation, result: Result) -> Verdict:
+    """Judge the result of a finished run."""
+    beyond = list(_beyond(simulation, result))
+    notes = [
+        *_numerical(simulation),
+        *(doubt.note for doubt in beyond),
+        *_few_evaluations(simulation, result),
+    ]
+    end = result.end
+    if end is None:
+        return Verdict(notes, "")
+    if end in OPEN_ENDS:
+        notes.append(OPEN_ENDS[end])
+    reasons = [Reason.OPEN] if end in (End.RISING, End.BETWEEN) else []
+    reasons += [doubt.reason for doubt in beyond]
+    peak_force = simulation.state.monitor.peak_force
+    if peak_force > CROSSED * result.threshold.get("force", np.inf):
+        reasons.append(Reason.DELAMINATED)
+    return Verdict(notes, joined(reasons))
+
+
+def _numerical(simulation: Simulation) -> Iterator[str]:
+    """Notes of the energy balance and the contact iteration; slips excuse both."""
+    state = simulation.state
+    has_slips = bool(simulation.options.slips)
+    error, step = state.monitor.worst_error, state.monitor.worst_step
+    if error > ENERGY_WARNING:
+        off = f"the energy balance is off by {error:.2%} of the supplied energy, at step {step}"
+        yield f"{off} (not a failure, as slips are active)" if has_slips else off
+    unconverged = state.impact.unconverged_steps if state.impact is not None else 0
+    if unconverged and not has_slips:
+        yield f"the contact iteration did not converge in {unconverged} steps; a smaller DT helps"
+
+
+def _few_evaluations(simulation: Simulation, result: Result) -> Iterator[str]:
+    """Note of a contact in which FAIL is evaluated so rarely that maxima are missed."""
+    if simulation.state.failure is None:
+        return
+    count = count_evaluations(result)
+    if "history/force" in result and count < FEWEST and result["history/force"].any():
+        yield (
+            f"FAIL was evaluated {count} times during contact, less than {FEWEST}: larger "
+            "exposures and the first failure may be missed; evaluate more often, in the loop of "
+            "the steps"
+        )
+
+
+def _beyond(simulation: Simulation, result: Result) -> Iterator[Doubt]:
+    """Deflection, strain, indentation and exposures beyond their limits."""
+    with np.errstate(all="ignore"):
+        deflection = peaks.deflection(simulation, result)
+        strain = peaks.strain(simulation, result)
+        indentation = peaks.indentation(simulation, result)
+    limits = simulation.problem.judge
+    h = limits.thickness
+    if deflection.value > limits.limit * h:
+        yield Doubt(BENT[limits.in_plane], _bent(simulation, result, deflection))
+    if strain.value > STRAIN:
+        reached = _reached(result, "strain", f"{strain.value:.2%}", strain)
+        yield Doubt(Reason.STRAINED, f"{reached} 1 % linear plies are doubtful")
+    if indentation.value > INDENTATION * h:
+        size = _size(result, indentation.value, h)
+        reached = _reached(result, "indentation", size, indentation)
+        yield Doubt(Reason.SOFT, f"{reached} h/4 the contact law of a half-space is doubtful")
+    broken = [spelt(one.criterion) for one in largest_exposures(result) if one.exposure > 1.0]
+    if broken:
+        yield Doubt(
+            Reason.BROKEN,
+            f"exposure above 1 ({', '.join(broken)}): the run goes on elastically, without the "
+            "softening that follows the first failure",
+        )
+
+
+def _bent(simulation: Simulation, result: Result, peak: Peak) -> str:
+    """Note of a deflection beyond the linear plate."""
+    limits = simulation.problem.judge
+    is_free = rigid_deflections(simulation.problem.mesh).size > 0
+    what = "deflection, less its rigid motion," if is_free else "deflection"
+    size = _size(result, peak.value, limits.thickness)
+    note = f"{_reached(result, what, size, peak)} {limits.limit} h {TOO_SOFT}"
+    if not simulation.problem.has_impact:
+        return note
+    return f"{note}: {softness(peak.value / limits.thickness, limits.in_plane)}; {UNSAFE}"
+
+
+def _size(result: Result, value: float, thickness: float) -> str:
+    """A length, and its ratio to the thickness."""
+    length = f"{value:.4g} {result.unit('length')}".rstrip()
+    return f"{length} = {value / thickness:.3g} h"
+
+
+def _reached(result: Result, what: str, value: str, peak: Peak) -> str:
+    """Begin of a note: what a quantity reaches, and where and when."""
+    time = f"{peak.time:.6g} {result.unit('time')}".rstrip()
+    return f"the {what} reaches {value} at ({peak.x:.6g}, {peak.y:.6g}), time {time}: beyond"
