@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 from collections.abc import Iterator, Mapping
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,17 @@ from fecm.results.groups import GROUPS
 from fecm.results.stored import Stored
 
 TEXT = h5py.string_dtype()
-TEXT_TYPE, SCALAR = h5py.h5t.py_create(TEXT, logical=True), h5py.h5s.create(h5py.h5s.SCALAR)
+TEXT_TYPE = h5py.h5t.py_create(TEXT, logical=True)
+SCALAR = h5py.h5s.create(h5py.h5s.SCALAR)
+
+
+class Operation(StrEnum):
+    """An operation on a result file, which a checkpoint repeats."""
+
+    ATTRIBUTES = "attributes"
+    CREATE = "create"
+    TEXT = "text"
+    WRITE = "write"
 
 
 class FileSink:
@@ -37,7 +48,7 @@ class FileSink:
         # Operations so far, rows without their values, if a checkpoint needs them.
         self.operations: list[dict[str, Any]] | None = None
 
-    def _note(self, operation: str, **about: Any) -> None:
+    def _note(self, operation: Operation, **about: Any) -> None:
         if self.operations is not None:
             self.operations.append({"do": operation, **about})
 
@@ -51,7 +62,7 @@ class FileSink:
 
     def attributes(self, group: str, values: Mapping[str, Any]) -> None:
         """Set attributes of a group; a list of strings becomes an array of strings."""
-        self._note("attributes", group=group, values=dict(values))
+        self._note(Operation.ATTRIBUTES, group=group, values=dict(values))
         target = self._group(group)
         if not group:
             self._units = schema.declared_units(values)
@@ -63,7 +74,7 @@ class FileSink:
 
     def create(self, dataset: schema.Dataset, shape: tuple[int, ...]) -> None:
         """Create a contiguous dataset of its full shape."""
-        self._note("create", path=dataset.path, shape=shape)
+        self._note(Operation.CREATE, path=dataset.path, shape=shape)
         made = self._group(dataset.group).create_dataset(dataset.name, shape, dataset.dtype)
         _set_text(made, dataset.description, "description", "long_name")
         if dataset.dimension:
@@ -106,7 +117,7 @@ class FileSink:
 
     def write(self, path: str, start: int, rows: Array) -> None:
         """Store rows of a dataset.  Raises OSError if this or an earlier write failed."""
-        self._note("write", path=path, start=start, rows=len(rows))
+        self._note(Operation.WRITE, path=path, start=start, rows=len(rows))
         self.check()
         dataset = self.arrays[path]
         # Low-level interface: slices of h5py take four times as long for a short block.
@@ -137,7 +148,7 @@ class FileSink:
         self, path: str, value: str | list[str], description: str, axes: tuple[str, ...] = ()
     ) -> None:
         """Store a text, or texts along an axis."""
-        self._note("text", path=path, value=value, description=description)
+        self._note(Operation.TEXT, path=path, value=value, description=description)
         made = self._file.create_dataset(path, data=value, dtype=TEXT)
         if not isinstance(value, str):
             self.arrays[path] = made

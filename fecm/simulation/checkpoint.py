@@ -15,7 +15,7 @@ import time
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from fecm._typing import Array
 from fecm._version import __version__
 from fecm.mechanics import kernels
 from fecm.mechanics.stiffness_product import KERNELS
-from fecm.results.hdf5_writer import FileSink
+from fecm.results.hdf5_writer import FileSink, Operation
 from fecm.results.schema import DATASETS
 from fecm.simulation.simulation import Simulation
 
@@ -36,6 +36,13 @@ CHUNK = 1_000_000  # bytes read at once when a spool is checked
 
 class CheckpointError(FecmError, ValueError):
     """The checkpoint, or its spool, can't be used."""
+
+
+class SpoolPart(NamedTuple):
+    """The part of a spool that a checkpoint names."""
+
+    length: int = 0  # bytes
+    checksum: int = 0  # their CRC
 
 
 def checkpoint_of(result: Path) -> Path:
@@ -50,7 +57,7 @@ def spool_of(result: Path) -> Path:
 
 def identity(simulation: Simulation) -> dict[str, Any]:
     """Properties that a run and its checkpoint must have in common, by what differs otherwise."""
-    import hashlib
+    import hashlib  # 3 ms, and few runs have a checkpoint
 
     deck, options = simulation.problem.deck, simulation.options
     text = deck.text or deck.to_text()
@@ -61,10 +68,11 @@ def identity(simulation: Simulation) -> dict[str, Any]:
         "another mode or other slips": sorted(options.slips),
         SOLVER: simulation.model.motion.solver,
         "another mass matrix or integrator of the rod": [
-            options.rod_method.mass, options.rod_method.integrator
+            options.rod_method.mass,
+            options.rod_method.integrator,
         ],
         "a run with another choice of --print": simulation.printer.is_on,
-    }  # fmt: skip
+    }
 
 
 def _difference(what: str, theirs: object, own: object) -> str:
@@ -83,11 +91,11 @@ class Checkpointer:
     """
 
     def __init__(self, result: Path, sink: FileSink) -> None:
-        self._checkpoint, self._spool = checkpoint_of(result), spool_of(result)
+        self._checkpoint = checkpoint_of(result)
+        self._spool = spool_of(result)
         self._sink = sink
         self._new = sink.operations = []
-        # Number of bytes of the part of the spool that a checkpoint names, and their CRC.
-        self._spooled = (0, 0)
+        self._spooled = SpoolPart()
         self._written = time.monotonic()
 
     @property
@@ -100,10 +108,10 @@ class Checkpointer:
 
         Raises OSError if it can't be written; the previous checkpoint then remains valid.
         """
-        import json
+        import json  # 2 ms
 
         flags = os.O_RDWR
-        if not self._spooled[0]:
+        if not self._spooled.length:
             self._spool.unlink(missing_ok=True)
             flags |= os.O_CREAT | os.O_EXCL
         with naming(self._spool), open_ordinary(self._spool, flags) as file:
@@ -111,8 +119,11 @@ class Checkpointer:
         state = simulation.save()
         arrays = {name: value for name, value in state.items() if isinstance(value, np.ndarray)}
         values = {name: value for name, value in state.items() if name not in arrays}
-        part = dict(zip(("length", "checksum"), spooled, strict=True))
-        about = {"identity": identity(simulation), "spool": part, "values": values}
+        about = {
+            "identity": identity(simulation),
+            "spool": spooled._asdict(),
+            "values": values,
+        }
         text = np.frombuffer(json.dumps(about).encode(), np.uint8)
         with beside(self._checkpoint, follow=False) as partial:
             partial.write_bytes(packed({"about": text, **arrays}))
@@ -120,20 +131,21 @@ class Checkpointer:
         self._new.clear()
         self._written = time.monotonic()
 
-    def _append(self, file: BinaryIO) -> tuple[int, int]:
-        """Append the new operations to the spool and sync it; return its length and checksum.
+    def _append(self, file: BinaryIO) -> SpoolPart:
+        """Append the new operations to the spool and sync it; return the whole.
 
         The next call overwrites them unless a checkpoint names them.
         """
-        import json
+        import json  # 2 ms
 
         self._sink.check()
         length, checksum = self._spooled
         file.truncate(length)
         file.seek(length)
         for entry in self._new:
-            about, rows = entry, np.empty(0)
-            if entry["do"] == "write":
+            about = entry
+            rows = np.empty(0)
+            if entry["do"] == Operation.WRITE:
                 stop = entry["start"] + entry["rows"]
                 rows = np.ascontiguousarray(self._sink.arrays[entry["path"]][entry["start"] : stop])
                 about = {**entry, "dtype": rows.dtype.str, "shape": rows.shape}
@@ -144,7 +156,7 @@ class Checkpointer:
                 checksum = zlib.crc32(data, checksum)
         file.flush()
         sync(file.fileno())
-        return file.tell(), checksum
+        return SpoolPart(file.tell(), checksum)
 
     def restore(self, simulation: Simulation) -> None:
         """Set a new simulation and its result to the state of the checkpoint.
@@ -159,10 +171,9 @@ class Checkpointer:
                 if theirs.get(what) != value:
                     which = _difference(what, theirs.get(what), value)
                     raise CheckpointError(f"{self._checkpoint} belongs to {what}{which}")
-            part = about["spool"]
-            spooled = part["length"], part["checksum"]
+            spooled = SpoolPart(about["spool"]["length"], about["spool"]["checksum"])
         with naming(self._spool), open_ordinary(self._spool) as file:
-            self._replay(file, *spooled)
+            self._replay(file, spooled)
         self._spooled = spooled
         self._new.clear()
         with self._reading():
@@ -170,8 +181,8 @@ class Checkpointer:
 
     def _read(self) -> tuple[dict[str, Any], dict[str, Array]]:
         """JSON values and arrays of the checkpoint."""
-        import json
-        import zipfile
+        import json  # 2 ms
+        import zipfile  # 10 ms
 
         if not self._checkpoint.exists():
             raise CheckpointError(f"there is no checkpoint {self._checkpoint}")
@@ -185,18 +196,19 @@ class Checkpointer:
             arrays = {name: stored[name] for name in stored.files}
         return json.loads(arrays.pop("about").tobytes()), arrays
 
-    def _replay(self, file: BinaryIO, length: int, checksum: int) -> None:
+    def _replay(self, file: BinaryIO, part: SpoolPart) -> None:
         """Repeat the operations of the first part of a spool on the result."""
-        import json
+        import json  # 2 ms
 
-        found, left = 0, length
+        found = 0
+        left = part.length
         while left > 0 and (data := file.read(min(left, CHUNK))):
             found = zlib.crc32(data, found)
             left -= len(data)
-        if found != checksum:
+        if found != part.checksum:
             raise CheckpointError(f"{self._spool} is damaged, or was written by another run")
         file.seek(0)
-        while file.tell() < length:
+        while file.tell() < part.length:
             try:
                 self._repeat(json.loads(file.readline()), file)
             except Exception as error:  # a damaged file raises anything in json, NumPy and h5py
@@ -205,20 +217,19 @@ class Checkpointer:
 
     def _repeat(self, entry: dict[str, Any], file: BinaryIO) -> None:
         """Repeat one operation."""
-        match entry["do"]:
-            case "attributes":
+        match Operation(entry["do"]):
+            case Operation.ATTRIBUTES:
                 self._sink.attributes(entry["group"], entry["values"])
-            case "create":
+            case Operation.CREATE:
                 self._sink.create(DATASETS[entry["path"]], tuple(entry["shape"]))
-            case "text":
+            case Operation.TEXT:
                 self._sink.text(entry["path"], entry["value"], entry["description"])
-            case "write":
-                dtype, shape = np.dtype(entry["dtype"]), tuple(entry["shape"])
+            case Operation.WRITE:
+                dtype = np.dtype(entry["dtype"])
+                shape = tuple(entry["shape"])
                 data = file.read(int(np.prod(shape)) * dtype.itemsize)
                 rows = np.frombuffer(data, dtype).reshape(shape)
                 self._sink.write(entry["path"], entry["start"], rows)
-            case other:
-                raise ValueError(f"unknown operation `{other}`")
 
     @contextlib.contextmanager
     def _reading(self) -> Iterator[None]:

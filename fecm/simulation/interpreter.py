@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import NamedTuple, TypeAlias
 
 from fecm.deck.macros import Body, Loop
 from fecm.deck.records import Macro
@@ -11,10 +11,33 @@ from fecm.deck.records import Macro
 Action = Callable[[], "bool | None"]  # carries out a macro; True leaves the innermost loop
 # Carries out complete passes of a loop at their begin; False if there are none to carry out so.
 Passes = Callable[[], bool]
+Position = Sequence[tuple[int, int]]  # index of the next item and pass of every open loop
 
 
 class EndedError(Exception):
     """The program ends before its last macro."""
+
+
+class _BoundLoop(NamedTuple):
+    """A loop whose macros are actions; the program itself is a loop of one pass."""
+
+    items: list[_Item]
+    last_pass: int = 1
+    passes: Passes | None = None  # carries out many of them together
+
+
+_Item: TypeAlias = Action | _BoundLoop
+
+
+class _Frame:
+    """An open loop: its next item and its pass."""
+
+    __slots__ = ("index", "loop", "number")
+
+    def __init__(self, loop: _BoundLoop, index: int = 0, number: int = 1) -> None:
+        self.loop = loop
+        self.index = index  # of the next item
+        self.number = number  # of the pass, from 1
 
 
 class Interpreter:
@@ -22,33 +45,31 @@ class Interpreter:
 
     def __init__(self, program: Body) -> None:
         self._program = program
-        # A frame per open loop: actions, number of passes, what carries out many of them, index of
-        # the next action, pass.
-        self._stack: list[list[Any]] = []
+        self._stack: list[_Frame] = []
 
     @property
     def position(self) -> list[tuple[int, int]]:
         """Index of the next item and pass, from the program itself to the innermost loop."""
-        return [(frame[3], frame[4]) for frame in self._stack]
+        return [(frame.index, frame.number) for frame in self._stack]
 
     @property
     def current_pass(self) -> int:
         """Pass of the innermost loop, from 1."""
-        return int(self._stack[-1][4])
+        return self._stack[-1].number
 
     @property
     def passes_to_come(self) -> int:
         """Passes of the innermost loop after this one."""
-        return int(self._stack[-1][1]) - self.current_pass
+        return self._stack[-1].loop.last_pass - self.current_pass
 
     def skip(self, passes: int) -> None:
         """Go on at the begin of a later pass of the innermost loop."""
-        self._stack[-1][4] += passes
+        self._stack[-1].number += passes
 
     def run(
         self,
         bind: Callable[[Macro], Action],
-        start: Sequence[tuple[int, int]] = (),
+        start: Position = (),
         on_macro: Callable[[], object] = lambda: None,
         bind_loop: Callable[[Body], Passes | None] = lambda body: None,
     ) -> None:
@@ -60,23 +81,25 @@ class Interpreter:
         """
         stack = self._stack
         try:
-            stack += _frames(_bound(self._program, bind, bind_loop), start or [(0, 1)])
+            program = _BoundLoop(_bound(self._program, bind, bind_loop))
+            stack += _frames(program, start or [(0, 1)])
             while True:
                 frame = stack[-1]
-                actions, count, passes, index, current = frame
-                if not index and passes is not None and passes():
-                    on_macro()
-                elif index < len(actions):
-                    frame[3] = index + 1
-                    action = actions[index]
-                    if type(action) is tuple:
-                        stack.append([*action, 0, 1])
+                loop = frame.loop
+                if not frame.index and loop.passes is not None and loop.passes():
+                    pass  # which has skipped them
+                elif frame.index < len(loop.items):
+                    item = loop.items[frame.index]
+                    frame.index += 1
+                    if isinstance(item, _BoundLoop):
+                        stack.append(_Frame(item))
                         continue
-                    if action():
+                    if item():
                         stack.pop()
-                elif current < count:
-                    frame[3:] = 0, current + 1
-                    if actions:
+                elif frame.number < loop.last_pass:
+                    frame.index = 0
+                    frame.number += 1
+                    if loop.items:
                         continue
                 elif len(stack) > 1:
                     stack.pop()
@@ -91,24 +114,28 @@ class Interpreter:
 
 def _bound(
     body: Body, bind: Callable[[Macro], Action], bind_loop: Callable[[Body], Passes | None]
-) -> list[Any]:
-    """Actions of a body; a loop is a tuple that begins a frame."""
+) -> list[_Item]:
+    """Actions and loops of a body."""
     return [
-        (_bound(item.body, bind, bind_loop), item.count, bind_loop(item.body))
+        _BoundLoop(_bound(item.body, bind, bind_loop), item.count, bind_loop(item.body))
         if isinstance(item, Loop)
         else bind(item)
         for item in body
     ]
 
 
-def _frames(actions: list[Any], position: Sequence[tuple[int, int]]) -> list[list[Any]]:
-    """Frames of a position."""
-    frames: list[list[Any]] = []
-    count, passes = 1, None
-    for index, current in position:
+def _frames(program: _BoundLoop, position: Position) -> list[_Frame]:
+    """Frames of a position.  Raises ValueError if the program has no such position."""
+    frames: list[_Frame] = []
+    loop: _Item = program
+    for index, number in position:
         if frames:
-            actions, count, passes = frames[-1][0][frames[-1][3] - 1]
-        if not (0 <= index <= len(actions) and 1 <= current <= count):
+            loop = frames[-1].loop.items[frames[-1].index - 1]
+        if not (
+            isinstance(loop, _BoundLoop)
+            and 0 <= index <= len(loop.items)
+            and 1 <= number <= loop.last_pass
+        ):
             raise ValueError(f"the program has no position {list(position)}")
-        frames.append([actions, count, passes, index, current])
+        frames.append(_Frame(loop, index, number))
     return frames

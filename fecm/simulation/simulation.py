@@ -22,7 +22,8 @@ from fecm.problem.problem import Problem
 from fecm.results.sinks import Sink
 from fecm.simulation.interpreter import Interpreter
 from fecm.simulation.printout import Printer
-from fecm.simulation.recorder import Columns, Recorder, subset
+from fecm.simulation.recorder import Recorder, subset
+from fecm.simulation.step_recorder import Columns
 
 TOLERANCE = 1.0e-9  # relative change of the displacement below which CONV leaves its loop
 
