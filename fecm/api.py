@@ -11,7 +11,8 @@ from fecm._errors import warn
 from fecm._frozen import frozen
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.model import Deck
-from fecm.deck.reader import Reader, load_text, read_deck
+from fecm.deck.reader import Reader, read_deck
+from fecm.deck.source_text import load_text
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.projectile import Integrator, MassMatrix, RodMethod
 from fecm.problem.build import ENERGY_LIMIT, RunOptions

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 import fecm
 from fecm.deck import Deck, DeckError, Reader
-from fecm.deck.card import format_real, parse_real
 from fecm.deck.model import (
     Boundary,
     Coordinates,
@@ -24,6 +23,7 @@ from fecm.deck.model import (
     Page,
     PrintOption,
 )
+from fecm.deck.numerals import format_real, parse_real
 from fecm.deck.records import Control, Macro, NodeValues
 from tests.decks import APPENDIX, DATA_CARDS, LONG, MESH, small
 

@@ -12,12 +12,14 @@ import pytest
 from fecm import _memory
 from fecm._memory import NotEnoughMemoryError
 from fecm.api import load_deck
-from fecm.deck import Finding, reader
-from fecm.deck.card import Card, parse_integer
+from fecm.deck import Finding, reader, source_text, stream
+from fecm.deck.card import Card
 from fecm.deck.findings import MOST, Findings, Place
 from fecm.deck.layup import LayupError, parse_layup
 from fecm.deck.macros import estimate_work
-from fecm.deck.reader import MOST_PROBLEMS, load_text
+from fecm.deck.numerals import parse_integer
+from fecm.deck.reader import MOST_PROBLEMS
+from fecm.deck.source_text import load_text
 from fecm.problem import check_gages, generate
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, MESH, OWN_FINDINGS, PROGRAM, small
@@ -129,7 +131,7 @@ def test_blank_lines_between_segments_make_no_cards(monkeypatch: pytest.MonkeyPa
         cards += 1
         return Card(line, text)
 
-    monkeypatch.setattr(reader, "Card", counted)
+    monkeypatch.setattr(stream, "Card", counted)
     made = []
     for blanks in (0, 5000):
         cards = 0
@@ -234,7 +236,7 @@ def test_a_deck_whose_cards_exceed_the_free_memory_is_not_read(
 ) -> None:
     deck = tmp_path / "deck.inp"
     deck.write_text("1\n" * 400_000)
-    monkeypatch.setattr(reader, "available", lambda: 300_000_000)
+    monkeypatch.setattr(source_text, "available", lambda: 300_000_000)
     monkeypatch.setattr(_memory, "available", lambda: 300_000_000)
     with pytest.raises(NotEnoughMemoryError, match=r"deck\.inp: the deck takes about .* free"):
         load_text(deck)

@@ -15,7 +15,7 @@ import pytest
 
 import fecm
 import fecm._memory
-import fecm.deck.reader
+import fecm.deck.source_text
 import fecm.problem.memory
 from fecm._memory import NotEnoughMemoryError, available
 from fecm.api import load_deck
@@ -202,7 +202,7 @@ def _write_on(pipe: int) -> None:
 
 
 def test_a_deck_that_never_ends_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fecm.deck.reader, "available", lambda: 12 * MEGABYTE)
+    monkeypatch.setattr(fecm.deck.source_text, "available", lambda: 12 * MEGABYTE)
     endless, begin = os.pipe()
     writer = threading.Thread(target=_write_on, args=(begin,))
     writer.start()

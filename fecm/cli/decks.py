@@ -23,7 +23,7 @@ from fecm.cli.common import DASH, FILE_PATH, CheckFailedError, RefusedError, ech
 from fecm.cli.help import typical
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.format import format_deck
-from fecm.deck.reader import load_text
+from fecm.deck.source_text import load_text
 from fecm.deck.units import unit_names, unit_of
 from fecm.problem.build import RunOptions
 from fecm.problem.problem import Problem

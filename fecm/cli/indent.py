@@ -20,7 +20,8 @@ from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, OneOf, list_of, stack
 from fecm.deck import catalogue
 from fecm.deck.catalogue import CONTACTS, SYSTEM, SYSTEMS, NamedPly
 from fecm.deck.model import Deck, Indentation
-from fecm.deck.reader import Reader, load_text
+from fecm.deck.reader import Reader
+from fecm.deck.source_text import load_text
 from fecm.deck.units import unit_names
 from fecm.mechanics import contact_law
 from fecm.mechanics.contact_law import LinearPermanent, YangSunPermanent, hertz_coefficient

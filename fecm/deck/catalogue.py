@@ -13,8 +13,7 @@ from typing import Any
 
 from fecm._frozen import frozen
 from fecm._inputs import parsed_toml
-from fecm.deck.model import Allowables, Delamination, Indentation, Units
-from fecm.deck.records import Ply
+from fecm.deck.model import Allowables, Delamination, Indentation, Ply, Units
 from fecm.deck.units import COEFFICIENT, DENSITY, MODULUS, TOUGHNESS, in_si
 
 # Systems of units: names of length, force and time.

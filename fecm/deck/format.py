@@ -6,13 +6,15 @@ and are replaced each time.
 
 from __future__ import annotations
 
-from fecm.deck.card import Card, Fields, Value, capitals, write_card
+from fecm.deck.card import BLANK, Card, Fields, Value, write_card
 from fecm.deck.findings import DeckError
-from fecm.deck.model import STOP
-from fecm.deck.reader import READERS, Reader
-from fecm.deck.records import Macro, without_points
+from fecm.deck.macros import Macro, without_points
+from fecm.deck.model import SEGMENTS, STOP
+from fecm.deck.numerals import capitals
+from fecm.deck.reader import Reader
 
-RULER = "!:"
+COMMENT = "!"
+RULER = "!:"  # first letters of a comment that shows where the fields are
 
 
 def format_deck(text: str, source: str = "<text>") -> str:
@@ -21,30 +23,36 @@ def format_deck(text: str, source: str = "<text>") -> str:
     reader.problems()
     if reader.findings.errors:
         raise DeckError(list(reader.findings), source)
+    lines = reader.cards.lines
     written: list[str] = []
-    above: Fields | None = None
-    for number, line in enumerate(reader.lines, start=1):
+    above: Fields | None = None  # fields of the card before, which need no ruler of their own
+    for number, line in enumerate(lines, start=1):
         if line.startswith(RULER):
             continue
+        if line.startswith(COMMENT):
+            written.append(line.rstrip())
+            continue
         card = Card(number, line)
-        if number in reader.read:
-            fields, values = reader.read[number]
+        if number in reader.cards.read:
+            fields, values = reader.cards.read[number]
             aligned = _aligned(card, fields, values)
             if fields != above and "," not in aligned and fields[0] != Macro.fields[0]:
                 written.append(ruler(fields))
             above = fields
-            written.append(_with_comment(aligned, line))
         else:
-            if not line.startswith("!"):
-                above = None
-            keyword = card.is_keyword and (card.keyword in READERS or card.keyword == STOP)
-            words = card.data.replace(",", " ").split()
-            known = card.keyword if keyword and len(words) == 1 else card.data
-            written.append(line.rstrip() if line.startswith("!") else _with_comment(known, line))
-        if card.keyword == STOP and not line.startswith("!"):
-            written += [rest.rstrip() for rest in reader.lines[number:]]
+            aligned = _keyword(card)
+            above = None
+        written.append(_with_comment(aligned, line))
+        if card.keyword == STOP:
+            written += [rest.rstrip() for rest in lines[number:]]
             break
     return "\n".join(written) + "\n"
+
+
+def _keyword(card: Card) -> str:
+    """Text of a card without fields: of a known keyword alone, its four letters in capitals."""
+    is_known = card.is_keyword and (card.keyword in SEGMENTS or card.keyword == STOP)
+    return card.keyword if is_known and len(card.words) == 1 else card.data
 
 
 def ruler(fields: Fields) -> str:
@@ -64,11 +72,11 @@ def _aligned(card: Card, fields: Fields, values: list[Value]) -> str:
     if fields in (Macro.fields, Macro.short_fields):
         kept[:1] = [capitals(str(v)) for v in kept[:1]]
         if fields == Macro.short_fields:
-            kept[1:1] = [""]
+            kept[1:1] = [BLANK]
         return write_card(Macro.fields[: len(kept)], without_points(kept))
     return write_card(fields[:count], kept) if count else ""
 
 
 def _with_comment(text: str, line: str) -> str:
-    _, mark, comment = line.partition("!")
+    _, mark, comment = line.partition(COMMENT)
     return f"{text}  !{comment.rstrip()}" if mark else text.rstrip()

@@ -13,8 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._frozen import frozen
-from fecm.deck.model import Boundary, Coordinates, Elements
-from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
+from fecm.deck.mesh_cards import (
+    Boundary,
+    Coordinates,
+    ElementNodes,
+    Elements,
+    NodeCodes,
+    NodeValues,
+)
 
 # Significant digits of coordinates, relative to the plate's size, so that they fit their columns.
 DIGITS = 6

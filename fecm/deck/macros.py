@@ -1,4 +1,4 @@
-"""The macro program: words, loops and the order of execution.
+"""The macro program: its cards, words, loops and the order of execution.
 
 A pass is the number of times that the innermost loop has been entered at its head, from 1; outside
 any loop it is 1.  LOOP 0 runs once.
@@ -6,17 +6,90 @@ any loop it is 1.  LOOP 0 runs once.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from enum import Enum, auto
+from typing import ClassVar, NamedTuple
 
 from fecm._frozen import frozen
-from fecm.deck.card import parse_real
+from fecm.deck.card import Fields, Value, layout
 from fecm.deck.findings import Findings
-from fecm.deck.records import Macro
+from fecm.deck.numerals import parse_real
+from fecm.deck.record import Record
 
-NESTING = 64
+NESTING = 64  # deepest nesting of loops
 MOST_MACROS = 10**9  # a program of more macros would run for days
+EXACT = 2**53  # floats represent every integer below this number
+
+
+def without_points(values: Sequence[Value]) -> list[Value]:
+    """Values of a card, whole floats as integers, which are written without a point."""
+    return [
+        int(v) if isinstance(v, float) and v.is_integer() and abs(v) < EXACT else v for v in values
+    ]
+
+
+@frozen
+class Macro(Record):
+    """A macro card: (A4,1X,A4,1X,2F5.0)."""
+
+    word: str  # name, in capitals
+    option: str = ""  # second word, in capitals; often blank
+    # The two numbers; 0 where blank.
+    value: float = 0.0
+    second: float = 0.0
+
+    fields: ClassVar[Fields] = layout(
+        "A4 macro", "X1", "A4 second word", "X1", "F5 value", "F5 second value"
+    )
+    # With commas the second word may be left out where the value follows: LOOP,794.
+    short_fields: ClassVar[Fields] = (fields[0], *fields[2:])
+
+    optional: ClassVar[int] = 3
+
+    def row(self) -> list[Value]:
+        """Values in the card's order; integers have no point."""
+        return without_points(super().row())
+
+
+@frozen
+class LoadTable(Record):
+    """Card of PROP: (2I5,7F10.0), after the macro program's END."""
+
+    # Type of the table, 1 (or blank), and the power L of the sine.
+    kind: int
+    exponent: int
+    # Times between which the load acts.
+    begin: float
+    end: float
+    constants: tuple[float, ...]  # A1 to A5 of A1 + A2 t + A3 sin(A4 t + A5)^L
+
+    packed: ClassVar[slice] = slice(4, None)
+    fields: ClassVar[Fields] = layout(
+        "I5 type",
+        "I5 exponent|exp",
+        "F10 begin|t_min",
+        "F10 end|t_max",
+        *(f"F10 constant A{i}|A{i}" for i in range(1, 6)),
+    )
+
+
+def load_factor(table: LoadTable, clock: float) -> float:
+    """A1 + A2 t + A3 sin(A4 t + A5)^L between t_min and t_max, 0 outside; L below 1 counts as 1."""
+    if not table.begin <= clock <= table.end:
+        return 0.0
+    a1, a2, a3, a4, a5 = table.constants
+    return a1 + a2 * clock + a3 * math.sin(a4 * clock + a5) ** max(table.exponent, 1)
+
+
+class Number(Enum):
+    """What the number of a macro is."""
+
+    COUNT = auto()  # an integer, at least 0
+    EVERY = auto()  # the same, 0 or blank counting as 1
+    TIME_STEP = auto()  # positive, or 0: the time step is found
+    TOLERANCE = auto()  # positive
 
 
 class Word(NamedTuple):
@@ -24,46 +97,70 @@ class Word(NamedTuple):
 
     name: str  # up to four letters
     meaning: str  # its effect, in one sentence
-    # Kind of its number: ``"count"`` (an integer, at least 0), ``"every"`` (the same, 0 or blank
-    # counting as 1), ``"time step"`` or ``"tolerance"`` (positive; 0 is a time step by itself), or
-    # empty without a number.
-    value: str = ""
-    needs: tuple[str, ...] = ()  # words that must come before; ``"LMAS|CMAS"`` is one or the other
+    value: Number | None = None
+    # Words that must come before; of several in one tuple, one.
+    needs: tuple[tuple[str, ...], ...] = ()
     inside: bool = False  # whether it belongs inside a loop
     second: bool = False  # whether it takes a second number, an integer of at least 0
 
 
+A_MASS = ("LMAS", "CMAS")
+A_SOLUTION = ("SOLV", "EXCD", "RODP")
+EXPLICIT = (("LMAS",), ("DT",))  # what a step of central differences needs
 WORDS = {
     word.name: word
     for word in (
-        Word("LOOP", "Repeats the macros up to its NEXT N times.", "count"),
+        Word("LOOP", "Repeats the macros up to its NEXT N times.", Number.COUNT),
         Word("NEXT", "Ends a loop."),
-        Word("DT", "Sets the time step; 0 takes 0.9 of the critical one.", "time step"),
+        Word("DT", "Sets the time step; 0 takes 0.9 of the critical one.", Number.TIME_STEP),
         Word("TIME", "Advances the clock by DT."),
-        Word("PROP", "Reads a proportional load from a card after END, or evaluates it again.",
-             "count"),
+        Word(
+            "PROP",
+            "Reads a proportional load from a card after END, or evaluates it again.",
+            Number.COUNT,
+        ),
         Word("LMAS", "Forms the lumped mass."),
         Word("CMAS", "Forms the consistent mass."),
         Word("TANG", "Forms and factorises the stiffness."),
         Word("FORM", "Forms the residual: the loads less the internal forces."),
-        Word("SOLV", "Solves for the displacement that removes the residual.", "",
-             ("TANG", "FORM")),
-        Word("TOL", "Sets the tolerance of CONV.", "tolerance"),
-        Word("CONV", "Leaves the loop once the solution has converged.", "", ("SOLV",), True),
-        Word("REAC", "Stores and prints the reactions.", "", ("SOLV|EXCD|RODP",)),
-        Word("EIGE", "Finds the N lowest natural modes.", "every", ("LMAS|CMAS",)),
-        Word("EXCD", "Takes one step of central differences.", "", ("LMAS", "DT")),
-        Word("RODP", "Takes one impact step; stores contact and strains at every N-th step.",
-             "every", ("LMAS", "DT")),
-        Word("DISP", "Stores displacements at every N-th pass of the loop.", "every"),
-        Word("STRE", "Stores and prints strains and stress resultants at every N-th pass.",
-             "every"),
-        Word("PLYS", "Stores ply stresses at every N-th pass, "
-             "in the M elements nearest to the load or all.", "every", second=True),
-        Word("FAIL", "Evaluates the failure criteria at every N-th pass.", "every"),
+        Word(
+            "SOLV",
+            "Solves for the displacement that removes the residual.",
+            needs=(("TANG",), ("FORM",)),
+        ),
+        Word("TOL", "Sets the tolerance of CONV.", Number.TOLERANCE),
+        Word(
+            "CONV",
+            "Leaves the loop once the solution has converged.",
+            needs=(("SOLV",),),
+            inside=True,
+        ),
+        Word("REAC", "Stores and prints the reactions.", needs=(A_SOLUTION,)),
+        Word("EIGE", "Finds the N lowest natural modes.", Number.EVERY, needs=(A_MASS,)),
+        Word("EXCD", "Takes one step of central differences.", needs=EXPLICIT),
+        Word(
+            "RODP",
+            "Takes one impact step; stores contact and strains at every N-th step.",
+            Number.EVERY,
+            needs=EXPLICIT,
+        ),
+        Word("DISP", "Stores displacements at every N-th pass of the loop.", Number.EVERY),
+        Word(
+            "STRE",
+            "Stores and prints strains and stress resultants at every N-th pass.",
+            Number.EVERY,
+        ),
+        Word(
+            "PLYS",
+            "Stores ply stresses at every N-th pass, in the M elements nearest to the load or all.",
+            Number.EVERY,
+            second=True,
+        ),
+        Word("FAIL", "Evaluates the failure criteria at every N-th pass.", Number.EVERY),
         Word("CHEC", "Reports mesh and storage."),
     )
-}  # fmt: skip
+}
+STEPS = {"RODP", "EXCD"}  # words that take a time step
 
 
 @frozen
@@ -85,12 +182,19 @@ def every(macro: Macro) -> int:
 
 def number(macro: Macro) -> float:
     """Meaning of a macro's number: its N if it has one, otherwise the number on the card."""
-    return every(macro) if WORDS[macro.word].value == "every" else macro.value
+    return every(macro) if WORDS[macro.word].value is Number.EVERY else macro.value
+
+
+class _OpenLoop(NamedTuple):
+    """A LOOP whose NEXT was not read yet."""
+
+    head: Macro
+    outer: list[Macro | Loop]  # macros of the loop around it, up to this one
 
 
 def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
     """Nest a macro program's loops and check its words."""
-    open_loops: list[tuple[Macro, list[Macro | Loop]]] = []
+    open_loops: list[_OpenLoop] = []
     body: list[Macro | Loop] = []
     done: set[str] = set()
     for macro in macros:
@@ -101,34 +205,27 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
         elif (word := _closest(macro, findings)) is None:
             continue
         _check_value(word, macro, findings)
-        for require in word.needs:  # each missing word is reported once
-            choices = require.split("|")
-            if not done.intersection(choices):
-                names = " or ".join(choices)
-                message = f"{names} must come before {word.name}."
-                findings.add("E504", message, macro.place("macro"), f"put {names} before it")
-                done.add(choices[0])
-        done.add(word.name)
+        _check_needs(word, macro, done, findings)
         if word.inside and not open_loops:
             message = f"{word.name} is outside any loop."
             findings.add("E513", message, macro.place("macro"), "put it between LOOP and NEXT")
-        if word.name == "LOOP":
-            open_loops.append((macro, body))
-            body = []
-            if len(open_loops) > NESTING:
-                message = f"Loops are nested deeper than {NESTING}."
-                findings.add("E506", message, macro.place("macro"))
-                return ()
-        elif word.name == "NEXT":
-            if not open_loops:
+        match word.name:
+            case "LOOP":
+                open_loops.append(_OpenLoop(macro, body))
+                body = []
+                if len(open_loops) > NESTING:
+                    message = f"Loops are nested deeper than {NESTING}."
+                    findings.add("E506", message, macro.place("macro"))
+                    return ()
+            case "NEXT" if open_loops:
+                head, outer = open_loops.pop()
+                count = max(1, int(head.value)) if head.value >= 0 else 1
+                outer.append(Loop(head, count, tuple(body)))
+                body = outer
+            case "NEXT":
                 findings.add("E503", "NEXT has no LOOP.", macro.place("macro"))
-                continue
-            head, outer = open_loops.pop()
-            count = max(1, int(head.value)) if head.value >= 0 else 1
-            outer.append(Loop(head, count, tuple(body)))
-            body = outer
-        else:
-            body.append(macro)
+            case _:
+                body.append(macro)
     for head, _ in open_loops:
         message = "The LOOP is not closed by a NEXT."
         hint = "put a NEXT card after the loop's last macro"
@@ -139,9 +236,20 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
     return tuple(body)
 
 
+def _check_needs(word: Word, macro: Macro, done: set[str], findings: Findings) -> None:
+    """Report the words that must come before and did not, each once, and note this one."""
+    for choices in word.needs:
+        if not done.intersection(choices):
+            names = " or ".join(choices)
+            message = f"{names} must come before {word.name}."
+            findings.add("E504", message, macro.place("macro"), f"put {names} before it")
+            done.add(choices[0])
+    done.add(word.name)
+
+
 def _closest(macro: Macro, findings: Findings) -> Word | None:
     """Report an unknown word; return the closest known one, so that loops stay complete."""
-    import difflib
+    import difflib  # 1 ms, and only what is misspelt needs it
 
     near = difflib.get_close_matches(macro.word, WORDS, 1, 0.5)
     hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(WORDS)}, END"
@@ -167,17 +275,19 @@ def _check_unused(word: Word, macro: Macro, findings: Findings) -> None:
 
 
 def _check_value(word: Word, macro: Macro, findings: Findings) -> None:
-    value, kind = macro.value, word.value
     if word.second and not (macro.second >= 0 and macro.second.is_integer()):
         must = f"takes a whole number of 0 or more as its second value, not {macro.second:g}"
         findings.add("E505", f"{word.name} {must}.", macro.place("second value"))
-    is_count = kind in ("count", "every")
-    if is_count and not (0 <= value <= MOST_MACROS and value.is_integer()):
-        must = f"whole number from 0 to {MOST_MACROS:g}"
-    elif (kind == "time step" and value < 0) or (kind == "tolerance" and value <= 0):
-        must = f"positive {kind}"
-    else:
-        return
+    value = macro.value
+    match word.value:
+        case Number.COUNT | Number.EVERY if not (0 <= value <= MOST_MACROS and value.is_integer()):
+            must = f"whole number from 0 to {MOST_MACROS:g}"
+        case Number.TIME_STEP if value < 0:
+            must = "positive time step"
+        case Number.TOLERANCE if value <= 0:
+            must = "positive tolerance"
+        case _:
+            return
     findings.add("E505", f"{word.name} takes a {must}, not {value:g}.", macro.place("value"))
 
 
@@ -206,9 +316,6 @@ def hits(body: Body) -> bool:
 def moves_only(body: Body) -> bool:
     """Whether a program moves the plate from rest and has no static solution."""
     return all(macro.word not in ("TANG", "FORM", "SOLV") for macro in flat(body))
-
-
-STEPS = {"RODP", "EXCD"}  # words that take a time step
 
 
 @frozen

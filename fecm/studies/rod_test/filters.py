@@ -24,7 +24,7 @@ from fecm._frozen import frozen
 from fecm._inputs import open_input
 from fecm._measured_tables import read_table, same_name
 from fecm._typing import Floats
-from fecm.deck.reader import HDF5
+from fecm.deck.source_text import HDF5
 from fecm.deck.units import KNOWN
 from fecm.results.result import Result, load
 from fecm.results.schema import DATASETS, declared_units

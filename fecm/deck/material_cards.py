@@ -1,0 +1,230 @@
+"""Cards of the plate's material: plies, layers, transverse shear, strengths and damping."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import compress
+from typing import ClassVar, Self
+
+from fecm._frozen import frozen
+from fecm.deck.card import BLANK, Card, Fields, Source, Value, layout, write_card
+from fecm.deck.record import Control, Record
+from fecm.deck.segment import Segment
+from fecm.deck.stream import CardStream
+
+
+@frozen
+class Integration(Record):
+    """First card of MATE: (3I5,2F10.0)."""
+
+    # Gauss orders of the bending and of the transverse shear stiffness (L1, L2).
+    bending: int
+    shear: int
+    # Stress points: Gauss points of this order if positive, nodal points if negative (K).
+    points: int
+    # Total thickness (length); the width is not used.
+    thickness: float
+    width: float = 0.0
+
+    optional: ClassVar[int] = 1
+    fields: ClassVar[Fields] = layout(
+        "I5 bending order L1|L1",
+        "I5 shear order L2|L2",
+        "I5 stress-point order K|K",
+        "F10 total thickness|thickness",
+        "F10 width",
+    )
+
+
+@frozen
+class Ply(Record):
+    """Second card of MATE: (7F10.0); mass density and elastic constants of every layer."""
+
+    density: float  # mass per volume
+    nu12: float  # major Poisson's ratio
+    # Moduli, force per area.
+    e1: float
+    e2: float
+    g12: float
+    g13: float
+    g23: float
+
+    fields: ClassVar[Fields] = layout(
+        "F10 mass density|density",
+        "F10 Poisson's ratio NU12|NU12",
+        "F10 Young's modulus E1|E1",
+        "F10 Young's modulus E2|E2",
+        "F10 shear modulus G12|G12",
+        "F10 shear modulus G13|G13",
+        "F10 shear modulus G23|G23",
+    )
+
+
+@frozen
+class Layer(Record):
+    """Layer card of MATE: (I5,F5.0,F10.0); the number is not used for placing."""
+
+    number: int
+    angle: float  # fibre direction in degrees, counter-clockwise from the x-axis
+    thickness: float  # length
+
+    fields: ClassVar[Fields] = layout(
+        "I5 layer|lay", "F5 fibre angle|ang", "F10 layer thickness|thickness"
+    )
+
+
+@frozen
+class Material(Segment, keyword="MATE"):
+    """MATE: integration orders, ply constants and layers, the first layer at z = -h/2."""
+
+    integration: Integration
+    ply: Ply
+    layers: tuple[Layer, ...]
+
+    @classmethod
+    def read(cls, head: Card, cards: CardStream) -> Self | None:
+        """Read both cards and the layers."""
+        integration = cards.single(head, Integration)
+        ply = cards.single(head, Ply)
+        layers = _read_layers(head, cards) if integration or ply else None
+        if integration is None or ply is None or layers is None:
+            return None
+        return cls(integration, ply, layers, source=Source(head))
+
+    def cards(self, control: Control) -> Iterator[str]:
+        """Text of the segment's cards."""
+        yield self.keyword
+        for record in (self.integration, self.ply, *self.layers):
+            yield record.to_card()
+
+
+def _read_layers(head: Card, cards: CardStream) -> tuple[Layer, ...] | None:
+    """Layer cards, as many as the control card says; None if one is missing or unreadable."""
+    count = cards.control.layers
+    layers: list[Layer] = []
+    for number in range(count):
+        card = cards.take_data()
+        if card is None or card.is_blank:
+            message = f"MATE has {number} layer cards where the control card says {count}."
+            cards.findings.add("E202", message, (card or cards.peek() or head).place)
+            return None
+        if (layer := cards.record(card, Layer)) is not None:
+            layers.append(layer)
+    return tuple(layers) if len(layers) == count else None
+
+
+@frozen
+class Shear(Segment, keyword="SHEA"):
+    """SHEA: (F10.0); treatment of transverse shear (not in the report's program)."""
+
+    # Shear correction factor: 1 in the report's program; its page on cut-off frequencies recommends
+    # pi^2/12.
+    factor: float = 1.0
+    # Assumed strains, ``MITC`` on the keyword card; otherwise quadrature of the order L2.
+    assumed: bool = False
+    # Stiffness from the equilibrium of the plies, ``EQUI`` on the keyword card; otherwise their
+    # sum, equation 2-19.
+    equilibrium: bool = False
+
+    fields: ClassVar[Fields] = layout("F10 shear correction factor|factor")
+    WORDS: ClassVar[tuple[str, ...]] = ("MITC", "EQUI")
+
+    @classmethod
+    def read(cls, head: Card, cards: CardStream) -> Self | None:
+        """Read the factor's card, which may be missing after a word."""
+        words = [word.upper() for word in head.words[1:]]
+        for word in words:
+            if word not in cls.WORDS:
+                hint = "SHEA takes MITC (assumed strains) and EQUI (stiffness from equilibrium)"
+                cards.findings.add("E446", f"`{word}` after SHEA is unknown.", head.place, hint)
+        assumed, equilibrium = (word in words for word in cls.WORDS)
+        following = cards.peek()
+        if words and (following is None or following.is_keyword or following.is_blank):
+            return cls(assumed=assumed, equilibrium=equilibrium, source=Source(head))
+        found = cards.single(head, cls)
+        return found and replace(found, assumed=assumed, equilibrium=equilibrium)
+
+    def words(self) -> list[str]:
+        """Words of the keyword card."""
+        return list(compress(self.WORDS, (self.assumed, self.equilibrium)))
+
+    def cards(self, control: Control) -> Iterator[str]:
+        """Text of the segment's cards; the factor's is missing where a word is and it is 1."""
+        words = self.words()
+        yield " ".join([self.keyword, *words])
+        if not words or self.factor != 1.0:
+            yield write_card(self.fields, [self.factor])
+
+
+@frozen
+class Allowables(Segment, keyword="ALLO"):
+    """ALLO: (7F10.0) and (3F10.0); strengths of the ply (not in the report's program)."""
+
+    # Strengths along and across the fibres, in tension and compression: all positive, force/area.
+    xt: float
+    xc: float
+    yt: float
+    yc: float
+    # Shear strengths; a blank S13 is S12, a blank S23 is S13.
+    s12: float
+    s13: float
+    s23: float
+    f12: float = -0.5  # Tsai and Wu's F12*; -0.5 if blank
+    # Puck's slopes; 0.35 and 0.3 if blank.
+    p_plus: float = 0.35
+    p_minus: float = 0.3
+
+    fields: ClassVar[Fields] = layout(
+        "F10 XT", "F10 XC", "F10 YT", "F10 YC", "F10 S12", "F10? S13", "F10? S23"
+    )
+    constants: ClassVar[Fields] = layout("F10? F12*", "F10? p+", "F10? p-")
+
+    @classmethod
+    def from_row(cls, values: Sequence[Value], source: Source | None) -> Self:
+        """Build the segment from its first card or from both."""
+        count = len(cls.fields)
+        *given, s12, s13, s23 = values[:count]
+        s13 = s12 if s13 == BLANK else s13
+        s23 = s13 if s23 == BLANK else s23
+        return super().from_row([*given, s12, s13, s23, *values[count:]], source)
+
+    @classmethod
+    def read(cls, head: Card, cards: CardStream) -> Self | None:
+        """Read the strengths and the constants, whose card may be missing."""
+        strengths = cards.single(head, cls)
+        card = cards.take_data()
+        if card is None:
+            return strengths
+        constants = cards.row(card, cls.constants)
+        if strengths is None or constants is None:
+            return None
+        values, _ = constants
+        return cls.from_row([*strengths.row()[: len(cls.fields)], *values], strengths.source)
+
+    def cards(self, control: Control) -> Iterator[str]:
+        """Text of the segment's cards."""
+        row = self.row()
+        count = len(self.fields)
+        yield self.keyword
+        yield write_card(self.fields, row[:count])
+        yield write_card(self.constants, row[count:])
+
+
+@frozen
+class Delamination(Segment, keyword="DELA"):
+    """DELA: (2F10.0); toughness for the delamination threshold (not in the report's program)."""
+
+    toughness: float  # G_IIc, force/length
+    number: float = 1.0  # number of delaminations; 1 if blank
+
+    fields: ClassVar[Fields] = layout("F10 G_IIc", "F10? number of delaminations|number")
+
+
+@frozen
+class Damping(Segment, keyword="DAMP"):
+    """DAMP: (F10.0); mass-proportional damping of the plate (not in the report's program)."""
+
+    coefficient: float  # a of the damping matrix C = a M, 1/time
+
+    fields: ClassVar[Fields] = layout("F10 a")

@@ -1,0 +1,75 @@
+"""Segments: a keyword card and the data that follow it, how they are read and how written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import ClassVar, Generic, Self, TypeVar, cast
+
+from fecm._frozen import frozen
+from fecm.deck.card import Card, Fields, Source
+from fecm.deck.record import Control, Record
+from fecm.deck.stream import CardStream
+
+_R = TypeVar("_R", bound=Record)
+
+
+@frozen
+class Segment(Record):
+    """A keyword card and the data that follow it: by default one card, the segment's own values."""
+
+    keyword: ClassVar[str]
+    # Whether its card of data begins with a letter, as a keyword card does.
+    is_worded: ClassVar[bool] = False
+
+    def __init_subclass__(cls, keyword: str = "") -> None:
+        super().__init_subclass__()
+        cls.keyword = keyword
+
+    @classmethod
+    def read(cls, head: Card, cards: CardStream) -> Self | None:
+        """Read the cards after the keyword card `head`; None after an error, which is reported."""
+        return cards.single(head, cls)
+
+    def cards(self, control: Control) -> Iterator[str]:
+        """Text of the segment's cards."""
+        yield self.keyword
+        yield self.to_card()
+
+
+@frozen
+class NumberedSegment(Segment, Generic[_R]):
+    """A segment of any number of cards, ended by a blank one."""
+
+    records: tuple[_R, ...]
+    record: ClassVar[type[Record]]
+
+    def __init_subclass__(cls, keyword: str, record: type[Record]) -> None:
+        super().__init_subclass__(keyword)
+        cls.record = record
+
+    @classmethod
+    def card_fields(cls, control: Control) -> Fields:
+        """Fields of a card."""
+        return cls.record.fields
+
+    @classmethod
+    def is_last(cls, record: Record, control: Control) -> bool:
+        """Whether a card ends the segment, so that no blank one must follow."""
+        return False
+
+    @classmethod
+    def read(cls, head: Card, cards: CardStream) -> Self | None:
+        """Read the cards up to a blank one; unreadable ones are reported and left out."""
+        control = cards.control
+        fields = cls.card_fields(control)
+        found = cards.until_blank(head, cls.record, fields, lambda r: cls.is_last(r, control))
+        # No class variable can have the type of the class's parameter.
+        return cls(cast("tuple[_R, ...]", found), source=Source(head))
+
+    def cards(self, control: Control) -> Iterator[str]:
+        """Text of the segment's cards."""
+        fields = self.card_fields(control)
+        yield self.keyword
+        for record in self.records:
+            yield record.to_card(fields)
+        yield ""

@@ -1,0 +1,49 @@
+"""Text of a deck: from a file, from standard input, or given as it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import BinaryIO
+
+from fecm._memory import NotEnoughMemoryError, available, format_bytes, require
+
+LARGEST_FILE = 1_000_000_000  # no deck needs more bytes
+# Largest memory of a deck per byte of text and per line, measured at 10 MB.
+BYTES_A_BYTE = 12
+BYTES_A_LINE = 1100
+# Line ends, see str.splitlines.  The last three are the last bytes of longer characters.
+LINE_ENDS = b"\n\r\x0b\x0c\x1c\x1d\x1e\x85\xa8\xa9"
+FIRST = 4096  # number of bytes that identify a binary file
+HDF5 = b"\x89HDF\r\n\x1a\n"  # first bytes of an HDF5 file
+STDIN = "<stdin>"  # name of the deck on standard input
+INLINE = "<text>"  # name of a deck that is given as text
+
+
+def load_text(path_or_text: str | Path | BinaryIO) -> tuple[str, str]:
+    """Text and name of a deck, see :func:`fecm.read_deck`; of an open file it is standard input."""
+    if isinstance(path_or_text, str) and ("\n" in path_or_text or not path_or_text.strip()):
+        return path_or_text, INLINE
+    if not isinstance(path_or_text, str | Path):
+        return _text(path_or_text, STDIN), STDIN
+    with Path(path_or_text).open("rb") as file:
+        return _text(file, str(path_or_text)), str(path_or_text)
+
+
+def _text(file: BinaryIO, path: str) -> str:
+    """Text of a deck, which may be an endless pipe: UTF-8, or Latin-1 where it is not."""
+    free = available()
+    most = LARGEST_FILE if free is None else min(LARGEST_FILE, free // BYTES_A_BYTE)
+    begin = file.read(FIRST)
+    if begin.startswith(HDF5):
+        raise OSError(f"{path} is an HDF5 file, not a deck; `fecm info {path}` shows a result")
+    if b"\0" in begin:
+        raise OSError(f"{path} is a binary file or UTF-16 text, not a deck in UTF-8 or Latin-1")
+    data = begin + file.read(max(0, most + 1 - len(begin)))
+    if len(data) > most:
+        raise NotEnoughMemoryError(f"{path}: a deck of more than {format_bytes(most)} is not read")
+    lines = len(data) - len(data.translate(None, LINE_ENDS)) - data.count(b"\r\n")
+    require(BYTES_A_BYTE * len(data) + BYTES_A_LINE * lines, f"{path}: the deck")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
