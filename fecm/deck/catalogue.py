@@ -7,9 +7,9 @@ all of them (section 3.2.2 and the input listing), and q for each indenter.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from importlib import resources
-from typing import Any
 
 from fecm._frozen import frozen
 from fecm._inputs import parsed_toml
@@ -36,17 +36,27 @@ def convert(value: float, dimension: str, system: str, other: str) -> float:
 # Keys of a ply in a TOML file, and their dimensions.
 ELASTIC = {"density": DENSITY, "nu12": "", "E1": MODULUS, "E2": MODULUS, "G12": MODULUS}
 KEYS = ELASTIC | {
-    "G13": MODULUS, "G23": MODULUS, "nu23": "",
-    "XT": MODULUS, "XC": MODULUS, "YT": MODULUS, "YC": MODULUS, "S12": MODULUS,
-    "S13": MODULUS, "S23": MODULUS,
-    "p_plus": "", "p_minus": "",
-    "GIc": TOUGHNESS, "GIIc": TOUGHNESS, "thickness": "length",
-}  # fmt: skip
+    "G13": MODULUS,
+    "G23": MODULUS,
+    "nu23": "",
+    "XT": MODULUS,
+    "XC": MODULUS,
+    "YT": MODULUS,
+    "YC": MODULUS,
+    "S12": MODULUS,
+    "S13": MODULUS,
+    "S23": MODULUS,
+    "p_plus": "",
+    "p_minus": "",
+    "GIc": TOUGHNESS,
+    "GIIc": TOUGHNESS,
+    "thickness": "length",
+}
 TEXTS = ("source", "assumed", "units")
 SLOPES = ("p_plus", "p_minus")  # of Puck's criterion
 STRENGTHS = ("XT", "XC", "YT", "YC", "S12")
-SYSTEM_OF_FILES = "mm-N-s"
-NU23 = 0.4
+SYSTEM_OF_FILES = "mm-N-s"  # system of units of a file that names none
+NU23 = 0.4  # of a ply whose nu23 is not known
 
 
 @frozen
@@ -120,28 +130,38 @@ def read_plies(text: str) -> dict[str, NamedPly]:
     return {name: _ply(name, {"units": units, **table}) for name, table in tables.items()}
 
 
-def _ply(name: str, table: dict[str, Any]) -> NamedPly:
+def _ply(name: str, table: Mapping[str, object]) -> NamedPly:
+    numbers: dict[str, float] = {}
+    texts: dict[str, str] = {}
     for key, value in table.items():
         if key in TEXTS:
             if not isinstance(value, str):
                 raise ValueError(f"[{name}] {key}: {value!r} is not a text in quotes")
-        elif key not in KEYS:
+            texts[key] = value
+        elif key in KEYS:
+            numbers[key] = _constant(name, key, value)
+        else:
             message = f"[{name}] {key} is unknown; the keys are {', '.join((*KEYS, *TEXTS))}"
             raise ValueError(message)
-        elif isinstance(value, bool) or not isinstance(value, int | float):
-            raise ValueError(f"[{name}] {key}: {value!r} is not a number")
-        elif not math.isfinite(value) or (KEYS[key] and value <= 0.0):
-            hint = "; compressive strengths are positive too" if key in ("XC", "YC") else ""
-            raise ValueError(f"[{name}] {key}: {value:g} is not a positive number{hint}")
-        elif key in SLOPES and not 0.0 < value < 1.0:
-            raise ValueError(f"[{name}] {key}: {value:g} is not between 0 and 1")
-    system = table["units"]
+    system = texts["units"]
     if system not in SYSTEMS:
         raise ValueError(f"[{name}] units: {system!r} is none of {', '.join(SYSTEMS)}")
-    if missing := [key for key in ELASTIC if key not in table]:
+    if missing := [key for key in ELASTIC if key not in numbers]:
         raise ValueError(f"[{name}] {' and '.join(missing)} missing")
-    values = {key: float(table[key]) for key in KEYS if key in table}
-    return NamedPly(name, values, system, table.get("source", ""), table.get("assumed", ""))
+    values = {key: numbers[key] for key in KEYS if key in numbers}
+    return NamedPly(name, values, system, texts.get("source", ""), texts.get("assumed", ""))
+
+
+def _constant(name: str, key: str, value: object) -> float:
+    """A number of a ply's table, or a ValueError where it can't be meant."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"[{name}] {key}: {value!r} is not a number")
+    if not math.isfinite(value) or (KEYS[key] and value <= 0.0):
+        hint = "; compressive strengths are positive too" if key in ("XC", "YC") else ""
+        raise ValueError(f"[{name}] {key}: {value:g} is not a positive number{hint}")
+    if key in SLOPES and not 0.0 < value < 1.0:
+        raise ValueError(f"[{name}] {key}: {value:g} is not between 0 and 1")
+    return float(value)
 
 
 def _text(file: str) -> str:
@@ -149,9 +169,11 @@ def _text(file: str) -> str:
 
 
 MATERIALS = read_plies(_text("materials.toml"))
-# Constants of the report that are not the indenter's: alpha_p, s_p and reference 14's alpha_cr.
-ALPHA_P, S_P, ALPHA_CR = 6.564e-4, 0.094, 3.16e-3
 SYSTEM = "in-lbf-s"  # system of units of the report
+# Constants of the report that are not the indenter's, in its units.
+ALPHA_P = 6.564e-4  # critical indentation
+S_P = 0.094  # slope of the permanent over the maximum indentation
+ALPHA_CR = 3.16e-3  # critical indentation of equation 3-7, from reference 14
 
 
 @frozen

@@ -7,7 +7,7 @@ import re
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from itertools import accumulate, pairwise
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,11 +25,30 @@ from fecm.deck.mesh_cards import (
 # Significant digits of coordinates, relative to the plate's size, so that they fit their columns.
 DIGITS = 6
 LEAST_BESIDE = 2  # least number of elements between a window and an edge
-# Restraints of an edge: nothing; w and, along x or y, the rotation along it; all out of the plane.
 SUPPORTS = ("free", "simple", "clamped")
-W_HELD, SIMPLE, CLAMPED = (1, 0, 0), ((1, 1, 0), (1, 0, 1)), (1, 1, 1)
-# Restraints of u and v on an edge along x and on one along y.
-IN_PLANE = {"held": ((1, 1), (1, 1)), "normal": ((0, 1), (1, 0)), "free": ((0, 0), (0, 0))}
+
+
+class EdgeCodes(NamedTuple):
+    """Restraint codes of an edge's nodes, by the direction of the edge."""
+
+    along_x: tuple[int, ...]
+    along_y: tuple[int, ...]
+
+    def of(self, edge: str) -> tuple[int, ...]:
+        """Codes of one of the :data:`EDGES`."""
+        return self.along_y if edge in ("left", "right") else self.along_x
+
+
+# Codes of w, theta_x and theta_y.  The rotation along an edge is theta_x along x, theta_y along y.
+W_HELD = (1, 0, 0)
+SIMPLE = EdgeCodes(along_x=(1, 1, 0), along_y=(1, 0, 1))
+CLAMPED = (1, 1, 1)
+# Codes of u and v.
+IN_PLANE = {
+    "held": EdgeCodes(along_x=(1, 1), along_y=(1, 1)),
+    "normal": EdgeCodes(along_x=(0, 1), along_y=(1, 0)),
+    "free": EdgeCodes(along_x=(0, 0), along_y=(0, 0)),
+}
 EDGES = ("left", "right", "bottom", "top")
 
 
@@ -220,11 +239,9 @@ class Grid:
         """
         codes: dict[str, tuple[int, ...]] = {}
         for edge, support in supports.items():
-            # The rotation along an edge x = const is theta_y, along y = const theta_x.
-            along_y = edge in ("left", "right")
             if support != "free":
-                out_of_plane = CLAMPED if support == "clamped" else SIMPLE[along_y]
-                codes[edge] = (*IN_PLANE[in_plane][along_y], *out_of_plane)
+                out_of_plane = CLAMPED if support == "clamped" else SIMPLE.of(edge)
+                codes[edge] = (*IN_PLANE[in_plane].of(edge), *out_of_plane)
         return self.boundary(everywhere, codes, window, in_plane=in_plane)
 
     def boundary(
@@ -246,18 +263,23 @@ class Grid:
         for name, code in edges.items():
             np.maximum(parts[name], code, out=parts[name])
         if window is not None:
-            left, right, low, high = (  # the lines of nodes nearest to the edges
-                int(np.abs(np.array(lines(part)) - (part[-1].end + distance) / 2.0).argmin())
-                for part, side in zip((self.columns, self.rows), window, strict=True)
-                for distance in (-side, side)
-            )
+            left, right = _nearest_lines(self.columns, window[0])
+            low, high = _nearest_lines(self.rows, window[1])
             across, up = slice(left, right + 1), slice(low, high + 1)
-            along_x, along_y = (np.array([*code, *W_HELD]) for code in IN_PLANE[in_plane])
+            along_x, along_y = (np.array([*held, *W_HELD]) for held in IN_PLANE[in_plane])
             for line in (low, high):
                 codes[line, across] = np.maximum(codes[line, across], along_x)
             for line in (left, right):
                 codes[up, line] = np.maximum(codes[up, line], along_y)
         return boundary_cards(codes.reshape(self.nodes, -1))
+
+
+def _nearest_lines(sections: Sequence[Section], side: float) -> tuple[int, int]:
+    """Numbers of the lines of nodes nearest to both ends of a side in the middle."""
+    places = np.array(lines(sections))
+    ends = ((sections[-1].end + distance) / 2.0 for distance in (-side, side))
+    first, last = (int(np.abs(places - end).argmin()) for end in ends)
+    return first, last
 
 
 def boundary_cards(codes: NDArray[np.int_]) -> Boundary | None:

@@ -32,6 +32,9 @@ PREFIXED = {
     "N*ms^2/mm": ("g", 0), "kN*ms^2/mm": ("g", 3),
 }  # fmt: skip
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+# Units of products and quotients that have a name of their own, in m, N and s.
+NAMED = {"force*length": {"J": 1.0, "mJ": 1e-3, "kJ": 1e3}}
+# Dimensions.
 MASS = "force*time^2/length"
 MODULUS = "force/length^2"
 TOUGHNESS = "force/length"
@@ -69,10 +72,6 @@ def in_si(dimension: str, names: dict[str, str]) -> float | None:
     return value
 
 
-# Units of products and quotients that have a name of their own, in m, N and s.
-NAMED = {"force*length": {"J": 1.0, "mJ": 1e-3, "kJ": 1e3}}
-
-
 def unit_in_si(unit: str, dimension: str) -> float | None:
     """A unit such as ``mm/s`` or ``J`` in m, N and s; None if it is not one of the dimension.
 
@@ -103,7 +102,8 @@ def with_prefix(unit: str, power: int) -> str:
 
 def quantity(value: float, unit: str, digits: int = 6) -> str:
     """A value with its unit: 20 g instead of 2e-05 N*s^2/mm, 1.5 J instead of 1500 N*mm."""
-    if PREFIXED.get(unit, ("",))[0] in ("g", "J") and 0.0 < abs(value) < math.inf:
+    base, _ = PREFIXED.get(unit, ("", 0))
+    if base in ("g", "J") and 0.0 < abs(value) < math.inf:
         power = thousands(float(f"{abs(value):.{digits}g}"))
         if name := with_prefix(unit, power):
             return f"{value / 10.0**power:.{digits}g} {name}"
