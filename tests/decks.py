@@ -89,6 +89,4 @@ def small(
 
 def model(text: str | Path) -> Deck:
     """Model of a deck of one problem."""
-    deck = fecm.read_deck(text)
-    assert isinstance(deck, Deck)
-    return deck
+    return fecm.read_one(text)

@@ -28,13 +28,6 @@ from fecm.deck.records import Control, Macro, NodeValues
 from tests.decks import APPENDIX, DATA_CARDS, LONG, MESH, small
 
 
-def read(text: str) -> Deck:
-    """The one problem of a sound deck."""
-    deck = fecm.read_deck(text)
-    assert isinstance(deck, Deck)
-    return deck
-
-
 def codes(text: str, *, zeros: bool = False) -> list[str]:
     """Codes of a text's findings."""
     reader = Reader(text, blanks_are_zeros=zeros)
@@ -43,8 +36,7 @@ def codes(text: str, *, zeros: bool = False) -> list[str]:
 
 
 def test_the_reports_deck_is_what_the_report_says() -> None:
-    deck = fecm.read_deck(APPENDIX)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(APPENDIX)
     assert deck.title == "**LOW VELOCITY IMPACT OF LAMINATED PLATE**"
     assert deck.control == Control(609, 140, 20, 2, 5, 9)
     assert deck.require(Impact) == Impact(305, 3, 115.0)
@@ -107,21 +99,21 @@ def test_whatever_ten_columns_held_can_be_written_into_ten_columns(text: str) ->
 
 
 def test_an_all_blank_field_is_zero() -> None:
-    deck = read(small(data=DATA_CARDS.replace("      .106", "      .106          ")))
+    deck = fecm.read_one(small(data=DATA_CARDS.replace("      .106", "      .106          ")))
     assert deck.require(Material).integration.width == 0.0
     assert deck.macros[0] == Macro("LMAS")
 
 
 def test_segments_may_stand_in_any_order() -> None:
-    shuffled = read(small(mesh=DATA_CARDS, data=MESH))
-    straight = read(small())
+    shuffled = fecm.read_one(small(mesh=DATA_CARDS, data=MESH))
+    straight = fecm.read_one(small())
     assert sorted(shuffled.segments, key=repr) == sorted(straight.segments, key=repr)
 
 
 def test_every_segment_of_the_listing_is_read() -> None:
     extra = "NOPR\nPAGE\n0\nFORC\n    1    1       1.0       2.0       3.0       4.0       5.0\n"
     extra += "    3    0       3.0       2.0       3.0       4.0       5.0\n\nPRIN\n"
-    deck = read(small(data=DATA_CARDS + extra))
+    deck = fecm.read_one(small(data=DATA_CARDS + extra))
     assert [o.on for o in deck.all(PrintOption)] == [False, True]
     assert deck.require(Page).carriage_control == "0"
     forces = deck.require(Forces).records
@@ -131,7 +123,7 @@ def test_every_segment_of_the_listing_is_read() -> None:
 
 
 def test_only_the_first_four_characters_of_a_keyword_count() -> None:
-    assert read(small(mesh=MESH.replace("COOR", "COORDINATES"))) == read(small())
+    assert fecm.read_one(small(mesh=MESH.replace("COOR", "COORDINATES"))) == fecm.read_one(small())
 
 
 def test_several_problems_stand_in_one_file_until_stop() -> None:
@@ -144,22 +136,23 @@ def test_several_problems_stand_in_one_file_until_stop() -> None:
 
 @pytest.mark.parametrize("path", [APPENDIX, LONG])
 def test_a_deck_written_and_read_is_the_same_model(path: str) -> None:
-    deck = fecm.read_deck(path)
-    assert isinstance(deck, Deck)
-    assert read(deck.to_text()) == deck
+    deck = fecm.read_one(path)
+    assert fecm.read_one(deck.to_text()) == deck
 
 
 def test_values_too_long_for_their_columns_are_written_in_free_format() -> None:
-    deck = read(small(data=DATA_CARDS.replace("     115.0", "     115.0\n").replace("\n\n", "\n")))
+    deck = fecm.read_one(
+        small(data=DATA_CARDS.replace("     115.0", "     115.0\n").replace("\n\n", "\n"))
+    )
     precise = Impact(13, 3, 115.12345678901)
     segments = tuple(precise if isinstance(s, Impact) else s for s in deck.segments)
-    again = read(Deck(deck.title, deck.control, segments, deck.macros).to_text())
+    again = fecm.read_one(Deck(deck.title, deck.control, segments, deck.macros).to_text())
     assert again.require(Impact) == precise
 
 
 def test_a_value_knows_its_line_and_columns() -> None:
     text = small()
-    impact = read(text).require(Impact)
+    impact = fecm.read_one(text).require(Impact)
     place = impact.place("impact velocity")
     assert place is not None
     assert text.splitlines()[place.line - 1][place.first - 1 : place.last] == "     115.0"
@@ -261,7 +254,7 @@ def test_free_format_and_comments_read_as_the_fixed_columns_do() -> None:
     text = text.replace("COOR\n", "! the mesh\nCOOR ! nodes\n").replace(
         "LOOP         10", "LOOP,,10"
     )
-    assert read(text) == read(small())
+    assert fecm.read_one(text) == fecm.read_one(small())
 
 
 def test_a_free_format_value_knows_its_place() -> None:
@@ -274,11 +267,11 @@ def test_a_free_format_value_knows_its_place() -> None:
 
 
 def test_line_ends_and_byte_order_marks_of_other_systems_change_nothing() -> None:
-    assert read("\ufeff" + small().replace("\n", "\r\n")) == read(small())
+    assert fecm.read_one("\ufeff" + small().replace("\n", "\r\n")) == fecm.read_one(small())
 
 
 def test_numpys_numbers_are_written_as_plain_ones() -> None:
-    deck = read(small())
+    deck = fecm.read_one(small())
     node = NodeValues(1, 0, (np.float64(0.123456789012), np.float64(1.6)))
     made = replace(deck, segments=(Coordinates((node,)),), text="")
     assert "np." not in made.to_text()

@@ -12,7 +12,6 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.deck.model import Impact
-from fecm.results.result import Result
 from fecm.studies.estimate import estimate
 from tests.calls import call
 from tests.decks import MESH, PROGRAM, small
@@ -35,8 +34,7 @@ def test_the_row_of_the_run_is_the_run(tmp_path: Path) -> None:
     assert done.exit_code == 0
     found = json.loads(done.stdout)
     assert [row["model"] for row in found["models"]] == ["infinite plate", "run"]
-    full = fecm.run(tmp_path / "d.inp")
-    assert isinstance(full, Result)
+    full = fecm.run_one(tmp_path / "d.inp")
     assert found["models"][1]["peak_force"] == pytest.approx(full.force.max(), rel=1e-9)
     assert found["models"][1]["threshold"] == pytest.approx(full.threshold["force"], rel=1e-12)
 
@@ -63,8 +61,9 @@ def test_a_held_plate_has_a_static_model_with_its_own_stiffness() -> None:
     assert np.isnan(estimate(free).stiffness)
     program = "TANG\nFORM\nSOLV\nDISP\n"
     held = estimate(load_deck(deck(mesh=HELD)).problems[0])
-    static = fecm.run(small(program, mesh=HELD).replace("EXPE", "PATC\nDISC,.2,1.,1.,1000.\nEXPE"))
-    assert isinstance(static, Result)
+    static = fecm.run_one(
+        small(program, mesh=HELD).replace("EXPE", "PATC\nDISC,.2,1.,1.,1000.\nEXPE")
+    )
     w = static["tape3/w"][0, static["patch/node"] - 1] @ static["patch/weight"]
     assert held.stiffness == pytest.approx(1000.0 / w, rel=1e-9)
     assert [model.name for model in held.models] == ["infinite plate", "static plate"]

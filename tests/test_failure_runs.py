@@ -18,7 +18,6 @@ from fecm.mechanics.laminate import laminate
 from fecm.mechanics.mesh import element_blocks
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import FailureMonitor, PlyStresses
-from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.simulation.run import simulate
 from fecm.sweeps.plan import without_output
@@ -63,8 +62,7 @@ def test_the_first_ply_fails_at_the_load_of_the_exact_solution(name: str) -> Non
 
 
 def test_exposures_are_the_largest_of_all_stored_displacements() -> None:
-    found = fecm.run(failing())
-    assert isinstance(found, Result)
+    found = fecm.run_one(failing())
     (problem,) = fecm.api.load_deck(failing()).problems
     stresses = PlyStresses(problem.mesh, problem.laminate, problem.rules[2])
     card = problem.deck.require(Allowables)
@@ -140,8 +138,7 @@ def test_fail_needs_strengths_and_report_mode() -> None:
 
 def test_a_single_ply_has_exposures_and_no_interface() -> None:
     one = failing().replace("    2  90.     0.053\n", "").replace("0.     0.053", "0.     0.106")
-    found = fecm.run(one.replace("   25    4    2", "   25    4    1"))
-    assert isinstance(found, Result)
+    found = fecm.run_one(one.replace("   25    4    2", "   25    4    1"))
     assert found["failure/puck/exposure"].shape[2] == 1
     assert found["failure/puck/exposure"].max() > 0.0
     assert found["failure/interlaminar/exposure"].shape == (4, 0)

@@ -10,7 +10,6 @@ import pytest
 
 import fecm
 from fecm.results.metrics import FOUND
-from fecm.results.result import Result
 from fecm.sweeps.find import search
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM, small
@@ -47,8 +46,7 @@ def test_a_run_at_the_found_velocity_has_the_threshold_as_its_peak(tmp_path: Pat
     found = fecm.load_sweep(tmp_path / "s.h5")
     (velocity,) = found["found_velocity"]
     assert f"smallest found    {velocity:.8g}, " in done.stdout
-    result = fecm.run(deck(400).replace("   13    3     115.0", f"13,3,{velocity:.10g}"))
-    assert isinstance(result, Result)
+    result = fecm.run_one(deck(400).replace("   13    3     115.0", f"13,3,{velocity:.10g}"))
     assert result.force.max() == pytest.approx(result.threshold["force"], rel=1e-5)
     assert found["peak_force"][0] == pytest.approx(result.force.max(), rel=1e-8)
     # The mass of the report's rod is 1.8096e-4.

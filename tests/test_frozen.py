@@ -9,9 +9,8 @@ from typing import Any
 
 import pytest
 
+import fecm
 from fecm._frozen import frozen
-from fecm.deck.model import Deck
-from fecm.deck.reader import read_deck
 from tests.decks import small
 
 
@@ -50,8 +49,7 @@ def test_no_attribute_can_be_set_or_deleted(value: Ours) -> None:
 
 
 def test_a_deck_survives_pickling_and_copying() -> None:
-    deck = read_deck(small())
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(small())
     for again in (pickle.loads(pickle.dumps(deck)), copy.deepcopy(deck)):
         assert again == deck
         assert hash(again.control) == hash(deck.control)

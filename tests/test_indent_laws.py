@@ -12,7 +12,6 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.deck import Deck
 from fecm.deck.catalogue import CONTACTS
 from fecm.deck.format import format_deck
 from fecm.deck.model import Indentation
@@ -84,8 +83,7 @@ def acr_deck(card: str, word: str = "ACR", program: str = "") -> str:
 
 
 def test_expe_acr_is_read_written_and_aligned() -> None:
-    deck = fecm.read_deck(acr_deck("  1912000.   0.00316"))
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(acr_deck("  1912000.   0.00316"))
     law = deck.require(Indentation)
     assert (law.k, law.alpha_p, law.word) == (1.912e6, 0.00316, "ACR")
     assert fecm.read_deck(deck.to_text()) == deck
@@ -163,13 +161,11 @@ PLATE = ("new", "-", "--size", "6x4", "--mesh", "6x4", "--layup", "[0/90]s", "--
 
 def test_a_new_deck_takes_a_named_contact_in_the_plys_units() -> None:
     done = call(*PLATE, "--material", "report", "--contact", "yang-0.5")
-    deck = fecm.read_deck(done.stdout)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(done.stdout)
     assert deck.require(Indentation) == Indentation(9.694e5, 3.16e-3, 0.0, 2.5, "ACR")
     metric = call(*PLATE, "--material", "report", "--units", "m-N-s", "--contact", "report-0.75",
                   "--projectile", "mass:0.05")  # fmt: skip
-    deck = fecm.read_deck(metric.stdout)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(metric.stdout)
     assert deck.require(Indentation).alpha_p == pytest.approx(6.564e-4 * 0.0254, rel=1e-5)
 
 

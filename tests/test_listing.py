@@ -47,9 +47,7 @@ MIXED = (
 
 def run(text: str, mode: Mode = "listing", *slips: str) -> Result:
     """Result of a deck of one problem."""
-    result = fecm.run(text, mode=mode, slips=slips)
-    assert isinstance(result, Result)
-    return result
+    return fecm.run_one(text, mode=mode, slips=slips)
 
 
 def test_rod_replaces_the_force_of_a_forc_before_it() -> None:

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+import fecm
 from fecm.api import load_deck
-from fecm.deck import Deck, DeckError, Finding, read_deck
+from fecm.deck import DeckError, Finding, read_deck
 from fecm.deck.format import format_deck
 from fecm.deck.macros import WORDS, estimate_work
 from fecm.deck.model import Impact, Indentation, Patch, Projectile, Segment, Shear
@@ -18,13 +19,6 @@ from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, ROOT, small
 
 BLANK_CARD = "   25    0    1    1    0    0    0\n\n"
-
-
-def read(text: str) -> Deck:
-    """The one problem of a sound deck."""
-    deck = read_deck(text)
-    assert isinstance(deck, Deck)
-    return deck
 
 
 def error_of(card: str, mode: str = "report") -> Finding:
@@ -56,7 +50,7 @@ def marked(finding: Finding) -> str:
     ],
 )
 def test_a_number_behind_the_word_is_the_macros_number(card: str, fixed: str) -> None:
-    assert read(small(card + "\n")).macros == read(small(fixed + "\n")).macros
+    assert fecm.read_one(small(card + "\n")).macros == fecm.read_one(small(fixed + "\n")).macros
 
 
 @pytest.mark.parametrize("comma", [",", ",,"])
@@ -116,7 +110,7 @@ def test_no_deck_of_the_project_has_a_field_that_no_macro_uses() -> None:
 
 
 def test_letters_behind_the_fourth_of_a_word_do_not_count() -> None:
-    assert read(small(PROGRAM.replace("DISP ", "DISPL"))) == read(small())
+    assert fecm.read_one(small(PROGRAM.replace("DISP ", "DISPL"))) == fecm.read_one(small())
 
 
 # Numbers that are longer than their columns ------------------------------------------------------
@@ -131,7 +125,7 @@ def test_a_number_longer_than_its_columns_is_an_error_that_shows_the_comma_card(
     (finding,) = caught.value.findings
     assert marked(finding) == "2.5E-7"
     written = finding.hint.split("`")[1]
-    assert read(small(written + "\n")).macros[0].value == 2.5e-7
+    assert fecm.read_one(small(written + "\n")).macros[0].value == 2.5e-7
 
 
 def test_a_number_that_its_last_field_cuts_short_is_an_error_where_the_value_changes() -> None:
@@ -141,7 +135,7 @@ def test_a_number_that_its_last_field_cuts_short_is_an_error_where_the_value_cha
     (finding,) = caught.value.findings
     assert (finding.code, marked(finding)) == ("E105", "1.1512345E+2")
     assert "`13,3,1.1512345E+2`" in finding.hint
-    exact = read(small(data=DATA_CARDS.replace(card, "   13    3   115.00000")))
+    exact = fecm.read_one(small(data=DATA_CARDS.replace(card, "   13    3   115.00000")))
     assert exact.require(Impact).velocity == 115.0
 
 
@@ -161,7 +155,7 @@ def test_a_new_deck_has_a_time_step_that_a_person_can_read() -> None:
     )  # fmt: skip
     assert made.exit_code == 0, made.stderr
     assert "\nDT,,2.5E-7\n" in made.stdout
-    assert Macro("DT", value=2.5e-7) in read(made.stdout).macros
+    assert Macro("DT", value=2.5e-7) in fecm.read_one(made.stdout).macros
 
 
 # Cards written and read again --------------------------------------------------------------------
@@ -188,24 +182,24 @@ def test_a_new_deck_has_a_time_step_that_a_person_can_read() -> None:
     ids=repr,
 )
 def test_a_segment_is_written_with_all_that_it_says(segment: Segment) -> None:
-    deck = read(small())
+    deck = fecm.read_one(small())
     made = replace(deck, segments=(*deck.segments, segment), text="")
-    assert read(made.to_text()) == made
-    assert read(format_deck(made.to_text())) == made
+    assert fecm.read_one(made.to_text()) == made
+    assert fecm.read_one(format_deck(made.to_text())) == made
 
 
 @pytest.mark.parametrize("card", ["", "hert", "DISC,,1.,2.", ",.3", ",,,,5.", " " * 49 + "5"])
 def test_blanks_of_a_patch_stay_blank_when_a_deck_is_formatted(card: str) -> None:
     deck = small().replace("EXPE", f"PATC\n{card}\nEXPE")
-    assert read(format_deck(deck)) == read(deck)
+    assert fecm.read_one(format_deck(deck)) == fecm.read_one(deck)
     assert format_deck(format_deck(deck)) == format_deck(deck)
 
 
 @pytest.mark.parametrize("value", [1e300, 1e-300, 5e-324, 2.0**53, -0.0, 1 / 3])
 def test_a_macros_number_is_written_exactly(value: float) -> None:
-    deck = replace(read(small()), macros=(Macro("DT", value=value),), text="")
-    assert read(deck.to_text()).macros[0].value == value
-    assert read(format_deck(deck.to_text())).macros[0].value == value
+    deck = replace(fecm.read_one(small()), macros=(Macro("DT", value=value),), text="")
+    assert fecm.read_one(deck.to_text()).macros[0].value == value
+    assert fecm.read_one(format_deck(deck.to_text())).macros[0].value == value
 
 
 @pytest.mark.parametrize("card", ["LOßP", "LAŉS", "ǰT,,5.E-7"])
@@ -225,12 +219,12 @@ def test_an_indented_end_ends_the_program_as_it_does_when_it_is_formatted(end: s
     text = small(PROGRAM)
     assert text.count("NEXT\nEND\n") == 1
     indented = text.replace("NEXT\nEND\n", f"NEXT\n{end}\n")
-    assert read(indented) == read(text)
-    assert read(format_deck(indented)) == read(text)
+    assert fecm.read_one(indented) == fecm.read_one(text)
+    assert fecm.read_one(format_deck(indented)) == fecm.read_one(text)
 
 
 def test_a_number_that_is_not_finite_is_written_in_no_form() -> None:
-    deck = read(small())
+    deck = fecm.read_one(small())
     law = Indentation(0.1234567890123, float("inf"), 0.1, 2.0)
     with pytest.raises(ValueError, match="inf"):
         replace(deck, segments=(*deck.segments, law)).to_text()
@@ -241,12 +235,12 @@ def test_a_card_of_commas_alone_is_a_blank_card_before_and_after_formatting(blan
     text = small()
     assert text.count(BLANK_CARD) == 1
     commas = text.replace(BLANK_CARD, BLANK_CARD.replace("\n\n", f"\n{blank}\n"))
-    assert read(commas) == read(text)
-    assert read(format_deck(commas)) == read(text)
+    assert fecm.read_one(commas) == fecm.read_one(text)
+    assert fecm.read_one(format_deck(commas)) == fecm.read_one(text)
 
 
 @pytest.mark.parametrize("head", ["EXPE ACR", "EXPE,ACR", "EXPE, acr"])
 def test_a_keywords_second_word_may_stand_behind_a_comma(head: str) -> None:
     text = small(data=DATA_CARDS.replace("EXPE\n", f"{head}\n").replace("0.094", "  0.0"))
-    assert read(text).require(Indentation).word == "ACR"
-    assert read(format_deck(text)) == read(text)
+    assert fecm.read_one(text).require(Indentation).word == "ACR"
+    assert fecm.read_one(format_deck(text)) == fecm.read_one(text)

@@ -28,9 +28,7 @@ def new(*options: str | Path) -> Done:
 def deck_of(*options: str | Path) -> Deck:
     made = new(*options)
     assert made.exit_code == 0, made.stderr
-    deck = fecm.read_deck(made.stdout)
-    assert isinstance(deck, Deck)
-    return deck
+    return fecm.read_one(made.stdout)
 
 
 # Soden, Hinton and Kaddour 1998, tables 1 and 2; Camanho, Maimi and Davila 2007, tables 2 and 3.
@@ -83,8 +81,7 @@ def test_damage_adds_strengths_and_toughness_in_the_decks_units(units: str) -> N
 def test_what_a_ply_lacks_is_told_or_refused() -> None:
     made = new("--material", "IM7/8551-7", "--damage")
     assert "note: IM7/8551-7 has no GIIc, so no delamination threshold (DELA)" in made.stderr
-    deck = fecm.read_deck(made.stdout)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(made.stdout)
     assert deck.require(Allowables).s23 == 57.0
     assert not deck.has(Delamination)
     for refused in (new("--material", "report", "--damage", "--units", "mm-N-s"),

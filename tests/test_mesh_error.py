@@ -27,8 +27,7 @@ def new(mesh: str, *options: str) -> str:
 
 def peak(deck: str) -> float:
     """Peak force of a run."""
-    result = fecm.run(deck)
-    assert isinstance(result, fecm.Result)
+    result = fecm.run_one(deck)
     return float(result.force.max())
 
 

@@ -13,7 +13,6 @@ import fecm
 from fecm.plot.kinds import PlotError
 from fecm.plot.pictures import draw
 from fecm.results.metrics import METRICS, RATIO, SUMMARY, THRESHOLD, VERDICTS
-from fecm.results.result import Result
 from fecm.results.summary import summary
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, small
@@ -28,14 +27,8 @@ def deck(segments: str = RIGID, *, steps: int = 330) -> str:
     return small(PROGRAM.replace(" 10\n", f"{steps:3}\n"), data=data)
 
 
-def run(text: str) -> Result:
-    result = fecm.run(text)
-    assert isinstance(result, Result)
-    return result
-
-
 def test_a_rigid_mass_rebounds_with_the_impulse_and_its_energy_is_absorbed() -> None:
-    result = run(deck())
+    result = fecm.run_one(deck())
     found = result.metrics
     assert found["rebound_velocity"] == pytest.approx(result.velocity[-1], rel=1e-9)
     assert found["impulse"] == pytest.approx(MASS * (SPEED + result.velocity[-1]), rel=1e-9)
@@ -47,7 +40,7 @@ def test_a_rigid_mass_rebounds_with_the_impulse_and_its_energy_is_absorbed() -> 
 
 def test_the_area_of_the_force_displacement_curve_is_the_absorbed_energy() -> None:
     pytest.importorskip("matplotlib")
-    result = run(deck())
+    result = fecm.run_one(deck())
 
     def curve(against: str) -> tuple[Any, Any]:
         line: Any = draw("loop", {"a": result}, against=against).figure.axes[0].get_lines()[0]
@@ -77,7 +70,7 @@ def test_run_info_and_sweep_have_the_same_metrics(tmp_path: Path) -> None:
 
 
 def test_metrics_of_the_threshold_are_those_of_its_group(tmp_path: Path) -> None:
-    result = run(deck(f"{RIGID}DELA\n.001,\n"))
+    result = fecm.run_one(deck(f"{RIGID}DELA\n.001,\n"))
     found = result.metrics
     for name in ("force", "time", "margin"):
         assert found[f"threshold_{name}"] == pytest.approx(result.threshold[name], rel=1e-12)
@@ -86,7 +79,7 @@ def test_metrics_of_the_threshold_are_those_of_its_group(tmp_path: Path) -> None
     assert found["threshold_margin"] == pytest.approx(
         1.0 - result.force.max() / result.threshold["force"], rel=1e-12
     )
-    missed = run(deck(f"{RIGID}DELA\n10.,\n"))
+    missed = fecm.run_one(deck(f"{RIGID}DELA\n10.,\n"))
     below = missed.metrics
     assert np.isnan(below["threshold_time"])
     assert below["time_above"] == 0.0

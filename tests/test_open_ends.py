@@ -18,13 +18,6 @@ from tests.decks import DATA_CARDS, PROGRAM, small
 CLOSED = small(program=PROGRAM.replace(" 10\n", "330\n"))
 
 
-def run(deck: str) -> Result:
-    """Result of a deck of one problem."""
-    result = fecm.run(deck)
-    assert isinstance(result, Result)
-    return result
-
-
 @pytest.mark.parametrize(
     ("force", "still"), [([], False), ([0.0], False), ([0.0, 2.0], True), ([2.0, 0.0], False)]
 )
@@ -36,7 +29,7 @@ def test_a_contact_is_open_where_the_last_force_is_above_zero(
 
 
 def test_a_summary_shows_no_end_of_a_contact_that_has_none() -> None:
-    open_, closed = run(small()), run(CLOSED)
+    open_, closed = fecm.run_one(small()), fecm.run_one(CLOSED)
     assert (open_.still_in_contact, closed.still_in_contact) == (True, False)
     told = "\n".join(summary(open_))
     assert "contact           from 5e-07, still in contact at the end" in told
@@ -63,6 +56,6 @@ def test_run_and_info_say_that_a_run_ends_in_contact(tmp_path: Path) -> None:
 
 def test_a_run_without_impact_never_ends_in_contact() -> None:
     program = "LMAS\nDT        .5E-6\nLOOP          2\nTIME\nDISP\nNEXT\n"
-    result = run(small(program, data=DATA_CARDS[DATA_CARDS.index("MATE") :]))
+    result = fecm.run_one(small(program, data=DATA_CARDS[DATA_CARDS.index("MATE") :]))
     assert not result.still_in_contact
     assert summary(result) == ["largest w         0: nothing moved the plate"]

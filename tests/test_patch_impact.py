@@ -163,14 +163,11 @@ def test_a_patch_in_the_middle_keeps_the_half_plate_and_its_response() -> None:
 
 def with_patch(card: str, program: str = PROGRAM) -> Result:
     text = small(program).replace("EXPE", f"PATC\n{card}\nEXPE")
-    found = fecm.run(text)
-    assert isinstance(found, Result)
-    return found
+    return fecm.run_one(text)
 
 
 def test_a_vanishing_patch_on_the_impact_node_is_the_point_force() -> None:
-    point = fecm.run(small())
-    assert isinstance(point, Result)
+    point = fecm.run_one(small())
     patch = with_patch("DISC,1e-7")
     np.testing.assert_allclose(patch.force, point.force, rtol=1e-6, atol=1e-6 * point.force.max())
 
@@ -194,8 +191,7 @@ def test_plate_w_is_the_weighted_mean_of_w() -> None:
 
 def test_the_energy_balance_holds_with_a_patch_over_4000_steps() -> None:
     text = LONG.read_text().replace("EXPE", "PATC\nDISC        0.0347\nSHEA MITC\nEXPE")
-    found = fecm.run(text)
-    assert isinstance(found, Result)
+    found = fecm.run_one(text)
     initial = found.energy.attributes["initial"]
     assert np.abs(found["energy/balance_error"]).max() < 1e-5 * initial
 
@@ -220,9 +216,7 @@ def with_load(program: str, segment: str) -> Result:
     clamped = MESH.replace(
         "    1    1   -1   -1    0    0    0", "    1    1   -1   -1    1    1    1"
     )
-    found = fecm.run(small(program, mesh=clamped).replace("MATE", f"{segment}MATE"))
-    assert isinstance(found, Result)
-    return found
+    return fecm.run_one(small(program, mesh=clamped).replace("MATE", f"{segment}MATE"))
 
 
 def test_assumed_shear_strains_take_the_half_plate_of_four_elements() -> None:

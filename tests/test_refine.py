@@ -18,14 +18,8 @@ def plate(deck: Deck) -> PlateModel:
     return problem.plate
 
 
-def of(text: str) -> Deck:
-    deck = fecm.read_deck(text)
-    assert isinstance(deck, Deck)
-    return deck
-
-
 def test_a_bisected_mesh_has_the_same_area_and_mass_and_four_times_the_elements() -> None:
-    deck = of(LONG.read_text())
+    deck = fecm.read_one(LONG.read_text())
     fine = refined(deck, generate(deck))
     coarse_plate, fine_plate = plate(deck), plate(fine)
     assert fine.control.numel == 4 * deck.control.numel
@@ -41,7 +35,7 @@ def test_restraints_carry_over_to_the_new_nodes_of_a_supported_side() -> None:
         "BOUN\n    1    1   -1   -1   -1    0    0\n    5    1   -1   -1    1    0    0\n"
         "   25    0    1    1    0    0    0\n\n"
     )
-    deck = of(small(mesh=edge))
+    deck = fecm.read_one(small(mesh=edge))
     mesh = generate(refined(deck, generate(deck)))
     held = mesh.codes[:, 2] != 0
     assert (held == (mesh.coordinates[:, 1] == 0.0)).all()
@@ -49,7 +43,7 @@ def test_restraints_carry_over_to_the_new_nodes_of_a_supported_side() -> None:
 
 
 def test_bisecting_one_element_cuts_its_strips_and_stays_conforming() -> None:
-    deck = of(LONG.read_text())
+    deck = fecm.read_one(LONG.read_text())
     mesh = generate(deck)
     marked = np.zeros(140, dtype=bool)
     marked[37] = True
@@ -62,13 +56,13 @@ def test_bisecting_one_element_cuts_its_strips_and_stays_conforming() -> None:
 
 def test_bisection_of_distorted_elements_keeps_their_sides() -> None:
     last = "   25    0       2.0       2.0\n"
-    deck = of(small(mesh=MESH.replace(last, f"{last}   13    0       1.1       0.9\n")))
+    deck = fecm.read_one(small(mesh=MESH.replace(last, f"{last}   13    0       1.1       0.9\n")))
     fine = refined(deck, generate(deck))
     assert plate(fine).area() == pytest.approx(plate(deck).area(), rel=1e-12)
 
 
 def test_elements_without_a_centre_node_are_not_bisected() -> None:
     eight = MESH.replace("    7    2\n", "    0    2\n").replace("   17    2\n", "    0    2\n")
-    deck = of(small(mesh=eight))
+    deck = fecm.read_one(small(mesh=eight))
     with pytest.raises(RefineError, match="four or nine nodes"):
         refined(deck, generate(deck))

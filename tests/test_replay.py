@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm.deck.grid import Grid, Section
-from fecm.deck.model import Deck, Indentation, Material
+from fecm.deck.model import Indentation, Material
 from fecm.mechanics.impact import ImpactSystem
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.results.result import Result
@@ -35,8 +35,7 @@ def results() -> dict[tuple[str, str], Result]:
     made: dict[tuple[str, str], Result] = {}
     for name, (deck, _) in DECKS.items():
         for mode in ("report", "listing"):
-            result = fecm.run(deck, mode=mode)
-            assert isinstance(result, Result)
+            result = fecm.run_one(deck, mode=mode)
             made[name, mode] = result
     return made
 
@@ -156,8 +155,7 @@ def test_the_reports_mesh_has_not_converged(results: dict[tuple[str, str], Resul
         [Section(0.0, 1.5, 6), Section(1.5, 4.5, 16), Section(4.5, 6.0, 6)],
         [Section(0.0, 0.5, 2), Section(0.5, 3.5, 16), Section(3.5, 4.0, 2)],
     )
-    deck = fecm.read_deck(LONG)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(LONG)
     law = deck.require(Indentation)
     finer = struck_plate(grid, deck.require(Material), None, 115.0, law, 1e-7, 600)
     coarse = results["long", "report"]

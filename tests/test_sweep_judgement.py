@@ -28,17 +28,9 @@ SHORT = PROGRAM.replace("LOOP         10", "LOOP        320")
 MASS = "PROJ\n    0    0    1.8E-4\n"
 
 
-def model(text: str | Path) -> Deck:
-    """Model of a deck of one problem."""
-    deck = fecm.read_deck(text)
-    assert isinstance(deck, Deck)
-    return deck
-
-
 def balance(deck: Deck) -> float:
     """Worst error of the energy balance of a run, as a part of the initial energy."""
-    result = fecm.run(deck, energy_limit=1e300)
-    assert isinstance(result, fecm.Result)
+    result = fecm.run_one(deck, energy_limit=1e300)
     initial = float(result.energy.attributes["initial"])
     return float(np.abs(result["energy/balance_error"]).max()) / initial
 
@@ -58,7 +50,7 @@ def balance(deck: Deck) -> float:
 def test_a_case_that_a_run_rejects_fails_with_the_runs_reason(
     data: str, case: dict[str, float]
 ) -> None:
-    deck = model(small(STEPS, data=data))
+    deck = fecm.read_one(small(STEPS, data=data))
     with pytest.raises(DivergenceError) as rejected:
         fecm.run(apply_case(deck, dict(case)))
     (name,) = case
@@ -79,7 +71,7 @@ def test_cases_together_keep_the_energy_as_well_as_their_runs_do(
         return made
 
     monkeypatch.setattr(batch, "impacts", watched)
-    deck = model(small(STEPS))
+    deck = fecm.read_one(small(STEPS))
     stiffnesses = [2e6, 1e8, 1e9]
     assert fecm.sweep(deck, {"k": stiffnesses}).fine.all()
     for k, error in zip(stiffnesses, seen, strict=True):
