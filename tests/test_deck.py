@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import fecm
 from fecm.deck import Deck, DeckError, Reader
 from fecm.deck.model import (
+    SEGMENTS,
     Boundary,
     Coordinates,
     Elements,
@@ -20,8 +21,10 @@ from fecm.deck.model import (
     Impact,
     Indentation,
     Material,
+    NumberedSegment,
     Page,
     PrintOption,
+    Segment,
 )
 from fecm.deck.numerals import format_real, parse_real
 from fecm.deck.records import Control, Macro, NodeValues
@@ -120,6 +123,13 @@ def test_every_segment_of_the_listing_is_read() -> None:
     assert [(f.node, f.increment) for f in forces] == [(1, 1), (3, 0)]
     assert forces[0].values == (1.0, 2.0, 3.0, 4.0, 5.0)
     assert {type(s) for s in deck.segments} >= {Coordinates, Elements, Boundary, Material}
+
+
+def test_every_kind_of_segment_is_read_by_its_keyword() -> None:
+    kinds = {*Segment.__subclasses__(), *NumberedSegment.__subclasses__()} - {NumberedSegment}
+    assert {keyword: kind for keyword, kind in SEGMENTS.items() if keyword != "NOPR"} == {
+        kind.keyword: kind for kind in kinds
+    }
 
 
 def test_only_the_first_four_characters_of_a_keyword_count() -> None:

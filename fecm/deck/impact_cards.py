@@ -47,23 +47,27 @@ class Indentation(Segment, keyword="EXPE"):
         "F10 constant s_p|s_p",
         "F10 unloading power q|q",
     )
-    acr_fields: ClassVar[Fields] = layout(
-        "F10 contact coefficient k|k",
-        "F10 critical indentation alpha_cr|alpha_cr",
-        "F10 constant s_p|(none)",
-        "F10 unloading power q|q",
-    )
+    # Fields by the second word.
+    fields_of: ClassVar[dict[str, Fields]] = {
+        "": fields,
+        ACR: layout(
+            "F10 contact coefficient k|k",
+            "F10 critical indentation alpha_cr|alpha_cr",
+            "F10 constant s_p|(none)",
+            "F10 unloading power q|q",
+        ),
+    }
 
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self | None:
         """Read the card of the law that the keyword card names."""
         word = " ".join(head.words[1:]).upper()
-        if word and word != cls.ACR:
+        if word not in cls.fields_of:
             message = f"`{word}` after EXPE is not read: the law is that of equation 3-8."
             hint = "EXPE ACR takes the law of equation 3-7"
             cards.findings.add("W416", message, head.place, hint)
             word = ""
-        law = cards.single(head, cls, cls.acr_fields if word else None)
+        law = cards.single(head, cls, cls.fields_of[word])
         return law and replace(law, word=word)
 
     def values(self) -> tuple[float, float, float, float]:
@@ -72,7 +76,7 @@ class Indentation(Segment, keyword="EXPE"):
 
     def names(self) -> list[str]:
         """Names of the values."""
-        return [field.name for field in (self.acr_fields if self.word else self.fields)]
+        return [field.name for field in self.fields_of[self.word]]
 
     def text(self) -> str:
         """Text of the keyword card and of the card of data."""
