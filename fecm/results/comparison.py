@@ -150,9 +150,14 @@ def compare(stored: Stored, measured: Measurement) -> Comparison:
     weights = 0.5 * (np.diff(time, prepend=time[0]) + np.diff(time, append=time[-1]))
     varies = np.ptp(own) > 0.0 and np.ptp(force) > 0.0
     return Comparison(
-        len(time), float(time[0]), float(time[-1]),
-        float(own.max()), float(force.max()), float(weights @ own), float(weights @ force),
-        float(np.sqrt(np.mean((own - force) ** 2))),
-        float(np.corrcoef(own, force)[0, 1]) if varies else math.nan,
-        declared_units(stored.attributes),
-    )  # fmt: skip
+        points=len(time),
+        begin=float(time[0]),
+        end=float(time[-1]),
+        peak=float(own.max()),
+        measured_peak=float(force.max()),
+        impulse=float(weights @ own),
+        measured_impulse=float(weights @ force),
+        rms=float(np.sqrt(np.mean((own - force) ** 2))),
+        correlation=float(np.corrcoef(own, force)[0, 1]) if varies else math.nan,
+        units=declared_units(stored.attributes),
+    )

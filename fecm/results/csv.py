@@ -31,9 +31,12 @@ NAMED: dict[str | int, tuple[str, ...]] = {
     "directions": ("xz", "yz"),
 }
 # Names of the other axes' columns.
-KEYS = {size: name for size, (name, _) in schema.SCALES.items()} | {
-    "members": "element", "npp": "point", "patch_nodes": "node"
-}  # fmt: skip
+KEYS = {
+    **{size: name for size, (name, _) in schema.SCALES.items()},
+    "members": "element",
+    "npp": "point",
+    "patch_nodes": "node",
+}
 # Datasets that number the positions along an axis.
 LABELS = {"gages": "gages/number", "members": "plies/element", "patch_nodes": "patch/node"}
 # Datasets of the table of ply stresses.

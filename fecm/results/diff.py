@@ -17,6 +17,7 @@ import contextlib
 import itertools
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -30,30 +31,48 @@ from fecm.results.blocks import row_blocks
 from fecm.results.hdf5_reader import Contents, read
 from fecm.results.missing import suggestion
 from fecm.results.schema import CONTACT, DATASETS, SCALES, Form
-from fecm.results.tapes import CURVATURES, SHEARS, TAPES, TapeText, W, last_digit, read_tapes
+from fecm.results.tapes import SHEARS, TAPES, TapeText, W, last_digit, read_tapes
 
-ON_TAPE = {
-    W, *(f"tape8/{name}" for name in (*CURVATURES, *SHEARS["tape8"])),
-    *(f"tape9/{name}" for name in CONTACT),
-}  # fmt: skip
 # Names and first numbers of the axes of a sweep's datasets: cases count from 0, as in commands.
 CASES = (("case", 0), ("step", 1))
 LINES = (("line", 1), ("column", 1))  # those of tape3 without a known number of nodes
-SOURCE_NAMES = {
-    Form.RUN: "the result of a run", Form.SWEEP: "the result of a sweep", TAPES: "a folder of tapes"
-}  # fmt: skip
-# Datasets of a resultant or strain that is zero in bending, and those of its bending counterpart.
-MEMBRANE = {"N": ("N_x", "N_y", "N_xy"), "eps": ("eps_xx", "eps_yy", "gamma_xy")}
-BENDING = {"N": ("M_x", "M_y", "M_xy"), "eps": ("kappa_x", "kappa_y", "kappa_xy")}
-# Scales other than the largest value of the dataset.
+SOURCE_NAMES: dict[str, str] = {
+    Form.RUN: "the result of a run",
+    Form.SWEEP: "the result of a sweep",
+    TAPES: "a folder of tapes",
+}
+# Those of a resultant or strain that is zero in bending, and those of its bending counterpart.
+RESULTANTS = ("N_x", "N_y", "N_xy")
+COUPLES = ("M_x", "M_y", "M_xy")
+STRAINS = ("eps_xx", "eps_yy", "gamma_xy")
+CURVATURES = ("kappa_x", "kappa_y", "kappa_xy")
+# Datasets that tapes hold.
+ON_TAPE = {
+    W,
+    *(f"tape8/{name}" for name in (*CURVATURES, *SHEARS["tape8"])),
+    *(f"tape9/{name}" for name in CONTACT),
+}
+
+
+class Scale(StrEnum):
+    """A scale of differences other than the largest value of the dataset, in words."""
+
+    ENERGY = "the energy put in"
+    COUPLING = "sqrt(max A * max D)"
+    INTERLAMINAR = "the largest interlaminar stress"
+    RESULTANT = "the largest N or M * sqrt(A/D)"
+    STRAIN = "the largest strain or curvature * sqrt(D/A)"
+    CONTACT = "the largest indentation in contact"
+
+
 SCALE_NAMES = {
-    "energy/balance_error": "the energy put in",
-    "laminate/B": "sqrt(max A * max D)",
-    "plies/residual": "the largest interlaminar stress",
-    **{f"stresses/{n}": "the largest N or M * sqrt(A/D)" for n in MEMBRANE["N"]},
-    **{f"stresses/{n}": "the largest strain or curvature * sqrt(D/A)" for n in MEMBRANE["eps"]},
-    "history/indentation": "the largest indentation in contact",
-    "tape9/indentation": "the largest indentation in contact",
+    "energy/balance_error": Scale.ENERGY,
+    "laminate/B": Scale.COUPLING,
+    "plies/residual": Scale.INTERLAMINAR,
+    **{f"stresses/{name}": Scale.RESULTANT for name in RESULTANTS},
+    **{f"stresses/{name}": Scale.STRAIN for name in STRAINS},
+    "history/indentation": Scale.CONTACT,
+    "tape9/indentation": Scale.CONTACT,
 }
 
 
@@ -259,7 +278,7 @@ def _compare(
     elif found.comparable:
         infinite = _measure(found)
         integers = all(source.dtypes[path].kind in "biu" for source in sources)
-        found.scale = _scale(found)
+        found.scale = _own_scale(found) or found.maximum
         if tolerances is None:
             found.tolerance = float(last_digit(np.array(found.maximum)))
             found.to_last_digit = True
@@ -271,44 +290,60 @@ def _compare(
     return found
 
 
-def _scale(found: Comparison) -> float:
-    """Scale of the differences of a dataset; by default its maximum."""
+def _own_scale(found: Comparison) -> float:
+    """Scale of the differences of a dataset that is not its maximum; 0 if there is none."""
+    match SCALE_NAMES.get(found.path):
+        case None:
+            return 0.0
+        case Scale.ENERGY:
+            return _initial_energy(found) + _largest(found, "energy/external_work")
+        case Scale.COUPLING:  # with the thickness h, A h and D / h have the order of B
+            return float((_largest(found, "laminate/A") * _largest(found, "laminate/D")) ** 0.5)
+        case Scale.INTERLAMINAR:
+            return max(_largest(found, "plies/tau_xz"), _largest(found, "plies/tau_yz"))
+        case Scale.RESULTANT:
+            couples = _largest_of(found, COUPLES) * _inverse_thickness(found)
+            return max(_largest_of(found, RESULTANTS), couples)
+        case Scale.STRAIN:
+            ratio = _inverse_thickness(found)
+            bending = _largest_of(found, CURVATURES) / ratio if ratio else 0.0
+            return max(_largest_of(found, STRAINS), bending)
+        case Scale.CONTACT:
+            group = found.path.partition("/")[0]
+            # A tape has few digits of every number, also in free flight.
+            known = all(f"{group}/step" in source.shapes for source in found.sources)
+            return _largest(found, found.path, above=0.0) if known else 0.0
 
-    def largest(path: str, low: float = -np.inf) -> float:
-        size = 0.0
-        for source in found.sources:
-            if path in source.shapes and source.dtypes[path].kind != "O":
-                for rows in row_blocks(source.shapes[path]):
-                    block = source.rows(path, *rows)
-                    counted = np.abs(block[np.isfinite(block) & (block > low)])
-                    size = max(size, float(counted.max(initial=0.0)))
-        return size
 
-    if found.path not in SCALE_NAMES:
-        return found.maximum
-    group, _, name = found.path.partition("/")
-    if found.path == "energy/balance_error":
-        files = (source for source in found.sources if isinstance(source, Contents))
-        initial = (file.groups.get("energy", {}).get("initial") for file in files)
-        known = (abs(e) for e in initial if isinstance(e, int | float) and np.isfinite(e))
-        scale = max(known, default=0.0) + largest("energy/external_work")
-    elif found.path == "plies/residual":
-        scale = max(largest("plies/tau_xz"), largest("plies/tau_yz"))
-    elif found.path == "laminate/B":
-        # With the thickness h, A h and D / h have the order of B.
-        scale = (largest("laminate/A") * largest("laminate/D")) ** 0.5
-    elif group == "stresses":
-        kind = "N" if name in MEMBRANE["N"] else "eps"
-        membrane = max(largest(f"stresses/{name}") for name in MEMBRANE[kind])
-        bending = max(largest(f"stresses/{name}") for name in BENDING[kind])
-        # sqrt(A/D) is of the order of 1/h.
-        ratio = (largest("laminate/A") / (largest("laminate/D") or np.inf)) ** 0.5
-        scale = max(membrane, bending * ratio if kind == "N" else ratio and bending / ratio)
-    elif all(f"{group}/step" in source.shapes for source in found.sources):
-        scale = largest(found.path, 0.0)
-    else:
-        scale = 0.0  # a tape has few digits of every number, also in free flight
-    return scale or found.maximum
+def _largest(found: Comparison, path: str, above: float = -np.inf) -> float:
+    """Largest finite absolute value of a dataset in both sources, of the numbers above a limit."""
+    size = 0.0
+    for source in found.sources:
+        if path in source.shapes and source.dtypes[path].kind != "O":
+            for rows in row_blocks(source.shapes[path]):
+                block = source.rows(path, *rows)
+                counted = np.abs(block[np.isfinite(block) & (block > above)])
+                size = max(size, float(counted.max(initial=0.0)))
+    return size
+
+
+def _largest_of(found: Comparison, names: Sequence[str]) -> float:
+    """Largest value of some of the resultants and strains that STRE stores."""
+    return max(_largest(found, f"stresses/{name}") for name in names)
+
+
+def _inverse_thickness(found: Comparison) -> float:
+    """sqrt(A/D), which is of the order of 1/h; 0 if it is not known."""
+    bending = _largest(found, "laminate/D") or np.inf
+    return float((_largest(found, "laminate/A") / bending) ** 0.5)
+
+
+def _initial_energy(found: Comparison) -> float:
+    """Largest initial energy of both files; 0 if it is not known."""
+    files = (source for source in found.sources if isinstance(source, Contents))
+    initial = (file.groups.get("energy", {}).get("initial") for file in files)
+    known = (abs(e) for e in initial if isinstance(e, int | float) and np.isfinite(e))
+    return max(known, default=0.0)
 
 
 def _measure(found: Comparison) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,65 +10,88 @@ from fecm._typing import Bools, Floats
 from fecm.results.criteria import ALL_CRITERIA, spelt
 from fecm.results.end import Texts, decided, ends, over, peak_known
 
-# Description and dimension of every quantity, by name.
+
+class Quantity(NamedTuple):
+    """A column of numbers."""
+
+    description: str
+    dimension: str = ""  # physical dimension; may be empty
+
+
+# Those of every case.
 SUMMARY = {
-    "peak_force": ("largest contact force", "force"),
-    "time_of_peak": ("time of the largest contact force", "time"),
-    "contacts": ("number of contacts", ""),
-    "contact_time": ("time in contact", "time"),
-    "last_contact": ("time of the last step in contact", "time"),
-    "max_indentation": ("largest indentation", "length"),
-    "permanent_indentation": ("permanent indentation", "length"),
-    "impulse": ("time integral of the contact force", "force*time"),
-    "rebound_velocity": (
+    "peak_force": Quantity("largest contact force", "force"),
+    "time_of_peak": Quantity("time of the largest contact force", "time"),
+    "contacts": Quantity("number of contacts"),
+    "contact_time": Quantity("time in contact", "time"),
+    "last_contact": Quantity("time of the last step in contact", "time"),
+    "max_indentation": Quantity("largest indentation", "length"),
+    "permanent_indentation": Quantity("permanent indentation", "length"),
+    "impulse": Quantity("time integral of the contact force", "force*time"),
+    "rebound_velocity": Quantity(
         "velocity of the projectile's centre at the end, positive away from the plate",
         "length/time",
     ),
-    "energy_absorbed": (
+    "energy_absorbed": Quantity(
         "kinetic energy that the projectile's centre has lost at the end: left in the vibration "
         "of the plate, the indentation and the projectile",
         "force*length",
     ),
-}  # fmt: skip
+}
 # Those of decks with a delamination threshold.
 THRESHOLD = {
-    "threshold_force": ("delamination threshold", "force"),
-    "threshold_margin": ("1 less the largest contact force over the threshold", ""),
-    "threshold_time": ("time at which the contact force first reaches the threshold", "time"),
-    "time_above": ("time at or above the threshold", "time"),
+    "threshold_force": Quantity("delamination threshold", "force"),
+    "threshold_margin": Quantity("1 less the largest contact force over the threshold"),
+    "threshold_time": Quantity(
+        "time at which the contact force first reaches the threshold", "time"
+    ),
+    "time_above": Quantity("time at or above the threshold", "time"),
 }
 # All of a run.
 METRICS = {
     **SUMMARY,
-    "max_deflection": ("largest displacement of the plate under the load", "length"),
+    "max_deflection": Quantity("largest displacement of the plate under the load", "length"),
     **THRESHOLD,
 }
-# Those of a search for velocities, and all of a sweep.
+INTEGERS = ("contacts",)
+# Those of a search for velocities.
 FOUND = {
-    "found_velocity": ("velocity at which the value searched for is reached", "length/time"),
-    "found_energy": ("kinetic energy of the projectile at that velocity", "force*length"),
+    "found_velocity": Quantity(
+        "velocity at which the value searched for is reached", "length/time"
+    ),
+    "found_energy": Quantity("kinetic energy of the projectile at that velocity", "force*length"),
 }
-# Those of a sweep that are measured on request; and the place that is hit instead of the one given.
+# Those of a sweep that are measured on request.
 EXPOSURES = {
-    f"exposure_{name}": (f"largest exposure {spelt(name)} outside the load", "")
+    f"exposure_{name}": Quantity(f"largest exposure {spelt(name)} outside the load")
     for name in ALL_CRITERIA
 }
-EVALUATIONS = {"fail_evaluations": ("evaluations of FAIL during contact", "")}
-HIT = {f"hit_{axis}": (f"{axis} of the impact node or of the patch", "length") for axis in "xy"}
+EVALUATIONS = {
+    "fail_evaluations": Quantity("evaluations of FAIL during contact"),
+}
+# The place that is hit instead of the one given.
+HIT = {
+    "hit_x": Quantity("x of the impact node or of the patch", "length"),
+    "hit_y": Quantity("y of the impact node or of the patch", "length"),
+}
 RATIO = "deflection_ratio"
-RATIOS = {RATIO: ("largest displacement of the plate under the load over its thickness", "")}
+RATIOS = {
+    RATIO: Quantity("largest displacement of the plate under the load over its thickness"),
+}
+# All of a sweep; gages have one each, whose name begins with GAGE.
 COLUMNS = {**METRICS, **FOUND, **EXPOSURES, **EVALUATIONS, **HIT, **RATIOS}
-# Columns of texts: whether a case was run, and whether its result is valid.
-STATUS, VALIDITY = VERDICTS = "status", "validity"
 GAGE = "gage_"
-INTEGERS = ("contacts",)
+# Columns of texts: whether a case was run, and whether its result is valid.
+STATUS = "status"
+VALIDITY = "validity"
+VERDICTS = (STATUS, VALIDITY)
 
 
 def described(name: str) -> str:
     """Description of a column of a sweep."""
     if name.startswith(GAGE):
         return f"largest absolute strain of gage {name.removeprefix(GAGE)}"
-    return COLUMNS.get(name, ("measured by the caller",))[0]
+    return COLUMNS[name].description if name in COLUMNS else "measured by the caller"
 
 
 MOBILITY = "rigid_mobility"  # attribute of a run whose plate is not held; see `Judge`
@@ -86,15 +109,15 @@ class Indentation(NamedTuple):
 class Projectiles(NamedTuple):
     """Mass and impact velocity of the projectiles of cases: numbers, or (cases,)."""
 
-    mass: Any
-    velocity: Any
+    mass: Floats | float
+    velocity: Floats | float
 
 
 class Metrics(NamedTuple):
     """Metrics of cases, and what their ends have decided."""
 
     columns: dict[str, Floats]  # (cases,) each; NaN where the end of the case has not decided them
-    end: Texts  # (cases,): state of the contact at the end, :class:`~fecm.results.validity.End`
+    end: Texts  # (cases,): state of the contact at the end, :class:`~fecm.results.end.End`
     reached: Floats  # (cases,): largest contact force up to the end, a lower bound of the peak
 
 

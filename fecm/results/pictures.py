@@ -11,9 +11,18 @@ if TYPE_CHECKING:
 
 # Kinds of pictures of a run.
 RunKind = Literal[
-    "force", "loop", "energy", "strain", "thickness", "failure", "line", "contour", "surface",
-    "mesh", "animation",
-]  # fmt: skip
+    "force",
+    "loop",
+    "energy",
+    "strain",
+    "thickness",
+    "failure",
+    "line",
+    "contour",
+    "surface",
+    "mesh",
+    "animation",
+]
 
 
 def plot(

@@ -66,9 +66,11 @@ _Strain = Annotated[Floats, "rows numel npt"]
 _Stress = Annotated[Floats, "rows numel nps"]
 _InPlane = Annotated[Floats, "rows members npp layers faces"]
 _Interlaminar = Annotated[
-    Floats, "rows members layers levels", "interlaminar shear stress at the element's centre",
+    Floats,
+    "rows members layers levels",
+    "interlaminar shear stress at the element's centre",
     "force/length^2",
-]  # fmt: skip
+]
 
 
 class Rows(Group):
@@ -120,9 +122,11 @@ class Tape3(Rows):
 
     w: Annotated[Floats, "rows numnp", "transverse displacement of every node", "length"]
     displacement: Annotated[
-        Floats, "rows numnp ndf", "u, v, w and the rotations theta_x, theta_y of every node",
+        Floats,
+        "rows numnp ndf",
+        "u, v, w and the rotations theta_x, theta_y of every node",
         "length (u, v, w), 1 (theta_x, theta_y)",
-    ]  # fmt: skip
+    ]
 
 
 class Tape8(Rows):
@@ -209,18 +213,21 @@ class PlyRows(Rows):
     element: Annotated[Int32s, "members", "number of every element with ply stresses"]
     z: Annotated[Floats, "layers levels", "lower, middle and upper z of every ply", "length"]
     under_load: Annotated[
-        Int32s, "members",
+        Int32s,
+        "members",
         "1 where plate theory does not hold: within the patch's radius + h/2 of the load",
-    ]  # fmt: skip
+    ]
     sigma_1: Annotated[_InPlane, "normal stress along the fibres, at both faces", "force/length^2"]
     sigma_2: Annotated[_InPlane, "normal stress across the fibres", "force/length^2"]
     tau_12: Annotated[_InPlane, "shear stress in the axes of the ply", "force/length^2"]
     tau_xz: _Interlaminar
     tau_yz: _Interlaminar
     residual: Annotated[
-        Floats, "rows members directions",
-        "tau_xz and tau_yz of equilibrium at z = h/2, removed linearly in z", "force/length^2",
-    ]  # fmt: skip
+        Floats,
+        "rows members directions",
+        "tau_xz and tau_yz of equilibrium at z = h/2, removed linearly in z",
+        "force/length^2",
+    ]
 
 
 class Exposure(Group):
@@ -240,9 +247,10 @@ class Failure(Group):
     x: Annotated[Floats, "numel npp", "x of every point of every element", "length"]
     y: Annotated[Floats, "numel npp", "y of every point of every element", "length"]
     under_load: Annotated[
-        Int32s, "numel npp",
+        Int32s,
+        "numel npp",
         "1 where plate theory does not hold: nearer than the patch's radius + h/2 to the load",
-    ]  # fmt: skip
+    ]
     max_stress: _PlyExposure
     tsai_wu: _PlyExposure
     hashin: _PlyExposure
@@ -266,10 +274,11 @@ class Reactions(Rows):
     """Forces of the supports, stored by REAC."""
 
     force: Annotated[
-        Floats, "rows numnp ndf",
+        Floats,
+        "rows numnp ndf",
         "internal less applied force of every unknown: forces of the supports",
         "force (u, v, w), force*length (theta_x, theta_y)",
-    ]  # fmt: skip
+    ]
 
 
 class Modes(Rows):
@@ -304,7 +313,8 @@ def _datasets(group: str, kind: type[Group], outer: str = "") -> Iterator[Datase
     """Datasets of a group, of these sizes unless they have their own."""
     for base in reversed(kind.__mro__):
         for name, column in getattr(base, "__annotations__", {}).items():
-            path, (sizes, *about) = f"{group}/{name}", column.__metadata__
+            path = f"{group}/{name}"
+            sizes, *about = column.__metadata__
             if column.__origin__ is Exposure:
                 yield from _datasets(path, Exposure, sizes)
             else:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fecm._typing import Floats
 from fecm.deck import model
 from fecm.deck.macros import WORDS
-from fecm.deck.records import DOF_NAMES
+from fecm.deck.records import DOF_NAMES, Macro
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.strains import GENERALISED_STRAINS, RESULTANTS
@@ -74,26 +74,35 @@ class Printer:
         if not self.is_on:
             return
         self._title = deck.title
-        c = deck.control
+        control = deck.control
         counts = {
-            "Nodes": c.numnp, "Elements": c.numel, "Layers": c.layers,
-            "Dimensions of space": c.ndm, "Dofs per node": c.ndf, "Largest number of nodes": c.nen,
-        }  # fmt: skip
+            "Nodes": control.numnp,
+            "Elements": control.numel,
+            "Layers": control.layers,
+            "Dimensions of space": control.ndm,
+            "Dofs per node": control.ndf,
+            "Largest number of nodes": control.nen,
+        }
         self._page("Control information", _values(counts))
         echo = True
         for segment in deck.segments:
-            if isinstance(segment, model.PrintOption):
-                echo = segment.on
-            elif isinstance(segment, model.Page):
-                self._control = segment.carriage_control
-            else:
-                self._segment(segment, mesh, plate, echo)
+            match segment:
+                case model.PrintOption():
+                    echo = segment.on
+                case model.Page():
+                    self._control = segment.carriage_control
+                case _:
+                    self._segment(segment, mesh, plate, echo)
         if echo:
             self._page("Equation numbers")
             self._nodes(mesh.equations)
+        self._program(deck.macros)
+
+    def _program(self, macros: Iterable[Macro]) -> None:
+        """Echo the macro program, its loops indented."""
         self._page("Macro program")
         depth = 0
-        for macro in deck.macros:
+        for macro in macros:
             depth -= macro.word == "NEXT"
             value = f"{macro.value:g}" if macro.value else ""
             word = "  " * max(0, depth) + macro.word
@@ -108,14 +117,7 @@ class Printer:
             case model.Material():
                 self._material(segment, plate)
             case model.Indentation():
-                law = build_constants(segment)
-                values: dict[str, float | str] = {
-                    "Contact coefficient k": law.k,
-                    f"Critical indentation alpha_{'cr' if segment.word else 'p'}": segment.alpha_p,
-                    **({} if segment.word else {"Constant s_p": segment.s_p}),
-                    "Power of the unloading law q": law.q,
-                }
-                self._page("Indentation law", _values(values))
+                self._indentation(segment)
             case model.Impact():
                 dof = f"{segment.dof:8d} ({DOF_NAMES[segment.dof - 1]})"
                 values = {"Node": segment.node, "Dof": dof, "Approach velocity": segment.velocity}
@@ -133,6 +135,17 @@ class Printer:
             case model.Forces() if echo:
                 self._page("Nodal forces and displacements")
                 self._nodes(mesh.forces, only=(mesh.forces != 0).any(axis=1))
+
+    def _indentation(self, segment: model.Indentation) -> None:
+        law = build_constants(segment)
+        values: dict[str, float | str] = {"Contact coefficient k": law.k}
+        if segment.word:
+            values["Critical indentation alpha_cr"] = segment.alpha_p
+        else:
+            values["Critical indentation alpha_p"] = segment.alpha_p
+            values["Constant s_p"] = segment.s_p
+        values["Power of the unloading law q"] = law.q
+        self._page("Indentation law", _values(values))
 
     def _nodes(self, values: NDArray[np.generic], only: NDArray[np.bool_] | None = None) -> None:
         """A table of every dof of every node, or of some nodes."""
