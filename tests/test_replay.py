@@ -16,7 +16,7 @@ from fecm.mechanics.impact import ImpactSystem
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.results.result import Result
 from fecm.results.tapes import tape_texts
-from fecm.simulation.simulation import restore, save
+from fecm.simulation.saved import restore, save
 from fecm.verification.decks import result_of, struck_plate
 from tests.decks import APPENDIX, DATA, LONG, ready
 

@@ -147,13 +147,15 @@ def read(path: Path, *forms: str) -> Contents:
         if DECK.search(opened.read(FIRST)):
             raise ResultFileError(f"{path} is a deck, not a result; `fecm run {path}` makes one")
     with _troubles(path), h5py.File(path) as file:
-        attributes, forms = _attributes(file), forms or (Form.RUN,)
-        form, version = attributes.get("format"), attributes.get("format_version")
-        if form not in forms:
+        attributes = _attributes(file)
+        form = attributes.get("format")
+        version = attributes.get("format_version")
+        wanted = forms or (Form.RUN,)
+        if form not in wanted:
             what = "not a result of fecm"
             if form in (Form.RUN, Form.SWEEP):
-                wanted = " or ".join(RESULT_OF[one] for one in forms)
-                what = f"the result of {RESULT_OF[form]}, not of {wanted}"
+                asked = " or ".join(RESULT_OF[one] for one in wanted)
+                what = f"the result of {RESULT_OF[form]}, not of {asked}"
             raise ResultFileError(f"{path}: this HDF5 file is {what}")
         if version != FORMAT_VERSION:
             raise ResultFileError(f"{path}: format version {version} is not {FORMAT_VERSION}")

@@ -134,7 +134,9 @@ class FileSink:
     def trim(self, path: str, rows: int) -> None:
         """Truncate a dataset to its first rows; delete it, or an empty group, without any."""
         old = self.arrays.pop(path)
-        group, attributes, kept = old.parent, dict(old.attrs), old[:rows]
+        group = old.parent
+        attributes = dict(old.attrs)
+        kept = old[:rows]
         del self._file[path]
         if rows:
             self.arrays[path] = made = self._file.create_dataset(path, data=kept)

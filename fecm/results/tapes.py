@@ -81,7 +81,9 @@ def _strain_lines(columns: Sequence[Array]) -> Iterator[str]:
 
 def tape_texts(result: Result) -> dict[str, Iterator[str]]:
     """Lines of every tape that the run stored, by name."""
-    strains, contact = ("tape9", "tape8") if result.has_listing_tapes else ("tape8", "tape9")
+    strains, contact = "tape8", "tape9"
+    if result.has_listing_tapes:
+        strains, contact = contact, strains
 
     def columns(group: str, names: Iterable[str]) -> list[Array]:
         paths = [f"{group}/{name}" for name in names]
@@ -166,11 +168,15 @@ def read_tapes(folder: Path) -> TapeText:
             arrays[W], lines = _displacements(text)
             continue
         if text.labelled:
-            kind, group, names = "strains", "tape8", [*CURVATURES, *SHEARS[name]]
+            kind = "strains"
+            group = "tape8"
+            names = [*CURVATURES, *SHEARS[name]]
             table = _strains(text)
         else:
-            kind, group, names = "contact", "tape9", [*CONTACT]
-            table = text.table(0, len(names), kind)
+            kind = "contact"
+            group = "tape9"
+            names = [*CONTACT]
+            table = text.table(lead=0, width=len(names), what=kind)
         if any(path.startswith(group) for path in arrays):
             raise ResultFileError(f"{folder}: tape8 and tape9 both hold {kind}")
         arrays |= {f"{group}/{one}": table[..., i].copy() for i, one in enumerate(names)}
@@ -233,7 +239,7 @@ class _Lines:
                 found.append(value)
         return np.array(found)
 
-    def require_complete(self, complete: Any) -> None:
+    def require_complete(self, complete: bool) -> None:
         """Require that the last line ends a row."""
         if not complete:
             raise ResultFileError(f"{self.path}:{len(self.lines)}: the last row is not complete")
@@ -265,13 +271,13 @@ def _displacements(text: _Lines) -> tuple[Array, bool]:
     wrong = np.zeros(len(counts), dtype=bool)
     wrong[ends] = (lengths != lengths[0]) | (counts[ends] != counts[ends[0]])
     text.refuse(wrong, "the row that ends here differs in length from the first")
-    text.require_complete(ends[-1] == len(counts) - 1)
+    text.require_complete(bool(ends[-1] == len(counts) - 1))
     return values.reshape(len(ends), -1), False
 
 
 def _strains(text: _Lines) -> Floats:
     """Table of the strain tape, (rows, elements, points, 5)."""
-    table = text.table(2 * PER_LINE, 5, "strains")
+    table = text.table(lead=2 * PER_LINE, width=5, what="strains")
     pairs = [(line[:6], line[6:12]) for line in text.lines]
     unlabelled = [not all(map(_LABELS.fullmatch, pair)) for pair in pairs]
     text.refuse(np.array(unlabelled), "a line of strains begins with its element and point")

@@ -8,6 +8,7 @@ n - 1 is node n, cell n - 1 element n.
 from __future__ import annotations
 
 from collections.abc import Callable
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,16 @@ from fecm.results.result import Result
 from fecm.results.vtk_cells import Ints, vtk_cells
 
 Note = Callable[[str], None]
+
+
+class At(StrEnum):
+    """What a field belongs to, as VTKHDF names it."""
+
+    POINTS = "Point"
+    CELLS = "Cell"
+    TIME = "Field"  # a number per time step
+
+
 
 VERSION = (2, 2)
 # Numbers of points that are the first nodes of an element (K = -2: corners, K = -3: nine).
@@ -78,13 +89,13 @@ def _write_mesh(root: h5py.Group, result: Result, times: Array) -> None:
     clock["CellOffsets"] = clock["ConnectivityIdOffsets"] = zeros[:, None]
 
 
-def _field(root: h5py.Group, kind: str, name: str, steps: int, shape: tuple[int, ...]) -> Any:
+def _field(root: h5py.Group, at: At, name: str, steps: int, shape: tuple[int, ...]) -> Any:
     """Create a field with an array of `shape` per step, concatenated."""
-    data = root.require_group(f"{kind}Data")
+    data = root.require_group(f"{at}Data")
     dataset = data.create_dataset(name, (steps * shape[0], *shape[1:]), "f8")
     offsets = np.arange(steps, dtype="i8") * shape[0]
-    root.require_group(f"Steps/{kind}DataOffsets")[name] = offsets
-    if kind == "Field":
+    root.require_group(f"Steps/{at}DataOffsets")[name] = offsets
+    if at is At.TIME:
         sizes = np.tile(np.array([1, shape[0]], dtype="i8"), (steps, 1))
         root.require_group("Steps/FieldDataSizes")[name] = sizes
     return dataset
@@ -96,7 +107,7 @@ def _write_displacements(root: h5py.Group, stored: Array, rows: Ints) -> None:
     parts: dict[str, Any] = {"displacement": slice(3), "w": 2, "rotation": slice(3, ndf)}
     one = np.empty((numnp, ndf))
     fields = [
-        (_field(root, "Point", name, len(rows), one[:, columns].shape), columns)
+        (_field(root, At.POINTS, name, len(rows), one[:, columns].shape), columns)
         for name, columns in parts.items()
         if one[:, columns].size
     ]
@@ -115,7 +126,7 @@ def _write_contact(root: h5py.Group, result: Result, steps: Ints) -> None:
     for name in CONTACT:
         values = np.concatenate((result[f"history/{name}"], [0.0]))
         at_step = np.where(steps > 0, values[np.minimum(at, len(values) - 1)], 0.0)
-        _field(root, "Field", name, len(steps), (1,))[:] = at_step
+        _field(root, At.TIME, name, len(steps), (1,))[:] = at_step
 
 
 def _write_strains(root: h5py.Group, result: Result, steps: Ints, note: Note) -> None:
@@ -126,16 +137,17 @@ def _write_strains(root: h5py.Group, result: Result, steps: Ints, note: Note) ->
     at, shared = _rows_of(result, "tape8", steps, "strains", note)
     if not shared.any():
         return
-    elements, numnp = result["mesh/elements"], len(result["mesh/coordinates"])
+    elements = result["mesh/elements"]
+    numnp = len(result["mesh/coordinates"])
     npt = result["tape8/kappa_x"].shape[2]
     all_nodes = npt in NODAL_POINTS and not (elements[:, npt:] > 0).any()
     at_nodes = all_nodes and result.tape8.attributes.get("location") == "nodes"
-    kind, length = ("Point", numnp) if at_nodes else ("Cell", len(elements))
+    length = numnp if at_nodes else len(elements)
     there = elements[:, :npt] > 0
     points = elements[:, :npt][there] - 1
     shares = np.bincount(points, minlength=numnp)  # elements at each node
     for name in STRAINS:
-        field = _field(root, kind, name, len(steps), (length,))
+        field = _field(root, At.POINTS if at_nodes else At.CELLS, name, len(steps), (length,))
         values = result[f"tape8/{name}"]
         for number in range(len(steps)):
             row = values[at[number]] if shared[number] else np.full(values.shape[1:], np.nan)
@@ -169,13 +181,14 @@ def _write_plies(root: h5py.Group, result: Result, steps: Ints, note: Note) -> N
     at, shared = _rows_of(result, "plies", steps, "ply stresses", note)
     if not shared.any():
         return
-    cells, length = result["plies/element"] - 1, len(result["mesh/elements"])
+    cells = result["plies/element"] - 1
+    length = len(result["mesh/elements"])
     if not 0 <= cells.min() <= cells.max() < length:
         raise ExportError(f"elements outside 1 to {length} have ply stresses")
     for name in (*IN_PLANE, *INTERLAMINAR):
         values = result[f"plies/{name}"]
-        largest = _field(root, "Cell", name, len(steps), (length,))
-        ply = _field(root, "Cell", f"{name}_ply", len(steps), (length,))
+        largest = _field(root, At.CELLS, name, len(steps), (length,))
+        ply = _field(root, At.CELLS, f"{name}_ply", len(steps), (length,))
         for number in range(len(steps)):
             step = np.full((2, length), np.nan)
             if shared[number]:

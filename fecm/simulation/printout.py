@@ -120,7 +120,11 @@ class Printer:
                 self._indentation(segment)
             case model.Impact():
                 dof = f"{segment.dof:8d} ({DOF_NAMES[segment.dof - 1]})"
-                values = {"Node": segment.node, "Dof": dof, "Approach velocity": segment.velocity}
+                values: dict[str, float | str] = {
+                    "Node": segment.node,
+                    "Dof": dof,
+                    "Approach velocity": segment.velocity,
+                }
                 self._page("Impact", _values(values))
             case model.Coordinates() if echo:
                 self._page("Nodal coordinates")

@@ -17,6 +17,7 @@ from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR
 from fecm.results.groups import STORED_BY
 from fecm.results.schema import DATASETS, FIXED, Dataset
 from fecm.results.sinks import RowBuffer, Sink
+from fecm.simulation.saved import subset
 from fecm.simulation.step_recorder import EVERY_STEP, OnBlock, StepRecorder
 
 Steps = Sequence[int]  # of rows
@@ -180,8 +181,3 @@ class Recorder:
             room, rows = self._room.get(dataset.group, 0), stored.get(dataset.group, 0)
             if room > rows and dataset.shape[0] == "rows":
                 self._sink.trim(dataset.path, rows)
-
-
-def subset(stored: Mapping[str, Any], prefix: str) -> dict[str, Any]:
-    """Return the entries whose names have a prefix, without it."""
-    return {n.removeprefix(prefix): v for n, v in stored.items() if n.startswith(prefix)}

@@ -1,0 +1,60 @@
+"""State of a run as values and arrays by path, for its checkpoint."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+
+def _names(value: object) -> tuple[str, ...]:
+    """Names of the fields of a dataclass or named tuple."""
+    if dataclasses.is_dataclass(value):
+        return tuple(f.name for f in dataclasses.fields(value) if f.init)
+    return getattr(value, "_fields", ())
+
+
+def save(value: object, path: str, seen: set[int] | None = None) -> dict[str, Any]:
+    """Values and arrays of a dataclass and its members, by path; shared members only once."""
+    names = _names(value)
+    seen = set() if seen is None else seen
+    if not names:
+        return {path: value.copy() if isinstance(value, np.ndarray) else value}
+    if id(value) in seen:
+        return {}
+    seen.add(id(value))
+    members = (save(getattr(value, name), f"{path}/{name}", seen) for name in names)
+    return {name: one for member in members for name, one in member.items()}
+
+
+def restore(value: Any, path: str, stored: Mapping[str, Any], seen: set[int] | None = None) -> Any:
+    """Set a dataclass to the state that :func:`save` returned for another of the same type.
+
+    Returns the value; dataclasses and arrays are changed in place where they can be.
+    """
+    names = _names(value)
+    seen = set() if seen is None else seen
+    if not names:
+        new = stored[path]
+        if not isinstance(value, np.ndarray):
+            return new
+        if new.shape != value.shape or new.dtype != value.dtype:
+            raise ValueError(f"{path} has another shape or type")
+        value[...] = new
+        return value
+    if id(value) in seen:
+        return value
+    seen.add(id(value))
+    new = {name: restore(getattr(value, name), f"{path}/{name}", stored, seen) for name in names}
+    if isinstance(value, tuple) or "__setattr__" in vars(type(value)):  # frozen
+        return type(value)(**new)
+    for name, one in new.items():
+        setattr(value, name, one)
+    return value
+
+
+def subset(stored: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    """Return the entries whose names have a prefix, without it."""
+    return {n.removeprefix(prefix): v for n, v in stored.items() if n.startswith(prefix)}

@@ -1,0 +1,103 @@
+"""State of a run, and the monitor of its energies and forces."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.mechanics.impact import ImpactState
+from fecm.mechanics.plate_motion import DivergenceError, PlateState
+from fecm.mechanics.ply_stresses import FailureEnvelope
+from fecm.problem.build import Threshold
+from fecm.simulation.step_recorder import Columns
+
+TOLERANCE = 1.0e-9  # relative change of the displacement below which CONV leaves its loop
+
+
+@dataclass
+class Monitor:
+    """Energy balance and largest contact force of the steps so far."""
+
+    # Largest and last work of the nodal forces, and its largest change in a step (force*length).
+    largest_work: float = 0.0
+    last_work: float = 0.0
+    largest_jump: float = 0.0
+    worst_error: float = 0.0  # largest error, relative to the supplied energy
+    worst_step: int = 0  # its step
+    peak_force: float = 0.0  # largest contact force
+    crossing: float = math.nan  # when it first reached the delamination threshold
+
+    def add(
+        self, block: Columns, initial: float, limit: float | None, threshold: Threshold | None
+    ) -> None:
+        """Add a block of steps; `initial` is the energy before the first.
+
+        The error is relative to the energy supplied up to the end of the block: in its first steps
+        a load has done almost no work.  The work of one step is not counted as an error: the work
+        belongs to the step, the energies to its end.  Raises DivergenceError if the energy is not
+        finite, or the error exceeds the limit, if there is one.
+        """
+        lost = ~np.isfinite(block["held_energy"])
+        if lost.any():
+            step = int(block["step"][np.flatnonzero(lost)[0]])
+            raise DivergenceError(step, "the motion is no longer finite")
+        if threshold is not None:
+            self._add_force(block, threshold)
+        self._add_work(block["external_work"])
+        supplied = initial + self.largest_work
+        if not supplied > 0.0:
+            return
+        error = np.maximum(np.abs(block["balance_error"]) - self.largest_jump, 0.0) / supplied
+        row = int(error.argmax())
+        if error[row] > self.worst_error:
+            self.worst_error = float(error[row])
+            self.worst_step = int(block["step"][row])
+        if limit is not None and error[row] > limit:
+            row = int(np.flatnonzero(error > limit)[0])
+            off = f"the energy balance is off by {error[row]:.2%} of the supplied energy"
+            reason = f"{off}, more than the limit of {limit:.3g}"
+            raise DivergenceError(int(block["step"][row]), reason)
+
+    def _add_force(self, block: Columns, threshold: Threshold) -> None:
+        """Add the contact forces of a block."""
+        self.peak_force = max(self.peak_force, float(block["force"].max()))
+        above = np.flatnonzero(block["force"] >= threshold.force)
+        if len(above) and math.isnan(self.crossing):
+            self.crossing = float(block["time"][above[0]])
+
+    def _add_work(self, work: Floats) -> None:
+        """Add the work of the nodal forces up to each step of a block."""
+        self.largest_work = max(self.largest_work, float(np.abs(work).max()))
+        jump = float(np.abs(np.diff(work, prepend=self.last_work)).max())
+        self.largest_jump = max(self.largest_jump, jump)
+        self.last_work = float(work[-1])
+
+
+@dataclass
+class RunState:
+    """State passed from one macro to the next; a checkpoint stores every field."""
+
+    plate: PlateState
+    impact: ImpactState | None = None  # plate, projectile and contact; shares `plate`
+    # The interpreter's position; empty before the first macro.
+    position: list[tuple[int, int]] = field(default_factory=list)
+    dt: float = 0.0  # time step
+    clock: float = 0.0  # time that TIME advances
+    load_clock: float = 0.0  # clock at the plate's last central difference
+    constant_factor: float = 1.0  # load factor without a table
+    table: int | None = None  # index of the current table of proportional loads
+    tables_read: int = 0  # tables that PROP has read
+    tolerance: float = TOLERANCE  # tolerance of CONV
+    consistent_mass: bool = False  # whether CMAS came after LMAS
+    factorised: bool = False  # whether TANG was carried out
+    converged: bool = False  # whether the last SOLV met the tolerance
+    residual: Floats | None = None  # (neq,): load less internal force, formed by FORM
+    steps_since_output: int = 0  # impact steps since the last output (the slip ``counter``)
+    prop_force: float | None = None  # instead of the contact force (the slip ``prop-contact``)
+    first_dt: float | None = None  # time step of the rod's constants
+    monitor: Monitor = field(default_factory=Monitor)
+    failure: FailureEnvelope | None = None  # largest exposures so far, of FAIL
+    notes: list[str] = field(default_factory=list)  # remarks for the user
