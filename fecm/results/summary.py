@@ -8,21 +8,26 @@ from typing import Any
 
 import numpy as np
 
+from fecm._typing import Floats
 from fecm.deck.units import quantity as shown_quantity
 from fecm.results.criteria import spelt, where
 from fecm.results.end import End
 from fecm.results.exposures import LargestExposure, evaluations_in_contact, largest_exposures
-from fecm.results.first_failure import failure_metrics, first_failures
+from fecm.results.first_failure import FirstFailure, failure_metrics, first_failures
 from fecm.results.result import Result
 from fecm.results.validity import CROSSED
 
-LEFT = "left in plate, indentation and projectile"
 LISTED = 6  # most contacts and frequencies listed individually
 # Where a run has ended that has not decided its peak.
 UNDECIDED = {
     End.RISING: "in contact",
     End.BETWEEN: "between two contacts",
 }
+
+
+def _line(name: str, text: str) -> str:
+    """A line of the summary."""
+    return f"{name:18}{text}"
 
 
 def summary(result: Result) -> list[str]:
@@ -32,24 +37,24 @@ def summary(result: Result) -> list[str]:
     clock = "history/time" if "history/force" in result else "energy/time"
     if clock in result:
         time = result[clock]
-        lines.append(f"steps             {len(time)}, up to time {quantity(time[-1], 'time')}")
+        lines.append(_line("steps", f"{len(time)}, up to time {quantity(time[-1], 'time')}"))
     if "history/force" in result:
         lines += _impact(result)
     elif "tape3/w" in result and (w := result["tape3/w"]).any():
         row, node = np.unravel_index(int(np.abs(w).argmax()), w.shape)
-        lines.append(f"largest w         {quantity(w[row, node], 'length')} at node {node + 1}")
+        lines.append(_line("largest w", f"{quantity(w[row, node], 'length')} at node {node + 1}"))
     elif "tape3/w" in result:
-        lines.append("largest w         0: nothing moved the plate")
+        lines.append(_line("largest w", "0: nothing moved the plate"))
     if result.threshold:
-        lines.append(f"delamination      {_delamination(result)}{_delaminations(result)}")
+        lines.append(_line("delamination", f"{_delamination(result)}{_delaminations(result)}"))
     lines += _exposures(result)
     if "failure/x" in result and (count := np.count_nonzero(result["failure/under_load"])):
-        lines.append(f"under the load    {count} points are left out of these exposures")
+        lines.append(_line("under the load", f"{count} points are left out of these exposures"))
     if "modes/angular_frequency" in result:
         found = result["modes/angular_frequency"]
         texts = ", ".join(f"{omega:.6g}" for omega in found[:LISTED])
         more = f" and {len(found) - LISTED} more" if len(found) > LISTED else ""
-        lines.append(f"frequencies       {texts}{more} {result.unit('1/time')}".rstrip())
+        lines.append(_line("frequencies", f"{texts}{more} {result.unit('1/time')}".rstrip()))
     return lines or ["nothing was stored"]
 
 
@@ -81,31 +86,37 @@ def _exposures(result: Result) -> list[str]:
         lines.append(f"{_exposure(result, exposure)}{known}")
     count = evaluations_in_contact(result)
     if count is not None and "history/force" in result:
-        lines.append(f"evaluations       {count} of FAIL during contact")
+        lines.append(_line("evaluations", f"{count} of FAIL during contact"))
     if first:
-        one, rounded = first[0], partial(_rounded, result)
-        texts = [
-            f"{one.mode} ({spelt(one.criterion)})",
-            f"{one.where} at ({one.x:.6g}, {one.y:.6g})",
-            f"time {rounded(one.time, 'time')}, between {one.earliest:.4g} and {one.latest:.4g}",
-        ]
-        if one.criterion in reached:
-            texts.append(f"force {rounded(one.force, 'force')}")
-            texts.append(f"energy {rounded(one.energy, 'force*length')}")
-        lines.append(f"first failure     {', '.join(texts)}")
+        lines.append(_line("first failure", _first_failure(result, first[0])))
     elif largest and count:
         ends = " by the end of the run, which is in contact: open"
-        lines.append(f"first failure     none{ends if result.still_in_contact else ''}")
+        lines.append(_line("first failure", f"none{ends if result.still_in_contact else ''}"))
     return lines
+
+
+def _first_failure(result: Result, first: FirstFailure) -> str:
+    """The first failure: mode, place, time, and force and energy of an impact."""
+    rounded = partial(_rounded, result)
+    texts = [
+        f"{first.mode} ({spelt(first.criterion)})",
+        f"{first.where} at ({first.x:.6g}, {first.y:.6g})",
+        f"time {rounded(first.time, 'time')}, between {first.earliest:.4g} and {first.latest:.4g}",
+    ]
+    if not math.isnan(first.force):
+        texts.append(f"force {rounded(first.force, 'force')}")
+        texts.append(f"energy {rounded(first.energy, 'force*length')}")
+    return ", ".join(texts)
 
 
 def _exposure(result: Result, largest: LargestExposure) -> str:
     """Line of the largest exposure of a criterion."""
     least = "at least " if result.end in UNDECIDED else ""
-    return (
-        f"{spelt(largest.criterion):18}{least}{largest.exposure:.4g}: {largest.mode}, "
+    return _line(
+        spelt(largest.criterion),
+        f"{least}{largest.exposure:.4g}: {largest.mode}, "
         f"{where(largest.criterion, largest.ply)} at ({largest.x:.6g}, {largest.y:.6g}), "
-        f"time {_quantity(result, largest.time, 'time')}"
+        f"time {_quantity(result, largest.time, 'time')}",
     )
 
 
@@ -132,48 +143,86 @@ def _quantity(result: Result, value: float, dimension: str) -> str:
 
 def _impact(result: Result) -> list[str]:
     """Lines about forces, contacts, indentation and energy of an impact."""
-    quantity = partial(_quantity, result)
+    lines = [_line("peak force", _peak_force(result))]
+    if intervals := _intervals(result):
+        indentation, w = result["history/indentation"], result["history/plate_w"]
+        lines += [
+            _line("contact", _contacts(result, intervals)),
+            _line("largest indent", f"{_largest(result, indentation)}, permanent {_left(result)}"),
+            _line("largest w", _largest(result, w, " under the load")),
+        ]
+        if not math.isnan(result.metrics["rebound_velocity"]):
+            lines.append(_line("rebound", _rebound(result)))
+    return [*lines, _line("energy balance", _energy_balance(result))]
+
+
+def _peak_force(result: Result) -> str:
+    """Peak force, its time and step, and what is doubtful about it."""
     force, time = result["history/force"], result["history/time"]
     peak = int(np.argmax(force))
-    at = f"{quantity(force[peak], 'force')} at time {quantity(time[peak], 'time')}"
-    text = f"{at} (step {peak + 1})" if force[peak] > 0.0 else "0: there was no contact"
-    if (end := result.end) in UNDECIDED and force[peak] > 0.0:
-        text = f"at least {text}, as the run ends {UNDECIDED[end]}"
-    if doubt := _elastic(result, float(force[peak])):
-        text += f" ({doubt})"
-    lines = [f"peak force        {text}"]
+    text = "0: there was no contact"
+    if force[peak] > 0.0:
+        at = _quantity(result, time[peak], "time")
+        text = f"{_quantity(result, force[peak], 'force')} at time {at} (step {peak + 1})"
+        if (end := result.end) in UNDECIDED:
+            text = f"at least {text}, as the run ends {UNDECIDED[end]}"
+    doubt = _elastic(result, float(force[peak]))
+    return f"{text} ({doubt})" if doubt else text
+
+
+def _intervals(result: Result) -> list[tuple[float, float]]:
+    """First and last time of every contact."""
+    force, time = result["history/force"], result["history/time"]
     edges = np.flatnonzero(np.diff(np.concatenate(([0], force > 0.0, [0])).astype(int)))
-    intervals = list(zip(time[edges[::2]], time[edges[1::2] - 1], strict=True))  # in contact
-    texts = [f"{begin:.6g} to {quantity(end, 'time')}" for begin, end in intervals[:LISTED]]
+    return list(zip(time[edges[::2]], time[edges[1::2] - 1], strict=True))
+
+
+def _contacts(result: Result, intervals: list[tuple[float, float]]) -> str:
+    """Times of the contacts."""
+    texts = [
+        f"{begin:.6g} to {_quantity(result, end, 'time')}" for begin, end in intervals[:LISTED]
+    ]
     if len(intervals) > LISTED:
         texts.append(f"and {len(intervals) - LISTED} more")
     if result.still_in_contact:
         if len(intervals) <= LISTED:
-            texts[-1] = f"from {quantity(intervals[-1][0], 'time')}"
+            texts[-1] = f"from {_quantity(result, intervals[-1][0], 'time')}"
         texts[-1] += ", still in contact at the end"
-    if texts:
-        indentation, w = result["history/indentation"], result["history/plate_w"]
-        deepest, last = (quantity(time[v.argmax()], "time") for v in (indentation, w))
-        permanent = float(result.history.attributes["permanent_indentation"])
-        left = "open" if end is not End.OVER else quantity(permanent, "length")
-        alpha, bent = (quantity(values.max(), "length") for values in (indentation, w))
-        lines += [
-            f"contact           {', '.join(texts)}",
-            f"largest indent    {alpha} at time {deepest}, permanent {left}",
-            f"largest w         {bent} under the load at time {last}",
-        ]
-        metrics = result.metrics
-        if not math.isnan(metrics["rebound_velocity"]):
-            lines.append(
-                f"rebound           {quantity(metrics['rebound_velocity'], 'length/time')}, "
-                f"impulse {quantity(metrics['impulse'], 'force*time')}, "
-                f"{quantity(metrics['energy_absorbed'], 'force*length')} {LEFT}"
-            )
+    return ", ".join(texts)
+
+
+def _largest(result: Result, lengths: Floats, where: str = "") -> str:
+    """Largest of the lengths of every step, and its time."""
+    time = result["history/time"][lengths.argmax()]
+    value = _quantity(result, lengths.max(), "length")
+    return f"{value}{where} at time {_quantity(result, time, 'time')}"
+
+
+def _left(result: Result) -> str:
+    """Permanent indentation."""
+    if result.end is not End.OVER:
+        return "open"
+    permanent = float(result.history.attributes["permanent_indentation"])
+    return _quantity(result, permanent, "length")
+
+
+def _rebound(result: Result) -> str:
+    """What the projectile has left of its velocity and its energy."""
+    metrics = result.metrics
+    return (
+        f"{_quantity(result, metrics['rebound_velocity'], 'length/time')}, "
+        f"impulse {_quantity(result, metrics['impulse'], 'force*time')}, "
+        f"{_quantity(result, metrics['energy_absorbed'], 'force*length')} "
+        "left in plate, indentation and projectile"
+    )
+
+
+def _energy_balance(result: Result) -> str:
+    """Largest error of the energy balance, of the initial energy."""
     initial = float(result.energy.attributes["initial"])
     worst = float(np.abs(result["energy/balance_error"]).max())
     share = f"{worst / initial:.2g} of the initial" if initial else f"{worst:.3g}, initially"
-    lines.append(f"energy balance    worst error {share} {quantity(initial, 'force*length')}")
-    return lines
+    return f"worst error {share} {_quantity(result, initial, 'force*length')}"
 
 
 def _elastic(result: Result, peak: float) -> str:

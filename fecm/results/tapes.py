@@ -31,6 +31,7 @@ NAMES = ("tape3", "tape8", "tape9")
 WIDTH = 12  # characters per number
 DIGITS = 4  # of them
 PER_LINE = 6  # numbers per line without labels
+LABEL = 6  # characters of the number of an element or of a point
 SHEARS = {"tape8": ("gamma_yz", "gamma_xz"), "tape9": ("gamma_xz", "gamma_yz")}
 W = "tape3/w"
 CURVATURES = ("kappa_x", "kappa_y", "kappa_xy")
@@ -66,8 +67,8 @@ def last_digit(values: Floats) -> Floats:
 def _lines(table: Floats) -> Iterator[str]:
     """Lines of six numbers; the last line of a row may be shorter."""
     for row in table:
-        for start in range(0, len(row), 6):
-            yield "".join(map(fortran_e, row[start : start + 6].tolist()))
+        for start in range(0, len(row), PER_LINE):
+            yield "".join(map(fortran_e, row[start : start + PER_LINE].tolist()))
 
 
 def _strain_lines(columns: Sequence[Array]) -> Iterator[str]:
@@ -197,7 +198,7 @@ class _Lines:
         while self.lines and not self.lines[-1]:
             del self.lines[-1]
         first = self.lines[0] if self.lines else b""
-        self.labelled = all(_LABELS.fullmatch(label) for label in (first[:6], first[6:12]))
+        self.labelled = all(_LABELS.fullmatch(label) for label in _pair(first))
 
     def refuse(self, wrong: Array, message: str, *values: Array) -> None:
         """Raise an error about the first wrong line, if any, with its values in the message."""
@@ -245,6 +246,11 @@ class _Lines:
             raise ResultFileError(f"{self.path}:{len(self.lines)}: the last row is not complete")
 
 
+def _pair(line: bytes) -> tuple[bytes, bytes]:
+    """Labels of element and point that begin a line of strains."""
+    return line[:LABEL], line[LABEL : 2 * LABEL]
+
+
 def fortran_number(field: bytes) -> float | None:
     """Value of a field of Fortran's format E12.4; None if it is invalid or too large.
 
@@ -277,8 +283,8 @@ def _displacements(text: _Lines) -> tuple[Array, bool]:
 
 def _strains(text: _Lines) -> Floats:
     """Table of the strain tape, (rows, elements, points, 5)."""
-    table = text.table(lead=2 * PER_LINE, width=5, what="strains")
-    pairs = [(line[:6], line[6:12]) for line in text.lines]
+    table = text.table(lead=2 * LABEL, width=5, what="strains")
+    pairs = [_pair(line) for line in text.lines]
     unlabelled = [not all(map(_LABELS.fullmatch, pair)) for pair in pairs]
     text.refuse(np.array(unlabelled), "a line of strains begins with its element and point")
     labels = np.array(pairs).astype(int)

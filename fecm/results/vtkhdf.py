@@ -36,7 +36,6 @@ class At(StrEnum):
     TIME = "Field"  # a number per time step
 
 
-
 VERSION = (2, 2)
 # Numbers of points that are the first nodes of an element (K = -2: corners, K = -3: nine).
 NODAL_POINTS = (4, 9)
