@@ -27,7 +27,7 @@ class StudyError(FecmError, ValueError):
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """End of a message about an unknown name: the most similar known one; empty if none is."""
-    import difflib
+    import difflib  # 1 ms, only after a mistake
 
     close = difflib.get_close_matches(name, known, n=1)
     return f"; did you mean {close[0]}?" if close else ""

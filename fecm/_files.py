@@ -183,7 +183,7 @@ def _discard(partial: Path) -> bool:
 def _lock(handle: int, *, wait: bool = False) -> bool:
     """Lock a file; return False if another process holds the lock."""
     try:
-        import fcntl
+        import fcntl  # Windows has none
 
         fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
     except BlockingIOError:
@@ -292,7 +292,7 @@ def packed(arrays: Mapping[str, Any]) -> memoryview:
     Built in memory: if the disk is full, NumPy before version 2 leaves the archive open, which
     reports the error again when the program ends.
     """
-    import numpy as np
+    import numpy as np  # 100 ms, which other users of this module do without
 
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)

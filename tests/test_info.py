@@ -16,11 +16,19 @@ import pytest
 
 import fecm
 from fecm.results.errors import ResultFileError
+from fecm.results.groups import GROUPS
 from fecm.results.hdf5_reader import read
+from fecm.results.schema import DATASETS, GROUP_TYPES
 from tests.calls import assert_unusable, call
 from tests.decks import APPENDIX, DATA_CARDS, small
 
 Edit = Callable[[h5py.File], object]
+
+
+def test_every_group_with_datasets_is_described() -> None:
+    described = [name for name in GROUPS if name in GROUP_TYPES]
+    assert described == list(GROUP_TYPES)
+    assert {dataset.group.partition("/")[0] for dataset in DATASETS.values()} == {*described}
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ def not_stored(asked: str, paths: Collection[str]) -> str:
 
 def suggestion(asked: str, paths: Iterable[str]) -> str:
     """End of a message about a missing dataset or group: similar names, or the groups."""
-    import difflib  # only to name what is missing
+    import difflib  # 1 ms, only after a mistake
 
     known = sorted({name for path in paths for name in (path, path.rpartition("/")[0])} - {""})
     last_parts = [name.rpartition("/")[2] for name in known]
