@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 import fecm
 from fecm._errors import FecmWarning
 from fecm.plot.data import patches, strain_points
-from fecm.plot.kinds import KINDS, MISSING, Picture, PlotError
+from fecm.plot.failure import outline
+from fecm.plot.kinds import KINDS, MISSING, Picture, PlotError, Shows
+from fecm.plot.mesh import Support, supports
 from fecm.plot.pictures import draw, save
-from fecm.plot.plate import profile, supports
-from fecm.plot.plies import outline
+from fecm.plot.plate import profile
 from fecm.plot.style import COLOURS, scale
 from fecm.results.result import Result
 from fecm.results.summary import summary
@@ -28,7 +29,7 @@ Array = NDArray[Any]
 
 pytest.importorskip("matplotlib")
 
-OF_RUNS = [name for name, kind in KINDS.items() if not kind.sweep]
+OF_RUNS = [name for name, kind in KINDS.items() if kind.shows is not Shows.SWEEP]
 
 NAMED = small(data=DATA_CARDS + "UNIT\nin lbf s\n")
 
@@ -283,9 +284,9 @@ def test_mesh_marks_supports_and_the_impact_point() -> None:
     mesh = MESH[: MESH.index("BOUN")] + f"BOUN\n{held}{inner}{simple}\n"
     result = run(small(mesh=mesh))
     kinds = {name: np.flatnonzero(nodes) + 1 for name, nodes in supports(result).items()}
-    assert kinds["clamped"].tolist() == [1, 2, 3, 4, 5]
-    assert kinds["w held"].tolist() == [21, 22, 23, 24, 25]
-    assert not len(kinds["rotation held"])
+    assert kinds[Support.CLAMPED].tolist() == [1, 2, 3, 4, 5]
+    assert kinds[Support.W_HELD].tolist() == [21, 22, 23, 24, 25]
+    assert not len(kinds[Support.ROTATION_HELD])
     figure = plot(result, "mesh", at=((0.3, 0.4),))
     axes: Any = figure.axes[0]
     assert legend_of(figure) == ["clamped", "w held", "impact", "points"]
@@ -296,21 +297,20 @@ def test_mesh_marks_supports_and_the_impact_point() -> None:
 
 
 @pytest.mark.parametrize("nodes", [4, 9])
-@pytest.mark.parametrize("support", ["simple", "clamped"])
-def test_corners_of_a_simply_supported_plate_are_not_clamped(nodes: int, support: str) -> None:
+@pytest.mark.parametrize("support", [Support.W_HELD, Support.CLAMPED])
+def test_corners_of_a_simply_supported_plate_are_not_clamped(nodes: int, support: Support) -> None:
     coordinates, elements = distorted_square(4, 4, nodes)
     x, y = np.isin(coordinates, (0.0, 1.0)).T
     equations = np.ones((len(coordinates), 5))
     equations[x | y, 2] = 0
     for edge, rotation in ((x, 4), (y, 3)):
         equations[edge, rotation] = 0
-    if support == "clamped":
+    if support is Support.CLAMPED:
         equations[x | y, 3:] = 0
     arrays: dict[str, Array] = {"mesh/elements": elements, "mesh/equations": equations}
     kinds = supports(Result(arrays, {}, {}))
-    same, other = ("clamped", "w held") if support == "clamped" else ("w held", "clamped")
-    np.testing.assert_array_equal(kinds[same], x | y)
-    assert not kinds[other].any()
+    np.testing.assert_array_equal(kinds.pop(support), x | y)
+    assert not any(nodes_of_kind.any() for nodes_of_kind in kinds.values())
 
 
 @pytest.mark.parametrize("kind", ["mesh", "contour"])

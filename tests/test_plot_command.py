@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.plot.kinds import KINDS, PlotError
+from fecm.plot.kinds import KINDS, PlotError, Shows
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, small
 
@@ -21,7 +21,7 @@ Array = NDArray[Any]
 
 pytest.importorskip("matplotlib")
 
-OF_RUNS = [name for name, kind in KINDS.items() if not kind.sweep]
+OF_RUNS = [name for name, kind in KINDS.items() if kind.shows is not Shows.SWEEP]
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.plot.kinds import KINDS, PlotError
+from fecm.plot.kinds import KINDS, PlotError, Shows
 from fecm.plot.pictures import draw
 from fecm.results.pictures import RunKind
 from tests.calls import call
@@ -131,7 +131,9 @@ def test_a_file_is_that_of_the_command_line_whatever_the_users_style(
 
 
 def test_the_kinds_for_type_checkers_are_those_of_results() -> None:
-    assert list(get_args(RunKind)) == [name for name, kind in KINDS.items() if not kind.sweep]
+    assert list(get_args(RunKind)) == [
+        name for name, kind in KINDS.items() if kind.shows is not Shows.SWEEP
+    ]
 
 
 def test_a_warning_of_a_picture_is_one_of_the_users_line(sweep: fecm.SweepResult) -> None:

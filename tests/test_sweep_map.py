@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm._errors import FecmWarning
-from fecm.plot.kinds import KINDS, PlotError
+from fecm.plot.kinds import KINDS, PlotError, Shows
 from fecm.plot.pictures import draw
 from fecm.sweeps.result import SweepResult, save
 from tests.calls import assert_unusable, call
@@ -382,7 +382,9 @@ def test_a_level_beyond_all_values_is_told(plane: SweepResult) -> None:
         plot(plane, level=(1e6,))
 
 
-@pytest.mark.parametrize("kind", [name for name, kind in KINDS.items() if not kind.sweep])
+@pytest.mark.parametrize(
+    "kind", [name for name, kind in KINDS.items() if kind.shows is not Shows.SWEEP]
+)
 def test_kinds_of_runs_do_not_show_a_sweep(plane: SweepResult, kind: str) -> None:
     with pytest.raises(PlotError, match=f"plane is the result of a sweep, .* {kind} can't show"):
         draw(kind, {"plane": plane})

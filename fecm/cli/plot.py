@@ -55,7 +55,7 @@ def _by_name(_: Any, __: Any, pairs: tuple[tuple[str, str], ...]) -> dict[str, s
     ),
 )
 @click.argument("results", type=DECK_PATH, nargs=-1, required=True, metavar="RESULT...")
-@option("--kind", "kinds", type=OneOf(list(KINDS)), multiple=True, metavar="KIND",
+@option("--kind", "kinds", type=OneOf([*map(str, KINDS)]), multiple=True, metavar="KIND",
         help=f"Picture to draw; may be repeated.  {_KIND_HELP}.  [default: force; map of a sweep, "
              "exceedance of a random one]")  # fmt: skip
 @option("-o", "--output", type=FILE_PATH, metavar="PATH",

@@ -6,13 +6,11 @@ What a result lacks, or can't be drawn, is a :class:`~fecm.plot.kinds.PlotError`
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecm._frozen import frozen
-from fecm._typing import Bools, Floats
+from fecm._typing import Array, Bools, Floats, Indices
 from fecm.deck.model import Deck, Impact
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import local_shape_functions
@@ -23,9 +21,6 @@ from fecm.results.missing import remedy
 from fecm.results.plies import points_of, rows_at
 from fecm.results.result import Result
 from fecm.results.stored import model_of
-
-Array = NDArray[Any]
-Ints = NDArray[np.intp]
 
 LARGEST = 1e100  # larger numbers are refused: axes fail long before numbers overflow
 MANY = 2000  # meshes with more elements are drawn with fewer points per element
@@ -75,10 +70,13 @@ def circle(result: Result, name: str) -> tuple[Floats, float] | None:
     """Centre, (2,), and radius of the contact patch, length; None without a patch."""
     if "patch/weight" not in result:
         return None
-    values: list[Any] = [result.patch.attributes.get(key) for key in ("x", "y", "radius")]
-    if not all(isinstance(value, int | float) and abs(value) <= LARGEST for value in values):
+    stored = [result.patch.attributes.get(key) for key in ("x", "y", "radius")]
+    values = [
+        float(value) for value in stored if isinstance(value, int | float) and abs(value) <= LARGEST
+    ]
+    if len(values) < len(stored):
         raise PlotError(f"{name} has a contact patch without a centre and a radius")
-    x, y, radius = map(float, values)
+    x, y, radius = values
     return np.array([x, y]), radius
 
 
@@ -103,7 +101,7 @@ def impact_point(result: Result, name: str) -> Floats:
     return np.asarray(points[0])
 
 
-def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -> Ints:
+def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -> Indices:
     """Rows of tape3 nearest to the given times; by default `count` rows at equal distances."""
     (stored,) = require(result, name, "tape3/time")
     if not times:
@@ -120,9 +118,9 @@ class Patches:
     """The plate divided into small quadrilaterals, equally many per element."""
 
     points: Floats  # (n, 2): corners (length)
-    quads: Ints  # (m, 4): rows of the corners in `points`
+    quads: Indices  # (m, 4): rows of the corners in `points`
     # (k,) each: rows of the points around an element; the first is repeated at the end.
-    edges: list[Ints]
+    edges: list[Indices]
     parts: list[tuple[ElementBlock, Floats]]  # elements, and the shape functions at their points
 
     def values(self, nodal: Array) -> Floats:
@@ -130,7 +128,7 @@ class Patches:
         return np.concatenate([(nodal[family.nodes] @ N.T).ravel() for family, N in self.parts])
 
     @property
-    def triangles(self) -> Ints:
+    def triangles(self) -> Indices:
         """Two triangles per quadrilateral; those without area are left out."""
         found = np.concatenate([self.quads[:, [0, 1, 2]], self.quads[:, [0, 2, 3]]])
         first, second = (self.points[found[:, n]] - self.points[found[:, 0]] for n in (1, 2))

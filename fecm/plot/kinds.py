@@ -1,18 +1,21 @@
-"""Kinds of pictures.
+"""Kinds of pictures, their options and their errors.
 
 Imports no matplotlib: the command line lists the kinds without it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from enum import Enum, StrEnum, auto
+from typing import TYPE_CHECKING, Literal, TypedDict
 
 from fecm._errors import FecmError
 from fecm._frozen import frozen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from fecm.results.comparison import Source
 
 SUFFIXES = (".png", ".svg", ".pdf")
 MISSING = "pictures need matplotlib: pip install 'fecm[plot]'"
@@ -35,35 +38,100 @@ class Picture:
     """A figure; `frames` draw its frames if it is animated; `notes` say what it shows in words."""
 
     figure: Figure
-    frames: Sequence[Callable[[], Any]] = ()
+    frames: Sequence[Callable[[], None]] = ()
     notes: Sequence[str] = ()
 
 
+class Kind(StrEnum):
+    """Names of the kinds of pictures."""
+
+    FORCE = auto()
+    LOOP = auto()
+    ENERGY = auto()
+    STRAIN = auto()
+    THICKNESS = auto()
+    FAILURE = auto()
+    LINE = auto()
+    CONTOUR = auto()
+    SURFACE = auto()
+    MESH = auto()
+    ANIMATION = auto()
+    MAP = auto()
+    EXCEEDANCE = auto()
+    SENSITIVITY = auto()
+    SCATTER = auto()
+
+
+class Shows(Enum):
+    """Results that a kind of picture shows."""
+
+    RUN = auto()  # the result of one run
+    RUNS = auto()  # the results of one or more runs
+    SWEEP = auto()  # the result of one sweep
+
+
 @frozen
-class Kind:
-    """A kind of picture."""
+class Drawing:
+    """How a kind of picture is drawn."""
 
-    function: str  # module of this package, and the function in it
-    summary: str  # what it shows
-    several: bool = False  # whether several results go into one picture
+    function: str  # ``module:name`` in this package; it is imported when it draws
+    shows: Shows
+    summary: str
     suffixes: tuple[str, ...] = SUFFIXES  # formats it can be written in, the usual one first
-    sweep: bool = False  # whether it shows the result of a sweep, not of a run
 
 
-KINDS = {
-    "force": Kind("histories:force", "contact force and transducer against time", True),
-    "loop": Kind("histories:loop", "contact force against indentation or displacement", True),
-    "energy": Kind("histories:energy", "energies of plate and projectile against time", True),
-    "strain": Kind("histories:strain", "surface strain at points against time", True),
-    "thickness": Kind("plies:thickness", "ply stresses through the thickness of an element"),
-    "failure": Kind("plies:failure", "largest exposures over the plate and of every ply"),
-    "line": Kind("plate:line", "deflection along a line through the impact point", True),
-    "contour": Kind("plate:contour", "deflection of the plate, seen from above"),
-    "surface": Kind("plate:surface", "the deflected plate"),
-    "mesh": Kind("plate:mesh", "mesh, supports, impact point and contact patch"),
-    "animation": Kind("plate:animation", "the moving plate", suffixes=(".gif",)),
-    "map": Kind("maps:parameter_map", "a quantity of a sweep over its parameters", sweep=True),
-    "exceedance": Kind("random_sweep:exceedance", "probabilities of a random sweep", sweep=True),
-    "sensitivity": Kind("random_sweep:sensitivity", "indices of a random sweep", sweep=True),
-    "scatter": Kind("random_sweep:scatter", "a quantity over the random values", sweep=True),
+KINDS: dict[str, Drawing] = {
+    Kind.FORCE: Drawing("histories:force", Shows.RUNS, "contact force and transducer against time"),
+    Kind.LOOP: Drawing(
+        "histories:loop", Shows.RUNS, "contact force against indentation or displacement"
+    ),
+    Kind.ENERGY: Drawing(
+        "histories:energy", Shows.RUNS, "energies of plate and projectile against time"
+    ),
+    Kind.STRAIN: Drawing("strains:strain", Shows.RUNS, "surface strain at points against time"),
+    Kind.THICKNESS: Drawing(
+        "thickness:thickness", Shows.RUN, "ply stresses through the thickness of an element"
+    ),
+    Kind.FAILURE: Drawing(
+        "failure:failure", Shows.RUN, "largest exposures over the plate and of every ply"
+    ),
+    Kind.LINE: Drawing(
+        "plate:line", Shows.RUNS, "deflection along a line through the impact point"
+    ),
+    Kind.CONTOUR: Drawing("plate:contour", Shows.RUN, "deflection of the plate, seen from above"),
+    Kind.SURFACE: Drawing("surface:surface", Shows.RUN, "the deflected plate"),
+    Kind.MESH: Drawing("mesh:mesh", Shows.RUN, "mesh, supports, impact point and contact patch"),
+    Kind.ANIMATION: Drawing("surface:animation", Shows.RUN, "the moving plate", (".gif",)),
+    Kind.MAP: Drawing(
+        "maps:parameter_map", Shows.SWEEP, "a quantity of a sweep over its parameters"
+    ),
+    Kind.EXCEEDANCE: Drawing(
+        "random_sweep:exceedance", Shows.SWEEP, "probabilities of a random sweep"
+    ),
+    Kind.SENSITIVITY: Drawing("random_sweep:sensitivity", Shows.SWEEP, "indices of a random sweep"),
+    Kind.SCATTER: Drawing("random_sweep:scatter", Shows.SWEEP, "a quantity over the random values"),
 }
+
+Width = Literal["column", "full"]  # of a journal's column, or of its page
+Against = Literal["indentation", "deflection", "displacement"]
+Face = Literal["far", "struck", "curvature"]
+Direction = Literal["x", "y"]
+
+
+class Options(TypedDict, total=False):
+    """Options of pictures; each kind takes some of them, as its function's docstring says."""
+
+    width: Width
+    at: Sequence[tuple[float, float]]
+    times: Sequence[float]
+    gages: Sequence[float]
+    face: Face
+    against: Against
+    along: Direction
+    overlay: Source | None
+    delay: float
+    offset: float
+    quantity: str
+    over: Sequence[str]
+    where: Mapping[str, float | str] | None
+    level: Sequence[float]

@@ -1,7 +1,9 @@
 """Draws and saves pictures of results: the report's figures.
 
-matplotlib is imported when something is drawn.  A kind of picture is a row of `KINDS`; its function
-takes named results and the options of the kind as keywords, and returns a :class:`Picture`.
+A kind of picture is a row of :data:`~fecm.plot.kinds.KINDS`.  Its function takes named results and
+the options of the kind as keywords, and returns a :class:`~fecm.plot.kinds.Picture`.
+
+matplotlib is imported when something is drawn: it takes half a second, and it may be absent.
 """
 
 from __future__ import annotations
@@ -13,11 +15,20 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from fecm._errors import FecmError, did_you_mean
 from fecm._files import beside
-from fecm.plot.kinds import KINDS, MISSING, Kind, MatplotlibError, Picture, PlotError
+from fecm.plot.kinds import (
+    KINDS,
+    MISSING,
+    Kind,
+    MatplotlibError,
+    Options,
+    Picture,
+    PlotError,
+    Shows,
+)
 from fecm.results.result import Result
 
 if TYPE_CHECKING:
@@ -25,13 +36,17 @@ if TYPE_CHECKING:
 
     from fecm.sweeps.result import SweepResult
 
+ANIMATION = ".gif"
+FRAMES_PER_SECOND = 15
+
 
 def kind_named(name: str) -> Kind:
     """Return the kind of this name, or raise a PlotError."""
-    if name not in KINDS:
-        others = did_you_mean(name, KINDS) or f"; the kinds are {', '.join(KINDS)}"
-        raise PlotError(f"unknown kind of picture {name!r}{others}")
-    return KINDS[name]
+    try:
+        return Kind(name)
+    except ValueError:
+        others = did_you_mean(name, list(Kind)) or f"; the kinds are {', '.join(Kind)}"
+        raise PlotError(f"unknown kind of picture {name!r}{others}") from None
 
 
 def require_matplotlib() -> None:
@@ -50,9 +65,15 @@ def imported(place: str) -> Callable[..., Picture]:
     return function
 
 
+def function_of(kind: str) -> Callable[..., Picture]:
+    """Import the function that draws a kind."""
+    return imported(KINDS[kind_named(kind)].function)
+
+
 def options_of(kind: str) -> list[str]:
     """Names of the options that a kind takes."""
-    return list(inspect.signature(imported(kind_named(kind).function)).parameters)[1:]
+    _, *options = inspect.signature(function_of(kind)).parameters  # the first are the results
+    return options
 
 
 def check_options(kinds: Iterable[str], options: Iterable[str]) -> None:
@@ -82,11 +103,29 @@ def _errors_as_one(what: str) -> Iterator[None]:
         raise PlotError(f"{what} can't be drawn: {type(error).__name__}: {message}") from error
 
 
+def _check_source(kind: Kind, results: Mapping[str, Result | SweepResult]) -> None:
+    """Refuse the result of a run for a kind of sweeps, and of a sweep for a kind of runs."""
+    shows = KINDS[kind].shows
+    for name, result in results.items():
+        is_sweep = not isinstance(result, Result)
+        if is_sweep and shows is not Shows.SWEEP:
+            of_sweeps = [one for one, drawing in KINDS.items() if drawing.shows is Shows.SWEEP]
+            raise PlotError(
+                f"{name} is the result of a sweep, which the kind {kind} can't show; the kinds "
+                f"{', '.join(of_sweeps)} do"
+            )
+        if not is_sweep and shows is Shows.SWEEP:
+            raise PlotError(
+                f"{name} is the result of a run, which the kind {kind} can't show; the other kinds "
+                "do"
+            )
+
+
 def draw(
     kind: str,
     results: Mapping[str, Result | SweepResult],
     style: Mapping[str, Any] | None = None,
-    **options: Any,
+    **options: Unpack[Options],
 ) -> Picture:
     """Draw a picture of the kind from results by their names in the legend, and the kind's options.
 
@@ -94,26 +133,18 @@ def draw(
     the kind is unknown, a result lacks what it shows, or the options do not fit.  Raises
     ImportError if matplotlib is not installed.
     """
-    properties = kind_named(kind)
-    if len(results) > 1 and not properties.several:
+    chosen = kind_named(kind)
+    if len(results) > 1 and KINDS[chosen].shows is not Shows.RUNS:
         raise PlotError(f"the kind {kind} shows one result; {len(results)} were given")
-    check_options([kind], options)
-    for name, result in results.items():
-        if properties.sweep == isinstance(result, Result):
-            kinds = ", ".join(name for name, one in KINDS.items() if one.sweep)
-            source, remedy = "sweep", f"the kinds {kinds} do"
-            if properties.sweep:
-                source, remedy = "run", "the other kinds do"
-            raise PlotError(
-                f"{name} is the result of a {source}, which the kind {kind} can't show; {remedy}"
-            )
+    check_options([chosen], options)
+    _check_source(chosen, results)
     import matplotlib
 
     from fecm.plot.style import RC
 
-    settings: Any = RC if style is None else style
+    settings = dict(RC if style is None else style)
     with matplotlib.rc_context(settings), _errors_as_one(f"{kind} of {' and '.join(results)}"):
-        return imported(properties.function)(results, **options)
+        return function_of(kind)(results, **options)
 
 
 def plot(
@@ -121,7 +152,7 @@ def plot(
     results: Mapping[str, Result | SweepResult],
     path: str | Path | None = None,
     ax: Axes | None = None,
-    **options: Any,
+    **options: Unpack[Options],
 ) -> Axes:
     """Draw one or more results: in a file, on given axes, or on a new figure of pyplot.
 
@@ -163,11 +194,13 @@ def plot(
         picture = draw(kind, results, **options)
         save(picture, Path(path))
         return picture.figure.axes[0]
-    imported(kind_named(kind).function)  # without matplotlib, this says what to install
-    pyplot: Any = import_module("matplotlib.pyplot")
+    function_of(kind)  # without matplotlib, this says what to install
+    from matplotlib import pyplot
+
     from fecm.plot.style import TARGET, style_on
 
-    pyplot.draw_if_interactive()  # loads the backend: a notebook's changes settings, to be kept
+    # Loads the backend: a notebook's changes settings, to be kept.
+    pyplot.draw_if_interactive()  # type: ignore[no-untyped-call]
     before = set(pyplot.get_fignums())
     token = TARGET.set("pyplot" if ax is None else ax)
     try:
@@ -185,7 +218,7 @@ def plot(
 
 def check_suffix(kind: str, path: Path) -> None:
     """Refuse a file name whose suffix is not a format of the kind."""
-    suffixes = kind_named(kind).suffixes
+    suffixes = KINDS[kind_named(kind)].suffixes
     if path.suffix.lower() not in suffixes:
         raise PlotError(f"{path}: the kind {kind} is written as {' or '.join(suffixes)}")
 
@@ -213,14 +246,14 @@ def save(
         matplotlib.rc_context(RC),
         beside(path, overwrite=overwrite) as partial,
     ):
-        if suffix != ".gif":
+        if suffix != ANIMATION:
             picture.figure.savefig(
                 partial, format=suffix[1:], dpi=RESOLUTION, metadata=UNDATED[suffix]
             )
             return
         from matplotlib.animation import PillowWriter
 
-        writer = PillowWriter(fps=15)
+        writer = PillowWriter(fps=FRAMES_PER_SECOND)
         with writer.saving(picture.figure, str(partial), dpi=SCREEN):
             for frame in picture.frames:
                 frame()

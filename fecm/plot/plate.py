@@ -1,60 +1,31 @@
-"""Pictures of the plate: its mesh (the report's figure 4.11 a), its deflection (figure 4.20)."""
+"""Pictures of the plate's deflection, along a line and from above (the report's figure 4.20)."""
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
-from fecm._typing import Bools, Floats
-from fecm.deck.model import Impact
+from fecm._typing import Array, Floats
 from fecm.mechanics.mesh import longest_sides
 from fecm.plot import data, style
-from fecm.plot.kinds import Picture, PlotError
+from fecm.plot.kinds import Direction, Picture, PlotError, Width
 from fecm.results.result import Result
 
-Results = Mapping[str, Result]
-Show = Callable[[int], None]  # shows a row of tape3
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
-AXES = {"x": 0, "y": 1}
-FRAMES = 60
+Results = Mapping[str, Result]
+
+AXES: dict[Direction, int] = {"x": 0, "y": 1}
 SAMPLES = 401
 LEVELS = 21
-EXAGGERATION = 0.3  # height of the deflected plate over its longer side
-# Marks of the supports by their label.
-MARKS: dict[str, dict[str, Any]] = {
-    "clamped": {"marker": "s", "color": style.COLOURS[0], "ms": 3.0},
-    "w held": {"marker": "^", "color": style.COLOURS[0], "ms": 3.5, "mfc": "white", "mew": 0.7},
-    "rotation held": {
-        "marker": "o", "color": style.COLOURS[2], "ms": 3.0, "mfc": "white", "mew": 0.7
-    },
-}  # fmt: skip
-
-
-def supports(result: Result) -> dict[str, Bools]:
-    """Masks of the nodes held against bending, by kind of support; each (numnp,)."""
-    held = result["mesh/equations"][:, 2:5] == 0
-    w, rotations = held[:, 0], held[:, 1:]
-    full = w & rotations.all(axis=1)
-    # At a corner of a simply supported plate one node of an element is fully held, others hold w.
-    nodes, present = result["mesh/elements"] - 1, result["mesh/elements"] > 0
-    one = (full[nodes] & present).sum(axis=1) == 1
-    several = (w[nodes] & present).sum(axis=1) > 1
-    corners, others = np.zeros_like(full), np.zeros_like(full)
-    corners[nodes[(one & several)[:, None] & present]] = True
-    others[nodes[~one[:, None] & present]] = True
-    clamped = full & ~(corners & ~others)
-    return {"clamped": clamped, "w held": w & ~clamped, "rotation held": ~w & rotations.any(axis=1)}
 
 
 def aspect(points: Floats) -> float:
@@ -78,41 +49,7 @@ def mark_impact(axes: Axes, result: Result, name: str) -> None:
     draw_circle(axes, result, name, color="black")
 
 
-def mesh(
-    results: Results, *, at: Sequence[tuple[float, float]] = (), width: str = "column"
-) -> Picture:
-    """Elements, supports, impact point, contact patch, and points to mark (`at`)."""
-    ((name, result),) = results.items()
-    coordinates, _ = data.require(result, name, "mesh/coordinates", "mesh/elements")
-    cut = data.patches(result, 4, name)
-    place = style.scale_of(results, "length", [coordinates])
-    low, high = cut.points.min(axis=0), cut.points.max(axis=0)
-    height = aspect(cut.points)
-    ratio = height + (0.55 - 0.5 * height) / style.WIDTHS[width]
-    figure, (axes,) = style.panels(width, ratio=ratio)
-    sides = [cut.points[edge] for edge in cut.edges]
-    axes.add_collection(LineCollection(sides, colors="0.4", linewidths=0.4))
-    for label, nodes in supports(result).items():
-        if nodes.any():
-            held = coordinates[nodes, :2].T
-            axes.plot(*held, ls="none", clip_on=False, label=label, **MARKS[label])
-    if len(where := data.struck(result, name)):
-        in_patch = data.circle(result, name) is not None
-        mark: Any = {"marker": "+"} if in_patch else {"marker": "X", "mec": "white"}
-        mark["label"] = "impact" if data.deck_of(result, name).has(Impact) else "load"
-        axes.plot(*where.T, color=style.COLOURS[1], ms=6.0, mew=0.5, ls="", clip_on=False, **mark)
-    draw_circle(axes, result, name, color=style.COLOURS[1], label="contact patch")
-    if at:
-        look: Any = {"color": style.COLOURS[3], "ms": 3.5, "label": "points"}
-        axes.plot(*np.array(at).T, "D", clip_on=False, **look)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-    place.name(axes.xaxis, "$x$")
-    place.name(axes.yaxis, "$y$")
-    style.lines_legend(figure, axes)
-    return Picture(figure)
-
-
-def profile(result: Result, name: str, along: str, rows: data.Array) -> tuple[Floats, Floats]:
+def profile(result: Result, name: str, along: Direction, rows: Array) -> tuple[Floats, Floats]:
     """Deflection on a line through the impact point along x or y, at some rows of tape3.
 
     Returns the positions, (n,), and w, (rows, n), of the nodes on the line if they cover it, else
@@ -146,12 +83,16 @@ def profile(result: Result, name: str, along: str, rows: data.Array) -> tuple[Fl
 
 
 def line(
-    results: Results, *, times: Sequence[float] = (), along: str = "x", width: str = "column"
+    results: Results,
+    *,
+    times: Sequence[float] = (),
+    along: Direction = "x",
+    width: Width = "column",
 ) -> Picture:
     """Deflection along a line through the impact point; of several results, one graph per time.
 
     Drawn are the stored rows nearest to `times` (the deck's unit), by default a few, in the
-    direction `along`, ``"x"`` or ``"y"``.
+    direction `along`.
     """
     drawn = {}
     for name, result in results.items():
@@ -168,7 +109,7 @@ def line(
     if len(drawn) == 1:
         figure, axes = style.panels(width)
         ((stored, position, w),) = drawn.values()
-        shades = matplotlib.colormaps[style.IN_ORDER](np.linspace(0.0, 0.85, len(stored)))
+        shades = matplotlib.colormaps[style.SEQUENTIAL](np.linspace(0.0, 0.85, len(stored)))
         for time, values, shade in zip(stored, w, shades, strict=True):
             axes[0].plot(position, values, color=shade, label=f"{clock.factor * time:.4g}")
     else:
@@ -186,7 +127,7 @@ def line(
     return Picture(figure)
 
 
-def contour(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
+def contour(results: Results, *, times: Sequence[float] = (), width: Width = "column") -> Picture:
     """Deflection of the plate at given times, seen from above, on one colour scale."""
     ((name, result),) = results.items()
     data.require(result, name, "tape3/w")
@@ -206,7 +147,7 @@ def contour(results: Results, *, times: Sequence[float] = (), width: str = "colu
     fills = []
     for ax, row, values in zip(axes, rows, fields, strict=False):
         norm = Normalize(-peak, peak)
-        fills.append(ax.tricontourf(triangles, values, levels, cmap=style.SIGNED, norm=norm))
+        fills.append(ax.tricontourf(triangles, values, levels, cmap=style.DIVERGING, norm=norm))
         fills[-1].set(edgecolor="face", linewidth=0.2)  # hides white seams
         mark_impact(ax, result, name)
         ax.set_title(f"time {clock.show(float(result['tape3/time'][row]))}", loc="left")
@@ -219,92 +160,3 @@ def contour(results: Results, *, times: Sequence[float] = (), width: str = "colu
         ax.set_axis_off()
     style.colour_bar(axes, fills[0], length, "Deflection", MaxNLocator(6), aspect=40, shrink=0.8)
     return Picture(figure)
-
-
-def surface(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
-    """The deflected plate; by default at the instant of largest deflection range."""
-    ((name, result),) = results.items()
-    (w,) = data.require(result, name, "tape3/w")
-    largest = np.array([int(np.ptp(w, axis=1).argmax())])
-    rows = data.stored_rows(result, name, times, 1) if times else largest
-    clock = style.scale_of(results, "time", [result["tape3/time"]])
-    figure, shows = _plates(results, width, rows, len(rows), clock)
-    for show, row in zip(shows, rows, strict=True):
-        show(row)
-    return Picture(figure)
-
-
-def animation(results: Results, *, times: Sequence[float] = (), width: str = "column") -> Picture:
-    """The deflected plate, frame by frame; the figure shows the last frame."""
-    ((name, result),) = results.items()
-    data.require(result, name, "tape3/w")
-    rows = data.stored_rows(result, name, times, FRAMES)
-    clock = style.scale_of(results, "time", [result["tape3/time"][rows]])
-    figure, (show,) = _plates(results, width, rows, 1, clock)
-    show(rows[-1])
-    return Picture(figure, [functools.partial(show, row) for row in rows])
-
-
-def _plates(
-    results: Results, width: str, rows: data.Array, count: int, clock: style.Scale
-) -> tuple[Figure, list[Show]]:
-    """Draw `count` flat plates on the common scale of all rows, and what shows a row on each."""
-    ((name, result),) = results.items()
-    cut, w = data.patches(result, 2, name), result["tape3/w"]
-    place = style.scale_of(results, "length", [cut.points])
-    flat, stored = cut.points[cut.quads], w[rows]
-    length = style.scale_of(results, "length", [stored])
-    span = (float(stored.min()), float(stored.max()))
-    columns = 1 if width == "column" else min(count, 2)
-    lines = math.ceil(count / columns)
-    figure, axes = style.panels(width, lines, columns, ratio=0.7, subplot_kw={"projection": "3d"})
-    for ax in axes[count:]:
-        ax.set_axis_off()
-
-    def show(collection: Any, title: Any, row: int) -> None:
-        heights = cut.values(w[row])[cut.quads]
-        collection.set_verts(np.dstack([flat, heights]))
-        collection.set_array(heights.mean(axis=1))
-        title.set_text(f"time {clock.show(float(result['tape3/time'][row]))}")
-
-    plates = [_plate(ax, cut, place, length, span) for ax in axes[:count]]
-    look = {"shrink": 0.6, "pad": 0.0, "fraction": 0.06, "aspect": 30 * columns}
-    bar = style.colour_bar(axes, plates[0][0], length, "Deflection", MaxNLocator(5), **look)
-    if span[0] < span[1]:
-        bar.ax.set_xlim(span)
-    return figure, [functools.partial(show, *plate) for plate in plates]
-
-
-def _plate(
-    axes: Any, cut: data.Patches, place: style.Scale, length: style.Scale, span: tuple[float, float]
-) -> tuple[Any, Any]:
-    """Draw the flat plate in three-dimensional axes; what is drawn, and an empty title."""
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    flat = cut.points[cut.quads]
-    peak = max(map(abs, span)) or 1.0
-    title = axes.text2D(0.03, 0.94, "", transform=axes.transAxes)
-    collection = Poly3DCollection(
-        np.pad(flat, ((0, 0), (0, 0), (0, 1))), cmap=style.SIGNED, norm=Normalize(-peak, peak),
-        edgecolors="0.25", linewidths=0.12, clip_on=False,
-    )  # fmt: skip
-    axes.add_collection3d(collection)
-    low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    axes.set_zlim(min(span[0], 0.0), max(span[1], 0.0))
-    side = float((high - low).max())
-    axes.set_box_aspect((*(high - low) / side, EXAGGERATION), zoom=1.3)
-    axes.view_init(elev=28.0, azim=-62.0)
-    for axis, shown, text, pad in (
-        (axes.xaxis, place, "$x$", -4.0), (axes.yaxis, place, "$y$", -4.0),
-        (axes.zaxis, length, "Deflection", -7.0),
-    ):  # fmt: skip
-        shown.name(axis, text)
-        axis.labelpad = pad
-        axis.pane.set_visible(False)
-        axis._axinfo["grid"]["linewidth"] = 0.3
-    axes.tick_params(pad=-3.0)
-    axes.locator_params(nbins=5)
-    axes.locator_params(axis="y", prune="lower")  # it would collide with the last of x
-    axes.locator_params(axis="z", nbins=4)
-    return collection, title

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from fecm._typing import Floats
 from fecm.deck.units import unit_of
@@ -17,9 +16,22 @@ from fecm.studies.indentation_test.curves import FALLING, LOADING, RISING
 from fecm.studies.rod_test.filters import Calibration
 from fecm.studies.rod_test.pulse_test import RodHistory
 
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.typing import LineStyleType
+
 COLOUR_OF = dict(zip((LOADING, FALLING, RISING), style.COLOURS, strict=False))
 POINTS = 100
-Line = tuple[str, Floats, str, Any]  # label, values, colour and style of a line
+
+
+class Line(NamedTuple):
+    """A line of a graph."""
+
+    label: str
+    values: Floats
+    colour: str
+    style: LineStyleType = style.SOLID
 
 
 @style.styled
@@ -28,14 +40,19 @@ def fit_picture(
 ) -> Picture:
     """Points of a test with the fitted curves, and permanent against largest indentation."""
     both = len(found.cycles) > 1
-    width, columns = ("full", 2) if both else ("column", 1)
-    figure, axes = style.panels(width, 1, columns, ratio=style.RATIO["column"])
+    ratio = style.RATIO["column"]
+    if both:
+        figure, axes = style.panels("full", 1, 2, ratio=ratio)
+    else:
+        figure, axes = style.panels("column", ratio=ratio)
     curves, p = found.solution.curves, found.solution.scaled
     labels = {LOADING: "first loading", FALLING: "unloading", RISING: "reloading"}
     for number, stretch in enumerate(curves.division.stretches):
         colour, a = COLOUR_OF[stretch.kind], indentation[stretch.rows]
-        look: Any = {"color": colour, "alpha": 0.5, "ms": 3.0, "mew": 0.0}
-        axes[0].plot(a, force[stretch.rows], ".", label=labels.pop(stretch.kind, "_"), **look)
+        label = labels.pop(stretch.kind, "_")
+        axes[0].plot(
+            a, force[stretch.rows], ".", label=label, color=colour, alpha=0.5, ms=3.0, mew=0.0
+        )
         if number in curves.numbers(stretch.kind) and len(a):
             top = float(a.max())
             if stretch.kind == FALLING:  # begin at the turning point
@@ -58,8 +75,7 @@ def _permanent(axes: Axes, found: Fit, length: style.Scale) -> None:
     """Permanent against largest indentation (figure 3.6)."""
     pairs = [(cycle.alpha_m, cycle.alpha_0) for cycle in found.cycles]
     x, y, down, across = np.array([(m.value, o.value, o.error, m.error) for m, o in pairs]).T
-    look: Any = {"color": style.COLOURS[0], "ms": 3.0, "lw": 0.8, "capsize": 2.0}
-    axes.errorbar(x, y, down, across, "o", **look)
+    axes.errorbar(x, y, down, across, "o", color=style.COLOURS[0], ms=3.0, lw=0.8, capsize=2.0)
     peaks = np.linspace(0.0, 1.05 * x.max(), 4 * POINTS)
     if (relation := found.relation()) is not None:
         axes.plot(peaks, np.asarray(relation.permanent(peaks)), color=style.COLOURS[1])
@@ -110,10 +126,10 @@ def _against_time(
     units: Mapping[str, str],
 ) -> None:
     """Draw lines against time, both axes scaled."""
-    for label, values, colour, look in lines:
-        axes.plot(time, values, color=colour, ls=look, label=label)
+    for line in lines:
+        axes.plot(time, line.values, color=line.colour, ls=line.style, label=line.label)
     style.scale(float(time[-1]), unit_of("time", dict(units))).name(axes.xaxis, "Time")
-    size = style.scale_in(units, dimension, *(values for _, values, _, _ in lines))
+    size = style.scale_in(units, dimension, *(line.values for line in lines))
     size.name(axes.yaxis, name)
     axes.set_xlim(min(0.0, float(time[0])), float(time[-1]))
 
@@ -127,18 +143,25 @@ def pulse_picture(
     `filtered` are the filtered forces at the stations, (rows, stations).
     """
     figure, (above, below) = style.panels("column", 2, sharex=True)
-    forces: list[Line] = [("applied", history.applied, style.COLOURS[-1], style.STYLES[2])]
+    forces = [Line("applied", history.applied, style.COLOURS[-1], style.DOTTED)]
     for number, x in enumerate(history.stations):
         colour = style.COLOURS[number % (len(style.COLOURS) - 1)]
         place = f"at {x:.4g} {unit_of('length', dict(units))}".rstrip()
-        forces.append((place, history.forces[:, number], colour, "-"))
+        forces.append(Line(place, history.forces[:, number], colour))
         if filtered is not None:
-            forces.append((f"{place}, filtered", filtered[:, number], colour, style.STYLES[1]))
+            values = filtered[:, number]
+            forces.append(Line(f"{place}, filtered", values, colour, style.DASHED))
     _against_time(above, history.time, forces, "Force", "force", units)
     above.set_xlabel("")
-    ends: list[Line] = [
-        (label, history.accelerations[:, number], style.COLOURS[number], style.STYLES[number])
-        for number, label in enumerate(("struck end", "middle", "far end"))
+    ends = [
+        Line(label, values, colour, line_style)
+        for label, values, colour, line_style in zip(
+            ("struck end", "middle", "far end"),
+            history.accelerations.T,
+            style.COLOURS,
+            style.STYLES,
+            strict=False,
+        )
     ]
     _against_time(below, history.time, ends, "Acceleration", "length/time^2", units)
     style.lines_legend(figure, above)
@@ -156,7 +179,7 @@ def filter_picture(
     """
     figure, (axes,) = style.panels("column")
     looks = zip(named.items(), style.COLOURS, strict=False)
-    lines: list[Line] = [(name, values, colour, "-") for (name, values), colour in looks]
+    lines = [Line(name, values, colour) for (name, values), colour in looks]
     name = "Force" if dimension == "force" else next(reversed(list(named)[:-1])).capitalize()
     _against_time(axes, time, lines, style.literal(name), dimension, units)
     style.lines_legend(figure, axes)
@@ -174,7 +197,7 @@ def calibration_picture(
     figure, (left, right) = style.panels("full", 1, 2, ratio=2 * style.RATIO["full"])
     other = left.twinx()
     other.spines["right"].set_visible(True)
-    handles = left.plot(time, v_f, color=style.COLOURS[0])
+    handles: list[Artist] = [*left.plot(time, v_f, color=style.COLOURS[0])]
     handles += other.plot(time, v_a, color=style.COLOURS[1])
     handles += right.plot(v_a, v_f, "o", color=style.COLOURS[0], ms=2.0)
     ends = np.array([min(0.0, float(v_a.min())), max(0.0, float(v_a.max()))])

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ContextDecorator
 from contextvars import ContextVar
-from typing import Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import matplotlib
 import numpy as np
@@ -24,20 +24,36 @@ from matplotlib.ticker import Formatter, Locator
 
 from fecm._frozen import frozen
 from fecm._text import printable
+from fecm._typing import Array
 from fecm.deck.units import PREFIXED, thousands, unit_of, with_prefix
-from fecm.plot.kinds import PlotError
+from fecm.plot.kinds import PlotError, Width
 from fecm.results.result import Result
 
-WIDTHS = {"column": 3.5, "full": 7.2}  # width of a column and of a page (in)
-RATIO = {"column": 0.68, "full": 0.45}  # height over width of a graph
-BAR = 0.32  # height of a colour bar with its labels (in)
-RESOLUTION, SCREEN = 300, 150  # dots per inch in print and on a screen
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.collections import Collection
+    from matplotlib.colorbar import Colorbar
+    from matplotlib.typing import LineStyleType
+
+# Properties of an artist, as keywords of matplotlib's functions, which are Any there.
+Look = dict[str, Any]
+
+WIDTHS: dict[Width, float] = {"column": 3.5, "full": 7.2}  # inches
+RATIO: dict[Width, float] = {"column": 0.68, "full": 0.45}  # height over width of a graph
+COLOUR_BAR_HEIGHT = 0.32  # with its labels (in)
+# Dots per inch in print and on a screen.
+RESOLUTION = 300
+SCREEN = 150
 
 # Okabe and Ito's colours, without yellow, which is hard to see on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-STYLES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))
-IN_ORDER = "viridis"  # sequential
-SIGNED = "RdBu_r"  # diverging, about zero
+SOLID: LineStyleType = "-"
+DASHED: LineStyleType = (0, (5, 1.5))
+DOTTED: LineStyleType = (0, (1, 1))
+DASH_DOTTED: LineStyleType = (0, (5, 1.5, 1, 1.5))
+STYLES = (SOLID, DASHED, DOTTED, DASH_DOTTED)
+SEQUENTIAL = "viridis"
+DIVERGING = "RdBu_r"  # about zero
 
 # Where pictures are drawn: on axes, on a new figure of pyplot, or on a figure by itself.
 TARGET: ContextVar[Axes | Literal["pyplot"] | None] = ContextVar("TARGET", default=None)
@@ -47,22 +63,32 @@ RC: Any = {
     "figure.dpi": SCREEN,
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
-    **dict.fromkeys(("font.size", "axes.labelsize", "axes.titlesize"), 8.0),
-    **dict.fromkeys(("xtick.labelsize", "ytick.labelsize"), 7.0),
-    **dict.fromkeys(("legend.fontsize", "legend.title_fontsize"), 7.0),
-    **dict.fromkeys(("axes.linewidth", "xtick.major.width", "ytick.major.width"), 0.6),
+    "font.size": 8.0,
+    "axes.labelsize": 8.0,
+    "axes.titlesize": 8.0,
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
+    "legend.fontsize": 7.0,
+    "legend.title_fontsize": 7.0,
+    "axes.linewidth": 0.6,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
     "lines.linewidth": 0.9,
-    **dict.fromkeys(("axes.spines.top", "axes.spines.right", "legend.frameon"), False),
+    "axes.spines.top": False,
+    "axes.spines.right": False,
     "axes.formatter.use_mathtext": True,
+    "legend.frameon": False,
     "legend.handlelength": 1.8,
     "legend.columnspacing": 1.2,
     "legend.borderaxespad": 0.2,
-    **dict.fromkeys(("figure.constrained_layout.h_pad", "figure.constrained_layout.w_pad"), 0.02),
+    "figure.constrained_layout.h_pad": 0.02,
+    "figure.constrained_layout.w_pad": 0.02,
     "savefig.facecolor": "white",
     "pdf.fonttype": 42,
     "svg.hashsalt": "fecm",
 }
-UNDATED: dict[str, dict[str, Any]] = {
+# Metadata to leave out of files, by their suffix, so that equal pictures have equal bytes.
+UNDATED: dict[str, dict[str, None]] = {
     ".png": {"Software": None},
     ".svg": {"Date": None, "Creator": None},
     ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
@@ -81,21 +107,27 @@ def literal(text: str) -> str:
 class Multiple(Formatter):
     """Shows ticks times a factor, all with the decimals that one of them needs."""
 
-    def __init__(self, factor: float) -> None:
-        self._factor, self._decimals = factor, 12
+    MOST_DECIMALS = 11
 
-    def set_locs(self, locs: Any) -> None:
+    def __init__(self, factor: float) -> None:
+        self._factor = factor
+        self._decimals: int | None = None  # None if no number of decimals shows the ticks
+
+    def set_locs(self, locs: Sequence[float]) -> None:
         """Take the positions of the ticks."""
         if not len(locs):
             return
         shown = self._factor * np.asarray(locs)
-        near = 1e-4 * (np.diff(np.sort(shown)).max() if len(shown) > 1 else np.abs(shown).max())
-        rounded = (n for n in range(12) if (np.abs(shown - shown.round(n)) <= near).all())
-        self._decimals = next(rounded, 12)
+        room = np.diff(np.sort(shown)).max() if len(shown) > 1 else np.abs(shown).max()
+        self._decimals = None
+        for decimals in range(self.MOST_DECIMALS + 1):
+            if (np.abs(shown - shown.round(decimals)) <= 1e-4 * room).all():
+                self._decimals = decimals
+                break
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         """Text of a tick."""
-        form = ".4g" if self._decimals == 12 else f".{self._decimals}f"
+        form = ".4g" if self._decimals is None else f".{self._decimals}f"
         return self.fix_minus(f"{self._factor * x:z{form}}")
 
     def format_data_short(self, value: float) -> str:
@@ -153,7 +185,7 @@ def open_ends(results: Mapping[str, Result]) -> str:
     return f"still in contact at the end{which}" if named else ""
 
 
-def scale_of(results: Mapping[str, Result], dimension: str, arrays: Iterable[Any]) -> Scale:
+def scale_of(results: Mapping[str, Result], dimension: str, arrays: Iterable[Array]) -> Scale:
     """Scale for arrays of one dimension, in the results' unit if all name it; units must agree."""
     units = {name: result.unit(dimension) for name, result in results.items()}
     named = {unit: name for name, unit in units.items() if unit}
@@ -163,13 +195,13 @@ def scale_of(results: Mapping[str, Result], dimension: str, arrays: Iterable[Any
     return scale(peak(*arrays), "" if "" in units.values() else next(iter(named)))
 
 
-def peak(*arrays: Any) -> float:
+def peak(*arrays: Array) -> float:
     """Largest finite absolute value of arrays; 0 if there is none."""
     finite = (np.abs(array[np.isfinite(array)]) for array in arrays)
     return max((float(values.max(initial=0.0)) for values in finite), default=0.0)
 
 
-def scale_in(units: Mapping[str, str], dimension: str, *arrays: Any) -> Scale:
+def scale_in(units: Mapping[str, str], dimension: str, *arrays: Array) -> Scale:
     """Scale for arrays of one dimension, in named units."""
     return scale(peak(*arrays), unit_of(dimension, dict(units)))
 
@@ -186,12 +218,12 @@ def colours() -> list[str]:
     return list(itertools.islice(itertools.cycle(own), len(COLOURS)))
 
 
-def style_on(axes: Axes | None) -> dict[str, Any]:
+def style_on(axes: Axes | None) -> Look:
     """The part of this style that the user's settings leave open, or the style on given axes.
 
     On given axes it is the user's, with the colours after those of the lines there.
     """
-    own: Any = matplotlib.rcParams
+    own = matplotlib.rcParams
     if axes is not None:
         cycle = own["axes.prop_cycle"]
         first = len(axes.get_lines()) % len(cycle)
@@ -200,55 +232,95 @@ def style_on(axes: Axes | None) -> dict[str, Any]:
 
 
 def panels(
-    width: str, rows: int = 1, columns: int = 1, *, ratio: float = 0.0, tall: float = 1.0,
-    **options: Any,
-) -> tuple[Figure, list[Axes]]:  # fmt: skip
-    """Figure with equal axes by rows: height over width is `ratio`, or `tall` times a graph's."""
-    inches, target, ratio = WIDTHS[width], TARGET.get(), ratio or tall * RATIO[width]
-    solid = "subplot_kw" in options and options["subplot_kw"].get("projection") == "3d"
+    width: Width,
+    rows: int = 1,
+    columns: int = 1,
+    *,
+    ratio: float = 0.0,
+    tall: float = 1.0,
+    projection: Literal["3d", "polar"] | None = None,
+    sharex: bool = False,
+    sharey: bool = False,
+    width_ratios: Sequence[float] | None = None,
+    height_ratios: Sequence[float] | None = None,
+) -> tuple[Figure, list[Axes]]:
+    """Figure with equal axes by rows: height over width is `ratio`, or `tall` times a graph's.
+
+    The ratios of widths and heights make axes unequal.
+    """
+    target = TARGET.get()
     if isinstance(target, Axes):
-        if rows * columns > 1:
-            raise PlotError(f"this picture has {rows * columns} axes and can't be drawn on one")
-        if solid != (target.name == "3d"):
-            raise PlotError(
-                "this picture needs axes made with subplot_kw={'projection': '3d'}"
-                if solid else "this picture can't be drawn on three-dimensional axes"
-            )  # fmt: skip
-        figure: Any = target.figure
-        return figure, [target]
+        return _figure_of(target, rows * columns, solid=projection == "3d"), [target]
+    inches = WIDTHS[width]
+    height = inches * (ratio or tall * RATIO[width]) * rows / columns
     # Layout engines do not know the size of three-dimensional axes.
-    layout: Any = None if "subplot_kw" in options else "constrained"
-    size = (inches, inches * ratio * rows / columns)
+    layout: Literal["constrained"] | None = None if projection else "constrained"
     if target is None:
-        figure = Figure(figsize=size, layout=layout)
+        figure = Figure(figsize=(inches, height), layout=layout)
         FigureCanvasAgg(figure)
     else:
-        from matplotlib import pyplot
+        from matplotlib import pyplot  # starts a user interface, which files do not need
 
-        figure = pyplot.figure(figsize=size, layout=layout)
-    axes = figure.subplots(rows, columns, squeeze=False, **options)
-    if solid:  # with room for a colour bar
-        top = 1.0 - BAR / size[1]
-        figure.subplots_adjust(0.0, 0.07, 0.91, top, wspace=0.1, hspace=0.05)
+        figure = pyplot.figure(figsize=(inches, height), layout=layout)
+    axes = figure.subplots(
+        rows,
+        columns,
+        squeeze=False,
+        sharex=sharex,
+        sharey=sharey,
+        width_ratios=width_ratios,
+        height_ratios=height_ratios,
+        subplot_kw={"projection": projection},
+    )
+    if projection == "3d":
+        top = 1.0 - COLOUR_BAR_HEIGHT / height
+        figure.subplots_adjust(left=0.0, bottom=0.07, right=0.91, top=top, wspace=0.1, hspace=0.05)
     return figure, list(axes.ravel())
 
 
+def _figure_of(target: Axes, count: int, *, solid: bool) -> Figure:
+    """Figure of the user's axes; refuse a picture that does not fit them."""
+    if count > 1:
+        raise PlotError(f"this picture has {count} axes and can't be drawn on one")
+    if solid and target.name != "3d":
+        raise PlotError("this picture needs axes made with subplot_kw={'projection': '3d'}")
+    if not solid and target.name == "3d":
+        raise PlotError("this picture can't be drawn on three-dimensional axes")
+    return cast(Figure, target.figure)  # or a SubFigure, which has the same methods
+
+
 def colour_bar(
-    axes: Axes | Sequence[Axes], drawn: Any, shown: Scale, name: str, locator: Locator,
-    **options: Any,
-) -> Any:  # fmt: skip
-    """Draw the colour bar of what is drawn above axes."""
-    place: dict[str, Any] = {"location": "top", "aspect": 30, "pad": 0.03} | options
-    bar = drawn.axes.figure.colorbar(drawn, ax=axes, **place)
+    axes: Axes | Sequence[Axes],
+    drawn: Collection,
+    shown: Scale,
+    name: str,
+    locator: Locator,
+    *,
+    aspect: float = 30.0,
+    fraction: float = 0.15,
+    pad: float = 0.03,
+    shrink: float = 1.0,
+) -> Colorbar:
+    """Draw the colour bar of what is drawn above axes.
+
+    `aspect` is its length over its height; `fraction`, `pad` and `shrink` are relative to the axes.
+    """
+    figure = cast(Figure, drawn.figure)
+    bar = figure.colorbar(
+        drawn, ax=axes, location="top", aspect=aspect, fraction=fraction, pad=pad, shrink=shrink
+    )
     bar.set_label(shown.label(name))
     bar.outline.set_linewidth(0.6)
-    bar.locator, bar.formatter = locator, Multiple(shown.factor)
+    bar.locator = locator
+    bar.formatter = Multiple(shown.factor)
     bar.minorticks_off()
     bar.update_ticks()
     return bar
 
 
-def legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str], title: str = "") -> None:
+def legend(
+    figure: Figure, handles: Sequence[Artist], labels: Sequence[str], title: str = ""
+) -> None:
     """Draw a legend with literal labels above the axes, or in the axes if they are given."""
     target = TARGET.get()
     if isinstance(target, Axes):
@@ -266,11 +338,13 @@ def legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str], title:
 
 def lines_legend(figure: Figure, axes: Axes, title: str = "") -> None:
     """Draw the legend of the labelled lines of axes, if there are any."""
-    named = [(str(line.get_label()), line) for line in axes.get_lines()]
     unnamed = ("_", "_nolegend_")  # matplotlib gives the latter to error bars
-    named = [
-        (text, line) for text, line in named
-        if text not in unnamed and not text.startswith("_child")
-    ]  # fmt: skip
-    if named:
-        legend(figure, [line for _, line in named], [text for text, _ in named], title)
+    lines: list[Artist] = []
+    labels: list[str] = []
+    for line in axes.get_lines():
+        label = str(line.get_label())
+        if label not in unnamed and not label.startswith("_child"):
+            lines.append(line)
+            labels.append(label)
+    if lines:
+        legend(figure, lines, labels, title)

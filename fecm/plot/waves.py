@@ -3,22 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from matplotlib.lines import Line2D
 
 from fecm.plot.kinds import Picture
-from fecm.plot.style import COLOURS, Multiple, limit_count, panels, scale_in, styled
+from fecm.plot.style import (
+    COLOURS,
+    DASHED,
+    DOTTED,
+    SOLID,
+    Look,
+    Multiple,
+    limit_count,
+    panels,
+    scale_in,
+    styled,
+)
 from fecm.studies.waves import FRONTS, MODES, Dispersion, Medium, WaveSurfaces
+
+if TYPE_CHECKING:
+    from matplotlib.projections.polar import PolarAxes
+    from matplotlib.typing import LineStyleType
 
 AROUND = np.arange(1441) / 4.0  # directions of the normals, degrees
 RAYS = 45.0  # degrees between the normals of the rays
 WORDS = {name: name.replace("_", " ").replace("in plane", "in-plane") for name in (*MODES, *FRONTS)}
-DASHES: tuple[Any, ...] = (
-    "-", (0, (5, 1.5)), (0, (1, 1)), (0, (7, 1.5, 1, 1.5)), (0, (7, 1.5, 1, 1.5, 1, 1.5))
-)  # fmt: skip
-_DOT: Any = {"ls": "", "marker": "o", "ms": 3.0, "mfc": "white", "mec": "black", "mew": 0.6}
+# A style per mode.
+DASHCUSPTED: LineStyleType = (0, (7, 1.5, 1, 1.5))
+DASHCUSPCUSPTED: LineStyleType = (0, (7, 1.5, 1, 1.5, 1, 1.5))
+DASHES = (SOLID, DASHED, DOTTED, DASHCUSPTED, DASHCUSPCUSPTED)
+CUSP: Look = {"ls": "", "marker": "o", "ms": 3.0, "mfc": "white", "mec": "black", "mew": 0.6}
 
 
 @styled
@@ -59,9 +75,9 @@ def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
     """Polar graphs of the normal velocities of in-plane and flexural fronts."""
     fronts = surfaces.fronts(AROUND)
     speed = scale_in(units, "length/time", fronts.velocity)
-    figure, axes = panels("full", 1, 2, ratio=1.16, subplot_kw={"projection": "polar"})
+    figure, axes = panels("full", 1, 2, ratio=1.16, projection="polar")
     figure.set_layout_engine("constrained")
-    graphs: Any = axes  # polar axes have additional methods
+    graphs = cast("list[PolarAxes]", axes)
     for place, (front, colour) in enumerate(zip(FRONTS, COLOURS, strict=False)):
         curve = np.deg2rad(fronts.normal), fronts.velocity[:, place]
         graphs[0 if place < 2 else 1].plot(*curve, color=colour, label=WORDS[front])
@@ -92,13 +108,13 @@ def fronts_picture(
     circle = radius * np.cos(around), radius * np.sin(around)
     figure, axes = panels("full", 2, 3, ratio=0.95)
     for mode, ax in enumerate(axes[:5]):
-        ax.plot(*circle, color="0.4", ls=DASHES[2])
+        ax.plot(*circle, color="0.4", ls=DOTTED)
         for start, end in zip(*(at[:, mode] for at in ends), strict=True):
             ax.plot(*zip(start, end, strict=True), color="0.6", lw=0.5)
         for at, colour in zip(places, COLOURS, strict=False):
             ax.plot(*at[:, mode].T, color=colour)
         dots = [(c.x, c.y) for found in turns for c in found if c.mode == FRONTS[mode]]
-        ax.plot(*np.reshape(dots, (-1, 2)).T, **_DOT)
+        ax.plot(*np.reshape(dots, (-1, 2)).T, **CUSP)
         ax.set_title(WORDS[FRONTS[mode]])
         ax.locator_params(nbins=5)
         ax.set_aspect("equal")
@@ -107,10 +123,10 @@ def fronts_picture(
     axes[5].set_axis_off()
     handles = [Line2D([], [], color=colour) for _, colour in zip(times, COLOURS, strict=False)]
     labels = [clock.show(time) for time in times]
-    handles += [Line2D([], [], color="0.4", ls=DASHES[2]), Line2D([], [], color="0.6", lw=0.5)]
+    handles += [Line2D([], [], color="0.4", ls=DOTTED), Line2D([], [], color="0.6", lw=0.5)]
     labels += ["time 0", f"rays, normals {RAYS:g}° apart"]
     if any(turns):
-        handles.append(Line2D([], [], **_DOT))
+        handles.append(Line2D([], [], **CUSP))
         labels.append("cusps")
     axes[5].legend(handles, labels, loc="center")
     return Picture(figure)

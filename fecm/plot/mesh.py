@@ -1,0 +1,103 @@
+"""Picture of the mesh: elements, supports, impact point and patch (the report's figure 4.11 a)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.collections import LineCollection
+
+from fecm._typing import Bools
+from fecm.deck.model import Impact
+from fecm.plot import data, style
+from fecm.plot.kinds import Picture, Width
+from fecm.plot.plate import aspect, draw_circle
+from fecm.results.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+class Support(StrEnum):
+    """How a node is held against bending, as the legend names it."""
+
+    CLAMPED = "clamped"
+    W_HELD = "w held"
+    ROTATION_HELD = "rotation held"
+
+
+# Marks of the supports.
+MARKS: dict[Support, style.Look] = {
+    Support.CLAMPED: {"marker": "s", "color": style.COLOURS[0], "ms": 3.0},
+    Support.W_HELD: {
+        "marker": "^", "color": style.COLOURS[0], "ms": 3.5, "mfc": "white", "mew": 0.7
+    },
+    Support.ROTATION_HELD: {
+        "marker": "o", "color": style.COLOURS[2], "ms": 3.0, "mfc": "white", "mew": 0.7
+    },
+}  # fmt: skip
+
+
+def supports(result: Result) -> dict[Support, Bools]:
+    """Masks of the nodes held against bending, by kind of support; each (numnp,)."""
+    held = result["mesh/equations"][:, 2:5] == 0
+    w, rotations = held[:, 0], held[:, 1:]
+    full = w & rotations.all(axis=1)
+    # At a corner of a simply supported plate one node of an element is fully held, others hold w.
+    nodes, present = result["mesh/elements"] - 1, result["mesh/elements"] > 0
+    one = (full[nodes] & present).sum(axis=1) == 1
+    several = (w[nodes] & present).sum(axis=1) > 1
+    corners, others = np.zeros_like(full), np.zeros_like(full)
+    corners[nodes[(one & several)[:, None] & present]] = True
+    others[nodes[~one[:, None] & present]] = True
+    clamped = full & ~(corners & ~others)
+    return {
+        Support.CLAMPED: clamped,
+        Support.W_HELD: w & ~clamped,
+        Support.ROTATION_HELD: ~w & rotations.any(axis=1),
+    }
+
+
+def mesh(
+    results: Mapping[str, Result],
+    *,
+    at: Sequence[tuple[float, float]] = (),
+    width: Width = "column",
+) -> Picture:
+    """Elements, supports, impact point, contact patch, and points to mark (`at`)."""
+    ((name, result),) = results.items()
+    coordinates, _ = data.require(result, name, "mesh/coordinates", "mesh/elements")
+    cut = data.patches(result, 4, name)
+    place = style.scale_of(results, "length", [coordinates])
+    low, high = cut.points.min(axis=0), cut.points.max(axis=0)
+    height = aspect(cut.points)
+    ratio = height + (0.55 - 0.5 * height) / style.WIDTHS[width]
+    figure, (axes,) = style.panels(width, ratio=ratio)
+    sides = [cut.points[edge] for edge in cut.edges]
+    axes.add_collection(LineCollection(sides, colors="0.4", linewidths=0.4))
+    for support, nodes in supports(result).items():
+        if nodes.any():
+            x, y = coordinates[nodes, :2].T
+            axes.plot(x, y, ls="none", clip_on=False, label=support, **MARKS[support])
+    _mark_load(axes, result, name)
+    if at:
+        x, y = np.array(at).T
+        axes.plot(x, y, "D", clip_on=False, color=style.COLOURS[3], ms=3.5, label="points")
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    place.name(axes.xaxis, "$x$")
+    place.name(axes.yaxis, "$y$")
+    style.lines_legend(figure, axes)
+    return Picture(figure)
+
+
+def _mark_load(axes: Axes, result: Result, name: str) -> None:
+    """Mark where the plate is hit or loaded, and the contact patch."""
+    where = data.struck(result, name)
+    if len(where):
+        in_patch = data.circle(result, name) is not None
+        mark: style.Look = {"marker": "+"} if in_patch else {"marker": "X", "mec": "white"}
+        mark["label"] = "impact" if data.deck_of(result, name).has(Impact) else "load"
+        axes.plot(*where.T, color=style.COLOURS[1], ms=6.0, mew=0.5, ls="", clip_on=False, **mark)
+    draw_circle(axes, result, name, color=style.COLOURS[1], label="contact patch")

@@ -1,0 +1,199 @@
+"""Data of pictures of sweeps: the cases to draw, and their parameters and quantities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+
+from fecm._errors import did_you_mean, warn
+from fecm._frozen import frozen
+from fecm._typing import Array, Bools, Indices
+from fecm.plot import style
+from fecm.plot.kinds import PlotError
+from fecm.results.metrics import COLUMNS, VERDICTS
+from fecm.results.metrics import INTEGERS as COUNTS
+from fecm.results.validity import MEANING, Reason, counted
+from fecm.sweeps.cases import INTEGERS as NUMBERS_OF_NODES
+from fecm.sweeps.cases import NAMES
+from fecm.sweeps.result import SweepResult, reasons
+
+if TYPE_CHECKING:
+    from matplotlib.axis import Axis
+
+LABELS = {
+    "velocity": "Impact velocity", "k": "Contact coefficient $k$", "alpha_p": r"$\alpha_p$",
+    "s_p": "$s_p$", "q": "$q$", "rod_length": "Length of the rod",
+    "rod_modulus": "Modulus of the rod", "rod_density": "Density of the rod",
+    "mass": "Mass of the projectile", "rod_mass": "Mass of the projectile",
+    "energy": "Impact energy", "radius": "Radius of the sphere", "at": "Impact point",
+    "angle": "Angle added (°)", "nu12": r"$\nu_{12}$", "e1": "$E_1$", "e2": "$E_2$",
+    "g12": "$G_{12}$", "g13": "$G_{13}$", "g23": "$G_{23}$", "dt": "Time step",
+    "patch": "Radius of the patch", "x0": "$x_0$", "y0": "$y_0$",
+    "max_indentation": "Largest indentation",
+}  # fmt: skip
+INTEGERS = (*NUMBERS_OF_NODES, *COUNTS)
+STILL = "still in contact at the end"
+ENDED = "contact not over at the end"
+Where = Mapping[str, float | str]  # values of parameters, by name, that select cases
+
+
+@frozen
+class Variable:
+    """A parameter or quantity of cases, shown by an axis or by colours."""
+
+    name: str
+    scale: style.Scale
+    values: Array  # (cases,): numbers; for texts their positions in `ticks`
+    ticks: tuple[str, ...] = ()  # texts in the order of the cases; empty for numbers
+
+    @property
+    def label(self) -> str:
+        """Name in words."""
+        plain = self.name.replace("_", " ")
+        own = self.name not in (*COLUMNS, *NAMES)  # the caller's symbol or word
+        return LABELS.get(self.name, plain if own else plain.capitalize())
+
+    @property
+    def whole(self) -> bool:
+        """Whether the numbers are counts."""
+        return self.name in INTEGERS
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Smallest and largest number of the cases that have one."""
+        return float(np.nanmin(self.values)), float(np.nanmax(self.values))
+
+    def mark(self, axis: Axis) -> None:
+        """Label an axis of a graph; counts have ticks at integers only."""
+        self.scale.name(axis, self.label)
+        if self.whole:
+            axis.set_major_locator(MaxNLocator(integer=True))
+
+
+def variable_of(sweep: SweepResult, name: str, values: Array) -> Variable:
+    """Variable of a parameter's or a quantity's values; counts are not scaled."""
+    plain = style.Scale(1.0, "")
+    if values.dtype.kind == "U":
+        ticks = tuple(dict.fromkeys(values.tolist()))
+        places = {text: place for place, text in enumerate(ticks)}
+        return Variable(name, plain, np.array([places[text] for text in values.tolist()]), ticks)
+    if name in INTEGERS:
+        return Variable(name, plain, values)
+    return Variable(name, style.scale(style.peak(values), sweep.unit(name)), values)
+
+
+def case_rows(sweep: SweepResult, name: str, where: Where) -> Indices:
+    """Cases at given values; numbers select the nearest value."""
+    kept = np.ones(len(sweep), dtype=bool)
+    for parameter, wanted in where.items():
+        values = parameter_values(sweep, name, parameter)
+        if values.dtype.kind == "U":
+            kept &= _equal_texts(values, wanted, f"{name} has no {parameter} {wanted}")
+        else:
+            kept &= _nearest_numbers(values, wanted, f"{name} has no {parameter} {wanted}")
+    if not kept.any():
+        raise PlotError(f"{name} has no case with these values of {listed(where)}")
+    return np.flatnonzero(kept)
+
+
+def _equal_texts(values: Array, wanted: float | str, otherwise: str) -> Bools:
+    """Mask of the cases with a text; begin the refusal of another with `otherwise`."""
+    chosen = np.asarray(values == str(wanted))
+    if not chosen.any():
+        raise PlotError(f"{otherwise}; there is {listed(dict.fromkeys(values))}")
+    return chosen
+
+
+def _nearest_numbers(values: Array, wanted: float | str, otherwise: str) -> Bools:
+    """Mask of the cases nearest to a number; begin the refusal of another with `otherwise`."""
+    try:
+        number = float(wanted)
+    except ValueError:
+        number = np.nan
+    low, high = values.min(), values.max()
+    room = 1e-6 * (high - low)
+    if not low - room <= number <= high + room:
+        raise PlotError(f"{otherwise}; its values range from {low:g} to {high:g}")
+    return np.asarray(values == values[np.abs(values - number).argmin()])
+
+
+def parameter_values(sweep: SweepResult, name: str, parameter: str) -> Array:
+    """Values of a parameter, (cases,); refuse one that the sweep does not have."""
+    if parameter not in sweep.cases:
+        raise PlotError(f"{name} has no parameter {parameter}; it has {listed(sweep.cases)}")
+    return sweep.cases[parameter]
+
+
+def listed(names: Iterable[object]) -> str:
+    """Join names in words."""
+    *most, last = map(str, names)
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def quantity_of(sweep: SweepResult, name: str, rows: Indices, quantity: str) -> Variable:
+    """Quantity to show of cases, NaN where a case has none; warn of cases that lack it.
+
+    The default is the velocity found, or else the peak force.
+    """
+    quantity = quantity or ("found_velocity" if "found_velocity" in sweep.summary else "peak_force")
+    known = [name for name in sweep.summary if name not in VERDICTS]
+    if quantity not in known:
+        others = did_you_mean(quantity, known) or f"; the sweep has {listed(known)}"
+        raise PlotError(f"unknown quantity {quantity}{others}")
+    fine = sweep.fine[rows]
+    values = np.where(fine, sweep[quantity][rows].astype(float), np.nan)
+    _warn_of_gaps(sweep, name, rows, quantity, np.isnan(values))
+    return variable_of(sweep, quantity, values)
+
+
+def _warn_of_gaps(
+    sweep: SweepResult, name: str, rows: Indices, quantity: str, lacking: Bools
+) -> None:
+    """Warn of cases that lack a quantity, by reason; refuse a picture if all do."""
+    fine = sweep.fine[rows]
+    open_ends = ended(sweep, rows)
+    still = next(iter(open_ends.values()), np.zeros_like(fine))
+    of_all = f"of {len(rows)} cases of {name}"
+    what = f"were {STILL}" if STILL in open_ends else "ended before their contact was over"
+    text_of_open = f"{still.sum()} {of_all} {what}"
+    failures = ""
+    if not fine.all():
+        failures = f"{(~fine).sum()} {of_all} failed ({reasons(sweep['status'][rows][~fine])})"
+
+    if lacking.all():
+        nothing = f"no case of {name} has a {quantity}"
+        if still.any():
+            raise PlotError(f"{nothing}: {text_of_open}; a deck with a longer duration may show it")
+        raise PlotError(failures or f"{nothing}: there was no contact")
+    if failures:
+        warn(f"{failures}; they are gaps in the picture")
+    if still.any():
+        gaps = "; they have no value in the picture" if lacking[still].any() else ""
+        warn(f"{text_of_open}{gaps}")
+    without_contact = int((lacking & fine & ~still).sum())
+    if without_contact:
+        warn(f"{without_contact} cases of {name} without contact have no {quantity}")
+
+
+def beyond(sweep: SweepResult, rows: Indices) -> dict[str, Bools]:
+    """Cases beyond the range of the model, by what they are."""
+    elsewhere = (Reason.OPEN, Reason.DELAMINATED)  # they have a mark and a line of their own
+    masks = counted(sweep.validity[rows])
+    return {MEANING[reason]: mask for reason, mask in masks if reason not in elsewhere}
+
+
+def ended(sweep: SweepResult, rows: Indices) -> dict[str, Bools]:
+    """Cases whose contact is not over, by what they are; empty if there are none."""
+    mask = sweep.fine[rows] & ~sweep.over[rows]
+    what = STILL if np.array_equal(mask, sweep.still[rows]) else ENDED
+    return {what: mask} if mask.any() else {}
+
+
+def counts(masks: Mapping[str, Bools], sign: str = "") -> str:
+    """Lines for below a picture: how many cases are what."""
+    return "".join(
+        f"\n{sign}{what}: {mask.sum()} of {len(mask)} cases" for what, mask in masks.items()
+    )

@@ -1,0 +1,163 @@
+"""Picture of the stresses of plies through the thickness of an element."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from fecm._errors import warn
+from fecm._typing import Array, Floats
+from fecm.mechanics.mesh import element_blocks, element_centres
+from fecm.mechanics.points import locate
+from fecm.plot import style
+from fecm.plot.data import mesh_of, on_plate, reach, require
+from fecm.plot.kinds import Picture, PlotError, Width
+from fecm.results.errors import NotStoredError, ResultFileError
+from fecm.results.plies import Plies, rows_at
+from fecm.results.result import Result
+
+LARGE_RESIDUAL = 0.1  # over the largest interlaminar stress: a note says so
+# A parabola through the lower, middle and upper value of a ply, at some parts of its thickness.
+_PARTS = np.linspace(0.0, 1.0, 9)
+_PARABOLA = np.stack(
+    [(1 - _PARTS) * (1 - 2 * _PARTS), 4 * _PARTS * (1 - _PARTS), _PARTS * (2 * _PARTS - 1)]
+)
+
+
+class Stress(NamedTuple):
+    """A stress over the thickness."""
+
+    label: str
+    z: Array  # (plies, n), from the midplane
+    values: Array  # (plies, n)
+
+
+def thickness(
+    results: Mapping[str, Result],
+    *,
+    at: Sequence[tuple[float, float]] = (),
+    times: Sequence[float] = (),
+    width: Width = "column",
+) -> Picture:
+    """Stresses of the plies of one element over z, the struck face at the top.
+
+    In-plane stresses are in the axes of each ply, interlaminar ones in those of the plate; the last
+    graph is the resultant of these.  sigma_z is not computed.
+
+    Of `at` (length) at most one place selects the nearest element with ply stresses, and its
+    nearest point; of `times` (the deck's unit) at most one the nearest stored row.  By default both
+    are those of the largest abs(sigma_1) outside the elements under the load.
+    """
+    ((name, result),) = results.items()
+    plies, point = _chosen(result, name, at, times)
+    drawn = _stresses(plies, point)
+    _warn(result, name, plies)
+    z = plies.z
+    columns = 2 if width == "column" else 3
+    lines = math.ceil(len(drawn) / columns)
+    figure, axes = style.panels(width, lines, columns, sharey=True, ratio=1.8 / columns)
+    place = style.scale_of(results, "length", [z])
+    for ax, one in zip(axes, drawn, strict=False):
+        stress = style.scale_of(results, "force/length^2", [one.values])
+        for face in np.unique(z[:, ::2]):
+            ax.axhline(face, color="0.6", lw=0.4, ls=":")
+        ax.axvline(0.0, color="0.6", lw=0.4)
+        ax.plot(one.values.ravel(), one.z.ravel(), color=style.colours()[0])
+        stress.name(ax.xaxis, one.label)
+        ax.set_ylim(z[-1, 2], z[0, 0])
+    for ax in axes[len(drawn) :]:
+        ax.set_axis_off()
+    for ax in axes[: len(drawn) : columns]:
+        place.name(ax.yaxis, "$z$")
+    clock = style.scale_of(results, "time", [plies.time])
+    x, y = plies.x[0, point], plies.y[0, point]
+    where = f"{x:.4g}, {y:.4g} {style.literal(result.unit('length'))}".rstrip()
+    time = clock.show(float(plies.time[0]))
+    figure.suptitle(f"element {plies.element[0]} at {where}, time {time}", fontsize=8.0)
+    return Picture(figure)
+
+
+def _stresses(plies: Plies, point: int) -> list[Stress]:
+    """Stresses at a point; those between the plies only where they are computed."""
+    faces = plies.z[:, ::2]
+    xz, yz, z = (values @ _PARABOLA for values in (plies.tau_xz[0, 0], plies.tau_yz[0, 0], plies.z))
+    found = [
+        Stress(r"$\sigma_1$", faces, plies.sigma_1[0, 0, point]),
+        Stress(r"$\sigma_2$", faces, plies.sigma_2[0, 0, point]),
+        Stress(r"$\tau_{12}$", faces, plies.tau_12[0, 0, point]),
+    ]
+    if np.isfinite([xz, yz]).all():
+        found += [
+            Stress(r"$\tau_{xz}$", z, xz),
+            Stress(r"$\tau_{yz}$", z, yz),
+            Stress(r"$(\tau_{xz}^2 + \tau_{yz}^2)^{1/2}$", z, np.hypot(xz, yz)),
+        ]
+    return found
+
+
+def _chosen(
+    result: Result, name: str, at: Sequence[tuple[float, float]], times: Sequence[float]
+) -> tuple[Plies, int]:
+    """Plies of one element at one time, and the number of the point in it, from 0."""
+    if len(at) > 1 or len(times) > 1:
+        raise PlotError("the kind thickness shows one point at one time; give --at and --time once")
+    sigma, stored, numbers, near = require(
+        result, name, "plies/sigma_1", "plies/time", "plies/element", "plies/under_load"
+    )
+    mesh = mesh_of(result, name)
+    outside = near == 0
+    try:
+        rows = rows_at(stored, times, "ply stresses") if times else np.arange(len(stored))
+        largest = np.abs(sigma[rows]).max(axis=(3, 4))  # (rows, elements, points)
+        loaded = largest.max(axis=(0, 2))  # (elements,)
+        member = int(np.where(outside, loaded, -1.0).argmax() if outside.any() else loaded.argmax())
+        if at:
+            member = _nearest_element(mesh, numbers, np.array(at[0]), name)
+        row, point = np.unravel_index(largest[:, member].argmax(), largest[:, member].shape)
+        plies = result.plies(float(stored[rows[row]]), int(numbers[member]))
+    except NotStoredError as error:
+        raise PlotError(f"{name} has {error}") from None
+    except ResultFileError as error:
+        raise PlotError(f"{name}: {error}") from None
+    if at:
+        point = np.hypot(plies.x[0] - at[0][0], plies.y[0] - at[0][1]).argmin()
+    return plies, int(point)
+
+
+def _nearest_element(mesh: tuple[Array, Floats], numbers: Array, at: Floats, name: str) -> int:
+    """Position of the element that contains a place, or else of the one with the nearest centre."""
+    coordinates = mesh[1]
+    elements = mesh[0][numbers - 1]
+    on_plate(coordinates, at, name)
+    distance = np.hypot(*(element_centres(elements, coordinates) - at).T)
+    blocks = element_blocks(elements, coordinates)
+    inside = np.concatenate([block.rows[locate(block, at[None])[0]] for block in blocks])
+    if len(inside):
+        return int(inside[distance[inside].argmin()])
+    nearest = int(distance.argmin())
+    warn(
+        f"{name} has no ply stresses at {at[0]:g},{at[1]:g}; the nearest element with ply stresses "
+        f"is {numbers[nearest]}, its centre {distance[nearest]:.3g} away"
+    )
+    return nearest
+
+
+def _warn(result: Result, name: str, plies: Plies) -> None:
+    """Say what limits the stresses of an element."""
+    element = f"element {plies.element[0]} of {name}"
+    if plies.under_load[0]:
+        near = reach(result, name, 2.0 * float(plies.z[-1, 2]))
+        warn(f"{element} is within {near:.3g} of the load, where plate theory does not hold")
+    tau = np.abs([plies.tau_xz, plies.tau_yz]).max()
+    residual = np.abs(plies.residual).max()
+    if np.isnan(tau):
+        warn(f"{element} does not have nine nodes: it has no interlaminar stresses")
+    elif residual > LARGE_RESIDUAL * tau:
+        warn(
+            f"at z = h/2 of {element} equilibrium leaves {residual / tau:.0%} of the largest "
+            "interlaminar stress, which is removed linearly in z: in-plane supports act there, or "
+            "the mesh is coarse"
+        )
