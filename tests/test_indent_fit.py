@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fecm.studies.indentation_test.constants import Fit, fit, notes
-from fecm.studies.indentation_test.curves import Estimate, divide
+from fecm.studies.indentation_test.constants import Fit, fit
+from fecm.studies.indentation_test.curves import Estimate
+from fecm.studies.indentation_test.output import notes
+from fecm.studies.indentation_test.turns import divide
 from tests.indentation_tests import (
     ALPHA_P,
     PEAKS,

@@ -29,9 +29,9 @@ from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
 from fecm.problem.build import build_constants
 from fecm.problem.check_segments import check_law
 from fecm.studies import StudyError
-from fecm.studies.indentation_test.constants import card, lines, notes, plain
 from fecm.studies.indentation_test.constants import fit as fitted
 from fecm.studies.indentation_test.curves import LIMITS_Q
+from fecm.studies.indentation_test.output import card, lines, notes, plain
 from fecm.studies.tables import read_test
 
 

@@ -12,7 +12,7 @@ from fecm.deck.units import unit_of
 from fecm.plot import style
 from fecm.plot.kinds import Picture
 from fecm.studies.indentation_test.constants import Fit
-from fecm.studies.indentation_test.curves import FALLING, LOADING, RISING
+from fecm.studies.indentation_test.turns import Kind
 from fecm.studies.rod_test.filters import Calibration
 from fecm.studies.rod_test.pulse_test import RodHistory
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.typing import LineStyleType
 
-COLOUR_OF = dict(zip((LOADING, FALLING, RISING), style.COLOURS, strict=False))
+COLOUR_OF = dict(zip(Kind, style.COLOURS, strict=False))
 POINTS = 100
 
 
@@ -46,7 +46,11 @@ def fit_picture(
     else:
         figure, axes = style.panels("column", ratio=ratio)
     curves, p = found.solution.curves, found.solution.scaled
-    labels = {LOADING: "first loading", FALLING: "unloading", RISING: "reloading"}
+    labels = {
+        Kind.LOADING: "first loading",
+        Kind.FALLING: "unloading",
+        Kind.RISING: "reloading",
+    }
     for number, stretch in enumerate(curves.division.stretches):
         colour, a = COLOUR_OF[stretch.kind], indentation[stretch.rows]
         label = labels.pop(stretch.kind, "_")
@@ -55,7 +59,7 @@ def fit_picture(
         )
         if number in curves.numbers(stretch.kind) and len(a):
             top = float(a.max())
-            if stretch.kind == FALLING:  # begin at the turning point
+            if stretch.kind is Kind.FALLING:  # begin at the turning point
                 top = max(top, found.solution.values[curves.layout.corners[stretch.begin]])
             x = np.linspace(max(0.0, a.min()), top, POINTS)
             y = curves.force * curves.stretch(p, number, x / curves.length)

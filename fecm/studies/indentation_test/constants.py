@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fecm._frozen import frozen
-from fecm._tables import aligned
-from fecm._typing import Floats, Indices
-from fecm.deck.model import Indentation
+from fecm._typing import Floats
 from fecm.mechanics.contact_law import (
     ACR_POWER,
     LOADING_POWER,
@@ -21,18 +16,20 @@ from fecm.mechanics.contact_law import (
 )
 from fecm.studies import StudyError
 from fecm.studies.indentation_test.curves import (
-    FALLING,
-    LOADING,
-    RISING,
     Curves,
     Estimate,
     Solution,
-    divide,
     influence,
     r_squared,
     scaled,
     solve,
 )
+from fecm.studies.indentation_test.permanent import Critical, Line, critical, line
+from fecm.studies.indentation_test.turns import Kind, divide
+
+LARGEST = 1e60  # largest number whose powers are finite
+# Smallest error of a coordinate relative to the largest indentation, for tests without noise.
+ROUNDING = 1e-9
 
 
 @frozen
@@ -50,9 +47,9 @@ def free_power(curves: Curves) -> FreePower:
     The coefficient at the largest indentation is almost independent of the power; the coefficient
     at unit indentation, far from every point, inherits the error of the power.
     """
-    from scipy.optimize import least_squares
+    from scipy.optimize import least_squares  # takes 0.3 s, and most commands do not fit
 
-    rows = curves.division.rows(LOADING)
+    rows = curves.division.rows(Kind.LOADING)
     everywhere = np.maximum(curves.a[rows], 0.0), curves.f[rows]
     a, f = (values[everywhere[0] > 0.0] for values in everywhere)
     start = [1.0, LOADING_POWER]
@@ -67,117 +64,6 @@ def free_power(curves: Curves) -> FreePower:
         Estimate(float(k), float((by @ covariance @ by) ** 0.5)),
         r_squared(c * everywhere[0] ** n, everywhere[1]),
     )
-
-
-# Relation of permanent to largest indentation, equations 3-8 and 3-7 ------------------------------
-
-# Both coordinates of a cycle have errors, which are correlated with each other and with those of
-# other cycles; the fit is by generalised least squares with the complete covariance.
-
-ROUNDS = 20  # iterations of the weights, which depend on the slope
-UNLIKELY = 0.01  # probability below which the scatter exceeds the noise of the points
-# Smallest error of a coordinate relative to the largest indentation, for tests without noise.
-ROUNDING = 1e-9
-
-
-@frozen
-class Line:
-    """Equation 3-8."""
-
-    s_p: Estimate
-    alpha_p: Estimate
-    elastic: tuple[int, ...]  # cycles below alpha_p, without permanent indentation
-    scatter: float  # of :func:`_scatter`; it multiplies the errors
-
-
-def line(peaks: Floats, permanents: Floats, covariance: Floats) -> Line | None:
-    """Fit alpha_0 = max(0, s_p (alpha_m - alpha_p)); None if fewer than two cycles exceed alpha_p.
-
-    The covariance, regular, is that of all peaks alpha_m, then all permanent indentations alpha_0.
-    """
-    order = np.argsort(peaks)
-    fits: list[tuple[float, Line]] = []
-    for count in range(len(peaks) - 1):
-        found = _split(peaks, permanents, covariance, order[:count])
-        if found is None:
-            continue
-        start = found[1].alpha_p.value
-        if not count or peaks[order[count - 1]] <= start < peaks[order[count]]:
-            fits.append(found)
-    return min(fits, key=lambda one: one[0])[1] if fits else None
-
-
-def _split(
-    peaks: Floats, permanents: Floats, covariance: Floats, elastic: Indices
-) -> tuple[float, Line] | None:
-    """Return chi² and the line for a set of elastic cycles."""
-    n = len(peaks)
-    beyond = np.full(n, 1.0)
-    beyond[elastic] = 0.0
-    design = np.stack([beyond * peaks, beyond], axis=1)
-    slope, level = np.polyfit(peaks[beyond > 0.0], permanents[beyond > 0.0], 1)
-    normal, weight = np.eye(2), np.eye(n)
-    for _ in range(ROUNDS):
-        across = np.concatenate([np.diag(-slope * beyond), np.eye(n)], axis=1)
-        variance = across @ covariance @ across.T
-        weight = np.linalg.pinv(variance, rcond=1e-14, hermitian=True)
-        normal = design.T @ weight @ design
-        if not np.all(np.isfinite(normal)) or np.linalg.matrix_rank(normal) < 2:
-            return None
-        slope, level = np.linalg.solve(normal, design.T @ weight @ permanents)
-    if slope == 0.0:
-        return None
-    errors = np.linalg.inv(normal)
-    left = permanents - design @ [slope, level]
-    chi = float(left @ weight @ left)
-    scatter = _scatter(chi, n - 2)
-    by = np.array([level / slope**2, -1.0 / slope])
-    s_p = Estimate(float(slope), scatter * float(errors[0, 0] ** 0.5))
-    alpha_p = Estimate(float(-level / slope), scatter * float((by @ errors @ by) ** 0.5))
-    return chi, Line(s_p, alpha_p, tuple(elastic.tolist()), scatter)
-
-
-def _scatter(chi: float, freedom: int) -> float:
-    """Return the root of chi² per degree of freedom if it exceeds the noise, else 1."""
-    from scipy.stats import chi2
-
-    return (chi / freedom) ** 0.5 if freedom > 0 and chi2.sf(chi, freedom) < UNLIKELY else 1.0
-
-
-@frozen
-class Critical:
-    """Equation 3-7."""
-
-    alpha_cr: Estimate
-    scatter: float  # as that of a line
-
-
-def critical(peaks: Floats, permanents: Floats, covariance: Floats) -> Critical:
-    """Fit alpha_cr = (alpha_m - alpha_0)^(5/2)/alpha_m^(3/2), equal for all cycles.
-
-    Parameters are those of :func:`line`.  A cycle below alpha_cr has no permanent indentation and
-    only bounds alpha_cr: such cycles are excluded if there are others.
-    """
-    own = (peaks - permanents) ** ACR_POWER / peaks**LOADING_POWER
-    by_peak = own * (ACR_POWER / (peaks - permanents) - LOADING_POWER / peaks)
-    by_permanent = -own * ACR_POWER / (peaks - permanents)
-    across = np.concatenate([np.diag(by_peak), np.diag(by_permanent)], axis=1)
-    variance = across @ covariance @ across.T
-    deep = peaks > own + np.sqrt(np.diag(variance))
-    if not deep.any():
-        deep[:] = True
-    weight = np.linalg.pinv(variance[np.ix_(deep, deep)], hermitian=True)
-    total = float(weight.sum())
-    mean = float((weight @ own[deep]).sum()) / total if total > 0.0 else float(own[deep].mean())
-    left = own[deep] - mean
-    scatter = _scatter(float(left @ weight @ left), int(deep.sum()) - 1)
-    error = scatter * total**-0.5 if total > 0.0 else 0.0
-    return Critical(Estimate(mean, error), scatter)
-
-
-# The whole test ---------------------------------------------------------------------------------
-
-LARGEST = 1e60  # largest number whose powers are finite
 
 
 @frozen
@@ -255,9 +141,8 @@ def fit(
     found = p[peaks], p[at.permanents], covariance
     cycles = tuple(_cycle(solution, n) for n in range(len(peaks)))
     straight = line(*found) if not acr and len(cycles) > 1 else None
-    kinds = (LOADING, FALLING, RISING)
-    of_curves = {kind: r_squared(*solution.curves.of(solution.scaled, kind)) for kind in kinds}
-    fitted, measured = solution.curves.of(solution.scaled, *kinds)
+    of_curves = {kind.value: r_squared(*solution.curves.of(solution.scaled, kind)) for kind in Kind}
+    fitted, measured = solution.curves.of(solution.scaled, *Kind)
     return Fit(
         k=_parameter(solution, at.K),
         free=free_power(curves),
@@ -301,146 +186,3 @@ def _cycle(solution: Solution, number: int) -> Cycle:
     recorded = division.corners[corner].indentation
     alpha_m, alpha_0 = _parameter(solution, peak), _parameter(solution, permanent)
     return Cycle(alpha_m, recorded, alpha_0, rigidity(permanent), measured)
-
-
-# Fits as text, as plain values and as an EXPE card ------------------------------------------------
-
-DIGITS = 5  # digits on the card
-NOT_ZERO = 2.0  # standard errors within which a slope does not differ from 0
-BAD = 0.05  # scatter that triggers a note
-
-
-def card(fit: Fit) -> str:
-    """Return the EXPE segment; empty if the test does not determine all parameters."""
-    relation = fit.relation()
-    if isinstance(relation, YangSunPermanent):
-        values, word = (relation.k, relation.alpha_cr, 0.0, relation.q), Indentation.ACR
-    elif isinstance(relation, LinearPermanent):
-        values, word = (relation.k, relation.alpha_p, relation.s_p, relation.q), ""
-    else:
-        return ""
-    k, alpha, s_p, q = (float(f"{value:.{DIGITS}g}") for value in values)
-    return Indentation(k, alpha, s_p, q, word).text()
-
-
-def notes(fit: Fit) -> list[str]:
-    """Return notes on the reliability of the fit."""
-    found: list[str] = []
-    corners = [fit.solution.curves.division.corners[n] for n in fit.solution.held]
-    held = [corner.cycle + 1 for corner in corners if corner.is_peak]
-    if not fit.cycles:
-        found.append("the test has no unloading: it gives only k and n, and no card")
-    elif fit.line is None and fit.critical is None:
-        found.append(
-            "no card: s_p and alpha_p require two or more peaks with a permanent indentation; "
-            "--acr requires one"
-        )
-    if fit.solution.at_limit:
-        found.append("a value is at a bound of the fit: the law does not fit this test")
-    if fit.scatter > BAD:
-        found.append(f"the points scatter by {100.0 * fit.scatter:.2g} % of the largest force")
-    if held:
-        which = ", ".join(map(str, sorted(held)))
-        found.append(
-            f"alpha_m of cycle {which} is the recorded value: the curves do not determine it"
-        )
-    straight = fit.line
-    if straight is not None:
-        if straight.s_p.value < NOT_ZERO * straight.s_p.error or straight.s_p.value >= 1.0:
-            found.append("s_p does not differ significantly from 0")
-        if straight.alpha_p.value < 0.0 < straight.s_p.value:
-            found.append("alpha_p is negative; the card has 0")
-        if straight.elastic:
-            which = ", ".join(str(n + 1) for n in straight.elastic)
-            found.append(f"cycle {which} is below alpha_p and has no permanent indentation")
-        if side := _one_side(fit.cycles, straight):
-            found.append(
-                f"the line of s_p and alpha_p is {side} all of its points: the test does not "
-                "follow the law; compare n with 3/2, and fit single cycles to compare q"
-            )
-    scatter = straight.scatter if straight else fit.critical.scatter if fit.critical else 1.0
-    if scatter > 1.0:
-        found.append(
-            f"the scatter of the permanent indentations is {scatter:.1f} times that expected from "
-            "the noise of the forces: the errors of their parameters are multiplied by it"
-        )
-    return found
-
-
-def _one_side(cycles: tuple[Cycle, ...], straight: Line) -> str:
-    """Return whether the line is ``"above"`` or ``"below"`` all points by more than an error."""
-    slope, start = straight.s_p.value, straight.alpha_p.value
-    points = [cycle for n, cycle in enumerate(cycles) if n not in straight.elastic]
-    off = [c.alpha_0.value - slope * (c.alpha_m.value - start) for c in points]
-    least = [max(c.alpha_0.error, 1e-6 * c.alpha_m.value) for c in points]
-    if len(off) < 3 or not any(abs(o) > e for o, e in zip(off, least, strict=True)):
-        return ""
-    return "above" if max(off) < 0.0 else "below" if min(off) > 0.0 else ""
-
-
-def _format(estimate: Estimate | None) -> str:
-    """Format a value and its error."""
-    if estimate is None:
-        return "-"
-    error = f" ± {estimate.error:.2g}" if estimate.error else ""
-    return f"{estimate.value:.5g}{error}"
-
-
-def _share(value: float | None) -> str:
-    return "" if value is None else f"   R² {value:.5f}"
-
-
-def lines(fit: Fit) -> list[str]:
-    """Return the fit as lines of text."""
-    division = fit.solution.curves.division
-    loading, falling, rising = (len(division.rows(kind)) for kind in (LOADING, FALLING, RISING))
-    shares = {kind: _share(value) for kind, value in fit.r_squared.items()}
-    found = [
-        f"first loading   {loading} points",
-        f"  k             {_format(fit.k)} (n = 3/2){shares[LOADING]}",
-        f"  n             {_format(fit.free.n)}, with k {_format(fit.free.k)}"
-        f"{_share(fit.free.r_squared)}",
-    ]
-    if fit.q is not None:
-        found.append(f"unloading       {falling} points")
-        found.append(f"  q             {_format(fit.q)}{shares[FALLING]}")
-    if rising:
-        found.append(f"reloading       {rising} points{shares[RISING]}")
-    if fit.line is not None:
-        found.append(f"permanent       {shares['permanent'].strip()}".rstrip())
-        found.append(f"  s_p           {_format(fit.line.s_p)}")
-        found.append(f"  alpha_p       {_format(fit.line.alpha_p)}")
-    if fit.critical is not None:
-        found.append(f"alpha_cr        {_format(fit.critical.alpha_cr)}")
-    found.append(f"scatter         {100.0 * fit.scatter:.2g} % of the largest force")
-    return [*found, "", *_table(fit.cycles), ""] if fit.cycles else found
-
-
-def _table(cycles: tuple[Cycle, ...]) -> list[str]:
-    rows: list[tuple[str, ...]] = [("cycle", "alpha_m", "alpha_0", "k_1", "k_1 of the reloading")]
-    for n, c in enumerate(cycles, start=1):
-        rows.append((str(n), *map(_format, (c.alpha_m, c.alpha_0, c.k_1, c.k_1_measured))))
-    width = 4 if all(c.k_1_measured is None for c in cycles) else 5
-    return aligned([row[:width] for row in rows])
-
-
-def plain(fit: Fit) -> dict[str, Any]:
-    """Return the fit as plain values for JSON."""
-    straight = fit.line
-    constants = {
-        "k": fit.k,
-        "n": fit.free.n,
-        "k_with_n": fit.free.k,
-        "q": fit.q,
-        "s_p": straight.s_p if straight else None,
-        "alpha_p": straight.alpha_p if straight else None,
-        "alpha_cr": fit.critical.alpha_cr if fit.critical else None,
-    }
-    return {
-        **{name: asdict(estimate) if estimate else None for name, estimate in constants.items()},
-        "r_squared": {**fit.r_squared, "loading_with_n": fit.free.r_squared},
-        "scatter": fit.scatter,
-        "cycles": [asdict(cycle) for cycle in fit.cycles],
-        "notes": notes(fit),
-        "card": card(fit) or None,
-    }

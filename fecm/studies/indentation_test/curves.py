@@ -1,7 +1,4 @@
-"""Turning points of an indentation test, and least squares fits of the curves between them.
-
-A stretch is a run of points between two turns.  A turn is a point from which the path retreats by
-more than a threshold above its noise.  Points within the noise of a turn belong to no stretch.
+"""Least squares fits of the curves of an indentation test.
 
 k follows from the first loading (equation 3-1 with n = 3/2).  With this k, one fit of all unloading
 and reloading curves (equations 3-3 and 3-11) gives the power q, the peak alpha_m and the permanent
@@ -16,198 +13,16 @@ k.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.mechanics.contact_law import LOADING_POWER, power_curve
 from fecm.studies import StudyError
-
-Ints = NDArray[np.int64]
-
-# Threshold of a turn: fraction of the range of the path, or standard deviations of its noise.
-LEAST_RETREAT = 0.02
-QUIET = 8.0
-GUARD = 2.0  # standard deviations of a smoothed point within which its neighbours may be the turn
-NEGLIGIBLE = 0.1  # noise below this fraction of a step reverses no step
-
-
-@frozen
-class Path:
-    """Moving mean of measured indentations, and their noise."""
-
-    smooth: Floats  # (n,), length
-    noise: float  # standard deviation of a smoothed point; 0 if noise reverses no step
-    reach: int  # points of the moving mean on either side
-
-    @property
-    def range(self) -> float:
-        """Largest minus smallest indentation (length)."""
-        return float(np.ptp(self.smooth))
-
-
-def smoothed(indentation: Floats) -> Path:
-    """Estimate the noise of a path, and smooth it only as much as needed to find its turns."""
-    # Third differences of a path without noise are almost zero; their median gives the noise.  A
-    # moving mean over w points divides the noise by sqrt(w) and cuts off about w/4 steps at a turn;
-    # w balances both.
-    n = len(indentation)
-    if n < 5:
-        return Path(indentation, 0.0, 0)
-    noise = float(np.median(np.abs(np.diff(indentation, 3)))) / (0.6745 * math.sqrt(20.0))
-    rough = _moving_mean(indentation, max(1, n // 200))
-    step = float(np.abs(np.diff(rough)).sum()) / (n - 1)
-    if noise <= NEGLIGIBLE * step:
-        return Path(indentation, 0.0, 0)
-    reach = min(max(1, round((4.0 * noise / step) ** (2.0 / 3.0) / 2.0)), n // 50 + 1)
-    return Path(_moving_mean(indentation, reach), noise / math.sqrt(2 * reach + 1), reach)
-
-
-def _moving_mean(values: Floats, reach: int) -> Floats:
-    """Mean of each point and up to `reach` neighbours on either side."""
-    sums = np.concatenate([[0.0], np.cumsum(values)])
-    n = np.arange(len(values))
-    first, last = np.maximum(n - reach, 0), np.minimum(n + reach + 1, len(values))
-    return np.asarray((sums[last] - sums[first]) / (last - first))
-
-
-def turns(path: Path, retreat: float) -> list[int]:
-    """Find points from which the path retreats by more than `retreat`, and the first and last."""
-    s = path.smooth
-    found, high, low, direction = [0], 0, 0, 0
-    for i in range(1, len(s)):
-        if s[i] > s[high]:
-            high = i
-        if s[i] < s[low]:
-            low = i
-        if direction >= 0 and s[high] - s[i] > retreat:
-            if direction:
-                found.append(high)
-            direction, low = -1, i
-        elif direction <= 0 and s[i] - s[low] > retreat:
-            if direction:
-                found.append(low)
-            direction, high = 1, i
-    if found[-1] != len(s) - 1:
-        found.append(len(s) - 1)
-    return found
-
-
-LOADING, FALLING, RISING = "loading", "unloading", "reloading"
-
-
-@frozen
-class Stretch:
-    """Points on one curve."""
-
-    kind: str  # LOADING, FALLING or RISING
-    cycle: int  # number of the last peak, from 0; of LOADING, of the next peak
-    rows: Ints  # numbers of the points
-    # Of FALLING, the corner at which it begins: the peak of its cycle, or a turn during reloading.
-    begin: int = -1
-    turn: float = 0.0  # of RISING, the recorded indentation at its beginning
-
-
-@frozen
-class Corner:
-    """An upper turn."""
-
-    indentation: float  # largest value of the smoothed path near the turn
-    cycle: int
-    is_peak: bool  # whether it is on the first loading curve
-    rise: int = -1  # otherwise, the number of the RISING stretch that ends there
-
-
-@frozen
-class Division:
-    """A test divided into stretches."""
-
-    path: Path
-    stretches: tuple[Stretch, ...]
-    corners: tuple[Corner, ...]
-
-    @property
-    def peaks(self) -> list[int]:
-        """Corners that are peaks, one per cycle."""
-        return [n for n, corner in enumerate(self.corners) if corner.is_peak]
-
-    def rows(self, kind: str, cycle: int | None = None) -> Ints:
-        """Return the points of all stretches of a kind, or of those of a cycle."""
-        own = [s for s in self.stretches if s.kind == kind]
-        parts = [s.rows for s in own if cycle is None or s.cycle == cycle]
-        return np.concatenate([np.empty(0, dtype=np.int64), *parts])
-
-
-def divide(indentation: Floats, retreat: float | None = None) -> Division:
-    """Divide a test into stretches on the curves of the law.
-
-    A retreat of the path counts as a turn; by default if it exceeds 2 % of the range of the path
-    and eight standard deviations of its noise.
-    """
-    path = smoothed(indentation)
-    if path.range <= 0.0:
-        raise StudyError("the indentation never changes")
-    if retreat is None:
-        retreat = max(LEAST_RETREAT * path.range, QUIET * path.noise)
-    if retreat >= path.range:
-        raise StudyError(f"the range of the path is below the threshold of a turn ({retreat:g})")
-    found = turns(path, retreat)
-    s = path.smooth
-    if s[found[1]] <= s[0]:
-        raise StudyError("the test begins with unloading; it must begin with the first loading")
-    near = max(retreat / 2.0, 4.0 * path.noise)  # peaks within this distance are one
-    stretches: list[Stretch] = []
-    corners: list[Corner] = []
-    cycle = begin = -1
-    peak = -math.inf
-    for first, end in pairwise(found):
-        ends_in_turn = end != found[-1]
-        rows, top = _between(path, first, end, ends_in_turn), float(s[end])
-        if top <= s[first]:
-            stretches.append(Stretch(FALLING, cycle, rows, begin))
-            continue
-        if cycle >= 0:
-            below = rows[s[rows] <= peak]
-            stretches.append(Stretch(RISING, cycle, below, turn=float(s[first])))
-        rise = len(stretches) - 1
-        if top > peak + near:  # a rise continues on the first loading curve beyond the peak
-            stretches.append(Stretch(LOADING, cycle + 1, rows[s[rows] > peak]))
-            if ends_in_turn:
-                cycle, peak, begin = cycle + 1, top, len(corners)
-                corners.append(Corner(top, cycle, True))
-        elif ends_in_turn and top < peak - near:
-            begin = len(corners)
-            corners.append(Corner(top, cycle, False, rise))
-        elif ends_in_turn:
-            begin = max(n for n, corner in enumerate(corners) if corner.is_peak)
-    return Division(path, tuple(stretches), tuple(corners))
-
-
-def _between(path: Path, first: int, end: int, ends_in_turn: bool) -> Ints:
-    """Return the points between two turns, without the turns and points too close to them.
-
-    The point at a turn may have been recorded before or after it.
-    """
-    begin = first + 1 if first else 0
-    rows: Ints = np.arange(begin, end if ends_in_turn else end + 1, dtype=np.int64)
-    if not path.noise:
-        return rows
-    s, guard = path.smooth, GUARD * path.noise
-    keep = np.full(len(rows), True)
-    if first:
-        keep &= (np.abs(s[rows] - s[first]) > guard) & (rows > first + path.reach)
-    if ends_in_turn:
-        keep &= (np.abs(s[rows] - s[end]) > guard) & (rows < end - path.reach)
-    return np.asarray(rows[keep])
-
-
-# Curves ------------------------------------------------------------------------------------------
+from fecm.studies.indentation_test.turns import Division, Kind, Rows
 
 
 @frozen
@@ -239,7 +54,8 @@ FIRST_Q = 2.2  # initial guess of the unloading power
 AT_LIMIT = 1e-4  # distance from a bound at which a value counts as at it, relative to the range
 # Bounds of peaks relative to the recorded value, and of origins relative to the peak.
 PEAK_MOVES = 0.15
-LIMITS_PERMANENT, LIMITS_ORIGIN = (-0.5, 0.8), (-3.0, 0.8)
+LIMITS_PERMANENT = (-0.5, 0.8)
+LIMITS_ORIGIN = (-3.0, 0.8)
 VAGUE = 0.05  # relative error above which the curves do not determine a peak
 SURE = 3.0  # standard errors by which an origin must exceed a turn
 STEP = 1e-6  # step of the scaled parameters in derivatives
@@ -258,7 +74,8 @@ class ParameterLayout:
     origins: dict[int, int]  # by RISING stretch
     size: int
 
-    K, Q = 0, 1
+    K = 0
+    Q = 1
 
 
 def layout_of(division: Division, tied: frozenset[int] = frozenset()) -> ParameterLayout:
@@ -268,7 +85,7 @@ def layout_of(division: Division, tied: frozenset[int] = frozenset()) -> Paramet
     origins: dict[int, int] = {}
     size = 2 + len(corners) + len(permanents)
     for n, s in enumerate(division.stretches):
-        if s.kind == RISING and len(s.rows) >= FEWEST and n not in tied:
+        if s.kind == Kind.RISING and len(s.rows) >= FEWEST and n not in tied:
             origins[n], size = size, size + 1
     return ParameterLayout(corners, permanents, origins, size)
 
@@ -298,9 +115,9 @@ class Curves:
     def stretch(self, p: Floats, number: int, a: Floats) -> Floats:
         """Return the scaled force on the curve of a stretch for scaled `p` and `a`."""
         s, at = self.division.stretches[number], self.layout
-        if s.kind == LOADING:
+        if s.kind == Kind.LOADING:
             return np.asarray(power_curve(p[at.K], 0.0, 1.0, LOADING_POWER, a))
-        if s.kind == RISING:
+        if s.kind == Kind.RISING:
             return self._rising(p, number, s.cycle, a)
         corner, top = self.division.corners[s.begin], p[at.corners[s.begin]]
         if corner.is_peak:
@@ -317,12 +134,12 @@ class Curves:
         top = self.peak_force(p, cycle)
         return np.asarray(power_curve(top, origin, peak - origin, LOADING_POWER, a))
 
-    def numbers(self, *kinds: str) -> list[int]:
+    def numbers(self, *kinds: Kind) -> list[int]:
         """Return the numbers of the stretches of some kinds with enough points."""
         own = [(n, s) for n, s in enumerate(self.division.stretches) if s.kind in kinds]
-        return [n for n, s in own if s.kind != RISING or len(s.rows) >= FEWEST]
+        return [n for n, s in own if s.kind != Kind.RISING or len(s.rows) >= FEWEST]
 
-    def of(self, p: Floats, *kinds: str) -> tuple[Floats, Floats]:
+    def of(self, p: Floats, *kinds: Kind) -> tuple[Floats, Floats]:
         """Return fitted and measured forces of the stretches of some kinds."""
         parts = [(n, self.division.stretches[n].rows) for n in self.numbers(*kinds)]
         fitted = [self.stretch(p, n, self.a[rows]) for n, rows in parts]
@@ -336,11 +153,11 @@ def scaled(division: Division, indentation: Floats, force: Floats) -> Curves:
     if length <= 0.0 or top <= 0.0:
         raise StudyError("indentation and force are never positive")
     curves = Curves(division, indentation / length, force / top, length, top, layout_of(division))
-    loading = division.rows(LOADING)
+    loading = division.rows(Kind.LOADING)
     if np.count_nonzero(curves.a[loading] > 0.0) < FEWEST:
         raise StudyError(f"the first loading has fewer than {FEWEST} points")
     for cycle in range(len(division.peaks)):
-        if len(division.rows(FALLING, cycle)) < FEWEST:
+        if len(division.rows(Kind.FALLING, cycle)) < FEWEST:
             raise StudyError(f"cycle {cycle + 1} has fewer than {FEWEST} points of unloading")
     return curves
 
@@ -401,7 +218,7 @@ def _held_or_not(curves: Curves, q: float | None) -> Solution:
 
 
 def _solve(curves: Curves, q: float | None, held: frozenset[int]) -> Solution:
-    from scipy.optimize import least_squares
+    from scipy.optimize import least_squares  # takes 0.3 s, and most commands do not fit
 
     start, low, high = _start(curves, q)
     free = np.full(curves.layout.size, True)
@@ -412,15 +229,19 @@ def _solve(curves: Curves, q: float | None, held: frozenset[int]) -> Solution:
     def residuals(x: Floats) -> Floats:
         p = start.copy()
         p[free] = x
-        fitted, measured = curves.of(p, FALLING, RISING)
+        fitted, measured = curves.of(p, Kind.FALLING, Kind.RISING)
         return np.asarray(measured - fitted)
 
     p = start.copy()
     if free.any():
         found = least_squares(
-            residuals, start[free], bounds=(low[free], high[free]),
-            xtol=1e-12, ftol=1e-12, gtol=1e-12,
-        )  # fmt: skip
+            residuals,
+            start[free],
+            bounds=(low[free], high[free]),
+            xtol=1e-12,
+            ftol=1e-12,
+            gtol=1e-12,
+        )
         p[free] = found.x
     units = curves.units
     covariance = _covariance(curves, p, free) * np.outer(units, units)
@@ -431,7 +252,7 @@ def _solve(curves: Curves, q: float | None, held: frozenset[int]) -> Solution:
 def _start(curves: Curves, q: float | None) -> tuple[Floats, Floats, Floats]:
     """Return initial values and bounds of all parameters; k is final."""
     at, division = curves.layout, curves.division
-    rows = division.rows(LOADING)
+    rows = division.rows(Kind.LOADING)
     x = np.maximum(curves.a[rows], 0.0) ** LOADING_POWER
     p, low, high = (np.zeros(at.size) for _ in range(3))
     p[at.K] = float(x @ curves.f[rows]) / float(x @ x)
@@ -439,20 +260,22 @@ def _start(curves: Curves, q: float | None) -> tuple[Floats, Floats, Floats]:
     low[at.Q], high[at.Q] = LIMITS_Q
     for number, corner in zip(at.corners, division.corners, strict=True):
         p[number] = corner.indentation / curves.length
-        low[number], high[number] = (1.0 - PEAK_MOVES) * p[number], (1.0 + PEAK_MOVES) * p[number]
+        low[number] = (1.0 - PEAK_MOVES) * p[number]
+        high[number] = (1.0 + PEAK_MOVES) * p[number]
 
-    def origin(
-        place: int, rows: Ints, cycle: int, power: float, limits: tuple[float, float]
+    def start_origin(
+        place: int, rows: Rows, *, cycle: int, power: float, limits: tuple[float, float]
     ) -> None:
         low[place], high[place] = np.array(limits) * p[at.corners[division.peaks[cycle]]]
         guess = _origin(curves.a[rows], curves.f[rows], power)
         p[place] = min(max(guess, 0.9 * low[place]), 0.9 * high[place])
 
     for cycle, place in enumerate(at.permanents):
-        origin(place, division.rows(FALLING, cycle), cycle, p[at.Q], LIMITS_PERMANENT)
+        rows = division.rows(Kind.FALLING, cycle)
+        start_origin(place, rows, cycle=cycle, power=p[at.Q], limits=LIMITS_PERMANENT)
     for number, place in at.origins.items():
         s = division.stretches[number]
-        origin(place, s.rows, s.cycle, LOADING_POWER, LIMITS_ORIGIN)
+        start_origin(place, s.rows, cycle=s.cycle, power=LOADING_POWER, limits=LIMITS_ORIGIN)
     return p, low, high
 
 
@@ -469,15 +292,15 @@ def _covariance(curves: Curves, p: Floats, free: Bools) -> Floats:
     """Return the covariance of the scaled parameters; zero for parameters that are not free."""
     # The sum over the points of the squares of their influence.  Points of the first loading affect
     # k and, through k, all other parameters.
-    rows = curves.division.rows(LOADING)
+    rows = curves.division.rows(Kind.LOADING)
     x = np.maximum(curves.a[rows], 0.0) ** LOADING_POWER
     share = x / float(x @ x)
     on_k = share * ((curves.f[rows] - p[ParameterLayout.K] * x) / np.sqrt(1.0 - x * share))
     covariance, by_k = np.zeros((len(p), len(p))), np.zeros(len(p))
     by_k[ParameterLayout.K] = 1.0
     if free.any():
-        jacobian = _derivatives(lambda x: curves.of(x, FALLING, RISING)[0], p)
-        fitted, measured = curves.of(p, FALLING, RISING)
+        jacobian = _derivatives(lambda x: curves.of(x, Kind.FALLING, Kind.RISING)[0], p)
+        fitted, measured = curves.of(p, Kind.FALLING, Kind.RISING)
         inverse, of_points = influence(jacobian[:, free], measured - fitted)
         by_k[free] = -inverse @ jacobian[:, ParameterLayout.K]
         block = of_points @ of_points.T

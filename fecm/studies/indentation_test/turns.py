@@ -1,0 +1,213 @@
+"""Turning points of an indentation test.
+
+A stretch is a run of points between two turns.  A turn is a point from which the path retreats by
+more than a threshold above its noise.  Points within the noise of a turn belong to no stretch.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._frozen import frozen
+from fecm._typing import Floats
+from fecm.studies import StudyError
+
+Rows = NDArray[np.int64]  # numbers of points
+
+# Smallest retreat that is a turn: fraction of the range of the path, standard deviations of noise.
+LEAST_RETREAT = 0.02
+QUIET = 8.0
+GUARD = 2.0  # standard deviations of a smoothed point within which its neighbours may be the turn
+NEGLIGIBLE = 0.1  # noise below this fraction of a step reverses no step
+
+
+@frozen
+class Path:
+    """Moving mean of measured indentations, and their noise."""
+
+    smooth: Floats  # (n,), length
+    noise: float  # standard deviation of a smoothed point; 0 if noise reverses no step
+    reach: int  # points of the moving mean on either side
+
+    @property
+    def range(self) -> float:
+        """Largest minus smallest indentation (length)."""
+        return float(np.ptp(self.smooth))
+
+
+def smoothed(indentation: Floats) -> Path:
+    """Estimate the noise of a path, and smooth it only as much as needed to find its turns."""
+    # Third differences of a path without noise are almost zero; their median gives the noise.  A
+    # moving mean over w points divides the noise by sqrt(w) and cuts off about w/4 steps at a turn;
+    # w balances both.
+    n = len(indentation)
+    if n < 5:
+        return Path(indentation, 0.0, 0)
+    noise = float(np.median(np.abs(np.diff(indentation, 3)))) / (0.6745 * math.sqrt(20.0))
+    rough = _moving_mean(indentation, max(1, n // 200))
+    step = float(np.abs(np.diff(rough)).sum()) / (n - 1)
+    if noise <= NEGLIGIBLE * step:
+        return Path(indentation, 0.0, 0)
+    reach = min(max(1, round((4.0 * noise / step) ** (2.0 / 3.0) / 2.0)), n // 50 + 1)
+    return Path(_moving_mean(indentation, reach), noise / math.sqrt(2 * reach + 1), reach)
+
+
+def _moving_mean(values: Floats, reach: int) -> Floats:
+    """Mean of each point and up to `reach` neighbours on either side."""
+    sums = np.concatenate([[0.0], np.cumsum(values)])
+    n = np.arange(len(values))
+    first, last = np.maximum(n - reach, 0), np.minimum(n + reach + 1, len(values))
+    return np.asarray((sums[last] - sums[first]) / (last - first))
+
+
+def turns(path: Path, retreat: float) -> list[int]:
+    """Find points from which the path retreats by more than `retreat`, and the first and last."""
+    s = path.smooth
+    found = [0]
+    high = low = 0  # points of the largest and smallest indentation since the last turn
+    direction = 0  # 1 while the indentation rises, -1 while it falls, 0 until either is sure
+    for i in range(1, len(s)):
+        if s[i] > s[high]:
+            high = i
+        if s[i] < s[low]:
+            low = i
+        if direction >= 0 and s[high] - s[i] > retreat:
+            if direction:
+                found.append(high)
+            direction = -1
+            low = i
+        elif direction <= 0 and s[i] - s[low] > retreat:
+            if direction:
+                found.append(low)
+            direction = 1
+            high = i
+    if found[-1] != len(s) - 1:
+        found.append(len(s) - 1)
+    return found
+
+
+class Kind(StrEnum):
+    """Kinds of stretches."""
+
+    LOADING = "loading"  # for the first time
+    FALLING = "unloading"
+    RISING = "reloading"
+
+
+@frozen
+class Stretch:
+    """Points on one curve."""
+
+    kind: Kind
+    cycle: int  # number of the last peak, from 0; of LOADING, of the next peak
+    rows: Rows
+    # Of FALLING, the corner at which it begins: the peak of its cycle, or a turn during reloading.
+    begin: int = -1
+    turn: float = 0.0  # of RISING, the recorded indentation at its beginning
+
+
+@frozen
+class Corner:
+    """An upper turn."""
+
+    indentation: float  # largest value of the smoothed path near the turn
+    cycle: int
+    is_peak: bool  # whether it is on the first loading curve
+    rise: int = -1  # otherwise, the number of the RISING stretch that ends there
+
+
+@frozen
+class Division:
+    """A test divided into stretches."""
+
+    path: Path
+    stretches: tuple[Stretch, ...]
+    corners: tuple[Corner, ...]
+
+    @property
+    def peaks(self) -> list[int]:
+        """Corners that are peaks, one per cycle."""
+        return [n for n, corner in enumerate(self.corners) if corner.is_peak]
+
+    def rows(self, kind: Kind, cycle: int | None = None) -> Rows:
+        """Return the points of all stretches of a kind, or of those of a cycle."""
+        own = [s for s in self.stretches if s.kind == kind]
+        parts = [s.rows for s in own if cycle is None or s.cycle == cycle]
+        return np.concatenate([np.empty(0, dtype=np.int64), *parts])
+
+
+def divide(indentation: Floats, retreat: float | None = None) -> Division:
+    """Divide a test into stretches on the curves of the law.
+
+    A retreat of the path counts as a turn; by default if it exceeds 2 % of the range of the path
+    and eight standard deviations of its noise.
+    """
+    path = smoothed(indentation)
+    if path.range <= 0.0:
+        raise StudyError("the indentation never changes")
+    if retreat is None:
+        retreat = max(LEAST_RETREAT * path.range, QUIET * path.noise)
+    if retreat >= path.range:
+        raise StudyError(f"the range of the path is below the threshold of a turn ({retreat:g})")
+    found = turns(path, retreat)
+    s = path.smooth
+    if s[found[1]] <= s[0]:
+        raise StudyError("the test begins with unloading; it must begin with the first loading")
+    return _stretches(path, found, near=max(retreat / 2.0, 4.0 * path.noise))
+
+
+def _stretches(path: Path, found: list[int], *, near: float) -> Division:
+    """Divide a path at its turns; peaks within a distance `near` are one."""
+    s = path.smooth
+    stretches: list[Stretch] = []
+    corners: list[Corner] = []
+    cycle = -1
+    begin = -1  # corner at which the next unloading begins
+    peak = -math.inf
+    for first, end in pairwise(found):
+        ends_in_turn = end != found[-1]
+        rows, top = _between(path, first, end, ends_in_turn), float(s[end])
+        if top <= s[first]:
+            stretches.append(Stretch(Kind.FALLING, cycle, rows, begin))
+            continue
+
+        if cycle >= 0:
+            below = rows[s[rows] <= peak]
+            stretches.append(Stretch(Kind.RISING, cycle, below, turn=float(s[first])))
+        rise = len(stretches) - 1
+        if top > peak + near:  # a rise continues on the first loading curve beyond the peak
+            stretches.append(Stretch(Kind.LOADING, cycle + 1, rows[s[rows] > peak]))
+            if ends_in_turn:
+                cycle += 1
+                peak = top
+                begin = len(corners)
+                corners.append(Corner(top, cycle, is_peak=True))
+        elif ends_in_turn and top < peak - near:
+            begin = len(corners)
+            corners.append(Corner(top, cycle, is_peak=False, rise=rise))
+        elif ends_in_turn:
+            begin = max(n for n, corner in enumerate(corners) if corner.is_peak)
+    return Division(path, tuple(stretches), tuple(corners))
+
+
+def _between(path: Path, first: int, end: int, ends_in_turn: bool) -> Rows:
+    """Return the points between two turns, without the turns and points too close to them.
+
+    The point at a turn may have been recorded before or after it.
+    """
+    begin = first + 1 if first else 0
+    rows: Rows = np.arange(begin, end if ends_in_turn else end + 1, dtype=np.int64)
+    if not path.noise:
+        return rows
+    s, guard = path.smooth, GUARD * path.noise
+    keep = np.full(len(rows), True)
+    if first:
+        keep &= (np.abs(s[rows] - s[first]) > guard) & (rows > first + path.reach)
+    if ends_in_turn:
+        keep &= (np.abs(s[rows] - s[end]) > guard) & (rows < end - path.reach)
+    return np.asarray(rows[keep])

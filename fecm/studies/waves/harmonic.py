@@ -1,0 +1,133 @@
+"""Harmonic plane waves: phase velocities and frequencies, section 2.2."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg.lapack import dgejsv
+
+from fecm._frozen import frozen
+from fecm._typing import Floats, Indices
+from fecm.studies import StudyError
+from fecm.studies.waves.medium import (
+    OUT_OF_RANGE,
+    Medium,
+    first_largest,
+    gradients,
+    in_normal_axes,
+    shares,
+)
+
+# Names of the modes; flexural modes in ascending order of velocity.
+MODES = ("flexural_1", "flexural_2", "flexural_3", "extension", "in_plane_shear")
+
+_PAIRS = np.array(list(combinations(range(5), 2)))  # candidates for the two in-plane modes
+
+
+@frozen
+class Dispersion:
+    """Harmonic waves in one direction, modes in the order of :data:`MODES`."""
+
+    angle: float  # direction of propagation, degrees
+    wavelength: Floats  # over thickness, (n,)
+    phase_velocity: Floats  # length/time, (n, 5)
+    angular_frequency: Floats  # radian/time, (n, 5)
+
+
+def dispersion(medium: Medium, angle: float, wavelengths: ArrayLike) -> Dispersion:
+    """Phase velocities and frequencies of all five modes, equations 2-27 to 2-34.
+
+    The angle is in degrees; the wavelengths, (n,), are over the thickness.  With B and R the
+    determinants 2-29 and 2-30 become one of order 5.  All frequencies are accurate to about 12
+    digits, even for long waves, where they differ by many orders of magnitude.  Raises StudyError
+    if a wavelength is outside 1e-9 to 1e9, or the laminate's constants are out of range.
+    """
+    ratio = np.atleast_1d(np.asarray(wavelengths, dtype=np.float64))
+    if not np.all((ratio >= 1e-9) & (ratio <= 1e9)):
+        raise StudyError("wavelengths over thickness must lie between 1e-9 and 1e9")
+    k = 2.0 * np.pi / (ratio * medium.laminate.thickness)
+    with np.errstate(all="ignore"):  # overflow raises an error below
+        stiffness, inertia, back = _problem(medium, angle, k)
+        frequency, modes = graded_modes(stiffness, inertia)
+        share = shares(medium.inertia, back @ modes)
+    frequency = np.take_along_axis(frequency, _in_order(share), axis=1)
+    return Dispersion(float(angle), ratio, frequency / k[:, None], frequency)
+
+
+def _problem(medium: Medium, angle: float, k: Floats) -> tuple[Floats, Floats, Floats]:
+    """Stiffness, inertia, and transformation to the components u_n ... w, each (n, 5, 5)."""
+    # With w a quarter of a period ahead of the others all matrices are real: 2-32 without i.  In
+    # long flexural waves phi_n nearly cancels k w; the variable phi_n + tau k w replaces phi_n to
+    # avoid the cancellation.  In short waves tau vanishes.
+    laminate = medium.laminate
+    beyond = k**2 * laminate.rotary_inertia / laminate.mass  # rotary over translatory inertia
+    tau = 1.0 / (1.0 + beyond)
+    back = np.tile(np.eye(5), (len(k), 1, 1))
+    back[:, 2, 4] = -tau * k
+    strain = gradients([angle])[0][0]
+    generalized = np.zeros((len(k), 8, 5))  # strains, curvatures and shear
+    generalized[:, :3, :2] = k[:, None, None] * strain
+    generalized[:, 3:6, 2:4] = k[:, None, None] * strain
+    generalized[:, 3:6, 4] = (-tau * k**2)[:, None] * strain[:, 0]
+    generalized[:, [6, 7], [2, 3]] = 1.0
+    generalized[:, 6, 4] = beyond * tau * k  # (1 - tau) k
+    constitutive = np.zeros((8, 8))
+    constitutive[:6, :6] = medium.section
+    constitutive[6:, 6:] = in_normal_axes(laminate.shear, [angle])[0]
+    stiffness = generalized.transpose(0, 2, 1) @ constitutive @ generalized
+    return stiffness, back.transpose(0, 2, 1) @ medium.inertia @ back, back
+
+
+def graded_modes(stiffness: Floats, inertia: Floats) -> tuple[Floats, Floats]:
+    """Frequencies and modes of K a = omega^2 M a with diagonals of very different magnitude.
+
+    The matrices, (n, m, m), must be symmetric, positive definite, and well conditioned after
+    scaling to a unit diagonal: then every frequency, not only the highest, is accurate to nearly
+    all digits.  omega, (n, m), is descending; the modes are columns, (n, m, m), with unit
+    generalized mass.
+    """
+    of_k, of_m = (np.sqrt(np.diagonal(matrix, axis1=1, axis2=2)) for matrix in (stiffness, inertia))
+    order = np.argsort(of_k / of_m, axis=1)
+    of_k, of_m = (np.take_along_axis(scale, order, axis=1) for scale in (of_k, of_m))
+    turn = np.eye(order.shape[1])[order]  # permutation, by rows
+    back = turn.transpose(0, 2, 1)
+    try:
+        root, mass = (
+            np.linalg.cholesky(turn @ matrix @ back / (scale[:, :, None] * scale[:, None]))
+            for matrix, scale in ((stiffness, of_k), (inertia, of_m))
+        )
+    except np.linalg.LinAlgError:
+        raise StudyError(OUT_OF_RANGE) from None
+    inverse = np.linalg.inv(mass).transpose(0, 2, 1)
+    rise = of_k / of_m
+    # The singular values of this product are the frequencies.  Apart from the column factor `rise`
+    # it is well conditioned, because its ratios are at most 1.
+    ratios = np.triu(rise[:, :, None] / rise[:, None])
+    values, right = _singular_values(root.transpose(0, 2, 1) @ (inverse * ratios) * rise[:, None])
+    return values, back @ ((inverse / of_m[:, :, None]) @ right)
+
+
+def _singular_values(matrices: Floats) -> tuple[Floats, Floats]:
+    """Singular values, descending, and right singular vectors as columns of matrices (n, m, m)."""
+    if not np.isfinite(matrices).all():
+        raise StudyError(OUT_OF_RANGE)
+    values, vectors = np.empty(matrices.shape[:2]), np.empty(matrices.shape)
+    for n, matrix in enumerate(matrices):
+        # The Jacobi method keeps small singular values of column-scaled matrices accurate.
+        scaled, _, vectors[n], scale, _, info = dgejsv(matrix, joba=0)
+        if info:
+            raise StudyError(OUT_OF_RANGE)
+        values[n] = scaled * (scale[0] / scale[1])
+    if not np.all(np.isfinite(values) & (values > 0.0)):
+        raise StudyError(OUT_OF_RANGE)
+    return values, vectors
+
+
+def _in_order(share: Floats) -> Indices:
+    """Indices of the modes, sorted by velocity, in the order of :data:`MODES`; (n, 5)."""
+    in_plane = share[:, :, :2].sum(axis=2)
+    pair = _PAIRS[first_largest(in_plane[:, _PAIRS].sum(axis=2))]
+    rest = [[mode for mode in (4, 3, 2, 1, 0) if mode not in taken] for taken in pair.tolist()]
+    return np.concatenate([np.array(rest, dtype=np.intp), pair], axis=1)
