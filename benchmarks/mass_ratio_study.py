@@ -23,7 +23,7 @@ from fecm.studies.estimate import LARGE, SMALL, estimate
 from fecm.sweeps.api import carry_out
 from fecm.sweeps.plan import plan
 from fecm.verification.decks import result_of
-from fecm.verification.plates import struck_square
+from fecm.verification.impacts import struck_square
 
 ROOT = Path(__file__).parent.parent
 NAMES = ("infinite plate", "static plate", "sweep kernel", "run")

@@ -35,7 +35,7 @@ from fecm.studies.estimate import (
     static_plate,
 )
 from fecm.verification.decks import result_of
-from fecm.verification.plates import struck_square
+from fecm.verification.impacts import struck_square
 from tests.builders import REPORT_ANGLES, report_plate, table
 from tests.calls import call
 from tests.decks import small

@@ -17,7 +17,7 @@ from fecm.mechanics import laminate as laminates
 from fecm.mechanics.contact_law import LinearPermanent
 from fecm.problem.generate import generate
 from fecm.verification import CASES, carry_out, chosen
-from fecm.verification.case import HEAD, Case, Check, Row, cells, page
+from fecm.verification.case import HEAD, Case, Check, Label, Row, cells, page
 from fecm.verification.decks import report_impact
 from tests import closed_forms
 from tests.builders import DATA
@@ -280,10 +280,10 @@ def test_rows_are_called_independent_only_where_they_are() -> None:
         ("rod-pulse", "mass of the report's projectile (lb s²/in)"),
         ("indentation", "F(α_p), 0.5 in indenter (lb)"),
     ):
-        assert labels[case, quantity] == "against change"
+        assert labels[case, quantity] is Label.AGAINST_CHANGE
     assert labels["report-impact", "worst error of the energy balance"] == "consistency"
     assert labels["convolution", "largest difference of the forces"] == "consistency"
-    assert set(labels.values()) == {"independent", "consistency", "against change"}
+    assert set(labels.values()) == set(Label)
 
 
 def test_figures_of_series_and_of_waves_are_those_of_the_reference_files() -> None:

@@ -8,7 +8,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from fecm._errors import FecmError
-from fecm.verification import damage, parts, plates, studies  # noqa: F401  (they fill CASE_OF)
+from fecm.verification import (  # noqa: F401  (they fill CASE_OF)
+    damage,
+    fields,
+    impacts,
+    parts,
+    plates,
+    studies,
+)
 from fecm.verification.case import CASE_OF, TABLES, Case, Row, carry_out
 
 __all__ = ["CASES", "Case", "Row", "UnknownCaseError", "carry_out", "chosen"]

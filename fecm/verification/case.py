@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from enum import StrEnum
 from importlib import resources
 from itertools import groupby
 from typing import Any
@@ -26,8 +27,24 @@ INTRODUCTION: Any = TABLES.pop("introduction")
 Value = float | Floats | tuple[Floats, Floats]
 Compute = Callable[[], Sequence[Value]]
 HEAD = ("case", "source", "quantity", "expected", "got", "error", "allowed", "label", "verdict")
-FINE, NOT_FINE = "ok", "FAILED"
+# Widths of columns whose texts are not known before the rows: numbers of nine digits, errors.
+LEAST_WIDTHS = {"expected": 15, "got": 15, "error": 8}
 COLUMNS = "| quantity | source | expected | got | error | allowed | because | label |"
+
+
+class Label(StrEnum):
+    """What a check proves."""
+
+    INDEPENDENT = "independent"  # the expected value comes from outside the program
+    CONSISTENCY = "consistency"  # two ways through the program agree
+    AGAINST_CHANGE = "against change"  # the value is the one of an earlier version
+
+
+class Verdict(StrEnum):
+    """Whether a row is within its tolerance."""
+
+    FINE = "ok"
+    FAILED = "FAILED"
 
 
 @frozen
@@ -39,7 +56,7 @@ class Check:
     source: str  # of the expected value
     tolerance: float  # largest admissible error
     why: str  # reason for the tolerance
-    label: str = "independent"  # or "consistency" or "against change"
+    label: Label = Label.INDEPENDENT
     scale: float | None = None  # reference of the relative error; None for the expected value
 
 
@@ -73,6 +90,11 @@ class Row:
         """Whether the error is within the tolerance; False for NaN."""
         return abs(self.error) <= self.check.tolerance
 
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict."""
+        return Verdict.FINE if self.within else Verdict.FAILED
+
 
 CASE_OF: dict[str, Case] = {}
 
@@ -82,12 +104,13 @@ def case(compute: Compute) -> Compute:
     name = compute.__name__[1:].replace("_", "-")
     common = dict(TABLES[name])
     title, groups = common.pop("title"), common.pop("checks")
-    checks = tuple(
-        Check(quantity, **(common | group | {"expected": expected}))
-        for group in groups
-        for quantity, expected in group["expected"].items()
-    )
-    CASE_OF[name] = Case(name, title, checks, compute)
+    checks: list[Check] = []
+    for group in groups:
+        shared = common | group
+        shared["label"] = Label(shared.get("label", Label.INDEPENDENT))
+        expected = shared.pop("expected")
+        checks += [Check(quantity, value, **shared) for quantity, value in expected.items()]
+    CASE_OF[name] = Case(name, title, tuple(checks), compute)
     return compute
 
 
@@ -118,20 +141,23 @@ def cells(row: Row) -> tuple[str, ...]:
     """Return the cells of a row in the order of :data:`HEAD`."""
     check = row.check
     return (
-        row.case, check.source, check.quantity, f"{check.expected:.9g}", f"{row.got:.9g}",
-        f"{row.error:.1e}", f"{check.tolerance:g}", check.label, FINE if row.within else NOT_FINE,
-    )  # fmt: skip
+        row.case,
+        check.source,
+        check.quantity,
+        f"{check.expected:.9g}",
+        f"{row.got:.9g}",
+        f"{row.error:.1e}",
+        f"{check.tolerance:g}",
+        check.label,
+        row.verdict,
+    )
 
 
 def table(cases: Sequence[Case], rows: Iterable[Row]) -> Iterator[str]:
     """Yield the lines of a table as rows are computed; the cases give the widths of the columns."""
-    # Numbers of nine digits are at most 15 wide, errors 8.
     known = [cells(Row(one.name, check, math.nan)) for one in cases for check in one.checks]
-    least = (0, 0, 0, 15, 15, 8, 0, 0, 0)
-    widths = [
-        max(minimum, *map(len, column))
-        for minimum, column in zip(least, zip(HEAD, *known, strict=True), strict=True)
-    ]
+    columns = zip(HEAD, *known, strict=True)
+    widths = [max(LEAST_WIDTHS.get(column[0], 0), *map(len, column)) for column in columns]
 
     def line(texts: Sequence[str]) -> str:
         return "  ".join(map(str.ljust, texts, widths)).rstrip()
@@ -148,11 +174,18 @@ def fields(row: Row) -> dict[str, Any]:
     check = row.check
     got, error = (value if math.isfinite(value) else None for value in (row.got, row.error))
     return {
-        "case": row.case, "source": check.source, "quantity": check.quantity,
-        "expected": check.expected, "got": got, "error": error, "tolerance": check.tolerance,
-        "why": check.why, "label": check.label, "verdict": FINE if row.within else NOT_FINE,
+        "case": row.case,
+        "source": check.source,
+        "quantity": check.quantity,
+        "expected": check.expected,
+        "got": got,
+        "error": error,
+        "tolerance": check.tolerance,
+        "why": check.why,
+        "label": check.label,
+        "verdict": row.verdict,
         "failure": row.failure,
-    }  # fmt: skip
+    }
 
 
 def page(rows: Iterable[Row]) -> str:

@@ -21,6 +21,7 @@ REPORT_PLY = Ply(0.000148, 0.3, 17.5e6, 1.15e6, 0.8e6, 0.8e6, 0.8e6)
 REPORT_HALF = (0.0, 45.0, 0.0, -45.0, 0.0) * 2
 REPORT_ANGLES = REPORT_HALF + REPORT_HALF[::-1]
 REPORT_THICKNESS = 0.0053
+SIDES = (6.0, 4.0)  # of rectangles (in)
 
 # Codes of every node of a rectangle, and of the left, bottom, right and top edge.
 FREE = "11000 00000 00000 00000 00000"
@@ -36,6 +37,9 @@ def isotropic(e: float, nu: float, rho: float, shear_factor: float = 1.0) -> Ply
     """Build an isotropic ply; the factor multiplies its transverse shear moduli."""
     g = e / (2.0 * (1.0 + nu))
     return Ply(rho, nu, e, e, g, shear_factor * g, shear_factor * g)
+
+
+ONE = isotropic(1.0, 0.3, 1.0)
 
 
 def material(
@@ -63,6 +67,10 @@ def impact_program(dt: float, steps: int) -> tuple[Macro, ...]:
     return program(f"LMAS DT={dt!r} LOOP={steps} TIME RODP={steps} NEXT")
 
 
+DEFLECTION = program("TANG FORM SOLV DISP")
+STRESSES = program("TANG FORM SOLV STRE")
+
+
 def supports(grid: Grid, codes: str) -> model.Boundary | None:
     """Restraints of codes such as `SUPPORTED`."""
     every, *edges = ([int(code) for code in word] for word in codes.split())
@@ -76,9 +84,11 @@ def held_but(dof: int) -> model.Boundary:
 
 
 def deck(
-    grid: Grid, segments: Iterable[model.Segment | None], macros: Iterable[Macro],
+    grid: Grid,
+    segments: Iterable[model.Segment | None],
+    macros: Iterable[Macro],
     coordinates: model.Coordinates | None = None,
-) -> model.Deck:  # fmt: skip
+) -> model.Deck:
     """Build a deck of 9-node elements on a grid's numbering."""
     made = (grid.element_cards(), coordinates or grid.coordinates(), *segments)
     given = tuple(segment for segment in made if segment is not None)
@@ -99,9 +109,13 @@ def fields(found: Result, group: str, names: str) -> list[Floats]:
 
 
 def constant_strains(
-    x: Floats, y: Floats, curvature: Sequence[float], *,
-    strain: Sequence[float] = (0.0, 0.0, 0.0), shear: Sequence[float] = (0.0, 0.0),
-) -> Floats:  # fmt: skip
+    x: Floats,
+    y: Floats,
+    curvature: Sequence[float],
+    *,
+    strain: Sequence[float] = (0.0, 0.0, 0.0),
+    shear: Sequence[float] = (0.0, 0.0),
+) -> Floats:
     """Dofs (nodes, 5) of a field of constant midplane strains, curvatures and shear yz, xz."""
     (ex, ey, exy), (kx, ky, kxy), (gyz, gxz) = strain, curvature, shear
     w = -(kx * x**2 + ky * y**2 + kxy * x * y) / 2.0 + gxz * x + gyz * y
@@ -125,9 +139,13 @@ def weights(coordinates: Sequence[float]) -> Floats:
 
 
 def quarter_plate(
-    elements: int, plate: model.Material, macros: Iterable[Macro], load: float | Floats = 0.0,
-    codes: str = BENDING, others: Sequence[model.Segment] = (),
-) -> model.Deck:  # fmt: skip
+    elements: int,
+    plate: model.Material,
+    macros: Iterable[Macro],
+    load: float | Floats = 0.0,
+    codes: str = BENDING,
+    others: Sequence[model.Segment] = (),
+) -> model.Deck:
     """Build a quarter of a simply supported square plate of side 1.
 
     x = 0 and y = 0 are lines of symmetry, and node 1 is the plate's middle.
@@ -143,10 +161,25 @@ def quarter_plate(
     return deck(grid, (supports(grid, codes), given, plate, *others), macros)
 
 
+def pressed_rectangle(
+    along: int, patch: model.Patch, macros: Iterable[Macro], *others: model.Segment
+) -> model.Deck:
+    """Build a simply supported [0/90]5s of the report's ply with MITC, pressed on a patch."""
+    grid = Grid(uniform(SIDES[0], along), uniform(SIDES[1], along * 2 // 3))
+    plate = material(REPORT_PLY, 5 * (0.0, 90.0) + 5 * (90.0, 0.0), 0.106 / 20)
+    held = supports(grid, SUPPORTED)
+    return deck(grid, (held, patch, *others, MITC, plate), macros)
+
+
 def struck_plate(
-    grid: Grid, plate: model.Material, projectile: model.Projectile | None, velocity: float,
-    law: model.Indentation, dt: float, steps: int,
-) -> model.Deck:  # fmt: skip
+    grid: Grid,
+    plate: model.Material,
+    projectile: model.Projectile | None,
+    velocity: float,
+    law: model.Indentation,
+    dt: float,
+    steps: int,
+) -> model.Deck:
     """Build a plate without supports that is hit in the middle."""
     middle = grid.nearest(grid.columns[-1].end / 2.0, grid.rows[-1].end / 2.0)[0]
     segments = (supports(grid, FREE), projectile, model.Impact(middle, 3, velocity), law, plate)

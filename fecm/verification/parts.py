@@ -59,9 +59,13 @@ def _isotropic_ply() -> Sequence[Value]:
     made = laminate(isotropic(1.0e7, 0.3, 2.5e-4), [30.0], [h])
     vanishing = [*made.A[:2, 2] / h, *made.B.ravel() / h**2, *made.D[:2, 2] / h**3]
     return [
-        *made.A[AT], np.abs(vanishing).max() / plate, *made.D[AT],
-        made.shear[0, 0], made.mass, made.rotary_inertia,
-    ]  # fmt: skip
+        *made.A[AT],
+        np.abs(vanishing).max() / plate,
+        *made.D[AT],
+        made.shear[0, 0],
+        made.mass,
+        made.rotary_inertia,
+    ]
 
 
 @case
@@ -76,9 +80,14 @@ def _angle_ply() -> Sequence[Value]:
     made = laminate(FIBRES, [45.0, -45.0], [THICK / 2.0] * 2)
     turned, a11 = laminate(FIBRES, [45.0], [THICK]), made.A[0, 0]
     return [
-        *made.A[AT], made.A[0, 2] / a11, made.B[0, 2], made.B[0, 0] / (a11 * THICK),
-        made.D[0, 0], made.D[2, 2], turned.shear[0, 1],
-    ]  # fmt: skip
+        *made.A[AT],
+        made.A[0, 2] / a11,
+        made.B[0, 2],
+        made.B[0, 0] / (a11 * THICK),
+        made.D[0, 0],
+        made.D[2, 2],
+        turned.shear[0, 1],
+    ]
 
 
 def report_laminate() -> Laminate:
@@ -177,7 +186,12 @@ def _indentation() -> Sequence[Value]:
     )
     half_inch = LinearPermanent(k=1.330e6, alpha_p=ALPHA_P, s_p=S_P, q=2.5)
     return [
-        half_inch.loading(ALPHA_P), *(point.force for point in down[1:]),
-        top[2].force - top[1].force, turn[3].force - turn[2].force, up[4].force, up[3].force, work,
+        half_inch.loading(ALPHA_P),
+        *(point.force for point in down[1:]),
+        top[2].force - top[1].force,
+        turn[3].force - turn[2].force,
+        up[4].force,
+        up[3].force,
+        work,
         *(p.force for p in path(PEAK, (PEAK + ACR_REMAINS) / 2.0, ACR_REMAINS, law=acr)[1:]),
-    ]  # fmt: skip
+    ]

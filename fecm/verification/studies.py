@@ -35,9 +35,14 @@ def _random_values() -> Sequence[Value]:
     drawn = statistics(matrix(Design({"k": Law("lognormal", (115.0, 0.08))}, samples))[:, 0])
     low, high = wilson(np.array(3), np.array(40))
     return [
-        *found.first[0], *found.total[0], float(drawn.mean), float(drawn.standard_deviation),
-        drawn.quantiles[3], float(low), float(high),
-    ]  # fmt: skip
+        *found.first[0],
+        *found.total[0],
+        float(drawn.mean),
+        float(drawn.standard_deviation),
+        drawn.quantiles[3],
+        float(low),
+        float(high),
+    ]
 
 
 @case

@@ -1,0 +1,130 @@
+"""Plates whose fields of strains and resultants every mesh must reproduce."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fecm.deck import model
+from fecm.deck.grid import Grid, Section, lines, uniform
+from fecm.deck.model import Deck, Impact, Projectile
+from fecm.deck.records import NodeCodes, NodeValues
+from fecm.verification import decks
+from fecm.verification.case import Value, case
+from fecm.verification.parts import FIBRES, THICK
+
+IN_PLANE = "eps_xx eps_yy gamma_xy kappa_x kappa_y kappa_xy"
+# Corners of the four elements of the patch: no side is parallel to another or to an axis.
+CORNERS = np.array([
+    [(0.0, 0.0), (1.1, -0.1), (2.0, 0.1)],
+    [(-0.1, 0.9), (1.2, 1.1), (2.1, 0.8)],
+    [(0.1, 2.0), (0.9, 2.2), (2.0, 1.9)],
+])  # fmt: skip
+
+
+@case
+def _patch() -> Sequence[Value]:
+    fine = np.empty((5, 5, 2))
+    fine[::2, ::2] = CORNERS
+    fine[::2, 1::2] = (CORNERS[:, 1:] + CORNERS[:, :-1]) / 2.0
+    fine[1::2] = (fine[2::2] + fine[:-2:2]) / 2.0
+    x, y = fine.reshape(-1, 2).T
+    field = decks.constant_strains(x, y, (0.4, -0.5, 0.6), strain=(1e-3, 2e-3, 3e-3))
+    field = field.reshape(5, 5, 5)
+    field[1:-1, 1:-1] = 0.0  # the inner nodes are free
+    grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
+    places = enumerate(fine.reshape(-1, 2).tolist(), start=1)
+    plate = decks.material(FIBRES, (0.0, 90.0), THICK / 2.0)
+    segments = (decks.supports(grid, "00000" + 4 * " 11111"), decks.forces(field), plate)
+    coordinates = model.Coordinates(tuple(NodeValues(n, 0, tuple(place)) for n, place in places))
+    found = decks.result_of(decks.deck(grid, segments, decks.STRESSES, coordinates))
+    shears = np.array(decks.fields(found, "stresses", "gamma_xz gamma_yz"))
+    return [*decks.fields(found, "stresses", IN_PLANE), shears, found["stresses/M_x"]]
+
+
+def loaded_rectangle(x: Sequence[float], y: Sequence[float], *, shears: bool = False) -> Deck:
+    """Build a rectangle of [0/45] under edge tractions, on supports without reactions.
+
+    `x` and `y` are the forces per length of the five dofs on an edge with normal x or y.  With
+    `shears` only w moves, and a shear correction factor acts.
+    """
+    columns = [Section(0.0, 1.2, 1), Section(1.2, 2.0, 1)]
+    grid = Grid(columns, [Section(0.0, 0.5, 1), Section(0.5, 1.5, 1)])
+    codes = np.tile([1, 1, 0, 1, 1] if shears else [0] * 5, (grid.up, grid.across, 1))
+    codes[0, 0, :3] = 1
+    if not shears:
+        codes[0, -1, 1:3] = codes[-1, 0, 2] = 1
+    loads = np.zeros(codes.shape)
+    for place, sign in ((-1, 1.0), (0, -1.0)):
+        loads[:, place] += sign * np.outer(decks.weights(lines(grid.rows)), x)
+        loads[place] += sign * np.outer(decks.weights(lines(grid.columns)), y)
+    rows = enumerate(codes.reshape(-1, 5).tolist(), start=1)
+    segments = (
+        model.Boundary(tuple(NodeCodes(n, 0, tuple(code)) for n, code in rows if any(code))),
+        decks.forces(np.where(codes == 0, loads, 0.0)),
+        decks.material(FIBRES, (0.0, 45.0), THICK / 2.0),
+        model.Shear(0.8) if shears else None,
+    )
+    return decks.deck(grid, segments, decks.STRESSES)
+
+
+@case
+def _resultants() -> Sequence[Value]:
+    n_x, n_y, n_xy, m_x, m_y, m_xy = 100.0, -40.0, 30.0, 0.5, 0.3, -0.2
+    # A couple M does work on -theta.
+    pulled = loaded_rectangle((n_x, n_xy, 0.0, -m_x, -m_xy), (n_xy, n_y, 0.0, -m_xy, -m_y))
+    shears = (0.0, 0.0, 20.0, 0.0, 0.0), (0.0, 0.0, -8.0, 0.0, 0.0)
+    found = decks.result_of(pulled)
+    sheared = decks.result_of(loaded_rectangle(*shears, shears=True))
+    return [
+        *decks.fields(found, "stresses", f"{IN_PLANE} N_x N_y N_xy M_x M_y M_xy"),
+        *decks.fields(sheared, "stresses", "gamma_xz gamma_yz Q_x Q_y"),
+    ]
+
+
+@case
+def _tape8() -> Sequence[Value]:
+    """Strains of a plate whose nodes are held in a field of constant strains, except one w.
+
+    A very slow rigid mass hits this dof, in the middle of the first element, for one step: the
+    other elements keep the field.
+    """
+    grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
+    struck = 2 + grid.across
+    x, y = (v.ravel() for v in np.meshgrid(lines(grid.columns), lines(grid.rows)))
+    field = decks.constant_strains(x, y, (0.4, -0.5, 0.6), shear=(0.02, -0.03))
+    field[struck - 1, 2] = 0.0
+    codes = [NodeCodes(n, 0, (1, 1, int(n != struck), 1, 1)) for n in range(1, grid.nodes + 1)]
+    hit = (Projectile(0, 0, 1e-6), Impact(struck, 3, 1e-12), decks.elastic(1.0))
+    plate = decks.material(FIBRES, (0.0, 90.0), 0.01)
+    segments = (model.Boundary(tuple(codes)), decks.forces(field), *hit, plate)
+    found = decks.result_of(decks.deck(grid, segments, decks.impact_program(1e-7, 1)))
+    names = "kappa_x kappa_y kappa_xy gamma_yz gamma_xz"
+    return [field[:, 1:] for field in decks.fields(found, "tape8", names)]
+
+
+def held_trapezoid() -> Deck:
+    """Build one element with MITC, x = ξ and y = η (1 + ξ/2)/2, that is held in θ_y = ξ².
+
+    The other dofs are 0, so that γ_yz is -θ_y, of which a cubic part in ξ is interpolated.
+    """
+    grid = Grid(uniform(2.0, 1), uniform(1.0, 1))
+    xi, eta = (v.ravel() for v in np.meshgrid((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)))
+    corners = enumerate(np.stack([xi, eta * (1.0 + xi / 2.0) / 2.0], axis=1).tolist(), start=1)
+    places = model.Coordinates(tuple(NodeValues(n, 0, tuple(place)) for n, place in corners))
+    field = np.zeros((9, 5))
+    field[:, 4] = xi**2
+    held, plate = decks.held_but(0), decks.material(decks.ONE, [0.0], 0.1)
+    return decks.deck(grid, (held, decks.forces(field), decks.MITC, plate), decks.STRESSES, places)
+
+
+@case
+def _assumed_shear() -> Sequence[Value]:
+    cards = (decks.material(decks.ONE, [0.0], h) for h in (0.1, 0.001))
+    made = [
+        decks.quarter_plate(4, card, decks.DEFLECTION, 1.0, others=[decks.MITC]) for card in cards
+    ]
+    x, shear = decks.fields(decks.result_of(held_trapezoid()), "stresses", "x gamma_yz")
+    sides = [shear[:, np.isclose(x, at)] for at in (-1.0, 1.0)]
+    return [*(decks.result_of(one).tape3.w[0, 0] for one in made), *sides]

@@ -1,0 +1,178 @@
+"""Impacts on plates and on a fixed target, and quick models of impacts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.api import load_deck
+from fecm.deck import model
+from fecm.deck.grid import Grid, refined, uniform
+from fecm.deck.model import Deck, Impact, Indentation, Patch, Projectile
+from fecm.mechanics.laminate import effective_rigidity, laminate
+from fecm.mechanics.solutions import static_stiffness
+from fecm.mechanics.time_step import critical_time_step, rounded_time_step
+from fecm.problem.build import build_plate
+from fecm.problem.generate import generate
+from fecm.results.result import Result
+from fecm.studies.estimate import inelasticity, infinite_plate, static_plate
+from fecm.sweeps.api import carry_out, problem_of
+from fecm.sweeps.plan import plan
+from fecm.verification import decks
+from fecm.verification.case import Value, case
+from fecm.verification.parts import ALPHA_CR
+
+V = 100.0  # of projectiles
+
+
+def peak(found: Result) -> list[float]:
+    """Largest force, and its time."""
+    return [found.force.max(), found.time[found.force.argmax()]]
+
+
+@case
+def _rigid_target() -> Sequence[Value]:
+
+    def values(law: Indentation) -> list[float]:
+        found = decks.result_of(decks.fixed_target(2.0e-4, V, law, 2e-8, 9000))
+        touching = found.time[found.force > 0.0]
+        return [found.indentation.max(), found.force.max(), touching[-1], found.velocity[-1]]
+
+    return values(decks.elastic(1.0e6)) + values(Indentation(1.0e6, ALPHA_CR, 0.0, 2.5, "ACR"))
+
+
+@case
+def _free_plate() -> Sequence[Value]:
+    """A plate so stiff that it moves as a rigid body, which DAMP slows down."""
+    grid = Grid(uniform(1.0, 2), uniform(1.0, 2))
+    plate, law = decks.material(decks.isotropic(1e9, 0.3, 2.5e-4), [0.0], 0.2), decks.elastic(1e5)
+    made = decks.struck_plate(grid, plate, Projectile(0, 0, 2.0e-4), V, law, 3e-8, 10000)
+    found = decks.result_of(replace(made, segments=(*made.segments, model.Damping(2000.0))))
+    ends = (found.velocity[-1], found.plate_w[-1], found.energy.damping_work[-1])
+    return [found.force.max(), *ends]
+
+
+@case
+def _infinite_plate() -> Sequence[Value]:
+    """A thin plate of 12 x 12 in, stiff in shear; no reflection returns within 200 us."""
+    grid = Grid(uniform(12.0, 48), uniform(12.0, 48))
+    plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4, 13.0), [0.0], 0.1)
+    mass, law = Projectile(0, 0, 2.0e-5), decks.elastic(5.0e4)
+    found = decks.result_of(decks.struck_plate(grid, plate, mass, V, law, 5e-8, 4000))
+    return [*peak(found), found.velocity[-1]]
+
+
+@case
+def _supported_plate() -> Sequence[Value]:
+    """A quarter of the plate, with a quarter of mass and contact coefficient."""
+    plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.03)
+    hit = (Projectile(0, 0, 5.0e-6 / 4.0), Impact(1, 3, V), decks.elastic(1.0e5 / 4.0))
+    macros = decks.impact_program(8e-8, 2500)
+    found = decks.result_of(decks.quarter_plate(8, plate, macros, others=hit))
+    force, time = peak(found)
+    return [4.0 * force, time, found.plate_w.max(), found.velocity[-1]]
+
+
+@case
+def _report_impact() -> Sequence[Value]:
+    found = decks.result_of(decks.report_impact())
+    energy = found.energy
+    balance = float(np.abs(energy.balance_error).max()) / float(energy.attributes["initial"])
+    first = int(found.force[found.time < 500e-6].argmax())
+    return [
+        balance,
+        _at(found, "force", 42e-6),
+        _at(found, "force", 642e-6),
+        _at(found, "transducer", 642e-6),
+        found.force[first],
+        found.time[first],
+        *peak(found),
+    ]
+
+
+def _at(result: Result, name: str, time: float) -> float:
+    """Value of a history at the step nearest to a time."""
+    values: Floats = result[f"history/{name}"]
+    return float(values[int(np.abs(result.time - time).argmin())])
+
+
+@case
+def _listing_impact() -> Sequence[Value]:
+    found = decks.result_of(decks.report_impact(500), "listing")
+    end = found.time[found.force > 0.0][-1]
+    return [_at(found, "force", 46e-6), _at(found, "transducer", 46e-6), end]
+
+
+@case
+def _convolution() -> Sequence[Value]:
+    made = decks.report_impact(1000)
+    problem = problem_of(made)
+    swept = carry_out(problem, plan(problem, [{"velocity": 60.0}], history=True)).force
+    if swept is None:
+        raise ValueError("the sweep has kept no forces")
+    slower = tuple(replace(s, velocity=60.0) if isinstance(s, Impact) else s for s in made.segments)
+    full = decks.result_of(replace(made, segments=slower)).force
+    return [np.abs(swept[0] - full).max() / full.max()]
+
+
+@case
+def _patch_impact() -> Sequence[Value]:
+    patch = Patch("DISC", 0.125, decks.SIDES[0] / 2.0, decks.SIDES[1] / 2.0)
+    middle = 97 * 32 + 49  # of 97 by 65 nodes
+    hit = (Projectile(0, 0, 0.000181), Impact(middle, 3, 115.0), decks.elastic(1.912e6))
+    return peak(
+        decks.result_of(
+            decks.pressed_rectangle(48, patch, decks.impact_program(1.0e-7, 1250), *hit)
+        )
+    )
+
+
+# A square of 0.256 kg (SI).
+SQUARE = decks.isotropic(240e9, 0.3, 1600.0)
+SQUARE_THICKNESS = 0.004
+SQUARE_K = 8.2641942e9  # contact coefficient
+
+
+def struck_square(mass: float, end: float) -> Deck:
+    """Build the simply supported square, hit in the middle at 1 m/s, until a time."""
+    side, radius = 0.2, 0.002
+    sections = refined(side, 12, side / 2.0, 4.0, radius)
+    grid = Grid(sections, sections)
+    middle = grid.nearest(side / 2.0, side / 2.0)[0]
+    segments = (
+        decks.supports(grid, decks.SUPPORTED),
+        Projectile(0, 0, mass),
+        Impact(middle, 3, 1.0),
+        Patch("DISC", radius),
+        decks.elastic(SQUARE_K),
+        decks.MITC,
+        decks.material(SQUARE, [0.0], SQUARE_THICKNESS),
+    )
+    made = decks.deck(grid, segments, ())
+    dt = rounded_time_step(critical_time_step(build_plate(made, generate(made))))
+    return replace(made, macros=decks.impact_program(dt, round(end / dt)))
+
+
+@case
+def _small_mass() -> Sequence[Value]:
+    dashpot, mass = infinite_plate(1.0, 1.0, 1.0, 1.0), 0.0128
+    plate = laminate(SQUARE, [0.0], [SQUARE_THICKNESS])
+    parameter = inelasticity(mass, 1.0, SQUARE_K, plate.mass, effective_rigidity(plate))
+    return [
+        dashpot.peak,
+        dashpot.time,
+        parameter,
+        infinite_plate(mass, 1.0, SQUARE_K, parameter).peak,
+        decks.result_of(struck_square(mass, 3e-5)).force.max(),
+    ]
+
+
+@case
+def _large_mass() -> Sequence[Value]:
+    (problem,) = load_deck(struck_square(1.0, 1e-6).to_text()).problems
+    assert problem.contact is not None
+    stiffness = static_stiffness(problem.moving_plate, problem.contact)
+    return [stiffness, static_plate(5.5, 2.0, 1e9, 2.5e6).peak]
