@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fecm.studies.rod_test.filters import calibrate
+from fecm.studies.rod_test.calibration import calibrate
 from tests.calls import assert_unusable, call
 
 Floats = NDArray[np.float64]

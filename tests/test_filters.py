@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from fecm.studies.rod_test.filters import FIRST_ORDER, KINDS, MOVING_AVERAGE, Filter, filter_of
+from fecm.studies.rod_test.filters import Filter, FilterKind, filter_of
 
 RISE = 10e-6
+OF_RISE_TIMES = (FilterKind.FIRST_ORDER, FilterKind.MOVING_AVERAGE)
 JUMP = 1e-13  # width of what stands for a step
 
 
@@ -18,18 +19,20 @@ def test_a_first_order_filter_passes_a_tenth_and_nine_tenths_a_rise_time_apart()
     low, high = constant * math.log(10 / 9), constant * math.log(10.0)
     assert high - low == pytest.approx(RISE, rel=1e-14)
     time = np.array([-1e-5, 0.0, JUMP, low, high, 1.0])
-    answer = Filter(FIRST_ORDER, RISE)(time, np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0]))
+    answer = Filter(FilterKind.FIRST_ORDER, RISE)(time, np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0]))
     assert answer == pytest.approx([0.0, 0.0, 0.0, 0.1, 0.9, 1.0], abs=1e-7)
 
 
 def test_a_moving_average_passes_a_tenth_and_nine_tenths_a_rise_time_apart() -> None:
     low, high = RISE / 8, 9 * RISE / 8
     time = np.array([-1e-5, 0.0, JUMP, low, high, 10 * RISE / 8, 1.0])
-    answer = Filter(MOVING_AVERAGE, RISE)(time, np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0]))
+    answer = Filter(FilterKind.MOVING_AVERAGE, RISE)(
+        time, np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    )
     assert answer == pytest.approx([0.0, 0.0, 0.0, 0.1, 0.9, 1.0, 1.0], abs=1e-7)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", OF_RISE_TIMES)
 def test_points_put_on_the_lines_of_a_polygon_change_nothing(kind: str) -> None:
     random = np.random.default_rng(12)
     time = np.cumsum(random.uniform(0.1e-6, 9e-6, 60))
@@ -40,8 +43,8 @@ def test_points_put_on_the_lines_of_a_polygon_change_nothing(kind: str) -> None:
     np.testing.assert_allclose(fine[np.isin(extra, time)], coarse, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize(("kind", "delay"), [(FIRST_ORDER, RISE / math.log(9.0)),
-                                              (MOVING_AVERAGE, RISE / 1.6)])  # fmt: skip
+@pytest.mark.parametrize(("kind", "delay"), [(FilterKind.FIRST_ORDER, RISE / math.log(9.0)),
+                                              (FilterKind.MOVING_AVERAGE, RISE / 1.6)])  # fmt: skip
 def test_a_ramp_is_followed_with_a_constant_delay(kind: str, delay: float) -> None:
     time = np.array([n * RISE for n in range(41)])
     answer = Filter(kind, RISE)(time, 3.0 * time)
@@ -49,7 +52,7 @@ def test_a_ramp_is_followed_with_a_constant_delay(kind: str, delay: float) -> No
     np.testing.assert_allclose(answer[late], 3.0 * (time[late] - delay), rtol=1e-7)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", OF_RISE_TIMES)
 def test_what_stands_still_stays_and_a_filter_without_inertia_changes_nothing(kind: str) -> None:
     time, values = np.array([n * 2e-7 for n in range(50)]), np.sin(np.arange(50.0))
     np.testing.assert_allclose(Filter(kind, RISE)(time, np.full(50, 7.0)), 7.0, rtol=1e-13)
@@ -59,7 +62,7 @@ def test_what_stands_still_stays_and_a_filter_without_inertia_changes_nothing(ki
 def test_a_first_order_filter_weakens_a_wave_by_its_transfer_function() -> None:
     period = 8e-6
     time = np.arange(0.0, 30 * period, period / 2000)
-    answer = Filter(FIRST_ORDER, RISE)(time, np.sin(2 * np.pi * time / period))
+    answer = Filter(FilterKind.FIRST_ORDER, RISE)(time, np.sin(2 * np.pi * time / period))
     w = 2 * np.pi / period * RISE / math.log(9.0)
     settled = answer[time > 20 * period]
     assert np.ptp(settled) / 2 == pytest.approx(1 / math.hypot(1.0, w), rel=1e-4)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fecm.studies.indentation_test.constants import fit
-from fecm.studies.tables import read_test
+from fecm.studies.indentation_test.measured import read_test
 from tests.calls import assert_unusable, call
 from tests.decks import LONG
 from tests.indentation_tests import ALPHA_P, S_P, K, Q, make_test, noisy, written

@@ -31,8 +31,8 @@ from fecm.problem.check_segments import check_law
 from fecm.studies import StudyError
 from fecm.studies.indentation_test.constants import fit as fitted
 from fecm.studies.indentation_test.curves import LIMITS_Q
+from fecm.studies.indentation_test.measured import read_test
 from fecm.studies.indentation_test.output import card, lines, notes, plain
-from fecm.studies.tables import read_test
 
 
 @click.group(cls=Group)

@@ -32,9 +32,10 @@ from fecm.mechanics.projectile import (
 from fecm.problem.build import build_projectile, build_station
 from fecm.studies import StudyError
 from fecm.studies.rod_test import pulse_test
-from fecm.studies.rod_test.filters import Filter, filter_of, recorded
-from fecm.studies.rod_test.filters import calibrate as fit_sensitivity
+from fecm.studies.rod_test.calibration import calibrate as fit_sensitivity
+from fecm.studies.rod_test.filters import Filter, filter_of
 from fecm.studies.rod_test.pulse_test import Pulse, RodHistory
+from fecm.studies.rod_test.recordings import recorded
 
 FILTER_HELP = ("first-order:RISE or moving-average:RISE, with the time RISE from 10 to 90 % of the "
                "step response; or cfc:60, 180, 600 or 1000 of SAE J211.")  # fmt: skip

@@ -28,16 +28,13 @@ class Support(StrEnum):
     ROTATION_HELD = "rotation held"
 
 
+HOLLOW: style.Look = {"mfc": "white", "mew": 0.7}
 # Marks of the supports.
 MARKS: dict[Support, style.Look] = {
     Support.CLAMPED: {"marker": "s", "color": style.COLOURS[0], "ms": 3.0},
-    Support.W_HELD: {
-        "marker": "^", "color": style.COLOURS[0], "ms": 3.5, "mfc": "white", "mew": 0.7
-    },
-    Support.ROTATION_HELD: {
-        "marker": "o", "color": style.COLOURS[2], "ms": 3.0, "mfc": "white", "mew": 0.7
-    },
-}  # fmt: skip
+    Support.W_HELD: HOLLOW | {"marker": "^", "color": style.COLOURS[0], "ms": 3.5},
+    Support.ROTATION_HELD: HOLLOW | {"marker": "o", "color": style.COLOURS[2], "ms": 3.0},
+}
 
 
 def supports(result: Result) -> dict[Support, Bools]:

@@ -13,7 +13,7 @@ from fecm.plot import style
 from fecm.plot.kinds import Picture
 from fecm.studies.indentation_test.constants import Fit
 from fecm.studies.indentation_test.turns import Kind
-from fecm.studies.rod_test.filters import Calibration
+from fecm.studies.rod_test.calibration import Calibration
 from fecm.studies.rod_test.pulse_test import RodHistory
 
 if TYPE_CHECKING:

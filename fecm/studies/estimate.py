@@ -167,9 +167,13 @@ def estimate(problem: Problem) -> Estimate:
 
 
 def _model(
-    name: str, impact: Callable[[float], QuickImpact], velocity: float, threshold: float, *,
+    name: str,
+    impact: Callable[[float], QuickImpact],
+    velocity: float,
+    threshold: float,
+    *,
     applies: bool,
-) -> Model:  # fmt: skip
+) -> Model:
     """A model, with the velocity at which its peak reaches the threshold."""
     found = math.nan
     if math.isfinite(threshold):

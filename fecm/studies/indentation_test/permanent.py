@@ -79,7 +79,7 @@ def _scatter(chi: float, freedom: int) -> float:
     from scipy.special import chdtrc  # takes 0.15 s, and most commands do not fit
 
     if freedom > 0 and chdtrc(freedom, chi) < UNLIKELY:
-        return (chi / freedom) ** 0.5
+        return float((chi / freedom) ** 0.5)
     return 1.0
 
 

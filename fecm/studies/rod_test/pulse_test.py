@@ -210,8 +210,11 @@ def force_row(rod: Rod, x: float) -> Floats:
     (element, s), L = _place(rod, x), rod.element_length
     row = np.zeros(2 * rod.elements + 2)
     row[2 * element : 2 * element + 4] = [
-        6.0 * (s**2 - s) / L, 1.0 - 4.0 * s + 3.0 * s**2, 6.0 * (s - s**2) / L, 3.0 * s**2 - 2.0 * s
-    ]  # fmt: skip
+        6.0 * (s**2 - s) / L,
+        1.0 - 4.0 * s + 3.0 * s**2,
+        6.0 * (s - s**2) / L,
+        3.0 * s**2 - 2.0 * s,
+    ]
     return -rod.modulus * float(rod.areas[element]) * row
 
 

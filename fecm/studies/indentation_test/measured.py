@@ -1,4 +1,4 @@
-"""Tables of indentation tests: columns by their names, numbers in consistent units."""
+"""Measured indentation tests: tables of indentation and force in any units."""
 
 from __future__ import annotations
 

@@ -1,0 +1,85 @@
+"""Time histories of results and of measured tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+from pathlib import Path
+
+import numpy as np
+
+from fecm._frozen import frozen
+from fecm._inputs import open_input
+from fecm._measured_tables import read_table, same_name
+from fecm._typing import Floats
+from fecm.deck.source_text import HDF5
+from fecm.results.result import Result, load
+from fecm.results.schema import DATASETS, declared_units
+from fecm.studies import StudyError
+
+TRANSDUCER = "transducer"
+
+
+@frozen
+class TimeHistory:
+    """A quantity in time."""
+
+    name: str
+    time: Floats  # (rows,)
+    values: Floats  # (rows,)
+    dimension: str  # empty if unknown
+    first: int = 0  # first recorded row; the rows before it are the state of rest
+    beside: Mapping[str, Floats] = field(default_factory=dict)  # others for the same plot
+    units: Mapping[str, str] = field(default_factory=dict)  # names; empty if unknown
+
+
+def recorded(path: Path, column: str | None = None) -> TimeHistory:
+    """Read a history from a result file or a CSV file.
+
+    The column is by default the transducer, or the second of a CSV file.  Raises StudyError if the
+    history does not exist, or the CSV file is invalid, ResultFileError if the result file is
+    damaged, OSError if the file cannot be read.
+    """
+    with open_input(path) as file:
+        is_result = file.read(len(HDF5)) == HDF5
+    return _of_result(path, load(path), column) if is_result else _of_table(path, column)
+
+
+def _of_result(path: Path, result: Result, column: str | None) -> TimeHistory:
+    known = [name.partition("/")[2] for name in result if name.startswith("history/")]
+    if not known:
+        raise StudyError(f"{path} has no history: the run has no impact step")
+    choice = [name for name in known if name not in ("step", "time")]
+    name = column or TRANSDUCER
+    if name not in choice:
+        raise StudyError(f"{path} has no history of {name}; it has {', '.join(choice)}")
+    # Histories begin after the first step; before it, the rod is at rest.
+    dataset = DATASETS.get(f"history/{name}")
+    dimension = dataset.dimension if dataset else ""
+    rest = [0.0] if dimension in ("force", "length") else []
+
+    def begun(column: str) -> Floats:
+        return np.concatenate([rest, result[f"history/{column}"]])
+
+    beside = {"contact force": begun("force")} if name == TRANSDUCER else {}
+    units = declared_units(result.attributes)
+    return TimeHistory(name, begun("time"), begun(name), dimension, len(rest), beside, units)
+
+
+def _of_table(path: Path, column: str | None) -> TimeHistory:
+    table = read_table(path)
+    names = table.names
+
+    def found(name: str) -> str | None:
+        return next((known for known in names if same_name(name, known)), None)
+
+    if column is not None and found(column) is None:
+        known = f"it has {', '.join(names)}" if names else "the first line has no names"
+        raise StudyError(f"{path} has no column {column}; {known}")
+    clock = found("time") or (names[0] if names else "time")
+    others = [name for name in names if name != clock]
+    name = found(column or TRANSDUCER) or (others[0] if others else "value")
+    columns = table.columns((clock, name), increasing=clock)
+    unit = next((u for n, u in zip(names, table.units, strict=True) if n == clock), "")
+    units = {"time": unit} if unit else {}
+    return TimeHistory(name, columns[clock], columns[name], dimension="", units=units)
