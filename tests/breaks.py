@@ -20,6 +20,8 @@ from fecm.mechanics.contact_law import (
 from fecm.mechanics.strains import StrainField
 
 Break = Callable[[pytest.MonkeyPatch], None]
+# What is broken; how; and the rows that have to see it: a case, and the beginnings of quantities.
+Breaks = dict[str, tuple[Break, dict[str, tuple[str, ...]]]]
 
 
 def instead(owner: Any, name: str, broken: Callable[..., Any]) -> Break:

@@ -1,0 +1,1 @@
+"""Physics broken on purpose, by subject: what is broken, how, and the rows that have to see it."""

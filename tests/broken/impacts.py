@@ -1,0 +1,133 @@
+"""Contact laws, impacts and their quick models broken on purpose."""
+
+from __future__ import annotations
+
+import fecm
+from fecm.mechanics import (
+    assumed_shear,
+    points,
+)
+from fecm.mechanics import impact as impacts
+from fecm.mechanics import laminate as laminates
+from fecm.mechanics.contact_law import (
+    UNLOADING,
+    VIRGIN,
+    HystereticLaw,
+    LinearPermanent,
+    YangSunPermanent,
+)
+from fecm.mechanics.impact import ImpactSystem
+from fecm.mechanics.plate_motion import PlateMotion
+from fecm.problem import build
+from fecm.studies import estimate
+from tests.breaks import (
+    Breaks,
+    changed,
+    doubled,
+    halved,
+    instead,
+    other_power,
+    standing_plate,
+    turned,
+    value,
+    work_of_the_new_force,
+)
+
+BREAKS: Breaks = {
+    "k a^1.4": (
+        value(fecm.mechanics.contact_law, "LOADING_POWER", 1.4),
+        {
+            "indentation": ("F(α_p)", "F at the peak", "F halfway down", "F back", "F halfway up",
+                            "work", "ACR: F at the peak"),
+            "rigid-target": ("deepest", "largest", "contact", "ACR"), "supported-plate": ("",),
+            "small-mass": ("largest force of",),
+        },
+    ),
+    "permanent indentation halved": (
+        changed(LinearPermanent, "permanent", halved),
+        {"indentation": ("F halfway down", "F at α₀", "work")},
+    ),
+    "permanent indentation of ACR halved": (
+        changed(YangSunPermanent, "permanent", halved),
+        {"indentation": ("ACR: F halfway", "ACR: F at α₀"),
+         "rigid-target": ("ACR: contact", "ACR: velocity")},
+    ),
+    "the unloading power of ACR 2 for 5/2": (
+        instead(YangSunPermanent, "__init__", other_power), {"indentation": ("ACR: F halfway",)},
+    ),
+    "unloading from nine tenths of the force": (
+        turned(lambda before, after: bool(before.branch == VIRGIN), f=0.9),
+        {"indentation": ("jump of F where unloading", "F halfway down", "work"),
+         "rigid-target": ("velocity",)},
+    ),
+    "reloading always from the permanent indentation": (
+        instead(HystereticLaw, "_reloading",
+                lambda right, law, m, last: right(law, m, last._replace(force=0.0))),
+        {"indentation": ("jump of F where reloading",)},
+    ),
+    "reloading to nine tenths of the peak": (
+        changed(HystereticLaw, "_reloading", lambda curve: curve._replace(f=0.9 * curve.f)),
+        {"indentation": ("F halfway up",)},
+    ),
+    "the first curve goes on at nine tenths": (
+        turned(lambda before, after: bool(after.branch == VIRGIN), f=0.9),
+        {"indentation": ("F back",)},
+    ),
+    "a steeper unloading": (
+        turned(lambda before, after: bool(after.branch == UNLOADING), p=1.05),
+        {"indentation": ("F halfway down", "work"), "rigid-target": ("velocity", "contact")},
+    ),
+    "a plate that does not move": (
+        instead(ImpactSystem, "__init__", standing_plate),
+        {"infinite-plate": ("",), "supported-plate": ("largest force",),
+         "report-impact": ("worst",)},
+    ),
+    "action without equal reaction": (
+        changed(ImpactSystem, "applied", lambda p: p._replace(force=1.01 * p.force)),
+        {"report-impact": ("worst",)},
+    ),
+    "work of the new force alone": (
+        instead(impacts, "couple_step", work_of_the_new_force), {"report-impact": ("worst",)},
+    ),
+    "a patch of half the radius": (
+        instead(points, "patch_weights",
+                lambda right, mesh, shape, c, *place: right(mesh, shape, c / 2.0, *place)),
+        {"patch-compliance": ("W",), "patch-impact": ("largest", "its time")},
+    ),
+    "Hertz's pressure taken for a uniform one": (
+        instead(points, "patch_weights",
+                lambda right, mesh, shape, *circle: right(mesh, points.DISC, *circle)),
+        {"patch-compliance": ("W, Hertz",)},
+    ),
+    "MITC ignored": (
+        changed(build, "has_assumed_shear", lambda found: False), {"assumed-shear": ("w",)},
+    ),
+    "tying points on the sides of the element": (
+        value(assumed_shear, "TYING", {9: (assumed_shear.TYING[9][0], (-1.0, 0.0, 1.0), 3)}),
+        {"assumed-shear": ("γ_yz",)},
+    ),
+    "half of DAMP": (
+        instead(PlateMotion, "__init__", lambda right, *a: right(*a[:-1], a[-1] / 2.0)),
+        {"free-plate": ("",)},
+    ),
+    "D for 12 D in the delamination threshold": (
+        changed(laminates, "threshold_force", lambda force: force / 12.0**0.5),
+        {"threshold": ("",)},
+    ),
+    "Olsson's D* in the delamination threshold": (
+        instead(laminates, "_agm", lambda right, a, b: (a * b) ** 0.5),
+        {"threshold": ("the report", "the same")},
+    ),
+    "a tenth of the plate's inertia missing in Zener's parameter": (
+        instead(estimate, "infinite_plate", lambda right, *a: right(*a[:-1], a[-1] / 0.9**0.5)),
+        {"small-mass": ("F T", "t_peak")},
+    ),
+    "4 for 8 in Zener's parameter": (
+        changed(estimate, "inelasticity", doubled),
+        {"small-mass": ("λ", "largest force on")},
+    ),
+    "nine tenths of the plate's stiffness": (
+        instead(estimate, "static_plate", lambda right, *a: right(*a[:-1], 0.9 * a[-1])),
+        {"large-mass": ("largest",)},
+    ),
+}  # fmt: skip

@@ -1,0 +1,79 @@
+"""Stresses of plies and their failure broken on purpose."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fecm.mechanics import (
+    failure,
+    ply_stresses,
+)
+from fecm.mechanics.ply_stresses import FailureMonitor
+from tests.breaks import (
+    Breaks,
+    bent_with_stretching_held,
+    changed,
+    in_plate_axes,
+    instead,
+    mirrored,
+    of_the_first,
+    of_the_last,
+    without_q26,
+    without_shear_stress,
+)
+
+BREAKS: Breaks = {
+    "EQUI ignored": (
+        instead(ply_stresses, "equilibrium_shear_stiffness", lambda right, plate: plate.shear),
+        {"equilibrium-shear": ("A*",)},
+    ),
+    "D for D - B A⁻¹ B in EQUI": (
+        instead(ply_stresses, "equilibrium_shear_stiffness", bent_with_stretching_held),
+        {"equilibrium-shear": ("A*55 of [0/90]", "A*44 of [0/90]", "A*55 of [30", "A*44 of [30")},
+    ),
+    "Q26 forgotten in the equilibrium of the plies": (
+        changed(ply_stresses, "_moments", without_q26),
+        {"equilibrium-shear": ("A*55 of [30", "A*44 of [30", "A*45 of [30"),
+         "failure-states": ("interlaminar",)},
+    ),
+    "interlaminar stresses turned the other way": (
+        instead(FailureMonitor, "__init__", mirrored), {"failure-states": ("interlaminar",)},
+    ),
+    "interlaminar failure of the ply above alone": (
+        changed(failure, "interlaminar", of_the_first),
+        {"failure-states": ("interlaminar shear, -45",)},
+    ),
+    "interlaminar failure of the ply below alone": (
+        changed(failure, "interlaminar", of_the_last),
+        {"failure-states": ("interlaminar shear, 30",)},
+    ),
+    "failure without the shear stress": (
+        without_shear_stress,
+        {"failure-states": ("maximum stress, 90", "Tsai and Wu", "Hashin, 30", "Hashin, -45",
+                            "Hashin, 90", "Puck, -45", "Puck, 90")},
+    ),
+    "faces of a ply exchanged": (
+        changed(ply_stresses, "in_plane_stresses", lambda found: found[:, ::-1]),
+        {"ply-stresses": ("σ", "τ12")},
+    ),
+    "stresses of a ply in the plate's axes": (
+        instead(ply_stresses, "in_plane_stresses", in_plate_axes),
+        {"ply-stresses": ("σ1 at z = h/6",),
+         "failure-states": ("maximum stress", "Tsai and Wu", "Hashin", "Puck")},
+    ),
+    "σ2 a tenth too small": (
+        changed(ply_stresses, "in_plane_stresses",
+                lambda found: found * np.array([1.0, 0.9, 1.0])[:, None]),
+        {"ply-stresses": ("σ2",), "failure": ("",)},
+    ),
+    "interlaminar stresses of x and y exchanged": (
+        changed(ply_stresses, "interlaminar_stresses",
+                lambda found: (found[0][:, :, ::-1], found[1])),
+        {"ply-stresses": ("τ_xz", "τ_yz"), "ply-shear": ("τ_xz at z = 0", "τ_xz at z = h")},
+    ),
+    "interlaminar stresses that do not begin at 0": (
+        changed(ply_stresses, "interlaminar_stresses",
+                lambda found: (found[0] + 0.1 * found[0].max(), found[1])),
+        {"ply-stresses": ("τ_xz", "τ_yz"), "ply-shear": ("τ_xz at z = ±h/2",)},
+    ),
+}  # fmt: skip

@@ -1,0 +1,45 @@
+"""Sweeps and studies broken on purpose."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fecm.mechanics import half_space
+from fecm.sweeps import cases, convergence, fitting, random_result
+from fecm.sweeps.responses import Convolution
+from tests.breaks import (
+    Breaks,
+    changed,
+    exchanged_matrices,
+    instead,
+    partly_given,
+    value,
+)
+
+BREAKS: Breaks = {
+    "a millionth of a step's force missing in the convolution": (
+        instead(Convolution, "give", partly_given), {"convolution": ("largest",)},
+    ),
+    "the matrices A and B exchanged": (
+        instead(cases, "matrix", exchanged_matrices), {"random-values": ("first", "total")},
+    ),
+    "the median of a lognormal law taken for its mean": (
+        instead(cases.Law, "values",
+                lambda right, law, unit: right(law, unit) * np.exp(-law.parameters[1] ** 2 / 2.0)),
+        {"random-values": ("mean", "its")},
+    ),
+    "an interval of 90 %": (
+        value(random_result, "Z", 1.6448536), {"random-values": ("lower", "upper")},
+    ),
+    "meshes in the opposite order": (
+        instead(convergence, "_limit", lambda right, values, order: right(values[::-1], order)),
+        {"refinement": ("",)},
+    ),
+    "the computed force 1 % too large": (
+        changed(fitting.Model, "at", lambda force: 1.01 * force), {"identification": ("",)},
+    ),
+    "E3 taken for the indentation modulus": (
+        instead(half_space, "indentation_modulus", lambda _, C: 1.0 / np.linalg.inv(C)[2, 2]),
+        {"contact-coefficient": ("",)},
+    ),
+}  # fmt: skip
