@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import multiprocessing
 import platform
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -15,7 +15,7 @@ import scipy
 import fecm
 
 
-def keep(figures: dict[str, Any], suffix: str = "") -> Path:
+def keep(figures: Mapping[str, object], suffix: str = "") -> Path:
     """Write figures into the folder of results; the file's path."""
     versions = {m.__name__: m.__version__ for m in (fecm, np, scipy, h5py)}
     machine = f"{platform.system()}-{platform.machine()}-{multiprocessing.cpu_count()}cores"

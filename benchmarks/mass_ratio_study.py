@@ -67,10 +67,21 @@ def picture(found: dict[str, list[float]]) -> Picture:
     ax.axhline(1.0, color="0.6", label="_")
     for name, colour, line in zip(NAMES[:3], style.COLOURS, style.STYLES, strict=False):
         label = "sweep kernel and run" if name == "sweep kernel" else name
-        ax.plot(found["ratio"], np.array(found[name]) / exact, "o", markersize=3, color=colour,
-                linestyle=line, label=label)  # fmt: skip
-    ax.set(xscale="log", xlabel="mass of the projectile over the plate's",
-           ylabel="peak force over that of the series", ylim=(0.0, 1.2))  # fmt: skip
+        ax.plot(
+            found["ratio"],
+            np.array(found[name]) / exact,
+            "o",
+            markersize=3,
+            color=colour,
+            linestyle=line,
+            label=label,
+        )
+    ax.set(
+        xscale="log",
+        xlabel="mass of the projectile over the plate's",
+        ylabel="peak force over that of the series",
+        ylim=(0.0, 1.2),
+    )
     style.lines_legend(figure, ax)
     return Picture(figure)
 

@@ -80,14 +80,21 @@ def picture(rows: dict[tuple[str, str], list[tuple[int, float, float]]]) -> Pict
             for mesh, line in zip(GRIDS, style.STYLES, strict=False):
                 values = np.array(rows[mesh, kind])
                 ax.plot(
-                    np.sqrt(24.0 / values[:, 0]), values[:, column], "o", markersize=3,
-                    color=colour, linestyle=line, label=f"{kind}, {mesh} mesh",
-                )  # fmt: skip
+                    np.sqrt(24.0 / values[:, 0]),
+                    values[:, column],
+                    "o",
+                    markersize=3,
+                    color=colour,
+                    linestyle=line,
+                    label=f"{kind}, {mesh} mesh",
+                )
         ax.set(
-            xscale="log", xticks=[0.0625, 0.125, 0.25, 0.5],
+            xscale="log",
+            xticks=[0.0625, 0.125, 0.25, 0.5],
             xticklabels=["1/16", "1/8", "1/4", "1/2"],
-            xlabel="mean side of the elements (in)", ylabel=f"peak of contact {column} (lb)",
-        )  # fmt: skip
+            xlabel="mean side of the elements (in)",
+            ylabel=f"peak of contact {column} (lb)",
+        )
         ax.minorticks_off()
     style.lines_legend(figure, axes[0])
     return Picture(figure)

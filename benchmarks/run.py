@@ -26,7 +26,7 @@ import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 from figures import keep
@@ -68,8 +68,10 @@ def refined(times: int, aside: int = 0) -> Deck:
     """
     deck = report()
     columns = [
-        Section(0.0, 1.5, 3 * times), Section(1.5, 4.5, 8 * times), Section(4.5, 6.0, 3 * times)
-    ]  # fmt: skip
+        Section(0.0, 1.5, 3 * times),
+        Section(1.5, 4.5, 8 * times),
+        Section(4.5, 6.0, 3 * times),
+    ]
     rows = [Section(0.0, 0.5, times), Section(0.5, 3.5, 8 * times), Section(3.5, 4.0, times)]
     grid = Grid(columns, rows)
     boundary = grid.boundary((1, 1, 0, 0, 0), {})
@@ -91,8 +93,9 @@ def moved(deck: Deck, move: Callable[[np.ndarray], np.ndarray]) -> Deck:
     places[1::2] = (places[:-1:2] + places[2::2]) / 2.0
     found = places.reshape(-1, 2).tolist()
     records = [NodeValues(n, 0, (x, y)) for n, (x, y) in enumerate(found, start=1)]
-    segments = [Coordinates(tuple(records)) if isinstance(s, Coordinates) else s
-                for s in deck.segments]  # fmt: skip
+    segments = [
+        Coordinates(tuple(records)) if isinstance(s, Coordinates) else s for s in deck.segments
+    ]
     return replace(deck, segments=tuple(segments), text="")
 
 
@@ -121,8 +124,11 @@ def coupled(deck: Deck) -> Deck:
     half = len(material.layers) // 2
     turned = [replace(layer, angle=90.0) for layer in material.layers[half:]]
     layers = (*material.layers[:half], *turned)
-    segments = [replace(material, layers=layers) if s is material else s
-                for s in deck.segments if not isinstance(s, Boundary)]  # fmt: skip
+    segments = [
+        replace(material, layers=layers) if s is material else s
+        for s in deck.segments
+        if not isinstance(s, Boundary)
+    ]
     return replace(deck, segments=tuple(segments), text="")
 
 
@@ -211,7 +217,14 @@ class Run:
             run(Simulation(checked(self.deck, steps), sink, self.options))
 
 
-def seconds(loop: Any, steps: int) -> float:
+class Loop(Protocol):
+    """Something that takes steps."""
+
+    def take(self, steps: int) -> None:
+        """Take steps."""
+
+
+def seconds(loop: Loop, steps: int) -> float:
     """Processor time of some steps; the last run's file is deleted before."""
     if isinstance(loop, Run):
         loop.path.unlink(missing_ok=True)
@@ -220,7 +233,7 @@ def seconds(loop: Any, steps: int) -> float:
     return time.process_time() - begin
 
 
-def wall(loop: Any, steps: int) -> float:
+def wall(loop: Loop, steps: int) -> float:
     """Time on the clock of some steps."""
     begin = time.perf_counter()
     loop.take(steps)
@@ -237,7 +250,7 @@ def memory_per_equation(problem: Problem, solver: str) -> float:
     return (after - before) / setup.motion.plate.neq
 
 
-def measure(name: str, rounds: int) -> dict[str, Any]:
+def measure(name: str, rounds: int) -> dict[str, object]:
     """Figures of one case."""
     deck = CASES[name]()
     problem = checked(deck, 10)
@@ -249,7 +262,7 @@ def measure(name: str, rounds: int) -> dict[str, Any]:
     begin = time.process_time()
     build_model(checked(deck, 10), RunOptions())
     setup = time.process_time() - begin
-    figures = {"case": name, "elements": deck.control.numel, "unknowns": neq}
+    figures: dict[str, object] = {"case": name, "elements": deck.control.numel, "unknowns": neq}
     kept = memory_per_equation(checked(deck, 10), solvers[0])
     with tempfile.TemporaryDirectory() as folder:
         loops = {s: Run(deck, folder, s) for s in solvers}
@@ -266,7 +279,7 @@ def measure(name: str, rounds: int) -> dict[str, Any]:
         own = 0 if memory is None else max(20, int(BUDGET * 20 / max(seconds(memory, 20), 1e-6)))
         best: dict[tuple[str, int], float] = {}
 
-        def take(key: str, loop: Any, steps: int, clock: Callable[..., float] = seconds) -> None:
+        def take(key: str, loop: Loop, steps: int, clock: Callable[..., float] = seconds) -> None:
             best[key, steps] = min(clock(loop, steps), best.get((key, steps), np.inf))
 
         pair = []

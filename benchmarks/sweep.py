@@ -22,7 +22,6 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from figures import keep
@@ -32,7 +31,7 @@ from run import seconds as processor_time
 import fecm
 from fecm.mechanics import kernels
 from fecm.sweeps.batch import _prepared
-from fecm.sweeps.cases import Case, parse_vary
+from fecm.sweeps.cases import Case, Value, parse_vary
 from fecm.sweeps.vary import apply_case
 
 DECK = HERE.parent / "decks" / "impact-115.inp"
@@ -47,8 +46,18 @@ LAYERS = ("--vary", f"layup={LAYUPS}", "--vary", "velocity=50:300:100")
 
 def process(output: Path, *options: str, vary: tuple[str, ...] = VARY) -> float:
     """Seconds of a sweep as a process."""
-    command = [sys.executable, "-m", "fecm", "sweep", str(DECK), *vary, "-o", str(output),
-               "--overwrite", *options]  # fmt: skip
+    command = [
+        sys.executable,
+        "-m",
+        "fecm",
+        "sweep",
+        str(DECK),
+        *vary,
+        "-o",
+        str(output),
+        "--overwrite",
+        *options,
+    ]
     begin = time.perf_counter()
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     return time.perf_counter() - begin
@@ -127,7 +136,7 @@ def by_numpy() -> None:
         kernels.LIBRARY = library
 
 
-def vary_of(options: tuple[str, ...]) -> dict[str, list[Any]]:
+def vary_of(options: tuple[str, ...]) -> dict[str, list[Value]]:
     """Values by name of the options --vary."""
     return dict(parse_vary(text) for text in options[1::2])
 

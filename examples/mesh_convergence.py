@@ -16,8 +16,12 @@ def deck_of(case):
         fecm.Laminate("[0/90]4s", "T300/5208", 0.125),
         fecm.RigidMass(1e-6),  # t
         fecm.Contact.estimate(radius=6),
-        velocity=3000, duration=2e-4, every=50, patch="disc:6", units="mm-N-s",
-    )  # fmt: skip
+        velocity=3000,
+        duration=2e-4,
+        every=50,
+        patch="disc:6",
+        units="mm-N-s",
+    )
 
 
 found = fecm.sweep(build=deck_of, vary={"elements": [10, 14, 20]})

@@ -16,9 +16,15 @@ mass = fecm.RigidMass(1e-4)
 results = {}
 for projectile in (rod, mass):
     deck = fecm.impact(
-        plate, laminate, projectile, "report-0.75",
-        velocity=115, duration=8e-4, every=100, units="in-lbf-s",
-    )  # fmt: skip
+        plate,
+        laminate,
+        projectile,
+        "report-0.75",
+        velocity=115,
+        duration=8e-4,
+        every=100,
+        units="in-lbf-s",
+    )
     name = type(projectile).__name__
     results[name] = fecm.run_one(deck)
     print(name, f"{results[name].metrics['peak_force']:.1f} lbf")
