@@ -13,15 +13,14 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.plot.kinds import KINDS, PlotError, Shows
+from fecm.plot.kinds import PlotError
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, small
+from tests.pictures import OF_RUNS
 
 Array = NDArray[Any]
 
 pytest.importorskip("matplotlib")
-
-OF_RUNS = [name for name, kind in KINDS.items() if kind.shows is not Shows.SWEEP]
 
 
 @pytest.fixture(scope="module")

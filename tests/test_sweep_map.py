@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm._errors import FecmWarning
-from fecm.plot.kinds import KINDS, PlotError, Shows
+from fecm.plot.kinds import PlotError
 from fecm.plot.pictures import draw
 from fecm.sweeps.result import SweepResult, save
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM, small
+from tests.pictures import OF_RUNS
 
 Floats = NDArray[np.float64]
 
@@ -382,9 +383,7 @@ def test_a_level_beyond_all_values_is_told(plane: SweepResult) -> None:
         plot(plane, level=(1e6,))
 
 
-@pytest.mark.parametrize(
-    "kind", [name for name, kind in KINDS.items() if kind.shows is not Shows.SWEEP]
-)
+@pytest.mark.parametrize("kind", OF_RUNS)
 def test_kinds_of_runs_do_not_show_a_sweep(plane: SweepResult, kind: str) -> None:
     with pytest.raises(PlotError, match=f"plane is the result of a sweep, .* {kind} can't show"):
         draw(kind, {"plane": plane})

@@ -1,0 +1,48 @@
+"""Pictures of small results, and what their axes and legends hold."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import fecm
+from fecm._typing import Array
+from fecm.plot.kinds import KINDS, Shows
+from fecm.plot.pictures import draw
+from fecm.results.result import Result
+from tests.decks import DATA_CARDS, PROGRAM, small
+
+OF_RUNS = [name for name, kind in KINDS.items() if kind.shows is not Shows.SWEEP]
+
+NAMED = small(data=DATA_CARDS + "UNIT\nin lbf s\n")
+
+
+# As many steps as the contact lasts, and some more.
+LONG_PROGRAM = PROGRAM.replace(" 10\n", "330\n")
+
+
+def run(deck: str) -> Result:
+    """Result of a deck of one problem."""
+    result = fecm.run(deck)
+    assert isinstance(result, Result)
+    return result
+
+
+def plot(result: Result, kind: str, **options: Any) -> Any:
+    """The command line's figure of one result."""
+    return draw(kind, {"the result": result}, **options).figure
+
+
+def lines(axes: Any) -> dict[str, tuple[Array, Array]]:
+    """Data of an axes' lines by their labels."""
+    return {line.get_label(): line.get_data() for line in axes.get_lines()}
+
+
+def ticks(axis: Any) -> list[tuple[float, str]]:
+    """Places and texts of the ticks of an axis."""
+    texts = [text.get_text() for text in axis.get_ticklabels()]
+    return list(zip(axis.get_ticklocs().tolist(), texts, strict=True))
+
+
+def legend_of(figure: Any) -> list[str]:
+    """Texts of a figure's legend."""
+    return [text.get_text() for text in figure.legends[0].get_texts()]
