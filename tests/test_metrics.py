@@ -42,7 +42,7 @@ def test_the_area_of_the_force_displacement_curve_is_the_absorbed_energy() -> No
     pytest.importorskip("matplotlib")
     result = fecm.run_one(deck())
 
-    def curve(against: str) -> tuple[Any, Any]:
+    def curve(against: Any) -> tuple[Any, Any]:
         line: Any = draw("loop", {"a": result}, against=against).figure.axes[0].get_lines()[0]
         return line.get_xdata(), line.get_ydata()
 
