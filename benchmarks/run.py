@@ -47,9 +47,9 @@ from fecm.simulation.run import run
 from fecm.simulation.simulation import Simulation
 
 HERE = Path(__file__).parent
-# Seconds that one loop of a round may take about, the long run beyond the short one, and bytes of
-# its file.
-BUDGET, LONGER, FILE = 0.4, 1.5, 1e9
+BUDGET = 0.4  # seconds that one loop of a round may take, approximately
+LONGER = 1.5  # seconds that the long run takes beyond the short one
+FILE_SIZE = 1e9  # most bytes of the file of the long run
 DT = 2.0e-7
 
 
@@ -267,7 +267,9 @@ def measure(name: str, rounds: int) -> dict[str, object]:
     with tempfile.TemporaryDirectory() as folder:
         loops = {s: Run(deck, folder, s) for s in solvers}
         short, counts = 20, {}
-        largest = 20.0 * FILE / (8.0 * (5.0 * 9.0 * deck.control.numel + 6.0 * deck.control.numnp))
+        largest = (
+            20.0 * FILE_SIZE / (8.0 * (5.0 * 9.0 * deck.control.numel + 6.0 * deck.control.numnp))
+        )
         for solver, loop in loops.items():
             few, more = (min(seconds(loop, n) for _ in range(3)) for n in (short, 3 * short))
             wanted = LONGER * 2 * short / max(more - few, 1e-3)

@@ -37,7 +37,9 @@ from fecm.sweeps.vary import apply_case
 DECK = HERE.parent / "decks" / "impact-115.inp"
 VARY = ("--vary", "velocity=50:300:40", "--vary", "k=1e6:3e6:25")
 ROUNDS = 5
-CASES, STEPS, EVERY = 1000, 4000, 50
+CASES = 1000
+STEPS = 4000
+EVERY = 50
 MANY = ("--vary", "velocity=50:300:400", "--vary", "k=1e6:3e6:250")
 MANY_CASES = 100_000
 LAYUPS = ",".join(f"[{angle}/{angle + 45}]5s" for angle in range(100))

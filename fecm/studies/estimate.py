@@ -23,8 +23,9 @@ from fecm.problem.build import build_projectile
 from fecm.problem.problem import Problem
 from fecm.studies import StudyError
 
-# Mass over the plate's below which waves control the impact, and above which it is quasi-static.
-SMALL, LARGE = 0.1, 50.0
+# Masses over the plate's.
+SMALL = 0.1  # below, waves control the impact
+LARGE = 50.0  # above, the impact is quasi-static
 MIDPOINTS = 1000  # of the quadrature over the force
 
 

@@ -13,7 +13,8 @@ from fecm.verification import decks
 from fecm.verification.case import Value, case
 
 CARBON = Ply(1.6e-9, 0.3, 150e3, 10e3, 5e3, 5e3, 3.5e3)
-ANGLES, PLY_H = (30.0, -45.0, 90.0), 0.25
+ANGLES = (30.0, -45.0, 90.0)
+PLY_THICKNESS = 0.25
 STRENGTHS = Allowables(2000.0, 1200.0, 60.0, 200.0, 90.0, 80.0, 50.0, -0.4, 0.3, 0.25)
 # By x, y, xx, xy and yy of u, v and the negatives of the rotations, in the middle of the element.
 FIELD = np.array([
@@ -31,7 +32,7 @@ def _failure_states() -> Sequence[Value]:
     grid = Grid(uniform(1.0, 1), uniform(1.0, 1))
     x, y = (v.ravel() - 0.5 for v in np.meshgrid(lines(grid.columns), lines(grid.rows)))
     u, v, p, q = FIELD @ [x, y, x * x / 2.0, x * y, y * y / 2.0]
-    plate = decks.material(CARBON, ANGLES, PLY_H, points=1)
+    plate = decks.material(CARBON, ANGLES, PLY_THICKNESS, points=1)
     held = decks.forces(np.stack([u, v, 0.0 * u, -p, -q], axis=1))
     macros = decks.program("TANG FORM SOLV FAIL")
     found = decks.result_of(decks.deck(grid, (decks.held_but(2), held, STRENGTHS, plate), macros))

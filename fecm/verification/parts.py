@@ -45,8 +45,12 @@ FIBRES = Ply(2.5e-4, 0.3, 17.5e6, 1.15e6, 0.8e6, 0.8e6, 0.5e6)
 THICK = 0.02
 AT = [0, 0, 2], [0, 1, 2]  # stiffnesses 11, 12 and 66
 DT = 2e-7  # for the report's steel bar and its pulse, section 4.2
-# The report's laminate with the 0.75 in indenter; the critical indentation of ACR.
-K, ALPHA_P, S_P, Q, ALPHA_CR = 1.912e6, 6.564e-4, 0.094, 2.0, 1.2e-3
+# The report's laminate with the 0.75 in indenter.
+K = 1.912e6
+ALPHA_P = 6.564e-4
+S_P = 0.094
+Q = 2.0
+ALPHA_CR = 1.2e-3  # critical indentation of ACR
 PEAK = 2e-3
 REMAINS = S_P * (PEAK - ALPHA_P)
 HALFWAY = (PEAK + REMAINS) / 2.0
