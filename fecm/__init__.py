@@ -32,11 +32,32 @@ if TYPE_CHECKING:
     from fecm.sweeps.result import load as load_sweep
 
 __all__ = [
-    "Contact", "Deck", "DeckError", "DivergenceError", "FecmError", "FecmWarning", "Identification",
-    "Laminate", "Plate", "Ply", "Result", "RigidMass", "Rod", "SweepResult", "__version__",
-    "examples", "identify", "impact", "load", "load_sweep", "read_deck", "read_one", "run",
-    "run_one", "sweep",
-]  # fmt: skip
+    "Contact",
+    "Deck",
+    "DeckError",
+    "DivergenceError",
+    "FecmError",
+    "FecmWarning",
+    "Identification",
+    "Laminate",
+    "Plate",
+    "Ply",
+    "Result",
+    "RigidMass",
+    "Rod",
+    "SweepResult",
+    "__version__",
+    "examples",
+    "identify",
+    "impact",
+    "load",
+    "load_sweep",
+    "read_deck",
+    "read_one",
+    "run",
+    "run_one",
+    "sweep",
+]
 
 if not TYPE_CHECKING:  # type checkers know the names from the imports above
     _NAMES = {

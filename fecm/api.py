@@ -207,9 +207,15 @@ def _check_one(found: Sequence[object]) -> None:
 
 
 def _run(
-    deck: str | Path | Deck, mode: str, force: bool, choices: RunOptions,
-    output: str | Path | None, progress: Progress | None, *, one: bool,
-) -> list[Result]:  # fmt: skip
+    deck: str | Path | Deck,
+    mode: str,
+    force: bool,
+    choices: RunOptions,
+    output: str | Path | None,
+    progress: Progress | None,
+    *,
+    one: bool,
+) -> list[Result]:
     """Run the problems of a deck; warn of what is doubtful."""
     prepared = load_deck(deck, mode)
     if prepared.errors(force):

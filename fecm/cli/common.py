@@ -37,12 +37,21 @@ DASH = Path("-")  # standard input or output
 DECK_PATH = click.Path(exists=True, dir_okay=False, path_type=Path)
 FILE_PATH = click.Path(path_type=Path, allow_dash=True)
 
-MODE_OPTION = click.option("--mode", type=click.Choice(MODES), default=REPORT, show_default=True,
-                           help="Follow the report's text, or its printed program slip by "
-                                "slip.")  # fmt: skip
-FORMAT_OPTION = click.option("--format", "form", type=click.Choice(["text", "json"]),
-                             default="text", show_default=True,
-                             help="Text for people, or JSON for programs.")  # fmt: skip
+MODE_OPTION = click.option(
+    "--mode",
+    type=click.Choice(MODES),
+    default=REPORT,
+    show_default=True,
+    help="Follow the report's text, or its printed program slip by slip.",
+)
+FORMAT_OPTION = click.option(
+    "--format",
+    "form",
+    type=click.Choice(["text", "json"]),
+    default="text",
+    show_default=True,
+    help="Text for people, or JSON for programs.",
+)
 
 
 class RefusedError(FecmError):

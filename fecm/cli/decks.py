@@ -39,9 +39,13 @@ def count_findings(findings: Sequence[Finding]) -> str:
 
 
 def load_valid(
-    deck: Path, otherwise: str = "", mode: str = REPORT, *, force: bool = True,
+    deck: Path,
+    otherwise: str = "",
+    mode: str = REPORT,
+    *,
+    force: bool = True,
     warnings: bool = True,
-) -> list[Problem]:  # fmt: skip
+) -> list[Problem]:
     """Problems of a deck, whose findings go to standard error; without `warnings` only errors.
 
     Errors that `--force` permits are permitted if `force`.  Raises RefusedError, whose message ends
@@ -96,13 +100,21 @@ def _failures(decks: Sequence[Path], work: Callable[[Path], None]) -> list[Excep
 )
 @DECKS
 @common.MODE_OPTION
-@option("--format", "form", type=click.Choice(["text", "json", "sarif"]), default="text",
-        show_default=True,
-        help="Text for people, JSON for programs, or SARIF for code hosts.")  # fmt: skip
+@option(
+    "--format",
+    "form",
+    type=click.Choice(["text", "json", "sarif"]),
+    default="text",
+    show_default=True,
+    help="Text for people, JSON for programs, or SARIF for code hosts.",
+)
 @option("--strict", is_flag=True, help="Exit with 1 for warnings too.")
-@option("--mesh-error", is_flag=True,
-        help="Run DECK twice, with its elements and with those around the load bisected, and "
-             "compare the peak forces.")  # fmt: skip
+@option(
+    "--mesh-error",
+    is_flag=True,
+    help="Run DECK twice, with its elements and with those around the load bisected, and "
+    "compare the peak forces.",
+)
 def check(decks: tuple[Path, ...], mode: str, form: str, strict: bool, mesh_error: bool) -> None:
     """Check decks without running them; print their findings and a summary.
 
@@ -192,27 +204,32 @@ def _sarif(checked: Mapping[Path, Sequence[Finding]], failures: Sequence[str]) -
     codes = sorted(severities)
     rules = [
         {
-            "id": code, "helpUri": f"{HOME}/page/findings.html#{code.lower()}",
+            "id": code,
+            "helpUri": f"{HOME}/page/findings.html#{code.lower()}",
             "defaultConfiguration": {"level": severities[code]},
         }
         for code in codes
-    ]  # fmt: skip
+    ]
     driver = {"name": "fecm", "version": __version__, "informationUri": HOME, "rules": rules}
     notifications = [{"level": "error", "message": {"text": text}} for text in failures]
     called = {"executionSuccessful": not failures, "toolExecutionNotifications": notifications}
     results = [
         {
-            "ruleId": f.code, "ruleIndex": codes.index(f.code), "level": f.severity,
+            "ruleId": f.code,
+            "ruleIndex": codes.index(f.code),
+            "level": f.severity,
             "message": {"text": f.message + (f.hint and f" Hint: {f.hint}.")},
             "locations": [{"physicalLocation": _location(deck, f)}],
         }
         for deck, findings in checked.items()
         for f in findings
-    ]  # fmt: skip
+    ]
     run = {
-        "tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "invocations": [called],
+        "tool": {"driver": driver},
+        "columnKind": "unicodeCodePoints",
+        "invocations": [called],
         "results": results,
-    }  # fmt: skip
+    }
     return {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
 
 
@@ -222,9 +239,11 @@ def _location(deck: Path, finding: Finding) -> dict[str, Any]:
     region: dict[str, Any] = {"startLine": 1}
     if place := finding.place:
         region = {
-            "startLine": place.line, "startColumn": place.first,
-            "endColumn": max(place.first, place.last) + 1, "snippet": {"text": place.text},
-        }  # fmt: skip
+            "startLine": place.line,
+            "startColumn": place.first,
+            "endColumn": max(place.first, place.last) + 1,
+            "snippet": {"text": place.text},
+        }
     return {"artifactLocation": {"uri": uri}, "region": region}
 
 
@@ -236,10 +255,16 @@ def _location(deck: Path, finding: Finding) -> dict[str, Any]:
     ),
 )
 @DECKS
-@option("-o", "--output", type=FILE_PATH, metavar="FILE",
-        help="File to write; - is standard output.  [default: DECK itself]")  # fmt: skip
-@option("--check", "only_check", is_flag=True,
-        help="Write nothing; exit with 1 if a deck would change.")  # fmt: skip
+@option(
+    "-o",
+    "--output",
+    type=FILE_PATH,
+    metavar="FILE",
+    help="File to write; - is standard output.  [default: DECK itself]",
+)
+@option(
+    "--check", "only_check", is_flag=True, help="Write nothing; exit with 1 if a deck would change."
+)
 @option("--overwrite", is_flag=True, help="Replace an existing FILE other than DECK.")
 def fmt(decks: tuple[Path, ...], output: Path | None, only_check: bool, overwrite: bool) -> None:
     """Align the columns of decks and put a ruler above each kind of card.

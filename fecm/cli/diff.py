@@ -62,30 +62,62 @@ def _tolerances(text: str) -> dict[str, Any]:
 )
 @click.argument("a", type=FILE_PATH)
 @click.argument("b", type=FILE_PATH)
-@option("--rtol", type=NOT_NEGATIVE, metavar="R",
-        help="Relative tolerance, of the dataset's largest absolute value.  [default: 0; of "
-             "tapes their last digit]")  # fmt: skip
-@option("--atol", type=NOT_NEGATIVE, metavar="T",
-        help="Absolute tolerance, in the dataset's unit.  [default: 0]")  # fmt: skip
-@option("--only", multiple=True, metavar="PATTERN",
-        help="Compare only this dataset (tape9/force), group (tape9) or pattern ('tape?/force'); "
-             "may be repeated.")  # fmt: skip
-@option("--exclude", multiple=True, metavar="PATTERN",
-        help="Leave out a dataset, group or pattern; may be repeated.")  # fmt: skip
-@option("--tol", "own", type=Parsed(_own, "PATTERN=R[,T]"), multiple=True,
-        help="Tolerances of a dataset, group or pattern instead of --rtol and --atol; may be "
-             "repeated, and the last that matches holds.")  # fmt: skip
-@option("--tol-file", "file", type=file_of(_tolerances),
-        help="File of these tolerances, with the keys rtol, atol, exclude and tol; options go "
-             "before it.")  # fmt: skip
+@option(
+    "--rtol",
+    type=NOT_NEGATIVE,
+    metavar="R",
+    help="Relative tolerance, of the dataset's largest absolute value.  [default: 0; of "
+    "tapes their last digit]",
+)
+@option(
+    "--atol",
+    type=NOT_NEGATIVE,
+    metavar="T",
+    help="Absolute tolerance, in the dataset's unit.  [default: 0]",
+)
+@option(
+    "--only",
+    multiple=True,
+    metavar="PATTERN",
+    help="Compare only this dataset (tape9/force), group (tape9) or pattern ('tape?/force'); "
+    "may be repeated.",
+)
+@option(
+    "--exclude",
+    multiple=True,
+    metavar="PATTERN",
+    help="Leave out a dataset, group or pattern; may be repeated.",
+)
+@option(
+    "--tol",
+    "own",
+    type=Parsed(_own, "PATTERN=R[,T]"),
+    multiple=True,
+    help="Tolerances of a dataset, group or pattern instead of --rtol and --atol; may be "
+    "repeated, and the last that matches holds.",
+)
+@option(
+    "--tol-file",
+    "file",
+    type=file_of(_tolerances),
+    help="File of these tolerances, with the keys rtol, atol, exclude and tol; options go "
+    "before it.",
+)
 @option("--brief", is_flag=True, help="Print only names of differences and the verdict.")
 @FORMAT_OPTION
 @reads("a", "b")
 def diff(
-    a: Path, b: Path, rtol: float | None, atol: float | None, only: tuple[str, ...],
-    exclude: tuple[str, ...], own: tuple[tuple[str, tuple[float, ...]], ...],
-    file: dict[str, Any] | None, brief: bool, form: str,
-) -> None:  # fmt: skip
+    a: Path,
+    b: Path,
+    rtol: float | None,
+    atol: float | None,
+    only: tuple[str, ...],
+    exclude: tuple[str, ...],
+    own: tuple[tuple[str, tuple[float, ...]], ...],
+    file: dict[str, Any] | None,
+    brief: bool,
+    form: str,
+) -> None:
     """Compare two results dataset by dataset.
 
     A and B are result files or folders of tapes, or both results of sweeps.
@@ -110,15 +142,22 @@ def diff(
     found = difference(a, b, rtol, atol, only, exclude, own)
     different = [c.path for c in found.compared if not c.same] + [*found.only[0], *found.only[1]]
     if form == "json":
-        echo_json({
-            "verdict": "same" if found.same else "different",
-            "a": printable(str(a)), "b": printable(str(b)),
-            "rtol": rtol or 0.0, "atol": atol or 0.0, "last_digit": found.to_last_digit,
-            "tol": dict(own),
-            "datasets": [_entry(c) for c in found.compared if not (brief and c.same)],
-            "only_in_a": found.only[0], "only_in_b": found.only[1],
-            "excluded": found.excluded, "listed": found.listed,
-        })  # fmt: skip
+        echo_json(
+            {
+                "verdict": "same" if found.same else "different",
+                "a": printable(str(a)),
+                "b": printable(str(b)),
+                "rtol": rtol or 0.0,
+                "atol": atol or 0.0,
+                "last_digit": found.to_last_digit,
+                "tol": dict(own),
+                "datasets": [_entry(c) for c in found.compared if not (brief and c.same)],
+                "only_in_a": found.only[0],
+                "only_in_b": found.only[1],
+                "excluded": found.excluded,
+                "listed": found.listed,
+            }
+        )
     else:
         lines = list(map(printable, sorted(different))) if brief else _lines(found)
         count = len(found.compared) + len(found.only[0]) + len(found.only[1])
@@ -200,14 +239,20 @@ def _entry(found: Comparison) -> dict[str, Any]:
     finite = numbers and math.isfinite(found.largest)
     values = found.values or (None, None)
     return {
-        "name": found.path, "same": found.same,
-        "shape_a": list(found.shapes[0]), "shape_b": list(found.shapes[1]),
-        "dtype_a": found.types[0], "dtype_b": found.types[1],
+        "name": found.path,
+        "same": found.same,
+        "shape_a": list(found.shapes[0]),
+        "shape_b": list(found.shapes[1]),
+        "dtype_a": found.types[0],
+        "dtype_b": found.types[1],
         "largest_difference": found.largest if finite else None,
         "relative": found.relative if finite else None,
         "maximum": found.maximum if numbers else None,
         "scale": found.scale if numbers else None,
         "tolerance": found.tolerance if numbers else None,
         "differing": found.differing if found.comparable else None,
-        "at": found.at, "a": values[0], "b": values[1], "first": found.first,
-    }  # fmt: skip
+        "at": found.at,
+        "a": values[0],
+        "b": values[1],
+        "first": found.first,
+    }

@@ -24,9 +24,12 @@ Row = tuple[str, float, float, float, float]  # name, peak, duration, threshold 
 
 # Columns of the table, and their dimensions.
 COLUMNS = {
-    "peak_force": "force", "duration": "time", "threshold": "force", "velocity": "length/time",
+    "peak_force": "force",
+    "duration": "time",
+    "threshold": "force",
+    "velocity": "length/time",
     "energy": "force*length",
-}  # fmt: skip
+}
 
 
 @click.command(
@@ -46,8 +49,9 @@ def estimate(deck: Path, form: str) -> None:
     """
     problem = load_single(deck, "estimate")
     found = estimate_problem(problem)
-    models = [(m.name, m.impact.peak, m.impact.duration, m.threshold, m.velocity)
-              for m in found.models]  # fmt: skip
+    models = [
+        (m.name, m.impact.peak, m.impact.duration, m.threshold, m.velocity) for m in found.models
+    ]
     own, bent, doubts = _run_itself(problem)
     models.append(own)
     # A model's name, peak, duration, threshold and velocity; then the energy.
@@ -64,13 +68,17 @@ def estimate(deck: Path, form: str) -> None:
     applies = [*(model.applies for model in found.models), True]  # the run always does
     if form == "json":
         named = [dict(zip(("model", *COLUMNS), row, strict=True)) for row in rows]
-        echo_json({
-            "class": found.response, "mass_ratio": found.mass_ratio, "lambda": found.parameter,
-            "stiffness": found.stiffness,
-            "models": [
-                {**row, "applies": one} for row, one in zip(named, applies, strict=True)
-            ],
-        })  # fmt: skip
+        echo_json(
+            {
+                "class": found.response,
+                "mass_ratio": found.mass_ratio,
+                "lambda": found.parameter,
+                "stiffness": found.stiffness,
+                "models": [
+                    {**row, "applies": one} for row, one in zip(named, applies, strict=True)
+                ],
+            }
+        )
         return
     names = unit_names(problem.deck)
 

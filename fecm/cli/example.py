@@ -21,8 +21,13 @@ from fecm.cli.types import Parsed
     ),
 )
 @click.argument("name", type=Parsed(str, "NAME", examples.CONTENTS), required=False)
-@click.option("-o", "--output", type=FILE_PATH, metavar="FILE",
-              help="File to write; - is standard output.  [default: NAME]")  # fmt: skip
+@click.option(
+    "-o",
+    "--output",
+    type=FILE_PATH,
+    metavar="FILE",
+    help="File to write; - is standard output.  [default: NAME]",
+)
 @click.option("--overwrite", is_flag=True, help="Replace an existing FILE.")
 def example(name: str | None, output: Path | None, overwrite: bool) -> None:
     """List the example decks and tables; with NAME, write that one."""

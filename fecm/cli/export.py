@@ -27,8 +27,14 @@ from fecm.results.vtkhdf import write_vtkhdf
     )
 )
 @click.argument("result", type=DECK_PATH)
-@click.option("-d", "--directory", type=FILE_PATH, default=Path(), metavar="DIR",
-              help="Folder for the tapes.  [default: this folder]")  # fmt: skip
+@click.option(
+    "-d",
+    "--directory",
+    type=FILE_PATH,
+    default=Path(),
+    metavar="DIR",
+    help="Folder for the tapes.  [default: this folder]",
+)
 @click.option("--overwrite", is_flag=True, help="Replace existing tapes.")
 @reads("result")
 def tapes(result: Path, directory: Path, overwrite: bool) -> None:
@@ -49,14 +55,27 @@ def tapes(result: Path, directory: Path, overwrite: bool) -> None:
     )
 )
 @click.argument("result", type=DECK_PATH)
-@click.option("--to", "target", type=click.Choice(["vtkhdf", "csv"]), required=True,
-              help="vtkhdf for ParaView and VTK, csv for spreadsheets.")  # fmt: skip
-@click.option("-o", "--output", type=FILE_PATH, metavar="PATH",
-              help="File to write; - is standard output, of csv only.  [default: RESULT's name "
-                   "with .vtkhdf or -DATASET.csv, in this folder]")  # fmt: skip
-@click.option("--dataset", metavar="NAME",
-              help="Content of csv: a dataset such as tape3/w, or a group.  [default: history; "
-                   "cases of a sweep]")  # fmt: skip
+@click.option(
+    "--to",
+    "target",
+    type=click.Choice(["vtkhdf", "csv"]),
+    required=True,
+    help="vtkhdf for ParaView and VTK, csv for spreadsheets.",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=FILE_PATH,
+    metavar="PATH",
+    help="File to write; - is standard output, of csv only.  [default: RESULT's name "
+    "with .vtkhdf or -DATASET.csv, in this folder]",
+)
+@click.option(
+    "--dataset",
+    metavar="NAME",
+    help="Content of csv: a dataset such as tape3/w, or a group.  [default: history; "
+    "cases of a sweep]",
+)
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 @reads("result")
 def export(

@@ -27,22 +27,44 @@ from fecm.sweeps.identify import CARDS, FREE, Identification, fit
 )
 @click.argument("deck", type=DECK_PATH)
 @click.argument("measured", type=DECK_PATH, metavar="MEASURED.csv")
-@option("--free", type=list_of("NAME,...", OneOf(FREE)), required=True,
-        help=f"Parameters to fit: {', '.join(FREE)}.")  # fmt: skip
-@option("--filter", "sensor", type=Parsed(filter_of, "FILTER"),
-        help="Filter of the measurement, which the computed force passes too: "
-             f"{FILTER_HELP}")  # fmt: skip
-@option("-o", "--output", type=FILE_PATH, metavar="FITTED.inp",
-        help="Also write the deck with the fitted values.")  # fmt: skip
-@option("--plot", "picture", type=FILE_PATH, metavar="FILE",
-        help="Also draw measured and fitted force and the residual: .png, .svg or "
-             ".pdf.")  # fmt: skip
+@option(
+    "--free",
+    type=list_of("NAME,...", OneOf(FREE)),
+    required=True,
+    help=f"Parameters to fit: {', '.join(FREE)}.",
+)
+@option(
+    "--filter",
+    "sensor",
+    type=Parsed(filter_of, "FILTER"),
+    help=f"Filter of the measurement, which the computed force passes too: {FILTER_HELP}",
+)
+@option(
+    "-o",
+    "--output",
+    type=FILE_PATH,
+    metavar="FITTED.inp",
+    help="Also write the deck with the fitted values.",
+)
+@option(
+    "--plot",
+    "picture",
+    type=FILE_PATH,
+    metavar="FILE",
+    help="Also draw measured and fitted force and the residual: .png, .svg or .pdf.",
+)
 @option("--overwrite", is_flag=True, help="Replace existing files.")
 @FORMAT_OPTION
 def identify(
-    deck: Path, measured: Path, free: tuple[str, ...], sensor: Filter | None, output: Path | None,
-    picture: Path | None, overwrite: bool, form: str,
-) -> None:  # fmt: skip
+    deck: Path,
+    measured: Path,
+    free: tuple[str, ...],
+    sensor: Filter | None,
+    output: Path | None,
+    picture: Path | None,
+    overwrite: bool,
+    form: str,
+) -> None:
     """Fit parameters of the impact of DECK to a measured contact force.
 
     MEASURED.csv has the columns time and force, in the deck's units; time 0 is the first contact,
@@ -64,12 +86,21 @@ def identify(
             name: {"value": value, "error": found.errors[name], "start": found.start[name]}
             for name, value in found.values.items()
         }
-        echo_json({
-            "values": values, "correlation": found.correlation.tolist(),
-            "points": len(found.time), "dof": found.dof, "rms": found.rms, "share": found.share,
-            "converged": found.converged, "accepted": found.accepted,
-            "plate_errors": found.plate_errors, "notes": list(found.notes), "cards": found.cards(),
-        })  # fmt: skip
+        echo_json(
+            {
+                "values": values,
+                "correlation": found.correlation.tolist(),
+                "points": len(found.time),
+                "dof": found.dof,
+                "rms": found.rms,
+                "share": found.share,
+                "converged": found.converged,
+                "accepted": found.accepted,
+                "plate_errors": found.plate_errors,
+                "notes": list(found.notes),
+                "cards": found.cards(),
+            }
+        )
     else:
         rms = f"{found.rms:.4g} {unit_of('force', units)}".rstrip()
         echo(f"points       {len(found.time)}, {found.dof} degrees of freedom")

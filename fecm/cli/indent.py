@@ -47,25 +47,45 @@ def indent() -> None:
     )
 )
 @click.argument("test", type=DECK_PATH, metavar="TEST.csv")
-@option("--acr", is_flag=True,
-        help="Fit alpha_cr of the law with one unloading rigidity (q = 5/2) instead of s_p and "
-             "alpha_p.")  # fmt: skip
+@option(
+    "--acr",
+    is_flag=True,
+    help="Fit alpha_cr of the law with one unloading rigidity (q = 5/2) instead of s_p and "
+    "alpha_p.",
+)
 @option("--q", type=Finite(*LIMITS_Q), help="Prescribed unloading power; fitted by default.")
-@option("--turn", type=POSITIVE, metavar="LENGTH",
-        help="Decrease of the indentation that counts as a turn.  [default: 2 % of its range, or 8 "
-             "standard deviations of its noise]")  # fmt: skip
-@option("--columns", type=list_of("INDENTATION,FORCE", click.STRING, [2]),
-        help="Names or numbers (from 1) of the two columns.  [default: indentation, displacement, "
-             "extension, stroke or depth; force or load]")  # fmt: skip
-@option("--unit", "units", type=list_of("LENGTH,FORCE", click.STRING, [2]),
-        help="Units of the card, to which a file that names its units is converted.  [default: "
-             "in,lbf or mm,N or m,N, as the file's]")  # fmt: skip
+@option(
+    "--turn",
+    type=POSITIVE,
+    metavar="LENGTH",
+    help="Decrease of the indentation that counts as a turn.  [default: 2 % of its range, or 8 "
+    "standard deviations of its noise]",
+)
+@option(
+    "--columns",
+    type=list_of("INDENTATION,FORCE", click.STRING, [2]),
+    help="Names or numbers (from 1) of the two columns.  [default: indentation, displacement, "
+    "extension, stroke or depth; force or load]",
+)
+@option(
+    "--unit",
+    "units",
+    type=list_of("LENGTH,FORCE", click.STRING, [2]),
+    help="Units of the card, to which a file that names its units is converted.  [default: "
+    "in,lbf or mm,N or m,N, as the file's]",
+)
 @outputs("test", table=False)
 @FORMAT_OPTION
 def fit(
-    test: Path, acr: bool, q: float | None, turn: float | None, columns: tuple[str, str] | None,
-    units: tuple[str, str] | None, targets: OutputPaths, form: str,
-) -> None:  # fmt: skip
+    test: Path,
+    acr: bool,
+    q: float | None,
+    turn: float | None,
+    columns: tuple[str, str] | None,
+    units: tuple[str, str] | None,
+    targets: OutputPaths,
+    form: str,
+) -> None:
     """Fit the indentation law to a test, and print its parameters and EXPE card.
 
     TEST.csv has the columns indentation and force, with rows in the order of measurement: first
@@ -116,26 +136,44 @@ def _law(deck: Path) -> tuple[Deck, Indentation]:
     )
 )
 @click.argument("deck", type=DECK_PATH)
-@option("--path", type=list_of("A,B,C,...", Finite()),
-        help="Indentations at which the path turns, from 0; with --rigidity the range FROM,TO of "
-             "alpha_m.")  # fmt: skip
-@option("--points", type=click.IntRange(min=1, max=100_000), default=100, show_default=True,
-        help="Points between two turns.")  # fmt: skip
-@option("--rigidity", is_flag=True,
-        help="Tabulate the unloading rigidity s over alpha_m by equations 3-9 and 3-7 "
-             "instead.")  # fmt: skip
+@option(
+    "--path",
+    type=list_of("A,B,C,...", Finite()),
+    help="Indentations at which the path turns, from 0; with --rigidity the range FROM,TO of "
+    "alpha_m.",
+)
+@option(
+    "--points",
+    type=click.IntRange(min=1, max=100_000),
+    default=100,
+    show_default=True,
+    help="Points between two turns.",
+)
+@option(
+    "--rigidity",
+    is_flag=True,
+    help="Tabulate the unloading rigidity s over alpha_m by equations 3-9 and 3-7 instead.",
+)
 @option("--q", type=POSITIVE, help="With --rigidity: power of 3-9.  [default: the deck's]")
-@option("--alpha-cr", type=POSITIVE,
-        help="With --rigidity: alpha_cr of 3-7.  [default: the deck's, or the "
-             "report's]")  # fmt: skip
-@option("--line", type=list_of("ALPHA_P,S_P", NOT_NEGATIVE, [2]),
-        help="With --rigidity: parameters of 3-8.  [default: the deck's, or the "
-             "report's]")  # fmt: skip
+@option(
+    "--alpha-cr",
+    type=POSITIVE,
+    help="With --rigidity: alpha_cr of 3-7.  [default: the deck's, or the report's]",
+)
+@option(
+    "--line",
+    type=list_of("ALPHA_P,S_P", NOT_NEGATIVE, [2]),
+    help="With --rigidity: parameters of 3-8.  [default: the deck's, or the report's]",
+)
 @outputs("deck")
 def curve(
-    deck: Path, path: tuple[float, ...] | None, points: int, rigidity: bool, targets: OutputPaths,
+    deck: Path,
+    path: tuple[float, ...] | None,
+    points: int,
+    rigidity: bool,
+    targets: OutputPaths,
     **parameters: Any,
-) -> None:  # fmt: skip
+) -> None:
     """Write the force along an indentation path, by the law of DECK, as CSV.
 
     The columns are indentation, force and the branch of the law; with --rigidity alpha_m, s_3_9 and
@@ -164,9 +202,15 @@ def curve(
 
 
 def _rigidities(
-    deck: Path, path: Sequence[float] | None, points: int, targets: OutputPaths, *, q: float | None,
-    alpha_cr: float | None, line: tuple[float, float] | None,
-) -> None:  # fmt: skip
+    deck: Path,
+    path: Sequence[float] | None,
+    points: int,
+    targets: OutputPaths,
+    *,
+    q: float | None,
+    alpha_cr: float | None,
+    line: tuple[float, float] | None,
+) -> None:
     """Write largest indentations and rigidities by both equations."""
     if path and (len(path) != 2 or not 0.0 <= path[0] < path[1]):
         raise click.BadParameter("with --rigidity the range FROM,TO", param_hint="--path")
@@ -218,13 +262,28 @@ SPHERE = stacked(
     option("--nus", "nu_s", type=float, required=True, help="Poisson's ratio of the sphere."),
 )
 CARD = stacked(
-    option("--alpha-p", type=NOT_NEGATIVE, default=0.0, show_default=True,
-           help="Critical indentation for the card."),
-    option("--s-p", type=Finite(0.0, 1.0, max_open=True), default=0.0, show_default=True,
-           help="Slope of permanent indentation for the card."),
-    option("--q", type=POSITIVE, default=1.5, show_default=True,
-           help="Unloading power for the card; 1.5 is elastic."),
-)  # fmt: skip
+    option(
+        "--alpha-p",
+        type=NOT_NEGATIVE,
+        default=0.0,
+        show_default=True,
+        help="Critical indentation for the card.",
+    ),
+    option(
+        "--s-p",
+        type=Finite(0.0, 1.0, max_open=True),
+        default=0.0,
+        show_default=True,
+        help="Slope of permanent indentation for the card.",
+    ),
+    option(
+        "--q",
+        type=POSITIVE,
+        default=1.5,
+        show_default=True,
+        help="Unloading power for the card; 1.5 is elastic.",
+    ),
+)
 
 
 @indent.command(
@@ -234,8 +293,13 @@ CARD = stacked(
     )
 )
 @SPHERE
-@option("--et", "e_t", type=float, required=True,
-        help="Young's modulus of the laminate through its thickness.")  # fmt: skip
+@option(
+    "--et",
+    "e_t",
+    type=float,
+    required=True,
+    help="Young's modulus of the laminate through its thickness.",
+)
 @CARD
 @FORMAT_OPTION
 def hertz(radius: float, e_s: float, nu_s: float, e_t: float, form: str, **card: Any) -> None:
@@ -267,17 +331,27 @@ def _print_law(k: float, card: dict[str, Any], form: str, **others: float) -> No
     )
 )
 @laminate_options(required=True, thickness_required=True)
-@option("--nu23", type=Finite(),
-        help="Poisson's ratio of the ply across the fibres.  [default: the named ply's, or "
-             "0.4]")  # fmt: skip
+@option(
+    "--nu23",
+    type=Finite(),
+    help="Poisson's ratio of the ply across the fibres.  [default: the named ply's, or 0.4]",
+)
 @SPHERE
 @CARD
 @FORMAT_OPTION
 def estimate(
-    layup: Sequence[float], ply_thickness: float, ply: Sequence[float] | None,
-    material: NamedPly | None, units: str | None, nu23: float | None, radius: float, e_s: float,
-    nu_s: float, form: str, **card: Any,
-) -> None:  # fmt: skip
+    layup: Sequence[float],
+    ply_thickness: float,
+    ply: Sequence[float] | None,
+    material: NamedPly | None,
+    units: str | None,
+    nu23: float | None,
+    radius: float,
+    e_s: float,
+    nu_s: float,
+    form: str,
+    **card: Any,
+) -> None:
     """Estimate k of a laminate from its elastic constants, and print its EXPE card.
 
     By the indentation modulus M of the laminate's effective solid, and by its E2 for comparison.
@@ -307,8 +381,13 @@ def estimate(
     )
 )
 @click.argument("name", type=OneOf(list(CONTACTS)), metavar="[NAME]", required=False)
-@option("--units", type=click.Choice(list(SYSTEMS)), default=SYSTEM, show_default=True,
-        help="Units of the parameters.")  # fmt: skip
+@option(
+    "--units",
+    type=click.Choice(list(SYSTEMS)),
+    default=SYSTEM,
+    show_default=True,
+    help="Units of the parameters.",
+)
 @FORMAT_OPTION
 def contacts(name: str | None, units: str, form: str) -> None:
     """List the named laws of `fecm new --contact`, or print the EXPE card of one."""

@@ -24,8 +24,18 @@ from fecm.results.schema import Form, declared_units
 from fecm.results.summary import about_run
 
 # Attributes of the file with lines of their own.
-HEADING = ("title", "mode", "slips", "fecm_version", "format", "format_version",
-           "unit_length", "unit_force", "unit_time", "notes")  # fmt: skip
+HEADING = (
+    "title",
+    "mode",
+    "slips",
+    "fecm_version",
+    "format",
+    "format_version",
+    "unit_length",
+    "unit_force",
+    "unit_time",
+    "notes",
+)
 
 # Those that are keys of the JSON output, of runs and of sweeps.
 RUN_KEYS, SWEEP_KEYS = HEADING[:6], ("title", "fecm_version", "format", "format_version")
@@ -63,9 +73,14 @@ def _system(context: click.Context, _: object, asked: bool) -> None:
     ),
 )
 @click.argument("result", type=FILE_PATH)
-@click.option("--system", is_flag=True, is_eager=True, expose_value=False, callback=_system,
-              help="Show the versions in use instead, and whether the kernels are "
-                   "compiled.")  # fmt: skip
+@click.option(
+    "--system",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_system,
+    help="Show the versions in use instead, and whether the kernels are compiled.",
+)
 @FORMAT_OPTION
 @reads("result")
 def info(result: Path, form: str) -> None:
@@ -123,13 +138,16 @@ def _page(about: Mapping[str, Any]) -> list[str]:
     version = about["fecm_version"]
     units = ", ".join(f"{name} {unit}" for name, unit in about["units"].items())
     rows += [
-        ("written by", f"fecm {'of unknown version' if version is None else version}, "
-                       f"format version {about['format_version']}"),
+        (
+            "written by",
+            f"fecm {'of unknown version' if version is None else version}, "
+            f"format version {about['format_version']}",
+        ),
         ("units", units or "the deck names none"),
         extent,
         *(("note", text) for text in about.get("notes", ())),
         *((name, shown(value)) for name, value in about["attributes"].items()),
-    ]  # fmt: skip
+    ]
     lines = [printable(str(about["title"] or "(no title)"))]
     lines += [f"  {printable(name):17} {printable(str(value))}" for name, value in rows]
     lines += ["", "summary", *(f"  {printable(line)}".rstrip() for line in about["summary"])]

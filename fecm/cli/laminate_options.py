@@ -29,21 +29,47 @@ def laminate_options(
     """Add ``--layup``, ``--ply-thickness``, ``--ply``, ``--material`` and ``--units``."""
     own = "" if thickness_required else "  [default: that of a named ply]"
     return stacked(
-        option("--layup", type=Parsed(parse_layup, "LAYUP"), required=required,
-               help='Layup from the struck face, as in "[0/45/0/-45/0]2s".'),
-        option("--ply-thickness", type=POSITIVE, required=thickness_required, metavar="T",
-               help=f"Thickness of a ply.{own}"),
-        option("--ply", type=list_of("RHO,NU12,E1,E2,G12,G13,G23", Finite(), [7]),
-               help="Density and moduli of a ply."),
-        option("--material", callback=_named, type=Parsed(str, "NAME", MATERIALS),
-               help="Named ply, instead of --ply; `fecm materials` lists them."),
-        option("--materials", "file", type=PLIES, is_eager=True, expose_value=False,
-               callback=lambda context, _, plies: context.meta.update({_META: plies or {}}),
-               help="Named plies of your own; `fecm materials FILE.toml` checks them."),
-        option("--units", type=click.Choice(list(SYSTEMS)), metavar="SYSTEM",
-               help="in-lbf-s, m-N-s or mm-N-s: names the units, and converts a named ply to "
-                    "them.  [default for a named ply: its source's]"),
-    )  # fmt: skip
+        option(
+            "--layup",
+            type=Parsed(parse_layup, "LAYUP"),
+            required=required,
+            help='Layup from the struck face, as in "[0/45/0/-45/0]2s".',
+        ),
+        option(
+            "--ply-thickness",
+            type=POSITIVE,
+            required=thickness_required,
+            metavar="T",
+            help=f"Thickness of a ply.{own}",
+        ),
+        option(
+            "--ply",
+            type=list_of("RHO,NU12,E1,E2,G12,G13,G23", Finite(), [7]),
+            help="Density and moduli of a ply.",
+        ),
+        option(
+            "--material",
+            callback=_named,
+            type=Parsed(str, "NAME", MATERIALS),
+            help="Named ply, instead of --ply; `fecm materials` lists them.",
+        ),
+        option(
+            "--materials",
+            "file",
+            type=PLIES,
+            is_eager=True,
+            expose_value=False,
+            callback=lambda context, _, plies: context.meta.update({_META: plies or {}}),
+            help="Named plies of your own; `fecm materials FILE.toml` checks them.",
+        ),
+        option(
+            "--units",
+            type=click.Choice(list(SYSTEMS)),
+            metavar="SYSTEM",
+            help="in-lbf-s, m-N-s or mm-N-s: names the units, and converts a named ply to "
+            "them.  [default for a named ply: its source's]",
+        ),
+    )
 
 
 def _named(context: click.Context, parameter: click.Parameter, name: str | None) -> NamedPly | None:
@@ -74,9 +100,12 @@ def ply_of_options(
 
 
 def laminate_of_options(
-    layup: Sequence[float], ply_thickness: float | None, ply: Sequence[float] | None,
-    material: NamedPly | None, units: str | None,
-) -> tuple[Laminate, dict[str, str]]:  # fmt: skip
+    layup: Sequence[float],
+    ply_thickness: float | None,
+    ply: Sequence[float] | None,
+    material: NamedPly | None,
+    units: str | None,
+) -> tuple[Laminate, dict[str, str]]:
     """Laminate of these options, checked as in a deck, and the names of its units."""
     if ply_thickness is None and material is not None:
         ply_thickness = material.value("thickness", units or material.system)

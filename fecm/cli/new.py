@@ -34,12 +34,14 @@ FIXED = ("size", "columns", "rows", "support", "edges")  # options that a fixtur
 # Constants of a named ply, as `fecm materials` lists them.
 LINES = (
     ("E1", "E2", "nu12", "nu23", "G12", "G13", "G23", "density", "thickness"),
-    (*STRENGTHS, "S13", "S23"), ("GIc", "GIIc"),
-)  # fmt: skip
+    (*STRENGTHS, "S13", "S23"),
+    ("GIc", "GIIc"),
+)
 
 PROJECTILES: dict[str, tuple[str, Callable[..., Rod | RigidMass]]] = {
-    "mass": ("M", RigidMass), "rod": ("LENGTH,DIAMETER,E,DENSITY", Rod.cylinder),
-}  # fmt: skip
+    "mass": ("M", RigidMass),
+    "rod": ("LENGTH,DIAMETER,E,DENSITY", Rod.cylinder),
+}
 
 
 def _projectile(text: str) -> Rod | RigidMass:
@@ -75,12 +77,19 @@ def _mesh(text: str) -> tuple[int, int] | Path:
 GROUPS = {
     "Plate": ("size", "mesh", "grading", "columns", "rows"),
     "Laminate": (
-        "layup", "ply_thickness", "material", "file", "ply", "units", "damage", "giic",
+        "layup",
+        "ply_thickness",
+        "material",
+        "file",
+        "ply",
+        "units",
+        "damage",
+        "giic",
     ),
     "Supports": ("fixture", "support", "edges", "in_plane"),
     "Impact": ("energy", "velocity", "at", "projectile", "contact", "law"),
     "Numerics": ("patch", "shear", "shear_factor", "duration", "dt", "every"),
-}  # fmt: skip
+}
 
 
 def _shear_factor(text: str) -> float | str:
@@ -105,65 +114,139 @@ def _shear_factor(text: str) -> float | str:
 )
 @click.argument("output", type=FILE_PATH, metavar="DECK")
 @option("--title", default="", help="Title of the deck.")
-@option("--size", type=list_of("6x4", POSITIVE, [2], "[xX×]"), metavar="LXxLY",
-        help="Size of the plate, as in 6x4.")  # fmt: skip
-@option("--mesh", type=Parsed(_mesh, "NXxNY|FILE"),
-        help="Elements along x and y, as in 14x10; or a mesh, Gmsh's .msh or another that meshio "
-             "reads, with groups of lines for --edge.")  # fmt: skip
-@option("--grading", type=Finite(min=1.0), default=1.0, metavar="RATIO",
-        help="Largest over smallest element; the smallest at the impact point.")  # fmt: skip
-@option("--columns", default="", metavar="LIST",
-        help="Elements along x one by one, as in 3*0.5,8*0.375,3*0.5, instead of --size and "
-             "--mesh.")  # fmt: skip
+@option(
+    "--size",
+    type=list_of("6x4", POSITIVE, [2], "[xX×]"),
+    metavar="LXxLY",
+    help="Size of the plate, as in 6x4.",
+)
+@option(
+    "--mesh",
+    type=Parsed(_mesh, "NXxNY|FILE"),
+    help="Elements along x and y, as in 14x10; or a mesh, Gmsh's .msh or another that meshio "
+    "reads, with groups of lines for --edge.",
+)
+@option(
+    "--grading",
+    type=Finite(min=1.0),
+    default=1.0,
+    metavar="RATIO",
+    help="Largest over smallest element; the smallest at the impact point.",
+)
+@option(
+    "--columns",
+    default="",
+    metavar="LIST",
+    help="Elements along x one by one, as in 3*0.5,8*0.375,3*0.5, instead of --size and --mesh.",
+)
 @option("--rows", default="", metavar="LIST", help="The same along y.")
 @laminate_options(required=True)
-@option("--damage", is_flag=True,
-        help="Add strengths and toughness of a named ply: failure exposures (ALLO, FAIL) and the "
-             "delamination threshold (DELA).")  # fmt: skip
-@option("--giic", type=POSITIVE, metavar="G",
-        help="Toughness G_IIc of the delamination threshold (DELA), force/length; goes before that "
-             "of a named ply.")  # fmt: skip
-@option("--support", type=click.Choice(SUPPORTS), default="free", show_default=True,
-        help="Support of all edges.")  # fmt: skip
-@option("--edge", "edges", type=Parsed(assignment, "EDGE=SUPPORT"), multiple=True,
-        help="Support of one edge: left, right, bottom or top, or a group of the mesh; may be "
-             "repeated.")  # fmt: skip
-@option("--fixture", metavar="NAME",
-        help=f"Fixture of a drop-weight test: {', '.join(FIXTURES)} or {CUSTOM}, a plate on the "
-             "edges of a window; --mesh then counts the window's elements.")  # fmt: skip
-@option("--in-plane", type=click.Choice(list(IN_PLANE)),
-        help="In-plane displacements of a coupled laminate on its supports: held, normal (held "
-             "across the edge only) or free.  [default: held; with --fixture free]")  # fmt: skip
-@option("--at", type=list_of("X,Y", Finite(), [2]),
-        help="Impact point.  [default: the plate's centre]")  # fmt: skip
-@option("--velocity", metavar="V[UNIT]",
-        help="Approach velocity in the deck's units, or with a unit, as in 3m/s.")  # fmt: skip
-@option("--energy", metavar="E[UNIT]",
-        help="Impact energy instead of --velocity: in the deck's units (mJ in mm-N-s), or with a "
-             "unit, as in 10J.")  # fmt: skip
-@option("--law", type=list_of("K,ALPHA_P,S_P,Q", Finite(), [4]),
-        help="Parameters of the indentation law.")  # fmt: skip
-@option("--contact", type=Parsed(_contact, "NAME"),
-        help=f"Named law, instead of --law; `fecm indent contacts` lists them.  {ESTIMATE} "
-             "estimates the k of a sphere (default: steel) as `fecm indent estimate` "
-             "does.")  # fmt: skip
-@option("--projectile", type=Parsed(_projectile, "PROJECTILE"),
-        help="mass:M, or rod:LENGTH,DIAMETER,E,DENSITY.  [default in lbf, in and s: the report's "
-             "rod]")  # fmt: skip
-@option("--patch", type=Parsed(parse_patch, "PATCH"), default="disc", show_default=True,
-        help="Area of the contact force: disc or hertz, with :RADIUS, to which a rectangle's mesh "
-             "is then refined; or none, a point force.  D7136 takes hertz.")  # fmt: skip
-@option("--shear", type=click.Choice([MITC, FULL]), default=MITC, show_default=True,
-        help="Transverse shear: assumed strains, or full quadrature.")  # fmt: skip
-@option("--shear-factor", type=Parsed(_shear_factor, "K|equi"), default="1", show_default=True,
-        help="Factor of the transverse shear stiffness, or equi, the stiffness from equilibrium "
-             "(SHEA EQUI).")  # fmt: skip
-@option("--duration", metavar="T[UNIT]",
-        help="Simulated time, also with a unit, as in 4ms.  [default with --fixture: longer than "
-             "the contact of the projectile with the static plate]")  # fmt: skip
+@option(
+    "--damage",
+    is_flag=True,
+    help="Add strengths and toughness of a named ply: failure exposures (ALLO, FAIL) and the "
+    "delamination threshold (DELA).",
+)
+@option(
+    "--giic",
+    type=POSITIVE,
+    metavar="G",
+    help="Toughness G_IIc of the delamination threshold (DELA), force/length; goes before that "
+    "of a named ply.",
+)
+@option(
+    "--support",
+    type=click.Choice(SUPPORTS),
+    default="free",
+    show_default=True,
+    help="Support of all edges.",
+)
+@option(
+    "--edge",
+    "edges",
+    type=Parsed(assignment, "EDGE=SUPPORT"),
+    multiple=True,
+    help="Support of one edge: left, right, bottom or top, or a group of the mesh; may be "
+    "repeated.",
+)
+@option(
+    "--fixture",
+    metavar="NAME",
+    help=f"Fixture of a drop-weight test: {', '.join(FIXTURES)} or {CUSTOM}, a plate on the "
+    "edges of a window; --mesh then counts the window's elements.",
+)
+@option(
+    "--in-plane",
+    type=click.Choice(list(IN_PLANE)),
+    help="In-plane displacements of a coupled laminate on its supports: held, normal (held "
+    "across the edge only) or free.  [default: held; with --fixture free]",
+)
+@option(
+    "--at", type=list_of("X,Y", Finite(), [2]), help="Impact point.  [default: the plate's centre]"
+)
+@option(
+    "--velocity",
+    metavar="V[UNIT]",
+    help="Approach velocity in the deck's units, or with a unit, as in 3m/s.",
+)
+@option(
+    "--energy",
+    metavar="E[UNIT]",
+    help="Impact energy instead of --velocity: in the deck's units (mJ in mm-N-s), or with a "
+    "unit, as in 10J.",
+)
+@option(
+    "--law",
+    type=list_of("K,ALPHA_P,S_P,Q", Finite(), [4]),
+    help="Parameters of the indentation law.",
+)
+@option(
+    "--contact",
+    type=Parsed(_contact, "NAME"),
+    help=f"Named law, instead of --law; `fecm indent contacts` lists them.  {ESTIMATE} "
+    "estimates the k of a sphere (default: steel) as `fecm indent estimate` "
+    "does.",
+)
+@option(
+    "--projectile",
+    type=Parsed(_projectile, "PROJECTILE"),
+    help="mass:M, or rod:LENGTH,DIAMETER,E,DENSITY.  [default in lbf, in and s: the report's rod]",
+)
+@option(
+    "--patch",
+    type=Parsed(parse_patch, "PATCH"),
+    default="disc",
+    show_default=True,
+    help="Area of the contact force: disc or hertz, with :RADIUS, to which a rectangle's mesh "
+    "is then refined; or none, a point force.  D7136 takes hertz.",
+)
+@option(
+    "--shear",
+    type=click.Choice([MITC, FULL]),
+    default=MITC,
+    show_default=True,
+    help="Transverse shear: assumed strains, or full quadrature.",
+)
+@option(
+    "--shear-factor",
+    type=Parsed(_shear_factor, "K|equi"),
+    default="1",
+    show_default=True,
+    help="Factor of the transverse shear stiffness, or equi, the stiffness from equilibrium "
+    "(SHEA EQUI).",
+)
+@option(
+    "--duration",
+    metavar="T[UNIT]",
+    help="Simulated time, also with a unit, as in 4ms.  [default with --fixture: longer than "
+    "the contact of the projectile with the static plate]",
+)
 @option("--dt", type=POSITIVE, help="Time step.  [default: 0.9 of the critical one]")
-@option("--every", type=click.IntRange(min=1),
-        help="Steps between stored rows.  [default: for about 200 rows]")  # fmt: skip
+@option(
+    "--every",
+    type=click.IntRange(min=1),
+    help="Steps between stored rows.  [default: for about 200 rows]",
+)
 @option("--overwrite", is_flag=True, help="Replace an existing deck.")
 def new(output: Path, overwrite: bool, **options: Any) -> None:
     """Write a deck that is ready to run from plate, layup, supports and impact.
@@ -223,13 +306,25 @@ def _as_options(message: str, options: Collection[str]) -> str:
 
 
 def _author(
-    given: Collection[str], *, size: tuple[float, float] | None,
-    mesh: tuple[int, int] | Path | None, grading: float, columns: str, rows: str,
-    layup: Sequence[float], ply_thickness: float | None, ply: Sequence[float] | None,
-    material: NamedPly | None, support: Any, edges: Sequence[tuple[str, Any]], fixture: str | None,
-    law: tuple[float, float, float, float] | None, contact: NamedContact | Sphere | None,
-    patch: Patch | None, **options: Any,
-) -> Authored:  # fmt: skip
+    given: Collection[str],
+    *,
+    size: tuple[float, float] | None,
+    mesh: tuple[int, int] | Path | None,
+    grading: float,
+    columns: str,
+    rows: str,
+    layup: Sequence[float],
+    ply_thickness: float | None,
+    ply: Sequence[float] | None,
+    material: NamedPly | None,
+    support: Any,
+    edges: Sequence[tuple[str, Any]],
+    fixture: str | None,
+    law: tuple[float, float, float, float] | None,
+    contact: NamedContact | Sphere | None,
+    patch: Patch | None,
+    **options: Any,
+) -> Authored:
     """Deck of the options of ``fecm new``; `given` are those on the command line."""
     for name in FIXED if fixture else RECTANGLE if isinstance(mesh, Path) else ():
         if name in given:
@@ -244,9 +339,14 @@ def _author(
         plate = Plate.from_mesh(mesh, wanted | dict(edges))
     else:
         plate = Plate.rectangle(
-            size, mesh, support=support, edges=dict(edges), grading=grading, columns=columns,
+            size,
+            mesh,
+            support=support,
+            edges=dict(edges),
+            grading=grading,
+            columns=columns,
             rows=rows,
-        )  # fmt: skip
+        )
     prescribed = plate.fixture is not None and plate.fixture.test is not None
     if (law is None) == (contact is None) and (law is not None or not prescribed):
         raise ObjectError("give either `law` or `contact`")

@@ -17,10 +17,21 @@ from fecm.cli.types import Decorated, stacked
 from fecm.plot.kinds import SUFFIXES
 from fecm.plot.pictures import imported, require_matplotlib, save
 
-_OUTPUT = click.option("-o", "--output", type=FILE_PATH, metavar="FILE", default=DASH,
-                       help="CSV file to write.  [default: standard output]")  # fmt: skip
-_PLOT = click.option("--plot", "picture", type=FILE_PATH, metavar="FILE",
-                     help="Also draw a picture: .png, .svg or .pdf.")  # fmt: skip
+_OUTPUT = click.option(
+    "-o",
+    "--output",
+    type=FILE_PATH,
+    metavar="FILE",
+    default=DASH,
+    help="CSV file to write.  [default: standard output]",
+)
+_PLOT = click.option(
+    "--plot",
+    "picture",
+    type=FILE_PATH,
+    metavar="FILE",
+    help="Also draw a picture: .png, .svg or .pdf.",
+)
 _OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 
 

@@ -55,52 +55,111 @@ def _by_name(_: Any, __: Any, pairs: tuple[tuple[str, str], ...]) -> dict[str, s
     ),
 )
 @click.argument("results", type=DECK_PATH, nargs=-1, required=True, metavar="RESULT...")
-@option("--kind", "kinds", type=OneOf([*map(str, KINDS)]), multiple=True, metavar="KIND",
-        help=f"Picture to draw; may be repeated.  {_KIND_HELP}.  [default: force; map of a sweep, "
-             "exceedance of a random one]")  # fmt: skip
-@option("-o", "--output", type=FILE_PATH, metavar="PATH",
-        help="Picture (.png, .svg, .pdf; .gif for animation), or folder for several.  [default: "
-             "RESULT-KIND.png in this folder]")  # fmt: skip
-@option("--at", type=list_of("X,Y", Finite(), [2]), multiple=True,
-        help="Point of strain (may be repeated), thickness or mesh.  [default of strain: the "
-             "contact patch, or the nearest point at least the thickness away from a point force; "
-             "of thickness: where |sigma_1| is largest]")  # fmt: skip
-@option("--gage", "gages", type=list_of("DEGREES,...", Finite()),
-        help="Directions of strain, from the x-axis.  [default: 0,90]")  # fmt: skip
-@option("--face", type=click.Choice(["far", "struck", "curvature"]),
-        help="Face of the strain, or curvature instead.  [default: far]")  # fmt: skip
-@option("--times", "--time", "times", type=list_of("T,T,...", Finite()),
-        help="Times, in the deck's unit; the nearest stored rows are drawn.")  # fmt: skip
-@option("--against", type=click.Choice(["indentation", "deflection", "displacement"]),
-        help="Horizontal axis of loop: indentation, displacement of the plate under the load, or "
-             "of the projectile (the sum).  [default: indentation]")  # fmt: skip
-@option("--overlay", type=DECK_PATH, metavar="FILE.csv",
-        help="Measured force to draw over that of the kind force: columns time and force (or "
-             "transducer) in the deck's units.  Notes compare both.")  # fmt: skip
-@option("--delay", type=Finite(), metavar="TIME",
-        help="Measured time of the first contact in --overlay, subtracted.  [default: "
-             "0]")  # fmt: skip
-@option("--offset", type=Finite(), metavar="FORCE",
-        help="Measured force without a contact in --overlay, subtracted.  [default: "
-             "0]")  # fmt: skip
+@option(
+    "--kind",
+    "kinds",
+    type=OneOf([*map(str, KINDS)]),
+    multiple=True,
+    metavar="KIND",
+    help=f"Picture to draw; may be repeated.  {_KIND_HELP}.  [default: force; map of a sweep, "
+    "exceedance of a random one]",
+)
+@option(
+    "-o",
+    "--output",
+    type=FILE_PATH,
+    metavar="PATH",
+    help="Picture (.png, .svg, .pdf; .gif for animation), or folder for several.  [default: "
+    "RESULT-KIND.png in this folder]",
+)
+@option(
+    "--at",
+    type=list_of("X,Y", Finite(), [2]),
+    multiple=True,
+    help="Point of strain (may be repeated), thickness or mesh.  [default of strain: the "
+    "contact patch, or the nearest point at least the thickness away from a point force; "
+    "of thickness: where |sigma_1| is largest]",
+)
+@option(
+    "--gage",
+    "gages",
+    type=list_of("DEGREES,...", Finite()),
+    help="Directions of strain, from the x-axis.  [default: 0,90]",
+)
+@option(
+    "--face",
+    type=click.Choice(["far", "struck", "curvature"]),
+    help="Face of the strain, or curvature instead.  [default: far]",
+)
+@option(
+    "--times",
+    "--time",
+    "times",
+    type=list_of("T,T,...", Finite()),
+    help="Times, in the deck's unit; the nearest stored rows are drawn.",
+)
+@option(
+    "--against",
+    type=click.Choice(["indentation", "deflection", "displacement"]),
+    help="Horizontal axis of loop: indentation, displacement of the plate under the load, or "
+    "of the projectile (the sum).  [default: indentation]",
+)
+@option(
+    "--overlay",
+    type=DECK_PATH,
+    metavar="FILE.csv",
+    help="Measured force to draw over that of the kind force: columns time and force (or "
+    "transducer) in the deck's units.  Notes compare both.",
+)
+@option(
+    "--delay",
+    type=Finite(),
+    metavar="TIME",
+    help="Measured time of the first contact in --overlay, subtracted.  [default: 0]",
+)
+@option(
+    "--offset",
+    type=Finite(),
+    metavar="FORCE",
+    help="Measured force without a contact in --overlay, subtracted.  [default: 0]",
+)
 @option("--along", type=click.Choice(["x", "y"]), help="Direction of line.  [default: x]")
-@option("--width", type=click.Choice(["column", "full"]),
-        help="3.5 in, or 7.2 in.  [default: column]")  # fmt: skip
-@option("--quantity", type=Parsed(str, "NAME", (*COLUMNS, *CRITERIA)),
-        help="Quantity of a sweep: a name of its summary; of failure: a criterion.  [default: "
-             "peak_force, found_velocity; the largest of all]")  # fmt: skip
-@option("--over", type=list_of("NAME or NAME,NAME", click.STRING, [1, 2]), metavar="NAME[,NAME]",
-        help="Parameters on the axes of map.  [default: those that vary]")  # fmt: skip
-@option("--where", type=Parsed(assignment, "NAME=VALUE"), callback=_by_name, multiple=True,
-        help="Show of a sweep only the cases nearest to this value; may be repeated.")  # fmt: skip
-@option("--level", type=list_of("VALUE,...", Finite()),
-        help="Values of the quantity to mark, in the deck's unit.")  # fmt: skip
+@option(
+    "--width", type=click.Choice(["column", "full"]), help="3.5 in, or 7.2 in.  [default: column]"
+)
+@option(
+    "--quantity",
+    type=Parsed(str, "NAME", (*COLUMNS, *CRITERIA)),
+    help="Quantity of a sweep: a name of its summary; of failure: a criterion.  [default: "
+    "peak_force, found_velocity; the largest of all]",
+)
+@option(
+    "--over",
+    type=list_of("NAME or NAME,NAME", click.STRING, [1, 2]),
+    metavar="NAME[,NAME]",
+    help="Parameters on the axes of map.  [default: those that vary]",
+)
+@option(
+    "--where",
+    type=Parsed(assignment, "NAME=VALUE"),
+    callback=_by_name,
+    multiple=True,
+    help="Show of a sweep only the cases nearest to this value; may be repeated.",
+)
+@option(
+    "--level",
+    type=list_of("VALUE,...", Finite()),
+    help="Values of the quantity to mark, in the deck's unit.",
+)
 @option("--overwrite", is_flag=True, help="Replace existing pictures.")
 @reads("results")
 def plot(
-    results: tuple[Path, ...], kinds: tuple[str, ...], output: Path | None, overwrite: bool,
+    results: tuple[Path, ...],
+    kinds: tuple[str, ...],
+    output: Path | None,
+    overwrite: bool,
     **asked: Any,
-) -> None:  # fmt: skip
+) -> None:
     """Draw the report's figures from one or more RESULTs, or the map of a sweep.
 
     A kind whose data were not stored is left out, and the exit status is then 1; 2 if no kind can

@@ -37,8 +37,10 @@ from fecm.studies.rod_test.filters import Filter, filter_of
 from fecm.studies.rod_test.pulse_test import Pulse, RodHistory
 from fecm.studies.rod_test.recordings import recorded
 
-FILTER_HELP = ("first-order:RISE or moving-average:RISE, with the time RISE from 10 to 90 % of the "
-               "step response; or cfc:60, 180, 600 or 1000 of SAE J211.")  # fmt: skip
+FILTER_HELP = (
+    "first-order:RISE or moving-average:RISE, with the time RISE from 10 to 90 % of the "
+    "step response; or cfc:60, 180, 600 or 1000 of SAE J211."
+)
 
 
 class _PulseGroup(Group):
@@ -66,38 +68,83 @@ def rod() -> None:
     )
 )
 @click.argument("deck", type=DECK_PATH, required=False)
-@option("--pulse", "applied", type=Parsed(pulse_test.pulse_of, "PULSE"), required=True,
-        help="gauss:F0,TAU,B (F0 exp(-(t-TAU)²/4B²)), sine:F0,B (F0 sin(πt/B), zero after B), or a "
-             "CSV of time and force, linear between its rows.")  # fmt: skip
+@option(
+    "--pulse",
+    "applied",
+    type=Parsed(pulse_test.pulse_of, "PULSE"),
+    required=True,
+    help="gauss:F0,TAU,B (F0 exp(-(t-TAU)²/4B²)), sine:F0,B (F0 sin(πt/B), zero after B), or a "
+    "CSV of time and force, linear between its rows.",
+)
 @option("--length", type=POSITIVE, help="Length of the rod, without a deck.")
 @option("--modulus", type=POSITIVE, help="Young's modulus, without a deck.")
 @option("--density", type=POSITIVE, help="Mass per volume, without a deck.")
 @option("--diameter", type=POSITIVE, help="Diameter, without a deck.")
-@option("--elements", type=click.IntRange(1, 1000), metavar="N",
-        help="Number of elements, without a deck.  [default: 20]")  # fmt: skip
-@option("--units", type=click.Choice(list(SYSTEMS)), metavar="SYSTEM",
-        help="in-lbf-s, m-N-s or mm-N-s: names the units on the picture, without a "
-             "deck.")  # fmt: skip
-@option("--dt", type=POSITIVE,
-        help="Time step.  [default: the deck's DT, or 0.8 of the travel time of a wave through an "
-             "element]")  # fmt: skip
-@option("--duration", type=POSITIVE,
-        help="Simulated time.  [default: TAU + 10 B, 1.5 B, or the table's]")  # fmt: skip
-@option("--station", "stations", type=Finite(), multiple=True, metavar="X",
-        help="Distance from the struck end at which to compute the force; may be repeated.  "
-             "[default: the middle]")  # fmt: skip
-@option("--filter", "transducer", type=Parsed(filter_of, "FILTER"),
-        help=f"Also filter these forces as a transducer does: {FILTER_HELP}")  # fmt: skip
-@option("--mass-matrix", type=click.Choice(MASSES), default=LUMPED, show_default=True,
-        help="Mass matrix; the report's program lumps it.")  # fmt: skip
-@option("--integrator", type=click.Choice(INTEGRATORS), default=WILSON, show_default=True,
-        help="Time integration; the report's is Wilson's.")  # fmt: skip
+@option(
+    "--elements",
+    type=click.IntRange(1, 1000),
+    metavar="N",
+    help="Number of elements, without a deck.  [default: 20]",
+)
+@option(
+    "--units",
+    type=click.Choice(list(SYSTEMS)),
+    metavar="SYSTEM",
+    help="in-lbf-s, m-N-s or mm-N-s: names the units on the picture, without a deck.",
+)
+@option(
+    "--dt",
+    type=POSITIVE,
+    help="Time step.  [default: the deck's DT, or 0.8 of the travel time of a wave through an "
+    "element]",
+)
+@option(
+    "--duration",
+    type=POSITIVE,
+    help="Simulated time.  [default: TAU + 10 B, 1.5 B, or the table's]",
+)
+@option(
+    "--station",
+    "stations",
+    type=Finite(),
+    multiple=True,
+    metavar="X",
+    help="Distance from the struck end at which to compute the force; may be repeated.  "
+    "[default: the middle]",
+)
+@option(
+    "--filter",
+    "transducer",
+    type=Parsed(filter_of, "FILTER"),
+    help=f"Also filter these forces as a transducer does: {FILTER_HELP}",
+)
+@option(
+    "--mass-matrix",
+    type=click.Choice(MASSES),
+    default=LUMPED,
+    show_default=True,
+    help="Mass matrix; the report's program lumps it.",
+)
+@option(
+    "--integrator",
+    type=click.Choice(INTEGRATORS),
+    default=WILSON,
+    show_default=True,
+    help="Time integration; the report's is Wilson's.",
+)
 @outputs()
 def pulse(
-    deck: Path | None, applied: Pulse, dt: float | None, duration: float | None,
-    stations: tuple[float, ...], transducer: Filter | None, mass_matrix: str, integrator: str,
-    targets: OutputPaths, **shape: Any,
-) -> None:  # fmt: skip
+    deck: Path | None,
+    applied: Pulse,
+    dt: float | None,
+    duration: float | None,
+    stations: tuple[float, ...],
+    transducer: Filter | None,
+    mass_matrix: str,
+    integrator: str,
+    targets: OutputPaths,
+    **shape: Any,
+) -> None:
     """Compute forces and accelerations of a free rod under a pulse on one end, as CSV.
 
     The rod is the projectile of DECK, or uniform by --length, --modulus, --density and --diameter.
@@ -166,9 +213,12 @@ def _summarise(struck: Rod, history: RodHistory) -> None:
 )
 @click.argument("history", type=DECK_PATH, metavar="RESULT")
 @option("--filter", "transducer", type=Parsed(filter_of, "FILTER"), required=True, help=FILTER_HELP)
-@option("--column", metavar="NAME",
-        help="Column of a result's history, or of a CSV, to filter.  [default: transducer; of a "
-             "CSV without one, the second]")  # fmt: skip
+@option(
+    "--column",
+    metavar="NAME",
+    help="Column of a result's history, or of a CSV, to filter.  [default: transducer; of a "
+    "CSV without one, the second]",
+)
 @outputs("history")
 def filter_(history: Path, transducer: Filter, column: str | None, targets: OutputPaths) -> None:
     """Filter a history as a transducer with a rise time does, or by a channel frequency class.
@@ -192,8 +242,12 @@ def filter_(history: Path, transducer: Filter, column: str | None, targets: Outp
 )
 @click.argument("test", type=DECK_PATH, metavar="TEST.csv")
 @option("--mass", type=POSITIVE, required=True, help="Mass of the target.")
-@option("--c-a", type=POSITIVE, required=True,
-        help="Sensitivity of the accelerometer, V_a per acceleration.")  # fmt: skip
+@option(
+    "--c-a",
+    type=POSITIVE,
+    required=True,
+    help="Sensitivity of the accelerometer, V_a per acceleration.",
+)
 @option("--through-origin", is_flag=True, help="Fit a line without an offset.")
 @FORMAT_OPTION
 @outputs("test", table=False)

@@ -45,43 +45,110 @@ from fecm.simulation.simulation import Simulation
     )
 )
 @click.argument("deck", type=common.DECK_PATH)
-@option("-o", "--output", type=common.FILE_PATH, metavar="OUT.h5",
-        help="Result file.  [default: the deck's name with .h5, in this folder]")  # fmt: skip
+@option(
+    "-o",
+    "--output",
+    type=common.FILE_PATH,
+    metavar="OUT.h5",
+    help="Result file.  [default: the deck's name with .h5, in this folder]",
+)
 @common.MODE_OPTION
-@option("--slip", "slips", type=OneOf(NAMES), multiple=True, metavar="NAME",
-        help="Add a single slip of the program to report mode; may be repeated.  Names: "
-             f"{', '.join(NAMES)}.")  # fmt: skip
-@option("--overwrite", is_flag=True,
-        help="Replace existing results and the checkpoints of interrupted runs.")  # fmt: skip
-@option("--solver", type=click.Choice(SOLVERS), default=AUTO, show_default=True,
-        help="Computation of K·u: by compiled kernels where there are any, else by NumPy; by one "
-             "of them; or by a sparse matrix.")  # fmt: skip
-@option("--threads", type=click.IntRange(0, 1024), default=0, metavar="N",
-        help="Threads that share the work of a step; 0 uses every core for a large mesh.  "
-             "[default: 0]")  # fmt: skip
-@option("--rod-mass", type=click.Choice(MASSES), default=LUMPED, show_default=True,
-        help="The projectile's mass matrix; the report's program lumps it.")  # fmt: skip
-@option("--rod-integrator", type=click.Choice(INTEGRATORS), default=WILSON, show_default=True,
-        help="The projectile's integration; the report's is Wilson's.")  # fmt: skip
-@option("--checkpoint", "every", type=Finite(min=0.0), metavar="SECONDS",
-        help="Write a checkpoint beside the output at this interval.")  # fmt: skip
+@option(
+    "--slip",
+    "slips",
+    type=OneOf(NAMES),
+    multiple=True,
+    metavar="NAME",
+    help="Add a single slip of the program to report mode; may be repeated.  Names: "
+    f"{', '.join(NAMES)}.",
+)
+@option(
+    "--overwrite",
+    is_flag=True,
+    help="Replace existing results and the checkpoints of interrupted runs.",
+)
+@option(
+    "--solver",
+    type=click.Choice(SOLVERS),
+    default=AUTO,
+    show_default=True,
+    help="Computation of K·u: by compiled kernels where there are any, else by NumPy; by one "
+    "of them; or by a sparse matrix.",
+)
+@option(
+    "--threads",
+    type=click.IntRange(0, 1024),
+    default=0,
+    metavar="N",
+    help="Threads that share the work of a step; 0 uses every core for a large mesh.  [default: 0]",
+)
+@option(
+    "--rod-mass",
+    type=click.Choice(MASSES),
+    default=LUMPED,
+    show_default=True,
+    help="The projectile's mass matrix; the report's program lumps it.",
+)
+@option(
+    "--rod-integrator",
+    type=click.Choice(INTEGRATORS),
+    default=WILSON,
+    show_default=True,
+    help="The projectile's integration; the report's is Wilson's.",
+)
+@option(
+    "--checkpoint",
+    "every",
+    type=Finite(min=0.0),
+    metavar="SECONDS",
+    help="Write a checkpoint beside the output at this interval.",
+)
 @option("--resume", is_flag=True, help="Resume from the checkpoint of an interrupted run.")
-@option("--energy-limit", type=POSITIVE, default=ENERGY_LIMIT, show_default=True, metavar="RATIO",
-        help="Relative energy error that ends a run without slips.")  # fmt: skip
-@option("--fail-limit", type=POSITIVE, metavar="EXPOSURE",
-        help="Exit with status 1 if an exposure of FAIL exceeds this value.")  # fmt: skip
-@option("--force", is_flag=True,
-        help="Run despite a time step above the critical one (E508) or L2 = 2 in a free plate "
-             "(E321).")  # fmt: skip
-@option("--print", "printed", type=common.FILE_PATH, metavar="OUT.txt",
-        help="Also write the printed output of the original program.")  # fmt: skip
+@option(
+    "--energy-limit",
+    type=POSITIVE,
+    default=ENERGY_LIMIT,
+    show_default=True,
+    metavar="RATIO",
+    help="Relative energy error that ends a run without slips.",
+)
+@option(
+    "--fail-limit",
+    type=POSITIVE,
+    metavar="EXPOSURE",
+    help="Exit with status 1 if an exposure of FAIL exceeds this value.",
+)
+@option(
+    "--force",
+    is_flag=True,
+    help="Run despite a time step above the critical one (E508) or L2 = 2 in a free plate (E321).",
+)
+@option(
+    "--print",
+    "printed",
+    type=common.FILE_PATH,
+    metavar="OUT.txt",
+    help="Also write the printed output of the original program.",
+)
 @common.FORMAT_OPTION
 def run(
-    deck: Path, output: Path | None, mode: str, slips: tuple[str, ...], overwrite: bool,
-    force: bool, printed: Path | None, resume: bool, rod_mass: str, rod_integrator: str,
-    solver: str, threads: int, every: float | None, energy_limit: float, fail_limit: float | None,
+    deck: Path,
+    output: Path | None,
+    mode: str,
+    slips: tuple[str, ...],
+    overwrite: bool,
+    force: bool,
+    printed: Path | None,
+    resume: bool,
+    rod_mass: str,
+    rod_integrator: str,
+    solver: str,
+    threads: int,
+    every: float | None,
+    energy_limit: float,
+    fail_limit: float | None,
     form: str,
-) -> None:  # fmt: skip
+) -> None:
     """Run every problem in DECK and write its result.
 
     The result of a second problem goes to OUT-2.h5, and so on.  An interrupted run leaves a
@@ -119,8 +186,16 @@ def run(
         if number < own - 1 and path.exists():
             note(f"{path} is complete")
             continue
-        result = _run_one(problem, path, print_to, choices, every, resumes=number == own - 1,
-                          overwrite=overwrite or number < own, form=form)  # fmt: skip
+        result = _run_one(
+            problem,
+            path,
+            print_to,
+            choices,
+            every,
+            resumes=number == own - 1,
+            overwrite=overwrite or number < own,
+            form=form,
+        )
         if fail_limit is not None:
             exceeded += [
                 f"exposure {e.exposure:.4g} of {e.criterion}"
@@ -132,9 +207,16 @@ def run(
 
 
 def _run_one(
-    problem: Problem, path: Path, printed: Path | None, choices: RunOptions, every: float | None, *,
-    resumes: bool, overwrite: bool, form: str,
-) -> Result:  # fmt: skip
+    problem: Problem,
+    path: Path,
+    printed: Path | None,
+    choices: RunOptions,
+    every: float | None,
+    *,
+    resumes: bool,
+    overwrite: bool,
+    form: str,
+) -> Result:
     """Run one problem of a deck into a file, print what came out and return its result."""
     import shutil
 

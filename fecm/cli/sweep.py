@@ -43,59 +43,139 @@ NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
     )
 )
 @click.argument("deck", type=DECK_PATH)
-@option("--vary", "varied", type=Parsed(inputs.parse_vary, "NAME=VALUES", NAMED), multiple=True,
-        help="FROM:TO:N or A,B,C; may be repeated, for a full grid.  Names: "
-             f"{', '.join(inputs.NAMES)}.")  # fmt: skip
-@option("--cases", "table", type=DECK_PATH, metavar="CASES.csv",
-        help="A table instead of --vary: a header of names, one row per case.")  # fmt: skip
-@option("--refine", "factors", type=list_of("FACTOR,...", click.IntRange(1, 8)), metavar="1,2,4",
-        help="Instead: divide the sides of all elements and DT by factors; order, limit and error "
-             "band of every quantity.")  # fmt: skip
-@option("--random", "laws", type=Parsed(inputs.parse_random, "NAME=LAW", NAMED), multiple=True,
-        help="Random value: normal:MEAN,SD, lognormal:MEDIAN,SIGMA, uniform:A,B or "
-             "triangular:A,MODE,B; may be repeated, together with --vary.")  # fmt: skip
+@option(
+    "--vary",
+    "varied",
+    type=Parsed(inputs.parse_vary, "NAME=VALUES", NAMED),
+    multiple=True,
+    help="FROM:TO:N or A,B,C; may be repeated, for a full grid.  Names: "
+    f"{', '.join(inputs.NAMES)}.",
+)
+@option(
+    "--cases",
+    "table",
+    type=DECK_PATH,
+    metavar="CASES.csv",
+    help="A table instead of --vary: a header of names, one row per case.",
+)
+@option(
+    "--refine",
+    "factors",
+    type=list_of("FACTOR,...", click.IntRange(1, 8)),
+    metavar="1,2,4",
+    help="Instead: divide the sides of all elements and DT by factors; order, limit and error "
+    "band of every quantity.",
+)
+@option(
+    "--random",
+    "laws",
+    type=Parsed(inputs.parse_random, "NAME=LAW", NAMED),
+    multiple=True,
+    help="Random value: normal:MEAN,SD, lognormal:MEDIAN,SIGMA, uniform:A,B or "
+    "triangular:A,MODE,B; may be repeated, together with --vary.",
+)
 @option("--samples", type=int, metavar="N", help="Number of samples of --random.")
 @option("--seed", type=int, metavar="S", help="Seed of --random.  [default: 0]")
-@option("--design", "kind", type=click.Choice(inputs.DESIGNS),
-        help="Design of --random: Latin hypercube, Sobol' sequence, or independent draws (Monte "
-             "Carlo).  [default: lhs]")  # fmt: skip
-@option("--sensitivity", is_flag=True,
-        help="Sobol' indices of the random values, from N times (their number + 2) "
-             "cases.")  # fmt: skip
-@option("--exceed", "limits", type=Parsed(inputs.parse_exceed, "QUANTITY=VALUE"), multiple=True,
-        help="Probability that a quantity of the summary exceeds a value; of peak_force also "
-             "threshold, that of DELA.  May be repeated.")  # fmt: skip
-@option("--find", type=click.Choice(["velocity"]),
-        help="Search in every case for the velocity at which --until holds.")  # fmt: skip
-@option("--until", type=Parsed(inputs.parse_until, "QUANTITY=VALUE"),
-        help="What to reach: peak_force=NUMBER, peak_force=threshold (that of DELA), or "
-             "exposure=NUMBER, the largest of FAIL outside the load, by full runs.")  # fmt: skip
-@option("-o", "--output", type=FILE_PATH, metavar="SWEEP.h5",
-        help="Result file.  [default: the deck's name with -sweep.h5, in this folder]")  # fmt: skip
+@option(
+    "--design",
+    "kind",
+    type=click.Choice(inputs.DESIGNS),
+    help="Design of --random: Latin hypercube, Sobol' sequence, or independent draws (Monte "
+    "Carlo).  [default: lhs]",
+)
+@option(
+    "--sensitivity",
+    is_flag=True,
+    help="Sobol' indices of the random values, from N times (their number + 2) cases.",
+)
+@option(
+    "--exceed",
+    "limits",
+    type=Parsed(inputs.parse_exceed, "QUANTITY=VALUE"),
+    multiple=True,
+    help="Probability that a quantity of the summary exceeds a value; of peak_force also "
+    "threshold, that of DELA.  May be repeated.",
+)
+@option(
+    "--find",
+    type=click.Choice(["velocity"]),
+    help="Search in every case for the velocity at which --until holds.",
+)
+@option(
+    "--until",
+    type=Parsed(inputs.parse_until, "QUANTITY=VALUE"),
+    help="What to reach: peak_force=NUMBER, peak_force=threshold (that of DELA), or "
+    "exposure=NUMBER, the largest of FAIL outside the load, by full runs.",
+)
+@option(
+    "-o",
+    "--output",
+    type=FILE_PATH,
+    metavar="SWEEP.h5",
+    help="Result file.  [default: the deck's name with -sweep.h5, in this folder]",
+)
 @option("--history", is_flag=True, help="Also store the contact force of every step.")
-@option("--measure", "extra", type=list_of("NAME,...", OneOf(plans.MEASURES)), default=(),
-        help=f"Also store {', '.join(plans.MEASURES)}: the largest deflection, strains of gages "
-             "(GAGE), exposures (FAIL).")  # fmt: skip
-@option("--full", type=list_of("CASE,...", click.IntRange(min=0)),
-        help="Also run these cases in full, into SWEEP-CASE.h5; cases count from 0.")  # fmt: skip
-@option("--workers", type=click.IntRange(1, 1024), default=1, show_default=True, metavar="N",
-        help="Worker processes on this machine.")  # fmt: skip
-@option("--scheduler", metavar="ADDRESS",
-        help="Running Dask scheduler, as in tcp://host:8786, to use instead.")  # fmt: skip
-@option("--scheduler-file", type=DECK_PATH, metavar="FILE",
-        help="File of `dask scheduler --scheduler-file` instead of its address.")  # fmt: skip
-@option("--allow-failed", is_flag=True,
-        help="Exit with 0 even if cases failed, or probabilities are open.")  # fmt: skip
+@option(
+    "--measure",
+    "extra",
+    type=list_of("NAME,...", OneOf(plans.MEASURES)),
+    default=(),
+    help=f"Also store {', '.join(plans.MEASURES)}: the largest deflection, strains of gages "
+    "(GAGE), exposures (FAIL).",
+)
+@option(
+    "--full",
+    type=list_of("CASE,...", click.IntRange(min=0)),
+    help="Also run these cases in full, into SWEEP-CASE.h5; cases count from 0.",
+)
+@option(
+    "--workers",
+    type=click.IntRange(1, 1024),
+    default=1,
+    show_default=True,
+    metavar="N",
+    help="Worker processes on this machine.",
+)
+@option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Running Dask scheduler, as in tcp://host:8786, to use instead.",
+)
+@option(
+    "--scheduler-file",
+    type=DECK_PATH,
+    metavar="FILE",
+    help="File of `dask scheduler --scheduler-file` instead of its address.",
+)
+@option(
+    "--allow-failed",
+    is_flag=True,
+    help="Exit with 0 even if cases failed, or probabilities are open.",
+)
 @option("--overwrite", is_flag=True, help="Replace existing results.")
 def sweep(
-    deck: Path, varied: tuple[tuple[str, list[inputs.Value]], ...], table: Path | None,
-    factors: tuple[int, ...] | None, laws: tuple[tuple[str, inputs.Law], ...],
-    samples: int | None, seed: int | None, kind: inputs.DesignKind | None, sensitivity: bool,
-    limits: tuple[inputs.Limit, ...], find: str | None, until: inputs.Until | None,
-    output: Path | None, history: bool, extra: tuple[str, ...], full: tuple[int, ...] | None,
-    workers: int, scheduler: str | None, scheduler_file: Path | None, allow_failed: bool,
+    deck: Path,
+    varied: tuple[tuple[str, list[inputs.Value]], ...],
+    table: Path | None,
+    factors: tuple[int, ...] | None,
+    laws: tuple[tuple[str, inputs.Law], ...],
+    samples: int | None,
+    seed: int | None,
+    kind: inputs.DesignKind | None,
+    sensitivity: bool,
+    limits: tuple[inputs.Limit, ...],
+    find: str | None,
+    until: inputs.Until | None,
+    output: Path | None,
+    history: bool,
+    extra: tuple[str, ...],
+    full: tuple[int, ...] | None,
+    workers: int,
+    scheduler: str | None,
+    scheduler_file: Path | None,
+    allow_failed: bool,
     overwrite: bool,
-) -> None:  # fmt: skip
+) -> None:
     """Run DECK many times with varied parameters.
 
     Cases that differ only in the projectile, its velocity or the indentation law share one run of
@@ -186,9 +266,12 @@ def sweep(
 
 
 def _carry_out(
-    problem: Problem, planned: plans.Plan, parts: PartialResults, workers: int,
+    problem: Problem,
+    planned: plans.Plan,
+    parts: PartialResults,
+    workers: int,
     scheduler: str | None,
-) -> SweepResult:  # fmt: skip
+) -> SweepResult:
     """Run the plan with a progress bar; finished cases survive any interruption."""
     begin, finished = time.monotonic(), 0
 
@@ -210,9 +293,15 @@ def _carry_out(
                 advance(0)
 
             return carry_out(
-                problem, planned, workers=workers, scheduler=scheduler, parts=parts, done=done,
-                idle=idle, note=note,
-            )  # fmt: skip
+                problem,
+                planned,
+                workers=workers,
+                scheduler=scheduler,
+                parts=parts,
+                done=done,
+                idle=idle,
+                note=note,
+            )
     except SchedulerError:
         parts.clear()
         raise

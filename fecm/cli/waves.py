@@ -83,14 +83,26 @@ def _is_number(text: str) -> bool:
 _SHARED = stacked(
     click.argument("deck", type=DECK_PATH, required=False),
     laminate_options(required=False),
-    option("--shear-factor", type=POSITIVE, default=1.0, metavar="F", show_default=True,
-           help="Factor of the transverse shear stiffness, in addition to a deck's SHEA; with "
-                "pi^2/12 = 0.822467 the cut-off frequencies are exact."),
+    option(
+        "--shear-factor",
+        type=POSITIVE,
+        default=1.0,
+        metavar="F",
+        show_default=True,
+        help="Factor of the transverse shear stiffness, in addition to a deck's SHEA; with "
+        "pi^2/12 = 0.822467 the cut-off frequencies are exact.",
+    ),
     outputs("deck"),
-)  # fmt: skip
+)
 
-STEP = option("--step", type=POSITIVE, default=5.0, show_default=True, metavar="DEG",
-              help="Angle between two normals, degrees.")  # fmt: skip
+STEP = option(
+    "--step",
+    type=POSITIVE,
+    default=5.0,
+    show_default=True,
+    metavar="DEG",
+    help="Angle between two normals, degrees.",
+)
 
 
 def _medium(
@@ -132,11 +144,24 @@ def waves() -> None:
         "fecm waves dispersion impact-115.inp --wavelengths 1:20:100 -o dispersion.csv",
     ),
 )
-@option("--angle", "angles", type=list_of("A,B,...", Finite()), multiple=True, callback=_joined,
-        default=("0", "45", "90"), show_default=True, metavar="A ...",
-        help="Directions of propagation, degrees; one or several.")  # fmt: skip
-@option("--wavelengths", type=Parsed(_wavelengths, "FROM:TO:N"), default="0.1:20:200",
-        show_default=True, help="N wavelengths at equal distances, in thicknesses.")  # fmt: skip
+@option(
+    "--angle",
+    "angles",
+    type=list_of("A,B,...", Finite()),
+    multiple=True,
+    callback=_joined,
+    default=("0", "45", "90"),
+    show_default=True,
+    metavar="A ...",
+    help="Directions of propagation, degrees; one or several.",
+)
+@option(
+    "--wavelengths",
+    type=Parsed(_wavelengths, "FROM:TO:N"),
+    default="0.1:20:200",
+    show_default=True,
+    help="N wavelengths at equal distances, in thicknesses.",
+)
 @_SHARED
 def dispersion(
     angles: tuple[float, ...], wavelengths: tuple[float, ...], targets: OutputPaths, **shared: Any
@@ -147,13 +172,16 @@ def dispersion(
     curves = [compute(medium, angle, wavelengths) for angle in angles]
     rows = (
         (
-            curve.angle, wavelength, mode,
-            curve.phase_velocity.item(row, place), curve.angular_frequency.item(row, place),
+            curve.angle,
+            wavelength,
+            mode,
+            curve.phase_velocity.item(row, place),
+            curve.angular_frequency.item(row, place),
         )
         for curve in curves
         for row, wavelength in enumerate(curve.wavelength.tolist())
         for place, mode in enumerate(MODES)
-    )  # fmt: skip
+    )
     targets.draw("waves:dispersion_picture", medium, curves)
     targets.write("angle_deg,wavelength_over_h,mode,phase_velocity,angular_frequency", rows)
 
@@ -185,10 +213,22 @@ def speeds(step: float, targets: OutputPaths, **shared: Any) -> None:
         "fecm waves fronts impact-115.inp --time 10e-6 20e-6 --plot fronts.png",
     ),
 )
-@option("--time", "times", type=list_of("T,T,...", NOT_NEGATIVE), multiple=True, callback=_joined,
-        required=True, metavar="T ...", help="Times; one or several.")  # fmt: skip
-@option("--radius", type=NOT_NEGATIVE, metavar="R",
-        help="Radius of the circular fronts at time 0.  [default: the thickness]")  # fmt: skip
+@option(
+    "--time",
+    "times",
+    type=list_of("T,T,...", NOT_NEGATIVE),
+    multiple=True,
+    callback=_joined,
+    required=True,
+    metavar="T ...",
+    help="Times; one or several.",
+)
+@option(
+    "--radius",
+    type=NOT_NEGATIVE,
+    metavar="R",
+    help="Radius of the circular fronts at time 0.  [default: the thickness]",
+)
 @STEP
 @_SHARED
 def fronts(
