@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+import shutil
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import click
 from click import option
 
 from fecm._files import check_outputs
+from fecm._frozen import frozen
 from fecm._memory import format_bytes
 from fecm.api import numbered
 from fecm.cli import common
 from fecm.cli.common import CheckFailedError, RefusedError, echo, note, signals
 from fecm.cli.decks import load_valid
-from fecm.cli.help import typical
-from fecm.cli.types import POSITIVE, Finite, OneOf
+from fecm.cli.help import GroupedCommand, typical
+from fecm.cli.types import POSITIVE, Finite, OneOf, collected
 from fecm.mechanics.plate_motion import DivergenceError
-from fecm.mechanics.projectile import INTEGRATORS, LUMPED, MASSES, WILSON, RodMethod
+from fecm.mechanics.projectile import (
+    INTEGRATORS,
+    LUMPED,
+    MASSES,
+    WILSON,
+    Integrator,
+    MassMatrix,
+    RodMethod,
+)
 from fecm.mechanics.solutions import SingularStiffnessError
 from fecm.mechanics.stiffness_product import AUTO, SOLVERS
 from fecm.problem.build import ENERGY_LIMIT, RunOptions
@@ -37,12 +48,65 @@ from fecm.simulation.printout import Printer
 from fecm.simulation.run import run as simulate_run
 from fecm.simulation.simulation import Simulation
 
+GROUPS = {
+    "Result": ("output", "overwrite", "printed", "form"),
+    "Model": ("mode", "slips", "rod_mass", "rod_integrator"),
+    "Computation": ("solver", "threads"),
+    "Interrupted runs": ("interval", "resume"),
+    "Limits": ("energy_limit", "fail_limit", "force"),
+}
+
+
+@frozen
+class Options:
+    """Argument and options of ``fecm run``."""
+
+    deck: Path
+    output: Path | None
+    overwrite: bool
+    printed: Path | None  # file of the printed output
+    form: str  # "text" or "json"
+    mode: str
+    slips: tuple[str, ...]
+    rod_mass: MassMatrix
+    rod_integrator: Integrator
+    solver: str
+    threads: int
+    interval: float | None  # seconds between two checkpoints
+    resume: bool
+    energy_limit: float
+    fail_limit: float | None  # largest exposure that passes
+    force: bool
+
+    def choices(self) -> RunOptions:
+        """What the computation needs to know; raises ValueError if a slip is unknown."""
+        return RunOptions(
+            slips=active_slips(self.mode, self.slips),
+            solver=self.solver,
+            threads=self.threads,
+            rod_method=RodMethod(self.rod_mass, self.rod_integrator),
+            energy_limit=self.energy_limit,
+        )
+
+
+class Job(NamedTuple):
+    """A problem of the deck, and its files."""
+
+    problem: Problem
+    path: Path  # of the result
+    printed: Path | None  # of the printed output
+    resumes: bool  # from the checkpoint of an interrupted run
+    complete: bool  # in an interrupted run that is resumed
+    overwrite: bool
+
 
 @click.command(
+    cls=GroupedCommand,
+    groups=GROUPS,
     epilog=typical(
         "fecm run impact-115.inp",
         "fecm run drop-weight.inp -o drop.h5 --overwrite --fail-limit 1",
-    )
+    ),
 )
 @click.argument("deck", type=common.DECK_PATH)
 @option(
@@ -98,7 +162,7 @@ from fecm.simulation.simulation import Simulation
 )
 @option(
     "--checkpoint",
-    "every",
+    "interval",
     type=Finite(min=0.0),
     metavar="SECONDS",
     help="Write a checkpoint beside the output at this interval.",
@@ -131,112 +195,94 @@ from fecm.simulation.simulation import Simulation
     help="Also write the printed output of the original program.",
 )
 @common.FORMAT_OPTION
-def run(
-    deck: Path,
-    output: Path | None,
-    mode: str,
-    slips: tuple[str, ...],
-    overwrite: bool,
-    force: bool,
-    printed: Path | None,
-    resume: bool,
-    rod_mass: str,
-    rod_integrator: str,
-    solver: str,
-    threads: int,
-    every: float | None,
-    energy_limit: float,
-    fail_limit: float | None,
-    form: str,
-) -> None:
+@collected(Options)
+def run(options: Options) -> None:
     """Run every problem in DECK and write its result.
 
     The result of a second problem goes to OUT-2.h5, and so on.  An interrupted run leaves a
     checkpoint beside its output; --resume with the same options gives the same bytes.
     """
     try:
-        active = active_slips(mode, slips)
+        choices = options.choices()
     except ValueError as error:
         raise click.UsageError(str(error)) from None
-    problems = load_valid(deck, "; nothing was run", mode, force=force)
-    first = output or Path(f"{deck.stem}.h5")
-    paths = [numbered(first, n) for n in range(1, len(problems) + 1)]
-    prints = [numbered(printed, n) if printed else None for n in range(1, len(problems) + 1)]
-    partial = [p for path in paths if path.name for p in (checkpoint_of(path), spool_of(path))]
-    check_outputs([*paths, *filter(None, prints)], True, [deck], partial)
-    left = [n for n, path in enumerate(paths) if checkpoint_of(path).exists()]  # interrupted runs
-    if resume and not left:
-        raise RefusedError(f"there is no checkpoint {checkpoint_of(paths[0])} to resume from")
-    if left and not (resume or overwrite):
-        raise RefusedError(
-            f"{checkpoint_of(paths[left[0]])} belongs to an interrupted run: --resume continues "
-            "it, --overwrite starts over"
-        )
-    # Outputs up to the interrupted problem belong to the run that is resumed.
-    own = left[0] + 1 if resume else 0
-    check_outputs([*paths[own:], *filter(None, prints[own:])], overwrite)
-    rod = RodMethod(rod_mass, rod_integrator)
-    choices = RunOptions(active, solver, threads, rod, energy_limit)
-    if fail_limit is not None and not any(problem.work.passes["FAIL"] for problem in problems):
-        raise RefusedError(f"--fail-limit needs the macro FAIL; {deck} has none")
+    problems = load_valid(options.deck, "; nothing was run", options.mode, force=options.force)
+    jobs = _jobs(problems, options)
+    limit = options.fail_limit
+    if limit is not None and not any(problem.work.passes["FAIL"] for problem in problems):
+        raise RefusedError(f"--fail-limit needs the macro FAIL; {options.deck} has none")
+
     exceeded: list[str] = []
-    for number, (problem, path, print_to) in enumerate(zip(problems, paths, prints, strict=True)):
-        if number and form == "text":
+    for number, job in enumerate(jobs):
+        if number and options.form == "text":
             echo()
-        if number < own - 1 and path.exists():
-            note(f"{path} is complete")
+        if job.complete:
+            note(f"{job.path} is complete")
             continue
-        result = _run_one(
-            problem,
-            path,
-            print_to,
-            choices,
-            every,
-            resumes=number == own - 1,
-            overwrite=overwrite or number < own,
-            form=form,
-        )
-        if fail_limit is not None:
+        result = _run_one(job, choices, options)
+        if limit is not None:
             exceeded += [
                 f"exposure {e.exposure:.4g} of {e.criterion}"
                 for e in largest_exposures(result)
-                if e.exposure > fail_limit
+                if e.exposure > limit
             ]
     if exceeded:
-        raise CheckFailedError(f"{'; '.join(exceeded)}: more than the limit of {fail_limit:g}")
+        raise CheckFailedError(f"{'; '.join(exceeded)}: more than the limit of {limit:g}")
 
 
-def _run_one(
-    problem: Problem,
-    path: Path,
-    printed: Path | None,
-    choices: RunOptions,
-    every: float | None,
-    *,
-    resumes: bool,
-    overwrite: bool,
-    form: str,
-) -> Result:
+def _jobs(problems: Sequence[Problem], options: Options) -> list[Job]:
+    """The problems with their files, which are checked."""
+    count = len(problems)
+    first, printed = options.output or Path(f"{options.deck.stem}.h5"), options.printed
+    paths = [numbered(first, n) for n in range(1, count + 1)]
+    prints = [numbered(printed, n) if printed else None for n in range(1, count + 1)]
+    partial = [p for path in paths if path.name for p in (checkpoint_of(path), spool_of(path))]
+    check_outputs([*paths, *filter(None, prints)], True, [options.deck], partial)
+
+    interrupted = [n for n, path in enumerate(paths) if checkpoint_of(path).exists()]
+    if options.resume and not interrupted:
+        raise RefusedError(f"there is no checkpoint {checkpoint_of(paths[0])} to resume from")
+    if interrupted and not (options.resume or options.overwrite):
+        raise RefusedError(
+            f"{checkpoint_of(paths[interrupted[0]])} belongs to an interrupted run: --resume "
+            "continues it, --overwrite starts over"
+        )
+    # Outputs up to the interrupted problem belong to the run that is resumed.
+    resumed = interrupted[0] if options.resume else -1
+    check_outputs([*paths[resumed + 1 :], *filter(None, prints[resumed + 1 :])], options.overwrite)
+    return [
+        Job(
+            problem,
+            path,
+            print_to,
+            resumes=number == resumed,
+            complete=number < resumed and path.exists(),
+            overwrite=options.overwrite or number <= resumed,
+        )
+        for number, (problem, path, print_to) in enumerate(
+            zip(problems, paths, prints, strict=True)
+        )
+    ]
+
+
+def _run_one(job: Job, choices: RunOptions, options: Options) -> Result:
     """Run one problem of a deck into a file, print what came out and return its result."""
-    import shutil
-
-    if problem.output_bytes > (free := shutil.disk_usage(path.parent).free):
-        size = format_bytes(problem.output_bytes)
-        left = f"the disk has {format_bytes(free)} left"
-        raise RefusedError(f"{path}: the result takes about {size}, and {left}")
+    problem, path = job.problem, job.path
+    _check_space(problem, path)
     check_memory(problem, solver=choices.solver)
     with contextlib.ExitStack() as stack:
         stack.enter_context(signals.deferred())
-        stack.enter_context(_ends(path, resumes=resumes))
-        sink = stack.enter_context(hdf5_writer.writing(path, overwrite=overwrite))
+        stack.enter_context(_ends(path, resumes=job.resumes))
+        sink = stack.enter_context(hdf5_writer.writing(path, overwrite=job.overwrite))
         checkpointer = Checkpointer(path, sink)
         printer = Printer()
-        if printed is not None:
-            printer = Printer(stack.enter_context(common.writing(printed, overwrite=overwrite)))
+        if job.printed is not None:
+            file = stack.enter_context(common.writing(job.printed, overwrite=job.overwrite))
+            printer = Printer(file)
         advance = stack.enter_context(common.progress("fecm", problem.work.steps))
-        on_step, on_macro = _observers(checkpointer, every, advance)
+        on_step, on_macro = _observers(checkpointer, options.interval, advance)
         simulation = Simulation(problem, sink, choices, printer, (on_step,), on_macro)
-        if resumes:
+        if job.resumes:
             checkpointer.restore(simulation)
             note(f"{path} resumes after step {simulation.state.plate.step}")
         simulate_run(simulation)
@@ -246,17 +292,26 @@ def _run_one(
     with contents.held():
         about = about_run(result)
     note(*simulation.state.notes, *result.notes)
-    if form == "json":
-        named = {"title": problem.deck.title, "result": str(path), "printed": printed}
+    if options.form == "json":
+        named = {"title": problem.deck.title, "result": str(path), "printed": job.printed}
         common.echo_json({**named, "units": declared_units(result.attributes), **about})
         return result
     echo(problem.deck.title or "(no title)")
     for line in (*about["summary"], *larger_steps(problem)):
         echo(f"  {line}")
     echo(f"  result            {path}")
-    if printed is not None:
-        echo(f"  printed           {printed}")
+    if job.printed is not None:
+        echo(f"  printed           {job.printed}")
     return result
+
+
+def _check_space(problem: Problem, path: Path) -> None:
+    """Refuse a run whose result does not fit on the disk."""
+    free = shutil.disk_usage(path.parent).free
+    if problem.output_bytes > free:
+        size = format_bytes(problem.output_bytes)
+        left = f"the disk has {format_bytes(free)} left"
+        raise RefusedError(f"{path}: the result takes about {size}, and {left}")
 
 
 @contextlib.contextmanager

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Concatenate, TypeVar
 
 import click
 
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 Decorated = Callable[..., None]
+Options = TypeVar("Options")
 
 MOST = 1_000_000  # bytes of a file whose contents are the value of an option
 
@@ -28,6 +31,26 @@ def stacked(*options: Callable[[Decorated], Decorated]) -> Callable[[Decorated],
         for option in reversed(options):
             function = option(function)
         return function
+
+    return decorate
+
+
+def collected(
+    kind: type[Options],
+) -> Callable[[Callable[Concatenate[Options, ...], None]], Decorated]:
+    """Pass the options of a command to its function as one object, an instance of a dataclass.
+
+    Its fields have the names of the options and arguments; values of other names are passed on.
+    """
+    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
+
+    def decorate(function: Callable[Concatenate[Options, ...], None]) -> Decorated:
+        @functools.wraps(function)
+        def command(**values: Any) -> None:
+            options = kind(**{name: values.pop(name) for name in names})
+            function(options, **values)
+
+        return command
 
     return decorate
 
