@@ -9,11 +9,12 @@ import click
 from click import option
 
 from fecm._files import check_outputs
+from fecm._frozen import frozen
 from fecm.api import load_deck
 from fecm.cli.common import DECK_PATH, FILE_PATH, NO, RefusedError, echo, note, progress, signals
 from fecm.cli.decks import count_findings
-from fecm.cli.help import typical
-from fecm.cli.types import OneOf, Parsed, list_of
+from fecm.cli.help import GroupedCommand, typical
+from fecm.cli.types import OneOf, Parsed, collected, list_of
 from fecm.deck.findings import DeckError
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
@@ -34,18 +35,95 @@ from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_i
 NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
 
 
+GROUPS = {
+    "Cases": ("vary", "cases", "refine"),
+    "Random values": ("random", "samples", "seed", "design", "sensitivity", "exceed"),
+    "Search": ("find", "until"),
+    "Result": ("output", "history", "measure", "full", "overwrite"),
+    "Computation": ("workers", "scheduler", "scheduler_file"),
+}
+
+
+@frozen
+class Options:
+    """Argument and options of ``fecm sweep``; those of :func:`fecm.sweep` have its names."""
+
+    deck: Path
+    vary: tuple[tuple[str, list[inputs.Value]], ...]
+    cases: Path | None  # table of the cases
+    refine: tuple[int, ...] | None
+    random: tuple[tuple[str, inputs.Law], ...]
+    samples: int | None
+    seed: int | None
+    design: inputs.DesignKind | None
+    sensitivity: bool
+    exceed: tuple[inputs.Limit, ...]
+    find: str | None
+    until: inputs.Until | None
+    output: Path | None
+    history: bool
+    measure: tuple[str, ...]
+    full: tuple[int, ...] | None  # cases that are also run in full
+    overwrite: bool
+    workers: int
+    scheduler: str | None
+    scheduler_file: Path | None
+    allow_failed: bool
+
+    @property
+    def path(self) -> Path:
+        """Result file."""
+        return self.output or Path(f"{self.deck.stem}-sweep.h5")
+
+    @property
+    def sources(self) -> list[Path]:
+        """Files that are read, and never replaced."""
+        return [self.deck] if self.cases is None else [self.deck, self.cases]
+
+    def check(self) -> None:
+        """Raise UsageError if options exclude each other, or one lacks another."""
+        if self.refine and (self.vary or self.cases or self.random or self.until or self.measure):
+            raise click.UsageError("--refine varies nothing else and measures no more")
+        other = self.until is not None or self.random or self.refine
+        if bool(self.vary) == (self.cases is not None) and (self.vary or not other):
+            raise click.UsageError("give either --vary or --cases")
+        self._check_random()
+        if (self.find is None) != (self.until is None):
+            raise click.UsageError("--find velocity and --until QUANTITY=VALUE belong together")
+        scheduled = (self.scheduler is not None) + (self.scheduler_file is not None)
+        if (self.workers > 1) + scheduled > 1:
+            raise click.UsageError("give only one of --workers, --scheduler and --scheduler-file")
+        if self.full and self.find:
+            raise click.UsageError("--full runs given velocities: --vary velocity=FOUND --full 0")
+
+    def _check_random(self) -> None:
+        """Raise UsageError if the options of random values do not fit together."""
+        if not self.random:
+            for name in ("samples", "seed", "design", "exceed", "sensitivity"):
+                if getattr(self, name) not in (None, (), False):
+                    raise click.UsageError(f"--{name} needs --random NAME=LAW")
+            return
+        if self.cases is not None:
+            raise click.UsageError("--random goes with --vary, not with --cases")
+        if self.samples is None:
+            raise click.UsageError("--random needs --samples N")
+        if len(dict(self.random)) < len(self.random):
+            raise click.UsageError("--random: a name is given twice")
+
+
 @click.command(
+    cls=GroupedCommand,
+    groups=GROUPS,
     epilog=typical(
         "fecm sweep impact-115.inp --vary velocity=50:150:11 --vary k=1e6,2e6",
         "fecm sweep drop-weight.inp --find velocity --until peak_force=threshold",
         "fecm sweep drop-weight.inp --random k=lognormal:42000,.2 --samples 200 "
         "--exceed peak_force=threshold",
-    )
+    ),
 )
 @click.argument("deck", type=DECK_PATH)
 @option(
     "--vary",
-    "varied",
     type=Parsed(inputs.parse_vary, "NAME=VALUES", NAMED),
     multiple=True,
     help="FROM:TO:N or A,B,C; may be repeated, for a full grid.  Names: "
@@ -53,14 +131,12 @@ NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
 )
 @option(
     "--cases",
-    "table",
     type=DECK_PATH,
     metavar="CASES.csv",
     help="A table instead of --vary: a header of names, one row per case.",
 )
 @option(
     "--refine",
-    "factors",
     type=list_of("FACTOR,...", click.IntRange(1, 8)),
     metavar="1,2,4",
     help="Instead: divide the sides of all elements and DT by factors; order, limit and error "
@@ -68,7 +144,6 @@ NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
 )
 @option(
     "--random",
-    "laws",
     type=Parsed(inputs.parse_random, "NAME=LAW", NAMED),
     multiple=True,
     help="Random value: normal:MEAN,SD, lognormal:MEDIAN,SIGMA, uniform:A,B or "
@@ -78,7 +153,6 @@ NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
 @option("--seed", type=int, metavar="S", help="Seed of --random.  [default: 0]")
 @option(
     "--design",
-    "kind",
     type=click.Choice(inputs.DESIGNS),
     help="Design of --random: Latin hypercube, Sobol' sequence, or independent draws (Monte "
     "Carlo).  [default: lhs]",
@@ -90,7 +164,6 @@ NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
 )
 @option(
     "--exceed",
-    "limits",
     type=Parsed(inputs.parse_exceed, "QUANTITY=VALUE"),
     multiple=True,
     help="Probability that a quantity of the summary exceeds a value; of peak_force also "
@@ -117,7 +190,6 @@ NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
 @option("--history", is_flag=True, help="Also store the contact force of every step.")
 @option(
     "--measure",
-    "extra",
     type=list_of("NAME,...", OneOf(plans.MEASURES)),
     default=(),
     help=f"Also store {', '.join(plans.MEASURES)}: the largest deflection, strains of gages "
@@ -153,29 +225,8 @@ NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
     help="Exit with 0 even if cases failed, or probabilities are open.",
 )
 @option("--overwrite", is_flag=True, help="Replace existing results.")
-def sweep(
-    deck: Path,
-    varied: tuple[tuple[str, list[inputs.Value]], ...],
-    table: Path | None,
-    factors: tuple[int, ...] | None,
-    laws: tuple[tuple[str, inputs.Law], ...],
-    samples: int | None,
-    seed: int | None,
-    kind: inputs.DesignKind | None,
-    sensitivity: bool,
-    limits: tuple[inputs.Limit, ...],
-    find: str | None,
-    until: inputs.Until | None,
-    output: Path | None,
-    history: bool,
-    extra: tuple[str, ...],
-    full: tuple[int, ...] | None,
-    workers: int,
-    scheduler: str | None,
-    scheduler_file: Path | None,
-    allow_failed: bool,
-    overwrite: bool,
-) -> None:
+@collected(Options)
+def sweep(options: Options) -> None:
     """Run DECK many times with varied parameters.
 
     Cases that differ only in the projectile, its velocity or the indentation law share one run of
@@ -183,86 +234,105 @@ def sweep(
     failed, those that ended in contact, and those that are beyond the range of the model.  The exit
     status is 1 if a case failed, or ended before a quantity of --exceed was known.
     """
-    path = output or Path(f"{deck.stem}-sweep.h5")
-    if factors and (varied or table or laws or until or extra):
-        raise click.UsageError("--refine varies nothing else and measures no more")
-    other = until is not None or laws or factors
-    if bool(varied) == (table is not None) and (varied or not other):
-        raise click.UsageError("give either --vary or --cases")
-    if laws and table is not None:
-        raise click.UsageError("--random goes with --vary, not with --cases")
-    asked = {"--samples": samples, "--seed": seed, "--design": kind, "--exceed": limits}
-    for name, value in {**asked, "--sensitivity": sensitivity}.items():
-        if not laws and value not in (None, (), False):
-            raise click.UsageError(f"{name} needs --random NAME=LAW")
-    if laws and samples is None:
-        raise click.UsageError("--random needs --samples N")
-    if len(dict(laws)) < len(laws):
-        raise click.UsageError("--random: a name is given twice")
-    if (find is None) != (until is None):
-        raise click.UsageError("--find velocity and --until QUANTITY=VALUE belong together")
-    if (workers > 1) + (scheduler is not None) + (scheduler_file is not None) > 1:
-        raise click.UsageError("give only one of --workers, --scheduler and --scheduler-file")
-    if full and find:
-        raise click.UsageError("--full runs given velocities: --vary velocity=FOUND --full 0")
-    try:
-        problem = problem_of(deck)
-    except DeckError as error:
-        echo(error, err=True)
-        errors = [finding for finding in error.findings if finding.severity == "error"]
-        raise RefusedError(f"{count_findings(errors)}; nothing was run") from None
-    cases = inputs.grid(varied) if table is None else inputs.read_cases(table)
-    if factors:
-        cases, extra = refined_cases(problem, factors), (plans.DEFLECTION,)
-    design = None
-    if laws:
-        design = inputs.design_of(
-            dict(laws), samples, seed or 0, kind or "lhs", sensitivity=sensitivity
-        )
-        cases = inputs.random_cases(design, cases)
-    chosen = tuple(dict.fromkeys(full or ()))
-    if chosen and max(chosen) >= len(cases):
-        raise click.UsageError(f"--full {max(chosen)}: the cases are 0 to {len(cases) - 1}")
-    fulls = {case: path.with_name(f"{path.stem}-{case}{path.suffix}") for case in chosen}
-    check_outputs([path, *fulls.values()], overwrite, [deck] if table is None else [deck, table])
-    scheduler = scheduler if scheduler_file is None else address_in(scheduler_file)
+    options.check()
+    path = options.path
+    problem = _problem(options.deck)
+    cases, design = _cases(problem, options)
+    fulls = _full_runs(options, len(cases))
+    check_outputs([path, *fulls.values()], options.overwrite, options.sources)
+    scheduler = options.scheduler
+    if options.scheduler_file is not None:
+        scheduler = address_in(options.scheduler_file)
     planned = plans.plan(
-        problem, cases, history=history, until=until, extra=extra, design=design, limits=limits
+        problem,
+        cases,
+        history=options.history,
+        until=options.until,
+        extra=(plans.DEFLECTION,) if options.refine else options.measure,
+        design=design,
+        limits=options.exceed,
     )
     check_draws(planned)
-    note(*(() if factors else doubtful_values(problem, cases)))
+    if not options.refine:
+        note(*doubtful_values(problem, cases))
     if design is not None:
         shared = plans.shares_plate(problem) and not planned.alone
-        cost = inputs.cost(cases, design, shared=shared)
-        note(*filter(None, (inputs.doubt(design), cost)))
-    plans.check_memory(problem, planned, 0 if scheduler is not None else workers, streamed=True)
+        note(*filter(None, (inputs.doubt(design), inputs.cost(cases, design, shared=shared))))
+    here = options.workers if scheduler is None else 0
+    plans.check_memory(problem, planned, here, streamed=True)
     if count := plans.freed(plans.tasks(problem, planned)):
         note(
             f"B is not zero in {count} case{'' if count == 1 else 's'}: u and v, which the deck "
             "restrains at every node, are free there except where w is held"
         )
+
     click.get_current_context().with_resource(alone(path))
-    parts = PartialResults(path, planned.fingerprint(), restart=overwrite)
-    result = _carry_out(problem, planned, parts, workers, scheduler)
-    forces = parts.forces(plans.tasks(problem, planned)) if history else ()
-    save(result, path, overwrite=overwrite, forces=forces)
+    parts = PartialResults(path, planned.fingerprint(), restart=options.overwrite)
+    result = _carry_out(problem, planned, parts, options.workers, scheduler)
+    forces = parts.forces(plans.tasks(problem, planned)) if options.history else ()
+    save(result, path, overwrite=options.overwrite, forces=forces)
     if lost := sum(status.startswith(LOST) for status in result["status"].tolist()):
         note(f"{lost} cases were lost with their workers; --overwrite runs them again")
     else:
         parts.clear()
+
+    _print(result, path)
+    _run_in_full(planned, fulls, overwrite=options.overwrite)
+    if result.random is not None:
+        note(*result.random.notes)
+    note(*remarks(result))
+    echo(verdict(result))
+    is_open = result.random is not None and result.random.exceedance.open.any()
+    if (is_open or not result.fine.all()) and not options.allow_failed:
+        raise SystemExit(NO)
+
+
+def _problem(deck: Path) -> Problem:
+    """The checked problem of the deck, whose findings go to standard error if it has errors."""
+    try:
+        return problem_of(deck)
+    except DeckError as error:
+        echo(error, err=True)
+        errors = [finding for finding in error.findings if finding.severity == "error"]
+        raise RefusedError(f"{count_findings(errors)}; nothing was run") from None
+
+
+def _cases(problem: Problem, options: Options) -> tuple[list[inputs.Case], inputs.Design | None]:
+    """Cases of the sweep, and the design of random ones."""
+    if options.refine:
+        return refined_cases(problem, options.refine), None
+    given = inputs.grid(options.vary)
+    if options.cases is not None:
+        given = inputs.read_cases(options.cases)
+    if not options.random:
+        return given, None
+    design = inputs.design_of(
+        dict(options.random),
+        options.samples,
+        options.seed or 0,
+        options.design or "lhs",
+        sensitivity=options.sensitivity,
+    )
+    return inputs.random_cases(design, given), design
+
+
+def _full_runs(options: Options, count: int) -> dict[int, Path]:
+    """Result files of the cases that are also run in full, by their numbers."""
+    chosen = tuple(dict.fromkeys(options.full or ()))
+    if chosen and max(chosen) >= count:
+        raise click.UsageError(f"--full {max(chosen)}: the cases are 0 to {count - 1}")
+    path = options.path
+    return {case: path.with_name(f"{path.stem}-{case}{path.suffix}") for case in chosen}
+
+
+def _print(result: SweepResult, path: Path) -> None:
+    """Print title, summary and the tables of a study of the mesh or of random values."""
     echo(result.title or "sweep")
     for line in (*summary(result), *table_of(result.cases, result.summary, result.convergence)):
         echo(f"  {line}")
     for line in () if result.random is None else tables(result.random, result.unit):
         echo(f"  {line}".rstrip())
     echo(f"  result            {path}")
-    _run_in_full(planned, fulls, overwrite=overwrite)
-    note(*(() if result.random is None else result.random.notes))
-    note(*remarks(result))
-    echo(verdict(result))
-    is_open = result.random is not None and result.random.exceedance.open.any()
-    if (is_open or not result.fine.all()) and not allow_failed:
-        raise SystemExit(NO)
 
 
 def _carry_out(
