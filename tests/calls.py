@@ -13,7 +13,7 @@ from unittest import mock
 import pytest
 
 from fecm.cli import main
-from fecm.cli.common import signals
+from fecm.cli.interrupts import signals
 
 
 @dataclass(frozen=True)

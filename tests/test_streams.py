@@ -230,11 +230,12 @@ def test_a_signal_while_the_program_ends_changes_no_exit_status(number: signal.S
 
 def test_nohup_keeps_a_run_from_ending_at_a_hangup() -> None:
     code = (
-        "import os, signal, sys, fecm.cli.common as common\n"
+        "import os, signal, sys\n"
+        "from fecm.cli.interrupts import signals\n"
         "signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
-        "common.signals.install()\n"
+        "signals.install()\n"
         "os.kill(os.getpid(), signal.SIGHUP)\n"
-        "print(bool(common.signals.received))"
+        "print(bool(signals.received))"
     )
     assert python(code).stdout == "False\n"
 

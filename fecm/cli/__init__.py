@@ -17,8 +17,9 @@ import click
 from fecm._errors import FecmError, did_you_mean
 from fecm._text import printable
 from fecm._version import __version__
-from fecm.cli import common, isolation
-from fecm.cli.common import INTERRUPTED, SIGNALLED, UNUSABLE, echo, signals
+from fecm.cli import isolation, streams
+from fecm.cli.common import INTERRUPTED, UNUSABLE, echo
+from fecm.cli.interrupts import SIGNALLED, signals
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -107,10 +108,10 @@ def cli() -> None:
 def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoReturn:
     """Run the command line and leave with its exit status."""
     signals.install()
-    common.guard_streams()
+    streams.guard_streams()
     isolation.switch.on = arguments is None
     status = _status(arguments, prog_name)
-    if (error := common.output_error()) is not None and status not in SIGNALLED:
+    if (error := streams.output_error()) is not None and status not in SIGNALLED:
         status = UNUSABLE
         if error.errno != errno.EPIPE:  # a reader who has left needs no message
             echo(f"fecm: error: standard output: {error.strerror}", err=True)
@@ -146,7 +147,7 @@ def _status(arguments: Sequence[str] | None, prog_name: str) -> int:
 
 def _report(error: Exception) -> int:
     """Print an error; return the exit status after it."""
-    if error is not common.output_error():
+    if error is not streams.output_error():
         echo(f"fecm: error: {_message(error)}", err=True)
     return error.exit_code if isinstance(error, FecmError) else UNUSABLE
 

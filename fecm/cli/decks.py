@@ -18,9 +18,17 @@ from fecm._errors import FecmError
 from fecm._files import check_outputs
 from fecm._version import __version__
 from fecm.api import LoadedDeck, load_deck
-from fecm.cli import common
-from fecm.cli.common import DASH, FILE_PATH, CheckFailedError, RefusedError, echo, echo_json
+from fecm.cli.common import (
+    DASH,
+    CheckFailedError,
+    RefusedError,
+    echo,
+    echo_json,
+    progress,
+    write_text,
+)
 from fecm.cli.help import typical
+from fecm.cli.options import FILE_PATH, MODE_OPTION, Format, format_option
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.format import format_deck
 from fecm.deck.source_text import load_text
@@ -99,15 +107,8 @@ def _failures(decks: Sequence[Path], work: Callable[[Path], None]) -> list[Excep
     ),
 )
 @DECKS
-@common.MODE_OPTION
-@option(
-    "--format",
-    "form",
-    type=click.Choice(["text", "json", "sarif"]),
-    default="text",
-    show_default=True,
-    help="Text for people, JSON for programs, or SARIF for code hosts.",
-)
+@MODE_OPTION
+@format_option(*Format, about="Text for people, JSON for programs, or SARIF for code hosts.")
 @option("--strict", is_flag=True, help="Exit with 1 for warnings too.")
 @option(
     "--mesh-error",
@@ -115,14 +116,14 @@ def _failures(decks: Sequence[Path], work: Callable[[Path], None]) -> list[Excep
     help="Run DECK twice, with its elements and with those around the load bisected, and "
     "compare the peak forces.",
 )
-def check(decks: tuple[Path, ...], mode: str, form: str, strict: bool, mesh_error: bool) -> None:
+def check(decks: tuple[Path, ...], mode: str, form: Format, strict: bool, mesh_error: bool) -> None:
     """Check decks without running them; print their findings and a summary.
 
     A DECK of - is standard input.  Of several decks, those that pass have one line each instead of
     a summary.  With --format json, each finding and each problem is a JSON object on a line.  The
     exit status is the worst of all decks: 1 if one has errors, 2 if one can't be read.
     """
-    if mesh_error and form == "sarif":
+    if mesh_error and form is Format.SARIF:
         raise click.UsageError("--mesh-error has no form in SARIF")
     checked: dict[Path, list[Finding]] = {}
 
@@ -139,24 +140,24 @@ def check(decks: tuple[Path, ...], mode: str, form: str, strict: bool, mesh_erro
             _compare_meshes(prepared, mode, form)
 
     failed = _failures(decks, one)
-    if form == "sarif":
+    if form is Format.SARIF:
         unread = [str(error) for error in failed if not isinstance(error, CheckFailedError)]
         echo_json(_sarif(checked, unread))
     if failed:
         raise ExceptionGroup("errors of decks", failed)
 
 
-def _print(prepared: LoadedDeck, form: str, *, brief: bool, passes: bool) -> None:
+def _print(prepared: LoadedDeck, form: Format, *, brief: bool, passes: bool) -> None:
     """Print findings and, if there are no errors, a summary, or one line of a deck that passes."""
-    shown = form == "json" or (form == "text" and not brief)
+    shown = form is Format.JSON or (form is Format.TEXT and not brief)
     problems = prepared.problems if shown and not prepared.errors() else []
     views = [ProblemSummary(problem) for problem in problems]
-    if form == "json":
+    if form is Format.JSON:
         for finding in prepared.findings:
             echo_json(finding.to_dict(prepared.source))
         for view in views:
             echo_json({"kind": "summary", "file": prepared.source, **view.to_dict()})
-    elif form == "text":
+    elif form is Format.TEXT:
         for finding in prepared.findings:
             echo(finding.render(prepared.source))
         if brief and passes:
@@ -167,7 +168,7 @@ def _print(prepared: LoadedDeck, form: str, *, brief: bool, passes: bool) -> Non
             echo("\n".join(view.lines()))
 
 
-def _compare_meshes(prepared: LoadedDeck, mode: str, form: str) -> None:
+def _compare_meshes(prepared: LoadedDeck, mode: str, form: Format) -> None:
     """Print the mesh error of the peak force of every problem."""
     from fecm.sweeps.convergence import bisected, mesh_error
 
@@ -175,9 +176,9 @@ def _compare_meshes(prepared: LoadedDeck, mode: str, form: str) -> None:
         units = unit_names(problem.deck)
         force, length = (unit_of(name, units) for name in ("force", "length"))
         fine = bisected(problem)
-        with common.progress("fecm", problem.work.steps + fine.work.steps) as advance:
+        with progress("fecm", problem.work.steps + fine.work.steps) as advance:
             found = mesh_error(problem, fine, RunOptions(active_slips(mode, ())), advance)
-        if form == "json":
+        if form is Format.JSON:
             changes = {"change": found.change, "relative_change": found.relative_change}
             head = {"kind": "mesh_error", "file": prepared.source}
             echo_json({**head, **vars(found), **changes, "units": units})
@@ -291,7 +292,7 @@ def fmt(decks: tuple[Path, ...], output: Path | None, only_check: bool, overwrit
             if after != before:
                 raise CheckFailedError(f"{source} would change")
         elif after != before or not in_place or target == DASH:
-            common.write_text(target, after, overwrite=overwrite or in_place)
+            write_text(target, after, overwrite=overwrite or in_place)
 
     if failed := _failures(decks, one):
         raise ExceptionGroup("errors of decks", failed)

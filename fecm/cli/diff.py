@@ -11,10 +11,18 @@ from click import option
 
 from fecm._inputs import parsed_toml
 from fecm._text import printable, shown_apart
-from fecm.cli.common import FILE_PATH, FORMAT_OPTION, NO, echo_json
+from fecm.cli.common import FAILED, echo_json
 from fecm.cli.help import typical
 from fecm.cli.isolation import reads
-from fecm.cli.types import NOT_NEGATIVE, Parsed, assignment, file_of
+from fecm.cli.options import (
+    FILE_PATH,
+    FORMAT_OPTION,
+    NOT_NEGATIVE,
+    Format,
+    Parsed,
+    assignment,
+    file_of,
+)
 from fecm.results.diff import SCALE_NAMES, Comparison, Difference, difference
 
 
@@ -116,7 +124,7 @@ def diff(
     own: tuple[tuple[str, tuple[float, ...]], ...],
     file: dict[str, Any] | None,
     brief: bool,
-    form: str,
+    form: Format,
 ) -> None:
     """Compare two results dataset by dataset.
 
@@ -141,7 +149,7 @@ def diff(
     exclude, own = (*file["exclude"], *exclude), (*file["own"], *own)
     found = difference(a, b, rtol, atol, only, exclude, own)
     different = [c.path for c in found.compared if not c.same] + [*found.only[0], *found.only[1]]
-    if form == "json":
+    if form is Format.JSON:
         echo_json(
             {
                 "verdict": "same" if found.same else "different",
@@ -171,7 +179,7 @@ def diff(
             verdict = f"same: {compared} within {within}"
         click.echo("\n".join([*lines, verdict]))
     if not found.same:
-        raise SystemExit(NO)
+        raise SystemExit(FAILED)
 
 
 def _lines(found: Difference) -> list[str]:

@@ -8,9 +8,10 @@ from pathlib import Path
 import click
 
 from fecm._tables import aligned
-from fecm.cli.common import DECK_PATH, FORMAT_OPTION, echo, echo_json, note
+from fecm.cli.common import echo, echo_json, note
 from fecm.cli.decks import load_single
 from fecm.cli.help import typical
+from fecm.cli.options import DECK_PATH, FORMAT_OPTION, Format
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.problem.problem import Problem
 from fecm.results.linear_plate import TOO_SOFT, UNSAFE, softness
@@ -40,7 +41,7 @@ COLUMNS = {
 )
 @click.argument("deck", type=DECK_PATH)
 @FORMAT_OPTION
-def estimate(deck: Path, form: str) -> None:
+def estimate(deck: Path, form: Format) -> None:
     """Estimate the impact of DECK by models without a mesh, beside the run itself.
 
     The infinite plate is for small masses, the static plate for large ones; a model out of its
@@ -66,7 +67,7 @@ def estimate(deck: Path, form: str) -> None:
         note(f"beyond {judge.limit} h {TOO_SOFT}; {UNSAFE}", *bent)
     note(*doubts)
     applies = [*(model.applies for model in found.models), True]  # the run always does
-    if form == "json":
+    if form is Format.JSON:
         named = [dict(zip(("model", *COLUMNS), row, strict=True)) for row in rows]
         echo_json(
             {

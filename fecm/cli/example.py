@@ -8,9 +8,9 @@ import click
 
 from fecm import examples
 from fecm._files import check_outputs
-from fecm.cli.common import DASH, FILE_PATH, echo, write_text
+from fecm.cli.common import DASH, echo, write_text
 from fecm.cli.help import typical
-from fecm.cli.types import Parsed
+from fecm.cli.options import FILE_PATH, Parsed
 
 
 @click.command(

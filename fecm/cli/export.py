@@ -7,9 +7,10 @@ from pathlib import Path
 import click
 
 from fecm._files import check_outputs
-from fecm.cli.common import DASH, DECK_PATH, FILE_PATH, RefusedError, echo, note
+from fecm.cli.common import DASH, RefusedError, echo, note
 from fecm.cli.help import typical
 from fecm.cli.isolation import reads
+from fecm.cli.options import DECK_PATH, FILE_PATH
 from fecm.cli.outputs import write_lines
 from fecm.results import csv
 from fecm.results.errors import ExportError

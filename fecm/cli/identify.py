@@ -7,12 +7,12 @@ from pathlib import Path
 import click
 from click import option
 
-from fecm.cli.common import DASH, DECK_PATH, FILE_PATH, FORMAT_OPTION, NO, echo, echo_json, note
+from fecm.cli.common import DASH, FAILED, echo, echo_json, note
 from fecm.cli.decks import load_single
 from fecm.cli.help import typical
+from fecm.cli.options import DECK_PATH, FILE_PATH, FORMAT_OPTION, Format, OneOf, Parsed, list_of
 from fecm.cli.outputs import OutputPaths, write_lines
 from fecm.cli.rod import FILTER_HELP
-from fecm.cli.types import OneOf, Parsed, list_of
 from fecm.deck.units import unit_names, unit_of
 from fecm.results.comparison import measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of
@@ -63,7 +63,7 @@ def identify(
     output: Path | None,
     picture: Path | None,
     overwrite: bool,
-    form: str,
+    form: Format,
 ) -> None:
     """Fit parameters of the impact of DECK to a measured contact force.
 
@@ -81,7 +81,7 @@ def identify(
         write_lines([found.deck.to_text()], output, overwrite=overwrite)
         note(f"wrote {output}")
     note(*found.notes)
-    if form == "json":
+    if form is Format.JSON:
         values = {
             name: {"value": value, "error": found.errors[name], "start": found.start[name]}
             for name, value in found.values.items()
@@ -118,7 +118,7 @@ def identify(
             echo(line)
         echo(found.cards())
     if not found.accepted:
-        raise SystemExit(NO)
+        raise SystemExit(FAILED)
 
 
 def _plate_errors(found: Identification) -> list[str]:

@@ -12,11 +12,21 @@ import click
 import numpy as np
 from click import option
 
-from fecm.cli.common import DECK_PATH, FORMAT_OPTION, RefusedError, echo, note
+from fecm.cli.common import RefusedError, echo, note
 from fecm.cli.help import Group, typical
 from fecm.cli.laminate_options import laminate_options, ply_of_options
+from fecm.cli.options import (
+    DECK_PATH,
+    FORMAT_OPTION,
+    NOT_NEGATIVE,
+    POSITIVE,
+    Finite,
+    Format,
+    OneOf,
+    list_of,
+    stacked,
+)
 from fecm.cli.outputs import OutputPaths, outputs
-from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, OneOf, list_of, stacked
 from fecm.deck import catalogue
 from fecm.deck.catalogue import CONTACTS, SYSTEM, SYSTEMS, NamedPly
 from fecm.deck.model import Deck, Indentation
@@ -84,7 +94,7 @@ def fit(
     columns: tuple[str, str] | None,
     units: tuple[str, str] | None,
     targets: OutputPaths,
-    form: str,
+    form: Format,
 ) -> None:
     """Fit the indentation law to a test, and print its parameters and EXPE card.
 
@@ -102,7 +112,7 @@ def fit(
     names = {**read.units, "time": "s"} if read.units else {}
     targets.draw("studies:fit_picture", read.indentation, read.force, found, names)
     note(*notes(found))
-    if form == "json":
+    if form is Format.JSON:
         click.echo(json.dumps({"file": str(test), "units": read.units or None, **plain(found)}))
         return
     own = tuple(read.units.values())
@@ -302,7 +312,7 @@ CARD = stacked(
 )
 @CARD
 @FORMAT_OPTION
-def hertz(radius: float, e_s: float, nu_s: float, e_t: float, form: str, **card: Any) -> None:
+def hertz(radius: float, e_s: float, nu_s: float, e_t: float, form: Format, **card: Any) -> None:
     """Print the EXPE card of a sphere in Hertzian contact, with k of equation 3-2.
 
     All values are in one system of units.  By default the law is elastic.
@@ -316,10 +326,10 @@ def hertz(radius: float, e_s: float, nu_s: float, e_t: float, form: str, **card:
     _print_law(k, card, form)
 
 
-def _print_law(k: float, card: dict[str, Any], form: str, **others: float) -> None:
+def _print_law(k: float, card: dict[str, Any], form: Format, **others: float) -> None:
     """Print the EXPE card of a coefficient, and in JSON the coefficient and other values."""
     law = Indentation(float(f"{k:.6g}"), **card).text()
-    click.echo(json.dumps({"k": k, **others, "card": law}) if form == "json" else law)
+    click.echo(json.dumps({"k": k, **others, "card": law}) if form is Format.JSON else law)
 
 
 @indent.command(
@@ -349,7 +359,7 @@ def estimate(
     radius: float,
     e_s: float,
     nu_s: float,
-    form: str,
+    form: Format,
     **card: Any,
 ) -> None:
     """Estimate k of a laminate from its elastic constants, and print its EXPE card.
@@ -367,7 +377,7 @@ def estimate(
         k, by_e2 = (hertz_coefficient(radius, e_s, nu_s, e) for e in (modulus, constants.e2))
     except ValueError as error:
         raise click.UsageError(str(error)) from None
-    if form == "text":
+    if form is Format.TEXT:
         click.echo(f"modulus M   {modulus:.6g}")
         click.echo(f"k by M      {k:.6g}")
         click.echo(f"k by E2     {by_e2:.6g}")
@@ -389,11 +399,11 @@ def estimate(
     help="Units of the parameters.",
 )
 @FORMAT_OPTION
-def contacts(name: str | None, units: str, form: str) -> None:
+def contacts(name: str | None, units: str, form: Format) -> None:
     """List the named laws of `fecm new --contact`, or print the EXPE card of one."""
     for contact in [CONTACTS[name]] if name else list(CONTACTS.values()):
         law = contact.converted(units)
-        if form == "json":
+        if form is Format.JSON:
             values = {field: getattr(law, field) for field in ("k", "alpha_p", "s_p", "q", "word")}
             about = {"units": units, "source": contact.source, "card": law.text()}
             click.echo(json.dumps({"name": contact.name, **values, **about}))

@@ -14,9 +14,10 @@ import numpy as np
 from fecm._tables import aligned
 from fecm._text import printable, shown
 from fecm._version import __version__
-from fecm.cli.common import FILE_PATH, FORMAT_OPTION, echo_json
+from fecm.cli.common import echo_json
 from fecm.cli.help import typical
 from fecm.cli.isolation import reads
+from fecm.cli.options import FILE_PATH, FORMAT_OPTION, Format
 from fecm.results.description import describe_groups
 from fecm.results.hdf5_reader import Contents, read
 from fecm.results.result import result_of
@@ -83,12 +84,12 @@ def _system(context: click.Context, _: object, asked: bool) -> None:
 )
 @FORMAT_OPTION
 @reads("result")
-def info(result: Path, form: str) -> None:
+def info(result: Path, form: Format) -> None:
     """Describe units, summary and every dataset of RESULT, of a run or of a sweep."""
     contents = read(result, Form.RUN, Form.SWEEP)
     with contents.held():
         about = _about(contents)
-    if form == "json":
+    if form is Format.JSON:
         echo_json(about)
     else:
         click.echo("\n".join(_page(about)))

@@ -36,7 +36,9 @@ from typing import Any, NamedTuple, NoReturn, TypeVar
 from fecm._files import clear_partials
 from fecm._memory import available, format_bytes
 from fecm._text import printable
-from fecm.cli.common import SIGNALLED, SIGNALS, RefusedError, echo, standard_error
+from fecm.cli.common import RefusedError, echo
+from fecm.cli.interrupts import SIGNALLED, SIGNALS
+from fecm.cli.streams import standard_error
 
 GB = 10**9
 ROOM, ROOM_A_BYTE = 4 * GB, 50

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import click
 from click import option
 
-from fecm.cli.types import POSITIVE, Decorated, Finite, Parsed, file_of, list_of, stacked
+from fecm.cli.options import POSITIVE, Decorated, Finite, Parsed, file_of, list_of, stacked
 from fecm.deck.catalogue import MATERIALS, SYSTEMS, NamedPly, read_plies
 from fecm.deck.findings import Findings
 from fecm.deck.layup import parse_layup

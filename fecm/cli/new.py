@@ -14,10 +14,10 @@ from click.core import ParameterSource
 from fecm._files import check_outputs
 from fecm.api import load_deck
 from fecm.authoring import AUTO, EQUI, FULL, MITC, Authored, author
-from fecm.cli.common import DASH, FILE_PATH, RefusedError, echo, note, write_text
+from fecm.cli.common import DASH, RefusedError, echo, note, write_text
 from fecm.cli.help import GroupedCommand, typical
 from fecm.cli.laminate_options import PLIES, laminate_options, one_ply
-from fecm.cli.types import POSITIVE, Finite, Parsed, assignment, list_of
+from fecm.cli.options import FILE_PATH, POSITIVE, Finite, Parsed, assignment, list_of
 from fecm.deck.catalogue import CONTACTS, MATERIALS, STRENGTHS, NamedContact, NamedPly
 from fecm.deck.format import format_deck
 from fecm.deck.grid import IN_PLANE, SUPPORTS

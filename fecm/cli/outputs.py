@@ -12,8 +12,8 @@ from typing import Any
 import click
 
 from fecm._files import check_outputs
-from fecm.cli.common import DASH, FILE_PATH, RefusedError, note, writing
-from fecm.cli.types import Decorated, stacked
+from fecm.cli.common import DASH, RefusedError, note, writing
+from fecm.cli.options import FILE_PATH, Decorated, stacked
 from fecm.plot.kinds import SUFFIXES
 from fecm.plot.pictures import imported, require_matplotlib, save
 

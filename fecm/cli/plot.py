@@ -13,18 +13,10 @@ from click import option
 from fecm._errors import FecmWarning
 from fecm._files import check_outputs
 from fecm._text import printable
-from fecm.cli.common import (
-    DECK_PATH,
-    FILE_PATH,
-    CheckFailedError,
-    RefusedError,
-    echo,
-    note,
-    progress,
-)
+from fecm.cli.common import CheckFailedError, RefusedError, echo, note, progress
 from fecm.cli.help import typical
 from fecm.cli.isolation import reads
-from fecm.cli.types import Finite, OneOf, Parsed, assignment, list_of
+from fecm.cli.options import DECK_PATH, FILE_PATH, Finite, OneOf, Parsed, assignment, list_of
 from fecm.mechanics.failure import CRITERIA
 from fecm.plot.kinds import KINDS, LackingError, Picture
 from fecm.plot.pictures import check_options, check_suffix, draw, options_of, save

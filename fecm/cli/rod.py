@@ -13,11 +13,11 @@ from click import option
 
 from fecm._measured_tables import read_table
 from fecm._typing import Floats
-from fecm.cli.common import DASH, DECK_PATH, FORMAT_OPTION, RefusedError
+from fecm.cli.common import DASH, RefusedError
 from fecm.cli.decks import load_valid
 from fecm.cli.help import Group, typical
+from fecm.cli.options import DECK_PATH, FORMAT_OPTION, POSITIVE, Finite, Format, Parsed
 from fecm.cli.outputs import OutputPaths, outputs
-from fecm.cli.types import POSITIVE, Finite, Parsed
 from fecm.deck.catalogue import SYSTEMS
 from fecm.deck.units import unit_names
 from fecm.mechanics.projectile import (
@@ -252,7 +252,7 @@ def filter_(history: Path, transducer: Filter, column: str | None, targets: Outp
 @FORMAT_OPTION
 @outputs("test", table=False)
 def calibrate(
-    test: Path, mass: float, c_a: float, through_origin: bool, form: str, targets: OutputPaths
+    test: Path, mass: float, c_a: float, through_origin: bool, form: Format, targets: OutputPaths
 ) -> None:
     """Calibrate the impact-force transducer with TEST.csv.
 
@@ -268,7 +268,7 @@ def calibrate(
     names = dict(zip(map(str.casefold, measured.names), measured.units, strict=True))
     units = [names.get(name, "") for name in ("time", "v_f", "v_a")]
     targets.draw("studies:calibration_picture", time, v_f, v_a, found, units)
-    if form == "json":
+    if form is Format.JSON:
         click.echo(json.dumps(vars(found)))
         return
     click.echo(f"points            {found.points}")

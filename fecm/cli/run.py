@@ -15,11 +15,21 @@ from fecm._files import check_outputs
 from fecm._frozen import frozen
 from fecm._memory import format_bytes
 from fecm.api import numbered
-from fecm.cli import common
-from fecm.cli.common import CheckFailedError, RefusedError, echo, note, signals
+from fecm.cli.common import CheckFailedError, RefusedError, echo, echo_json, note, progress, writing
 from fecm.cli.decks import load_valid
 from fecm.cli.help import GroupedCommand, typical
-from fecm.cli.types import POSITIVE, Finite, OneOf, collected
+from fecm.cli.interrupts import signals
+from fecm.cli.options import (
+    DECK_PATH,
+    FILE_PATH,
+    FORMAT_OPTION,
+    MODE_OPTION,
+    POSITIVE,
+    Finite,
+    Format,
+    OneOf,
+    collected,
+)
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.projectile import (
     INTEGRATORS,
@@ -65,7 +75,7 @@ class Options:
     output: Path | None
     overwrite: bool
     printed: Path | None  # file of the printed output
-    form: str  # "text" or "json"
+    form: Format  # "text" or "json"
     mode: str
     slips: tuple[str, ...]
     rod_mass: MassMatrix
@@ -108,15 +118,15 @@ class Job(NamedTuple):
         "fecm run drop-weight.inp -o drop.h5 --overwrite --fail-limit 1",
     ),
 )
-@click.argument("deck", type=common.DECK_PATH)
+@click.argument("deck", type=DECK_PATH)
 @option(
     "-o",
     "--output",
-    type=common.FILE_PATH,
+    type=FILE_PATH,
     metavar="OUT.h5",
     help="Result file.  [default: the deck's name with .h5, in this folder]",
 )
-@common.MODE_OPTION
+@MODE_OPTION
 @option(
     "--slip",
     "slips",
@@ -190,11 +200,11 @@ class Job(NamedTuple):
 @option(
     "--print",
     "printed",
-    type=common.FILE_PATH,
+    type=FILE_PATH,
     metavar="OUT.txt",
     help="Also write the printed output of the original program.",
 )
-@common.FORMAT_OPTION
+@FORMAT_OPTION
 @collected(Options)
 def run(options: Options) -> None:
     """Run every problem in DECK and write its result.
@@ -214,7 +224,7 @@ def run(options: Options) -> None:
 
     exceeded: list[str] = []
     for number, job in enumerate(jobs):
-        if number and options.form == "text":
+        if number and options.form is Format.TEXT:
             echo()
         if job.complete:
             note(f"{job.path} is complete")
@@ -277,9 +287,9 @@ def _run_one(job: Job, choices: RunOptions, options: Options) -> Result:
         checkpointer = Checkpointer(path, sink)
         printer = Printer()
         if job.printed is not None:
-            file = stack.enter_context(common.writing(job.printed, overwrite=job.overwrite))
+            file = stack.enter_context(writing(job.printed, overwrite=job.overwrite))
             printer = Printer(file)
-        advance = stack.enter_context(common.progress("fecm", problem.work.steps))
+        advance = stack.enter_context(progress("fecm", problem.work.steps))
         on_step, on_macro = _observers(checkpointer, options.interval, advance)
         simulation = Simulation(problem, sink, choices, printer, (on_step,), on_macro)
         if job.resumes:
@@ -292,9 +302,9 @@ def _run_one(job: Job, choices: RunOptions, options: Options) -> Result:
     with contents.held():
         about = about_run(result)
     note(*simulation.state.notes, *result.notes)
-    if options.form == "json":
+    if options.form is Format.JSON:
         named = {"title": problem.deck.title, "result": str(path), "printed": job.printed}
-        common.echo_json({**named, "units": declared_units(result.attributes), **about})
+        echo_json({**named, "units": declared_units(result.attributes), **about})
         return result
     echo(problem.deck.title or "(no title)")
     for line in (*about["summary"], *larger_steps(problem)):

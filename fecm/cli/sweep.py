@@ -11,10 +11,11 @@ from click import option
 from fecm._files import check_outputs
 from fecm._frozen import frozen
 from fecm.api import load_deck
-from fecm.cli.common import DECK_PATH, FILE_PATH, NO, RefusedError, echo, note, progress, signals
+from fecm.cli.common import FAILED, RefusedError, echo, note, progress
 from fecm.cli.decks import count_findings
 from fecm.cli.help import GroupedCommand, typical
-from fecm.cli.types import OneOf, Parsed, collected, list_of
+from fecm.cli.interrupts import signals
+from fecm.cli.options import DECK_PATH, FILE_PATH, OneOf, Parsed, collected, list_of
 from fecm.deck.findings import DeckError
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
@@ -284,7 +285,7 @@ def sweep(options: Options) -> None:
     echo(verdict(result))
     is_open = result.random is not None and result.random.exceedance.open.any()
     if (is_open or not result.fine.all()) and not options.allow_failed:
-        raise SystemExit(NO)
+        raise SystemExit(FAILED)
 
 
 def _problem(deck: Path) -> Problem:

@@ -7,8 +7,9 @@ from itertools import chain, tee
 
 import click
 
-from fecm.cli.common import FORMAT_OPTION, CheckFailedError, RefusedError
+from fecm.cli.common import CheckFailedError, RefusedError
 from fecm.cli.help import typical
+from fecm.cli.options import FORMAT_OPTION, Format
 from fecm.verification import carry_out, chosen
 from fecm.verification.case import fields, page, table
 
@@ -23,15 +24,15 @@ from fecm.verification.case import fields, page, table
 @click.option("--list", "listing", is_flag=True, help="List the cases without computing them.")
 @click.option("--markdown", is_flag=True, help="Write the page of the documentation instead.")
 @FORMAT_OPTION
-def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: str) -> None:
+def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: Format) -> None:
     """Compare this program with closed forms and the literature.
 
     By default all cases are computed.  The exit status is 1 if a row is beyond its tolerance.
     """
-    if markdown and (listing or form == "json"):
+    if markdown and (listing or form is Format.JSON):
         raise RefusedError("--markdown goes with neither --list nor --format json")
     wanted = chosen(cases)
-    if listing and form == "json":
+    if listing and form is Format.JSON:
         listed = [{"case": c.name, "title": c.title, "rows": len(c.checks)} for c in wanted]
         click.echo(json.dumps({"cases": listed}, ensure_ascii=False))
         return
@@ -44,7 +45,7 @@ def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: str) -> 
     rows, kept = tee(chain.from_iterable(map(carry_out, wanted)))
     if markdown:
         click.echo(page(rows), nl=False)
-    elif form == "json":
+    elif form is Format.JSON:
         found = list(rows)
         values = [fields(row) for row in found]
         told = {"ok": all(row.within for row in found), "rows": values}
@@ -56,5 +57,5 @@ def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: str) -> 
     bad, count = fine.count(False), f"{len(fine)} row{'s' * (len(fine) != 1)}"
     if bad:
         raise CheckFailedError(f"{bad} of {count} {'is' if bad == 1 else 'are'} beyond tolerance")
-    if form == "text" and not markdown:
+    if form is Format.TEXT and not markdown:
         click.echo(f"{count}, all within tolerance")

@@ -12,12 +12,12 @@ import click
 import numpy as np
 from click import option
 
-from fecm.cli.common import DECK_PATH, RefusedError, note
+from fecm.cli.common import RefusedError, note
 from fecm.cli.decks import load_valid
 from fecm.cli.help import Group, typical
 from fecm.cli.laminate_options import laminate_of_options, laminate_options
+from fecm.cli.options import DECK_PATH, NOT_NEGATIVE, POSITIVE, Finite, Parsed, list_of, stacked
 from fecm.cli.outputs import OutputPaths, outputs
-from fecm.cli.types import NOT_NEGATIVE, POSITIVE, Finite, Parsed, list_of, stacked
 from fecm.deck.units import unit_names
 from fecm.problem.build import laminate_of_deck
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces

@@ -1,4 +1,4 @@
-"""Numbers, lists and files among the options of commands."""
+"""Types of options, and the options that several commands have."""
 
 from __future__ import annotations
 
@@ -7,19 +7,20 @@ import math
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
+from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Concatenate, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from fecm._errors import did_you_mean
 from fecm._inputs import InputError, read_input
+from fecm.problem.slips import MODES, REPORT
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 Decorated = Callable[..., None]
-Options = TypeVar("Options")
 
 MOST = 1_000_000  # bytes of a file whose contents are the value of an option
 
@@ -35,24 +36,27 @@ def stacked(*options: Callable[[Decorated], Decorated]) -> Callable[[Decorated],
     return decorate
 
 
-def collected(
-    kind: type[Options],
-) -> Callable[[Callable[Concatenate[Options, ...], None]], Decorated]:
-    """Pass the options of a command to its function as one object, an instance of a dataclass.
+def collected(kind: type, name: str = "options") -> Callable[[Decorated], Decorated]:
+    """Pass options of a command to its function as one object, an instance of a dataclass.
 
-    Its fields have the names of the options and arguments; values of other names are passed on.
+    The fields of the dataclass have the names of the options and arguments.  The object is the
+    parameter `name`; values that are no fields stay parameters.
     """
-    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
+    own = [field.name for field in fields(kind)]
 
-    def decorate(function: Callable[Concatenate[Options, ...], None]) -> Decorated:
+    def decorate(function: Decorated) -> Decorated:
         @functools.wraps(function)
         def command(**values: Any) -> None:
-            options = kind(**{name: values.pop(name) for name in names})
-            function(options, **values)
+            values[name] = kind(**{key: values.pop(key) for key in own})
+            function(**values)
 
         return command
 
     return decorate
+
+
+DECK_PATH = click.Path(exists=True, dir_okay=False, path_type=Path)
+FILE_PATH = click.Path(path_type=Path, allow_dash=True)
 
 
 class Finite(click.FloatRange):
@@ -125,6 +129,18 @@ class OneOf(click.Choice):  # type: ignore[type-arg]
         return super().convert(value, param, ctx)
 
 
+class Member(click.Choice):  # type: ignore[type-arg]
+    """A member of an enumeration of texts, given by its value."""
+
+    def __init__(self, members: Sequence[StrEnum]) -> None:
+        super().__init__([member.value for member in members])
+        self._members = members
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> StrEnum:
+        """Read the value."""
+        return self._members[self.choices.index(super().convert(value, param, ctx))]
+
+
 def list_of(form: str, item: Any, counts: Sequence[int] = (), separator: str = ",") -> Parsed:
     """Type of a tuple of values of a type, in any number but 0 or in one of the `counts`.
 
@@ -167,3 +183,37 @@ def assignment(text: str) -> tuple[str, str]:
     if not name or not value:
         raise ValueError(f"{text!r} is not of the form NAME=VALUE")
     return name, value
+
+
+class Format(StrEnum):
+    """Form of a command's output."""
+
+    TEXT = "text"
+    JSON = "json"
+    SARIF = "sarif"
+
+
+MODE_OPTION = click.option(
+    "--mode",
+    type=click.Choice(MODES),
+    default=REPORT,
+    show_default=True,
+    help="Follow the report's text, or its printed program slip by slip.",
+)
+
+
+def format_option(*formats: Format, about: str) -> Callable[[Decorated], Decorated]:
+    """``--format``, whose value is the parameter `form`."""
+    return click.option(
+        "--format",
+        "form",
+        type=Member(formats),
+        default=Format.TEXT.value,
+        show_default=True,
+        help=about,
+    )
+
+
+FORMAT_OPTION = format_option(
+    Format.TEXT, Format.JSON, about="Text for people, or JSON for programs."
+)
