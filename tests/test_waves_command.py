@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fecm.cli.laminate_options import laminate_of_options
+from fecm.cli.laminate_options import LaminateOptions
 from fecm.plot.kinds import PlotError
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from tests.builders import general_plate, report_plate, table
@@ -341,9 +341,14 @@ def test_of_a_deck_with_several_problems_the_first_is_taken(tmp_path: Path) -> N
 
 
 def test_options_make_the_laminate_of_their_plies() -> None:
-    made, names = laminate_of_options(
-        (0.0, 30.0, 70.0), 0.1, (1.5, 0.3, 20, 1.5, 0.9, 0.8, 0.5), None, "m-N-s"
+    options = LaminateOptions(
+        layup=(0.0, 30.0, 70.0),
+        ply_thickness=0.1,
+        ply=(1.5, 0.3, 20, 1.5, 0.9, 0.8, 0.5),
+        material=None,
+        units="m-N-s",
     )
+    made, names = options.laminate()
     assert names == {"length": "m", "force": "N", "time": "s"}
     assert made.thickness == pytest.approx(0.3)
     assert made.is_coupled

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import click
 import numpy as np
 from click import option
 
+from fecm._frozen import frozen
 from fecm.cli.common import RefusedError, echo, note
 from fecm.cli.help import Group, typical
-from fecm.cli.laminate_options import laminate_options, ply_of_options
+from fecm.cli.laminate_options import LaminateOptions, laminate_options
 from fecm.cli.options import (
     DECK_PATH,
     FORMAT_OPTION,
@@ -23,12 +22,13 @@ from fecm.cli.options import (
     Finite,
     Format,
     OneOf,
+    collected,
     list_of,
     stacked,
 )
 from fecm.cli.outputs import OutputPaths, outputs
 from fecm.deck import catalogue
-from fecm.deck.catalogue import CONTACTS, SYSTEM, SYSTEMS, NamedPly
+from fecm.deck.catalogue import CONTACTS, SYSTEM, SYSTEMS
 from fecm.deck.model import Deck, Indentation
 from fecm.deck.reader import Reader
 from fecm.deck.source_text import load_text
@@ -48,6 +48,20 @@ from fecm.studies.indentation_test.output import card, lines, notes, plain
 @click.group(cls=Group)
 def indent() -> None:
     """Indentation tests and the law of contact (the report's chapter 3)."""
+
+
+@frozen
+class FitOptions:
+    """Argument and options of ``fecm indent fit``."""
+
+    test: Path
+    acr: bool
+    q: float | None
+    turn: float | None
+    columns: tuple[str, str] | None
+    units: tuple[str, str] | None
+    targets: OutputPaths
+    form: Format
 
 
 @indent.command(
@@ -86,33 +100,28 @@ def indent() -> None:
 )
 @outputs("test", table=False)
 @FORMAT_OPTION
-def fit(
-    test: Path,
-    acr: bool,
-    q: float | None,
-    turn: float | None,
-    columns: tuple[str, str] | None,
-    units: tuple[str, str] | None,
-    targets: OutputPaths,
-    form: Format,
-) -> None:
+@collected(FitOptions)
+def fit(options: FitOptions) -> None:
     """Fit the indentation law to a test, and print its parameters and EXPE card.
 
     TEST.csv has the columns indentation and force, with rows in the order of measurement: first
     loading, unloading, reloading, in any number of cycles.  Commas, semicolons or tabs separate
     the columns.  Units are in brackets after the names, or in the line below.
     """
-    if acr and q not in (None, 2.5):
+    test = options.test
+    if options.acr and options.q not in (None, contact_law.ACR_POWER):
         raise click.UsageError("--acr requires q = 5/2: equation 3-7 holds for no other power")
-    read = read_test(test, columns or (), units)
+    read = read_test(test, options.columns or (), options.units)
     try:
-        found = fitted(read.indentation, read.force, retreat=turn, q=q, acr=acr)
+        found = fitted(
+            read.indentation, read.force, retreat=options.turn, q=options.q, acr=options.acr
+        )
     except StudyError as error:
         raise RefusedError(f"{test}: {error}") from None
     names = {**read.units, "time": "s"} if read.units else {}
-    targets.draw("studies:fit_picture", read.indentation, read.force, found, names)
+    options.targets.draw("studies:fit_picture", read.indentation, read.force, found, names)
     note(*notes(found))
-    if form is Format.JSON:
+    if options.form is Format.JSON:
         click.echo(json.dumps({"file": str(test), "units": read.units or None, **plain(found)}))
         return
     own = tuple(read.units.values())
@@ -137,6 +146,20 @@ def _law(deck: Path) -> tuple[Deck, Indentation]:
     if not laws:
         raise RefusedError(f"{deck} has no indentation law: it has no EXPE segment")
     return laws[0]
+
+
+@frozen
+class CurveOptions:
+    """Argument and options of ``fecm indent curve``."""
+
+    deck: Path
+    path: tuple[float, ...] | None  # indentations at which it turns, or a range of them
+    points: int
+    rigidity: bool
+    q: float | None
+    alpha_cr: float | None
+    line: tuple[float, float] | None  # alpha_p and s_p
+    targets: OutputPaths
 
 
 @indent.command(
@@ -176,75 +199,52 @@ def _law(deck: Path) -> tuple[Deck, Indentation]:
     help="With --rigidity: parameters of 3-8.  [default: the deck's, or the report's]",
 )
 @outputs("deck")
-def curve(
-    deck: Path,
-    path: tuple[float, ...] | None,
-    points: int,
-    rigidity: bool,
-    targets: OutputPaths,
-    **parameters: Any,
-) -> None:
+@collected(CurveOptions)
+def curve(options: CurveOptions) -> None:
     """Write the force along an indentation path, by the law of DECK, as CSV.
 
     The columns are indentation, force and the branch of the law; with --rigidity alpha_m, s_3_9 and
     s_3_7.
     """
-    if rigidity:
-        _rigidities(deck, path, points, targets, **parameters)
+    if options.rigidity:
+        _rigidities(options)
         return
-    if not path:
+    if not options.path:
         raise click.UsageError("--path is missing: indentations separated by commas")
-    if any(value is not None for value in parameters.values()):
+    if any(value is not None for value in (options.q, options.alpha_cr, options.line)):
         raise click.UsageError("--q, --alpha-cr and --line require --rigidity")
-    problem, card = _law(deck)
+    problem, card = _law(options.deck)
     law = contact_law.HystereticLaw(build_constants(card))
     try:
-        walk = list(contact_law.follow(law, path, points))
+        walk = list(contact_law.follow(law, options.path, options.points))
     except OverflowError:
         walk = []
     if not walk or not all(math.isfinite(point.force) for point, _ in walk):
         raise RefusedError("the forces along --path overflow")
     columns = np.array([point for point, _ in walk]).T
-    targets.draw("studies:path_picture", *columns, unit_names(problem))
+    options.targets.draw("studies:path_picture", *columns, unit_names(problem))
     branches = ("loading", "unloading", "reloading")
     rows = ((point.indentation, point.force, branches[branch]) for point, branch in walk)
-    targets.write("indentation,force,branch", rows)
+    options.targets.write("indentation,force,branch", rows)
 
 
-def _rigidities(
-    deck: Path,
-    path: Sequence[float] | None,
-    points: int,
-    targets: OutputPaths,
-    *,
-    q: float | None,
-    alpha_cr: float | None,
-    line: tuple[float, float] | None,
-) -> None:
+def _rigidities(options: CurveOptions) -> None:
     """Write largest indentations and rigidities by both equations."""
+    path, line, targets = options.path, options.line, options.targets
     if path and (len(path) != 2 or not 0.0 <= path[0] < path[1]):
         raise click.BadParameter("with --rigidity the range FROM,TO", param_hint="--path")
     if line is not None and line[1] >= 1.0:
         raise click.BadParameter("s_p must be below 1", param_hint="--line")
-    problem, card = _law(deck)
-    own = build_constants(card)
-    if line is None and isinstance(own, LinearPermanent):
-        line = float(own.alpha_p), float(own.s_p)
-    elif line is None:
-        line = _report_length(problem, catalogue.ALPHA_P, "alpha_p", "--line"), catalogue.S_P
-    if alpha_cr is None and isinstance(own, YangSunPermanent):
-        alpha_cr = float(own.alpha_cr)
-    elif alpha_cr is None:
-        alpha_cr = _report_length(problem, catalogue.ALPHA_CR, "alpha_cr", "--alpha-cr")
-    critical = YangSunPermanent(card.k, alpha_cr)
-    slope = LinearPermanent(card.k, *line, own.q if q is None else q)
+    problem, card = _law(options.deck)
+    slope, critical = _permanent(problem, card, options)
     if slope.q != contact_law.ACR_POWER:
         units = f"s of 3-9 is force/length^{slope.q:g} here, that of 3-7 force/length^2.5"
         if targets.picture:
             raise RefusedError(f"{units}: they can't share axes; --q 2.5 makes them comparable")
         note(f"{units}: --q 2.5 makes them comparable")
+
     low, high = path or (0.0, 2.0 * max(critical.alpha_cr, slope.alpha_p))
-    peaks = np.linspace(low, high, points + 1)
+    peaks = np.linspace(low, high, options.points + 1)
     peaks = peaks[peaks > 0.0]
     with np.errstate(all="ignore"):
         by = [np.asarray(relation.rigidity(peaks)) for relation in (slope, critical)]
@@ -253,6 +253,24 @@ def _rigidities(
     named = dict(zip(("equation 3-9", "equation 3-7"), by, strict=True))
     targets.draw("studies:rigidity_picture", peaks, named, slope.q, unit_names(problem))
     targets.write("alpha_m,s_3_9,s_3_7", np.column_stack([peaks, *by]).tolist())
+
+
+def _permanent(
+    problem: Deck, card: Indentation, options: CurveOptions
+) -> tuple[LinearPermanent, YangSunPermanent]:
+    """Permanent indentations of 3-8 and 3-7: of the options, the deck, or the report."""
+    own = build_constants(card)
+    line, alpha_cr = options.line, options.alpha_cr
+    if line is None and isinstance(own, LinearPermanent):
+        line = float(own.alpha_p), float(own.s_p)
+    elif line is None:
+        line = _report_length(problem, catalogue.ALPHA_P, "alpha_p", "--line"), catalogue.S_P
+    if alpha_cr is None and isinstance(own, YangSunPermanent):
+        alpha_cr = float(own.alpha_cr)
+    elif alpha_cr is None:
+        alpha_cr = _report_length(problem, catalogue.ALPHA_CR, "alpha_cr", "--alpha-cr")
+    q = own.q if options.q is None else options.q
+    return LinearPermanent(card.k, *line, q), YangSunPermanent(card.k, alpha_cr)
 
 
 def _report_length(deck: Deck, value: float, name: str, flag: str) -> float:
@@ -266,10 +284,41 @@ def _report_length(deck: Deck, value: float, name: str, flag: str) -> float:
     return catalogue.convert(value, "length", SYSTEM, system)
 
 
+@frozen
+class SphereOptions:
+    """An indenter."""
+
+    radius: float
+    e_s: float  # Young's modulus
+    nu_s: float  # Poisson's ratio
+
+    def coefficient(self, modulus: float) -> float:
+        """Contact coefficient k (equation 3-2) of a solid with a modulus."""
+        try:
+            return hertz_coefficient(self.radius, self.e_s, self.nu_s, modulus)
+        except ValueError as error:
+            raise click.UsageError(str(error)) from None
+
+
+@frozen
+class CardOptions:
+    """Parameters of an EXPE card besides its coefficient."""
+
+    alpha_p: float
+    s_p: float
+    q: float
+
+    def print(self, k: float, form: Format, **others: float) -> None:
+        """Print the card of a coefficient, and in JSON the coefficient and other values."""
+        law = Indentation(float(f"{k:.6g}"), self.alpha_p, self.s_p, self.q).text()
+        click.echo(json.dumps({"k": k, **others, "card": law}) if form is Format.JSON else law)
+
+
 SPHERE = stacked(
     option("--radius", type=float, required=True, help="Radius of the sphere."),
     option("--es", "e_s", type=float, required=True, help="Young's modulus of the sphere."),
     option("--nus", "nu_s", type=float, required=True, help="Poisson's ratio of the sphere."),
+    collected(SphereOptions, "sphere"),
 )
 CARD = stacked(
     option(
@@ -293,6 +342,7 @@ CARD = stacked(
         show_default=True,
         help="Unloading power for the card; 1.5 is elastic.",
     ),
+    collected(CardOptions, "card"),
 )
 
 
@@ -312,24 +362,15 @@ CARD = stacked(
 )
 @CARD
 @FORMAT_OPTION
-def hertz(radius: float, e_s: float, nu_s: float, e_t: float, form: Format, **card: Any) -> None:
+def hertz(sphere: SphereOptions, e_t: float, card: CardOptions, form: Format) -> None:
     """Print the EXPE card of a sphere in Hertzian contact, with k of equation 3-2.
 
     All values are in one system of units.  By default the law is elastic.
     """
-    try:
-        k = hertz_coefficient(radius, e_s, nu_s, e_t)
-    except ValueError as error:
-        raise click.UsageError(str(error)) from None
+    k = sphere.coefficient(e_t)
     if not 0.0 < k < math.inf:
         raise click.UsageError("k is not a finite number: check radius and moduli, and their units")
-    _print_law(k, card, form)
-
-
-def _print_law(k: float, card: dict[str, Any], form: Format, **others: float) -> None:
-    """Print the EXPE card of a coefficient, and in JSON the coefficient and other values."""
-    law = Indentation(float(f"{k:.6g}"), **card).text()
-    click.echo(json.dumps({"k": k, **others, "card": law}) if form is Format.JSON else law)
+    card.print(k, form)
 
 
 @indent.command(
@@ -350,17 +391,11 @@ def _print_law(k: float, card: dict[str, Any], form: Format, **others: float) ->
 @CARD
 @FORMAT_OPTION
 def estimate(
-    layup: Sequence[float],
-    ply_thickness: float,
-    ply: Sequence[float] | None,
-    material: NamedPly | None,
-    units: str | None,
+    laminate: LaminateOptions,
     nu23: float | None,
-    radius: float,
-    e_s: float,
-    nu_s: float,
+    sphere: SphereOptions,
+    card: CardOptions,
     form: Format,
-    **card: Any,
 ) -> None:
     """Estimate k of a laminate from its elastic constants, and print its EXPE card.
 
@@ -368,20 +403,20 @@ def estimate(
     Measured coefficients may be larger: that of the report's plate under the 0.5 in indenter is
     1.330e6 lb/in^1.5, where M gives 1.084e6 and E2 0.741e6.  By default the law is elastic.
     """
-    constants = ply_of_options(ply, material, units)
+    layup, thickness = laminate.layup, laminate.ply_thickness
+    assert layup is not None  # both options are required
+    assert thickness is not None
+    constants = laminate.constants()
     if nu23 is None:
-        nu23 = material.nu23 if material else catalogue.NU23
-    stiffness = effective_stiffness(constants, layup, [ply_thickness] * len(layup), nu23)
+        nu23 = laminate.material.nu23 if laminate.material else catalogue.NU23
+    stiffness = effective_stiffness(constants, layup, [thickness] * len(layup), nu23)
     modulus = indentation_modulus(stiffness)
-    try:
-        k, by_e2 = (hertz_coefficient(radius, e_s, nu_s, e) for e in (modulus, constants.e2))
-    except ValueError as error:
-        raise click.UsageError(str(error)) from None
+    k, by_e2 = sphere.coefficient(modulus), sphere.coefficient(constants.e2)
     if form is Format.TEXT:
         click.echo(f"modulus M   {modulus:.6g}")
         click.echo(f"k by M      {k:.6g}")
         click.echo(f"k by E2     {by_e2:.6g}")
-    _print_law(k, card, form, modulus=modulus, k_by_e2=by_e2)
+    card.print(k, form, modulus=modulus, k_by_e2=by_e2)
 
 
 @indent.command(

@@ -8,7 +8,17 @@ from collections.abc import Callable, Sequence
 import click
 from click import option
 
-from fecm.cli.options import POSITIVE, Decorated, Finite, Parsed, file_of, list_of, stacked
+from fecm._frozen import frozen
+from fecm.cli.options import (
+    POSITIVE,
+    Decorated,
+    Finite,
+    Parsed,
+    collected,
+    file_of,
+    list_of,
+    stacked,
+)
 from fecm.deck.catalogue import MATERIALS, SYSTEMS, NamedPly, read_plies
 from fecm.deck.findings import Findings
 from fecm.deck.layup import parse_layup
@@ -23,10 +33,51 @@ _META = "fecm.plies"  # key of the plies of --materials among the values of a co
 PLIES = file_of(read_plies)
 
 
+@frozen
+class LaminateOptions:
+    """Layup and ply."""
+
+    layup: Sequence[float] | None  # angles, degrees
+    ply_thickness: float | None
+    ply: Sequence[float] | None  # constants
+    material: NamedPly | None
+    units: str | None  # system to which a named ply is converted
+
+    def one_ply(self) -> Ply | NamedPly:
+        """The ply of one of the two options."""
+        if self.ply is not None and self.material is None:
+            return Ply(*self.ply)
+        if self.ply is not None or self.material is None:
+            raise click.UsageError("give either --ply or --material")
+        return self.material
+
+    def constants(self) -> Ply:
+        """Constants of the ply; of a named one in the units."""
+        chosen = self.one_ply()
+        return chosen if isinstance(chosen, Ply) else chosen.converted(self.units or chosen.system)
+
+    def laminate(self) -> tuple[Laminate, dict[str, str]]:
+        """Laminate, checked as in a deck, and the names of its units."""
+        thickness, material = self.ply_thickness, self.material
+        if thickness is None and material is not None:
+            thickness = material.value("thickness", self.units or material.system)
+        if thickness is None:
+            raise click.UsageError("--layup needs --ply-thickness")
+        angles = self.layup or ()
+        layers = tuple(Layer(n, angle, thickness) for n, angle in enumerate(angles, start=1))
+        integration = Integration(3, 3, -3, thickness * len(layers))
+        segment = Material(integration, self.constants(), layers)
+        findings = Findings()
+        check_material(segment, findings)
+        if findings.errors:
+            raise click.UsageError(findings.errors[0].message)
+        return laminate_of(segment), {} if self.units is None else SYSTEMS[self.units]
+
+
 def laminate_options(
     *, required: bool, thickness_required: bool = False
 ) -> Callable[[Decorated], Decorated]:
-    """Add ``--layup``, ``--ply-thickness``, ``--ply``, ``--material`` and ``--units``."""
+    """Add the options of a laminate, whose object is the parameter `laminate`."""
     own = "" if thickness_required else "  [default: that of a named ply]"
     return stacked(
         option(
@@ -69,6 +120,7 @@ def laminate_options(
             help="in-lbf-s, m-N-s or mm-N-s: names the units, and converts a named ply to "
             "them.  [default for a named ply: its source's]",
         ),
+        collected(LaminateOptions, "laminate"),
     )
 
 
@@ -80,42 +132,3 @@ def _named(context: click.Context, parameter: click.Parameter, name: str | None)
     near = ", ".join(difflib.get_close_matches(name, plies, cutoff=0.4))
     hint = f"did you mean {near}?" if near else "`fecm materials` lists them"
     raise click.BadParameter(f"{name!r} is not a named ply; {hint}", context, parameter)
-
-
-def one_ply(ply: Sequence[float] | None, material: NamedPly | None) -> Ply | NamedPly:
-    """The ply of one of the two options."""
-    if ply is not None and material is None:
-        return Ply(*ply)
-    if ply is not None or material is None:
-        raise click.UsageError("give either --ply or --material")
-    return material
-
-
-def ply_of_options(
-    ply: Sequence[float] | None, material: NamedPly | None, units: str | None
-) -> Ply:
-    """Constants of the ply; of a named one in the units."""
-    chosen = one_ply(ply, material)
-    return chosen if isinstance(chosen, Ply) else chosen.converted(units or chosen.system)
-
-
-def laminate_of_options(
-    layup: Sequence[float],
-    ply_thickness: float | None,
-    ply: Sequence[float] | None,
-    material: NamedPly | None,
-    units: str | None,
-) -> tuple[Laminate, dict[str, str]]:
-    """Laminate of these options, checked as in a deck, and the names of its units."""
-    if ply_thickness is None and material is not None:
-        ply_thickness = material.value("thickness", units or material.system)
-    if ply_thickness is None:
-        raise click.UsageError("--layup needs --ply-thickness")
-    constants = ply_of_options(ply, material, units)
-    layers = tuple(Layer(n, angle, ply_thickness) for n, angle in enumerate(layup, start=1))
-    segment = Material(Integration(3, 3, -3, ply_thickness * len(layers)), constants, layers)
-    findings = Findings()
-    check_material(segment, findings)
-    if findings.errors:
-        raise click.UsageError(findings.errors[0].message)
-    return laminate_of(segment), {} if units is None else SYSTEMS[units]

@@ -3,28 +3,39 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 import click
 from click import option
 from click.core import ParameterSource
 
 from fecm._files import check_outputs
+from fecm._frozen import frozen
 from fecm.api import load_deck
-from fecm.authoring import AUTO, EQUI, FULL, MITC, Authored, author
+from fecm.authoring import AUTO, EQUI, FULL, MITC, Authored, InPlane, author
 from fecm.cli.common import DASH, RefusedError, echo, note, write_text
 from fecm.cli.help import GroupedCommand, typical
-from fecm.cli.laminate_options import PLIES, laminate_options, one_ply
-from fecm.cli.options import FILE_PATH, POSITIVE, Finite, Parsed, assignment, list_of
+from fecm.cli.laminate_options import PLIES, LaminateOptions, laminate_options
+from fecm.cli.options import FILE_PATH, POSITIVE, Finite, Parsed, assignment, collected, list_of
 from fecm.deck.catalogue import CONTACTS, MATERIALS, STRENGTHS, NamedContact, NamedPly
 from fecm.deck.format import format_deck
 from fecm.deck.grid import IN_PLANE, SUPPORTS
 from fecm.deck.model import Deck, Indentation, Material, Patch, Shear
 from fecm.mechanics.points import DISC, RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass, Rod
-from fecm.objects import CUSTOM, FIXTURES, MOST, Laminate, ObjectError, Plate, Sphere, parse_patch
+from fecm.objects import (
+    CUSTOM,
+    FIXTURES,
+    MOST,
+    Laminate,
+    ObjectError,
+    Plate,
+    Sphere,
+    Support,
+    parse_patch,
+)
 from fecm.problem.plate_mesh import BOUNDARY
 
 ESTIMATE = "estimate:RADIUS[,ES,NUS]"
@@ -98,6 +109,69 @@ def _shear_factor(text: str) -> float | str:
         return text if text == EQUI else float(text)
     except ValueError:
         raise ValueError(f"{text!r} is not a number or {EQUI}") from None
+
+
+@frozen
+class Options:
+    """Argument and options of ``fecm new``."""
+
+    output: Path
+    overwrite: bool
+    title: str
+    size: tuple[float, float] | None
+    mesh: tuple[int, int] | Path | None
+    grading: float
+    columns: str
+    rows: str
+    laminate: LaminateOptions
+    damage: bool
+    giic: float | None
+    support: Support
+    edges: tuple[tuple[str, Support], ...]
+    fixture: str | None
+    in_plane: InPlane | None
+    at: tuple[float, float] | None
+    velocity: str | None
+    energy: str | None
+    law: tuple[float, float, float, float] | None
+    contact: NamedContact | Sphere | None
+    projectile: Rod | RigidMass | None
+    patch: Patch | None
+    shear: Literal["mitc", "full"]
+    shear_factor: float | Literal["equi"]
+    duration: str | None
+    dt: float | None
+    every: int | None
+
+    def plate(self, given: Collection[str]) -> Plate:
+        """Mesh and supports; `given` are the options on the command line."""
+        if self.fixture:
+            return self._plate_on_fixture(self.fixture, given)
+        if isinstance(self.mesh, Path):
+            for name in RECTANGLE:
+                if name in given:
+                    raise ObjectError(f"`mesh` is a file; leave out `{name}`")
+            wanted = {BOUNDARY: self.support} if "support" in given else {}
+            return Plate.from_mesh(self.mesh, wanted | dict(self.edges))
+        return Plate.rectangle(
+            self.size,
+            self.mesh,
+            support=self.support,
+            edges=dict(self.edges),
+            grading=self.grading,
+            columns=self.columns,
+            rows=self.rows,
+        )
+
+    def _plate_on_fixture(self, fixture: str, given: Collection[str]) -> Plate:
+        """Plate on a fixture, which has its own size and supports."""
+        for name in FIXED:
+            if name in given:
+                raise ObjectError(f"`fixture` has its own plate and supports; leave out `{name}`")
+        if isinstance(self.mesh, Path):
+            raise ObjectError("`fixture` has its own plate and supports; `mesh` is NXxNY")
+        grading = self.grading if "grading" in given else None
+        return Plate.on_fixture(fixture, self.mesh, grading=grading)
 
 
 @click.command(
@@ -248,21 +322,24 @@ def _shear_factor(text: str) -> float | str:
     help="Steps between stored rows.  [default: for about 200 rows]",
 )
 @option("--overwrite", is_flag=True, help="Replace an existing deck.")
-def new(output: Path, overwrite: bool, **options: Any) -> None:
+@collected(Options)
+def new(options: Options) -> None:
     """Write a deck that is ready to run from plate, layup, supports and impact.
 
     DECK is the file to write; - is standard output.
     """
+    output, overwrite = options.output, options.overwrite
     to_file = output != DASH
     if to_file:
         check_outputs([output], overwrite)
-    source = click.get_current_context().get_parameter_source
-    given = {name for name in options if source(name) is ParameterSource.COMMANDLINE}
+    context = click.get_current_context()
+    source = context.get_parameter_source
+    given = {name for name in context.params if source(name) is ParameterSource.COMMANDLINE}
     try:
-        made = _author(given, **options)
+        made = _author(options, given)
     except (ObjectError, ImportError) as error:
-        raise click.UsageError(_as_options(str(error), options)) from None
-    notes = [_as_options(text, options) for text in (*made.doubts, *made.notes)]
+        raise click.UsageError(_as_options(str(error), context.params)) from None
+    notes = [_as_options(text, context.params) for text in (*made.doubts, *made.notes)]
     if made.deck.has(Patch) or made.deck.has(Shear):
         notes.append(_additions(made.deck))
     text = made.comments + format_deck(made.deck.to_text())
@@ -305,55 +382,35 @@ def _as_options(message: str, options: Collection[str]) -> str:
     return re.sub(f"`({names})`", lambda m: "--" + name.get(m[1], m[1]).replace("_", "-"), message)
 
 
-def _author(
-    given: Collection[str],
-    *,
-    size: tuple[float, float] | None,
-    mesh: tuple[int, int] | Path | None,
-    grading: float,
-    columns: str,
-    rows: str,
-    layup: Sequence[float],
-    ply_thickness: float | None,
-    ply: Sequence[float] | None,
-    material: NamedPly | None,
-    support: Any,
-    edges: Sequence[tuple[str, Any]],
-    fixture: str | None,
-    law: tuple[float, float, float, float] | None,
-    contact: NamedContact | Sphere | None,
-    patch: Patch | None,
-    **options: Any,
-) -> Authored:
+def _author(options: Options, given: Collection[str]) -> Authored:
     """Deck of the options of ``fecm new``; `given` are those on the command line."""
-    for name in FIXED if fixture else RECTANGLE if isinstance(mesh, Path) else ():
-        if name in given:
-            what = "fixture` has its own plate and supports" if fixture else "mesh` is a file"
-            raise ObjectError(f"`{what}; leave out `{name}`")
-    if fixture:
-        if isinstance(mesh, Path):
-            raise ObjectError("`fixture` has its own plate and supports; `mesh` is NXxNY")
-        plate = Plate.on_fixture(fixture, mesh, grading=grading if "grading" in given else None)
-    elif isinstance(mesh, Path):
-        wanted = {BOUNDARY: support} if "support" in given else {}
-        plate = Plate.from_mesh(mesh, wanted | dict(edges))
-    else:
-        plate = Plate.rectangle(
-            size,
-            mesh,
-            support=support,
-            edges=dict(edges),
-            grading=grading,
-            columns=columns,
-            rows=rows,
-        )
+    plate = options.plate(given)
     prescribed = plate.fixture is not None and plate.fixture.test is not None
+    law, contact = options.law, options.contact
     if (law is None) == (contact is None) and (law is not None or not prescribed):
         raise ObjectError("give either `law` or `contact`")
-    laminate = Laminate(layup, one_ply(ply, material), ply_thickness)
-    options["contact"] = contact if law is None else Indentation(*law)
-    options["patch"] = patch if "patch" in given else AUTO
-    return author(plate, laminate, gages=(), **options)
+    laminate = options.laminate
+    return author(
+        plate,
+        Laminate(laminate.layup or (), laminate.one_ply(), laminate.ply_thickness),
+        options.projectile,
+        contact if law is None else Indentation(*law),
+        velocity=options.velocity,
+        energy=options.energy,
+        at=options.at,
+        duration=options.duration,
+        dt=options.dt,
+        every=options.every,
+        units=laminate.units,
+        patch=options.patch if "patch" in given else AUTO,
+        shear=options.shear,
+        shear_factor=options.shear_factor,
+        in_plane=options.in_plane,
+        gages=(),
+        damage=options.damage,
+        giic=options.giic,
+        title=options.title,
+    )
 
 
 def _additions(deck: Deck) -> str:

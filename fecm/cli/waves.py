@@ -12,13 +12,24 @@ import click
 import numpy as np
 from click import option
 
+from fecm._frozen import frozen
 from fecm.cli.common import RefusedError, note
 from fecm.cli.decks import load_valid
 from fecm.cli.help import Group, typical
-from fecm.cli.laminate_options import laminate_of_options, laminate_options
-from fecm.cli.options import DECK_PATH, NOT_NEGATIVE, POSITIVE, Finite, Parsed, list_of, stacked
+from fecm.cli.laminate_options import LaminateOptions, laminate_options
+from fecm.cli.options import (
+    DECK_PATH,
+    NOT_NEGATIVE,
+    POSITIVE,
+    Finite,
+    Parsed,
+    collected,
+    list_of,
+    stacked,
+)
 from fecm.cli.outputs import OutputPaths, outputs
 from fecm.deck.units import unit_names
+from fecm.mechanics.laminate import Laminate
 from fecm.problem.build import laminate_of_deck
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces
 from fecm.studies.waves import dispersion as compute
@@ -79,6 +90,37 @@ def _is_number(text: str) -> bool:
     return True
 
 
+@frozen
+class Source:
+    """Where a laminate comes from: a deck, or options."""
+
+    deck: Path | None
+    laminate: LaminateOptions
+    shear_factor: float
+
+    def medium(self) -> tuple[Medium, dict[str, str]]:
+        """Build the laminate, and name its units."""
+        if self.deck is None:
+            if self.laminate.layup is None:
+                message = "give a DECK, or --layup, --ply-thickness and --ply or --material"
+                raise click.UsageError(message)
+            laminate, units = self.laminate.laminate()
+        else:
+            laminate, units = self._of_deck(self.deck)
+        return Medium(replace(laminate, shear=self.shear_factor * laminate.shear)), units
+
+    def _of_deck(self, deck: Path) -> tuple[Laminate, dict[str, str]]:
+        """The laminate of a deck's first problem, and its units."""
+        for name, value in vars(self.laminate).items():
+            if value is not None:
+                given = name.replace("_", "-")
+                raise click.UsageError(f"--{given} describes a laminate; {deck} has one already")
+        problems = load_valid(deck, "; no waves were computed", warnings=False)
+        if len(problems) > 1:
+            note(f"{deck} has {len(problems)} problems; the laminate of the first is used")
+        return laminate_of_deck(problems[0].deck), unit_names(problems[0].deck)
+
+
 # The argument and the options of all three commands.
 _SHARED = stacked(
     click.argument("deck", type=DECK_PATH, required=False),
@@ -93,6 +135,7 @@ _SHARED = stacked(
         "pi^2/12 = 0.822467 the cut-off frequencies are exact.",
     ),
     outputs("deck"),
+    collected(Source, "source"),
 )
 
 STEP = option(
@@ -103,27 +146,6 @@ STEP = option(
     metavar="DEG",
     help="Angle between two normals, degrees.",
 )
-
-
-def _medium(
-    deck: Path | None, shear_factor: float, **options: Any
-) -> tuple[Medium, dict[str, str]]:
-    """Build the laminate, from a deck or from options, and name its units."""
-    if deck is None:
-        if options["layup"] is None:
-            message = "give a DECK, or --layup, --ply-thickness and --ply or --material"
-            raise click.UsageError(message)
-        laminate, units = laminate_of_options(**options)
-    else:
-        for name, value in options.items():
-            if value is not None:
-                given = name.replace("_", "-")
-                raise click.UsageError(f"--{given} describes a laminate; {deck} has one already")
-        problems = load_valid(deck, "; no waves were computed", warnings=False)
-        if len(problems) > 1:
-            note(f"{deck} has {len(problems)} problems; the laminate of the first is used")
-        laminate, units = laminate_of_deck(problems[0].deck), unit_names(problems[0].deck)
-    return Medium(replace(laminate, shear=shear_factor * laminate.shear)), units
 
 
 def _normals(step: float) -> list[float]:
@@ -164,11 +186,11 @@ def waves() -> None:
 )
 @_SHARED
 def dispersion(
-    angles: tuple[float, ...], wavelengths: tuple[float, ...], targets: OutputPaths, **shared: Any
+    angles: tuple[float, ...], wavelengths: tuple[float, ...], source: Source, targets: OutputPaths
 ) -> None:
     """Phase velocity and frequency of all modes against wavelength (figures 2.4, 2.5)."""
     _bound(5 * len(angles) * len(wavelengths))
-    medium, _ = _medium(**shared)
+    medium, _ = source.medium()
     curves = [compute(medium, angle, wavelengths) for angle in angles]
     rows = (
         (
@@ -194,10 +216,10 @@ def dispersion(
 )
 @STEP
 @_SHARED
-def speeds(step: float, targets: OutputPaths, **shared: Any) -> None:
+def speeds(step: float, source: Source, targets: OutputPaths) -> None:
     """Normal velocities of the five wave fronts (figures 2.7, 2.8)."""
     _bound(360.0 / step)
-    medium, units = _medium(**shared)
+    medium, units = source.medium()
     surfaces = WaveSurfaces(medium)
     fronts = surfaces.fronts(_normals(step))
     rows = np.column_stack([fronts.normal, fronts.velocity]).tolist()
@@ -232,11 +254,15 @@ def speeds(step: float, targets: OutputPaths, **shared: Any) -> None:
 @STEP
 @_SHARED
 def fronts(
-    times: tuple[float, ...], radius: float | None, step: float, targets: OutputPaths, **shared: Any
+    times: tuple[float, ...],
+    radius: float | None,
+    step: float,
+    source: Source,
+    targets: OutputPaths,
 ) -> None:
     """Front positions and rays (figures 2.9 to 2.12); cusps go to standard error."""
     _bound(5 * len(times) * 360.0 / step)
-    medium, units = _medium(**shared)
+    medium, units = source.medium()
     start = medium.laminate.thickness if radius is None else radius
     surfaces = WaveSurfaces(medium)
     found = surfaces.fronts(_normals(step))
