@@ -9,6 +9,7 @@ from typing import Any
 import click
 from click import option
 
+from fecm._frozen import frozen
 from fecm._inputs import parsed_toml
 from fecm._text import printable, shown_apart
 from fecm.cli.common import FAILED, echo_json
@@ -21,9 +22,46 @@ from fecm.cli.options import (
     Format,
     Parsed,
     assignment,
+    collected,
     file_of,
 )
 from fecm.results.diff import SCALE_NAMES, Comparison, Difference, difference
+
+
+@frozen
+class Tolerances:
+    """Tolerances, patterns that are left out, and patterns with tolerances of their own."""
+
+    rtol: float | None = None
+    atol: float | None = None
+    exclude: tuple[str, ...] = ()
+    own: tuple[tuple[str, tuple[float, ...]], ...] = ()
+
+
+@frozen
+class Options:
+    """Arguments and options of ``fecm diff``."""
+
+    a: Path
+    b: Path
+    rtol: float | None
+    atol: float | None
+    only: tuple[str, ...]
+    exclude: tuple[str, ...]
+    own: tuple[tuple[str, tuple[float, ...]], ...]
+    file: Tolerances | None
+    brief: bool
+    form: Format
+
+    def tolerances(self) -> Tolerances:
+        """Tolerances of the options, and of the file where they give none."""
+        file = self.file or Tolerances()
+        return Tolerances(
+            rtol=file.rtol if self.rtol is None else self.rtol,
+            atol=file.atol if self.atol is None else self.atol,
+            exclude=(*file.exclude, *self.exclude),
+            own=(*file.own, *self.own),
+        )
 
 
 def _tolerance(name: str, values: object) -> tuple[float, ...]:
@@ -45,8 +83,8 @@ def _own(text: str) -> tuple[str, tuple[float, ...]]:
     return pattern, _tolerance(pattern, values.split(","))
 
 
-def _tolerances(text: str) -> dict[str, Any]:
-    """Options of a tolerance file."""
+def _tolerances(text: str) -> Tolerances:
+    """Contents of a tolerance file."""
     given = parsed_toml(text)
     if unknown := given.keys() - {"rtol", "atol", "exclude", "tol"}:
         raise ValueError(f"{min(unknown)} is unknown; the keys are rtol, atol, exclude and tol")
@@ -58,8 +96,9 @@ def _tolerances(text: str) -> dict[str, Any]:
     rtol, atol = (
         _tolerance(name, [given[name]])[0] if name in given else None for name in ("rtol", "atol")
     )
-    tolerances = [(name, _tolerance(name, values)) for name, values in own.items()]
-    return {"rtol": rtol, "atol": atol, "exclude": exclude, "own": tolerances}
+    return Tolerances(
+        rtol, atol, tuple(exclude), tuple((name, _tolerance(name, own[name])) for name in own)
+    )
 
 
 @click.command(
@@ -114,18 +153,8 @@ def _tolerances(text: str) -> dict[str, Any]:
 @option("--brief", is_flag=True, help="Print only names of differences and the verdict.")
 @FORMAT_OPTION
 @reads("a", "b")
-def diff(
-    a: Path,
-    b: Path,
-    rtol: float | None,
-    atol: float | None,
-    only: tuple[str, ...],
-    exclude: tuple[str, ...],
-    own: tuple[tuple[str, tuple[float, ...]], ...],
-    file: dict[str, Any] | None,
-    brief: bool,
-    form: Format,
-) -> None:
+@collected(Options)
+def diff(options: Options) -> None:
     """Compare two results dataset by dataset.
 
     A and B are result files or folders of tapes, or both results of sweeps.
@@ -143,43 +172,53 @@ def diff(
 
     Exit status: 0 equal, 1 different, 2 unusable file or call.
     """
-    file = file or _tolerances("")
-    rtol = file["rtol"] if rtol is None else rtol
-    atol = file["atol"] if atol is None else atol
-    exclude, own = (*file["exclude"], *exclude), (*file["own"], *own)
-    found = difference(a, b, rtol, atol, only, exclude, own)
-    different = [c.path for c in found.compared if not c.same] + [*found.only[0], *found.only[1]]
-    if form is Format.JSON:
-        echo_json(
-            {
-                "verdict": "same" if found.same else "different",
-                "a": printable(str(a)),
-                "b": printable(str(b)),
-                "rtol": rtol or 0.0,
-                "atol": atol or 0.0,
-                "last_digit": found.to_last_digit,
-                "tol": dict(own),
-                "datasets": [_entry(c) for c in found.compared if not (brief and c.same)],
-                "only_in_a": found.only[0],
-                "only_in_b": found.only[1],
-                "excluded": found.excluded,
-                "listed": found.listed,
-            }
-        )
+    asked = options.tolerances()
+    found = difference(
+        options.a, options.b, asked.rtol, asked.atol, options.only, asked.exclude, asked.own
+    )
+    if options.form is Format.JSON:
+        echo_json(_document(found, asked, options))
     else:
-        lines = list(map(printable, sorted(different))) if brief else _lines(found)
-        count = len(found.compared) + len(found.only[0]) + len(found.only[1])
-        compared = f"{count} dataset{'s' * (count != 1)}"
-        within = f"rtol {rtol or 0.0:g}, atol {atol or 0.0:g}"
-        within = "the last digit of the tapes" if found.to_last_digit else within
-        within += ", --tol" * bool(own)
-        within += f"; {len(found.excluded)} excluded" if found.excluded else ""
-        verdict = f"different: {len(different)} of {compared} at {within}"
-        if found.same:
-            verdict = f"same: {compared} within {within}"
-        click.echo("\n".join([*lines, verdict]))
+        click.echo("\n".join(_page(found, asked, brief=options.brief)))
     if not found.same:
         raise SystemExit(FAILED)
+
+
+def _document(found: Difference, asked: Tolerances, options: Options) -> dict[str, Any]:
+    """JSON of a comparison."""
+    shown = [c for c in found.compared if not (options.brief and c.same)]
+    return {
+        "verdict": "same" if found.same else "different",
+        "a": printable(str(options.a)),
+        "b": printable(str(options.b)),
+        "rtol": asked.rtol or 0.0,
+        "atol": asked.atol or 0.0,
+        "last_digit": found.to_last_digit,
+        "tol": dict(asked.own),
+        "datasets": [_entry(comparison) for comparison in shown],
+        "only_in_a": found.only[0],
+        "only_in_b": found.only[1],
+        "excluded": found.excluded,
+        "listed": found.listed,
+    }
+
+
+def _page(found: Difference, asked: Tolerances, *, brief: bool) -> list[str]:
+    """Lines about a comparison; the last one is the verdict."""
+    different = [c.path for c in found.compared if not c.same] + [*found.only[0], *found.only[1]]
+    lines = list(map(printable, sorted(different))) if brief else _lines(found)
+    count = len(found.compared) + len(found.only[0]) + len(found.only[1])
+    compared = f"{count} dataset{'s' * (count != 1)}"
+    within = f"rtol {asked.rtol or 0.0:g}, atol {asked.atol or 0.0:g}"
+    if found.to_last_digit:
+        within = "the last digit of the tapes"
+    if asked.own:
+        within += ", --tol"
+    if found.excluded:
+        within += f"; {len(found.excluded)} excluded"
+    if found.same:
+        return [*lines, f"same: {compared} within {within}"]
+    return [*lines, f"different: {len(different)} of {compared} at {within}"]
 
 
 def _lines(found: Difference) -> list[str]:

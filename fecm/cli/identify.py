@@ -7,16 +7,40 @@ from pathlib import Path
 import click
 from click import option
 
+from fecm._frozen import frozen
 from fecm.cli.common import DASH, FAILED, echo, echo_json, note
 from fecm.cli.decks import load_single
 from fecm.cli.help import typical
-from fecm.cli.options import DECK_PATH, FILE_PATH, FORMAT_OPTION, Format, OneOf, Parsed, list_of
+from fecm.cli.options import (
+    DECK_PATH,
+    FILE_PATH,
+    FORMAT_OPTION,
+    Format,
+    OneOf,
+    Parsed,
+    collected,
+    list_of,
+)
 from fecm.cli.outputs import OutputPaths, write_lines
 from fecm.cli.rod import FILTER_HELP
 from fecm.deck.units import unit_names, unit_of
 from fecm.results.comparison import measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of
 from fecm.sweeps.identify import CARDS, FREE, Identification, fit
+
+
+@frozen
+class Options:
+    """Arguments and options of ``fecm identify``."""
+
+    deck: Path
+    measured: Path
+    free: tuple[str, ...]
+    sensor: Filter | None
+    output: Path | None
+    picture: Path | None
+    overwrite: bool
+    form: Format
 
 
 @click.command(
@@ -55,16 +79,8 @@ from fecm.sweeps.identify import CARDS, FREE, Identification, fit
 )
 @option("--overwrite", is_flag=True, help="Replace existing files.")
 @FORMAT_OPTION
-def identify(
-    deck: Path,
-    measured: Path,
-    free: tuple[str, ...],
-    sensor: Filter | None,
-    output: Path | None,
-    picture: Path | None,
-    overwrite: bool,
-    form: Format,
-) -> None:
+@collected(Options)
+def identify(options: Options) -> None:
     """Fit parameters of the impact of DECK to a measured contact force.
 
     MEASURED.csv has the columns time and force, in the deck's units; time 0 is the first contact,
@@ -72,53 +88,64 @@ def identify(
     the measurement does not determine the parameters, the fit does not converge, the model does
     not describe the data, or a delay or an offset should be fitted too.
     """
-    targets = OutputPaths(output or DASH, picture, overwrite, deck, measured)
-    problem = load_single(deck, "identify")
+    output, overwrite = options.output, options.overwrite
+    targets = OutputPaths(
+        output or DASH, options.picture, overwrite, options.deck, options.measured
+    )
+    problem = load_single(options.deck, "identify")
     units = unit_names(problem.deck)
-    found = fit(problem.deck, measurement_of(measured, units), free, sensor)
+    measured = measurement_of(options.measured, units)
+    found = fit(problem.deck, measured, options.free, options.sensor)
     targets.draw("histories:fit_picture", found, units)
     if output is not None:
         write_lines([found.deck.to_text()], output, overwrite=overwrite)
         note(f"wrote {output}")
     note(*found.notes)
-    if form is Format.JSON:
-        values = {
-            name: {"value": value, "error": found.errors[name], "start": found.start[name]}
-            for name, value in found.values.items()
-        }
-        echo_json(
-            {
-                "values": values,
-                "correlation": found.correlation.tolist(),
-                "points": len(found.time),
-                "dof": found.dof,
-                "rms": found.rms,
-                "share": found.share,
-                "converged": found.converged,
-                "accepted": found.accepted,
-                "plate_errors": found.plate_errors,
-                "notes": list(found.notes),
-                "cards": found.cards(),
-            }
-        )
+    if options.form is Format.JSON:
+        echo_json(_document(found))
     else:
-        rms = f"{found.rms:.4g} {unit_of('force', units)}".rstrip()
-        echo(f"points       {len(found.time)}, {found.dof} degrees of freedom")
-        echo(f"residual     {rms} rms, {100.0 * found.share:.2g} % of the peak")
-        echo(f"converged    {'yes' if found.converged else 'no'}")
-        echo(f"accepted     {'yes' if found.accepted else 'no'}")
-        for name, value in found.values.items():
-            error, start = found.errors[name], found.start[name]
-            echo(f"{name:<11}  {value:.5g} ± {error:.2g}, from {start:.5g}")
-        if len(found.values) > 1:
-            echo("correlation  " + "".join(f"{name:>12}" for name in found.values))
-            for name, row in zip(found.values, found.correlation, strict=True):
-                echo(f"  {name:<11}" + "".join(f"{value:12.3f}" for value in row))
-        for line in _plate_errors(found):
-            echo(line)
-        echo(found.cards())
+        echo("\n".join(_page(found, unit_of("force", units))))
     if not found.accepted:
         raise SystemExit(FAILED)
+
+
+def _document(found: Identification) -> dict[str, object]:
+    """JSON of a fit."""
+    return {
+        "values": {
+            name: {"value": value, "error": found.errors[name], "start": found.start[name]}
+            for name, value in found.values.items()
+        },
+        "correlation": found.correlation.tolist(),
+        "points": len(found.time),
+        "dof": found.dof,
+        "rms": found.rms,
+        "share": found.share,
+        "converged": found.converged,
+        "accepted": found.accepted,
+        "plate_errors": found.plate_errors,
+        "notes": list(found.notes),
+        "cards": found.cards(),
+    }
+
+
+def _page(found: Identification, force: str) -> list[str]:
+    """Lines about a fit; `force` is the unit of the force."""
+    rms = f"{found.rms:.4g} {force}".rstrip()
+    lines = [
+        f"points       {len(found.time)}, {found.dof} degrees of freedom",
+        f"residual     {rms} rms, {100.0 * found.share:.2g} % of the peak",
+        f"converged    {'yes' if found.converged else 'no'}",
+        f"accepted     {'yes' if found.accepted else 'no'}",
+    ]
+    for name, value in found.values.items():
+        error, start = found.errors[name], found.start[name]
+        lines.append(f"{name:<11}  {value:.5g} ± {error:.2g}, from {start:.5g}")
+    if len(found.values) > 1:
+        lines.append("correlation  " + "".join(f"{name:>12}" for name in found.values))
+        for name, row in zip(found.values, found.correlation, strict=True):
+            lines.append(f"  {name:<11}" + "".join(f"{value:12.3f}" for value in row))
+    return [*lines, *_plate_errors(found), found.cards()]
 
 
 def _plate_errors(found: Identification) -> list[str]:

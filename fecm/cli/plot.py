@@ -12,11 +12,21 @@ from click import option
 
 from fecm._errors import FecmWarning
 from fecm._files import check_outputs
+from fecm._frozen import frozen
 from fecm._text import printable
 from fecm.cli.common import CheckFailedError, RefusedError, echo, note, progress
 from fecm.cli.help import typical
 from fecm.cli.isolation import reads
-from fecm.cli.options import DECK_PATH, FILE_PATH, Finite, OneOf, Parsed, assignment, list_of
+from fecm.cli.options import (
+    DECK_PATH,
+    FILE_PATH,
+    Finite,
+    OneOf,
+    Parsed,
+    assignment,
+    collected,
+    list_of,
+)
 from fecm.mechanics.failure import CRITERIA
 from fecm.plot.kinds import KINDS, LackingError, Picture
 from fecm.plot.pictures import check_options, check_suffix, draw, options_of, save
@@ -37,6 +47,30 @@ def _by_name(_: Any, __: Any, pairs: tuple[tuple[str, str], ...]) -> dict[str, s
     if len(values) < len(pairs):
         raise click.BadParameter("a name is given twice")
     return values
+
+
+@frozen
+class PictureOptions:
+    """Options of kinds of pictures, with the names that their functions give them."""
+
+    at: tuple[tuple[float, float], ...]
+    gages: tuple[float, ...] | None
+    face: str | None
+    times: tuple[float, ...] | None
+    against: str | None
+    overlay: Path | None
+    delay: float | None
+    offset: float | None
+    along: str | None
+    width: str | None
+    quantity: str | None
+    over: tuple[str, ...] | None
+    where: dict[str, str]
+    level: tuple[float, ...] | None
+
+    def given(self) -> dict[str, Any]:
+        """Those that are given, by name."""
+        return {name: value for name, value in vars(self).items() if value}
 
 
 @click.command(
@@ -145,19 +179,20 @@ def _by_name(_: Any, __: Any, pairs: tuple[tuple[str, str], ...]) -> dict[str, s
 )
 @option("--overwrite", is_flag=True, help="Replace existing pictures.")
 @reads("results")
+@collected(PictureOptions, "asked")
 def plot(
     results: tuple[Path, ...],
     kinds: tuple[str, ...],
     output: Path | None,
     overwrite: bool,
-    **asked: Any,
+    asked: PictureOptions,
 ) -> None:
     """Draw the report's figures from one or more RESULTs, or the map of a sweep.
 
     A kind whose data were not stored is left out, and the exit status is then 1; 2 if no kind can
     be drawn.
     """
-    options = {name: value for name, value in asked.items() if value}
+    options = asked.given()
     named = _named(results)
     first = next(iter(named.values()))
     usual = "force" if isinstance(first, Result) else "exceedance" if first.random else "map"

@@ -5,18 +5,19 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import click
 import numpy as np
 from click import option
 
+from fecm._frozen import frozen
 from fecm._measured_tables import read_table
 from fecm._typing import Floats
 from fecm.cli.common import DASH, RefusedError
 from fecm.cli.decks import load_valid
 from fecm.cli.help import Group, typical
-from fecm.cli.options import DECK_PATH, FORMAT_OPTION, POSITIVE, Finite, Format, Parsed
+from fecm.cli.options import DECK_PATH, FORMAT_OPTION, POSITIVE, Finite, Format, Parsed, collected
 from fecm.cli.outputs import OutputPaths, outputs
 from fecm.deck.catalogue import SYSTEMS
 from fecm.deck.units import unit_names
@@ -26,6 +27,8 @@ from fecm.mechanics.projectile import (
     MASSES,
     REPORT_ELEMENTS,
     WILSON,
+    Integrator,
+    MassMatrix,
     RigidMass,
     Rod,
 )
@@ -61,6 +64,47 @@ def rod() -> None:
     """
 
 
+@frozen
+class Shape:
+    """A uniform rod, and the system of its units."""
+
+    length: float | None
+    modulus: float | None
+    density: float | None
+    diameter: float | None
+    elements: int | None
+    units: str | None
+
+    def given(self) -> list[str]:
+        """Names of the options that are given."""
+        return [name for name, value in vars(self).items() if value is not None]
+
+
+class Struck(NamedTuple):
+    """A rod under a pulse."""
+
+    rod: Rod
+    station: float  # where the force is computed by default
+    dt: float | None  # time step of the deck
+    units: Mapping[str, str]
+
+
+@frozen
+class PulseOptions:
+    """Argument and options of ``fecm rod pulse``."""
+
+    deck: Path | None
+    shape: Shape
+    pulse: Pulse
+    dt: float | None
+    duration: float | None
+    stations: tuple[float, ...]
+    transducer: Filter | None
+    mass_matrix: MassMatrix
+    integrator: Integrator
+    targets: OutputPaths
+
+
 @rod.command(
     epilog=typical(
         "fecm rod impact-115.inp --pulse gauss:1000,200e-6,40e-6 --plot pulse.png",
@@ -70,7 +114,6 @@ def rod() -> None:
 @click.argument("deck", type=DECK_PATH, required=False)
 @option(
     "--pulse",
-    "applied",
     type=Parsed(pulse_test.pulse_of, "PULSE"),
     required=True,
     help="gauss:F0,TAU,B (F0 exp(-(t-TAU)²/4B²)), sine:F0,B (F0 sin(πt/B), zero after B), or a "
@@ -133,59 +176,62 @@ def rod() -> None:
     help="Time integration; the report's is Wilson's.",
 )
 @outputs()
-def pulse(
-    deck: Path | None,
-    applied: Pulse,
-    dt: float | None,
-    duration: float | None,
-    stations: tuple[float, ...],
-    transducer: Filter | None,
-    mass_matrix: str,
-    integrator: str,
-    targets: OutputPaths,
-    **shape: Any,
-) -> None:
+@collected(Shape, "shape")
+@collected(PulseOptions)
+def pulse(options: PulseOptions) -> None:
     """Compute forces and accelerations of a free rod under a pulse on one end, as CSV.
 
     The rod is the projectile of DECK, or uniform by --length, --modulus, --density and --diameter.
     Force is positive in compression.
     """
-    system = shape.pop("units")
-    given = [name for name, value in shape.items() if value is not None]
-    given += ["units"] if system and deck else []
-    missing = [f"--{name}" for name in shape if name not in (*given, "elements")]
-    if deck is not None and given:
-        raise click.UsageError(f"--{given[0]} is for a rod without a deck; {deck} has one")
-    if deck is None and missing:
-        raise click.UsageError(f"the rod lacks {', '.join(missing)}; or name a deck with a rod")
-    units: Mapping[str, str] = SYSTEMS[system] if system else {}
-    steps: list[float] = []
-    if deck is None:
-        diameters = (shape["diameter"],) * (shape["elements"] or REPORT_ELEMENTS)
-        struck = Rod(shape["length"], diameters, shape["modulus"], shape["density"])
-        station = struck.length / 2.0
-    else:
-        problems = load_valid(deck)
-        if not problems:
-            raise RefusedError(f"{deck} contains no problem")
-        first = problems[0].deck
-        steps = [macro.value for macro in first.macros if macro.word == "DT" and macro.value > 0.0]
-        projectile, units = build_projectile(first), unit_names(first)
-        if isinstance(projectile, RigidMass):
-            raise RefusedError(f"{deck}: the projectile is a rigid mass; a pulse needs a rod")
-        struck, node = projectile, build_station(first, projectile, frozenset()).node
-        station = (node - 1) * struck.length / struck.elements
-    struck = struck.with_mass(mass_matrix)
-    step = dt or (steps[0] if steps else pulse_test.default_time_step(struck))
-    end, places = duration or applied.duration, tuple(dict.fromkeys(stations)) or (station,)
-    history = pulse_test.simulate_pulse(struck, applied, step, end, places, integrator)
+    deck, shape = options.deck, options.shape
+    struck = _uniform(shape) if deck is None else _of_deck(deck, shape)
+    projectile, units = struck.rod.with_mass(options.mass_matrix), struck.units
+    history = pulse_test.simulate_pulse(
+        projectile,
+        options.pulse,
+        options.dt or struck.dt or pulse_test.default_time_step(projectile),
+        options.duration or options.pulse.duration,
+        tuple(dict.fromkeys(options.stations)) or (struck.station,),
+        options.integrator,
+    )
     filtered = None
-    if transducer is not None:
-        filtered = transducer.in_unit(units.get("time", ""))(history.time, history.forces)
+    if options.transducer is not None:
+        transducer = options.transducer.in_unit(units.get("time", ""))
+        filtered = transducer(history.time, history.forces)
+    targets = options.targets
     targets.draw("studies:pulse_picture", history, filtered, units)
     targets.write(*pulse_test.table(history, filtered))
     if targets.table != DASH:
-        _summarise(struck, history)
+        _summarise(projectile, history)
+
+
+def _uniform(shape: Shape) -> Struck:
+    """The rod of the options."""
+    length, modulus, density, diameter = shape.length, shape.modulus, shape.density, shape.diameter
+    if length is None or modulus is None or density is None or diameter is None:
+        needed = ("length", "modulus", "density", "diameter")
+        missing = ", ".join(f"--{name}" for name in needed if name not in shape.given())
+        raise click.UsageError(f"the rod lacks {missing}; or name a deck with a rod")
+    uniform = Rod(length, (diameter,) * (shape.elements or REPORT_ELEMENTS), modulus, density)
+    return Struck(uniform, length / 2.0, None, SYSTEMS[shape.units] if shape.units else {})
+
+
+def _of_deck(deck: Path, shape: Shape) -> Struck:
+    """The rod of the first problem of a deck."""
+    if given := shape.given():
+        raise click.UsageError(f"--{given[0]} is for a rod without a deck; {deck} has one")
+    problems = load_valid(deck)
+    if not problems:
+        raise RefusedError(f"{deck} contains no problem")
+    first = problems[0].deck
+    projectile = build_projectile(first)
+    if isinstance(projectile, RigidMass):
+        raise RefusedError(f"{deck}: the projectile is a rigid mass; a pulse needs a rod")
+    node = build_station(first, projectile, frozenset()).node
+    station = (node - 1) * projectile.length / projectile.elements
+    steps = [macro.value for macro in first.macros if macro.word == "DT" and macro.value > 0.0]
+    return Struck(projectile, station, steps[0] if steps else None, unit_names(first))
 
 
 def _summarise(struck: Rod, history: RodHistory) -> None:
