@@ -17,14 +17,16 @@ from fecm._version import __version__
 
 if TYPE_CHECKING:
     from fecm.api import read_one, run, run_one
-    from fecm.authoring import impact
+    from fecm.authoring.contact import Contact
+    from fecm.authoring.impact import impact
+    from fecm.authoring.laminate import Laminate
+    from fecm.authoring.plate import Plate
     from fecm.deck.findings import DeckError
     from fecm.deck.model import Deck
     from fecm.deck.reader import read_deck
     from fecm.deck.records import Ply
     from fecm.mechanics.plate_motion import DivergenceError
     from fecm.mechanics.projectile import RigidMass, Rod
-    from fecm.objects import Contact, Laminate, Plate
     from fecm.results.result import Result, load
     from fecm.sweeps.api import sweep
     from fecm.sweeps.identify import Identification, identify
@@ -62,14 +64,16 @@ __all__ = [
 if not TYPE_CHECKING:  # type checkers know the names from the imports above
     _NAMES = {
         "fecm.api": "read_one run run_one",
-        "fecm.authoring": "impact",
+        "fecm.authoring.contact": "Contact",
+        "fecm.authoring.impact": "impact",
+        "fecm.authoring.laminate": "Laminate",
+        "fecm.authoring.plate": "Plate",
         "fecm.deck.findings": "DeckError",
         "fecm.deck.model": "Deck",
         "fecm.deck.reader": "read_deck",
         "fecm.deck.records": "Ply",
         "fecm.mechanics.plate_motion": "DivergenceError",
         "fecm.mechanics.projectile": "RigidMass Rod",
-        "fecm.objects": "Contact Laminate Plate",
         "fecm.results.result": "Result load",
         "fecm.sweeps.api": "sweep",
         "fecm.sweeps.identify": "Identification identify",

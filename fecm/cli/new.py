@@ -14,7 +14,14 @@ from click.core import ParameterSource
 from fecm._files import check_outputs
 from fecm._frozen import frozen
 from fecm.api import load_deck
-from fecm.authoring import AUTO, EQUI, FULL, MITC, Authored, InPlane, author
+from fecm.authoring.contact import Sphere, parse_patch
+from fecm.authoring.fixtures import CUSTOM, FIXTURES
+from fecm.authoring.impact import Authored, Request, Strike, author
+from fecm.authoring.laminate import Laminate
+from fecm.authoring.mesh import InPlane
+from fecm.authoring.numerics import AUTO, EQUI, FULL, MITC, Numerics, Quadrature
+from fecm.authoring.parameters import ObjectError
+from fecm.authoring.plate import MOST, Plate, Support
 from fecm.cli.common import DASH, RefusedError, echo, note, write_text
 from fecm.cli.help import GroupedCommand, typical
 from fecm.cli.laminate_options import PLIES, LaminateOptions, laminate_options
@@ -25,17 +32,6 @@ from fecm.deck.grid import IN_PLANE, SUPPORTS
 from fecm.deck.model import Deck, Indentation, Material, Patch, Shear
 from fecm.mechanics.points import DISC, RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass, Rod
-from fecm.objects import (
-    CUSTOM,
-    FIXTURES,
-    MOST,
-    Laminate,
-    ObjectError,
-    Plate,
-    Sphere,
-    Support,
-    parse_patch,
-)
 from fecm.problem.plate_mesh import BOUNDARY
 
 ESTIMATE = "estimate:RADIUS[,ES,NUS]"
@@ -137,7 +133,7 @@ class Options:
     contact: NamedContact | Sphere | None
     projectile: Rod | RigidMass | None
     patch: Patch | None
-    shear: Literal["mitc", "full"]
+    shear: Quadrature
     shear_factor: float | Literal["equi"]
     duration: str | None
     dt: float | None
@@ -391,25 +387,30 @@ def _author(options: Options, given: Collection[str]) -> Authored:
         raise ObjectError("give either `law` or `contact`")
     laminate = options.laminate
     return author(
-        plate,
-        Laminate(laminate.layup or (), laminate.one_ply(), laminate.ply_thickness),
-        options.projectile,
-        contact if law is None else Indentation(*law),
-        velocity=options.velocity,
-        energy=options.energy,
-        at=options.at,
-        duration=options.duration,
-        dt=options.dt,
-        every=options.every,
-        units=laminate.units,
-        patch=options.patch if "patch" in given else AUTO,
-        shear=options.shear,
-        shear_factor=options.shear_factor,
-        in_plane=options.in_plane,
-        gages=(),
-        damage=options.damage,
-        giic=options.giic,
-        title=options.title,
+        Request(
+            plate,
+            Laminate(laminate.layup or (), laminate.one_ply(), laminate.ply_thickness),
+            Strike(
+                options.projectile,
+                contact if law is None else Indentation(*law),
+                options.velocity,
+                options.energy,
+                options.at,
+            ),
+            Numerics(
+                options.patch if "patch" in given else AUTO,
+                options.shear,
+                options.shear_factor,
+                options.duration,
+                options.dt,
+                options.every,
+            ),
+            units=laminate.units,
+            in_plane=options.in_plane,
+            damage=options.damage,
+            giic=options.giic,
+            title=options.title,
+        )
     )
 
 

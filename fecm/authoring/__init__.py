@@ -1,0 +1,1 @@
+"""Decks from plate, laminate, projectile and contact as objects."""

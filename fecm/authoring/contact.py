@@ -1,0 +1,150 @@
+"""Indentation laws and contact patches."""
+
+from __future__ import annotations
+
+from fecm._frozen import frozen
+from fecm.authoring.laminate import Plies
+from fecm.authoring.parameters import ObjectError, check_positive
+from fecm.deck.catalogue import (
+    CONTACTS,
+    STANDARD,
+    STEEL_MODULUS,
+    STEEL_POISSON,
+    NamedContact,
+    convert,
+)
+from fecm.deck.model import Indentation, Patch
+from fecm.deck.units import MODULUS
+from fecm.mechanics.contact_law import hertz_coefficient
+from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
+from fecm.mechanics.points import DISC, HERTZ
+
+# Shapes of the contact patch.
+PATCHES = {"disc": DISC, "hertz": HERTZ}
+
+
+@frozen
+class Sphere:
+    """Elastic contact of a sphere, its k estimated from the ply's constants."""
+
+    radius: float | None = None  # length; None where a standard prescribes it
+    # Elastic constants; None for steel.
+    modulus: float | None = None
+    poisson: float | None = None
+
+    def law(self, plies: Plies) -> tuple[Indentation, str]:
+        """Law of contact, and comment lines of the deck which say how k was computed."""
+        if self.radius is None:
+            raise ObjectError("the `contact` estimate needs the sphere's radius")
+        if self.modulus is None and plies.system is None:
+            raise ObjectError(
+                "the `contact` estimate with constants of a `ply` needs `units`, or the sphere's "
+                "elastic constants"
+            )
+        modulus = self.modulus
+        if modulus is None:
+            modulus = convert(STEEL_MODULUS, MODULUS, STANDARD, plies.system or STANDARD)
+        poisson = STEEL_POISSON if self.poisson is None else self.poisson
+        angles = plies.layup.angles
+        try:
+            stiffness = effective_stiffness(plies.ply, angles, [1.0] * len(angles), plies.nu23)
+            effective = indentation_modulus(stiffness)
+            k = float(f"{hertz_coefficient(self.radius, modulus, poisson, effective):.6g}")
+        except (ValueError, ArithmeticError) as error:
+            raise ObjectError(f"k cannot be estimated: {error}; give a law") from None
+        return Indentation(k, 0.0, 0.0, 1.5), (
+            "! k of EXPE is estimated by the laminate's indentation modulus "
+            f"{effective:.5g}: a sphere of radius {self.radius:g},\n"
+            f"! E {modulus:g} and nu {poisson:g}; nu23 of the ply {plies.nu23:g}.  "
+            "A measured k may be larger; the law is elastic.\n"
+        )
+
+
+class Contact(Indentation):
+    """Measured indentation law in the deck's units; :meth:`named` and :meth:`estimate` find one.
+
+    Parameters
+    ----------
+    k : float
+        Contact coefficient, force/length^1.5.
+    alpha_p : float
+        Critical indentation (length), beyond which an indentation remains.
+    s_p : float
+        Slope of the permanent over the maximum indentation.
+    q : float
+        Power of the unloading curve.
+
+    Examples
+    --------
+    >>> import fecm
+    >>> fecm.Contact(1.912e6, 6.564e-4, 0.094, 2.0).k
+    1912000.0
+    """
+
+    @staticmethod
+    def named(name: str) -> NamedContact:
+        """Published law, which `fecm indent contacts` lists; converted to the deck's units.
+
+        Raises
+        ------
+        ValueError
+            If there is none of this name.
+        """
+        if name not in CONTACTS:
+            raise ObjectError(f"{name!r} is not a named contact: {', '.join(CONTACTS)}")
+        return CONTACTS[name]
+
+    @staticmethod
+    def estimate(
+        radius: float | None = None, modulus: float | None = None, poisson: float | None = None
+    ) -> Sphere:
+        """Elastic law of a sphere on the laminate, as `fecm indent estimate` has it.
+
+        Parameters
+        ----------
+        radius : float, optional
+            Length; a standard's where it is not given.
+        modulus, poisson : float, optional
+            Elastic constants of the sphere; steel's where they are not given.
+        """
+        check_positive(radius=radius, modulus=modulus)
+        return Sphere(radius, modulus, poisson)
+
+
+def parse_patch(text: str) -> Patch | None:
+    """Contact patch of ``disc``, ``hertz``, ``disc:RADIUS`` or ``hertz:RADIUS``.
+
+    ``none`` is a point force, None.  Raises ValueError if the text is none of these.
+    """
+    shape, colon, given = text.partition(":")
+    if text == "none":
+        return None
+    try:
+        radius = float(given) if colon else None
+        check_positive(radius=radius)
+        return Patch(PATCHES[shape], radius)
+    except (KeyError, ValueError):
+        message = f"{text!r} is not none, disc, hertz, disc:RADIUS or hertz:RADIUS"
+        raise ObjectError(message) from None
+
+
+AnyContact = Indentation | NamedContact | Sphere | str
+
+
+def law_of(contact: AnyContact | None, plies: Plies) -> tuple[Indentation, str]:
+    """Indentation law in the units of the deck, and comment lines about one that is estimated."""
+    match contact:
+        case str():
+            return law_of(Contact.named(contact), plies)
+        case Indentation():
+            return Indentation(*contact.values(), contact.word), ""
+        case Sphere():
+            return contact.law(plies)
+        case NamedContact():
+            if plies.system is None:
+                raise ObjectError(
+                    "a named `contact` with constants of a `ply` needs `units`, theirs"
+                )
+            return contact.converted(plies.system), ""
+        case None:
+            raise ObjectError(f"give `contact`, a law or one of {', '.join(CONTACTS)}")

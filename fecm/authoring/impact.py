@@ -1,0 +1,404 @@
+"""The deck of an impact from plate, laminate, projectile and contact."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from types import UnionType
+from typing import Literal, NamedTuple
+
+from fecm._errors import warn
+from fecm._frozen import frozen
+from fecm.api import load_deck
+from fecm.authoring.contact import AnyContact, Sphere, law_of
+from fecm.authoring.fixtures import DropWeight
+from fecm.authoring.laminate import Laminate, Plies, damages, plies_of, toughness
+from fecm.authoring.mesh import InPlane, placed, supported
+from fecm.authoring.numerics import AUTO, FULL, MITC, Numerics, Quadrature
+from fecm.authoring.parameters import ObjectError, check_positive, in_units
+from fecm.authoring.plate import Plate
+from fecm.deck import model
+from fecm.deck.catalogue import STANDARD, SYSTEM, SYSTEMS, NamedContact
+from fecm.deck.findings import DeckError
+from fecm.deck.grid import IN_PLANE
+from fecm.deck.records import Control, Gage
+from fecm.deck.units import in_si, unit_of
+from fecm.mechanics.projectile import RigidMass, Rod
+from fecm.problem.build import build_projectile, projectile_segment
+
+AnyProjectile = Rod | RigidMass | model.Projectile
+GagePlace = tuple[float, float, float, float]  # x, y, z and degrees
+
+
+@frozen
+class Strike:
+    """What hits the plate, how fast and where."""
+
+    projectile: AnyProjectile | None = None
+    contact: AnyContact | None = None
+    velocity: float | str | None = None
+    energy: float | str | None = None
+    at: tuple[float, float] | None = None
+
+
+@frozen
+class Request:
+    """What :func:`impact` and ``fecm new`` are asked for; see there."""
+
+    plate: Plate
+    laminate: Laminate
+    strike: Strike
+    numerics: Numerics
+    units: str | None = None
+    in_plane: InPlane | None = None
+    gages: Iterable[GagePlace] = ()
+    damage: bool = False
+    giic: float | None = None
+    title: str = ""
+
+    @property
+    def test(self) -> DropWeight | None:
+        """What a standard prescribes."""
+        return self.plate.fixture.test if self.plate.fixture else None
+
+    def check(self) -> None:
+        """Raise ObjectError if an argument is no object of fecm, or a text none of the choices."""
+        strike, numerics = self.strike, self.numerics
+        _check_kind("plate", self.plate, Plate)
+        _check_kind("laminate", self.laminate, Laminate)
+        if numerics.patch is not None:
+            _check_kind("patch", numerics.patch, str | model.Patch)
+        if strike.projectile is not None:
+            _check_kind("projectile", strike.projectile, AnyProjectile)
+        if strike.contact is not None:
+            _check_kind("contact", strike.contact, AnyContact)
+        _check_choice("shear", numerics.shear, (MITC, FULL))
+        _check_choice("in_plane", self.in_plane, (None, *IN_PLANE))
+        _check_choice("units", self.units, (None, *SYSTEMS))
+        if "\n" in self.title:
+            raise ObjectError("`title` has more than one line")
+
+
+class Motion(NamedTuple):
+    """Motion of a projectile and simulated time as numbers, in the deck's units."""
+
+    velocity: float | None
+    energy: float | None
+    duration: float | None
+
+
+@frozen
+class Authored:
+    """A new deck, not yet checked."""
+
+    deck: model.Deck
+    comments: str  # comment lines for the deck's head
+    # What was filled in, and what differs from what was asked.
+    notes: list[str]
+    doubts: list[str]
+
+
+def impact(
+    plate: Plate,
+    laminate: Laminate,
+    projectile: Rod | RigidMass | model.Projectile | None = None,
+    contact: model.Indentation | NamedContact | Sphere | str | None = None,
+    *,
+    velocity: float | str | None = None,
+    energy: float | str | None = None,
+    at: tuple[float, float] | None = None,
+    duration: float | str | None = None,
+    dt: float | None = None,
+    every: int | None = None,
+    units: str | None = None,
+    patch: str | model.Patch | None = AUTO,
+    shear: Quadrature = "mitc",
+    shear_factor: float | Literal["equi"] = 1.0,
+    in_plane: InPlane | None = None,
+    gages: Iterable[tuple[float, float, float, float]] = (),
+    damage: bool = False,
+    giic: float | None = None,
+    title: str = "",
+) -> model.Deck:
+    """Deck of an impact, as `fecm new` writes it.
+
+    A laminate without coupling has its in-plane dofs restrained, as the report's does; any other
+    has them free inside the plate, and restrained on its supports as `in_plane` says.
+
+    Parameters
+    ----------
+    plate : Plate
+        Mesh and supports.
+    laminate : Laminate
+        Layup and ply.
+    projectile : Rod or RigidMass, optional
+        In the deck's units; the report's rod, or the mass of a fixture's standard, by default.
+    contact : Contact or str
+        Indentation law, or the name of a published one.
+    velocity, energy : float or str
+        Approach velocity (length/time) or energy (force*length) of the projectile, in the deck's
+        units (mJ in mm-N-s) or with a unit, as in ``"3m/s"`` and ``"10J"``.
+    at : tuple of float, optional
+        Impact point; the middle of the plate by default.  The nearest node is hit; on an imported
+        mesh a patch is centred at the point itself.
+    duration : float or str
+        Simulated time, also with a unit, ``"4ms"``; with a fixture by default 1.25 half periods of
+        the projectile on the plate, or 1.1 times the contact with the indentation where that is
+        longer.
+    dt : float, optional
+        Time step; 0.9 of the critical one by default.
+    every : int, optional
+        Steps between stored rows; about 200 rows by default.
+    units : str, optional
+        ``"in-lbf-s"``, ``"m-N-s"`` or ``"mm-N-s"``, to which a named ply and contact are converted;
+        those of a named ply's source by default.
+    patch : str or Patch or None
+        Area of the contact force: ``"disc"`` or ``"hertz"``, with ``":RADIUS"``, to which the mesh
+        of a rectangle is then refined; None is a point force.  By default a disc.
+    shear : str
+        Transverse shear: assumed strains, ``"mitc"``, or full quadrature, ``"full"``.
+    shear_factor : float or str
+        Factor of the transverse shear stiffness, or ``"equi"``, the stiffness from equilibrium.
+    in_plane : str, optional
+        Displacements u and v of a coupled laminate where the plate is supported: ``"held"``, the
+        default of edges; ``"free"``, that of fixtures; or ``"normal"``, held across the edge only.
+    gages : iterable of tuple
+        Place x, y and z from the mid-plane (length) and direction (degrees) of strain gages.
+    damage : bool
+        Add strengths and toughness of a named ply.
+    giic : float, optional
+        Toughness G_IIc of the delamination threshold, force/length; a named ply's by default.
+    title : str, optional
+        Title of the deck.
+
+    Returns
+    -------
+    Deck
+        It has no errors.
+
+    Raises
+    ------
+    ValueError
+        If something is missing or makes no sense.
+    DeckError
+        If the deck has errors.
+
+    Examples
+    --------
+    >>> import fecm
+    >>> deck = fecm.impact(
+    ...     fecm.Plate.rectangle((100, 80), (10, 8), support="simple"),
+    ...     fecm.Laminate("[0/90]2s", "T300/5208", 0.25),
+    ...     fecm.RigidMass(1e-3),
+    ...     fecm.Contact.estimate(radius=8),
+    ...     energy=500, duration=5e-4, units="mm-N-s",
+    ... )
+    >>> deck.control.numel
+    80
+    """
+    made = author(
+        Request(
+            plate,
+            laminate,
+            Strike(projectile, contact, velocity, energy, at),
+            Numerics(patch, shear, shear_factor, duration, dt, every),
+            units=units,
+            in_plane=in_plane,
+            gages=gages,
+            damage=damage,
+            giic=giic,
+            title=title,
+        )
+    )
+    loaded = load_deck(made.deck)
+    if errors := loaded.errors():
+        raise DeckError(errors, "<deck>")
+    for doubt in made.doubts:
+        warn(doubt)
+    return replace(loaded.problems[0].deck, text="")
+
+
+def author(asked: Request) -> Authored:
+    """Make the deck of a request without checking it."""
+    asked.check()
+    notes: list[str] = []
+    doubts: list[str] = []
+    fixture, test = asked.plate.fixture, asked.test
+    if test is not None and asked.units not in (None, STANDARD):
+        raise ObjectError(f"the fixture's standard is in {STANDARD}; leave out `units`")
+    plies = plies_of(asked.laminate, STANDARD if test else asked.units, notes)
+    strike, motion = asked.strike, _motion(asked, plies)
+    if fixture is not None and test is not None:
+        strike, motion = _prescribed(test, strike, motion, plies.layup.thickness)
+        if not test.allows(plies.layup.thickness):
+            doubts.append(_doubt_of_thickness(fixture.name, test, plies.layup.thickness))
+    patch = asked.numerics.contact_patch(prescribed=test is not None)
+    _check_complete(asked, strike, motion, plies.system)
+
+    law, comment = law_of(strike.contact, plies)
+    if comment:
+        notes.append(
+            f"k = {law.k:g} is estimated from the ply's constants (fecm indent estimate) for an "
+            "elastic law; a measured one is better"
+        )
+    damage = damages(plies, asked.giic, notes) if asked.damage else toughness(asked.giic)
+    mesh, node, patch = placed(asked.plate, plies.layup, strike.at, patch, doubts)
+    boundary, slides = supported(asked.plate, mesh, plies.is_coupled, asked.in_plane, notes)
+    segments = (
+        _units(asked, plies),
+        mesh.coordinates(),
+        mesh.element_cards(),
+        boundary,
+        _projectile(strike.projectile),
+        model.Impact(node, 3, 1.0 if motion.velocity is None else motion.velocity),
+        patch,
+        _gages(asked.gages),
+        *damage,
+        law,
+        asked.numerics.shear_segment(),
+        plies.segment(),
+    )
+    control = Control(mesh.nodes, mesh.elements, len(plies.layup.angles), 2, 5, mesh.most_nodes)
+    deck = model.Deck(asked.title, control, tuple(s for s in segments if s is not None), ())
+    dt = asked.numerics.time_step(deck)
+    if motion.energy is not None:
+        deck = _with_energy(deck, motion.energy)
+    notes.append(_energy_note(deck, asked, plies))
+    doubts += _doubts_of_energy(deck, asked, plies)
+    deck = asked.numerics.with_program(deck, dt, motion.duration)
+    comments = (fixture.comment if fixture else "") + slides + comment
+    return Authored(deck, comments, notes, doubts)
+
+
+def _check_kind(name: str, value: object, kind: type | UnionType) -> None:
+    """Refuse an argument that is no object of fecm."""
+    if not isinstance(value, kind):
+        raise ObjectError(f"`{name}` is {value!r}, not a {name} of fecm")
+
+
+def _check_choice(name: str, value: str | None, choices: Sequence[str | None]) -> None:
+    """Refuse a text that is none of the choices."""
+    if value not in choices:
+        known = ", ".join(choice for choice in choices if choice is not None)
+        raise ObjectError(f"`{name}` is {value!r}, none of {known}")
+
+
+def _motion(asked: Request, plies: Plies) -> Motion:
+    """Velocity, energy and duration in the units of the deck."""
+    strike, numerics, system = asked.strike, asked.numerics, plies.system
+    motion = Motion(
+        in_units("velocity", strike.velocity, "length/time", system),
+        in_units("energy", strike.energy, "force*length", system),
+        in_units("duration", numerics.duration, "time", system),
+    )
+    check_positive(
+        energy=motion.energy,
+        duration=motion.duration,
+        dt=numerics.dt,
+        every=numerics.every,
+        giic=asked.giic,
+        ply_thickness=plies.thickness,
+    )
+    return motion
+
+
+def _prescribed(
+    test: DropWeight, strike: Strike, motion: Motion, thickness: float
+) -> tuple[Strike, Motion]:
+    """What a standard has in place of what is not given."""
+    if motion.velocity is None and motion.energy is None:
+        motion = motion._replace(energy=test.energy * thickness)
+    contact = strike.contact
+    if contact in (None, Sphere()):
+        contact = Sphere(test.radius)
+    projectile = strike.projectile or RigidMass(test.mass)
+    return replace(strike, projectile=projectile, contact=contact), motion
+
+
+def _doubt_of_thickness(name: str, test: DropWeight, thickness: float) -> str:
+    """What a standard says about a laminate whose thickness is outside its range."""
+    limits = f"{test.thinnest:g} to {test.thickest:g} mm"
+    return f"{name} is for laminates of {limits}; this one has {thickness:.4g} mm"
+
+
+def _check_complete(asked: Request, strike: Strike, motion: Motion, system: str | None) -> None:
+    """Raise ObjectError if projectile, velocity or duration is missing."""
+    if strike.projectile is None and system not in (None, SYSTEM):
+        raise ObjectError(
+            "give `projectile`, a rigid mass or a rod: without it the projectile is the report's "
+            f"steel rod, whose numbers are in {SYSTEM}"
+        )
+    if (motion.velocity is None) == (motion.energy is None):
+        raise ObjectError("give either `velocity` or `energy`")
+    if motion.duration is None and asked.plate.fixture is None:
+        raise ObjectError("`duration` is missing")
+
+
+def _units(asked: Request, plies: Plies) -> model.Units | None:
+    """UNIT segment; the report's decks have none."""
+    if plies.system is None or (plies.system == SYSTEM and asked.units is None):
+        return None
+    return model.Units(*SYSTEMS[plies.system].values())
+
+
+def _projectile(projectile: AnyProjectile | None) -> model.Projectile | None:
+    """Segment of a projectile."""
+    if isinstance(projectile, Rod | RigidMass):
+        return projectile_segment(projectile)
+    return projectile
+
+
+def _gages(places: Iterable[GagePlace]) -> model.Gages | None:
+    """GAGE segment of strain gages, if there are any."""
+    try:
+        gages = tuple(Gage(n, *map(float, place)) for n, place in enumerate(places, start=1))
+    except (TypeError, ValueError):
+        raise ObjectError("`gages` are not x, y, z and degrees of each") from None
+    return model.Gages(gages) if gages else None
+
+
+def _energy_of(deck: model.Deck) -> float:
+    """Kinetic energy of the projectile."""
+    velocity, mass = deck.require(model.Impact).velocity, build_projectile(deck).total_mass
+    return 0.5 * mass * velocity**2
+
+
+def _energy_note(deck: model.Deck, asked: Request, plies: Plies) -> str:
+    """Say energy and velocity of the projectile."""
+    energy, velocity = _energy_of(deck), deck.require(model.Impact).velocity
+    names = SYSTEMS[plies.system] if plies.system else {}
+    joule = in_si("force*length", names)
+    said = f"{energy * joule:.4g} J" if joule else f"{energy:.4g}"
+    if asked.test is not None:
+        share = energy / plies.layup.thickness
+        said += f" ({share / 1e3:.3g} J per mm of thickness)"
+    speed = f"{velocity:.4g} {unit_of('length/time', names)}".rstrip()
+    return f"energy {said}, {speed}"
+
+
+def _doubts_of_energy(deck: model.Deck, asked: Request, plies: Plies) -> list[str]:
+    """Doubt an energy that is far below a standard's."""
+    fixture = asked.plate.fixture
+    if fixture is None or fixture.test is None:
+        return []
+    energy = _energy_of(deck)
+    share = energy / plies.layup.thickness
+    if share >= fixture.test.least_energy:
+        return []
+    return [
+        f"the energy is {energy / 1e3:.3g} J, {share / 1e3:.2g} J per mm of thickness, "
+        f"where {fixture.name} has {fixture.test.energy / 1e3:g}: `energy` is in mJ unless it has "
+        'a unit, as in "10J"'
+    ]
+
+
+def _with_energy(deck: model.Deck, energy: float) -> model.Deck:
+    """The deck with a velocity for an energy, in as many digits as its card has."""
+    mass = build_projectile(deck).total_mass
+    velocity = math.sqrt(2.0 * energy / mass) if mass > 0.0 else math.inf
+    if not 0.0 < velocity < math.inf:
+        raise ObjectError(f"no velocity gives the energy {energy:g} to the mass {mass:g}")
+    old = deck.require(model.Impact)
+    new = replace(old, velocity=float(f"{velocity:.6g}"))
+    return replace(deck, segments=tuple(new if s is old else s for s in deck.segments))

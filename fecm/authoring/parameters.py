@@ -1,0 +1,62 @@
+"""Numbers and units of parameters, and the error about them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from numbers import Real
+
+from fecm._errors import FecmError
+from fecm.deck.catalogue import SYSTEMS
+from fecm.deck.units import in_si, unit_in_si
+
+NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+
+# A value with a unit of a dimension, for messages.
+EXAMPLES = {"force*length": "10J", "length/time": "3m/s", "time": "4ms"}
+
+
+class ObjectError(FecmError, ValueError):
+    """Objects that make no deck; messages quote the names of parameters in backquotes."""
+
+
+def check_positive(**values: float | None) -> None:
+    """Refuse parameters that are not positive numbers; None is not given."""
+    for name, value in values.items():
+        if value is not None and not (isinstance(value, Real) and 0.0 < value < math.inf):
+            raise ObjectError(f"`{name}` is {value!r}; it must be a positive number")
+
+
+def in_units(
+    name: str, value: float | str | None, dimension: str, system: str | None
+) -> float | None:
+    """A parameter in a system of units; one that is a number or None stays as it is.
+
+    Raises ObjectError if a text, as in ``10J`` or ``3m/s``, is no positive number with a unit of
+    the dimension, or the system is not known.
+    """
+    if not isinstance(value, str):
+        return value
+    match = re.fullmatch(rf"\s*({NUMBER})\s*(\S.*)?", value)
+    unit = match[2] if match else None
+    known = unit_in_si(unit, dimension) if unit else 1.0
+    if match is None or known is None or not math.isfinite(float(match[1])):
+        raise ObjectError(
+            f"`{name}` is {value!r}, not a number or one with a unit, as in {EXAMPLES[dimension]}"
+        )
+    if unit is None:
+        return float(match[1])
+    own = in_si(dimension, SYSTEMS[system]) if system else None
+    if own is None:
+        raise ObjectError(f"`{name}` is {value!r}: give `units`, the deck's")
+    return float(f"{float(match[1]) * known / own:.9g}")
+
+
+def pair(name: str, value: Sequence[float]) -> tuple[float, float]:
+    """Two numbers of a parameter."""
+    try:
+        x, y = map(float, value)
+    except (TypeError, ValueError):
+        raise ObjectError(f"`{name}` is {value!r}, not two numbers") from None
+    return x, y

@@ -1,0 +1,204 @@
+"""Mesh and supports of a plate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field, replace
+from pathlib import Path
+from typing import Literal, Self
+
+from numpy.typing import ArrayLike
+
+from fecm._frozen import frozen
+from fecm.authoring.fixtures import Fixture, parse_fixture
+from fecm.authoring.parameters import ObjectError, check_positive, pair
+from fecm.deck import grid as grids
+from fecm.deck.grid import EDGES, SUPPORTS, Section
+from fecm.problem import plate_mesh
+from fecm.problem.plate_mesh import BOUNDARY, MeshLike, PlateMesh
+
+MOST = 2000  # elements in one direction
+# Elements of the window where the mesh does not give them, and their grading.
+WINDOW_MESH = (20, 12)
+WINDOW_GRADING = 3.0
+
+Support = Literal["free", "simple", "clamped"]
+
+
+@frozen
+class Plate:
+    """Mesh and supports of a plate.
+
+    :meth:`rectangle`, :meth:`on_fixture` and :meth:`from_mesh` make one.
+
+    Attributes
+    ----------
+    supports : dict
+        Support by the name of an edge or of a group.
+    size : tuple of float or None
+        Sides of a rectangle, or of a fixture's window, length.
+    mesh : tuple of int or None
+        Elements along x and y.
+    grading : float
+        Largest over smallest element.
+    columns, rows : tuple of Section
+        Elements along x and y one by one.
+    fixture : Fixture or None
+    imported : PlateMesh or None
+    """
+
+    supports: Mapping[str, str]
+    size: tuple[float, float] | None = None
+    mesh: tuple[int, int] | None = None
+    grading: float = 1.0
+    columns: tuple[Section, ...] = field(default=(), repr=False)
+    rows: tuple[Section, ...] = field(default=(), repr=False)
+    fixture: Fixture | None = None
+    imported: PlateMesh | None = None
+
+    @classmethod
+    def rectangle(
+        cls,
+        size: tuple[float, float] | None = None,
+        mesh: tuple[int, int] | None = None,
+        *,
+        support: Support = "free",
+        edges: Mapping[str, Support] | None = None,
+        grading: float = 1.0,
+        columns: str = "",
+        rows: str = "",
+    ) -> Self:
+        """Rectangle of elements with nine nodes, one corner at the origin.
+
+        Parameters
+        ----------
+        size : tuple of float
+            Sides along x and y, length.
+        mesh : tuple of int
+            Elements along x and y.
+        support : str
+            Support of all edges: ``"free"``, ``"simple"`` or ``"clamped"``.
+        edges : dict, optional
+            Support of single edges: ``"left"``, ``"right"``, ``"bottom"`` or ``"top"``.
+        grading : float
+            Largest over smallest element; the smallest is at the impact point.
+        columns, rows : str
+            Elements along x and y one by one, as in ``"3*0.5,8*0.375"``, instead of `size`, `mesh`.
+
+        Raises
+        ------
+        ValueError
+            If a value makes no sense.
+
+        Examples
+        --------
+        >>> import fecm
+        >>> fecm.Plate.rectangle((100, 80), (10, 8), edges={"left": "clamped"}).size
+        (100.0, 80.0)
+        """
+        supports = dict.fromkeys(EDGES, str(support)) | dict(edges or {})
+        for edge, kind in supports.items():
+            if edge not in EDGES or kind not in SUPPORTS:
+                raise ObjectError(
+                    f"{edge}={kind}: the edges are {', '.join(EDGES)}, the supports "
+                    f"{', '.join(SUPPORTS)}"
+                )
+        check_positive(grading=grading)
+        if grading < 1.0:
+            raise ObjectError(f"`grading` is {grading:g}; it must be 1 or more")
+        if columns and rows:
+            if size or mesh or grading != 1.0:
+                raise ObjectError("`columns` and `rows` replace `size`, `mesh` and `grading`")
+            try:
+                x_sections, y_sections = grids.listed(columns), grids.listed(rows)
+                return cls(supports, columns=tuple(x_sections), rows=tuple(y_sections))
+            except ValueError as error:
+                raise ObjectError(f"`columns` and `rows`: {error}") from None
+        if columns or rows or size is None or mesh is None:
+            raise ObjectError("give `size` and `mesh`, or `columns` and `rows`")
+        x, y = pair("size", size)
+        check_positive(size=min(x, y))
+        nx, ny = pair("mesh", mesh)
+        if not all(1 <= n <= MOST and n == int(n) for n in (nx, ny)):
+            raise ObjectError(f"`mesh` is {mesh!r}, not two numbers of elements from 1 to {MOST}")
+        return cls(supports, (x, y), (int(nx), int(ny)), float(grading))
+
+    @classmethod
+    def on_fixture(
+        cls, name: str, mesh: tuple[int, int] | None = None, *, grading: float | None = None
+    ) -> Self:
+        """Plate on the edges of a window; with a standard's name its test gives defaults.
+
+        Parameters
+        ----------
+        name : str
+            ``"D7136"`` or ``"window:LXxLY,WXxWY"``: sides of the plate and of the window.
+        mesh : tuple of int, optional
+            Elements of the window along x and y; 20 and 12 by default.
+        grading : float, optional
+            Largest over smallest element; 3 where `mesh` is not given, otherwise 1.
+
+        Raises
+        ------
+        ValueError
+            If the name or a value makes no sense.
+        """
+        fixture = parse_fixture(name)
+        ratio = grading or (WINDOW_GRADING if mesh is None else 1.0)
+        plain = cls.rectangle(fixture.window, mesh or WINDOW_MESH, grading=ratio)
+        return replace(plain, fixture=fixture)
+
+    @classmethod
+    def from_mesh(
+        cls,
+        mesh: str | Path | MeshLike | tuple[ArrayLike, ArrayLike],
+        support: Mapping[str, Support] | Support | None = None,
+        *,
+        groups: Mapping[str, ArrayLike] | None = None,
+    ) -> Self:
+        """Plate with the elements of a mesh generator.
+
+        All elements are triangles of 3 or 6 nodes, or all quadrilaterals of 4, 8 or 9.  They are
+        turned counter-clockwise, and nodes without an element dropped.  A triangle becomes three
+        quadrilaterals of 4 nodes; one of 8 nodes gets its centre.
+
+        Parameters
+        ----------
+        mesh : str, Path, meshio.Mesh or tuple of arrays
+            A file that meshio reads, such as Gmsh's `.msh`; or points (n, 2) and cells (m, k) with
+            points counted from 0.
+        support : dict or str, optional
+            Support by the name of a group of lines: ``"free"``, ``"simple"`` or ``"clamped"``.  The
+            group ``"boundary"``, or a single support, means all outer sides and those of holes
+            that are in no other group named here.  A group with the name of a support has it.
+        groups : dict, optional
+            Points of groups, for arrays.
+
+        Raises
+        ------
+        ValueError
+            If the mesh or a support cannot be used.
+        ImportError
+            If a file is given and meshio is not installed.
+        OSError
+            If the file can't be read.
+
+        Examples
+        --------
+        >>> import fecm
+        >>> corners = [(0, 0), (2, 0), (2, 1), (0, 1)]
+        >>> fecm.Plate.from_mesh((corners, [[0, 1, 2, 3]]), "clamped").supports
+        {'boundary': 'clamped'}
+        """
+        if isinstance(mesh, tuple):
+            found = plate_mesh.plate_mesh(mesh[0], mesh[1], groups or {})
+        elif groups is not None:
+            raise ObjectError("`groups` are for arrays; a mesh has its own")
+        elif isinstance(mesh, str | Path):
+            found = plate_mesh.read_mesh(mesh)
+        else:
+            found = plate_mesh.from_meshio(mesh)
+        wanted = {BOUNDARY: support} if isinstance(support, str) else support or {}
+        if not isinstance(wanted, Mapping):
+            raise ObjectError(f"`support` is {support!r}, not a dictionary of groups")
+        return cls(found.supports(wanted), imported=found)
