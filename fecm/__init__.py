@@ -62,31 +62,38 @@ __all__ = [
 ]
 
 if not TYPE_CHECKING:  # type checkers know the names from the imports above
-    _NAMES = {
-        "fecm.api": "read_one run run_one",
-        "fecm.authoring.contact": "Contact",
-        "fecm.authoring.impact": "impact",
-        "fecm.authoring.laminate": "Laminate",
-        "fecm.authoring.plate": "Plate",
-        "fecm.deck.findings": "DeckError",
-        "fecm.deck.model": "Deck",
-        "fecm.deck.reader": "read_deck",
-        "fecm.deck.records": "Ply",
-        "fecm.mechanics.plate_motion": "DivergenceError",
-        "fecm.mechanics.projectile": "RigidMass Rod",
-        "fecm.results.result": "Result load",
-        "fecm.sweeps.api": "sweep",
-        "fecm.sweeps.identify": "Identification identify",
-        "fecm.sweeps.result": "SweepResult load_sweep",
+    # Module of each name, and its name there.  They are imported on first access: `import fecm`
+    # takes 20 ms, and 900 ms with all of them.
+    _HOMES = {
+        "Contact": ("fecm.authoring.contact", "Contact"),
+        "Deck": ("fecm.deck.model", "Deck"),
+        "DeckError": ("fecm.deck.findings", "DeckError"),
+        "DivergenceError": ("fecm.mechanics.plate_motion", "DivergenceError"),
+        "Identification": ("fecm.sweeps.identify", "Identification"),
+        "Laminate": ("fecm.authoring.laminate", "Laminate"),
+        "Plate": ("fecm.authoring.plate", "Plate"),
+        "Ply": ("fecm.deck.records", "Ply"),
+        "Result": ("fecm.results.result", "Result"),
+        "RigidMass": ("fecm.mechanics.projectile", "RigidMass"),
+        "Rod": ("fecm.mechanics.projectile", "Rod"),
+        "SweepResult": ("fecm.sweeps.result", "SweepResult"),
+        "identify": ("fecm.sweeps.identify", "identify"),
+        "impact": ("fecm.authoring.impact", "impact"),
+        "load": ("fecm.results.result", "load"),
+        "load_sweep": ("fecm.sweeps.result", "load"),
+        "read_deck": ("fecm.deck.reader", "read_deck"),
+        "read_one": ("fecm.api", "read_one"),
+        "run": ("fecm.api", "run"),
+        "run_one": ("fecm.api", "run_one"),
+        "sweep": ("fecm.sweeps.api", "sweep"),
     }
-    _HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
     def __getattr__(name):
-        """Import a public name on first access, so that `import fecm` is fast."""
+        """Import a public name on first access."""
         if name not in _HOMES:
             raise AttributeError(f"module 'fecm' has no attribute {name!r}")
-        own = "load" if name == "load_sweep" else name
-        return getattr(_import_module(_HOMES[name]), own)
+        module, own = _HOMES[name]
+        return getattr(_import_module(module), own)
 
 
 def __dir__() -> list[str]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import logging
 import os
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +27,21 @@ def test_the_namespace_lists_the_public_names_and_nothing_else() -> None:
         assert getattr(fecm, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'runn'"):
         fecm.runn  # type: ignore[attr-defined]  # noqa: B018
+
+
+def test_each_public_name_is_what_a_type_checker_takes_it_for() -> None:
+    block = next(
+        node for node in ast.parse(inspect.getsource(fecm)).body if isinstance(node, ast.If)
+    )
+    assert ast.unparse(block.test) == "TYPE_CHECKING"
+    named: dict[str, object] = {}
+    for line in block.body:
+        assert isinstance(line, ast.ImportFrom)
+        module = import_module(str(line.module))
+        named |= {alias.asname or alias.name: getattr(module, alias.name) for alias in line.names}
+    assert len(named) > 20
+    for name, value in named.items():
+        assert getattr(fecm, name) is value
 
 
 def test_the_page_of_the_api_has_every_public_name() -> None:
