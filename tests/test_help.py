@@ -62,6 +62,17 @@ def test_a_help_page_ends_with_two_calls_that_the_command_takes(
             pass
 
 
+@pytest.mark.parametrize("name", ["new", "run", "sweep"])
+def test_a_command_of_many_options_shows_them_in_groups(name: str) -> None:
+    page = call(name, "--help").stdout
+    last = page.partition("\nOther options:\n")[2].partition("Typical calls:")[0]
+    ungrouped = {line.split()[0].strip(",") for line in last.splitlines() if line[:4].strip()}
+    assert "\nOptions:" not in page
+    assert len(ungrouped) <= 3
+    for option in found((name,)).params:
+        assert option.opts[-1] in page or isinstance(option, click.Argument)
+
+
 @pytest.mark.parametrize("group", ["indent", "waves", "rod"])
 def test_a_group_lists_whole_sentences(group: str) -> None:
     assert "..." not in call(group, "--help").stdout.partition("Commands:")[2]

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import click
 
@@ -17,11 +19,23 @@ from fecm.problem.problem import Problem
 from fecm.results.linear_plate import TOO_SOFT, UNSAFE, softness
 from fecm.results.metrics import RATIO
 from fecm.results.validity import Judge
+from fecm.studies.estimate import Estimate
 from fecm.studies.estimate import estimate as estimate_problem
 from fecm.sweeps.api import carry_out
 from fecm.sweeps.plan import plan
 
-Row = tuple[str, float, float, float, float]  # name, peak, duration, threshold and velocity
+
+class Row(NamedTuple):
+    """A row of the table: a model without a mesh, or the run itself."""
+
+    name: str
+    peak: float
+    duration: float
+    threshold: float
+    velocity: float  # at which the peak reaches the threshold
+    energy: float  # of this velocity
+    applies: bool  # whether the impact is in the range of the model
+
 
 # Columns of the table, and their dimensions.
 COLUMNS = {
@@ -50,13 +64,20 @@ def estimate(deck: Path, form: Format) -> None:
     """
     problem = load_single(deck, "estimate")
     found = estimate_problem(problem)
-    models = [
-        (m.name, m.impact.peak, m.impact.duration, m.threshold, m.velocity) for m in found.models
+    rows = [
+        Row(
+            model.name,
+            model.impact.peak,
+            model.impact.duration,
+            model.threshold,
+            model.velocity,
+            0.5 * found.mass * model.velocity**2,
+            model.applies,
+        )
+        for model in found.models
     ]
-    own, bent, doubts = _run_itself(problem)
-    models.append(own)
-    # A model's name, peak, duration, threshold and velocity; then the energy.
-    rows = [(*model, 0.5 * found.mass * model[-1] ** 2) for model in models]
+    own, bent, doubts = _run_itself(problem, found.mass)
+    rows.append(own)
     static, judge = found.models[-1], problem.judge
     bent = [
         *_bent("the static plate", static.impact.peak / found.stiffness, judge),
@@ -66,44 +87,56 @@ def estimate(deck: Path, form: Format) -> None:
     if bent:
         note(f"beyond {judge.limit} h {TOO_SOFT}; {UNSAFE}", *bent)
     note(*doubts)
-    applies = [*(model.applies for model in found.models), True]  # the run always does
     if form is Format.JSON:
-        named = [dict(zip(("model", *COLUMNS), row, strict=True)) for row in rows]
-        echo_json(
-            {
-                "class": found.response,
-                "mass_ratio": found.mass_ratio,
-                "lambda": found.parameter,
-                "stiffness": found.stiffness,
-                "models": [
-                    {**row, "applies": one} for row, one in zip(named, applies, strict=True)
-                ],
-            }
-        )
-        return
+        echo_json(_document(found, rows))
+    else:
+        echo("\n".join(_page(problem, found, rows)))
+
+
+def _document(found: Estimate, rows: Sequence[Row]) -> dict[str, object]:
+    """JSON of an estimate."""
+    models = []
+    for row in rows:
+        values = dict(zip(COLUMNS, row[1:-1], strict=True))
+        models.append({"model": row.name, **values, "applies": row.applies})
+    return {
+        "class": found.response,
+        "mass_ratio": found.mass_ratio,
+        "lambda": found.parameter,
+        "stiffness": found.stiffness,
+        "models": models,
+    }
+
+
+def _page(problem: Problem, found: Estimate, rows: Sequence[Row]) -> list[str]:
+    """Lines about an estimate."""
     names = unit_names(problem.deck)
 
     def text(value: float, dimension: str, missing: str = "-") -> str:
         return missing if math.isnan(value) else quantity(value, unit_of(dimension, names), 5)
 
-    echo(problem.deck.title or "(no title)")
-    echo(f"  class       M/M_plate = {found.mass_ratio:.4g}, {found.response}")
-    echo(f"  lambda      {found.parameter:.4g}")
     free = " (the plate is free: no static model)" if math.isnan(found.stiffness) else ""
-    echo(f"  stiffness   {text(found.stiffness, 'force/length')}{free}")
+    lines = [
+        f"class       M/M_plate = {found.mass_ratio:.4g}, {found.response}",
+        f"lambda      {found.parameter:.4g}",
+        f"stiffness   {text(found.stiffness, 'force/length')}{free}",
+    ]
     if problem.damping:
-        echo("  damping     in the run only: the models without a mesh neglect DAMP")
+        lines.append("damping     in the run only: the models without a mesh neglect DAMP")
     table = [["model", *(name.replace("_", " ") for name in COLUMNS)]]
-    for (name, *numbers), fits in zip(rows, applies, strict=True):
-        marked = name if fits else f"{name} (out of range)"
+    for row in rows:
+        marked = row.name if row.applies else f"{row.name} (out of range)"
+        numbers = row[1:-1]
         # Of the models the duration is known, of the run only if its contact ends.
         missing = ["open", "open", *["-"] * (len(numbers) - 2)]
         table.append([marked, *map(text, numbers, COLUMNS.values(), missing)])
-    for line in aligned(table):
-        echo(f"  {line}")
+    return [
+        problem.deck.title or "(no title)",
+        *(f"  {line}" for line in (*lines, *aligned(table))),
+    ]
 
 
-def _run_itself(problem: Problem) -> tuple[Row, list[str], list[str]]:
+def _run_itself(problem: Problem, mass: float) -> tuple[Row, list[str], list[str]]:
     """Row of the run itself, by the kernel of sweeps, its deflections, and what is open in it."""
     own = carry_out(problem, plan(problem, [{}]))
     swept, doubts = {"the run": own}, []
@@ -118,7 +151,9 @@ def _run_itself(problem: Problem) -> tuple[Row, list[str], list[str]]:
     doubts += [f"{name}: {one['status'][0]}" for name, one in swept.items() if not one.fine.all()]
     h, judge = problem.judge.thickness, problem.judge
     bent = [text for name, one in swept.items() for text in _bent(name, one[RATIO][0] * h, judge)]
-    return ("run", peak, duration, threshold, velocity), bent, doubts
+    energy = 0.5 * mass * velocity**2
+    row = Row("run", peak, duration, threshold, velocity, energy, applies=True)
+    return row, bent, doubts
 
 
 def _bent(where: str, deflection: float, judge: Judge) -> list[str]:
