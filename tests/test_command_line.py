@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from fecm.problem import slips
-from tests.calls import call, program
+from tests.calls import assert_unusable, call, program
 from tests.decks import APPENDIX, DATA_CARDS, ROOT, small
 
 
@@ -252,3 +252,13 @@ def test_a_limit_that_is_no_number_is_refused(option: str, value: str, deck: Pat
     assert done.exit_code == 2
     assert f"Invalid value for '{option}'" in done.stderr
     assert [path.name for path in deck.parent.iterdir()] == ["small.inp"]
+
+
+def test_a_solver_that_is_not_installed_is_refused_in_one_line(
+    deck: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fecm.problem.build.LIBRARY", None)
+    done = call("run", deck, "--solver", "kernels", cwd=deck.parent)
+    assert_unusable(done)
+    assert "no compiled kernels; take the solver numpy" in done.stderr
+    assert not deck.with_suffix(".h5").exists()
