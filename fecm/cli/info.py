@@ -24,22 +24,12 @@ from fecm.results.result import result_of
 from fecm.results.schema import Form, declared_units
 from fecm.results.summary import about_run
 
-# Attributes of the file with lines of their own.
-HEADING = (
-    "title",
-    "mode",
-    "slips",
-    "fecm_version",
-    "format",
-    "format_version",
-    "unit_length",
-    "unit_force",
-    "unit_time",
-    "notes",
-)
+# Attributes of the file that are keys of the JSON output, of runs and of sweeps.
+RUN_KEYS = ("title", "mode", "slips", "fecm_version", "format", "format_version")
+SWEEP_KEYS = ("title", "fecm_version", "format", "format_version")
 
-# Those that are keys of the JSON output, of runs and of sweeps.
-RUN_KEYS, SWEEP_KEYS = HEADING[:6], ("title", "fecm_version", "format", "format_version")
+# Attributes of the file with lines of their own.
+HEADING = (*RUN_KEYS, "unit_length", "unit_force", "unit_time", "notes")
 
 PERMANENT = "permanent_indentation"
 

@@ -41,9 +41,12 @@ from fecm.cli.interrupts import SIGNALLED, SIGNALS
 from fecm.cli.streams import standard_error
 
 GB = 10**9
-ROOM, ROOM_A_BYTE = 4 * GB, 50
-PATIENCE, SPEED = 30.0, 5_000_000
-TOTAL, TOTAL_SPEED = 600.0, 100_000
+ROOM = 4 * GB
+ROOM_A_BYTE = 50
+PATIENCE = 30.0
+SPEED = 5_000_000
+TOTAL = 600.0
+TOTAL_SPEED = 100_000
 FREE_SHARE = 0.75
 PR_SET_PDEATHSIG = 1  # prctl(2): signal of this process when its parent ends
 WAIT = 0.1  # time between two looks at the child (s)
