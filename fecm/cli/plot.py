@@ -102,9 +102,8 @@ class PictureOptions:
     "--at",
     type=list_of("X,Y", Finite(), [2]),
     multiple=True,
-    help="Point of strain (may be repeated), thickness or mesh.  [default of strain: the "
-    "contact patch, or the nearest point at least the thickness away from a point force; "
-    "of thickness: where |sigma_1| is largest]",
+    help="Point of strain (may be repeated), thickness or mesh.  [default of strain: the point "
+    "with the largest bending strain outside the load; of thickness: where |sigma_1| is largest]",
 )
 @option(
     "--gage",
