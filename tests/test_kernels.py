@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import ctypes
+import itertools
 import shutil
 import subprocess
 import sysconfig
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 
 import h5py
@@ -16,11 +16,17 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.mechanics import kernels
-from fecm.mechanics.impact_steps import Modes
+from fecm.mechanics import failure, impact, kernels
+from fecm.mechanics.contact_law import RELOADING, UNLOADING, VIRGIN
+from fecm.mechanics.impact_steps import COLUMNS, LawKind
+from fecm.mechanics.impact_sweep import Found, Given
 from fecm.mechanics.interpolation import NDOF
+from fecm.mechanics.kernels.element_groups import ElementKind
+from fecm.mechanics.kernels.layout import LANES
 from fecm.mechanics.kernels.plate import CompiledProduct
+from fecm.mechanics.kernels.strains import Strains
 from fecm.mechanics.projectile import Rod, RodState, WilsonStep
+from fecm.mechanics.rod_modes import Modes
 from fecm.mechanics.stiffness_product import stiffness_operator
 from fecm.problem.build import RunOptions, build_model
 from fecm.problem.problem import Problem
@@ -29,7 +35,6 @@ from fecm.results.result import Result
 from fecm.simulation.checkpoint import Checkpointer
 from fecm.simulation.run import run
 from fecm.simulation.simulation import Simulation
-from fecm.sweeps.responses import FOUND
 from tests.builders import distorted_square, square
 from tests.calls import call
 from tests.decks import small
@@ -70,7 +75,7 @@ def assert_same_product(text: str, dofs: int, slips: frozenset[str]) -> None:
 @pytest.mark.parametrize("coupled", [False, True])
 def test_the_product_is_numpys_for_every_family_and_rule(kind: int, coupled: bool) -> None:
     meshes = square(8, 8, kind), distorted_square(5, 4, kind)
-    for mesh, orders, variant in product(
+    for mesh, orders, variant in itertools.product(
         meshes, ((3, 3, 3), (4, 2, 3)), ("", "SHEA MITC", "jacobian")
     ):
         if variant == "SHEA MITC" and kind not in (4, 9):
@@ -207,16 +212,70 @@ def test_the_modes_of_a_rod_take_the_step_of_its_matrices(elements: int, tapered
         np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-9 * np.abs(wanted).max())
 
 
+class Entry(ctypes.Structure):
+    """Entry of a table of fields.h."""
+
+    _fields_ = [
+        ("owner", ctypes.c_char_p),
+        ("name", ctypes.c_char_p),
+        ("offset", ctypes.c_int64),
+        ("size", ctypes.c_int64),
+    ]
+
+
+def entries(address: int) -> dict[tuple[str, str], tuple[int, int]]:
+    """Offset and size by owner and name, up to the empty entry at the end of a table."""
+    found = {}
+    table = ctypes.cast(address, ctypes.POINTER(Entry))
+    for place in itertools.count():
+        entry = table[place]
+        if entry.owner is None:
+            break
+        found[entry.owner.decode(), entry.name.decode()] = entry.offset, entry.size
+    return found
+
+
 @compiled
-def test_the_structures_of_python_have_the_sizes_of_those_in_c() -> None:
-    sizes = (ctypes.c_int64 * 11)()
-    kernels.LIBRARY.fecm_sizes(sizes)
-    structures = (
-        kernels.Group, kernels.Block, kernels.Chunk, kernels.Plate, kernels.Impact,
-        kernels.Strains, kernels.Sweep, kernels.Failure,
-    )  # fmt: skip
-    counts = [len(kernels.COLUMNS), 6, len(FOUND)]
-    assert list(sizes) == [*map(ctypes.sizeof, structures), *counts]
+def test_the_structures_of_python_lie_as_those_of_c() -> None:
+    expected = {}
+    structures = {kind.__name__: kind for kind in kernels.Structure.__subclasses__()}
+    for name, kind in structures.items():
+        expected[name, ""] = 0, ctypes.sizeof(kind)
+        for field, *_ in kind._fields_:
+            at = getattr(kind, field)
+            expected[name, field] = at.offset, at.size
+    found = entries(kernels.LIBRARY.fecm_fields())
+    assert len(structures) == 13
+    assert found == expected
+
+
+@compiled
+def test_the_enumerations_of_python_have_the_values_of_those_in_c() -> None:
+    enumerations = (ElementKind, LawKind, Given, Found)
+    expected = {(kind.__name__, one.name): one.value for kind in enumerations for one in kind}
+    branches = {"VIRGIN": VIRGIN, "UNLOADING": UNLOADING, "RELOADING": RELOADING}
+    expected |= {("Branch", name): branch for name, branch in branches.items()}
+    expected |= {("Column", name.upper()): place for place, name in enumerate(COLUMNS)}
+    counts = {
+        "COLUMNS": len(COLUMNS),
+        "GIVEN": len(Given),
+        "FOUND": len(Found),
+        "LANES": LANES,
+        "CRITERIA": len(failure.CRITERIA),
+        "PASSES": impact.PASSES,
+    }
+    expected |= {("Count", name): count for name, count in counts.items()}
+    found = entries(kernels.LIBRARY.fecm_constants())
+    assert {key: value for key, (value, _) in found.items()} == expected
+
+
+def test_a_structure_takes_arrays_of_its_types_in_c_order() -> None:
+    table = np.zeros((2, 3, 4))
+    assert Strains(table=table).table[5] == 0.0
+    with pytest.raises(TypeError, match="LP_c_double"):
+        Strains(table=table.astype(np.int64))
+    with pytest.raises(ValueError, match="not in C order"):
+        Strains(table=table[:, :2])
 
 
 @compiled

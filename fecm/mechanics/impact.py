@@ -107,7 +107,7 @@ class ImpactSystem:
         if not math.isfinite(state.contact.indentation + state.contact.force):
             raise DivergenceError(step, "the motion is no longer finite")
 
-    def _rod_step(self, dt: float) -> RodIntegrator:
+    def rod_step(self, dt: float) -> RodIntegrator:
         """Linear map of the rod for a time step, computed when the step changes."""
         if self._step is None or self._step.dt != dt:
             if not self.contact.keeps_first_step or self.first_dt is None:
@@ -118,7 +118,7 @@ class ImpactSystem:
     def move_projectile(self, state: ImpactState, dt: float) -> None:
         """Advance projectile and contact to the plate's time."""
         w = self.contact.load.dot(state.plate.padded) if self.contact.plate_moves else 0.0
-        couple_step(self._rod_step(dt), self.law, state, w)
+        couple_step(self.rod_step(dt), self.law, state, w)
 
 
 def couple_step(step: TipStep, law: Law, state: ContactState, w: Number) -> None:

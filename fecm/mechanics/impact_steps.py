@@ -1,20 +1,23 @@
 """Many impact steps in one call of the compiled kernels.
 
-The projectile moves in its natural modes, of which the first is the rigid motion.  State before and
-after is that of :mod:`fecm.mechanics.impact`.
+In: a state of :mod:`fecm.mechanics.impact` and a number of steps.  Out: the state after them, and
+the records of each step, :class:`Burst`.  The projectile moves in its natural modes
+(:mod:`~fecm.mechanics.rod_modes`), of which the first is the rigid motion.
 """
 
 from __future__ import annotations
 
 import ctypes
+from ctypes import c_double, c_int64
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from fecm._typing import Floats, Indices
 from fecm.mechanics.contact_law import (
+    ContactParameters,
     ContactPoint,
     HystereticLaw,
     LinearPermanent,
@@ -22,94 +25,177 @@ from fecm.mechanics.contact_law import (
     YangSunPermanent,
 )
 from fecm.mechanics.impact import ImpactState, ImpactSystem
-from fecm.mechanics.kernels import COLUMNS, LIBRARY, Impact, Longs, floats
+from fecm.mechanics.kernels import LIBRARY, Doubles, Longs, Structure
 from fecm.mechanics.kernels.plate import CompiledProduct
 from fecm.mechanics.plate_motion import DivergenceError, DofSums, PlateState, PointLoad, Sums
-from fecm.mechanics.projectile import RodIntegrator, RodState
+from fecm.mechanics.rod_modes import Modes
 
-# Difference of squares of frequencies below which modes count as equal, relative to the largest.
-EQUAL = 1e-10
+# Records of a step, in the order of structures.h.
+COLUMNS = (
+    "time",
+    # Inner products of the plate's state: d M d, d K u, u K u, and K u with s.
+    "inertia",
+    "power",
+    "strain",
+    "internal",
+    # d and s under the load.
+    "load_d",
+    "load_s",
+    "force",
+    "indentation",
+    "plate_w",
+    "contact_work",
+    # Motion of the projectile's tip.
+    "displacement",
+    "velocity",
+    "acceleration",
+    "projectile_kinetic",
+    "projectile_strain",
+    "station",  # deformation of the projectile at the dof of :class:`ImpactSteps`
+)
 
 
 class LawKind(IntEnum):
-    """Permanent indentation of a contact law, as impact.h numbers it."""
+    """Permanent indentation of a contact law."""
 
     LINEAR = 0  # equation 3-8
     YANG_SUN = 1  # equation 3-7
 
 
-# Kind, critical indentation and slope of the laws that the kernels know.
-LAWS: dict[type, Any] = {
-    LinearPermanent: lambda law: (LawKind.LINEAR, law.alpha_p, law.s_p),
-    YangSunPermanent: lambda law: (LawKind.YANG_SUN, law.alpha_cr, 0.0),
-}
+class KernelLaw(NamedTuple):
+    """Permanent indentation of a law that the kernels know."""
+
+    kind: LawKind
+    critical: float  # alpha_p or alpha_cr, length
+    slope: float  # s_p of equation 3-8
 
 
-@dataclass(frozen=True)
-class Modes:
-    """Natural modes of a projectile, of unit modal mass; the first is its rigid motion."""
+class Law(Structure):
+    """Constants of the contact law."""
 
-    shapes: Floats  # (n, modes)
-    stiffness: Floats  # (modes,): square of the angular frequency; 0 for the rigid motion
-    weights: Floats  # (n, modes): the mass matrix times the shapes
+    _fields_ = (
+        ("k", c_double),  # force/length^1.5
+        ("q", c_double),
+        ("critical", c_double),  # length
+        ("slope", c_double),
+        ("kind", c_int64),  # a LawKind
+    )
 
-    @classmethod
-    def of(cls, K: Floats, m: Floats) -> Modes:
-        """Modes of a free projectile with the dofs u and du/dx of its nodes."""
-        M = np.diag(m) if m.ndim == 1 else m
-        inverse = np.linalg.inv(np.linalg.cholesky(M))
-        values, vectors = np.linalg.eigh(inverse @ K @ inverse.T)
-        # One Newton step in extended precision: the errors of a low mode are relative to the
-        # largest frequency (T. Ogita and K. Aishima, Iterative refinement for symmetric
-        # eigenvalue decomposition, 2018).  Modes of equal frequency are only made orthogonal.
-        V = (inverse.T @ vectors).astype(np.longdouble)
-        overlap, S = np.eye(len(m)) - V.T @ M @ V, V.T @ K @ V
-        exact = np.diagonal(S) / (1.0 - np.diagonal(overlap))
-        gap = exact - exact[:, None]
-        far = abs(gap) > EQUAL * values[-1]
-        change = np.where(far, S + overlap * exact, overlap) / np.where(far, gap, 2.0)
-        shapes, values = (V + V @ change).astype(float), exact.astype(float)
-        rigid = np.zeros(len(m))
-        rigid[::2] = 1.0
-        shapes[:, 0] = rigid / np.sqrt(rigid @ M @ rigid)
-        values[0] = 0.0
-        return cls(shapes, values, M @ shapes)
 
-    def motion(self, state: RodState) -> Floats:
-        """Motion of the modes, (3, modes), without the rigid displacement."""
-        y = np.stack([state.deformation, state.velocity, state.acceleration])
-        rigid = y @ self.weights[:, 0]
-        # Without it, its rounding does not reach the other modes.
-        modal = (y - rigid[:, None] * self.shapes[:, 0]) @ self.weights
-        modal[:, 0] = rigid
-        modal[0, 0] = 0.0
-        return np.ascontiguousarray(modal)
+class History(Structure):
+    """:class:`~fecm.mechanics.contact_law.LoadingHistory`, by the same names."""
 
-    def state(self, motion: Floats, tip: float, moved: float) -> RodState:
-        """State with a motion of the modes and a displacement of the tip; `moved` in the step."""
-        y = motion @ self.shapes.T
-        y[0, ::2] -= y[0, 0]
-        y[0, 0] = moved
-        return RodState(y, tip)
+    _fields_ = tuple((name, c_double) for name in LoadingHistory._fields)
 
-    def step(self, integrator: RodIntegrator) -> tuple[Floats, Floats]:
-        """Matrices (9, modes) and motion per tip force (3, modes) of a step, as an integrator's."""
-        theta, r, dt = integrator.theta, integrator.inverse_beta, integrator.dt
-        a0, a2 = r / (theta * dt) ** 2, r / (theta * dt)
-        a4 = a0 / theta
-        effective = 1.0 / (self.stiffness + a0)
-        one, none = np.ones_like(effective), np.zeros_like(effective)
-        acceleration = np.stack([
-            -a4 * effective * self.stiffness,
-            a4 * a2 * effective - a2 / theta,
-            (r / 2.0 - 1.0) * a4 * effective + 1.0 - r / 2.0 / theta,
-        ])  # fmt: skip
-        gain = a4 * effective * self.shapes[0]
-        before, after = integrator.weights
-        velocity = np.stack([none, one, dt / 2.0 * one]) + dt / 2.0 * acceleration
-        moved = np.stack([one, dt * one, before * one]) + after * acceleration
-        T = np.concatenate([moved, velocity, acceleration])
-        return T, np.stack([after * gain, dt / 2.0 * gain, gain])
+
+class Point(Structure):
+    """:class:`~fecm.mechanics.contact_law.ContactPoint`, by the same names."""
+
+    _fields_ = tuple((name, c_double) for name in ContactPoint._fields)
+
+
+class Rod(Structure):
+    """Projectile, and its step as in :class:`~fecm.mechanics.projectile.RodIntegrator`.
+
+    The arrays:
+
+    ============  ============  ===============================================================
+    `T`           (9, modes)    new displacement, velocity and acceleration from the last ones
+    `h`           (3, modes)    the same per force on the tip
+    `stiffness`   (modes,)      squares of the angular frequencies
+    `tip_shape`   (modes,)      displacement of the tip
+    `station`     (modes,)      deformation at the station
+    `motion`      (3, modes)    displacement, velocity and acceleration; changed
+    ============  ============  ===============================================================
+    """
+
+    _fields_ = (
+        ("dt", c_double),
+        ("theta", c_double),  # time of equilibrium, as a fraction of the step
+        # Tip displacement per acceleration at the start and at the end of the step.
+        ("weight_before", c_double),
+        ("weight", c_double),
+        ("gain", c_double),  # tip acceleration per force
+        ("modes", c_int64),
+        ("T", Doubles),
+        ("h", Doubles),
+        ("stiffness", Doubles),
+        ("tip_shape", Doubles),
+        ("station", Doubles),
+        ("motion", Doubles),
+        ("tip", c_double),  # displacement of the tip; changed
+    )
+
+
+class Impact(Structure):
+    """Contact, projectile, load, gages, and records of the steps.
+
+    The arrays, with those that the kernel writes last:
+
+    ==============  ====================  =====================================================
+    `entry`         (loaded,)             entries of the plate's vectors under the force
+    `weight`        (loaded,)             their shares of the force
+    `mobility`      (loaded,)             acceleration per force
+    `gage_entry`    (gages, gage_dofs)    entries of the plate's vectors that a gage sums
+    `gage_weight`   (gages, gage_dofs)    strain per displacement
+    `stored`        (rows,)               steps, from 0, after which u is stored
+    `last`          (loaded,)             increment of the step under the force
+    `records`       (steps, columns)      see :data:`COLUMNS`
+    `strains`       (steps, gages)        strains of the gages
+    `fields`        (rows, entries)       u of the stored steps
+    ==============  ====================  =====================================================
+    """
+
+    _fields_ = (
+        ("law", Law),
+        # State before the steps, and after them.
+        ("memory", History),
+        ("contact", Point),
+        ("plate_w", c_double),  # the plate's displacement in the contact law
+        ("work", c_double),  # of the contact force on the indentation
+        ("time", c_double),
+        ("unconverged", c_int64),  # steps whose contact iteration did not converge
+        ("rod", Rod),
+        ("dt2", c_double),  # square of the plate's time step
+        ("loaded", c_int64),
+        ("entry", Longs),
+        ("weight", Doubles),
+        ("mobility", Doubles),
+        ("last", Doubles),
+        ("gages", c_int64),
+        ("gage_dofs", c_int64),
+        ("gage_entry", Longs),
+        ("gage_weight", Doubles),
+        ("rows", c_int64),
+        ("stored", Longs),
+        ("records", Doubles),
+        ("strains", Doubles),
+        ("fields", Doubles),
+    )
+
+
+class Written(NamedTuple):
+    """Arrays that the kernel writes; see :class:`Rod` and :class:`Impact`."""
+
+    motion: Floats
+    records: Floats
+    strains: Floats
+    fields: Floats
+
+
+def knows(constants: ContactParameters) -> bool:
+    """Whether the kernels have a law with these constants; one of a subclass is another law."""
+    return type(constants) in (LinearPermanent, YangSunPermanent)
+
+
+def kernel_law(constants: ContactParameters) -> KernelLaw:
+    """Permanent indentation of a law that the kernels have; see :func:`knows`."""
+    match constants:
+        case LinearPermanent():
+            return KernelLaw(LawKind.LINEAR, constants.alpha_p, constants.s_p)
+        case YangSunPermanent():
+            return KernelLaw(LawKind.YANG_SUN, constants.alpha_cr, 0.0)
+    raise TypeError(f"the kernels have no law of {type(constants).__name__}")
 
 
 @dataclass(frozen=True)
@@ -127,7 +213,7 @@ def supports(system: ImpactSystem) -> bool:
     return (
         isinstance(motion.product, CompiledProduct)
         and isinstance(law, HystereticLaw)
-        and type(law.constants) in LAWS
+        and knows(law.constants)
         and contact.plate_moves
         and not contact.keeps_first_step
         and contact.share == 1.0
@@ -159,7 +245,6 @@ class ImpactSteps:
             entry, weights, mobility = position[load.equations], load.weights, load.mobility
         self._entry = np.ascontiguousarray(entry, dtype=np.int64)
         self._weights, self._mobility = map(np.ascontiguousarray, (weights, mobility))
-        self._last = np.empty(len(entry))
         self._gage_entry = np.zeros((0, 0), dtype=np.int64)
         self._gage_weights = np.zeros((0, 0))
         if gages is not None:
@@ -170,58 +255,83 @@ class ImpactSteps:
 
         Raises DivergenceError if the motion is no longer finite.
         """
-        system, plate, kernel = self._system, state.plate, self._plate
-        integrator = system._rod_step(dt)
-        T, h = self._modes.step(integrator)
-        motion = self._modes.motion(state.rod)
-        law: Any = system.law
-        c = law.constants
-        kind, critical, slope = LAWS[type(c)](c)
-        rows = np.ascontiguousarray(stored, dtype=np.int64)
-        records = np.empty((steps, len(COLUMNS)))
-        strains = np.empty((steps, len(self._gage_entry)))
-        fields = np.empty((len(rows), len(kernel.u)))
-        m: LoadingHistory = state.memory
-        impact = Impact(
-            c.k, c.q, critical, slope, kind, *m,
-            *state.contact, state.plate_w, state.contact_work, plate.time,
-            int(state.unconverged_steps), integrator.dt, integrator.theta, *integrator.weights,
-            integrator.gain, len(self._tip_shape), floats(T), floats(h),
-            floats(self._modes.stiffness), floats(self._tip_shape), floats(self._station),
-            floats(motion), state.rod.tip, plate.dt2,
-            len(self._entry), self._entry.ctypes.data_as(Longs), floats(self._weights),
-            floats(self._mobility), floats(self._last),
-            *self._gage_entry.shape, self._gage_entry.ctypes.data_as(Longs),
-            floats(self._gage_weights),
-            len(rows), rows.ctypes.data_as(Longs), floats(records), floats(strains), floats(fields),
-        )  # fmt: skip
+        plate = state.plate
+        written = Written(
+            motion=self._modes.motion(state.rod),
+            records=np.empty((steps, len(COLUMNS))),
+            strains=np.empty((steps, len(self._gage_entry))),
+            fields=np.empty((len(stored), len(self._plate.u))),
+        )
+        impact = self._impact(state, dt, stored, written)
         self._enter(plate, dt)
         taken = LIBRARY.fecm_impact_steps(
-            ctypes.byref(kernel.structure), ctypes.byref(impact), ctypes.c_int64(steps),
-            ctypes.c_int64(self._threads),
-        )  # fmt: skip
+            ctypes.byref(self._plate.structure), ctypes.byref(impact), steps, self._threads
+        )
         if taken < 0:
             raise MemoryError
         if taken < steps:
             raise DivergenceError(plate.step + taken + 1, "the motion is no longer finite")
-        self._leave(plate)
-        columns = dict(zip(COLUMNS, records.T, strict=True))
+        columns = dict(zip(COLUMNS, written.records.T, strict=True))
+        tips = columns["displacement"]
+        moved = float(tips[-1] - (tips[-2] if steps > 1 else state.rod.tip))
+        state.rod = self._modes.state(written.motion, impact.rod.tip, moved)
+        self._leave(state, impact)
         names = ("inertia", "power", "strain", "internal")
         inertia, power, strain, internal = (columns[name][-1].item() for name in names)
         plate.sums = Sums(inertia, power, strain, internal, 0.0, 0.0)
-        plate.step, plate.time = plate.step + steps, impact.time
-        tips = columns["displacement"]
-        moved = tips[-1] - (tips[-2] if steps > 1 else state.rod.tip)
-        state.rod = self._modes.state(motion, impact.tip, float(moved))
-        memory = (getattr(impact, name) for name in LoadingHistory._fields[1:])
-        state.memory = LoadingHistory(int(impact.branch), *memory)
-        state.contact = ContactPoint(impact.indentation, impact.force)
-        state.plate_w, state.contact_work = impact.plate_w, impact.work
-        state.unconverged_steps = impact.unconverged
+        plate.step += steps
         columns["step"] = np.arange(plate.step - steps + 1, plate.step + 1, dtype=float)
         columns["plate_kinetic"] = self._kinetic(columns, plate.dt2)
         columns["plate_strain"] = 0.5 * columns["strain"]
-        return Burst(columns, strains, self._product.fields(fields))
+        return Burst(columns, written.strains, self._product.fields(written.fields))
+
+    def _impact(self, state: ImpactState, dt: float, stored: Indices, written: Written) -> Impact:
+        """What the kernel needs besides the plate, and where it writes."""
+        law = self._system.law
+        assert isinstance(law, HystereticLaw)  # as `supports` has found
+        integrator = self._system.rod_step(dt)
+        T, h = self._modes.step(integrator)
+        rod = Rod(
+            dt=integrator.dt,
+            theta=integrator.theta,
+            weight_before=integrator.weights[0],
+            weight=integrator.weights[1],
+            gain=integrator.gain,
+            modes=len(self._tip_shape),
+            T=T,
+            h=h,
+            stiffness=self._modes.stiffness,
+            tip_shape=self._tip_shape,
+            station=self._station,
+            motion=written.motion,
+            tip=state.rod.tip,
+        )
+        gages, gage_dofs = self._gage_entry.shape
+        return Impact(
+            law=Law(k=law.constants.k, q=law.constants.q, **kernel_law(law.constants)._asdict()),
+            memory=History(**state.memory._asdict()),
+            contact=Point(**state.contact._asdict()),
+            plate_w=state.plate_w,
+            work=state.contact_work,
+            time=state.plate.time,
+            unconverged=int(state.unconverged_steps),
+            rod=rod,
+            dt2=state.plate.dt2,
+            loaded=len(self._entry),
+            entry=self._entry,
+            weight=self._weights,
+            mobility=self._mobility,
+            last=np.empty(len(self._entry)),
+            gages=gages,
+            gage_dofs=gage_dofs,
+            gage_entry=self._gage_entry,
+            gage_weight=self._gage_weights,
+            rows=len(stored),
+            stored=np.ascontiguousarray(stored, dtype=np.int64),
+            records=written.records,
+            strains=written.strains,
+            fields=written.fields,
+        )
 
     def _enter(self, state: PlateState, dt: float) -> None:
         """Copy a state into the vectors of the kernels."""
@@ -232,8 +342,28 @@ class ImpactSteps:
         plate.set_scale(state.dt2)
         plate.structure.damping = 0.5 * self._system.motion.damping * dt
 
-    def _leave(self, state: PlateState) -> None:
-        """Copy the vectors of the kernels into a state."""
+    def _leave(self, state: ImpactState, impact: Impact) -> None:
+        """Copy the contact and the vectors of the kernels into a state."""
+        memory = impact.memory
+        state.memory = LoadingHistory(
+            branch=int(memory.branch),
+            f=memory.f,
+            b=memory.b,
+            w=memory.w,
+            p=memory.p,
+            peak=memory.peak,
+            peak_force=memory.peak_force,
+            permanent=memory.permanent,
+        )
+        state.contact = ContactPoint(impact.contact.indentation, impact.contact.force)
+        state.plate_w = impact.plate_w
+        state.contact_work = impact.work
+        state.unconverged_steps = impact.unconverged
+        state.plate.time = impact.time
+        self._leave_plate(state.plate)
+
+    def _leave_plate(self, state: PlateState) -> None:
+        """Copy the vectors of the kernels into a plate's state."""
         plate, count = self._plate, len(state.increment)
         state.displacement[...] = plate.u[plate.position]
         state.increment[...] = plate.d[plate.position]

@@ -9,7 +9,6 @@ block are added one by one.
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -22,10 +21,11 @@ from fecm._typing import Floats
 from fecm.mechanics import kernels
 from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, LinearPermanent
 from fecm.mechanics.impact import ContactState, ImpactConditions, ImpactSystem, couple_step
-from fecm.mechanics.impact_steps import LAWS, ImpactSteps, Modes, supports
-from fecm.mechanics.kernels import floats
+from fecm.mechanics.impact_steps import ImpactSteps, kernel_law, knows, supports
+from fecm.mechanics.impact_sweep import Found, Given, sweep
 from fecm.mechanics.plate_motion import AppliedForce, DofSums, Load, PlateMotion
 from fecm.mechanics.projectile import Projectile, RigidMass, RodIntegrator, RodState, WilsonStep
+from fecm.mechanics.rod_modes import Modes
 from fecm.results.metrics import Indentation
 
 BLOCK = 64  # steps of a block
@@ -35,10 +35,6 @@ BLOCK = 64  # steps of a block
 NEAR, FAR = 8, 256
 TILE = 16  # cases of every matrix product, so that no case depends on the others
 SMALL = BLOCK**3  # multiplications of a matrix product small enough for BLAS to use one thread
-FOUND = (  # rows of the results of the kernel
-    "deepest", "indentation", "permanent", "highest", "w", "largest_ddw", "lost", "initial",
-    "unconverged",
-)  # fmt: skip
 NO_FORCE = HystereticLaw(LinearPermanent(0.0, 0.0, 0.0, 1.0))
 
 
@@ -268,7 +264,7 @@ def impacts(response: Floats, dt: float, node_mass: float, hits: Hits) -> Impact
     `node_mass` is the mass that the contact force accelerates: the lumped mass of the impact node,
     or 1/(g M^-1 g) of a patch with the weights g.
     """
-    if kernels.LIBRARY is not None and type(hits.law.constants) in LAWS:
+    if kernels.LIBRARY is not None and knows(hits.law.constants):
         return _by_kernels(response, dt, node_mass, hits)
     return by_numpy(response, node_mass, TipSteps(hits, dt, len(response)))[0]
 
@@ -341,25 +337,32 @@ def _modes(rod: Projectile) -> Modes:
 
 def _by_kernels(response: Floats, dt: float, node_mass: float, hits: Hits) -> Impacts:
     """Compute impacts by the compiled kernels, and projectiles by their modes."""
-    steps, cases, c = len(response), len(hits.speed), hits.law.constants
-    kind, critical, slope = LAWS[type(c)](c)
-    given = np.stack(np.broadcast_arrays(c.k, c.q, critical, slope, hits.speed, hits.scale))
-    force, found = np.empty((cases, steps)), np.empty((len(FOUND), cases))
+    constants = hits.law.constants
+    law = kernel_law(constants)
+    rows = {
+        Given.K: constants.k,
+        Given.Q: constants.q,
+        Given.CRITICAL: law.critical,
+        Given.SLOPE: law.slope,
+        Given.VELOCITY: hits.speed,
+        Given.FACTOR: hits.scale,
+    }
+    given = np.stack(np.broadcast_arrays(*(rows[row] for row in Given)))
+    cases = len(hits.speed)
+    force, found = np.empty((cases, len(response))), np.empty((len(Found), cases))
     starts = np.searchsorted(hits.kind, np.arange(len(hits.rods) + 1)).tolist()
     for rod, first, last in zip(hits.rods, starts[:-1], starts[1:], strict=True):
         step = WilsonStep(rod.stiffness(), rod.mass(), dt)
-        modes = _modes(rod)
-        (T, h), shape = modes.step(step), modes.shapes[0].copy()
-        own = kernels.Sweep(
-            last - first, cases, steps, len(shape), kind, dt, step.theta, *step.weights,
-            floats(T), floats(h), floats(modes.stiffness), floats(shape), floats(response),
-            floats(given[:, first:]), floats(force[first:]), floats(found[:, first:]),
-        )  # fmt: skip
-        if not kernels.LIBRARY.fecm_sweep(ctypes.byref(own)):
-            raise MemoryError
-    at = dict(zip(FOUND, found, strict=True))
-    lost = at["lost"] + node_mass * at["largest_ddw"] ** 2 / (8.0 * dt**2)
-    error = lost / np.where(at["initial"] > 0.0, at["initial"], 1.0)
-    indentation = Indentation(at["deepest"], at["indentation"], at["permanent"])
-    unconverged, w = at["unconverged"].astype(np.int64), (at["highest"], at["w"])
-    return Impacts(force.T, indentation, unconverged, w, error)
+        own = slice(first, last)
+        sweep(_modes(rod), step, law.kind, response, given[:, own], force[own], found[:, own])
+    lost = found[Found.LOST] + node_mass * found[Found.LARGEST_DDW] ** 2 / (8.0 * dt**2)
+    initial = found[Found.INITIAL]
+    return Impacts(
+        force=force.T,
+        indentation=Indentation(
+            found[Found.DEEPEST], found[Found.INDENTATION], found[Found.PERMANENT]
+        ),
+        unconverged_steps=found[Found.UNCONVERGED].astype(np.int64),
+        deflection=(found[Found.HIGHEST], found[Found.W]),
+        error=lost / np.where(initial > 0.0, initial, 1.0),
+    )

@@ -1,125 +1,69 @@
-"""Compiled kernels, where the installation has them; :data:`LIBRARY` is None otherwise."""
+"""Compiled kernels, where the installation has them; :data:`LIBRARY` is None otherwise.
+
+Each kernel has one Python file, with its structures, what goes in and what comes out:
+
+- K u: :mod:`~fecm.mechanics.kernels.plate`, with :mod:`~fecm.mechanics.kernels.element_groups`;
+- steps of an impact: :mod:`fecm.mechanics.impact_steps`;
+- many impacts on one plate: :mod:`fecm.mechanics.impact_sweep`;
+- strains: :mod:`~fecm.mechanics.kernels.strains`;
+- exposures of plies: :mod:`~fecm.mechanics.kernels.failure`.
+
+This one finds and loads the library.
+"""
 
 from __future__ import annotations
 
 import ctypes
 import zlib
-from ctypes import POINTER, Structure, c_double, c_int8, c_int32, c_int64
+from ctypes import POINTER, c_double, c_int, c_int8, c_int32, c_int64, c_void_p
 from importlib.util import find_spec
 from io import SEEK_END
 from pathlib import Path
 from struct import Struct
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from fecm._typing import Floats
 
-Doubles, Integers, Longs = POINTER(c_double), POINTER(c_int32), POINTER(c_int64)
+if TYPE_CHECKING:
+    from ctypes import _Pointer
+
+# Kinds of the fields of structures that point to arrays.
+Doubles = POINTER(c_double)
+Integers = POINTER(c_int32)
+Longs = POINTER(c_int64)
 Codes = POINTER(c_int8)
-
-# The structures of kernels.c and impact.h, field by field.
-
-
-def _fields(text: str, **kinds: Any) -> list[tuple[str, Any]]:
-    """Fields of a structure from `kind: name name; ...`."""
-    known = {"int": c_int64, "float": c_double, "floats": Doubles, "ints": Integers} | kinds
-    found: list[tuple[str, Any]] = []
-    for part in text.split(";"):
-        kind, names = part.split(":")
-        found += [(name, known[kind.strip()]) for name in names.split()]
-    return found
-
-
-class Group(Structure):
-    """Elements with the same nodes present, and either one matrix or none."""
-
-    _fields_ = _fields(
-        "int: kind nodes pairs; floats: matrix; int: bending shear tying; floats: rotations"
-        " deflection rotations_t deflection_t in_plane_t tied tied_t"
+POINTERS = {
+    np.dtype(number).char: kind
+    for number, kind in (
+        (np.float64, Doubles),
+        (np.int32, Integers),
+        (np.int64, Longs),
+        (np.int8, Codes),
     )
+}
 
-
-class Block(Structure):
-    """Eight elements."""
-
-    _fields_ = _fields("group: group; ints: place; floats: data", group=POINTER(Group))
-
-
-class Chunk(Structure):
-    """Blocks of near elements."""
-
-    _fields_ = _fields(
-        "int: blocks; blocks: block; int: first nodes shared fixed; ints: shares copies at_rest;"
-        " floats: signs force",
-        blocks=POINTER(Block),
-    )
-
-
-class Plate(Structure):
-    """A plate and its state."""
-
-    _fields_ = _fields(
-        "int: nd chunks nodes most; chunks: chunk; ints: lane; floats: stiffness shear;"
-        " int: transposed planes;"
-        " floats: mass inverse ratio rate u d s shared; float: damping",
-        chunks=POINTER(Chunk),
-    )
-
-
-class Strains(Structure):
-    """Strains of elements with the same nodes present."""
-
-    _fields_ = _fields(
-        "int: elements nodes points width; longs: row node shape; floats: table metric",
-        longs=Longs,
-    )
-
-
-class Failure(Structure):
-    """Largest exposures of plies."""
-
-    _fields_ = _fields(
-        "int: points states width; floats: in_plane; float: xt xc yt yc s12 f12 p_plus p_minus"
-        " resistance critical; floats: exposure time; codes: mode",
-        codes=Codes,
-    )
-
-
-class Impact(Structure):
-    """Contact, projectile and records of steps."""
-
-    _fields_ = _fields(
-        "float: k q critical slope; int: law; float: branch f b w p peak peak_force permanent"
-        " indentation force plate_w work time; int: unconverged; float: dt theta weight_before"
-        " weight gain; int: modes; floats: T h stiffness tip_shape station motion;"
-        " float: tip dt2; int: loaded; longs: entry; floats: load_weight mobility last;"
-        " int: gages gage_dofs; longs: gage_entry; floats: gage_weight; int: rows; longs: stored;"
-        " floats: records strains fields",
-        longs=Longs,
-    )
-
-
-class Sweep(Structure):
-    """Impacts of many cases by one kind of projectile."""
-
-    _fields_ = _fields(
-        "int: cases stride steps modes law; float: dt theta weight_before weight;"
-        " floats: T h stiffness tip_shape plate given force found"
-    )
-
-
-COLUMNS = (
-    "time", "inertia", "power", "strain", "internal", "load_d", "load_s", "force", "indentation",
-    "plate_w", "contact_work", "displacement", "velocity", "acceleration", "projectile_kinetic",
-    "projectile_strain", "station",
-)  # fmt: skip
-
+# Result and arguments of the functions of the library; structures are passed by reference.
+FUNCTIONS = {
+    "fecm_stamp": (c_int, []),
+    "fecm_has_avx2": (c_int, []),
+    "fecm_internal_force": (c_int, [c_void_p, c_int64]),
+    "fecm_impact_steps": (c_int64, [c_void_p, c_void_p, c_int64, c_int64]),
+    "fecm_sweep": (c_int, [c_void_p]),
+    "fecm_strains": (None, [c_void_p, c_int64, c_int64, c_int64, Doubles, Doubles]),
+    "fecm_failure": (None, [c_void_p, Doubles, c_double]),
+    "fecm_fields": (c_void_p, []),
+    "fecm_constants": (c_void_p, []),
+}
 
 ELF64 = b"\x7fELF\x02\x01"  # begin of a little-endian 64-bit ELF file
 # e_phoff and e_phnum of its header; p_offset and p_filesz of a segment's.
-ELF_HEADER, SEGMENT = Struct("<32x Q 16x H"), Struct("<8x Q 16x Q 16x")
+ELF_HEADER = Struct("<32x Q 16x H")
+SEGMENT = Struct("<8x Q 16x Q 16x")
 
 
-def _load() -> Any:
+def _load() -> ctypes.CDLL | None:
     """Compiled library of these sources, None without one.
 
     One of other sources, left by an earlier installation in place, is not used.
@@ -135,7 +79,9 @@ def _load() -> Any:
             return None
     except (OSError, AttributeError):  # no library, or an older one without a stamp
         return None
-    library.fecm_impact_steps.restype = c_int64
+    for name, (result, arguments) in FUNCTIONS.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
     return library
 
 
@@ -161,7 +107,9 @@ def stamp(folder: Path) -> int:
     return zlib.crc32(b"".join(path.read_bytes() for path in sorted(folder.glob("*.[ch]")))) >> 1
 
 
-LIBRARY = _load()
+# Any, as the functions of a library have no types, and callers that need one have asked before
+# whether there is one.
+LIBRARY: Any = _load()
 
 
 def description() -> str:
@@ -171,6 +119,27 @@ def description() -> str:
     return f"compiled, {'AVX2' if LIBRARY.fecm_has_avx2() else 'portable'}"
 
 
-def floats(array: Floats) -> Any:
-    """Pointer to an array of numbers."""
+class Structure(ctypes.Structure):
+    """A structure of structures.h, filled by the names of its fields.
+
+    Pointers are given as arrays, in C order and of the field's type; they live as long as the
+    structure.  An array in another order needs a pointer of :func:`floats`, and must be kept alive.
+    """
+
+    def __init__(self, **values: Any) -> None:
+        self.held = values
+        super().__init__(**{name: _passed(value) for name, value in values.items()})
+
+
+def _passed(value: Any) -> Any:
+    """An array as a pointer, anything else as it is."""
+    if not isinstance(value, np.ndarray):
+        return value
+    if not value.flags.c_contiguous:
+        raise ValueError("the array is not in C order")
+    return value.ctypes.data_as(POINTERS[value.dtype.char])
+
+
+def floats(array: Floats) -> _Pointer[c_double]:
+    """Pointer to the first number of an array, which the caller keeps alive."""
     return array.ctypes.data_as(Doubles)

@@ -1,4 +1,12 @@
-/* Largest exposures of plies, with FailureMonitor's arithmetic; included once for each instruction set. */
+/* Largest exposures of plies, with FailureMonitor's arithmetic; included once for each instruction set.
+ *
+ * Layout.  A state of stress is a ply at one of its faces; four states are computed at once, from the
+ * strains of a point, (6,), and a table of stresses per strain, (6, 3, width).  `width` is the number
+ * of states in fours; lanes beyond the last state compute zeros and are not stored.
+ *
+ * Sums run over the six strains in their order.  Of equal exposures of one criterion the first mode
+ * stays, and of equal exposures in time the first time.  A call is one thread's.
+ */
 
 /* Largest of some candidates, the first of equals, and the codes of their modes. */
 typedef struct {

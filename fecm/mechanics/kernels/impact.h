@@ -1,59 +1,15 @@
-/* The coupled step of plate, projectile and contact law; included once. */
-
-enum { VIRGIN, UNLOADING, RELOADING };
-
-/* Permanent indentation after a peak: equation 3-8, or 3-7, which has no slope. */
-enum { LINEAR_PERMANENT, YANG_SUN_PERMANENT };
-
-/* Constants of the contact law; `kind` is one of the above. */
-typedef struct {
-    double k, q, critical, slope;
-    int64_t kind;
-} Law;
-
-/* LoadingHistory of contact_law.py. */
-typedef struct {
-    double branch, f, b, w, p, peak, peak_force, permanent;
-} History;
-
-typedef struct {
-    double indentation, force;
-} Point;
-
-typedef struct {
-    double dt, theta, weight_before, weight, gain; /* as in RodIntegrator */
-    int64_t modes;                                 /* the first is the rigid motion */
-    const double *T, *h; /* (9, modes), (3, modes): new motion, and motion per force */
-    const double *stiffness, *tip_shape, *station; /* (modes,) */
-    double *motion;                                /* (3, modes) */
-    double tip;
-} Rod;
-
-typedef struct {
-    Law law;
-    History memory;
-    Point contact;
-    double plate_w, work, time;
-    int64_t unconverged;
-    Rod rod;
-    double dt2;
-    int64_t loaded; /* entries of the plate under the contact force */
-    const int64_t *entry;
-    const double *weight, *mobility;
-    double *last; /* (loaded,) */
-    int64_t gages, gage_dofs;
-    const int64_t *gage_entry; /* (gages, gage_dofs) */
-    const double *gage_weight;
-    int64_t rows;
-    const int64_t *stored; /* (rows,): steps, from 0, after which u is stored */
-    double *records, *strains, *fields; /* (steps, COLUMNS), (steps, gages), (rows, nodes, nd) */
-} Impact;
-
-/* Columns of `records`. */
-enum {
-    TIME, INERTIA, POWER, STRAIN, FORCE, LOAD_D, LOAD_S, CONTACT, INDENTATION, PLATE_W, WORK, TIP,
-    VELOCITY, ACCELERATION, ROD_KINETIC, ROD_STRAIN, STATION, COLUMNS
-};
+/* The coupled step of plate, projectile and contact law, of one case; included once.
+ *
+ * The same arithmetic as couple_step of impact.py and HystereticLaw of contact_law.py, in floats.
+ *
+ * Layout.  The projectile moves in its natural modes, (modes,), of unit modal mass; the first is the
+ * rigid motion, whose displacement is kept in `tip` alone.  `motion` has the rows displacement,
+ * velocity and acceleration; T and h give the rows of the next step from these and from the tip's
+ * force.  Signs: w is positive along the push, the motion of the projectile away from the plate, so
+ * that the indentation is -tip - w.
+ *
+ * Sums run over the modes in ascending order.  Thread 0 alone calls these functions.
+ */
 
 static double power(double x, double p) {
     if (p == 1.5) return x * sqrt(x);
@@ -67,7 +23,7 @@ static double force_of(const History *m, double a) {
 
 static double permanent(const Law *law, double peak) {
     double value;
-    if (law->kind == LINEAR_PERMANENT)
+    if (law->kind == LINEAR)
         value = law->slope * (peak - law->critical);
     else {
         const double top = peak > 0.0 ? peak : 0.0;

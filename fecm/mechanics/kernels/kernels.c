@@ -1,12 +1,39 @@
-/* Compiled kernels: the product K u of a plate, bursts of impact steps.
+/* Compiled kernels: the product K u of a plate, bursts of impact steps, sweeps, strains and exposures.
  *
- * Loaded with ctypes by __init__.py, whose structures mirror those below.
+ * Loaded with ctypes by __init__.py.  The files, all compiled as this one:
  *
- * Elements are taken eight at a time, one in each lane.  They belong to chunks, which threads share;
- * cuts and sums do not depend on the number of threads, and so neither do the results.
- * A plate's vectors have a part (nd, nodes) for each chunk, with all of its nodes, and a last one for
- * the nodes that several chunks share or that have images by symmetry.  Chunks have copies of these.
- * nd is 3, for w, theta_x, theta_y, or 5.  Restrained dofs are among them.
+ *   structures.h  what Python passes
+ *   impact.h      contact law, projectile and contact iteration of one case
+ *   plate.h       K u, the plate's update, and strains; twice, with AVX2 and without
+ *   sweep.h       many impacts on one plate, four at a time; twice
+ *   failure.h     exposures of plies, four states of stress at a time; twice
+ *   fields.h      places of the fields of structures, for a test
+ *
+ * and here the steps, their threads, and the functions that Python calls.
+ *
+ * Layout.  A plate's vectors u, d and s are cut into chunks of near elements; structures.h has the
+ * order of the entries.  nd is 3, for w, theta_x, theta_y, or 5, for u, v, w, theta_x, theta_y.
+ * Restrained dofs are among them, with a mass of 0.
+ *
+ * A step.  The displacement of a step is known when it begins.
+ *
+ *   thread 0      begin_step: contact force and projectile for this displacement, records
+ *   all threads   run_chunk: K u of their chunks; d and u of the next step without the contact force
+ *   thread 0      finish: forces on shared nodes, their update, the sums of all chunks
+ *                 end_step: the pull of the contact force on d and u, records
+ *
+ * The last step of a burst leaves d and u as they are and stores s, with which the next burst moves
+ * them.
+ *
+ * Threads.  Thread t of n takes the chunks from chunks t/n up to chunks (t + 1)/n, one after another,
+ * and has a buffer of forces for the chunk in work.  They meet twice in a step: when the contact is
+ * known, and when all chunks are computed.  Threads wait busily at first, as a step takes
+ * microseconds, and then give the processor away.
+ *
+ * Sums.  The force on a node is the sum over the blocks of a chunk in their order, and for shared
+ * nodes the sum over the chunks in their order.  Energies are summed per chunk in four lanes, then
+ * over the chunks in their order, then over the lanes.  Chunks do not depend on the threads, and so
+ * neither do the results.  Compilers may contract a*b + c, but not reorder sums.
  */
 #if defined __FAST_MATH__ || (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__)
 #error "divergence is found by isfinite(), and sums have a fixed order: compile without -ffast-math"
@@ -15,6 +42,7 @@
 #include <Python.h>
 #include <math.h>
 #include <stdatomic.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -38,85 +66,17 @@ typedef struct {
 #define ALIGNED __attribute__((aligned(64)))
 #define HALF(value) (*((half *)&(value) + side))
 
-/* One matrix for all elements, or one for even and one for odd motions; or none: sums over points of
- * quadrature, factorized or by tables. */
-enum { ONE, TWO, FACTORIZED, POINTS };
+#include "structures.h"
 
-/* Elements with the same nodes present, and either one matrix or none. */
-typedef struct {
-    int64_t kind, nodes;
-    int64_t pairs;        /* TWO: node i < `pairs` is the image of i + `pairs` under half a turn */
-    const double *matrix; /* ONE: (n, n); TWO: (even, even) and (odd, odd) */
-    /* POINTS: number of points; `tying` of each covariant strain, or 0.  FACTORIZED: in a direction. */
-    int64_t bending, shear, tying;
-    /* POINTS: (2 bending + values, nodes), (slopes, nodes).  FACTORIZED: points in a direction. */
-    const double *rotations, *deflection;
-    const double *rotations_t, *deflection_t; /* POINTS: transposed.  FACTORIZED: weights of the points */
-    const double *in_plane_t;                 /* POINTS: (nodes, 2 bending) */
-    const double *tied, *tied_t;              /* POINTS: (2, shear, tying), (2, tying, shear) */
-} Group;
+typedef int64_t mask __attribute__((vector_size(32)));
 
-/* Eight elements. */
-typedef struct {
-    const Group *group;
-    /* (nodes,): place in the chunk of a node of the first element, followed by those of the others;
-     * or -1 - i, and the places are row i of `lane`. */
-    const int32_t *place;
-    /* POINTS: inverse Jacobian with its determinant times the weight, (points, 5, 8), and slopes of the
-     * mapping (2 tying, 2, 8).  FACTORIZED: a factor, and coefficients of x and y, (1 + 8 + 8, 8). */
-    const double *data;
-} Block;
-
-/* Blocks of near elements; the last chunk has no blocks, and the nodes that others share. */
-typedef struct {
-    int64_t blocks;
-    const Block *block;
-    int64_t first, nodes; /* nodes before it in the vectors; its own, a multiple of eight */
-    int64_t shared, fixed;
-    const int32_t *shares, *copies; /* (shared,): places in the last chunk and in this one */
-    const int32_t *at_rest;         /* (fixed,): entries without a mass */
-    const double *signs;            /* (shared, nd) */
-    double *force;                  /* (shared, nd) */
-} Chunk;
-
-typedef struct {
-    int64_t nd, chunks, nodes, most; /* chunks but the last one; nodes of all, and of the largest */
-    const Chunk *chunk;
-    const int32_t *lane;             /* (rows, 8) */
-    const double *stiffness, *shear; /* (6, 6) of strains and negative curvatures; (2, 2) */
-    int64_t transposed;              /* whether the Jacobian of FACTORIZED elements is */
-    int64_t planes;                  /* of the next two: 1, or one for each dof */
-    const double *mass, *inverse;    /* divided by `ratio`; of each node, or of each entry */
-    const double *ratio, *rate;      /* (nd,): and dt^2 over it, or NULL for a scale of 1 */
-    double *u, *d, *s; /* displacement, increment, scaled internal force */
-    double *shared;    /* forces of the last chunk */
-    double damping;    /* a dt/2 */
-} Plate;
-
-/* Inner products of a state: d M d, d K u, u K u, K u s. */
-typedef struct {
-    double inertia, power, strain, force;
-} Sums;
-
-/* Impacts on one plate by one kind of projectile, whose mass and stiffness have a factor in each case. */
-typedef struct {
-    int64_t cases, stride, steps, modes; /* `stride`: columns of the arrays of cases */
-    int64_t law;                         /* kind of the contact law */
-    double dt, theta, weight_before, weight; /* as in RodIntegrator */
-    const double *T, *h, *stiffness, *tip_shape; /* modes: see Rod */
-    const double *plate; /* (steps,): displacement per force after 1, 2, ... steps */
-    const double *given; /* (GIVEN, cases): k, q, critical, slope, velocity, factor */
-    double *force, *found; /* (cases, steps), (FOUND, cases) */
-} Sweep;
-
-enum { GIVEN = 6, FOUND = 9 }; /* rows; those found are in sweep.h */
+/* Sizes of a sweep. */
 enum {
     CASES = 4,
     CHECKED = 64, /* steps from one check of the energies to the next */
     FAR = 128,    /* steps whose forces act on later blocks of steps by Fourier transforms */
     SPACED = 4 * FAR + 8 /* from one spectrum to the next; a power of two would share few sets of the cache */
 };
-typedef int64_t mask __attribute__((vector_size(32)));
 
 /* Responses of plate and tip to a unit force, and memory for their sums over forces. */
 typedef struct {
@@ -128,33 +88,15 @@ typedef struct {
     int64_t *used;         /* (blocks,): those whose forces are not all 0 */
 } Response;
 
-/* Strains of elements with the same nodes present; `width` is that of `points` in fours. */
+/* Inner products of a state: d M d, d K u, u K u, K u s. */
 typedef struct {
-    int64_t elements, nodes, points, width;
-    const int64_t *row, *node, *shape; /* (elements,), (elements, nodes), (elements,): row of `metric` */
-    const double *table;  /* (nodes, 3, width): slopes in xi and eta, values */
-    const double *metric; /* (shapes, 4, width): inverse Jacobian */
-} Strains;
-
-enum { CRITERIA = 4 };
-
-/* Strengths, in the order of failure.py, and Puck's limits. */
-typedef struct {
-    double xt, xc, yt, yc, s12, f12, p_plus, p_minus, resistance, critical;
-} Ply;
-
-/* Largest exposures of the states of stress (plies, faces) at points; `width` is `states` in fours. */
-typedef struct {
-    int64_t points, states, width;
-    const double *in_plane; /* (6, 3, width): stresses per strain */
-    Ply ply;
-    double *exposure, *time; /* (CRITERIA, points, states) */
-    int8_t *mode;
-} Failure;
+    double inertia, power, strain, force;
+} Sums;
 
 #define TARGET static
 #include "impact.h"
 #undef TARGET
+#include "fields.h"
 
 #if defined(__x86_64__)
 #define NAME(name) name##_avx2
@@ -243,10 +185,10 @@ static void begin_step(Job *job, int64_t number) {
     }
     double *row = x->records + COLUMNS * number;
     row[TIME] = x->time, row[LOAD_D] = d;
-    row[CONTACT] = x->contact.force, row[INDENTATION] = x->contact.indentation;
-    row[PLATE_W] = x->plate_w, row[WORK] = x->work, row[TIP] = rod->tip;
+    row[FORCE] = x->contact.force, row[INDENTATION] = x->contact.indentation;
+    row[PLATE_W] = x->plate_w, row[CONTACT_WORK] = x->work, row[DISPLACEMENT] = rod->tip;
     row[VELOCITY] = velocity, row[ACCELERATION] = acceleration;
-    row[ROD_KINETIC] = 0.5 * kinetic, row[ROD_STRAIN] = 0.5 * strain, row[STATION] = station;
+    row[PROJECTILE_KINETIC] = 0.5 * kinetic, row[PROJECTILE_STRAIN] = 0.5 * strain, row[STATION] = station;
     for (int64_t gage = 0; gage < x->gages; gage++) {
         double sum = 0.0;
         for (int64_t i = gage * x->gage_dofs; i < (gage + 1) * x->gage_dofs; i++)
@@ -279,7 +221,7 @@ static void end_step(Job *job, int64_t number, int next) {
     }
     double *row = x->records + COLUMNS * number;
     row[INERTIA] = job->result.inertia, row[POWER] = job->result.power;
-    row[STRAIN] = job->result.strain, row[FORCE] = job->result.force, row[LOAD_S] = s;
+    row[STRAIN] = job->result.strain, row[INTERNAL] = job->result.force, row[LOAD_S] = s;
 }
 
 static void take_steps(Job *job, int64_t thread) {
@@ -443,12 +385,10 @@ EXPORT void fecm_failure(const Failure *failure, const double *strains, double t
     CHOSEN(failure)(failure, strains, time);
 }
 
-/* Sizes of the structures, which those in Python must have. */
-EXPORT void fecm_sizes(int64_t *sizes) {
-    sizes[0] = sizeof(Group), sizes[1] = sizeof(Block), sizes[2] = sizeof(Chunk);
-    sizes[3] = sizeof(Plate), sizes[4] = sizeof(Impact), sizes[5] = sizeof(Strains), sizes[6] = sizeof(Sweep);
-    sizes[7] = sizeof(Failure), sizes[8] = COLUMNS, sizes[9] = GIVEN, sizes[10] = FOUND;
-}
+/* Places of the fields of structures, and values of enumerations; each ends with an empty entry. */
+EXPORT const Entry *fecm_fields(void) { return FIELDS; }
+
+EXPORT const Entry *fecm_constants(void) { return CONSTANTS; }
 
 /* Checksum of the sources, given by the build. */
 EXPORT int fecm_stamp(void) { return FECM_STAMP; }

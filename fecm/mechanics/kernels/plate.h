@@ -1,4 +1,29 @@
-/* K u of a plate, and strains; included once for each instruction set. */
+/* K u of a plate, and strains; included once for each instruction set.
+ *
+ * Layout.  Eight elements of a group are computed at once: `lanes` has a value of each.  A block takes
+ * the entries of its nodes from the vector u of its chunk, (nodes, nd) or (nd, nodes) of lanes, forms
+ * y = K x by one of four kinds, and gives y to the chunk's vector of forces:
+ *
+ *   ONE_MATRIX     y = K x with the one matrix of congruent elements
+ *   TWO_MATRICES   the same with the even and the odd motions under half a turn apart: half the work
+ *   FACTORIZED     quadrature of 9-node elements, sums along xi and then along eta
+ *   TABULATED      quadrature with tables of shape functions, for all other elements
+ *
+ * Where the eight places of a node follow one another, they are two loads of four; elsewhere they are
+ * eight numbers of `lane`.  A lane without an element takes and gives at a spare place of the chunk.
+ *
+ * A chunk: its copies of shared nodes are taken from the last part of u; its blocks add forces, in
+ * their order; the forces on copies are put aside in `force`, and the entries of nodes that are its
+ * own are updated at once, while they are in the cache.  `finish` adds the forces put aside, chunk by
+ * chunk, and updates the shared nodes.
+ *
+ * Sums.  In matrix products a register sums over the columns in ascending order.  `update` sums each
+ * energy in two registers of four lanes, even and odd fours of nodes, for all dofs; a chunk returns
+ * them added, (4 energies, 4 lanes).  Every order is fixed by the layout alone.
+ *
+ * Threads.  run_chunk writes the entries of its chunk, its `force`, its `sums` and the buffer of its
+ * thread, and reads shared nodes, which only `finish` writes.
+ */
 
 INLINE half NAME(load)(const double *x) { return *(const half *)x; }
 INLINE void NAME(store)(double *x, half value) { *(half *)x = value; }
@@ -105,7 +130,7 @@ INLINE void NAME(two_matrices)(int nd, int pairs, int centre, const Plate *p, co
 }
 
 /* Strains at the points of quadrature from values and slopes in xi and eta, stresses, and back. */
-INLINE void NAME(no_matrix)(int nd, int nodes, const Plate *p, const Chunk *c, const Block *b, const double *u, double *f) {
+INLINE void NAME(tabulated)(int nd, int nodes, const Plate *p, const Chunk *c, const Block *b, const double *u, double *f) {
     const Group *g = b->group;
     const double *data = b->data;
     lanes x[60] ALIGNED, y[60] ALIGNED;
@@ -426,15 +451,15 @@ INLINE void NAME(chunk)(int nd, const Plate *p, const Chunk *c, int next, double
         const Block *b = c->block + number;
         const int nodes = (int)b->group->nodes, pairs = (int)b->group->pairs;
         switch (b->group->kind) {
-        case ONE: NAME(one_matrix)(nd, nodes, p, c, b, u, force); break;
-        case TWO:
+        case ONE_MATRIX: NAME(one_matrix)(nd, nodes, p, c, b, u, force); break;
+        case TWO_MATRICES:
             if (pairs == 4 && nodes == 9)
                 NAME(two_matrices)(nd, 4, 1, p, c, b, u, force);
             else
                 NAME(two_matrices)(nd, pairs, nodes - 2 * pairs, p, c, b, u, force);
             break;
         case FACTORIZED: NAME(factorized)(nd, p, c, b, u, force); break;
-        case POINTS: NAME(no_matrix)(nd, nodes, p, c, b, u, force); break;
+        case TABULATED: NAME(tabulated)(nd, nodes, p, c, b, u, force); break;
         }
     }
     for (int64_t i = 0; i < c->shared; i++)

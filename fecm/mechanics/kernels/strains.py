@@ -1,61 +1,101 @@
-"""Strains by the compiled kernels."""
+"""Strains by the compiled kernels.
+
+In: displacement fields (fields, numnp, 5).  Out: strains (5, fields, numel, points), as
+:class:`~fecm.mechanics.strains.StrainField` has them.  Four points of an element are computed at
+once; tables are filled up to fours of points with zeros.
+"""
 
 from __future__ import annotations
 
 import ctypes
 import math
+from ctypes import c_int64
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecm._typing import Floats
 from fecm.mechanics.interpolation import local_shape_functions
-from fecm.mechanics.kernels import LIBRARY, Longs, Strains, floats
-from fecm.mechanics.kernels.plate import jacobians
-from fecm.mechanics.mesh import congruence
+from fecm.mechanics.kernels import LIBRARY, Doubles, Longs, Structure, floats
+from fecm.mechanics.kernels.element_groups import jacobians
+from fecm.mechanics.mesh import ElementBlock, congruence
 from fecm.mechanics.strains import STRAINS, StrainField
+
+
+class Strains(Structure):
+    """Elements with the same nodes present, `elements` of `nodes` nodes, and their points.
+
+    The arrays:
+
+    =========  ====================  ==========================================================
+    `row`      (elements,)           number of the element in the result
+    `node`     (elements, nodes)     numbers of its nodes
+    `shape`    (elements,)           row of `metric`
+    `table`    (nodes, 3, width)     slopes in xi and eta, and value, of the shape functions
+    `metric`   (shapes, 4, width)    inverse Jacobian of the elements of one shape, 1/length
+    =========  ====================  ==========================================================
+    """
+
+    _fields_ = (
+        ("elements", c_int64),
+        ("nodes", c_int64),
+        ("points", c_int64),
+        ("width", c_int64),  # number of points, filled up to fours
+        ("row", Longs),
+        ("node", Longs),
+        ("shape", Longs),
+        ("table", Doubles),
+        ("metric", Doubles),
+    )
 
 
 class CompiledStrains(StrainField):
     """The same strains; those of assumed shear strains remain NumPy's."""
 
     @cached_property
-    def _structures(self) -> list[tuple[Strains, list[NDArray[Any]]]]:
-        """A structure of each family, with the arrays that it points to."""
-        made = []
+    def _structures(self) -> list[Strains]:
+        """A structure of each family."""
+        return [self._structure(family) for family in self.families]
+
+    def _structure(self, family: ElementBlock) -> Strains:
+        same = congruence(family)
+        values, local = local_shape_functions(family, self.rule)
+        inverse, _ = jacobians(family.take(same.representatives), local, self.transposed_jacobian)
+        nodes = family.nodes.shape[1]
         points = self.shape[1]
         width = -(-points // 4) * 4
-        for family in self.families:
-            same = congruence(family)
-            values, local = local_shape_functions(family, self.rule)
-            inverse, _ = jacobians(
-                family.take(same.representatives), local, self.transposed_jacobian
-            )
-            nodes = family.nodes.shape[1]
-            table, metric = np.zeros((nodes, 3, width)), np.zeros((len(inverse), 4, width))
-            table[:, :2, :points] = local.transpose(2, 1, 0)
-            table[:, 2, :points] = values.T
-            metric[:, :, :points] = inverse.swapaxes(1, 2)
-            longs = [np.ascontiguousarray(a, dtype=np.int64)
-                     for a in (family.rows, family.nodes, same.group)]  # fmt: skip
-            pointers: list[Any] = [array.ctypes.data_as(Longs) for array in longs]
-            pointers += [floats(array) for array in (table, metric)]
-            numbers = len(family.rows), nodes, points, width
-            made.append((Strains(*numbers, *pointers), [*longs, table, metric]))
-        return made
+        table = np.zeros((nodes, 3, width))
+        table[:, :2, :points] = local.transpose(2, 1, 0)
+        table[:, 2, :points] = values.T
+        metric = np.zeros((len(inverse), 4, width))
+        metric[:, :, :points] = inverse.swapaxes(1, 2)
+        return Strains(
+            elements=len(family.rows),
+            nodes=nodes,
+            points=points,
+            width=width,
+            row=np.ascontiguousarray(family.rows, dtype=np.int64),
+            node=np.ascontiguousarray(family.nodes, dtype=np.int64),
+            shape=np.ascontiguousarray(same.group, dtype=np.int64),
+            table=table,
+            metric=metric,
+        )
 
     def evaluate(self, displacement: Floats) -> Floats:
         """Strains of fields; see :meth:`StrainField.evaluate`."""
         if self.assumes_shear:
             return super().evaluate(displacement)
         *leading, numnp, _ = displacement.shape
-        fields, count = np.ascontiguousarray(displacement), math.prod(leading)
+        fields = np.ascontiguousarray(displacement)
+        count = math.prod(leading)
         strains = np.empty((len(STRAINS), *leading, *self.shape))
-        for structure, _ in self._structures:
+        for structure in self._structures:
             LIBRARY.fecm_strains(
-                ctypes.byref(structure), *map(ctypes.c_int64, (count, numnp, self.shape[0])),
-                floats(fields), floats(strains),
-            )  # fmt: skip
+                ctypes.byref(structure),
+                count,
+                numnp,
+                self.shape[0],
+                floats(fields),
+                floats(strains),
+            )
         return strains

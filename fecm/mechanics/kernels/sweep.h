@@ -1,4 +1,23 @@
-/* Many impacts on one plate, four cases at a time; included once for each instruction set. */
+/* Many impacts on one plate, four cases at a time; included once for each instruction set.
+ *
+ * Plate and projectile are linear.  The displacement w of the plate and the acceleration of the tip
+ * are sums over the earlier contact forces of a case with `response`, the answers to a unit force:
+ * w_n = sum over m < n of g_(n-m) F_m.  The force of a step follows from w by the contact iteration.
+ *
+ * Layout.  Each of four lanes is a case; those beyond the last case repeat it.  Response and spectra
+ * interleave plate and tip, (.., 2), so that both sums are one complex transform: the plate is the
+ * real part, the tip the imaginary one, divided by `unit` to be of the same size.
+ *
+ * Sums.  Steps are cut into blocks of FAR.  Forces of earlier blocks act by Fourier transforms of
+ * 2 FAR numbers, once per block (far_sums); blocks without a force are left out.  Forces of this block
+ * act one by one (near_sums).  Both run over the past in a fixed order, and no lane reads another, so
+ * that a case has the same bytes in any company.
+ *
+ * Every CHECKED steps the modes of the projectile are moved on, by a power of the step's matrix and
+ * the forces since, and the energies are compared: the largest error is that of a case.
+ *
+ * Threads.  None: a call computes its cases alone, and several processes share a sweep.
+ */
 
 INLINE half NAME(choose)(mask where, half a, half b) { return (half)((where & (mask)a) | (~where & (mask)b)); }
 INLINE half NAME(size)(half x) { return (half)((mask)x & INT64_MAX); }
@@ -167,10 +186,10 @@ TARGET void NAME(run_cases)(const Sweep *x, const Response *r, int64_t first) {
     }
     Law law[CASES];
     for (int lane = 0; lane < CASES; lane++)
-        law[lane] = (Law){given[0][lane], given[1][lane], given[2][lane], given[3][lane], x->law};
-    const half scale = given[5], gain = r->gain / scale;
-    half m[8] = {none, given[0], none, none + 1.0, none + 1.5, none, none, none};
-    half tip = none, velocity = -given[4], acceleration = none, indentation = none, force = none, w = none;
+        law[lane] = (Law){given[GIVEN_K][lane], given[GIVEN_Q][lane], given[GIVEN_CRITICAL][lane], given[GIVEN_SLOPE][lane], x->law};
+    const half scale = given[GIVEN_FACTOR], gain = r->gain / scale;
+    half m[8] = {none, given[GIVEN_K], none, none + 1.0, none + 1.5, none, none, none};
+    half tip = none, velocity = -given[GIVEN_VELOCITY], acceleration = none, indentation = none, force = none, w = none;
     half deepest = none, highest = none, sharpest = none, lost = none, unconverged = none;
     half plate_work = none, contact_work = none, dw = none, applied[CHECKED], near[2][2] = {{none}};
     for (int64_t i = 0; i < 3 * x->modes; i++) r->motion[i] = none;
@@ -255,8 +274,17 @@ TARGET void NAME(run_cases)(const Sweep *x, const Response *r, int64_t first) {
     }
     for (int lane = 0; lane < CASES; lane++) {
         const double peak = m[0][lane] == VIRGIN && indentation[lane] > m[5][lane] ? indentation[lane] : m[5][lane];
-        const double found[FOUND] = {deepest[lane], indentation[lane], permanent(law + lane, peak), highest[lane],
-                                     w[lane], sharpest[lane], lost[lane], initial[lane], unconverged[lane]};
+        const double found[FOUND] = {
+            [FOUND_DEEPEST] = deepest[lane],
+            [FOUND_INDENTATION] = indentation[lane],
+            [FOUND_PERMANENT] = permanent(law + lane, peak),
+            [FOUND_HIGHEST] = highest[lane],
+            [FOUND_W] = w[lane],
+            [FOUND_LARGEST_DDW] = sharpest[lane],
+            [FOUND_LOST] = lost[lane],
+            [FOUND_INITIAL] = initial[lane],
+            [FOUND_UNCONVERGED] = unconverged[lane],
+        };
         for (int row = 0; row < FOUND; row++) x->found[row * x->stride + at[lane]] = found[row];
     }
 }

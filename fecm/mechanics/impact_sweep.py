@@ -1,0 +1,120 @@
+"""Many impacts on one plate by the compiled kernels.
+
+In: the plate's response to a unit force, a projectile in its modes, and the values :class:`Given`
+of each case.  Out: the contact force of every step, and the values :class:`Found` of each case.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from ctypes import c_double, c_int64
+from enum import IntEnum
+
+from fecm._typing import Floats
+from fecm.mechanics.impact_steps import LawKind
+from fecm.mechanics.kernels import LIBRARY, Doubles, Structure, floats
+from fecm.mechanics.projectile import RodIntegrator
+from fecm.mechanics.rod_modes import Modes
+
+
+class Given(IntEnum):
+    """Rows of what is given of each case."""
+
+    K = 0  # contact coefficient, force/length^1.5
+    Q = 1  # power of the unloading curve
+    CRITICAL = 2  # critical indentation, length
+    SLOPE = 3  # s_p of equation 3-8
+    VELOCITY = 4  # approach velocity
+    FACTOR = 5  # mass and stiffness over those of the projectile
+
+
+class Found(IntEnum):
+    """Rows of what is found of each case."""
+
+    DEEPEST = 0  # largest indentation
+    INDENTATION = 1  # the last one
+    PERMANENT = 2  # after unloading from the last point
+    HIGHEST = 3  # largest displacement of the plate under the load
+    W = 4  # the last one
+    LARGEST_DDW = 5  # largest second difference of it
+    LOST = 6  # largest difference of the energies from the initial one
+    INITIAL = 7  # kinetic energy of the approach
+    UNCONVERGED = 8  # steps whose contact iteration did not converge
+
+
+class Sweep(Structure):
+    """Impacts of `cases` cases by one kind of projectile.
+
+    The arrays, of which the last two are written:
+
+    ============  ===================  ========================================================
+    `T`           (9, modes)           step of the modes; see ``impact_steps.Rod``
+    `h`           (3, modes)           the same per force on the tip
+    `stiffness`   (modes,)             squares of the angular frequencies
+    `tip_shape`   (modes,)             displacement of the tip
+    `plate`       (steps,)             the plate's displacement per force 1, 2, ... steps ago
+    `given`       (given, stride)      :class:`Given`, of which the first `cases` columns
+    `force`       (cases, steps)       contact force
+    `found`       (found, stride)      :class:`Found`, likewise
+    ============  ===================  ========================================================
+    """
+
+    _fields_ = (
+        ("cases", c_int64),
+        ("stride", c_int64),  # columns of `given` and `found`
+        ("steps", c_int64),
+        ("modes", c_int64),
+        ("law", c_int64),  # a LawKind
+        ("dt", c_double),
+        ("theta", c_double),  # as in Rod
+        ("weight_before", c_double),
+        ("weight", c_double),
+        ("T", Doubles),
+        ("h", Doubles),
+        ("stiffness", Doubles),
+        ("tip_shape", Doubles),
+        ("plate", Doubles),
+        ("given", Doubles),
+        ("force", Doubles),
+        ("found", Doubles),
+    )
+
+
+def sweep(
+    modes: Modes,
+    step: RodIntegrator,
+    law: LawKind,
+    response: Floats,
+    given: Floats,
+    force: Floats,
+    found: Floats,
+) -> None:
+    """Compute the impacts of cases by a projectile; write `force` (cases, steps) and `found`.
+
+    `given` (given, cases) and `found` (found, cases) may be columns of larger arrays, `response` is
+    (steps,).  Raises MemoryError.
+    """
+    T, h = modes.step(step)
+    before, after = step.weights
+    cases, steps = force.shape
+    structure = Sweep(
+        cases=cases,
+        stride=given.strides[0] // given.itemsize,
+        steps=steps,
+        modes=len(modes.stiffness),
+        law=law,
+        dt=step.dt,
+        theta=step.theta,
+        weight_before=before,
+        weight=after,
+        T=T,
+        h=h,
+        stiffness=modes.stiffness,
+        tip_shape=modes.shapes[0].copy(),
+        plate=response,
+        given=floats(given),
+        force=force,
+        found=floats(found),
+    )
+    if not LIBRARY.fecm_sweep(ctypes.byref(structure)):
+        raise MemoryError

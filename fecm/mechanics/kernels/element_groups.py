@@ -1,0 +1,301 @@
+"""Groups of elements for the compiled kernels: those that share one matrix, or the same tables."""
+
+from __future__ import annotations
+
+from ctypes import c_int64
+from enum import IntEnum
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.mechanics import assumed_shear
+from fecm.mechanics.elements import Quadrature
+from fecm.mechanics.interpolation import NDOF, jacobian, local_shape_functions
+from fecm.mechanics.kernels import Doubles, Structure
+from fecm.mechanics.kernels.layout import LANES, Indices
+from fecm.mechanics.mesh import ElementBlock, congruence, distinct
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.symmetry import TURNED, opposite_nodes
+
+# With fewer congruent elements a shared matrix fills too few lanes.
+WORTH_GROUPING = 8
+# Largest coupling of even and odd motions of an element, relative to its largest stiffness.
+SYMMETRIC = 1e-14
+
+
+# Fields of a Group by their names.
+Fields = dict[str, int | Floats]
+
+
+class ElementKind(IntEnum):
+    """How the kernels compute K u of a group."""
+
+    ONE_MATRIX = 0  # a matrix for all elements
+    TWO_MATRICES = 1  # one for the even and one for the odd motions under half a turn
+    FACTORIZED = 2  # quadrature of 9-node elements, along xi and then along eta
+    TABULATED = 3  # quadrature with tables of the shape functions
+
+
+class Group(Structure):
+    """Elements with the same nodes present, and either a matrix or none.
+
+    Arrays that a kind does not use are not set.  n is the number of dofs of an element, `nodes`
+    times nd; (points) are those of bending, of shear or of tying.
+
+    ================  ============================  ==========================================
+    Field             Shape                         Meaning
+    ================  ============================  ==========================================
+    ONE_MATRIX:
+    `matrix`          (n, n)                        stiffness, dof by dof and then node by node
+    TWO_MATRICES:
+    `pairs`           number                        node i < `pairs` and i + `pairs` are images
+    `matrix`          (even, even) and (odd, odd)   stiffness of both motions, in a row
+    FACTORIZED:
+    `bending`         number                        points in a direction, also `shear`
+    `rotations`       (bending,)                    these points, ascending
+    `rotations_t`     (bending, bending)            weights of the points of bending
+    `deflection`      (shear,)                      points of shear, ascending
+    `deflection_t`    (shear, shear)                weights of the points of shear
+    TABULATED:
+    `bending`         number                        points, also `shear`
+    `tying`           number                        tying points of each strain, or 0
+    `rotations`       (2 bending + values, nodes)   slopes in xi, in eta, and values
+    `deflection`      (slopes, nodes)               slopes in xi and in eta
+    `rotations_t`     transposed                    also `deflection_t`
+    `in_plane_t`      (nodes, 2 bending)            the slopes at the points of bending
+    `tied`            (2, shear, tying)             weights between the tying points
+    `tied_t`          (2, tying, shear)             transposed
+    ================  ============================  ==========================================
+    """
+
+    _fields_ = (
+        ("kind", c_int64),
+        ("nodes", c_int64),
+        ("pairs", c_int64),
+        ("matrix", Doubles),
+        ("bending", c_int64),
+        ("shear", c_int64),
+        ("tying", c_int64),
+        ("rotations", Doubles),
+        ("deflection", Doubles),
+        ("rotations_t", Doubles),
+        ("deflection_t", Doubles),
+        ("in_plane_t", Doubles),
+        ("tied", Doubles),
+        ("tied_t", Doubles),
+    )
+
+
+class ElementGroup:
+    """Elements of a family, `plate.families` or a part of one, that share a matrix or have none.
+
+    `columns` are the dofs of a node that move, `weights` the number of elements that each
+    represents.  `order` are the nodes of an element as the arrays have them.
+    """
+
+    def __init__(
+        self,
+        plate: PlateModel,
+        family: ElementBlock,
+        columns: Indices,
+        weights: Floats,
+        *,
+        congruent: bool,
+    ) -> None:
+        self._plate = plate
+        self._columns = columns
+        self._weights = weights
+        self.family = family
+        nn = family.nodes.shape[1]
+        self.order = np.arange(nn)
+        rules = plate.rules
+        shear = assumed_shear.quadrature(family) if rules.assumes_shear else rules.shear
+        self._rules = (rules.bending, shear)
+        if congruent:
+            self.kind, fields = self._matrices(weights[0])
+        elif nn == family.shape.nodes == 9 and not rules.assumes_shear:
+            self.order = np.lexsort((family.shape.xi, family.shape.eta))
+            self.kind, fields = ElementKind.FACTORIZED, self._factors()
+        else:
+            self.kind, fields = ElementKind.TABULATED, self._tables()
+        self.structure = Group(
+            kind=self.kind,
+            nodes=nn,
+            **{
+                name: value if isinstance(value, int) else np.ascontiguousarray(value)
+                for name, value in fields.items()
+            },
+        )
+
+    @property
+    def has_matrix(self) -> bool:
+        """Whether the elements have no numbers of their own."""
+        return self.kind in (ElementKind.ONE_MATRIX, ElementKind.TWO_MATRICES)
+
+    def _matrices(self, weight: float) -> tuple[ElementKind, Fields]:
+        """The common matrix, or those of the even and odd motions; sets the order."""
+        nn = self.family.nodes.shape[1]
+        columns = self._columns
+        K = weight * self._plate.stiffness_of(self.family.take(np.array([0])))[0]
+        K = K.reshape(nn, NDOF, nn, NDOF).transpose(1, 0, 3, 2)[columns][:, :, columns]
+        opposite = opposite_nodes(self.family)
+        if opposite is not None:
+            first = np.flatnonzero(opposite > np.arange(nn))
+            centre = np.flatnonzero(opposite == np.arange(nn))
+            order = np.concatenate([first, opposite[first], centre])
+            halves = self._halves(K[:, order][:, :, :, order], len(first))
+            if halves is not None:
+                self.order = order
+                return ElementKind.TWO_MATRICES, {"pairs": len(first), "matrix": halves}
+        return ElementKind.ONE_MATRIX, {"matrix": K.reshape(nn * len(columns), -1).copy()}
+
+    def _halves(self, K: Floats, pairs: int) -> Floats | None:
+        """Matrices of the even and the odd motions, in a row; None if they are coupled."""
+        nd, nn = K.shape[:2]
+        even: list[Floats] = []
+        odd: list[Floats] = []
+        unit = np.eye(nd * nn).reshape(nd, nn, -1)
+        for dof, column in enumerate(self._columns):
+            one = unit[dof, :pairs]
+            other = unit[dof, pairs : 2 * pairs]
+            centre = unit[dof, 2 * pairs :]
+            if TURNED[column] > 0.0:
+                even += [*(one + other), *centre]
+                odd += list(one - other)
+            else:
+                even += list(one - other)
+                odd += [*(one + other), *centre]
+        T = np.array(even + odd)
+        scale = 1.0 / (T**2).sum(axis=1)
+        turned = scale[:, None] * (T @ K.reshape(nd * nn, -1) @ T.T) * scale
+        n = len(even)
+        coupled = max(abs(turned[:n, n:]).max(), abs(turned[n:, :n]).max())
+        if coupled > SYMMETRIC * abs(turned).max():
+            return None
+        return np.concatenate([turned[:n, :n].ravel(), turned[n:, n:].ravel()])
+
+    def _factors(self) -> Fields:
+        """Points of a direction, and weights of the points in the order of eta and then xi."""
+        bending, shear = self._rules
+        of_bending = distinct(bending.xi)
+        of_shear = distinct(shear.xi)
+        return {
+            "bending": len(of_bending),
+            "rotations": of_bending,
+            "rotations_t": _in_rows(bending),
+            "shear": len(of_shear),
+            "deflection": of_shear,
+            "deflection_t": _in_rows(shear),
+        }
+
+    def _tables(self) -> Fields:
+        """Values and slopes of the shape functions at the points of quadrature."""
+        family = self.family
+        bending, shear = self._rules
+        nn = family.nodes.shape[1]
+        fields: Fields = {"bending": len(bending.xi), "shear": len(shear.xi)}
+        _, local = local_shape_functions(family, bending)
+        slopes = _slopes(local)
+        if self._plate.rules.assumes_shear:
+            tied = [
+                local_shape_functions(family, assumed_shear.tying_points(nn, axis))
+                for axis in (0, 1)
+            ]
+            weights = [assumed_shear.tying_weights(nn, axis, shear) for axis in (0, 1)]
+            values = np.concatenate([value for value, _ in tied])
+            deflection = np.concatenate([at[:, axis] for axis, (_, at) in enumerate(tied)])
+            fields["tying"] = len(tied[0][0])
+            fields["tied"] = np.stack(weights)
+            fields["tied_t"] = np.stack([table.T for table in weights])
+        else:
+            values, local = local_shape_functions(family, shear)
+            deflection = _slopes(local)
+        rotations = np.concatenate([slopes, values])
+        return fields | {
+            "rotations": rotations,
+            "rotations_t": rotations.T,
+            "in_plane_t": slopes.T,
+            "deflection": deflection,
+            "deflection_t": deflection.T,
+        }
+
+    def data(self, members: Indices) -> Floats:
+        """Numbers of elements without a matrix, (blocks, numbers, 8).
+
+        FACTORIZED: a factor, and coefficients of x and of y, (1 + 8 + 8); TABULATED: inverse
+        Jacobian with its determinant times the weight, (points, 5), and slopes of the mapping at
+        the tying points, (2 tying, 2).
+        """
+        family = self.family.take(members)
+        if self.kind == ElementKind.FACTORIZED:
+            parts = self._coefficients(family, members)
+        else:
+            parts = [self._at_points(rule, family, members) for rule in self._rules]
+            if self._plate.rules.assumes_shear:
+                parts += _slopes_of_mapping(family)
+        values = np.concatenate([part.reshape(len(members), -1) for part in parts], axis=1)
+        return np.ascontiguousarray(values.reshape(-1, LANES, values.shape[1]).swapaxes(1, 2))
+
+    def _coefficients(self, family: ElementBlock, members: Indices) -> list[Floats]:
+        """A quarter of the weights, and coefficients of the coordinates but the constant ones."""
+        places = family.coordinates[:, self.order]
+        # Coefficients (eta, xi) of a biquadratic function of nodal values.
+        c = (places - places[:, 4:5]).reshape(-1, 3, 3, 2)
+        for axis in (1, 2):
+            first, middle, last = np.moveaxis(c, axis, 0)
+            c = np.stack([middle, last - first, first + last - 2.0 * middle], axis=axis)
+        x, y = c.reshape(-1, 9, 2)[:, 1:].transpose(2, 0, 1)
+        return [0.25 * self._weights[members, None], x, y]
+
+    def _at_points(self, rule: Quadrature, family: ElementBlock, members: Indices) -> Floats:
+        """Inverse Jacobian, and its determinant times the weight, (ne, npt, 5)."""
+        _, local = local_shape_functions(family, rule)
+        inverse, determinant = jacobians(family, local, self._plate.rules.transposed_jacobian)
+        jxw = determinant * rule.weights * self._weights[members, None]
+        return np.concatenate([inverse, jxw[:, :, None]], axis=2)
+
+
+def grouped(family: ElementBlock, weights: Floats) -> list[tuple[Indices, bool]]:
+    """Groups of a family's elements that move, and whether they are congruent.
+
+    Elements of weight 0 are left out: they are images of others.
+    """
+    same = congruence(family)
+    (stepped,) = np.nonzero(weights)
+    key = 3 * same.group[stepped] + weights[stepped].astype(int)
+    _, group, counts = np.unique(key, return_inverse=True, return_counts=True)
+    many = np.flatnonzero(counts >= WORTH_GROUPING)
+    found = [(stepped[group == one], True) for one in many.tolist()]
+    alone = stepped[counts[group] < WORTH_GROUPING]
+    return [*found, (alone, False)] if len(alone) else found
+
+
+def _in_rows(rule: Quadrature) -> Floats:
+    """Weights of the points, along xi first."""
+    return np.asarray(rule.weights[np.lexsort((rule.eta, rule.xi))])
+
+
+def _slopes(local: Floats) -> Floats:
+    """Slopes in xi at all points, then in eta, (2 npt, nn), of (npt, 2, nn)."""
+    return local.transpose(1, 0, 2).reshape(-1, local.shape[2])
+
+
+def _slopes_of_mapping(family: ElementBlock) -> list[Floats]:
+    """Slopes x,xi and y,xi at the tying points along xi, and those in eta; (ne, tying, 2) each."""
+    nn = family.nodes.shape[1]
+    found: list[Floats] = []
+    for axis in (0, 1):
+        _, local = local_shape_functions(family, assumed_shear.tying_points(nn, axis))
+        found.append(np.einsum("tn,eni->eti", local[:, axis], family.coordinates))
+    return found
+
+
+def jacobians(family: ElementBlock, local: Floats, transposed: bool) -> tuple[Floats, Floats]:
+    """Inverse Jacobian (ne, npt, 4) and its determinant (ne, npt), in closed form.
+
+    See :func:`fecm.mechanics.interpolation.inverse_jacobian`.
+    """
+    (a, b), (c, d) = jacobian(family, local).transpose(2, 3, 0, 1)  # x, y by xi; x, y by eta
+    determinant = a * d - b * c
+    rows = (d, -c, -b, a) if transposed else (d, -b, -c, a)
+    return np.stack(rows, axis=2) / determinant[:, :, None], determinant

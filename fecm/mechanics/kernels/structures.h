@@ -1,0 +1,169 @@
+/* The structures and enumerations that C and Python share; included once.
+ *
+ * Python fills them in, and points them to arrays that it owns: the kernels allocate nothing that
+ * outlives a call.  Each is repeated with ctypes in the Python file of its kernel: plate.py and
+ * element_groups.py (Plate, Chunk, Block, Group), strains.py (Strains), failure.py (Failure), and beside
+ * this folder impact_steps.py (Impact) and impact_sweep.py (Sweep).  fields.h says where each field lies,
+ * for a test that compares both sides.
+ *
+ * Shapes are those of NumPy, C order; the last index runs fastest.  Numbers are in the deck's units.
+ */
+
+/* Plate; plate.py has a drawing of chunks, blocks, lanes and places. */
+
+/* One matrix for all elements, or one for even and one for odd motions; or none: sums over points of
+ * quadrature, factorized or by tables. */
+enum { ONE_MATRIX, TWO_MATRICES, FACTORIZED, TABULATED };
+
+/* Elements with the same nodes present, and either one matrix or none. */
+typedef struct {
+    int64_t kind, nodes;
+    int64_t pairs;        /* TWO_MATRICES: node i < `pairs` is the image of i + `pairs` under half a turn */
+    const double *matrix; /* ONE_MATRIX: (n, n); TWO_MATRICES: (even, even) and (odd, odd) */
+    /* TABULATED: number of points; `tying` of each covariant strain, or 0.  FACTORIZED: in a direction. */
+    int64_t bending, shear, tying;
+    /* TABULATED: (2 bending + values, nodes), (slopes, nodes).  FACTORIZED: points in a direction. */
+    const double *rotations, *deflection;
+    const double *rotations_t, *deflection_t; /* TABULATED: transposed.  FACTORIZED: weights of the points */
+    const double *in_plane_t;                 /* TABULATED: (nodes, 2 bending) */
+    const double *tied, *tied_t;              /* TABULATED: (2, shear, tying), (2, tying, shear) */
+} Group;
+
+/* Eight elements. */
+typedef struct {
+    const Group *group;
+    /* (nodes,): place in the chunk of a node of the first element, followed by those of the others;
+     * or -1 - i, and the places are row i of `lane`. */
+    const int32_t *place;
+    /* TABULATED: inverse Jacobian with its determinant times the weight, (points, 5, 8), and slopes of the
+     * mapping (2 tying, 2, 8).  FACTORIZED: a factor, and coefficients of x and y, (1 + 8 + 8, 8). */
+    const double *data;
+} Block;
+
+/* Blocks of near elements; the last chunk has no blocks, and the nodes that others share. */
+typedef struct {
+    int64_t blocks;
+    const Block *block;
+    int64_t first, nodes; /* nodes before it in the vectors; its own, a multiple of eight */
+    int64_t shared, fixed;
+    const int32_t *shares, *copies; /* (shared,): places in the last chunk and in this one */
+    const int32_t *at_rest;         /* (fixed,): entries without a mass */
+    const double *signs;            /* (shared, nd) */
+    double *force;                  /* (shared, nd) */
+} Chunk;
+
+typedef struct {
+    int64_t nd, chunks, nodes, most; /* chunks but the last one; nodes of all, and of the largest */
+    const Chunk *chunk;
+    const int32_t *lane;             /* (rows, 8) */
+    const double *stiffness, *shear; /* (6, 6) of strains and negative curvatures; (2, 2) */
+    int64_t transposed;              /* whether the Jacobian of FACTORIZED elements is */
+    int64_t planes;                  /* of the next two: 1, or one for each dof */
+    const double *mass, *inverse;    /* divided by `ratio`; of each node, or of each entry */
+    const double *ratio, *rate;      /* (nd,): and dt^2 over it, or NULL for a scale of 1 */
+    double *u, *d, *s; /* displacement, increment, scaled internal force */
+    double *shared;    /* forces of the last chunk */
+    double damping;    /* a dt/2 */
+} Plate;
+
+/* Branches of the contact law. */
+enum { VIRGIN, UNLOADING, RELOADING };
+
+/* Permanent indentation after a peak: equation 3-8, or 3-7, which has no slope. */
+enum { LINEAR, YANG_SUN };
+
+/* Constants of the contact law; `kind` is one of the above. */
+typedef struct {
+    double k, q, critical, slope;
+    int64_t kind;
+} Law;
+
+/* LoadingHistory of contact_law.py. */
+typedef struct {
+    double branch, f, b, w, p, peak, peak_force, permanent;
+} History;
+
+typedef struct {
+    double indentation, force;
+} Point;
+
+typedef struct {
+    double dt, theta, weight_before, weight, gain; /* as in RodIntegrator */
+    int64_t modes;                                 /* the first is the rigid motion */
+    const double *T, *h; /* (9, modes), (3, modes): new motion, and motion per force */
+    const double *stiffness, *tip_shape, *station; /* (modes,) */
+    double *motion;                                /* (3, modes) */
+    double tip;
+} Rod;
+
+typedef struct {
+    Law law;
+    History memory;
+    Point contact;
+    double plate_w, work, time;
+    int64_t unconverged;
+    Rod rod;
+    double dt2;
+    int64_t loaded; /* entries of the plate under the contact force */
+    const int64_t *entry;
+    const double *weight, *mobility;
+    double *last; /* (loaded,) */
+    int64_t gages, gage_dofs;
+    const int64_t *gage_entry; /* (gages, gage_dofs) */
+    const double *gage_weight;
+    int64_t rows;
+    const int64_t *stored; /* (rows,): steps, from 0, after which u is stored */
+    double *records, *strains, *fields; /* (steps, COLUMNS), (steps, gages), (rows, nodes, nd) */
+} Impact;
+
+/* Columns of `records`. */
+enum {
+    TIME, INERTIA, POWER, STRAIN, INTERNAL, LOAD_D, LOAD_S, FORCE, INDENTATION, PLATE_W, CONTACT_WORK, DISPLACEMENT,
+    VELOCITY, ACCELERATION, PROJECTILE_KINETIC, PROJECTILE_STRAIN, STATION, COLUMNS
+};
+
+/* Impacts on one plate by one kind of projectile, whose mass and stiffness have a factor in each case. */
+typedef struct {
+    int64_t cases, stride, steps, modes; /* `stride`: columns of the arrays of cases */
+    int64_t law;                         /* kind of the contact law */
+    double dt, theta, weight_before, weight; /* as in RodIntegrator */
+    const double *T, *h, *stiffness, *tip_shape; /* modes: see Rod */
+    const double *plate; /* (steps,): displacement per force after 1, 2, ... steps */
+    const double *given; /* (GIVEN, cases) */
+    double *force, *found; /* (cases, steps), (FOUND, cases) */
+} Sweep;
+
+/* Rows of `given`. */
+enum { GIVEN_K, GIVEN_Q, GIVEN_CRITICAL, GIVEN_SLOPE, GIVEN_VELOCITY, GIVEN_FACTOR, GIVEN };
+
+/* Rows of `found`: the largest and the last indentation, the permanent one, the largest and the last
+ * displacement of the plate and its largest second difference; the largest error of the energies, the
+ * initial energy, and the number of steps whose contact iteration did not converge. */
+enum {
+    FOUND_DEEPEST, FOUND_INDENTATION, FOUND_PERMANENT, FOUND_HIGHEST, FOUND_W, FOUND_LARGEST_DDW, FOUND_LOST,
+    FOUND_INITIAL, FOUND_UNCONVERGED, FOUND
+};
+
+/* Strains of elements with the same nodes present; `width` is that of `points` in fours. */
+typedef struct {
+    int64_t elements, nodes, points, width;
+    const int64_t *row, *node, *shape; /* (elements,), (elements, nodes), (elements,): row of `metric` */
+    const double *table;  /* (nodes, 3, width): slopes in xi and eta, values */
+    const double *metric; /* (shapes, 4, width): inverse Jacobian */
+} Strains;
+
+enum { CRITERIA = 4 };
+
+/* Strengths, in the order of failure.py, and Puck's limits. */
+typedef struct {
+    double xt, xc, yt, yc, s12, f12, p_plus, p_minus, resistance, critical;
+} Ply;
+
+/* Largest exposures of the states of stress (plies, faces) at points; `width` is `states` in fours. */
+typedef struct {
+    int64_t points, states, width;
+    const double *in_plane; /* (6, 3, width): stresses per strain */
+    Ply ply;
+    double *exposure, *time; /* (CRITERIA, points, states) */
+    int8_t *mode;
+} Failure;

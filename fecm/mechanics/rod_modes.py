@@ -1,0 +1,82 @@
+"""A projectile in its natural modes, and one implicit step of each.
+
+The first mode is the rigid motion, whose displacement is left to the tip.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.mechanics.projectile import RodIntegrator, RodState
+
+# Difference of squares of frequencies below which modes count as equal, relative to the largest.
+EQUAL = 1e-10
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Natural modes of a projectile, of unit modal mass; the first is its rigid motion."""
+
+    shapes: Floats  # (n, modes)
+    stiffness: Floats  # (modes,): square of the angular frequency; 0 for the rigid motion
+    weights: Floats  # (n, modes): the mass matrix times the shapes
+
+    @classmethod
+    def of(cls, K: Floats, m: Floats) -> Modes:
+        """Modes of a free projectile with the dofs u and du/dx of its nodes."""
+        M = np.diag(m) if m.ndim == 1 else m
+        inverse = np.linalg.inv(np.linalg.cholesky(M))
+        values, vectors = np.linalg.eigh(inverse @ K @ inverse.T)
+        # One Newton step in extended precision: the errors of a low mode are relative to the
+        # largest frequency (T. Ogita and K. Aishima, Iterative refinement for symmetric
+        # eigenvalue decomposition, 2018).  Modes of equal frequency are only made orthogonal.
+        V = (inverse.T @ vectors).astype(np.longdouble)
+        overlap, S = np.eye(len(m)) - V.T @ M @ V, V.T @ K @ V
+        exact = np.diagonal(S) / (1.0 - np.diagonal(overlap))
+        gap = exact - exact[:, None]
+        far = abs(gap) > EQUAL * values[-1]
+        change = np.where(far, S + overlap * exact, overlap) / np.where(far, gap, 2.0)
+        shapes, values = (V + V @ change).astype(float), exact.astype(float)
+        rigid = np.zeros(len(m))
+        rigid[::2] = 1.0
+        shapes[:, 0] = rigid / np.sqrt(rigid @ M @ rigid)
+        values[0] = 0.0
+        return cls(shapes, values, M @ shapes)
+
+    def motion(self, state: RodState) -> Floats:
+        """Motion of the modes, (3, modes), without the rigid displacement."""
+        y = np.stack([state.deformation, state.velocity, state.acceleration])
+        rigid = y @ self.weights[:, 0]
+        # Without it, its rounding does not reach the other modes.
+        modal = (y - rigid[:, None] * self.shapes[:, 0]) @ self.weights
+        modal[:, 0] = rigid
+        modal[0, 0] = 0.0
+        return np.ascontiguousarray(modal)
+
+    def state(self, motion: Floats, tip: float, moved: float) -> RodState:
+        """State with a motion of the modes and a displacement of the tip; `moved` in the step."""
+        y = motion @ self.shapes.T
+        y[0, ::2] -= y[0, 0]
+        y[0, 0] = moved
+        return RodState(y, tip)
+
+    def step(self, integrator: RodIntegrator) -> tuple[Floats, Floats]:
+        """Matrices (9, modes) and motion per tip force (3, modes) of a step, as an integrator's."""
+        theta, r, dt = integrator.theta, integrator.inverse_beta, integrator.dt
+        a0, a2 = r / (theta * dt) ** 2, r / (theta * dt)
+        a4 = a0 / theta
+        effective = 1.0 / (self.stiffness + a0)
+        one, none = np.ones_like(effective), np.zeros_like(effective)
+        of_displacement = -a4 * effective * self.stiffness
+        of_velocity = a4 * a2 * effective - a2 / theta
+        of_acceleration = (r / 2.0 - 1.0) * a4 * effective + 1.0 - r / 2.0 / theta
+        acceleration = np.stack([of_displacement, of_velocity, of_acceleration])
+        gain = a4 * effective * self.shapes[0]
+        before, after = integrator.weights
+        velocity = np.stack([none, one, dt / 2.0 * one]) + dt / 2.0 * acceleration
+        moved = np.stack([one, dt * one, before * one]) + after * acceleration
+        T = np.concatenate([moved, velocity, acceleration])
+        return T, np.stack([after * gain, dt / 2.0 * gain, gain])
