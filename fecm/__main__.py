@@ -31,7 +31,7 @@ def main() -> NoReturn:
         signal.signal(signal.SIGINT, _leave)
         signal.signal(signal.SIGTERM, _leave)
     with contextlib.suppress(ImportError):  # Windows has no such limits
-        import resource
+        import resource  # Unix only
 
         space = resource.getrlimit(resource.RLIMIT_AS)[0]
         if space < LEAST_SPACE and space != resource.RLIM_INFINITY:

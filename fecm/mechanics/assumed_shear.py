@@ -17,7 +17,8 @@ from fecm.mechanics.interpolation import NDOF, inverse_jacobian, local_shape_fun
 from fecm.mechanics.mesh import ElementBlock
 
 # By number of nodes: tying points of e_xi along xi and along eta, and the order of the quadrature.
-_G, _H = 3.0**-0.5, 0.6**0.5
+_G = 3.0**-0.5
+_H = 0.6**0.5
 TYING = {4: ((0.0,), (-1.0, 1.0), 2), 9: ((-_G, _G), (-_H, 0.0, _H), 3)}
 
 

@@ -28,7 +28,9 @@ LOADING_POWER = 1.5
 ACR_POWER = 2.5
 
 # Branches.
-VIRGIN, UNLOADING, RELOADING = 0, 1, 2
+VIRGIN = 0
+UNLOADING = 1
+RELOADING = 2
 
 
 def _select(condition: Truth, a: Number, b: Number) -> Number:

@@ -20,9 +20,18 @@ from numpy.typing import NDArray
 from fecm._typing import Floats, Indices
 
 MODES = (
-    "none", "fibre tension", "fibre compression", "matrix tension", "matrix compression", "shear",
-    "interactive", "inter-fibre A", "inter-fibre B", "inter-fibre C", "interlaminar shear",
-)  # fmt: skip
+    "none",
+    "fibre tension",
+    "fibre compression",
+    "matrix tension",
+    "matrix compression",
+    "shear",
+    "interactive",
+    "inter-fibre A",
+    "inter-fibre B",
+    "inter-fibre C",
+    "interlaminar shear",
+)
 
 Codes = NDArray[np.int8]
 # Values of a criterion by mode; the exposure is the largest.

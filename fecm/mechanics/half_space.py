@@ -16,9 +16,12 @@ from fecm._errors import FecmError
 from fecm._typing import Floats
 from fecm.mechanics.laminate import PlyConstants
 
-SURFACE, AROUND = 72, 180  # directions in the surface and around each of them
+# Directions in the surface, and around each of them.
+SURFACE = 72
+AROUND = 180
 # In-plane and out-of-plane components.
-_A, _B = [0, 1, 5], [2, 4, 3]
+_A = [0, 1, 5]
+_B = [2, 4, 3]
 _VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 
 

@@ -19,7 +19,8 @@ from fecm._typing import Floats
 
 # The slip ``small-stiffness`` sets entries of A, B and D below the first limit to 0, except
 # rounding errors below the second one, relative to A h^n.
-LISTING_LEAST, ROUNDING = 1.0e-6, 1.0e-12
+LISTING_LEAST = 1.0e-6
+ROUNDING = 1.0e-12
 
 
 @dataclass(frozen=True, match_args=False)  # attributes that need not be assignable

@@ -33,7 +33,8 @@ from fecm.mechanics.symmetry import SymmetryReduction, unreduced
 # Length of a product for which BLAS uses one thread, whatever the number of threads.
 SERIAL = 8192
 # Equations are taken as a slice if it is at most so long, or so many times longer: that is faster.
-SHORT, NEAR = 2048, 8
+SHORT = 2048
+NEAR = 8
 
 
 class DivergenceError(FecmError, ArithmeticError):

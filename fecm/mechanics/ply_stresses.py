@@ -27,9 +27,13 @@ def in_plane_stresses(laminate: Laminate) -> Floats:
     """
     plies = laminate.plies
     m, n = np.cos(np.deg2rad(plies.angles)), np.sin(np.deg2rad(plies.angles))
-    T = np.array([
-        [m * m, n * n, 2 * m * n], [n * n, m * m, -2 * m * n], [-m * n, m * n, m * m - n * n]
-    ])  # fmt: skip
+    T = np.array(
+        [
+            [m * m, n * n, 2 * m * n],
+            [n * n, m * m, -2 * m * n],
+            [-m * n, m * n, m * m - n * n],
+        ]
+    )
     stiffness = T.transpose(2, 0, 1) @ plies.stiffness
     z = np.stack([plies.faces[:-1], plies.faces[1:]], axis=1)[:, :, None, None]
     parts = np.broadcast_arrays(stiffness[:, None], z * stiffness[:, None])
@@ -100,11 +104,13 @@ def equilibrium_shear_stiffness(laminate: Laminate) -> Floats:
 
 
 # Second derivatives d2/dxi2, d2/deta2 and d2/dxi deta of the 9-node shape functions at the centre.
-_CURVED = np.array([
-    [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, -2.0],
-    [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, -2.0],
-    [0.25, -0.25, 0.25, -0.25, 0.0, 0.0, 0.0, 0.0, 0.0],
-])  # fmt: skip
+_CURVED = np.array(
+    [
+        [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, -2.0],
+        [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, -2.0],
+        [0.25, -0.25, 0.25, -0.25, 0.0, 0.0, 0.0, 0.0, 0.0],
+    ]
+)
 
 
 def second_derivatives(family: ElementBlock) -> Floats:
@@ -184,9 +190,10 @@ class PlyStresses:
         shear = np.einsum("lptds,eds->telp", self._interlaminar, gradients)
         residual = np.einsum("tds,eds->et", self._residual, gradients)
         names = ("sigma_1", "sigma_2", "tau_12")
-        return dict(zip(names, stress, strict=True)) | {
-            "tau_xz": shear[0], "tau_yz": shear[1], "residual": residual
-        }  # fmt: skip
+        found = dict(zip(names, stress, strict=True))
+        found["tau_xz"], found["tau_yz"] = shear
+        found["residual"] = residual
+        return found
 
 
 def _strains(slopes: Floats) -> Floats:

@@ -72,7 +72,8 @@ def _local(elements: ElementBlock, points: Floats) -> tuple[Floats, Bools]:
 # p = 3/(2 pi c^2) sqrt(1 - r^2/c^2).  Its nodal weights g_i, the integral of N_i p, distribute the
 # contact force, F g, and average the displacement in the contact law, W = g w.
 
-DISC, HERTZ = "DISC", "HERT"
+DISC = "DISC"
+HERTZ = "HERT"
 # Radius, over the thickness, whose midplane deflection is that of a plate pressed on one face over
 # a contact small against the thickness (Westergaard; three-dimensional elasticity, nu = 0.3).
 RADIUS_PER_THICKNESS = {DISC: 0.327, HERTZ: 0.377}
@@ -80,7 +81,8 @@ RADIUS_PER_THICKNESS = {DISC: 0.327, HERTZ: 0.377}
 # Gauss points along the radius and equal angles, for a radius c of up to SIDES times the shortest
 # side a of an element under the patch.  For c = n SIDES a there are sqrt(n) times as many of both,
 # rounded up: the deflection under the patch is then right to 1e-6 up to c = 25 a, 3e-5 otherwise.
-RADII, ANGLES = 24, 48
+RADII = 24
+ANGLES = 48
 SIDES = 4.0
 
 
@@ -102,9 +104,13 @@ def patch_weights(mesh: Mesh, shape: str, radius: float, x: float, y: float) -> 
 
 
 def _summed(
-    families: Sequence[ElementBlock], nodes: int, shape: str, radius: float,
-    centre: tuple[float, float], times: int,
-) -> tuple[Floats, float]:  # fmt: skip
+    families: Sequence[ElementBlock],
+    nodes: int,
+    shape: str,
+    radius: float,
+    centre: tuple[float, float],
+    times: int,
+) -> tuple[Floats, float]:
     """Nodal weights of w, not yet scaled, and the shortest side of an element under the patch.
 
     By `times` RADII points along the radius and `times` ANGLES angles.

@@ -22,7 +22,8 @@ REPORT_DIAMETER = 0.625
 REPORT_ELEMENTS = 20
 REPORT_LENGTH = 1.0
 REPORT_MODULUS = 30.0e6
-REPORT_DENSITY, LISTING_DENSITY = 0.0006875, 0.0003225
+REPORT_DENSITY = 0.0006875
+LISTING_DENSITY = 0.0003225
 
 # The report's program uses the lumped mass, its text the consistent one (equation 4-24).
 MassMatrix = Literal["lumped", "consistent"]

@@ -23,8 +23,6 @@ DENSE = 60
 # Shift of the spectrum relative to the largest eigenvalue, about half the digits of a double, which
 # makes the matrix of a plate without supports regular.
 SHIFT = 1.0e-9
-
-
 # Eigenvalue of the supported rigid motions, relative to the largest, below which one is free.
 NOT_HELD = 1.0e-9
 
@@ -65,8 +63,9 @@ class Tangent:
     """
 
     def __init__(self, plate: PlateModel) -> None:
+        # 0.2 s, which most runs don't need.
         from scipy.sparse import diags_array
-        from scipy.sparse.linalg import MatrixRankWarning, splu  # slow to import
+        from scipy.sparse.linalg import MatrixRankWarning, splu
 
         self._stiffness = held = plate.stiffness
         if pins := in_plane_pins(plate):
@@ -79,9 +78,11 @@ class Tangent:
                 # K is positive definite; pivoting only costs fill, a factor of 40 on a plate of
                 # 30 x 30 elements.
                 self._factors: SuperLU = splu(
-                    held.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                    held.tocsc(),
+                    permc_spec="MMD_AT_PLUS_A",
+                    diag_pivot_thresh=0.0,
                     options={"SymmetricMode": True},
-                )  # fmt: skip
+                )
         except (RuntimeError, MatrixRankWarning) as error:
             raise SingularStiffnessError(f"the stiffness is singular ({error})") from None
 
@@ -129,7 +130,8 @@ class Modes:
 
 def modes(plate: PlateModel, count: int, *, consistent: bool) -> Modes:
     """Compute the lowest modes, at most as many as equations, with the chosen mass matrix."""
-    from scipy import linalg, sparse  # slow to import
+    # 0.2 s, which most runs don't need.
+    from scipy import linalg, sparse
     from scipy.sparse.linalg import eigsh
 
     K = plate.stiffness

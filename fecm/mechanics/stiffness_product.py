@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -50,7 +50,7 @@ class Workers:
         self.count = count
         self._pool = None
         if count > 1:
-            from concurrent.futures import ThreadPoolExecutor
+            from concurrent.futures import ThreadPoolExecutor  # 6 ms, for several threads only
 
             self._pool = ThreadPoolExecutor(count - 1)
 
@@ -109,7 +109,7 @@ class _Domain:
         self.dof_indices = np.concatenate([part.ravel() for _, part in moving])
         self._gathered, self.forces = scratch[:, : len(self.dof_indices)]
         # Product function, nodal values, matrix or matrices, forces.
-        self._parts: list[tuple[Callable[..., Any], Floats, Floats, Floats]] = []
+        self._parts: list[tuple[np.ufunc | Callable[..., Floats], Floats, Floats, Floats]] = []
         end = 0
         for K, part in moving:
             for first in range(0, len(part), BLOCK):
@@ -132,7 +132,7 @@ class _Domain:
 
     def prepare_sums(self) -> None:
         """Build the matrix that sums the elements' forces, for the equations of the domain."""
-        from scipy import sparse  # slow to import, and not needed by small plates
+        from scipy import sparse  # 0.16 s, which small plates don't need
 
         turned = (self.dof_indices >= self._count) & (self.dof_indices < self._last)
         equations = np.where(turned, self.dof_indices - self._count, self.dof_indices)

@@ -15,8 +15,15 @@ from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.mesh import ElementBlock, Ints, element_blocks
 
 GENERALISED_STRAINS = (
-    "eps_xx", "eps_yy", "gamma_xy", "kappa_x", "kappa_y", "kappa_xy", "gamma_xz", "gamma_yz",
-)  # fmt: skip
+    "eps_xx",
+    "eps_yy",
+    "gamma_xy",
+    "kappa_x",
+    "kappa_y",
+    "kappa_xy",
+    "gamma_xz",
+    "gamma_yz",
+)
 RESULTANTS = ("N_x", "N_y", "N_xy", "M_x", "M_y", "M_xy", "Q_x", "Q_y")
 STRAINS = ("kappa_x", "kappa_y", "kappa_xy", "gamma_yz", "gamma_xz")
 

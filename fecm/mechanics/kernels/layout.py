@@ -85,12 +85,13 @@ def layout_of(families: list[ElementBlock]) -> Layout:
 
 def _strips(families: list[ElementBlock], axis: int) -> tuple[Indices, Indices]:
     """Strip of each element, and its place in it: elements of a family that share sides."""
-    follows = np.concatenate([
-        np.where(after < 0, -1, after + before)
-        for family, before in zip(families, _starts(families), strict=True)
-        for after in [_following(family, axis)]
-    ])  # fmt: skip
-    strip, place = np.full(len(follows), -1), np.zeros(len(follows), dtype=np.intp)
+    parts: list[Indices] = []
+    for family, before in zip(families, _starts(families), strict=True):
+        after = _following(family, axis)
+        parts.append(np.where(after < 0, -1, after + before))
+    follows = np.concatenate(parts)
+    strip = np.full(len(follows), -1)
+    place = np.zeros(len(follows), dtype=np.intp)
     current = np.flatnonzero(np.bincount(follows + 1, minlength=len(follows) + 1)[1:] == 0)
     number, step = np.arange(len(current)), 0
     while len(current):
@@ -150,8 +151,10 @@ def places_of(layout: Layout, families: list[ElementBlock], leader: Indices) -> 
     numnp, keys, pairs = len(leader), [], []
     for family, before in zip(families, _starts(families), strict=True):
         members = slice(before, before + len(family.rows))
-        levels = [np.unique(at[family.present], return_index=True, return_inverse=True)[2]
-                  for at in (family.shape.xi, family.shape.eta)]  # fmt: skip
+        levels = [
+            np.unique(at[family.present], return_index=True, return_inverse=True)[2]
+            for at in (family.shape.xi, family.shape.eta)
+        ]
         along, across = levels[layout.axis], levels[1 - layout.axis]
         last = along == along.max()  # the first of the next element
         line = layout.piece[members, None] * len(along) + across
