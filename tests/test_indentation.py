@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -132,7 +134,7 @@ def test_a_closed_path_never_gives_energy_back(path: list[float]) -> None:
 @settings(max_examples=25)
 @given(paths=st.lists(st.lists(indentations, min_size=6, max_size=6), min_size=1, max_size=8))
 def test_many_cases_at_once_are_each_the_single_case(
-    kind: type[HystereticLaw] | type[ListingLaw], paths: list[list[float]]
+    kind: type[HystereticLaw[Any]] | type[ListingLaw[Any]], paths: list[list[float]]
 ) -> None:
     k = np.full(len(paths), 1.912e6)
     law = kind(LinearPermanent(k, 6.564e-4 + 0 * k, 0.094 + 0 * k, 2.0 + 0 * k))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm._typing import Floats
 from fecm.api import load_deck
 from fecm.mechanics import kernels
 from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
@@ -130,7 +131,7 @@ def test_the_response_of_a_plate_is_that_of_numpy(steps: int) -> None:
 
 @compiled
 def test_a_law_that_the_kernels_do_not_know_is_numpys() -> None:
-    class Other(LinearPermanent):
+    class Other(LinearPermanent[Floats]):
         """The same law by another name."""
 
     one, kind = np.ones(3), np.zeros(3, dtype=np.intp)

@@ -2,8 +2,11 @@
 
 Every curve of the report's laws (equations 3-1, 3-3 and 3-11) has the form F = f ((a - b)/w)^p, and
 is zero for a <= b.  The loading history is the current curve and the peak at which first loading
-ended; it is immutable.  Force and indentation are positive in compression.  All values are floats,
-or arrays with one entry per case.
+ended; it is immutable.  Force and indentation are positive in compression.
+
+A law is that of one case, whose values are floats, or of many, whose values are arrays with an
+entry per case: the type parameter :data:`Number`, which is float where it is left out.  Powers of
+floats are Python's, those of arrays NumPy's.
 """
 
 from __future__ import annotations
@@ -12,16 +15,19 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import field, fields, replace
-from typing import Any, NamedTuple, Protocol, cast
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar, cast, overload
 
 import numpy as np
 
 from fecm._frozen import frozen
-from fecm._typing import Floats, Indices
+from fecm._typing import Bools, Floats, Indices
 
-# float or Floats, and bool or Bools: one case, or an array of cases.
-Number = Any
-Truth = Any
+if TYPE_CHECKING:
+    import typing_extensions
+
+    Number = typing_extensions.TypeVar("Number", float, Floats, default=float)
+else:  # the default is of Python 3.13
+    Number = TypeVar("Number", float, Floats)
 
 LOADING_POWER = 1.5
 # Equation 3-7 holds for this unloading power only.
@@ -33,14 +39,20 @@ UNLOADING = 1
 RELOADING = 2
 
 
-def _select(condition: Truth, a: Number, b: Number) -> Number:
+@overload
+def select(condition: bool, a: float, b: float) -> float: ...
+@overload
+def select(condition: Bools, a: float | Floats, b: float | Floats) -> Floats: ...
+@overload
+def select(condition: bool | Bools, a: float | Floats, b: float | Floats) -> float | Floats: ...
+def select(condition: bool | Bools, a: float | Floats, b: float | Floats) -> float | Floats:
     """`a` where the condition holds, otherwise `b`."""
     if isinstance(condition, np.ndarray):
         return np.where(condition, a, b)
     return a if condition else b
 
 
-def _any(condition: Truth) -> bool:
+def any_case(condition: bool | Bools) -> bool:
     """Whether the condition holds for any case."""
     return bool(condition.any()) if isinstance(condition, np.ndarray) else bool(condition)
 
@@ -61,27 +73,35 @@ def hertz_coefficient(radius: float, e_s: float, nu_s: float, e_t: float) -> flo
     return 4.0 / 3.0 * math.sqrt(radius) / ((1.0 - nu_s**2) / e_s + 1.0 / e_t)
 
 
-class ContactParameters(ABC):
+class ContactParameters(ABC, Generic[Number]):
     """Parameters of the contact law."""
 
     __slots__ = ()
     k: Number  # contact coefficient, force/length^1.5 (equation 3-1)
-    q: Number  # power of the unloading curve (equation 3-3)
+    q: float | Number  # power of the unloading curve (equation 3-3)
 
+    @overload
+    def permanent(self, peak: Number) -> Number: ...
+    @overload
+    def permanent(self, peak: Floats) -> Floats: ...
     @abstractmethod
-    def permanent(self, peak: Number) -> Number:
+    def permanent(self, peak: float | Floats) -> float | Floats:
         """Permanent indentation after a peak (length)."""
 
-    def of_cases(self, cases: Indices) -> ContactParameters:
+    def of_cases(self: ContactParameters[Floats], cases: Indices) -> ContactParameters[Floats]:
         """Select some cases."""
         return stacked([self], lambda values: values[0][cases])
 
-    def loading(self, indentation: Number) -> Number:
+    @overload
+    def loading(self, indentation: Number) -> Number: ...
+    @overload
+    def loading(self, indentation: Floats) -> Floats: ...
+    def loading(self, indentation: float | Floats) -> float | Floats:
         """Force on the first loading curve, equation 3-1."""
         return power_curve(self.k, 0.0, 1.0, LOADING_POWER, indentation)
 
-    def rigidity(self, peak: Number) -> Number:
-        """Unloading rigidity s after a positive peak, equation 3-5, force/length^q.
+    def rigidity(self, peak: Floats) -> Floats:
+        """Unloading rigidity s after positive peaks, equation 3-5, force/length^q.
 
         The permanent indentation of 3-8 gives 3-9 and 3-10, that of 3-7 gives 3-6.
         """
@@ -89,7 +109,7 @@ class ContactParameters(ABC):
 
 
 @frozen
-class LinearPermanent(ContactParameters):
+class LinearPermanent(ContactParameters[Number]):
     """Parameters with a linear permanent indentation (the card of EXPE)."""
 
     k: Number  # contact coefficient, force/length^1.5 (equation 3-1)
@@ -98,28 +118,56 @@ class LinearPermanent(ContactParameters):
     s_p: Number
     q: Number  # power of the unloading curve (equation 3-3)
 
-    def permanent(self, peak: Number) -> Number:
+    @overload
+    def permanent(self, peak: Number) -> Number: ...
+    @overload
+    def permanent(self, peak: Floats) -> Floats: ...
+    def permanent(self, peak: float | Floats) -> float | Floats:
         """Permanent indentation after a peak, equation 3-8, never negative (length)."""
         value = self.s_p * (peak - self.alpha_p)
-        return _select(value > 0.0, value, 0.0)
+        return select(value > 0.0, value, 0.0)
 
 
 @frozen
-class YangSunPermanent(ContactParameters):
+class YangSunPermanent(ContactParameters[Number]):
     """Parameters with one unloading rigidity k/alpha_cr for every peak (the card of EXPE ACR)."""
 
     k: Number  # contact coefficient, force/length^1.5 (equation 3-1)
     alpha_cr: Number  # critical indentation of equation 3-6 (length)
-    q: Number = field(default=ACR_POWER, init=False)  # 5/2
+    q: float = field(default=ACR_POWER, init=False)  # 5/2
 
-    def permanent(self, peak: Number) -> Number:
+    @overload
+    def permanent(self, peak: Number) -> Number: ...
+    @overload
+    def permanent(self, peak: Floats) -> Floats: ...
+    def permanent(self, peak: float | Floats) -> float | Floats:
         """Permanent indentation after a peak, equation 3-7, never negative (length)."""
-        top = _select(peak > 0.0, peak, 0.0)
-        value = top - self.alpha_cr**0.4 * top**0.6
-        return _select(value > 0.0, value, 0.0)
+        top = select(peak > 0.0, peak, 0.0)
+        value: float | Floats = top - self.alpha_cr**0.4 * top**0.6
+        return select(value > 0.0, value, 0.0)
 
 
-def power_curve(f: Number, b: Number, w: Number, p: Number, a: Number) -> Number:
+@overload
+def power_curve(f: float, b: float, w: float, p: float, a: float) -> float: ...
+@overload
+def power_curve(
+    f: float | Floats, b: float | Floats, w: float | Floats, p: float | Floats, a: Floats
+) -> Floats: ...
+@overload
+def power_curve(
+    f: float | Floats,
+    b: float | Floats,
+    w: float | Floats,
+    p: float | Floats,
+    a: float | Floats,
+) -> float | Floats: ...
+def power_curve(
+    f: float | Floats,
+    b: float | Floats,
+    w: float | Floats,
+    p: float | Floats,
+    a: float | Floats,
+) -> float | Floats:
     """F = f ((a - b)/w)^p, zero for a <= b."""
     if isinstance(a, np.ndarray):
         return np.where(a > b, f * (np.maximum(a - b, 0.0) / w) ** p, 0.0)
@@ -128,14 +176,14 @@ def power_curve(f: Number, b: Number, w: Number, p: Number, a: Number) -> Number
 
 def stacked(
     records: Sequence[Any], function: Callable[[list[Any]], Any] = np.array
-) -> ContactParameters:
+) -> ContactParameters[Floats]:
     """Parameters of many cases, all of one class, as arrays: a function of the values of each."""
     names = [part.name for part in fields(records[0]) if part.init]
     made = {name: function([getattr(record, name) for record in records]) for name in names}
-    return cast(ContactParameters, replace(records[0], **made))
+    return cast(ContactParameters[Floats], replace(records[0], **made))
 
 
-class LoadingHistory(NamedTuple):
+class LoadingHistory(NamedTuple, Generic[Number]):
     """Loading history of a contact."""
 
     branch: Number  # VIRGIN, UNLOADING or RELOADING
@@ -149,19 +197,20 @@ class LoadingHistory(NamedTuple):
     peak_force: Number
     permanent: Number  # permanent indentation after that peak
 
-    def force(self, indentation: Number) -> Number:
-        """Force on the branch's curve."""
-        return power_curve(self.f, self.b, self.w, self.p, indentation)
 
-
-class ContactPoint(NamedTuple):
+class ContactPoint(NamedTuple, Generic[Number]):
     """An accepted indentation and its force."""
 
     indentation: Number
     force: Number
 
 
-class Law(Protocol):
+def branch_force(history: LoadingHistory[Number], indentation: Number) -> Number:
+    """Force on the curve of the history's branch."""
+    return power_curve(history.f, history.b, history.w, history.p, indentation)
+
+
+class Law(Protocol[Number]):
     """A contact law: a force for each trial indentation, and a memory of the loading history.
 
     A step calls `trial` up to five times, as the contact iteration does, and `accept` once, with
@@ -187,41 +236,51 @@ class Law(Protocol):
     def start(self) -> Any:
         """Memory before the first contact."""
 
-    def trial(self, memory: Any, last: ContactPoint, indentation: Number) -> tuple[Number, Any]:
+    def trial(
+        self, memory: Any, last: ContactPoint[Number], indentation: Number
+    ) -> tuple[Number, Any]:
         """Contact force at a trial indentation, and the memory after the trial.
 
         The last point is that at the end of the last step.  An indentation is a length, negative
         where the bodies are apart.
         """
 
-    def accept(self, memory: Any, last: ContactPoint, indentation: Number) -> Any:
+    def accept(self, memory: Any, last: ContactPoint[Number], indentation: Number) -> Any:
         """Memory after a step that ends at an indentation."""
 
-    def permanent(self, memory: Any, last: ContactPoint) -> Number:
+    def permanent(self, memory: Any, last: ContactPoint[Number]) -> Number:
         """Permanent indentation after unloading from the last point (length)."""
 
 
 @frozen
-class MeasuredLaw:
+class MeasuredLaw(Generic[Number]):
     """A law of the report, with measured parameters; subclasses add `trial` and `accept`."""
 
-    constants: ContactParameters
+    constants: ContactParameters[Number]
 
-    def start(self) -> LoadingHistory:
+    def start(self) -> LoadingHistory[Number]:
         """Loading history before the first contact."""
         k = self.constants.k
-        zero, one = 0.0 * k, 0.0 * k + 1.0
-        branch = VIRGIN + (zero == one)  # VIRGIN for every case
-        return LoadingHistory(branch, k, zero, one, LOADING_POWER * one, zero, zero, zero)
+        zero = _like(k, 0.0)
+        return LoadingHistory(
+            branch=_like(k, VIRGIN),
+            f=k,
+            b=zero,
+            w=_like(k, 1.0),
+            p=_like(k, LOADING_POWER),
+            peak=zero,
+            peak_force=zero,
+            permanent=zero,
+        )
 
-    def permanent(self, memory: LoadingHistory, last: ContactPoint) -> Number:
+    def permanent(self, memory: LoadingHistory[Number], last: ContactPoint[Number]) -> Number:
         """Permanent indentation after unloading from the last accepted point (length)."""
-        peak = _select(memory.branch == VIRGIN, last.indentation, memory.peak)
-        return self.constants.permanent(_select(peak > memory.peak, peak, memory.peak))
+        peak = select(memory.branch == VIRGIN, last.indentation, memory.peak)
+        return self.constants.permanent(select(peak > memory.peak, peak, memory.peak))
 
 
 @frozen
-class HystereticLaw(MeasuredLaw):
+class HystereticLaw(MeasuredLaw[Number]):
     """The report's law with any sequence of unloadings and reloadings.
 
     The peak is the point at which the indentation falls from the first loading curve (3-1).  Below
@@ -231,20 +290,20 @@ class HystereticLaw(MeasuredLaw):
     """
 
     def trial(
-        self, memory: LoadingHistory, last: ContactPoint, indentation: Number
-    ) -> tuple[Number, LoadingHistory]:
+        self, memory: LoadingHistory[Number], last: ContactPoint[Number], indentation: Number
+    ) -> tuple[Number, LoadingHistory[Number]]:
         """Contact force at a trial indentation; a trial does not change the history."""
         if not isinstance(indentation, np.ndarray):
-            return self.accept(memory, last, indentation).force(indentation), memory
+            return branch_force(self.accept(memory, last, indentation), indentation), memory
         cases, new = self._turning(memory, last, indentation)
-        force = memory.force(indentation)
+        force = branch_force(memory, indentation)
         if new is not None:
-            force[cases] = new.force(indentation[cases])
+            force[cases] = branch_force(new, indentation[cases])
         return force, memory
 
     def accept(
-        self, memory: LoadingHistory, last: ContactPoint, indentation: Number
-    ) -> LoadingHistory:
+        self, memory: LoadingHistory[Number], last: ContactPoint[Number], indentation: Number
+    ) -> LoadingHistory[Number]:
         """Loading history after a step that ends at an indentation."""
         m, a = memory, indentation
         if isinstance(a, np.ndarray):
@@ -263,8 +322,11 @@ class HystereticLaw(MeasuredLaw):
         return self._turned(m, last, a)
 
     def _turning(
-        self, m: LoadingHistory, last: ContactPoint, a: Floats
-    ) -> tuple[Indices, LoadingHistory | None]:
+        self: HystereticLaw[Floats],
+        m: LoadingHistory[Floats],
+        last: ContactPoint[Floats],
+        a: Floats,
+    ) -> tuple[Indices, LoadingHistory[Floats] | None]:
         """Cases that may leave their branch, and their loading histories; None without any."""
         falls, rises = a < last.indentation, a > last.indentation
         virgin, unloading = m.branch == VIRGIN, m.branch == UNLOADING
@@ -276,7 +338,9 @@ class HystereticLaw(MeasuredLaw):
         at = ContactPoint(*(x[cases] for x in last))
         return cases, law._turned(LoadingHistory(*(x[cases] for x in m)), at, a[cases])
 
-    def _turned(self, m: LoadingHistory, last: ContactPoint, a: Number) -> LoadingHistory:
+    def _turned(
+        self, m: LoadingHistory[Number], last: ContactPoint[Number], a: Number
+    ) -> LoadingHistory[Number]:
         """Loading history where the indentation may leave the branch."""
         falls = a < last.indentation
         leaves = (m.branch == VIRGIN) & falls
@@ -284,33 +348,47 @@ class HystereticLaw(MeasuredLaw):
         turns_up = (m.branch == UNLOADING) & (a > last.indentation) & (a < m.peak)
         turns_down = (m.branch == RELOADING) & falls
         c = self.constants
-        peak = _select(leaves, last.indentation, m.peak)
-        peak_force = _select(leaves, c.loading(last.indentation), m.peak_force)
-        permanent = _select(leaves, c.permanent(last.indentation), m.permanent)
+        peak = select(leaves, last.indentation, m.peak)
+        peak_force = select(leaves, c.loading(last.indentation), m.peak_force)
+        permanent = select(leaves, c.permanent(last.indentation), m.permanent)
         # Unloading starts on the first loading curve, or at the last point of a reloading curve.
-        begin = _select(leaves, peak_force, last.force)
-        down = _unloading(c.q, last.indentation, begin, peak, peak_force, permanent)
+        begin = select(leaves, peak_force, last.force)
+        down = _unloading(c.q, last, begin, peak=peak, peak_force=peak_force, permanent=permanent)
         up = self._reloading(m, last)
-        first = m._replace(branch=VIRGIN, f=c.k, b=0.0, w=1.0, p=LOADING_POWER)
+        first = m._replace(
+            branch=_like(a, VIRGIN),
+            f=c.k,
+            b=_like(a, 0.0),
+            w=_like(a, 1.0),
+            p=_like(a, LOADING_POWER),
+        )
         return _choose(leaves | turns_down, down, _choose(turns_up, up, _choose(returns, first, m)))
 
-    def _reloading(self, m: LoadingHistory, last: ContactPoint) -> LoadingHistory:
+    def _reloading(
+        self, m: LoadingHistory[Number], last: ContactPoint[Number]
+    ) -> LoadingHistory[Number]:
         """Reloading from the last point to the peak, equation 3-11."""
         loaded = (last.force > 0.0) & (last.force < m.peak_force)
-        share = _select(loaded, last.force, 0.0) / _select(loaded, m.peak_force, 1.0)
+        share = select(loaded, last.force, 0.0) / select(loaded, m.peak_force, 1.0)
         ratio = share ** (1.0 / LOADING_POWER)
-        origin = _select(loaded, (last.indentation - ratio * m.peak) / (1.0 - ratio), m.permanent)
+        origin = select(loaded, (last.indentation - ratio * m.peak) / (1.0 - ratio), m.permanent)
         # The accepted force is one iteration older than the indentation.  If it has not fallen
         # below the peak's, it stays constant up to the peak.
         level = (last.force > 0.0) & (last.force >= m.peak_force)
         return _curve(
-            RELOADING, m.peak_force, origin, m.peak - origin, _select(level, 0.0, LOADING_POWER),
-            m.peak, m.peak_force, m.permanent,
-        )  # fmt: skip
+            branch=RELOADING,
+            f=m.peak_force,
+            b=origin,
+            w=m.peak - origin,
+            p=select(level, _like(origin, 0.0), _like(origin, LOADING_POWER)),
+            peak=m.peak,
+            peak_force=m.peak_force,
+            permanent=m.permanent,
+        )
 
 
 @frozen
-class ListingLaw(MeasuredLaw):
+class ListingLaw(MeasuredLaw[Number]):
     """The printed program's law (the slip ``reload``), which never returns to an earlier branch.
 
     The first trial whose force is below the last accepted one ends loading; the first trial on the
@@ -319,43 +397,78 @@ class ListingLaw(MeasuredLaw):
     """
 
     def trial(
-        self, memory: LoadingHistory, last: ContactPoint, indentation: Number
-    ) -> tuple[Number, LoadingHistory]:
+        self, memory: LoadingHistory[Number], last: ContactPoint[Number], indentation: Number
+    ) -> tuple[Number, LoadingHistory[Number]]:
         """Contact force at a trial indentation, and the loading history after the trial."""
         m, c = memory, self.constants
-        force = m.force(indentation)
+        force = branch_force(m, indentation)
         leaves = (m.branch == VIRGIN) & (force < last.force)
-        if _any(leaves):
+        if any_case(leaves):
             a, f = last
-            m = _choose(leaves, _unloading(c.q, a, f, a, f, c.permanent(a)), m)
-            force = m.force(indentation)
+            down = _unloading(c.q, last, f, peak=a, peak_force=f, permanent=c.permanent(a))
+            m = _choose(leaves, down, m)
+            force = branch_force(m, indentation)
         turns = (m.branch == UNLOADING) & (indentation > m.permanent) & (force >= last.force)
-        if _any(turns):
+        if any_case(turns):
             f = m.peak_force * (m.w > 0.0)
-            m = _choose(turns, m._replace(branch=RELOADING, f=f, b=m.permanent, p=LOADING_POWER), m)
-            force = m.force(indentation)
+            up = m._replace(
+                branch=_like(f, RELOADING), f=f, b=m.permanent, p=_like(f, LOADING_POWER)
+            )
+            m = _choose(turns, up, m)
+            force = branch_force(m, indentation)
         return force, m
 
     def accept(
-        self, memory: LoadingHistory, last: ContactPoint, indentation: Number
-    ) -> LoadingHistory:
+        self, memory: LoadingHistory[Number], last: ContactPoint[Number], indentation: Number
+    ) -> LoadingHistory[Number]:
         """Loading history after a step, which its trials have already changed."""
         return memory
 
 
 def _unloading(
-    q: Number, a: Number, f: Number, peak: Number, peak_force: Number, permanent: Number
-) -> LoadingHistory:
-    """Unloading from the point (a, f), equation 3-3."""
-    return _curve(UNLOADING, f, permanent, a - permanent, q, peak, peak_force, permanent)
+    q: float | Number,
+    last: ContactPoint[Number],
+    begin: Number,
+    *,
+    peak: Number,
+    peak_force: Number,
+    permanent: Number,
+) -> LoadingHistory[Number]:
+    """Unloading with the power q from the last point, where the force is `begin`, equation 3-3."""
+    return _curve(
+        branch=UNLOADING,
+        f=begin,
+        b=permanent,
+        w=last.indentation - permanent,
+        p=q,
+        peak=peak,
+        peak_force=peak_force,
+        permanent=permanent,
+    )
 
 
 def _curve(
-    branch: int, f: Number, b: Number, w: Number, p: Number, *peak: Number
-) -> LoadingHistory:
+    *,
+    branch: int,
+    f: Number,
+    b: Number,
+    w: Number,
+    p: float | Number,
+    peak: Number,
+    peak_force: Number,
+    permanent: Number,
+) -> LoadingHistory[Number]:
     """A branch; its force is zero if its width is not positive."""
-    f, w = _select(w > 0.0, f, 0.0), _select(w > 0.0, w, 1.0)
-    return LoadingHistory(branch, f, b, w, p, *peak)
+    return LoadingHistory(
+        branch=_like(f, branch),
+        f=select(w > 0.0, f, 0.0),
+        b=b,
+        w=select(w > 0.0, w, 1.0),
+        p=_like(f, p),
+        peak=peak,
+        peak_force=peak_force,
+        permanent=permanent,
+    )
 
 
 def follow(
@@ -375,8 +488,17 @@ def follow(
         begin = corner
 
 
-def _choose(condition: Truth, yes: LoadingHistory, no: LoadingHistory) -> LoadingHistory:
+def _choose(
+    condition: bool | Bools, yes: LoadingHistory[Number], no: LoadingHistory[Number]
+) -> LoadingHistory[Number]:
     """`yes` where the condition holds, otherwise `no`."""
     if not isinstance(condition, np.ndarray):
         return yes if condition else no
-    return LoadingHistory(*(np.where(condition, a, b) for a, b in zip(yes, no, strict=True)))
+    # The numbers are arrays as the condition is.
+    chosen = (cast(Number, np.where(condition, a, b)) for a, b in zip(yes, no, strict=True))
+    return LoadingHistory(*chosen)
+
+
+def _like(number: Number, value: float | Number) -> Number:
+    """A value, for each case where the number is an array."""
+    return np.full_like(number, value) if isinstance(number, np.ndarray) else value

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Generic
 
 import numpy as np
 
 from fecm._frozen import frozen
-from fecm.mechanics.contact_law import ContactPoint, Law, Number, Truth
+from fecm.mechanics.contact_law import ContactPoint, Law, Number, any_case, select
 from fecm.mechanics.plate_motion import AppliedForce, DivergenceError, Load, PlateMotion, PlateState
 from fecm.mechanics.projectile import Projectile, RodIntegrator, TipStep, WilsonStep, rigid_approach
 
@@ -26,19 +26,20 @@ TOLERANCE = 1.0e-6
 
 
 @dataclass(slots=True)
-class ContactState:
+class ContactState(Generic[Number]):
     """State of projectile and contact after a step: floats, or arrays with an entry per case."""
 
     rod: Any  # the projectile: RodState or TipState
     memory: Any  # memory of the contact law
-    contact: ContactPoint  # accepted indentation and contact force
-    plate_w: Number = 0.0  # the plate's displacement in the contact law
-    contact_work: Number = 0.0  # work stored or dissipated by the indentation
-    unconverged_steps: Number = 0  # steps whose contact iteration did not converge
+    contact: ContactPoint[Number]  # accepted indentation and contact force
+    plate_w: Number  # the plate's displacement in the contact law
+    contact_work: Number  # work stored or dissipated by the indentation
+    # An integer for one case.
+    unconverged_steps: Any  # steps whose contact iteration did not converge
 
 
 @dataclass(slots=True)
-class ImpactState(ContactState):
+class ImpactState(ContactState[float]):
     """State of plate, projectile and contact after a step."""
 
     plate: PlateState = field(kw_only=True)  # the plate, with the number of steps and the time
@@ -83,7 +84,15 @@ class ImpactSystem:
         rod = rigid_approach(
             self.rod, contact.velocity, derivatives_too=contact.strains_start_moving
         )
-        return ImpactState(rod, self.law.start(), ContactPoint(0.0, 0.0), plate=state)
+        return ImpactState(
+            rod=rod,
+            memory=self.law.start(),
+            contact=ContactPoint(0.0, 0.0),
+            plate_w=0.0,
+            contact_work=0.0,
+            unconverged_steps=0,
+            plate=state,
+        )
 
     def applied(self, state: ImpactState, force: float | None = None) -> AppliedForce:
         """Force on the plate: the contact force unless another is passed."""
@@ -121,22 +130,21 @@ class ImpactSystem:
         couple_step(self.rod_step(dt), self.law, state, w)
 
 
-def couple_step(step: TipStep, law: Law, state: ContactState, w: Number) -> None:
+def couple_step(step: TipStep, law: Law[Number], state: ContactState[Number], w: Number) -> None:
     """Iterate contact force and tip acceleration for the plate's w; change the state."""
     last = state.contact
     motion, base, drift, acceleration = step.begin(state.rod)
     carried = (1.0 - step.theta) * last.force
     memory, tip = state.memory, drift + step.weight * acceleration
-    force: Number = last.force
+    force = last.force
     # The force of a case is kept once its iteration has converged.
-    many = isinstance(w, np.ndarray)
-    iterating: Truth = np.ones(len(w), dtype=bool) if many else True
+    iterating = np.ones(len(w), dtype=bool) if isinstance(w, np.ndarray) else True
     for _ in range(PASSES):
         trial, memory = law.trial(memory, last, -tip - w)
-        force = np.where(iterating, trial, force) if many else trial
+        force = select(iterating, trial, force)
         before, tip = tip, drift + step.weight * (base + step.gain * (carried + step.theta * force))
         iterating = iterating & ((abs(tip - before) < TOLERANCE * abs(tip)) ^ True)
-        if not (iterating.any() if many else iterating):
+        if not any_case(iterating):
             break
     state.unconverged_steps += iterating
     state.rod = step.end(state.rod, motion, carried + step.theta * force)

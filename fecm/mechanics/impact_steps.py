@@ -11,7 +11,7 @@ import ctypes
 from ctypes import c_double, c_int64
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import NamedTuple, cast
+from typing import Generic, NamedTuple, cast
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from fecm.mechanics.contact_law import (
     HystereticLaw,
     LinearPermanent,
     LoadingHistory,
+    Number,
     YangSunPermanent,
 )
 from fecm.mechanics.impact import ImpactState, ImpactSystem
@@ -62,12 +63,12 @@ class LawKind(IntEnum):
     YANG_SUN = 1  # equation 3-7
 
 
-class KernelLaw(NamedTuple):
+class KernelLaw(NamedTuple, Generic[Number]):
     """Permanent indentation of a law that the kernels know."""
 
     kind: LawKind
-    critical: float  # alpha_p or alpha_cr, length
-    slope: float  # s_p of equation 3-8
+    critical: Number  # alpha_p or alpha_cr, length
+    slope: float | Number  # s_p of equation 3-8
 
 
 class Law(Structure):
@@ -183,12 +184,12 @@ class Written(NamedTuple):
     fields: Floats
 
 
-def knows(constants: ContactParameters) -> bool:
+def knows(constants: ContactParameters[Number]) -> bool:
     """Whether the kernels have a law with these constants; one of a subclass is another law."""
     return type(constants) in (LinearPermanent, YangSunPermanent)
 
 
-def kernel_law(constants: ContactParameters) -> KernelLaw:
+def kernel_law(constants: ContactParameters[Number]) -> KernelLaw[Number]:
     """Permanent indentation of a law that the kernels have; see :func:`knows`."""
     match constants:
         case LinearPermanent():

@@ -168,7 +168,7 @@ class Hits(NamedTuple):
     rods: Sequence[Projectile]  # the kinds of projectiles
     kind: NDArray[np.intp]  # (cases,), ascending
     scale: Floats  # (cases,): factor of the mass and stiffness of the kind
-    law: HystereticLaw  # with arrays of constants
+    law: HystereticLaw[Floats]  # with arrays of constants
     speed: Floats  # (cases,): approach velocity
 
 
@@ -277,9 +277,13 @@ def by_numpy(response: Floats, node_mass: float, tips: TipSteps) -> tuple[Impact
     of_plate = np.broadcast_to(response[:, None], tips.responses.shape)
     sums = Convolution(np.stack([of_plate, tips.responses]), tips.hits.kind)
     state = ContactState(
-        TipState(none, -speed, none), law.start(), ContactPoint(none, none), none,
+        rod=TipState(none, -speed, none),
+        memory=law.start(),
+        contact=ContactPoint(none, none),
+        plate_w=none,
+        contact_work=np.zeros(cases),  # summed in place
         unconverged_steps=np.zeros(cases, dtype=np.int64),
-    )  # fmt: skip
+    )
     force, deepest = np.empty((steps, cases)), none
     plate_work, dw, largest_ddw, highest = none, none, none, none
     done: list[Floats] = []
@@ -300,8 +304,9 @@ def by_numpy(response: Floats, node_mass: float, tips: TipSteps) -> tuple[Impact
     permanent = law.permanent(state.memory, state.contact)
     indentation = Indentation(deepest, state.contact.indentation, permanent)
     work = Work(np.array(done), node_mass * largest_ddw**2 / (8.0 * tips.dt**2))
-    error, w = balance_errors(force, work, tips), (highest, state.plate_w)
-    return Impacts(force, indentation, state.unconverged_steps, w, error), work
+    error = balance_errors(force, work, tips)
+    deflection = (highest, state.plate_w)
+    return Impacts(force, indentation, state.unconverged_steps, deflection, error), work
 
 
 def balance_errors(force: Floats, work: Work, tips: TipSteps) -> Floats:
@@ -339,7 +344,7 @@ def _by_kernels(response: Floats, dt: float, node_mass: float, hits: Hits) -> Im
     """Compute impacts by the compiled kernels, and projectiles by their modes."""
     constants = hits.law.constants
     law = kernel_law(constants)
-    rows = {
+    rows: dict[Given, float | Floats] = {
         Given.K: constants.k,
         Given.Q: constants.q,
         Given.CRITICAL: law.critical,
