@@ -29,13 +29,13 @@ TOLERANCE = 1.0e-6
 class ContactState(Generic[Number]):
     """State of projectile and contact after a step: floats, or arrays with an entry per case."""
 
-    rod: Any  # the projectile: RodState or TipState
-    memory: Any  # memory of the contact law
+    rod: Any  # the projectile: RodState, or a sweep's motion of the tips
+    memory: Any  # memory of the contact law, of a type of its own
     contact: ContactPoint[Number]  # accepted indentation and contact force
     plate_w: Number  # the plate's displacement in the contact law
     contact_work: Number  # work stored or dissipated by the indentation
-    # An integer for one case.
-    unconverged_steps: Any  # steps whose contact iteration did not converge
+    # Steps whose contact iteration did not converge: an int, or an array of integers.
+    unconverged_steps: Any
 
 
 @dataclass(slots=True)
@@ -130,7 +130,9 @@ class ImpactSystem:
         couple_step(self.rod_step(dt), self.law, state, w)
 
 
-def couple_step(step: TipStep, law: Law[Number], state: ContactState[Number], w: Number) -> None:
+def couple_step(
+    step: TipStep[Any, Number], law: Law[Number], state: ContactState[Number], w: Number
+) -> None:
     """Iterate contact force and tip acceleration for the plate's w; change the state."""
     last = state.contact
     motion, base, drift, acceleration = step.begin(state.rod)

@@ -2,19 +2,19 @@
 
 Conventions: the dofs of a node are u and du/dx, node by node; x runs from the impacted end (node 1)
 into the rod.  Displacement, velocity and acceleration are positive away from the plate: an approach
-is negative, and the contact force acts on u of node 1 in the positive direction.  The first axis of
-state arrays is over dofs; another axis, one column per case, may follow.
+is negative, and the contact force acts on u of node 1 in the positive direction.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal, Protocol
+from typing import ClassVar, Literal, Protocol, TypeVar
 
 import numpy as np
 
 from fecm._frozen import frozen
 from fecm._typing import Floats
+from fecm.mechanics.contact_law import Number
 
 # The report's steel rod, in lb, in and s: a spherical cap of five steps, then the cylinder.
 REPORT_CAP = (0.22, 0.36, 0.43, 0.48, 0.50)
@@ -191,14 +191,17 @@ class Transducer:
         return max(0, 2 * self.node - 1)
 
 
+State = TypeVar("State")
+
+
 @dataclass(slots=True)
 class RodState:
     """State of a rod; displacements relative to the tip keep the strains of a long flight."""
 
-    # (3, n, ...): displacement relative to the tip, velocity and acceleration of every dof; the
+    # (3, n): displacement relative to the tip, velocity and acceleration of every dof; the
     # first displacement is the tip's increment of the last step.
     motion: Floats
-    tip: Any = 0.0  # displacement of the tip
+    tip: float = 0.0  # displacement of the tip
 
     @classmethod
     def of(cls, displacement: Floats, velocity: Floats, acceleration: Floats) -> RodState:
@@ -209,36 +212,39 @@ class RodState:
 
     @property
     def deformation(self) -> Floats:
-        """Displacement of every dof relative to the tip, (n, ...)."""
+        """Displacement of every dof relative to the tip, (n,)."""
         deformation = self.motion[0].copy()
         deformation[0] = 0.0
         return np.asarray(deformation)
 
     @property
     def velocity(self) -> Floats:
-        """Velocity of every dof, (n, ...)."""
+        """Velocity of every dof, (n,)."""
         return np.asarray(self.motion[1])
 
     @property
     def acceleration(self) -> Floats:
-        """Acceleration of every dof, (n, ...)."""
+        """Acceleration of every dof, (n,)."""
         return np.asarray(self.motion[2])
 
 
-class TipStep(Protocol):
-    """Interface of a projectile's step to the contact iteration; see :class:`RodIntegrator`."""
+class TipStep(Protocol[State, Number]):
+    """Interface of a projectile's step to the contact iteration; see :class:`RodIntegrator`.
 
-    gain: Any  # tip acceleration per force
-    weight: Any  # tip displacement per new acceleration
+    For one case, whose numbers are floats, or for many, whose numbers are arrays.
+    """
+
+    gain: Number  # tip acceleration per force
+    weight: float  # tip displacement per new acceleration
 
     @property
     def theta(self) -> float:
         """Time of equilibrium, as a fraction of the step."""
 
-    def begin(self, state: Any) -> tuple[Any, Any, Any, Any]:
+    def begin(self, state: State) -> tuple[Floats, Number, Number, Number]:
         """Free motion, and the tip's acceleration in it, drift and last acceleration."""
 
-    def end(self, state: Any, motion: Any, force: Any) -> Any:
+    def end(self, state: State, motion: Floats, force: Number) -> State:
         """State after the step."""
 
 
@@ -299,25 +305,22 @@ class RodIntegrator:
         self.h = np.concatenate([tau**2 / r * relative @ gain, tau / 2.0 * gain, gain])
         self.gain = float(gain[0])  # tip acceleration per force
 
-    def begin(self, state: RodState) -> tuple[Floats, Any, Any, Any]:
-        """New motion without a force on the tip, (3 n, ...), and three values of the tip.
+    def begin(self, state: RodState) -> tuple[Floats, float, float, float]:
+        """New motion without a force on the tip, (3 n,), and three values of the tip.
 
         These are its acceleration in that motion, its new displacement without `weight` times the
         new acceleration, and its last acceleration.
         """
-        motion = np.dot(self.T, state.motion.reshape(3 * self.n, *state.motion.shape[2:]))
-        _, v, a = state.motion[:, 0].tolist() if motion.ndim == 1 else state.motion[:, 0]
-        base = motion.item(2 * self.n) if motion.ndim == 1 else motion[2 * self.n]
-        return motion, base, state.tip + self.dt * v + self.weights[0] * a, a
+        motion = np.dot(self.T, state.motion.reshape(3 * self.n))
+        _, v, a = state.motion[:, 0].tolist()
+        return motion, motion.item(2 * self.n), state.tip + self.dt * v + self.weights[0] * a, a
 
-    def end(self, state: RodState, motion: Floats, force: Any) -> RodState:
+    def end(self, state: RodState, motion: Floats, force: float) -> RodState:
         """Complete a step of free motion `motion` under a force on the tip at t + theta dt."""
-        h = self.h if motion.ndim == 1 else self.h[:, None]
-        motion += h * force
-        moved = motion.item(0) if motion.ndim == 1 else motion[0]
-        return RodState(motion.reshape(3, self.n, *motion.shape[1:]), state.tip + moved)
+        motion += self.h * force
+        return RodState(motion.reshape(3, self.n), state.tip + motion.item(0))
 
-    def advance(self, state: RodState, force: Any = 0.0) -> RodState:
+    def advance(self, state: RodState, force: float = 0.0) -> RodState:
         """State after a step under a force on the tip at t + theta dt."""
         return self.end(state, self.begin(state)[0], force)
 
